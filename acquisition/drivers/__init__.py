@@ -1,0 +1,1 @@
+"""Real instruments: the only place, with `virtual`, that talks to pyvisa and nidaqmx."""

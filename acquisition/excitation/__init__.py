@@ -1,0 +1,1 @@
+"""What the generator plays: one excitation a file."""

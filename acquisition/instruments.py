@@ -1,0 +1,112 @@
+"""What a bench needs of its instruments: the promises that every driver keeps."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Samples = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Who an instrument says it is, kept with every recording."""
+
+    maker: str
+    model: str
+    serial: str
+    firmware: str
+    reply: str
+    """The whole reply, as it came."""
+
+
+@dataclass(frozen=True)
+class Overload:
+    """An input past 95 % of its range: which channel, and which samples of the run."""
+
+    channel: str
+    """Role of the channel, ``"m0_velocity"`` for example."""
+    first_sample: int
+    last_sample: int
+    """Inclusive; counted from the first sample of the run."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """Samples handed over at once, for all channels, without a gap to the block before."""
+
+    first_sample: int
+    """Position of the first sample in the run."""
+    volts: Samples
+    """Shape (channels, samples) [V] at the converter's input."""
+    overloads: tuple[Overload, ...] = ()
+
+
+class FunctionGenerator(Protocol):
+    """A generator with a sine, one waveform memory, and an output relay.
+
+    Amplitudes are peak to peak at the terminal, in volts, as the instrument's panel shows them.
+    """
+
+    @property
+    def identity(self) -> Identity:
+        """Who answered ``*IDN?``."""
+
+    def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
+        """Set up a sine. The output keeps its state."""
+
+    def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
+        """Put one period (values -1 to 1, the full range being ``amplitude_vpp``) in memory and select it."""
+
+    def set_frequency(self, frequency_hz: float) -> None:
+        """Change the frequency of what is playing; the phase goes on without a jump."""
+
+    def set_amplitude(self, amplitude_vpp: float) -> None:
+        """Change the peak-to-peak amplitude of what is playing."""
+
+    def start(self) -> None:
+        """Turn the output on."""
+
+    def stop(self) -> None:
+        """Turn the output off. Legal at any time, in any state; never gives up silently."""
+
+    def close(self) -> None:
+        """Output off, connection closed."""
+
+
+class Digitizer(Protocol):
+    """A converter that samples voltages continuously, without a gap."""
+
+    @property
+    def identity(self) -> Identity:
+        """Product, serial, driver version."""
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """The rate that the hardware really runs at, read back from it."""
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """Roles of the channels, in the order of the rows of a block."""
+
+    def start(self) -> None:
+        """Begin sampling; the first sample of the run is sample 0."""
+
+    def read(self, samples: int) -> Block:
+        """Wait for the next ``samples`` of every channel and hand them over.
+
+        Raises
+        ------
+        DataLost
+            When samples were overwritten before they were read.
+        InstrumentLost
+            When the device or its server is gone.
+
+        """
+
+    def stop(self) -> None:
+        """End sampling. Legal at any time."""
+
+    def close(self) -> None:
+        """Release the device. Legal at any time."""

@@ -1,0 +1,1 @@
+"""The HDF5 recording: its layout, writing, finalising, recovering and reading."""

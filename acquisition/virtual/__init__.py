@@ -1,0 +1,1 @@
+"""The simulated instruments, and the analogue world between them."""

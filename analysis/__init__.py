@@ -1,0 +1,1 @@
+"""Recordings and predictions become transmissions, spectra, responses, figures and reports."""

@@ -1,0 +1,1 @@
+"""The `vibench` command: one thin file a command, no logic."""

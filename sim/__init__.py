@@ -1,0 +1,1 @@
+"""The physics: specimen, contact, exact flight, responses. Imports nothing of ours."""
