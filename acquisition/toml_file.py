@@ -1,0 +1,69 @@
+"""TOML files in: parsed, validated, and refused with the file, the key, what was given and what is allowed."""
+
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from .errors import ConfigurationError
+
+
+class FrozenModel(BaseModel):
+    """What crosses a file: immutable, complete, and deaf to keys it does not know."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False)
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def load_toml(path: Path, model: type[Model]) -> Model:
+    """Read a TOML file as ``model``.
+
+    Raises
+    ------
+    ConfigurationError
+        When the file is missing, is not TOML, or says something the model does not allow.
+
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(
+            f"{path}: cannot be read ({error.strerror}); give the path of a TOML file"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise ConfigurationError(f"{path}: is not UTF-8 text; save it as UTF-8") from error
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigurationError(f"{path}: is not valid TOML: {error}; correct that line") from error
+    return validated(content, model, str(path))
+
+
+def validated(content: dict[str, Any], model: type[Model], origin: str) -> Model:
+    """Validate ``content`` as ``model``; errors name ``origin`` and the key."""
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        complaints = "; ".join(_complaint(detail) for detail in error.errors())
+        raise ConfigurationError(f"{origin}: {complaints}") from error
+
+
+def _complaint(detail: Any) -> str:
+    key = ".".join(str(part) for part in detail["loc"]) or "the whole file"
+    match detail["type"]:
+        case "missing":
+            return f"{key} is missing: it is required"
+        case "extra_forbidden":
+            return f"{key} is not a known key: check its spelling and unit suffix, or remove it"
+        case _:
+            reason = str(detail["msg"]).removeprefix("Value error, ")
+            return f"{key} = {_shown(detail['input'])}: {reason[0].lower()}{reason[1:]}"
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    longest = 60
+    return text if len(text) <= longest else f"{text[:longest]}..."
