@@ -1,4 +1,4 @@
-"""What a hardware configuration describes: the chain from generator to converter, its limits and its knobs."""
+"""What a hardware configuration describes: the chain from generator to converter, its limits, its knobs."""
 
 from datetime import date
 from enum import StrEnum

@@ -1,4 +1,4 @@
-"""TOML files in: parsed, validated, and refused with the file, the key, what was given and what is allowed."""
+"""TOML files in: parsed, validated, or refused with the file, the key, what was given, what is allowed."""
 
 import tomllib
 from pathlib import Path
