@@ -1,0 +1,20 @@
+"""Where the configurations and campaigns lie that come with vibench."""
+
+import sysconfig
+from pathlib import Path
+
+from acquisition.errors import ConfigurationError
+
+FOLDERS = (
+    Path(__file__).resolve().parent.parent,  # a checkout, or an editable install of one
+    Path(sysconfig.get_path("data")) / "share" / "vibench",  # installed from a wheel
+)
+
+
+def shipped(name: str) -> Path:
+    """Path of a file that comes with vibench, ``"hardware_configs/virtual_rig.toml"`` for example."""
+    for folder in FOLDERS:
+        path = folder / name
+        if path.is_file():
+            return path
+    raise ConfigurationError(f"{name} is not part of this installation; give the path of your own file")
