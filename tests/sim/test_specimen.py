@@ -1,0 +1,65 @@
+import dataclasses
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter
+
+from sim.contact_law import Elasticity, Hertz, hertz_stiffness
+from sim.specimen import Specimen, gong2025
+
+
+def test_the_papers_materials_give_the_stiffness_of_its_contact():
+    stiffness = hertz_stiffness(Elasticity(206e9, 0.27), Elasticity(67e9, 0.3), 4.4e-3)
+    assert stiffness == pytest.approx(4.891e9, rel=1e-4)
+    assert gong2025().contact == Hertz(stiffness)
+
+
+def test_the_free_specimen_has_the_three_modes_of_the_paper():
+    np.testing.assert_allclose(gong2025().natural_frequencies_hz, [94.6, 266.2, 499.6], atol=0.05)
+
+
+def test_the_specimen_bound_together_has_the_two_terminal_resonances():
+    np.testing.assert_allclose(gong2025().bound_frequencies_hz, [201.5, 436.0], atol=0.05)
+
+
+def test_damping_in_proportion_to_stiffness_gives_a_ratio_that_grows_with_frequency():
+    specimen = gong2025(damping_time_s=3e-5)
+    np.testing.assert_allclose(
+        specimen.damping_ratios, np.pi * specimen.natural_frequencies_hz * 3e-5, rtol=1e-12
+    )
+
+
+def test_the_si_reading_of_the_papers_damping_is_overdamped_in_every_mode():
+    np.testing.assert_allclose(gong2025(damping_time_s=1e-2).damping_ratios, [2.97, 8.36, 15.7], rtol=3e-3)
+
+
+def test_a_specimen_survives_json():
+    kept = TypeAdapter(Specimen)
+    for specimen in (gong2025(), gong2025(contact="linear")):
+        assert kept.validate_json(kept.dump_json(specimen)) == specimen
+
+
+def test_an_unknown_field_of_a_stored_specimen_is_refused():
+    stored = TypeAdapter(Specimen).dump_python(gong2025(), mode="json") | {"colour": "grey"}
+    with pytest.raises(ValueError, match="colour"):
+        TypeAdapter(Specimen).validate_python(stored)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "sentence"),
+    [
+        ("masses", (5.8e-3, 0.0, 2e-3), r"mass m1 = 0\.0 kg is not allowed"),
+        ("stiffnesses", (1.0, 1.0, -2.0), r"stiffness k2 = -2\.0 N/m is not allowed"),
+        ("dampings", (-1.0, 0.0, 0.0), r"Damping c0 = -1\.0 N s/m is not allowed"),
+        ("gap_m", 0.0, r"Gap 0\.0 m is not allowed"),
+        ("gap_m", float("nan"), r"Gap nan m is not allowed"),
+    ],
+)
+def test_a_specimen_that_cannot_be_says_which_number_is_wrong(field, value, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        dataclasses.replace(gong2025(), **{field: value})
+
+
+def test_an_unknown_contact_names_the_known_ones():
+    with pytest.raises(ValueError, match="'rubber' is not known: choose one of hertz, linear"):
+        gong2025(contact="rubber")
