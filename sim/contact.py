@@ -1,0 +1,239 @@
+"""The contact phase: from touching the stop to leaving it, with controlled error. SI units."""
+
+import math
+
+import numpy as np
+
+from .compiled import compiled
+from .contact_flow import (
+    CVX,
+    CVZ,
+    CX,
+    CZ,
+    POINT,
+    TRIAL,
+    WIDTH,
+    WORK_ROWS,
+    R,
+    T,
+    W,
+    contact_rates,
+    step_error,
+    trial_step,
+)
+from .parameters import (
+    RATE,
+    RATE_SCALE,
+    ROOT,
+    ROOT_SCALE,
+    SIDE,
+    STEP,
+    VX,
+    VY,
+    VZ,
+    Parameters,
+    Table,
+    Vector,
+    X,
+    Y,
+    Z,
+)
+
+LEFT, HELD, NOT_FINITE, STALLED = range(4)
+"""How a call ends: the stop was left; the time limit came first; NaN; no progress."""
+
+SLOWEST_TOUCH = 1e-12
+"""A touch slower than this [m/s] enters at this rate: at exactly w = r = 0 the flow in s stands still."""
+ROOT_FLOOR = 1e-6
+"""Added to the error scale of w [m^0.5] (a penetration of 1 pm), so that it never vanishes."""
+RATE_FLOOR = 1e-6
+"""Added to the error scale of r [m/s]."""
+SAFETY, SHRINK, GROW = 0.9, 0.2, 4.0
+"""Step control: aim below the tolerance; the most a step may shrink and grow."""
+MOST_STEPS = 100_000
+"""Steps within one call; a contact takes about ten."""
+LANDING = 1e-11
+"""An exit is found when |w| is below this part of its scale."""
+MOST_CORRECTIONS = 100
+"""Bracketed Newton always ends by bisection before this."""
+STANDARD_TOLERANCE = 1e-6
+"""The tolerance for which the first step is tuned; it scales with the eighth root."""
+
+
+@compiled
+def contact_workspace() -> Table:
+    """Memory that one run (one thread) hands to every contact."""
+    return np.zeros((WORK_ROWS, WIDTH))
+
+
+@compiled
+def begin_contact(state: Vector, side: float, par: Parameters, tolerance: float) -> None:
+    """Enter contact from the flight state, at any penetration (zero when the stop is just touched).
+
+    The first step resolves whichever is faster: the elastic collision (a half-wave in s of about
+    4.8 w_max/v), or the other springs pressing a slow contact (w'' = -(a/2) w).
+    """
+    p = state[Y] - state[Z]
+    root = math.sqrt(max(side * p - par.gap, 0.0))
+    rate = side * (state[VY] - state[VZ])
+    if root == 0.0:
+        rate = max(rate, SLOWEST_TOUCH)
+    collision = 0.8 * par.contact_stiffness / par.reduced_mass
+    speed = math.sqrt(rate * rate + collision * root**5)
+    deepest = (speed * speed / collision) ** 0.2
+    pull = par.k2 * (state[Z] - state[X]) + par.c2 * (state[VZ] - state[VX])
+    pressing = par.k1 * par.gap + par.c1 * rate
+    press = abs(side * pull / par.mass2 - pressing / par.reduced_mass)
+    tuned = min(1.0, (tolerance / STANDARD_TOLERANCE) ** 0.125)
+    state[SIDE] = side
+    state[ROOT] = root
+    state[RATE] = rate
+    state[ROOT_SCALE] = deepest + ROOT_FLOOR
+    state[RATE_SCALE] = speed + RATE_FLOOR
+    state[STEP] = tuned * min(4.8 * deepest / speed / 5.0, 0.7 / math.sqrt(0.5 * press + 1e-300))
+
+
+@compiled
+def _gather(work: Table, state: Vector, tau: float) -> None:
+    at = work[POINT]
+    at[W], at[R], at[CX], at[CZ] = state[ROOT], state[RATE], state[X], state[Z]
+    at[CVX], at[CVZ], at[T], at[WIDTH - 1] = state[VX], state[VZ], tau, 0.0
+
+
+@compiled
+def _scatter(work: Table, state: Vector, par: Parameters) -> None:
+    at, side = work[POINT], state[SIDE]
+    state[ROOT], state[RATE] = at[W], at[R]
+    state[X], state[Z], state[VX], state[VZ] = at[CX], at[CZ], at[CVX], at[CVZ]
+    state[Y] = at[CZ] + side * (par.gap + at[W] * at[W])
+    state[VY] = at[CVZ] + side * at[R]
+
+
+@compiled
+def _step_to_exit(
+    work: Table, longest: float, side: float, force: Vector, middle: float, par: Parameters, close: float
+) -> float:
+    """Shorten the trial step until it ends at w = 0; ``work[TRIAL]`` is past it. Gives the step taken."""
+    low, high, step = 0.0, longest, longest
+    for _ in range(MOST_CORRECTIONS):
+        w, slope = work[TRIAL, W], 0.5 * work[TRIAL, R]
+        if abs(w) <= close:
+            break
+        if w > 0.0:
+            low = step
+        else:
+            high = step
+        step = step - w / slope if slope < 0.0 else low
+        if not low < step < high:
+            step = 0.5 * (low + high)
+            if not low < step < high:
+                break
+        trial_step(work, step, TRIAL, side, force, middle, par)
+    return step
+
+
+@compiled
+def _step_to_time(
+    work: Table, longest: float, limit: float, side: float, force: Vector, middle: float, par: Parameters
+) -> None:
+    """Shorten the trial step until it ends at the time limit; ``work[TRIAL]`` is past it."""
+    low, high, step = 0.0, longest, longest
+    # A few units in the last place of the stretch: closer than that, time itself has no digits.
+    close = 4.0 * np.finfo(np.float64).eps * (abs(limit) + abs(work[POINT, T]))
+    for _ in range(MOST_CORRECTIONS):
+        late, slope = work[TRIAL, T] - limit, work[TRIAL, W]
+        if abs(late) <= close:
+            break
+        if late < 0.0:
+            low = step
+        else:
+            high = step
+        step = step - late / slope if slope > 0.0 else low
+        if not low < step < high:
+            step = 0.5 * (low + high)
+            if not low < step < high:
+                break
+        trial_step(work, step, TRIAL, side, force, middle, par)
+    work[TRIAL, T] = limit
+
+
+@compiled
+def _step_factor(error: float) -> float:
+    """Next step over this one. The eighth root as three square roots; an error of NaN shrinks."""
+    if not error < 1e300:
+        return SHRINK
+    if error <= 1e-12:
+        return GROW
+    return min(GROW, max(SHRINK, SAFETY / math.sqrt(math.sqrt(math.sqrt(error)))))
+
+
+@compiled
+def advance_contact(  # noqa: C901 - a step control and its three ends are one loop
+    state: Vector,
+    tau: float,
+    limit: float,
+    force: Vector,
+    middle: float,
+    par: Parameters,
+    tolerance: float,
+    work: Table,
+) -> tuple[int, float]:
+    """Advance a contact until m1 leaves the stop or the time reaches ``limit``, whichever is first.
+
+    Parameters
+    ----------
+    state
+        In and out; ``state[SIDE]`` is back at 0 when the stop was left.
+    tau, limit
+        Time now and time to stop at [s], on the clock of ``force``.
+    force, middle
+        k0 U + c0 dU/dt as coefficients in powers of (tau - middle), shape (8,).
+    tolerance
+        Relative error allowed in a step, on w and r.
+    work
+        From `contact_workspace`.
+
+    Returns
+    -------
+    LEFT, HELD, NOT_FINITE or STALLED, and the time reached.
+
+    """
+    side, step = state[SIDE], state[STEP]
+    root_scale, rate_scale = state[ROOT_SCALE], state[RATE_SCALE]
+    _gather(work, state, tau)
+    if tau >= limit:
+        return HELD, tau
+    contact_rates(work[POINT], work[0], side, force, middle, par)
+    for _ in range(MOST_STEPS):
+        trial_step(work, step, TRIAL, side, force, middle, par)
+        error = step_error(work, step, root_scale, rate_scale, tolerance)
+        factor = _step_factor(error)
+        if not error <= 1.0:
+            step *= min(factor, 1.0)
+            if step < 1e-300:
+                return NOT_FINITE, work[POINT, T]
+            continue
+        taken, code = step, -1
+        if work[TRIAL, W] <= 0.0:
+            taken = _step_to_exit(work, step, side, force, middle, par, LANDING * root_scale)
+            code = LEFT
+        if work[TRIAL, T] >= limit:
+            _step_to_time(work, taken, limit, side, force, middle, par)
+            code = HELD
+        if work[TRIAL, T] < work[POINT, T]:
+            # Time runs backwards where w < 0: the step leapt over the exit and came back.
+            step *= 0.5
+            continue
+        work[POINT] = work[TRIAL]
+        if code == LEFT:
+            work[POINT, W] = 0.0
+        if code >= 0:
+            _scatter(work, state, par)
+            state[STEP] = step
+            if code == LEFT:
+                state[SIDE] = 0.0
+            return code, work[POINT, T]
+        contact_rates(work[POINT], work[0], side, force, middle, par)
+        step *= factor
+    _scatter(work, state, par)
+    return STALLED, work[POINT, T]
