@@ -1,9 +1,13 @@
 """What the generator does, step by step: the language between an excitation and the run that plays it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+Samples = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -13,12 +17,31 @@ class Tone:
     frequency_hz: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Waveform:
-    """One period of anything, repeated: values from -1 to 1, the largest magnitude being 1."""
+    """One period of anything, repeated, as a generator holds it: each value lasts until the next."""
 
-    values: NDArray[np.float64]
+    values: Samples
+    """From -1 to 1, the full range being the amplitude setting. The largest magnitude may be below 1:
+    realisations of one noise share their rms value, and only the sharpest of them reaches 1."""
     repetition_hz: float
+
+
+class SampleSource(Protocol):
+    """A signal that never repeats, made on demand."""
+
+    def samples(self, first: int, count: int, sample_rate_hz: float) -> Samples:
+        """Make samples ``first`` to ``first + count - 1``, -1 to 1; the same at every call."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stream:
+    """A signal that does not repeat, for an analogue output: the full range is the amplitude setting."""
+
+    source: SampleSource
+
+
+Play: TypeAlias = Tone | Waveform | Stream
 
 
 @dataclass(frozen=True)
@@ -26,8 +49,8 @@ class Segment:
     """A named stretch of the recording that belongs together in the analysis."""
 
     label: str
-    """``"realisation"``, ``"sweep"``, ``"dwell"``, ``"step"``."""
-    numbers: dict[str, float] = field(default_factory=dict)
+    """``"realisation"``, ``"sweep"``, ``"dwell"``, ``"step"``, ``"noise"``."""
+    numbers: Mapping[str, int | float | str] = field(default_factory=dict)
     """What the analysis must know: ``realisation``, ``repetition_hz``, ``frequency_hz``, ``start_hz`` ..."""
 
 
@@ -38,7 +61,12 @@ class Step:
     Steps that follow each other with an equal segment and no settling are recorded as one segment.
     """
 
-    play: Tone | Waveform
+    play: Play
     settle_s: float
     record_s: float
     segment: Segment
+
+    @property
+    def duration_s(self) -> float:
+        """Settling and recording together [s]."""
+        return self.settle_s + self.record_s

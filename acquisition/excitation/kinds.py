@@ -1,0 +1,17 @@
+"""All kinds of excitation, told apart by the word ``kind`` in a file."""
+
+from typing import Annotated, TypeAlias
+
+from pydantic import Field
+
+from .dwell import Dwell
+from .multisine_noise import MultisineNoise
+from .odd_multisine import OddMultisine
+from .sine_sweep import SineSweep
+from .stepped_sine import SteppedSine
+from .streamed_noise import StreamedNoise
+
+Excitation: TypeAlias = Annotated[
+    MultisineNoise | StreamedNoise | SineSweep | Dwell | SteppedSine | OddMultisine,
+    Field(discriminator="kind"),
+]

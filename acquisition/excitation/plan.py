@@ -1,0 +1,51 @@
+"""What every excitation is: a frozen plan with an amplitude setting that lists the steps of the generator."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from typing import Annotated
+
+from pydantic import Field, PositiveFloat
+
+from ..toml_file import FrozenModel
+from .preview import Preview
+from .steps import Step
+
+LOWEST_AMPLITUDE_VPP = 2e-3
+"""Smallest setting of an AFG1022 into an open output, peak to peak [V] (Tektronix data sheet)."""
+HIGHEST_AMPLITUDE_VPP = 20.0
+"""Largest setting of an AFG1022 into an open output, peak to peak [V] (Tektronix data sheet)."""
+
+AmplitudeVpp = Annotated[float, Field(ge=LOWEST_AMPLITUDE_VPP, le=HIGHEST_AMPLITUDE_VPP)]
+FrequencyHz = PositiveFloat
+
+
+class AbstractExcitation(FrozenModel, ABC):
+    """What the generator plays, from the first waveform to the last, at one amplitude setting."""
+
+    amplitude_vpp: AmplitudeVpp
+    """Setting of the generator, peak to peak [V], as its panel shows it."""
+
+    @abstractmethod
+    def steps(self) -> Iterator[Step]:
+        """List what the generator does, in the order of time."""
+
+    @property
+    @abstractmethod
+    def playing_s(self) -> float:
+        """Time of all steps, settling included, ramps not [s]."""
+
+    @property
+    @abstractmethod
+    def highest_frequency_hz(self) -> float:
+        """The highest frequency that is meant to be there; what a converter must be able to follow [Hz]."""
+
+    @abstractmethod
+    def preview(self, sample_rate_hz: float) -> Preview:
+        """Show what will be played, before anything moves.
+
+        Raises
+        ------
+        ConfigurationError
+            When ``sample_rate_hz`` is too low to show the highest frequency.
+
+        """

@@ -1,0 +1,105 @@
+"""A sine whose frequency moves slowly through a band, in steps too small to notice."""
+
+from collections.abc import Iterator
+from enum import StrEnum
+from math import ceil, expm1, log
+from typing import Literal, Self
+
+from pydantic import NonNegativeFloat, PositiveFloat, model_validator
+
+from .plan import AbstractExcitation, FrequencyHz
+from .preview import Preview, preview_of
+from .steps import Segment, Step, Tone
+
+
+class Spacing(StrEnum):
+    """How the frequency moves with time."""
+
+    LINEAR = "linear"
+    """The same number of hertz in every second."""
+    LOGARITHMIC = "logarithmic"
+    """The same time in every octave."""
+
+
+class SineSweep(AbstractExcitation):
+    """A sine sweep, up or down, that the computer steps through: the generator has no sweep time to set.
+
+    Each step plays the mean frequency of the ideal sweep over its time, so that at the end of every
+    step the phase is the ideal sweep's. What the generator really played, and when, is in the
+    recorded drive.
+    """
+
+    kind: Literal["sine_sweep"] = "sine_sweep"
+    start_hz: FrequencyHz
+    """Frequency at the beginning [Hz]; above ``stop_hz`` for a sweep downwards."""
+    stop_hz: FrequencyHz
+    """Frequency at the end [Hz]."""
+    duration_s: PositiveFloat
+    """Time from start to stop [s]."""
+    spacing: Spacing = Spacing.LINEAR
+    step_s: PositiveFloat = 0.1
+    """Time at one frequency [s]; the last step may be shorter."""
+    settle_s: NonNegativeFloat = 3.0
+    """Wait before the sweep starts, close to ``start_hz``, until the transient has died out [s]."""
+
+    @model_validator(mode="after")
+    def _sweep_moves(self) -> Self:
+        if self.start_hz == self.stop_hz:
+            raise ValueError(
+                f"start_hz and stop_hz are both {self.start_hz:g}, but a sweep moves; "
+                "use a dwell for one frequency"
+            )
+        if self.step_s > self.duration_s:
+            raise ValueError(
+                f"step_s = {self.step_s:g} is longer than the whole sweep of {self.duration_s:g} s; "
+                "give a shorter step"
+            )
+        return self
+
+    @property
+    def highest_frequency_hz(self) -> float:
+        """The upper end of the sweep [Hz]."""
+        return max(self.start_hz, self.stop_hz)
+
+    @property
+    def playing_s(self) -> float:
+        """Settling and sweep [s]."""
+        return self.settle_s + self.duration_s
+
+    def cycles(self, time_s: float) -> float:
+        """Cycles of the ideal sweep since its start, in closed form."""
+        match self.spacing:
+            case Spacing.LINEAR:
+                rate = (self.stop_hz - self.start_hz) / self.duration_s
+                return self.start_hz * time_s + 0.5 * rate * time_s**2
+            case Spacing.LOGARITHMIC:
+                rate = log(self.stop_hz / self.start_hz) / self.duration_s
+                return self.start_hz * expm1(rate * time_s) / rate
+
+    def steps(self) -> Iterator[Step]:
+        """One step for every ``step_s``, all of one segment."""
+        # 1e-9 keeps a duration that is a whole number of steps, but for rounding, from growing a sliver.
+        count = ceil(self.duration_s / self.step_s * (1 - 1e-9))
+        segment = Segment(
+            "sweep",
+            {
+                "start_hz": self.start_hz,
+                "stop_hz": self.stop_hz,
+                "duration_s": self.duration_s,
+                "step_s": self.step_s,
+                "spacing": self.spacing.value,
+            },
+        )
+        for number in range(count):
+            begin_s = number * self.step_s
+            end_s = min(begin_s + self.step_s, self.duration_s)
+            mean_hz = (self.cycles(end_s) - self.cycles(begin_s)) / (end_s - begin_s)
+            settle_s = self.settle_s if number == 0 else 0.0
+            yield Step(Tone(mean_hz), settle_s, end_s - begin_s, segment)
+
+    def preview(self, sample_rate_hz: float) -> Preview:
+        """Show the whole sweep, without the wait before it."""
+        moving = (Step(step.play, 0.0, step.record_s, step.segment) for step in self.steps())
+        return preview_of(
+            moving, self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
+        )

@@ -1,0 +1,120 @@
+"""Multisine arithmetic, checked by Fourier transform and closed form."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from acquisition.excitation.multisine import MEMORY_POINTS, band_lines, flat_periods, held_lines, hold_droop
+
+BAND = np.arange(20, 801)
+OVERSAMPLING = 16
+
+
+def played_amplitudes(values):
+    """Line amplitudes of what a holding converter puts out, from a finely sampled picture of it."""
+    held = np.repeat(values, OVERSAMPLING)
+    spectrum = 2 * np.abs(np.fft.rfft(held)) / len(held)
+    # The picture itself holds each of its fine samples; take that second hold off again.
+    fine = np.arange(len(spectrum))
+    return spectrum * np.abs(hold_droop(fine)) / _picture_droop(fine)
+
+
+def _picture_droop(harmonics):
+    """Gain of a sum of OVERSAMPLING equal samples at each harmonic of the memory: a Dirichlet kernel."""
+    x = np.pi * harmonics / MEMORY_POINTS
+    with np.errstate(invalid="ignore", divide="ignore"):
+        kernel = np.abs(np.sin(x) / (OVERSAMPLING * np.sin(x / OVERSAMPLING)))
+    return np.where(harmonics == 0, 1.0, kernel)
+
+
+def test_the_played_spectrum_is_flat_in_the_band_and_empty_elsewhere():
+    (values,) = flat_periods(BAND, realisations=1, seed=3)
+    spectrum = played_amplitudes(values)[: MEMORY_POINTS // 2]
+    inside = spectrum[BAND]
+    outside = np.delete(spectrum, BAND)
+    assert np.ptp(inside) / np.mean(inside) < 1e-10
+    assert np.max(outside) / np.mean(inside) < 1e-10
+
+
+def test_the_mean_of_a_period_is_zero():
+    (values,) = flat_periods(BAND, realisations=1, seed=3)
+    assert abs(np.mean(values)) < 1e-15
+
+
+def test_realisations_share_their_rms_and_the_sharpest_reaches_full_range():
+    periods = flat_periods(BAND, realisations=6, seed=5)
+    rms = [np.sqrt(np.mean(np.square(period))) for period in periods]
+    peaks = [np.max(np.abs(period)) for period in periods]
+    # The droop pre-compensation is phase-independent, so equal line amplitudes mean equal rms.
+    np.testing.assert_allclose(rms, rms[0], rtol=1e-12)
+    assert max(peaks) == pytest.approx(1.0, rel=1e-15)
+
+
+def test_realisations_are_different_noises():
+    first, second = flat_periods(BAND, realisations=2, seed=5)
+    correlation = np.corrcoef(first, second)[0, 1]
+    # Two random-phase multisines of L lines correlate like a mean of L cosines: sd 1/sqrt(2 L).
+    assert abs(correlation) < 5 / np.sqrt(2 * len(BAND))
+
+
+def test_the_same_seed_gives_the_same_period_and_another_seed_another():
+    again = flat_periods(BAND, 1, seed=7)[0]
+    np.testing.assert_array_equal(flat_periods(BAND, 1, seed=7)[0], again)
+    assert not np.array_equal(flat_periods(BAND, 1, seed=8)[0], again)
+
+
+def test_more_realisations_leave_the_phases_of_the_first_as_they_were():
+    alone = flat_periods(BAND, 1, seed=7)[0]
+    among = flat_periods(BAND, 4, seed=7)[0]
+    np.testing.assert_allclose(among / np.max(np.abs(among)), alone, rtol=0, atol=1e-14)
+
+
+def test_the_chosen_crest_factor_is_below_what_random_phases_give_on_average():
+    (values,) = flat_periods(np.arange(10, 1001), 1, seed=1)
+    crest = np.max(np.abs(values)) / np.sqrt(np.mean(values**2))
+    # Single draws of 991 lines scatter from 3.18 to 4.53.
+    assert 2.9 < crest < 3.6
+
+
+def test_values_stay_close_to_gaussian():
+    (values,) = flat_periods(np.arange(10, 1001), 1, seed=1)
+    kurtosis = np.mean(values**4) / np.mean(values**2) ** 2
+    assert kurtosis == pytest.approx(3.0, abs=0.3)
+
+
+@given(
+    start=st.integers(1, 400),
+    width=st.integers(0, 400),
+    repetition_hz=st.sampled_from([0.1, 0.3, 0.5, 1.0, 2.0]),
+)
+def test_band_edges_that_are_harmonics_belong_to_the_band(start, width, repetition_hz):
+    lines = band_lines(start * repetition_hz, (start + width) * repetition_hz, repetition_hz)
+    assert lines[0] == start
+    assert lines[-1] == start + width
+
+
+def test_held_lines_are_those_of_a_finely_sampled_picture():
+    (values,) = flat_periods(BAND, 1, seed=2)
+    picture = np.repeat(values, OVERSAMPLING)
+    fine = 2 * np.fft.rfft(picture)[: 2 * MEMORY_POINTS] / len(picture)
+    lines = held_lines(values, spans=4)
+    # The picture's samples stand at the start of their hold; centring them shifts by half a fine sample.
+    harmonics = np.arange(2 * MEMORY_POINTS)
+    centred = fine * np.exp(-1j * np.pi * harmonics / len(picture)) * np.sinc(harmonics / len(picture))
+    np.testing.assert_allclose(lines[1:], centred[1:], atol=1e-12)
+
+
+@settings(max_examples=20)
+@given(seed=st.integers(0, 2**32), first=st.integers(1, 100), count=st.integers(2, 300))
+def test_no_value_ever_leaves_the_range(seed, first, count):
+    for values in flat_periods(np.arange(first, first + count), 2, seed):
+        assert np.max(np.abs(values)) <= 1.0
+
+
+def test_the_first_image_lies_where_the_hold_leaves_it():
+    (values,) = flat_periods(np.array([1000]), 1, seed=1)
+    lines = np.abs(held_lines(values, spans=4))
+    # -17.1 dB at 7192 Hz for 1000 Hz out of 8192 points a second (the hold's gain over itself).
+    image_db = 20 * np.log10(lines[MEMORY_POINTS - 1000] / lines[1000])
+    assert image_db == pytest.approx(-17.14, abs=0.01)

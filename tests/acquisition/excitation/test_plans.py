@@ -1,0 +1,306 @@
+"""What every kind of excitation promises, and what each one plays."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import TypeAdapter, ValidationError
+
+from acquisition.excitation.dwell import Dwell
+from acquisition.excitation.kinds import Excitation
+from acquisition.excitation.multisine_noise import MultisineNoise
+from acquisition.excitation.odd_multisine import OddMultisine
+from acquisition.excitation.sine_sweep import SineSweep, Spacing
+from acquisition.excitation.stepped_sine import Direction, FrequencyGrid, SteppedSine
+from acquisition.excitation.streamed_noise import StreamedNoise
+
+PLANS = [
+    MultisineNoise(amplitude_vpp=1.5, band_start_hz=20, band_stop_hz=800, realisations=3),
+    OddMultisine(amplitude_vpp=1.5, band_start_hz=20, band_stop_hz=800, realisations=3),
+    SineSweep(amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=4, settle_s=0.5),
+    SineSweep(amplitude_vpp=1.5, start_hz=350, stop_hz=150, duration_s=4, spacing=Spacing.LOGARITHMIC),
+    Dwell(amplitude_vpp=10.0, frequency_hz=260, duration_s=2, settle_s=1),
+    SteppedSine(amplitude_vpp=1.5, frequencies_hz=(100, 150, 260), record_s=0.5, settle_s=0.25),
+    SteppedSine(
+        amplitude_vpp=1.5,
+        grid=FrequencyGrid(start_hz=150, stop_hz=350, step_hz=50),
+        direction=Direction.UP_THEN_DOWN,
+    ),
+    StreamedNoise(amplitude_vpp=1.5, band_start_hz=20, band_stop_hz=800, duration_s=3),
+]
+ANY = TypeAdapter(Excitation)
+IDS = [f"{plan.kind}-{number}" for number, plan in enumerate(PLANS)]
+
+
+@pytest.fixture(params=PLANS, ids=IDS)
+def plan(request):
+    return request.param
+
+
+def test_a_plan_comes_back_from_json_as_it_was(plan):
+    assert ANY.validate_json(ANY.dump_json(plan)) == plan
+
+
+def test_the_steps_take_the_time_the_plan_says(plan):
+    assert sum(step.duration_s for step in plan.steps()) == pytest.approx(plan.playing_s, rel=1e-12)
+
+
+def test_the_steps_are_the_same_at_every_listing(plan):
+    first, second = list(plan.steps()), list(plan.steps())
+    assert [step.segment for step in first] == [step.segment for step in second]
+    assert [(step.settle_s, step.record_s) for step in first] == [
+        (step.settle_s, step.record_s) for step in second
+    ]
+
+
+def test_a_preview_reaches_no_further_than_half_the_amplitude_setting(plan):
+    shown = plan.preview(4096.0)
+    assert shown.peak_v <= plan.amplitude_vpp / 2 * (1 + 1e-12)
+    assert shown.peak_v == pytest.approx(np.max(np.abs(shown.volts)))
+    assert shown.crest_factor == pytest.approx(shown.peak_v / shown.rms_v)
+    assert len(shown.time_s) == len(shown.volts)
+    assert len(shown.frequency_hz) == len(shown.spectrum_v)
+    assert shown.duration_s == plan.playing_s
+
+
+def test_a_preview_keeps_the_energy(plan):
+    shown = plan.preview(4096.0)
+    # Parseval: half the square of each line's peak is its share of the mean square.
+    mean_square = np.sum(shown.spectrum_v[1:] ** 2) / 2 + shown.spectrum_v[0] ** 2
+    assert np.sqrt(mean_square) == pytest.approx(shown.rms_v, rel=1e-3)
+
+
+def test_a_preview_that_cannot_show_the_plan_says_which_rate_can(plan):
+    with pytest.raises(ValueError, match=f"ask for more than {2 * plan.highest_frequency_hz:g}"):
+        plan.preview(1.9 * plan.highest_frequency_hz)
+
+
+@pytest.mark.parametrize("amplitude_vpp", [0.0, -1.0, 0.0019, 20.1, float("nan"), float("inf")])
+def test_an_amplitude_the_generator_cannot_set_is_refused(amplitude_vpp):
+    with pytest.raises(ValidationError, match="amplitude_vpp"):
+        Dwell(amplitude_vpp=amplitude_vpp, frequency_hz=260, duration_s=2)
+
+
+def test_an_unknown_key_is_refused():
+    with pytest.raises(ValidationError, match=r"amplitude_v\n.*Extra"):
+        Dwell(amplitude_vpp=1.0, amplitude_v=1.0, frequency_hz=260, duration_s=2)
+
+
+def test_an_unknown_kind_lists_the_known_ones():
+    with pytest.raises(ValidationError, match="'multisine_noise', 'streamed_noise', 'sine_sweep'"):
+        ANY.validate_python({"kind": "pink_noise", "amplitude_vpp": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("kind", "fields", "sentence"),
+    [
+        (
+            MultisineNoise,
+            {"band_start_hz": 800, "band_stop_hz": 20},
+            "band_stop_hz = 20 is not above band_start_hz = 800; give the band from low to high",
+        ),
+        (
+            MultisineNoise,
+            {"band_start_hz": 10, "band_stop_hz": 1000, "repetition_hz": 0.25},
+            (
+                "repetition_hz = 0.25 puts the first image of 1000 Hz at 1048 Hz, too near the band; "
+                "repetition_hz must be at least 0.3662"
+            ),
+        ),
+        (
+            MultisineNoise,
+            {"band_start_hz": 20.1, "band_stop_hz": 20.9, "repetition_hz": 1},
+            "no harmonic of 1 Hz lies in the band up to 20.9 Hz; lower repetition_hz or widen the band",
+        ),
+        (SineSweep, {"start_hz": 100, "stop_hz": 100, "duration_s": 5}, "use a dwell for one frequency"),
+        (
+            SineSweep,
+            {"start_hz": 100, "stop_hz": 200, "duration_s": 1, "step_s": 2},
+            "step_s = 2 is longer than the whole sweep of 1 s; give a shorter step",
+        ),
+        (SteppedSine, {}, "give either frequencies_hz or grid, and not both"),
+        (SteppedSine, {"frequencies_hz": (100, 90)}, "frequencies_hz has 90 after 100"),
+        (
+            SteppedSine,
+            {"grid": {"start_hz": 1, "stop_hz": 500, "step_hz": 0.1}},
+            "the plan has 4991 steps; one recording holds at most 4000",
+        ),
+        (
+            OddMultisine,
+            {"band_start_hz": 20, "band_stop_hz": 800, "excited_lines": (21, 22)},
+            (
+                "excited_lines has 22, which is not an odd harmonic in the band; "
+                "odd lines from 21 to 799 are allowed"
+            ),
+        ),
+    ],
+)
+def test_a_plan_that_cannot_be_played_says_what_can(kind, fields, sentence):
+    with pytest.raises(ValidationError) as refused:
+        kind(amplitude_vpp=1.0, **fields)
+    assert sentence in str(refused.value)
+
+
+def test_noise_excites_exactly_the_lines_of_its_band():
+    plan = MultisineNoise(amplitude_vpp=2.0, band_start_hz=20, band_stop_hz=800, repetition_hz=0.5)
+    # At a multiple of the playback rate a held waveform has its lines on the bins, images above half of it.
+    shown = plan.preview(8192 * 0.5 * 4)
+    strong = shown.frequency_hz[(shown.spectrum_v > 1e-9) & (shown.frequency_hz < 2048)]
+    np.testing.assert_allclose(strong, np.arange(20, 800.5, 0.5))
+
+
+def test_the_rms_at_one_volt_is_half_over_the_crest_factor():
+    shown = MultisineNoise(amplitude_vpp=1.0, band_start_hz=10, band_stop_hz=1000, realisations=1).preview(
+        16384
+    )
+    assert shown.rms_v == pytest.approx(0.5 / shown.crest_factor, rel=1e-3)
+    assert 0.11 < shown.rms_v < 0.17
+
+
+def test_odd_multisine_leaves_out_one_of_every_four_odd_lines():
+    plan = OddMultisine(amplitude_vpp=1.0, band_start_hz=1, band_stop_hz=800, seed=4)
+    odd = np.arange(1, 800, 2).reshape(-1, 4)
+    left_out = np.isin(odd, plan.detection_lines)
+    assert np.all(np.sum(left_out, axis=1) == 1)
+    assert sorted(plan.excited_lines + plan.detection_lines) == list(range(1, 800, 2))
+    # Random, not regular: all four places are used.
+    assert set(np.argmax(left_out, axis=1)) == {0, 1, 2, 3}
+
+
+def test_odd_multisine_is_silent_on_even_and_detection_lines():
+    plan = OddMultisine(amplitude_vpp=2.0, band_start_hz=1, band_stop_hz=800)
+    shown = plan.preview(8192.0)
+    excited = shown.spectrum_v[list(plan.excited_lines)]
+    silent = np.delete(shown.spectrum_v, list(plan.excited_lines))
+    assert np.max(silent) < 1e-12 * np.mean(excited)
+
+
+def test_odd_multisine_repeats_with_opposite_sign_after_half_a_period():
+    first = next(OddMultisine(amplitude_vpp=2.0, band_start_hz=1, band_stop_hz=800).steps())
+    values = first.play.values
+    np.testing.assert_allclose(values[: len(values) // 2], -values[len(values) // 2 :], atol=1e-14)
+
+
+SWEEPS = st.builds(
+    SineSweep,
+    amplitude_vpp=st.just(1.0),
+    start_hz=st.floats(1, 200),
+    stop_hz=st.floats(201, 2000),
+    duration_s=st.floats(0.5, 20),
+    spacing=st.sampled_from(Spacing),
+    step_s=st.floats(0.05, 0.5),
+    settle_s=st.just(0.0),
+)
+
+
+@settings(max_examples=50)
+@given(sweep=SWEEPS)
+def test_a_stepped_sweep_keeps_the_phase_of_the_ideal_one_at_the_end_of_every_step(sweep):
+    elapsed_s = cycles = 0.0
+    for step in sweep.steps():
+        elapsed_s += step.record_s
+        cycles += step.play.frequency_hz * step.record_s
+        assert cycles == pytest.approx(sweep.cycles(elapsed_s), rel=1e-9)
+    assert elapsed_s == pytest.approx(sweep.duration_s, rel=1e-9)
+
+
+def test_a_linear_sweep_has_half_the_sum_of_its_ends_as_mean_frequency():
+    sweep = SineSweep(amplitude_vpp=1, start_hz=150, stop_hz=350, duration_s=200)
+    assert sweep.cycles(200.0) == pytest.approx(250.0 * 200.0, rel=1e-14)
+
+
+def test_a_logarithmic_sweep_passes_the_geometric_mean_at_half_time():
+    sweep = SineSweep(
+        amplitude_vpp=1, start_hz=100, stop_hz=400, duration_s=10, spacing=Spacing.LOGARITHMIC, step_s=0.001
+    )
+    step = list(sweep.steps())[5000]
+    assert step.play.frequency_hz == pytest.approx(200.0, rel=1e-3)
+
+
+def test_a_sweep_down_mirrors_the_sweep_up():
+    up = SineSweep(amplitude_vpp=1, start_hz=150, stop_hz=350, duration_s=10)
+    down = SineSweep(amplitude_vpp=1, start_hz=350, stop_hz=150, duration_s=10)
+    rising = [step.play.frequency_hz for step in up.steps()]
+    falling = [step.play.frequency_hz for step in down.steps()]
+    np.testing.assert_allclose(rising, falling[::-1], rtol=1e-12)
+
+
+def test_only_the_first_step_of_a_sweep_waits_so_that_it_is_one_segment():
+    steps = list(SineSweep(amplitude_vpp=1, start_hz=150, stop_hz=350, duration_s=10, settle_s=2).steps())
+    assert steps[0].settle_s == 2
+    assert {step.settle_s for step in steps[1:]} == {0.0}
+    assert all(step.segment == steps[0].segment for step in steps)
+
+
+def test_a_tone_takes_up_the_phase_where_the_last_one_ended():
+    shown = SineSweep(amplitude_vpp=2, start_hz=100, stop_hz=140, duration_s=4, step_s=0.3).preview(51200)
+    # A continuous sine of at most 140 Hz moves at most this much from sample to sample.
+    assert np.max(np.abs(np.diff(shown.volts))) <= 2 * np.pi * 140 / 51200
+
+
+def test_the_paper_s_sweep_keeps_its_whole_number_of_steps():
+    steps = list(SineSweep(amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=200, step_s=0.1).steps())
+    assert len(steps) == 2000
+
+
+def test_stepped_sine_goes_up_then_down_through_every_frequency():
+    plan = SteppedSine(
+        amplitude_vpp=1,
+        grid=FrequencyGrid(start_hz=100, stop_hz=100.3, step_hz=0.1),
+        direction=Direction.UP_THEN_DOWN,
+    )
+    played = [(step.play.frequency_hz, step.segment.numbers["direction"]) for step in plan.steps()]
+    rising = [100.0, 100.1, 100.2, 100.3]
+    expected = [(f, "up") for f in rising] + [(f, "down") for f in rising[::-1]]
+    assert [way for _, way in played] == [way for _, way in expected]
+    np.testing.assert_allclose([f for f, _ in played], [f for f, _ in expected], rtol=1e-12)
+
+
+class TestStreamedNoise:
+    PLAN = StreamedNoise(amplitude_vpp=2.0, band_start_hz=50, band_stop_hz=800, duration_s=3, seed=9)
+    RATE = 8192.0
+
+    @settings(max_examples=30, deadline=None)
+    @given(first=st.integers(0, 50_000), count=st.integers(1, 3000), cut=st.floats(0, 1))
+    def test_the_same_samples_come_in_blocks_of_any_size(self, first, count, cut):
+        source = self.PLAN.source
+        middle = round(cut * count)
+        whole = source.samples(first, count, self.RATE)
+        pieces = [
+            source.samples(start, length, self.RATE)
+            for start, length in ((first, middle), (first + middle, count - middle))
+            if length
+        ]
+        np.testing.assert_allclose(np.concatenate(pieces), whole, atol=1e-13)
+
+    def test_its_rms_is_the_range_over_the_crest_factor(self):
+        samples = self.PLAN.source.samples(0, 400_000, self.RATE)
+        # 2 B T independent values: relative sd of the rms 1 / sqrt(4 B T).
+        spread = 1 / np.sqrt(4 * 750 * 400_000 / self.RATE)
+        assert np.sqrt(np.mean(samples**2)) == pytest.approx(1 / 4.5, rel=5 * spread)
+
+    def test_its_power_lies_in_the_band(self):
+        samples = self.PLAN.source.samples(0, 2**18, self.RATE)
+        power = np.abs(np.fft.rfft(samples * np.hanning(len(samples)))) ** 2
+        frequency_hz = np.fft.rfftfreq(len(samples), 1 / self.RATE)
+        far_out = (frequency_hz < 25) | (frequency_hz > 825)
+        assert np.sum(power[far_out]) / np.sum(power) < 1e-5
+
+    def test_its_values_are_gaussian(self):
+        samples = self.PLAN.source.samples(0, 400_000, self.RATE)
+        assert np.mean(samples**4) / np.mean(samples**2) ** 2 == pytest.approx(3.0, abs=0.1)
+
+    def test_it_is_stationary_from_the_first_sample(self):
+        starts = [
+            StreamedNoise(amplitude_vpp=2, band_start_hz=50, band_stop_hz=800, duration_s=1, seed=seed)
+            .source.samples(0, 16, self.RATE)
+            .std()
+            for seed in range(200)
+        ]
+        later = [
+            StreamedNoise(amplitude_vpp=2, band_start_hz=50, band_stop_hz=800, duration_s=1, seed=seed)
+            .source.samples(5000, 16, self.RATE)
+            .std()
+            for seed in range(200)
+        ]
+        assert np.mean(starts) == pytest.approx(np.mean(later), rel=0.25)
