@@ -1,0 +1,92 @@
+"""Opening a VISA resource: the one place that makes pyvisa sessions, and says why one cannot be made."""
+
+from typing import Protocol, cast
+
+import pyvisa
+from pyvisa.resources import MessageBasedResource
+
+from acquisition.errors import InstrumentBusy, InstrumentError, InstrumentLost
+
+# A reply later than this is a failure. The slowest known: the read-back of 8192 points.
+TIMEOUT_S = 3.0
+_MS_PER_S = 1000.0
+
+
+class Link(Protocol):
+    """What a SCPI port needs of a VISA session; `pyvisa`'s message-based resources offer it."""
+
+    timeout: float
+    """How long a read waits [ms], as VISA counts it."""
+
+    def write(self, message: str) -> int:
+        """Send text with its termination."""
+
+    def read_raw(self) -> bytes:
+        """One whole reply, as it came."""
+
+    def write_raw(self, message: bytes) -> int:
+        """Send bytes as they are."""
+
+    def close(self) -> None:
+        """Give the resource back."""
+
+
+def open_link(resource: str, visa_library: str, timeout_s: float = TIMEOUT_S) -> Link:
+    """Open a VISA resource for messages that end in a newline.
+
+    Raises
+    ------
+    InstrumentLost
+        When no such instrument answers.
+    InstrumentBusy
+        When another program holds it.
+    InstrumentError
+        When the VISA library itself cannot be used.
+
+    """
+    manager = _manager(visa_library)
+    try:
+        link = manager.open_resource(resource, open_timeout=int(timeout_s * _MS_PER_S))
+    except pyvisa.VisaIOError as error:
+        if error.error_code == pyvisa.constants.StatusCode.error_resource_busy:
+            raise InstrumentBusy(
+                f"{resource} is held by another program; close that program and open the bench again"
+            ) from error
+        raise _absent(resource, manager, error) from error
+    except (ValueError, OSError) as error:  # pyvisa-py reports an absent or dead USB device so
+        raise _absent(resource, manager, error) from error
+    message_link = cast("MessageBasedResource", link)
+    message_link.timeout = timeout_s * _MS_PER_S
+    message_link.write_termination = "\n"
+    return cast("Link", message_link)
+
+
+def list_visa_resources(visa_library: str = "@py") -> tuple[str, ...]:
+    """Resource names of everything that the VISA library can see now.
+
+    pyvisa-py writes USB numbers in decimal: ``USB0::1689::851::C010101::0::INSTR`` is an AFG1022.
+    """
+    return tuple(_manager(visa_library).list_resources("?*"))
+
+
+def _manager(visa_library: str) -> pyvisa.ResourceManager:
+    # One manager a library lives as long as the process: pyvisa shares it, and closing it would
+    # close every session that anybody has opened.
+    try:
+        return pyvisa.ResourceManager(visa_library)
+    except (OSError, ValueError) as error:
+        raise InstrumentError(
+            f"the VISA library {visa_library or 'of the system'!r} cannot be loaded ({error}); "
+            'install it, or set generator.visa_library = "@py"'
+        ) from error
+
+
+def _absent(resource: str, manager: pyvisa.ResourceManager, error: Exception) -> InstrumentLost:
+    try:
+        seen = ", ".join(manager.list_resources("?*")) or "nothing"
+    except (pyvisa.VisaIOError, ValueError, OSError):
+        seen = "nothing that can be listed"
+    return InstrumentLost(
+        f"no instrument answers at {resource} ({error}); the bus shows {seen}. "
+        "Check its power and cable, and generator.resource in the hardware configuration"
+    )
