@@ -46,8 +46,8 @@ def check_frequency(shape: Shape, frequency_hz: float) -> None:
     """Raise LimitExceeded unless the generator can play ``shape`` so often a second."""
     if not LOWEST_HZ <= frequency_hz <= HIGHEST_HZ[shape]:
         raise LimitExceeded(
-            f"{frequency_hz:g} Hz was asked for; an AFG1022 plays its "
-            f"{shape.name.lower().replace('_', ' ')} from {LOWEST_HZ:g} to {HIGHEST_HZ[shape]:g} Hz. Nothing was sent; choose a frequency in that range"
+            f"{frequency_hz:g} Hz was asked for; an AFG1022 plays {shape.value} from {LOWEST_HZ:g} to "
+            f"{HIGHEST_HZ[shape]:g} Hz. Nothing was sent; choose a frequency in that range"
         )
 
 

@@ -1,0 +1,155 @@
+"""What each DAQmx error means for a measurement, and what to do about it: one table.
+
+Numbers and names: ``nidaqmx.error_codes.DAQmxErrors``; meanings: NI-DAQmx help and hardware
+reference 5.3.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import grpc
+from nidaqmx.error_codes import DAQmxErrors as Code
+from nidaqmx.errors import DaqError, Error, RpcError
+
+from acquisition.errors import (
+    AcquisitionError,
+    ConfigurationError,
+    DataLost,
+    InstrumentBusy,
+    InstrumentError,
+    InstrumentLost,
+)
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """One DAQmx error for the person at the bench."""
+
+    kind: type[AcquisitionError]
+    happened: str
+    advice: str
+
+
+_LOST = "samples were overwritten before they were read, so the record has a hole and ends here"
+_SLOWER = "read more often, lower the sample rate, or close what else keeps this computer busy"
+_BUSY = "another program, or a task that was never closed, holds the device"
+_RELEASE = "close that program (or restart the device server, or reset the device), then open the bench again"
+_GONE = "the device cannot be reached"
+_RECONNECT = "check its cable and power, then open the bench again"
+_UNDERFLOW = "the output ran out of samples and stopped, holding its last value on some devices"
+_FEED = "write further ahead, or lower the output's sample rate"
+_CONFIGURE = "correct daq in the hardware configuration; `vibench bench list` shows what is there"
+
+MEANINGS: dict[Code, Meaning] = {
+    Code.SAMPLES_NO_LONGER_AVAILABLE: Meaning(DataLost, _LOST, _SLOWER),
+    Code.INPUT_FIFO_OVERFLOW_2: Meaning(DataLost, "the memory of the device overflowed: " + _LOST, _SLOWER),
+    Code.INPUT_FIFO_OVERFLOW: Meaning(DataLost, "the memory of the device overflowed: " + _LOST, _SLOWER),
+    Code.ACQ_STOPPED_DRIVER_CANT_XFER_DATA_FAST_ENOUGH: Meaning(
+        DataLost,
+        "the bus was too slow: " + _LOST,
+        "give the device its own USB port, or lower the sample rate",
+    ),
+    Code.SAMPLES_NOT_YET_AVAILABLE: Meaning(
+        InstrumentError,
+        "the samples did not come in time",
+        "check that the sample clock runs and the device is connected, then start the run again",
+    ),
+    Code.SAMPLES_WILL_NEVER_BE_AVAILABLE: Meaning(
+        InstrumentError, "samples were asked for past the end of the acquisition", "start the run again"
+    ),
+    Code.PAL_RESOURCE_RESERVED: Meaning(InstrumentBusy, _BUSY, _RELEASE),
+    Code.RESOURCE_ALREADY_RESERVED: Meaning(InstrumentBusy, _BUSY, _RELEASE),
+    Code.INVALID_ATTRIBUTE_VALUE: Meaning(
+        ConfigurationError, "the device does not support a rate, range, coupling or current", _CONFIGURE
+    ),
+    Code.INVALID_DEVICE_ID: Meaning(
+        ConfigurationError, "the driver knows no device of that name", _CONFIGURE
+    ),
+    Code.PHYSICAL_CHAN_DOES_NOT_EXIST: Meaning(
+        ConfigurationError, "the device has no such channel", _CONFIGURE
+    ),
+    Code.DEV_CANNOT_BE_ACCESSED: Meaning(InstrumentLost, _GONE, _RECONNECT),
+    Code.DRIVER_DEVICE_GUID_NOT_FOUND_ROUTING: Meaning(InstrumentLost, _GONE, _RECONNECT),
+    Code.RESOURCE_NOT_IN_POOL_ROUTING: Meaning(InstrumentLost, _GONE, _RECONNECT),
+    Code.RUNTIME_ABORTING_ROUTING: Meaning(
+        InstrumentLost,
+        "the device was reset while it ran",
+        "find out which program reset it, then open the bench again",
+    ),
+    Code.PAL_TRANSFER_ABORTED: Meaning(
+        InstrumentLost, "the transfer from the device was broken off", _RECONNECT
+    ),
+    Code.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES: Meaning(DataLost, _UNDERFLOW, _FEED),
+    Code.DAC_UNDERFLOW: Meaning(DataLost, _UNDERFLOW, _FEED),
+    Code.OUTPUT_FIFO_UNDERFLOW_2: Meaning(DataLost, _UNDERFLOW, _FEED),
+    Code.OUTPUT_FIFO_UNDERFLOW: Meaning(DataLost, _UNDERFLOW, _FEED),
+    Code.SAMPLES_CAN_NOT_YET_BE_WRITTEN: Meaning(
+        InstrumentError,
+        "the output took no more samples in time",
+        "check that the sample clock runs: the input that triggers the output must have been started",
+    ),
+    Code.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE: Meaning(
+        InstrumentError, "the output had not finished in time", "check that the sample clock runs"
+    ),
+    Code.CANNOT_GET_PROPERTY_WHEN_TASK_NOT_RESERVED_COMMITTED_OR_RUNNING: Meaning(
+        InstrumentError,
+        "a property was read before the device was reserved",
+        "report this: the driver is at fault",
+    ),
+    Code.INVALID_TASK: Meaning(
+        InstrumentLost,
+        "the driver no longer knows the task: it, or its server, was restarted",
+        "open the bench again",
+    ),
+    Code.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING: Meaning(
+        InstrumentError, "the task is running", "stop it before changing it"
+    ),
+}
+
+# A property that this device, or this kind of task, does not have.
+NOT_OFFERED = frozenset({Code.ATTR_NOT_SUPPORTED, Code.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT})
+
+_SERVER_LOST = frozenset({grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.DEADLINE_EXCEEDED})
+
+
+@contextmanager
+def daqmx_call(doing: str) -> Iterator[None]:
+    """Turn any failure of the DAQmx client into an error that says what was being done and what to do.
+
+    Parameters
+    ----------
+    doing
+        ``"reading cDAQ1Mod1"``: the start of the sentence.
+
+    """
+    try:
+        yield
+    except DaqError as error:
+        raise from_code(error, doing) from error
+    except RpcError as error:
+        raise _from_server(error, doing) from error
+    except Error as error:
+        raise InstrumentError(
+            f"{doing} failed: this computer has no NI-DAQmx driver ({error}). Install the driver, or set "
+            "daq.server to the address of a device server"
+        ) from error
+
+
+def from_code(error: DaqError, doing: str) -> AcquisitionError:
+    """Return the error of ours that a DAQmx error stands for; one that is not in the table keeps its text."""
+    said = " ".join(str(error).split())
+    meaning = MEANINGS.get(error.error_type)
+    if meaning is None:
+        return InstrumentError(f"{doing} failed: {said}. Look the number up in the NI-DAQmx help")
+    name = f"{error.error_type.name}, {error.error_code}"
+    return meaning.kind(f"{doing} failed: {meaning.happened} ({name}: {said}). To do: {meaning.advice}")
+
+
+def _from_server(error: RpcError, doing: str) -> InstrumentError:
+    if error.rpc_code in _SERVER_LOST:
+        return InstrumentLost(
+            f"{doing} failed: the device server does not answer ({error}). Check that it runs and that "
+            "daq.server is its address, then open the bench again"
+        )
+    return InstrumentError(f"{doing} failed: the device server could not do it ({error}); look into its log")
