@@ -7,6 +7,7 @@ from pydantic import Field
 from .dwell import Dwell
 from .multisine_noise import MultisineNoise
 from .odd_multisine import OddMultisine
+from .plan import AbstractExcitation
 from .sine_sweep import SineSweep
 from .stepped_sine import SteppedSine
 from .streamed_noise import StreamedNoise
@@ -15,3 +16,14 @@ Excitation: TypeAlias = Annotated[
     MultisineNoise | StreamedNoise | SineSweep | Dwell | SteppedSine | OddMultisine,
     Field(discriminator="kind"),
 ]
+
+_PLANS: tuple[type[AbstractExcitation], ...] = (
+    MultisineNoise,
+    StreamedNoise,
+    SineSweep,
+    Dwell,
+    SteppedSine,
+    OddMultisine,
+)
+KINDS = frozenset(str(plan.model_fields["kind"].default) for plan in _PLANS)
+"""The words that a file may give as ``kind``."""

@@ -28,7 +28,19 @@ class Waveform:
 
 
 class SampleSource(Protocol):
-    """A signal that never repeats, made on demand."""
+    """A Gaussian signal that never repeats, made on demand."""
+
+    @property
+    def band_start_hz(self) -> float:
+        """Lower edge of its flat spectrum [Hz]."""
+
+    @property
+    def band_stop_hz(self) -> float:
+        """Upper edge of its flat spectrum [Hz]."""
+
+    @property
+    def crest_factor(self) -> float:
+        """Full range over rms."""
 
     def samples(self, first: int, count: int, sample_rate_hz: float) -> Samples:
         """Make samples ``first`` to ``first + count - 1``, -1 to 1; the same at every call."""

@@ -35,6 +35,11 @@ class GaussianBand:
     band_stop_hz: float
     seed: int
 
+    @property
+    def crest_factor(self) -> float:
+        """Full range over rms."""
+        return CREST_FACTOR
+
     def samples(self, first: int, count: int, sample_rate_hz: float) -> Samples:
         """Make samples ``first`` to ``first + count - 1``, -1 to 1: the same however they are asked for."""
         taps = _taps(self.band_start_hz, self.band_stop_hz, sample_rate_hz)

@@ -1,0 +1,34 @@
+"""The states of a run."""
+
+from enum import StrEnum
+
+
+class RunState(StrEnum):
+    """Where a run stands.
+
+    ::
+
+        idle -> checking -> armed -> ramping_up -> settling -> recording -> ramping_down -> finished
+                    |          |          ^            (next waveform)           |
+                    |          |          +--------------------------------------+
+                    |          +-> ramping_down -> stopped    (cancelled)
+                    +-> failed <- from every state            (limit, check, driver, disk)
+
+    From ``armed`` to ``ramping_down`` the generator's output may be on; in every other state it is off,
+    but for the low-level part of ``checking``.
+    """
+
+    IDLE = "idle"
+    CHECKING = "checking"
+    ARMED = "armed"
+    RAMPING_UP = "ramping_up"
+    SETTLING = "settling"
+    RECORDING = "recording"
+    RAMPING_DOWN = "ramping_down"
+    FINISHED = "finished"
+    STOPPED = "stopped"
+    FAILED = "failed"
+
+
+ENDED = frozenset({RunState.FINISHED, RunState.STOPPED, RunState.FAILED})
+"""States that a run does not leave."""
