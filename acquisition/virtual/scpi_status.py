@@ -1,0 +1,136 @@
+"""What a SCPI instrument remembers of its troubles: error queue, event register, status byte."""
+
+from collections import deque
+from enum import IntEnum, IntFlag
+
+QUEUE_LENGTH = 20
+"""Errors kept before the last one becomes "Queue overflow" (the depth is assumed, SCPI asks for >= 2)."""
+
+
+class ErrorCode(IntEnum):
+    """SCPI-1999 error numbers (volume 2, chapter 21.8) that the instrument uses."""
+
+    NO_ERROR = 0
+    SYNTAX_ERROR = -102
+    DATA_TYPE_ERROR = -104
+    PARAMETER_NOT_ALLOWED = -108
+    MISSING_PARAMETER = -109
+    UNDEFINED_HEADER = -113
+    SUFFIX_OUT_OF_RANGE = -114
+    INVALID_SUFFIX = -131
+    INVALID_BLOCK_DATA = -161
+    SETTINGS_CONFLICT = -221
+    DATA_OUT_OF_RANGE = -222
+    ILLEGAL_PARAMETER_VALUE = -224
+    QUEUE_OVERFLOW = -350
+    QUERY_INTERRUPTED = -410
+    QUERY_UNTERMINATED = -420
+
+    @property
+    def text(self) -> str:
+        """The words that SYST:ERR? sends with the number."""
+        return _TEXTS[self]
+
+
+_TEXTS = {
+    ErrorCode.NO_ERROR: "No error",
+    ErrorCode.SYNTAX_ERROR: "Syntax error",
+    ErrorCode.DATA_TYPE_ERROR: "Data type error",
+    ErrorCode.PARAMETER_NOT_ALLOWED: "Parameter not allowed",
+    ErrorCode.MISSING_PARAMETER: "Missing parameter",
+    ErrorCode.UNDEFINED_HEADER: "Undefined header",
+    ErrorCode.SUFFIX_OUT_OF_RANGE: "Header suffix out of range",
+    ErrorCode.INVALID_SUFFIX: "Invalid suffix",
+    ErrorCode.INVALID_BLOCK_DATA: "Invalid block data",
+    ErrorCode.SETTINGS_CONFLICT: "Settings conflict",
+    ErrorCode.DATA_OUT_OF_RANGE: "Data out of range",
+    ErrorCode.ILLEGAL_PARAMETER_VALUE: "Illegal parameter value",
+    ErrorCode.QUEUE_OVERFLOW: "Queue overflow",
+    ErrorCode.QUERY_INTERRUPTED: "Query INTERRUPTED",
+    ErrorCode.QUERY_UNTERMINATED: "Query UNTERMINATED",
+}
+
+
+class ScpiError(Exception):
+    """A command was refused; carries the number that goes into the error queue."""
+
+    def __init__(self, code: ErrorCode) -> None:
+        super().__init__(f'{int(code)},"{code.text}"')
+        self.code = code
+
+
+class Event(IntFlag):
+    """Bits of the standard event status register (IEEE 488.2-1992, 11.5.1)."""
+
+    NONE = 0
+    OPERATION_COMPLETE = 1
+    QUERY_ERROR = 4
+    DEVICE_ERROR = 8
+    EXECUTION_ERROR = 16
+    COMMAND_ERROR = 32
+    POWER_ON = 128
+
+
+class StatusByte(IntFlag):
+    """Bits of the status byte (IEEE 488.2-1992, 11.2; error bit from SCPI-1999)."""
+
+    NONE = 0
+    ERROR_QUEUED = 4
+    MESSAGE_AVAILABLE = 16
+    EVENT_SUMMARY = 32
+    SERVICE_REQUEST = 64
+
+
+_EVENT_OF_HUNDRED = {
+    1: Event.COMMAND_ERROR,
+    2: Event.EXECUTION_ERROR,
+    3: Event.DEVICE_ERROR,
+    4: Event.QUERY_ERROR,
+}
+BYTE = 255
+
+
+class Status:
+    """Error queue and registers of one instrument."""
+
+    def __init__(self) -> None:
+        self._errors: deque[ErrorCode] = deque()
+        self._events = Event.POWER_ON
+        self.event_enable = 0
+        self.service_enable = 0
+
+    def report(self, code: ErrorCode) -> None:
+        """Queue an error and set its bit in the event register."""
+        self._events |= _EVENT_OF_HUNDRED[-int(code) // 100]
+        if len(self._errors) < QUEUE_LENGTH:
+            self._errors.append(code)
+        else:
+            self._errors[-1] = ErrorCode.QUEUE_OVERFLOW
+
+    def next_error(self) -> ErrorCode:
+        """Take the oldest error from the queue; NO_ERROR when it is empty."""
+        return self._errors.popleft() if self._errors else ErrorCode.NO_ERROR
+
+    def take_events(self) -> Event:
+        """Read the event register, which clears it."""
+        events, self._events = self._events, Event.NONE
+        return events
+
+    def operation_complete(self) -> None:
+        """Note that everything asked for is done (``*OPC``)."""
+        self._events |= Event.OPERATION_COMPLETE
+
+    def clear(self) -> None:
+        """Empty queue and event register (``*CLS``); the enable registers stay."""
+        self._errors.clear()
+        self._events = Event.NONE
+
+    @property
+    def byte(self) -> StatusByte:
+        """The status byte, without the bit for a waiting message, which only the interface knows."""
+        byte = StatusByte.ERROR_QUEUED if self._errors else StatusByte.NONE
+        if self._events & self.event_enable:
+            byte |= StatusByte.EVENT_SUMMARY
+        if byte & self.service_enable:
+            byte |= StatusByte.SERVICE_REQUEST
+        return byte
