@@ -33,9 +33,8 @@ def finalise(part: Path) -> Path:
     Raises
     ------
     RecordingError
-        When ``NAME.h5`` exists, or what was written does not read back the same.
-    OSError
-        When the disk refuses (it may be full).
+        When ``NAME.h5`` exists, the disk refuses (it may be full), or what was written does not
+        read back the same. ``NAME.h5.part`` is untouched.
 
     """
     final = part.with_suffix("")
@@ -44,13 +43,16 @@ def finalise(part: Path) -> Path:
         raise RecordingError(f"{final} exists, and nothing is ever overwritten; move it away.")
     try:
         _copy(part, tmp)
-    except (OSError, RuntimeError):
-        # Incomplete, and made by this call; HDF5 reports a full disk as either.
+        sync_file(tmp)
+        os.replace(tmp, final)  # noqa: PTH105 - the pair of os.fsync
+        sync_folder(final.parent)
+    except (OSError, RuntimeError) as error:  # HDF5 reports a full disk as either
+        # Incomplete, and made by this call; everything in it is in the .part.
         tmp.unlink(missing_ok=True)
-        raise
-    sync_file(tmp)
-    os.replace(tmp, final)  # noqa: PTH105 - the pair of os.fsync
-    sync_folder(final.parent)
+        raise RecordingError(
+            f"{final} could not be written: {error}. All committed samples are safe in {part};"
+            " make room, then recover that file."
+        ) from error
     return final
 
 

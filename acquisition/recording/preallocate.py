@@ -107,8 +107,8 @@ def _require_room(path: Path, needed_bytes: int) -> None:
     if free_bytes < ROOM_FACTOR * needed_bytes:
         raise RecordingError(
             f"{path} needs {ROOM_FACTOR * needed_bytes / 1e6:.0f} MB (the recording, and as much again"
-            f" while it is finished); the disk has {free_bytes / 1e6:.0f} MB. Nothing was recorded; make room, or choose"
-            " another folder or a shorter measurement."
+            f" while it is finished); the disk has {free_bytes / 1e6:.0f} MB. Nothing was recorded; make"
+            " room, or choose another folder or a shorter measurement."
         )
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import RecordingError
 from ..instruments import Block, Samples
 from . import layout
-from .committer import Batch, Committer
+from .committer import COMMIT_INTERVAL_S, Batch, Committer
 from .counts import Counts, CountScale
 from .disk import Buffer, Disk, PositionedFile
 from .finalise import discard, finalise
@@ -65,14 +65,21 @@ class RecordingWriter:
     stopped (keyboard) or as failed (any other exception).
     """
 
-    def __init__(self, path: Path, header: RecordingHeader, places: Places, disk: Disk) -> None:
+    def __init__(
+        self,
+        path: Path,
+        header: RecordingHeader,
+        places: Places,
+        disk: Disk,
+        commit_interval_s: float = COMMIT_INTERVAL_S,
+    ) -> None:
         self._path = path
         self._header = header
         self._places = places
         self._disk = disk
         self._scale = CountScale(header.channels)
         self._journal = Journal(places.tables, tuple(channel.role for channel in header.channels))
-        self._committer = Committer(disk, queue_samples=round(QUEUE_S * header.sample_rate_hz))
+        self._committer = Committer(disk, round(QUEUE_S * header.sample_rate_hz), commit_interval_s)
         self._samples = 0
         self._reserved = places.reserved
         self._is_finished = False
@@ -160,11 +167,6 @@ class RecordingWriter:
         try:
             self._write_ending(state, reason)
             finalise(part)
-        except OSError as error:
-            raise RecordingError(
-                f"{self._path} could not be finished: {error} The {self.committed_samples} committed samples"
-                f" are safe in {part}; make room, then recover that file."
-            ) from error
         finally:
             self._disk.close()
         discard(part)
@@ -245,9 +247,14 @@ class RecordingWriter:
 
     def _write_ending(self, state: RecordingState, reason: str) -> None:
         """State last: a file that says how it ended also says why."""
-        self._disk.write(
-            self._places.reason, encoded(reason, layout.TEXT_WIDTH).ljust(layout.TEXT_WIDTH, b"\0")
-        )
-        self._disk.sync()
-        self._disk.write(self._places.state, state.value.encode().ljust(layout.STATE_WIDTH, b"\0"))
-        self._disk.sync()
+        why = encoded(reason, layout.TEXT_WIDTH).ljust(layout.TEXT_WIDTH, b"\0")
+        try:
+            self._disk.write(self._places.reason, why)
+            self._disk.sync()
+            self._disk.write(self._places.state, state.value.encode().ljust(layout.STATE_WIDTH, b"\0"))
+            self._disk.sync()
+        except OSError as error:
+            raise RecordingError(
+                f"The disk refused the end of the recording: {error}. The {self.committed_samples} samples"
+                f" committed before are in {layout.part_of(self._path)}; recover it when the disk is well."
+            ) from error

@@ -1,0 +1,20 @@
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.recording.fixed_text import decoded, encoded
+
+UTF8 = st.text(st.characters(codec="utf-8", exclude_characters="\0"))
+
+
+@given(UTF8)
+def test_text_that_fits_comes_back(text):
+    width = len(text.encode()) + 3
+    assert decoded(encoded(text, width).ljust(width, b"\0")) == text
+
+
+@given(UTF8, st.integers(3, 40))
+def test_text_that_does_not_fit_is_cut_between_letters(text, width):
+    raw = encoded(text, width)
+    assert len(raw) <= width
+    if len(text.encode()) > width:
+        assert text.startswith(raw.decode().removesuffix("…"))

@@ -1,0 +1,215 @@
+import numpy as np
+import pytest
+
+from acquisition.errors import RecordingError
+from acquisition.instruments import Overload
+from acquisition.recording import RecordingState, create_recording, open_recording
+
+BLOCK = 250
+
+
+def test_every_24_bit_count_comes_back(tmp_path, make_header, make_block):
+    written = []
+    with create_recording(tmp_path / "a.h5", make_header()) as writer:
+        for first in range(0, 4000, BLOCK):
+            counts, block = make_block(first, BLOCK)
+            written.append(counts)
+            writer.append(block)
+    truth = np.concatenate(written, axis=1)
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert recording.state is RecordingState.COMPLETE
+        assert recording.samples == 4000
+        assert recording.duration_s == 4.0
+        for row, role in enumerate(recording.roles):
+            np.testing.assert_array_equal(recording.read_counts(role), truth[row])
+            assert recording.is_intact(role)
+        step = 5.0 / 2**23
+        np.testing.assert_allclose(
+            recording.read("m0_velocity"), 0.125 * (truth[1] + 1.5) * step, rtol=1e-13, atol=1e-18
+        )
+
+
+def test_only_the_finished_file_remains(tmp_path, make_header, make_block):
+    with create_recording(tmp_path / "a.h5", make_header()) as writer:
+        writer.append(make_block(0, BLOCK)[1])
+    assert [each.name for each in tmp_path.iterdir()] == ["a.h5"]
+
+
+@pytest.mark.parametrize("taken", ["a.h5", "a.h5.part", "a.h5.tmp"])
+def test_an_existing_file_is_never_overwritten(tmp_path, make_header, taken):
+    (tmp_path / taken).write_text("precious")
+    with pytest.raises(RecordingError, match=rf"{taken} exists"):
+        create_recording(tmp_path / "a.h5", make_header())
+    assert (tmp_path / taken).read_text() == "precious"
+
+
+@pytest.mark.parametrize("name", ["a.hdf5", "a", "a.h5.part"])
+def test_another_ending_than_h5_is_refused(tmp_path, make_header, name):
+    with pytest.raises(RecordingError, match=r"NAME\.h5"):
+        create_recording(tmp_path / name, make_header())
+
+
+def test_a_missing_folder_is_named(tmp_path, make_header):
+    with pytest.raises(RecordingError, match="nowhere does not exist"):
+        create_recording(tmp_path / "nowhere" / "a.h5", make_header())
+
+
+def test_a_plan_that_the_disk_cannot_hold_is_refused_before_the_start(tmp_path, make_header):
+    with pytest.raises(RecordingError, match=r"needs \d+ MB .* the disk has \d+ MB"):
+        create_recording(tmp_path / "a.h5", make_header(expected_samples=10**15))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_lost_samples_are_a_gap_and_read_as_nan(tmp_path, make_header, make_block):
+    with create_recording(tmp_path / "a.h5", make_header()) as writer:
+        writer.append(make_block(0, 100)[1])
+        counts, block = make_block(150, 100)
+        writer.append(block)
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert [(gap.first_sample, gap.last_sample) for gap in recording.gaps] == [(100, 149)]
+        values = recording.read("m0_velocity")
+        assert np.isnan(values[100:150]).all()
+        assert not np.isnan(values[:100]).any()
+        np.testing.assert_array_equal(recording.read_counts("m0_velocity", 150), counts[1])
+
+
+def test_a_block_that_was_handed_over_already_is_refused(tmp_path, make_header, make_block):
+    with create_recording(tmp_path / "a.h5", make_header()) as writer:
+        writer.append(make_block(0, 100)[1])
+        with pytest.raises(RecordingError, match="sample 50 was given, but 100 samples"):
+            writer.append(make_block(50, 100)[1])
+        assert writer.samples == 100
+
+
+def test_a_block_of_the_wrong_shape_is_refused(tmp_path, make_header, make_block):
+    with (
+        create_recording(tmp_path / "a.h5", make_header()) as writer,
+        pytest.raises(RecordingError, match=r"must be \(2, samples\)"),
+    ):
+        writer.append(make_block(0, 100, channels=3)[1])
+
+
+def test_a_plan_may_run_over_by_its_margin_and_no_further(tmp_path, make_header, make_block):
+    planned, margin = 4000, 10_000
+    with create_recording(tmp_path / "a.h5", make_header(expected_samples=planned)) as writer:
+        writer.append(make_block(0, planned + margin)[1])
+        with pytest.raises(RecordingError, match=r"full.*14000 fit"):
+            writer.append(make_block(planned + margin, 1)[1])
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert recording.samples == planned + margin
+
+
+def test_an_open_ended_recording_takes_what_comes(tmp_path, make_header, make_block):
+    header = make_header(expected_samples=None)
+    with create_recording(tmp_path / "a.h5", header) as writer:
+        disk_bytes = (tmp_path / "a.h5.part").stat().st_blocks * 512
+        for first in range(0, 200_000, 10_000):  # 200 s: three times what is reserved at the start
+            counts, block = make_block(first, 10_000)
+            writer.append(block)
+    assert disk_bytes < 20e6, "a day is declared, but only a minute may be claimed"
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert recording.expected_samples is None
+        assert recording.samples == 200_000
+        np.testing.assert_array_equal(recording.read_counts("m0_velocity", 190_000), counts[1])
+
+
+def test_a_recording_that_raises_says_failed_and_why(tmp_path, make_header, make_block):
+    def measure():
+        with create_recording(tmp_path / "a.h5", make_header()) as writer:
+            writer.append(make_block(0, BLOCK)[1])
+            writer.log("limit", str(1 / 0))
+
+    with pytest.raises(ZeroDivisionError):
+        measure()
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert recording.state is RecordingState.FAILED
+        assert recording.reason == "ZeroDivisionError: division by zero"
+        assert recording.samples == BLOCK
+
+
+def test_the_keyboard_stops_a_recording(tmp_path, make_header):
+    with pytest.raises(KeyboardInterrupt), create_recording(tmp_path / "a.h5", make_header()):
+        raise KeyboardInterrupt
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert recording.state is RecordingState.STOPPED
+        assert recording.samples == 0
+
+
+def test_a_recording_can_only_end_in_an_ending(tmp_path, make_header):
+    with (
+        create_recording(tmp_path / "a.h5", make_header()) as writer,
+        pytest.raises(RecordingError, match="complete, stopped, failed"),
+    ):
+        writer.finish(RecordingState.INTERRUPTED)
+
+
+def test_events_and_segments_say_where_they_belong(tmp_path, make_header, make_block):
+    with create_recording(tmp_path / "a.h5", make_header()) as writer:
+        writer.begin_segment("steady", realisation=3, frequency_hz=260.0, direction="up")
+        writer.append(make_block(0, 100)[1])
+        writer.end_segment()
+        writer.log("ramp", "drive up to 2.5 V, 45 µm gap")
+        writer.begin_segment("ramp")
+        writer.append(make_block(100, 50)[1])
+        writer.finish(RecordingState.STOPPED, "operator")
+    with open_recording(tmp_path / "a.h5") as recording:
+        steady, ramp = recording.segments
+        assert (steady.label, steady.start, steady.stop, steady.is_complete) == ("steady", 0, 100, True)
+        assert steady.numbers == {"realisation": 3, "frequency_hz": 260.0, "direction": "up"}
+        assert (ramp.start, ramp.stop, ramp.is_complete) == (100, 150, False)
+        (event,) = recording.events
+        assert (event.sample, event.kind, event.text) == (100, "ramp", "drive up to 2.5 V, 45 µm gap")
+        assert (recording.state, recording.reason) == (RecordingState.STOPPED, "operator")
+
+
+def test_a_segment_cannot_begin_inside_another(tmp_path, make_header):
+    with create_recording(tmp_path / "a.h5", make_header()) as writer:
+        writer.begin_segment("one")
+        with pytest.raises(RecordingError, match="'one' has not ended"):
+            writer.begin_segment("two")
+        writer.end_segment()
+        with pytest.raises(RecordingError, match="No segment is open"):
+            writer.end_segment()
+
+
+def test_an_overload_over_several_blocks_is_one_range(tmp_path, make_header, make_block):
+    parts = [(0, 99), (100, 149), (200, 210)]
+    with create_recording(tmp_path / "a.h5", make_header()) as writer:
+        for index, (first, last) in enumerate(parts):
+            writer.append(make_block(100 * index, 100, overloads=(Overload("m0_velocity", first, last),))[1])
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert recording.overloads == (Overload("m0_velocity", 0, 149), Overload("m0_velocity", 200, 210))
+
+
+def test_more_overloads_than_fit_are_never_forgotten(tmp_path, make_header, make_block):
+    many = tuple(Overload("m0_velocity", 2 * each, 2 * each) for each in range(9000))
+    late = (Overload("drive_voltage", 5, 6),)
+    with create_recording(tmp_path / "a.h5", make_header(expected_samples=20_000)) as writer:
+        writer.append(make_block(0, 18_000, overloads=many)[1])
+        writer.append(make_block(18_000, 100, overloads=late)[1])
+    with open_recording(tmp_path / "a.h5") as recording:
+        marked = np.zeros(18_100, dtype=bool)
+        for each in recording.overloads:
+            if each.channel == "m0_velocity":
+                marked[each.first_sample : each.last_sample + 1] = True
+        assert marked[0:18_000:2].all()
+        assert late[0] in recording.overloads
+
+
+def test_more_events_than_fit_are_counted(tmp_path, make_header):
+    with create_recording(tmp_path / "a.h5", make_header()) as writer:
+        for number in range(4100):
+            writer.log("note", f"number {number}")
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert len(recording.events) == 4096
+        assert recording.events[-1].text == "5 more events were not kept"
+
+
+def test_a_finished_writer_takes_nothing_more(tmp_path, make_header, make_block):
+    writer = create_recording(tmp_path / "a.h5", make_header())
+    assert writer.finish(RecordingState.COMPLETE) == tmp_path / "a.h5"
+    with pytest.raises(RecordingError, match="is finished"):
+        writer.append(make_block(0, 10)[1])
+    assert writer.finish(RecordingState.FAILED) == tmp_path / "a.h5"
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert recording.state is RecordingState.COMPLETE
