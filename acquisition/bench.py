@@ -1,0 +1,156 @@
+"""The bench: all instruments of a rig, opened together or not at all, and left with the generator silent."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from .calibration import CalibrationRule, check_calibrations
+from .channel import Channel, channels_of
+from .drivers.afg1022x import AFG1022X
+from .drivers.daqmx import DaqmxDigitizer
+from .errors import AcquisitionError
+from .instruments import Identity
+from .knobs import Confirm, KnobSheet, confirm_at_terminal, confirm_simulated
+from .rig import Rig, load_rig
+
+
+class Reality(StrEnum):
+    """Whether the numbers of a bench come from the world or from a calculation."""
+
+    REAL = "real"
+    SIMULATED = "simulated"
+
+
+class Bench:
+    """The open instruments of a rig. Use it in a ``with``, or `close` it.
+
+    Leaving silences the generator first, then closes everything, whatever happened; an error that
+    is under way stays in front, and what fails while leaving becomes a note on it.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        generator: AFG1022X,
+        digitizer: DaqmxDigitizer,
+        confirmations: KnobSheet,
+        closing: ExitStack,
+    ) -> None:
+        self.rig = rig
+        self.generator = generator
+        self.digitizer = digitizer
+        self.confirmations = confirmations
+        self._closing = closing
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What is recorded, in the order of the rows of a block."""
+        return channels_of(self.rig)
+
+    @property
+    def identities(self) -> dict[str, Identity]:
+        """Who answered: ``"generator"`` and ``"digitizer"``."""
+        return {"generator": self.generator.identity, "digitizer": self.digitizer.identity}
+
+    @property
+    def reality(self) -> Reality:
+        """Whether the instruments are simulated."""
+        return Reality.REAL if self.rig.virtual is None else Reality.SIMULATED
+
+    def close(self) -> None:
+        """Silence the generator, then close everything. Legal at any time."""
+        self._closing.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        _leave(self._closing, error)
+
+
+def open_bench(
+    config: Rig | Path,
+    confirm: Confirm | None = None,
+    calibration: CalibrationRule = CalibrationRule.ENFORCED,
+) -> Bench:
+    """Open every instrument of a rig, with the generator silent.
+
+    Parameters
+    ----------
+    config
+        The rig, or the path of its TOML file. With a ``[virtual]`` table the simulated instruments
+        are started as well, and stopped when the bench is left.
+    confirm
+        How settings made by hand are confirmed; see `knobs`. Absent: at the terminal, and for a
+        virtual rig without asking.
+    calibration
+        What a calibration that has run out does; a virtual rig's never runs out.
+
+    Raises
+    ------
+    ConfigurationError
+        When the file says something that is not allowed.
+    CheckFailed
+        When a calibration has run out, or a knob is not confirmed.
+    InstrumentError
+        When an instrument cannot be opened; the others are then closed again.
+
+    """
+    rig = config if isinstance(config, Rig) else load_rig(config)
+    if rig.virtual is None and calibration is CalibrationRule.ENFORCED:
+        check_calibrations(rig, datetime.now(UTC).astimezone().date())
+    closing = ExitStack()
+    try:
+        return _opened(rig, confirm, closing)
+    except BaseException as error:
+        _leave(closing, error)
+        raise
+
+
+def _opened(rig: Rig, confirm: Confirm | None, closing: ExitStack) -> Bench:
+    connected = rig if rig.virtual is None else _virtual(rig, closing)
+    digitizer = DaqmxDigitizer.open(connected)
+    closing.callback(digitizer.close)
+    generator = AFG1022X.open(connected.generator)
+    closing.callback(generator.close)
+    closing.callback(generator.stop)  # the last to enter is the first to happen
+    ask = confirm or _usual_confirmation(rig)
+    return Bench(rig, generator, digitizer, ask((*rig.knobs, *generator.unconfirmed)), closing)
+
+
+def _usual_confirmation(rig: Rig) -> Callable[..., KnobSheet]:
+    return confirm_at_terminal if rig.virtual is None else confirm_simulated
+
+
+def _virtual(rig: Rig, closing: ExitStack) -> Rig:
+    """Start the simulated instruments, and point the rig at them."""
+    # The one place where production code knows of them, and only when a rig asks for it.
+    from .virtual.rig import VirtualRig  # noqa: PLC0415 - a real bench must not load the simulation
+
+    virtual = closing.enter_context(VirtualRig(rig))
+    return rig.model_copy(
+        update={
+            "daq": rig.daq.model_copy(update={"server": virtual.daq_address}),
+            "generator": rig.generator.model_copy(update={"resource": virtual.visa_resource}),
+        }
+    )
+
+
+def _leave(closing: ExitStack, error: BaseException | None) -> None:
+    try:
+        closing.close()
+    except AcquisitionError as failure:
+        if error is None:
+            raise
+        error.add_note(f"While leaving the bench: {failure}")
+        # One failure after another: each carries the one before it.
+        earlier = failure.__context__
+        while earlier is not None and earlier is not error:
+            error.add_note(f"While leaving the bench: {earlier}")
+            earlier = earlier.__context__
