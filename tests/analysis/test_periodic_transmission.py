@@ -1,0 +1,221 @@
+"""Periodic noise: no leakage between two clocks, noise and distortion apart, bounds that hold."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from analysis.best_linear_approximation import Scatter
+from analysis.errors import InvalidRequest, NotEnoughData, UnusableData
+from analysis.periodic_transmission import PeriodicSums, periodic_transmission
+
+RATE = 5120.0
+
+
+def multisine(orders, phases, period_samples, samples):
+    """Unit sines at multiples of the repetition, sampled by a clock on which a period is not whole."""
+    turns = np.arange(samples) / period_samples
+    return np.sum(
+        [np.cos(2 * np.pi * ((k * turns) % 1) + p) for k, p in zip(orders, phases, strict=True)], axis=0
+    )
+
+
+def resonator(frequency_hz):
+    return 260**2 / (260**2 - frequency_hz**2 + 2j * 0.02 * 260 * frequency_hz)
+
+
+def linear_realisation(rng, orders, period_samples, samples, delay_samples=0.0):
+    phases = rng.uniform(0, 2 * np.pi, orders.size)
+    frequency_hz = orders * RATE / period_samples
+    exact = resonator(frequency_hz)
+    turns = np.arange(samples) / period_samples
+    drive = np.zeros(samples)
+    response = np.zeros(samples)
+    for k, p, h in zip(orders, phases, exact, strict=True):
+        angle = 2 * np.pi * ((k * turns) % 1) + p
+        drive += np.cos(angle)
+        response += np.abs(h) * np.cos(angle + np.angle(h) - 2 * np.pi * k * delay_samples / period_samples)
+    return drive, response
+
+
+@settings(max_examples=12, deadline=None)
+@given(offset_ppm=st.floats(-90, 90), period=st.floats(700, 1500), periods=st.integers(2, 6))
+def test_lines_are_exact_whatever_the_clocks_and_however_fractional_the_period(offset_ppm, period, periods):
+    true_period = period * (1 + offset_ppm * 1e-6)
+    orders = np.arange(3, int(0.3 * period), 7)
+    rng = np.random.default_rng(1)
+    samples = int(np.ceil(periods * period))
+    drive, response = linear_realisation(rng, orders, true_period, samples)
+    result = periodic_transmission([(drive, drive, response)], RATE, repetition_hz=RATE / period)
+    exact = resonator(orders * RATE / true_period)
+    np.testing.assert_allclose(result.transmission.frequency_hz, orders * RATE / true_period, rtol=1e-10)
+    assert np.max(np.abs(result.transmission.value / exact - 1)) < 1e-6
+    assert result.repetitions[0].period_samples == pytest.approx(true_period, rel=1e-10)
+
+
+def test_taking_the_nominal_rate_instead_would_leak():
+    """The guard of the test above: with 50 ppm ignored, the same lines are wrong by far more."""
+    from analysis.repetition import period_spectra
+
+    orders = np.arange(3, 300)
+    drive = multisine(orders, np.zeros(orders.size), 1000.05, 5000)
+    assert np.max(np.abs(period_spectra(drive, 1000.0, 5).mean(axis=0)[orders] - 1)) > 1e-2
+    assert np.max(np.abs(period_spectra(drive, 1000.05, 5).mean(axis=0)[orders] - 1)) < 1e-7
+
+
+def test_the_measured_period_scatters_as_stated():
+    from analysis.repetition import measured_repetition
+
+    rng = np.random.default_rng(2)
+    orders = np.arange(10, 60)
+    clean = multisine(orders, rng.uniform(0, 6, orders.size), 512.01, 2560)
+    found = [measured_repetition(clean + 0.5 * rng.standard_normal(2560), 512.0) for _ in range(150)]
+    periods = [one.period_samples for one in found]
+    stated = np.mean([one.sd_samples for one in found])
+    assert np.std(periods) == pytest.approx(stated, rel=0.2)
+    assert np.mean(periods) == pytest.approx(512.01, abs=4 * stated / np.sqrt(150))
+
+
+def test_images_of_a_held_waveform_neither_mislead_the_clock_nor_enter_the_band():
+    """8192 points held over a period put an image of the band 8192 lines higher, 22 dB down."""
+    rng = np.random.default_rng(9)
+    period = 51200 * (1 + 60e-6)
+    band, image = np.arange(20, 600, 19), 8192 - np.arange(20, 600, 19)
+    drive = multisine(band, rng.uniform(0, 6, band.size), period, 102_400)
+    drive += 0.3 * multisine(image, rng.uniform(0, 6, image.size), period, 102_400)
+    result = periodic_transmission([(drive, drive, drive)], 51200.0, repetition_hz=1.0, band_hz=(20, 600))
+    assert result.repetitions[0].period_samples == pytest.approx(period, rel=1e-10)
+    assert result.repetitions[0].periods == 2
+    np.testing.assert_allclose(result.transmission.frequency_hz, band * 51200 / period)
+    with pytest.raises(InvalidRequest, match="no line"):
+        periodic_transmission([(drive, drive, drive)], 51200.0, repetition_hz=1.0, band_hz=(1e5, 2e5))
+
+
+def test_the_delay_of_the_response_channel_is_removed():
+    rng = np.random.default_rng(3)
+    orders = np.arange(5, 100)
+    drive, response = linear_realisation(rng, orders, 512.0, 2048, delay_samples=2.7)
+    result = periodic_transmission(
+        [(drive, drive, response)], RATE, repetition_hz=RATE / 512, delay_s=2.7 / RATE
+    )
+    np.testing.assert_allclose(result.transmission.value, resonator(orders * 10.0), rtol=1e-6)
+
+
+@pytest.mark.parametrize("count", [2, 3, 8])
+def test_the_bounds_hold_the_truth_as_often_as_they_say(count):
+    """Noise and distortion both: a static cube makes the realisations differ beyond the noise."""
+    rng = np.random.default_rng(count)
+    period, orders, cube = 128, np.arange(1, 31), 0.02
+    power = orders.size / 2
+    inside_magnitude = inside_phase = trials = 0
+    best = 1 + 3 * cube * power * (1 - 1 / (2 * orders.size))
+    for _ in range(60):
+        sums = PeriodicSums(RATE, RATE / period)
+        for _ in range(count):
+            drive = multisine(orders, rng.uniform(0, 2 * np.pi, orders.size), period, 3 * period)
+            response = drive + cube * drive**3 + 0.3 * rng.standard_normal(drive.size)
+            sums.add(drive, drive, response)
+        result = sums.transmission().transmission
+        inside_magnitude += np.count_nonzero(
+            (result.magnitude_lower <= best) & (result.magnitude_upper >= best)
+        )
+        inside_phase += np.count_nonzero((result.phase_lower <= 0) & (result.phase_upper >= 0))
+        trials += result.value.size
+    own_error = 4 * np.sqrt(0.95 * 0.05 / trials)
+    assert inside_phase / trials == pytest.approx(0.95, abs=own_error)
+    assert inside_magnitude / trials == pytest.approx(0.95, abs=own_error + 0.01)
+
+
+@pytest.mark.parametrize("sigma", [0.5, 1.0, 2.0])
+def test_a_static_cube_is_approximated_by_the_closed_form(sigma):
+    """u + 0.1 u^3 driven by noise of variance s^2 looks like the gain 1 + 0.3 s^2."""
+    rng = np.random.default_rng(4)
+    orders = np.arange(1, 201)
+    sums = PeriodicSums(RATE, RATE / 1024)
+    for _ in range(60):
+        drive = multisine(orders, rng.uniform(0, 2 * np.pi, orders.size), 1024, 2048)
+        drive *= sigma / np.sqrt(orders.size / 2)
+        sums.add(drive, drive, drive + 0.1 * drive**3)
+    result = sums.transmission()
+    assert np.mean(result.transmission.value.real) == pytest.approx(1 + 0.3 * sigma**2, rel=0.015)
+    assert np.all(result.noise_variance < 1e-12)
+    assert result.distortion_variance is not None
+    assert np.mean(result.distortion_variance) > 1e-6
+
+
+def test_noise_and_distortion_are_told_apart():
+    rng = np.random.default_rng(5)
+    orders = np.arange(1, 101)
+    period, periods, noise = 512, 4, 0.5
+
+    def realise(cube):
+        sums = PeriodicSums(RATE, RATE / period)
+        for _ in range(25):
+            drive = multisine(orders, rng.uniform(0, 2 * np.pi, orders.size), period, periods * period)
+            response = drive + cube * drive**3 + noise * rng.standard_normal(drive.size)
+            sums.add(drive, drive, response)
+        return sums.transmission()
+
+    linear, cubic = realise(0.0), realise(0.01)
+    # White noise of variance s^2 puts 4 s^2 / samples on an amplitude.
+    expected = 4 * noise**2 / (period * periods)
+    assert np.mean(linear.noise_variance) == pytest.approx(expected, rel=0.05)
+    assert np.mean(cubic.noise_variance) == pytest.approx(expected, rel=0.05)
+    assert np.mean(cubic.distortion_variance) > 30 * np.mean(linear.distortion_variance)
+
+
+def test_odd_and_even_distortion_show_on_their_own_detection_lines():
+    rng = np.random.default_rng(6)
+    odd = np.arange(1, 200, 2)
+    driven = odd[rng.permutation(odd.size) % 4 != 0]
+    driven = np.unique(np.concatenate((driven, [1, 199])))
+
+    def detection(shape):
+        drive = multisine(driven, rng.uniform(0, 2 * np.pi, driven.size), 1024, 2048)
+        return periodic_transmission([(drive, drive, shape(drive))], RATE, repetition_hz=5.0).detection
+
+    cube, square = detection(lambda u: u + 0.01 * u**3), detection(lambda u: u + 0.01 * u**2)
+    even = cube.order % 2 == 0
+    assert np.max(cube.response_amplitude[even]) < 1e-6
+    assert np.min(cube.response_amplitude[~even]) > 1e-4
+    assert np.max(square.response_amplitude[~even]) < 1e-6
+    assert np.median(square.response_amplitude[even]) > 1e-2
+
+
+def test_noise_on_the_base_does_not_bias_the_drive_referenced_estimate():
+    rng = np.random.default_rng(7)
+    orders = np.arange(5, 105)
+    sums = PeriodicSums(RATE, RATE / 512)
+    for _ in range(20):
+        drive = multisine(orders, rng.uniform(0, 2 * np.pi, orders.size), 512, 1024)
+        sums.add(drive, drive + 4 * rng.standard_normal(1024), 2 * drive + 4 * rng.standard_normal(1024))
+    result = sums.transmission().transmission
+    error = (result.value - 2) / (2 * result.relative_sd_magnitude)
+    assert abs(np.mean(error.real)) < 4 / np.sqrt(orders.size)
+
+
+def test_one_realisation_says_that_its_bounds_hold_noise_only():
+    orders = np.arange(5, 105)
+    drive = multisine(orders, orders**2.0, 512, 2048)
+    result = periodic_transmission([(drive, drive, drive)], RATE, repetition_hz=10.0)
+    assert result.scatter is Scatter.PERIODS
+    assert result.distortion_variance is None
+
+
+def test_less_than_two_periods_or_a_silent_or_aperiodic_drive_is_refused():
+    rng = np.random.default_rng(8)
+    short = rng.standard_normal(700)
+    with pytest.raises(NotEnoughData, match="at least 2"):
+        periodic_transmission([(short, short, short)], RATE, repetition_hz=10.0)
+    silent = np.zeros(2048)
+    with pytest.raises(UnusableData, match="silent"):
+        periodic_transmission([(silent, silent, silent)], RATE, repetition_hz=10.0)
+    noise = rng.standard_normal(4096)
+    with pytest.raises(UnusableData, match="does not repeat"):
+        periodic_transmission([(noise, noise, noise)], RATE, repetition_hz=10.0)
+    with pytest.raises(NotEnoughData, match="no realisation"):
+        periodic_transmission([], RATE, repetition_hz=10.0)
+    with pytest.raises(InvalidRequest, match="equally long"):
+        periodic_transmission([(noise, noise[1:], noise)], RATE, repetition_hz=10.0)
+    with pytest.raises(InvalidRequest, match="quarter"):
+        periodic_transmission([], RATE, repetition_hz=2000.0)
