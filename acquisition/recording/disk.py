@@ -49,7 +49,7 @@ class PositionedFile:
     """
 
     def __init__(self, path: Path) -> None:
-        self._descriptor = _opened_to_write(path)
+        self._descriptor = opened_to_write(path)
         _mark_in_use(self._descriptor)
 
     def write(self, offset: int, data: Buffer) -> None:
@@ -65,7 +65,7 @@ class PositionedFile:
 
     def reserve(self, offset: int, size: int) -> None:
         """Allocate blocks where the system can; elsewhere the check of free space must do."""
-        _allocate(self._descriptor, offset, size)
+        allocate(self._descriptor, offset, size)
 
     def close(self) -> None:
         """Release file and mark."""
@@ -74,7 +74,7 @@ class PositionedFile:
 
 def sync_file(path: Path) -> None:
     """Push a finished file to the disk."""
-    descriptor = _opened_to_write(path)
+    descriptor = opened_to_write(path)
     try:
         os.fsync(descriptor)
     finally:
@@ -102,7 +102,7 @@ def sole_use(path: Path) -> Iterator[None]:
         When another process is recording to it.
 
     """
-    descriptor = _opened_to_write(path)
+    descriptor = opened_to_write(path)
     try:
         if not _taken_alone(descriptor):
             raise RecordingError(
@@ -125,7 +125,8 @@ def is_being_recorded(path: Path) -> bool:
 
 if sys.platform == "win32":
 
-    def _opened_to_write(path: Path) -> int:
+    def opened_to_write(path: Path) -> int:
+        """Open an existing file; the descriptor comes back."""
         return os.open(path, os.O_RDWR | os.O_BINARY)
 
     def _write_at(descriptor: int, data: memoryview, offset: int) -> int:
@@ -135,8 +136,8 @@ if sys.platform == "win32":
     def _sync_data(descriptor: int) -> None:
         os.fsync(descriptor)
 
-    def _allocate(descriptor: int, offset: int, size: int) -> None:
-        """NTFS has allocated the file when its length was set."""
+    def allocate(descriptor: int, offset: int, size: int) -> None:
+        """Do nothing: NTFS has allocated the file when its length was set."""
 
     def _mark_in_use(descriptor: int) -> None:
         os.lseek(descriptor, LOCK_BYTE, os.SEEK_SET)
@@ -151,7 +152,8 @@ if sys.platform == "win32":
 
 else:
 
-    def _opened_to_write(path: Path) -> int:
+    def opened_to_write(path: Path) -> int:
+        """Open an existing file; the descriptor comes back."""
         return os.open(path, os.O_RDWR)
 
     def _write_at(descriptor: int, data: memoryview, offset: int) -> int:
@@ -163,7 +165,8 @@ else:
         else:
             os.fsync(descriptor)
 
-    def _allocate(descriptor: int, offset: int, size: int) -> None:
+    def allocate(descriptor: int, offset: int, size: int) -> None:
+        """Let the system give blocks to a range of the file, where it can."""
         if sys.platform != "linux":
             return
         try:

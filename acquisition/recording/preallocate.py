@@ -17,6 +17,7 @@ from ..errors import RecordingError
 from . import layout
 from .attributes import write_attributes, write_text_dataset
 from .disk import PositionedFile, sync_folder
+from .disk_room import claim_room
 from .header import RecordingHeader
 from .layout import Table
 
@@ -31,6 +32,9 @@ RESERVE_AHEAD_S = 60.0
 
 ROOM_FACTOR = 2
 """While a recording is finished, it and its compressed copy lie side by side."""
+
+HEAD_BYTES = 8_000_000
+"""More than tables, attributes and configuration take together (5 MB)."""
 
 ITEM_BYTES = 4
 
@@ -70,12 +74,16 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
     """
     capacity, reserved = _lengths(header)
     _require_room(path, reserved * ITEM_BYTES * len(header.channels))
+    channel_bytes = ITEM_BYTES * len(header.channels)
     try:
-        file = h5py.File(part, "x", libver=layout.LIBVER, locking=False)
+        claim_room(part, HEAD_BYTES + reserved * channel_bytes, HEAD_BYTES + capacity * channel_bytes)
     except OSError as error:
-        raise RecordingError(f"{part} cannot be created: {error}. Nothing was recorded.") from error
+        raise RecordingError(
+            f"{part} cannot be created with {reserved * channel_bytes / 1e6:.0f} MB: {error}."
+            " Nothing was recorded; make room, or choose another folder or a shorter measurement."
+        ) from error
     try:
-        with file:
+        with h5py.File(part, "w", libver=layout.LIBVER, locking=False) as file:
             places = _write_layout(file, header, capacity, reserved)
         _claim(part, places)
         sync_folder(part.parent)

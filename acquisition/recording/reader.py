@@ -25,6 +25,8 @@ from .replacing import replace_with_change
 from .results import ResultArray, SavedResult, Setting, read_results, write_result
 from .tables import Event, Gap, Segment
 
+RESULT_HEAD_BYTES = 100_000
+"""More than HDF5 needs to describe one array of a result."""
 DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError)
 """What h5py raises when a file's inside is not what its outside promised."""
 
@@ -177,7 +179,13 @@ class Recording:
         """
         self._require_finished("added to")
         used = self.roles if roles is None else tuple(self.channel(role).role for role in roles)
-        given = replace_with_change(self.path, lambda file: write_result(file, name, arrays, settings, used))
+        room = RESULT_HEAD_BYTES * (1 + len(arrays)) + sum(
+            np.asarray(each.values).nbytes for each in arrays.values()
+        )
+        room += len(json.dumps(dict(settings)))
+        given = replace_with_change(
+            self.path, room, lambda file: write_result(file, name, arrays, settings, used)
+        )
         self._open.reopen()
         return given
 

@@ -13,6 +13,7 @@ import h5py
 from ..errors import RecordingError
 from . import layout
 from .disk import sync_file, sync_folder
+from .disk_room import extend_room, release_room
 
 Answer = TypeVar("Answer")
 
@@ -22,8 +23,8 @@ ATTEMPTS = 10
 _one_at_a_time = threading.Lock()
 
 
-def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> Answer:
-    """Apply ``change`` to a copy of the file and put the copy in its place.
+def replace_with_change(path: Path, room: int, change: Callable[[h5py.File], Answer]) -> Answer:
+    """Apply ``change``, which adds at most ``room`` bytes, to a copy of the file, and swap the two.
 
     A crash leaves the old file untouched (and perhaps a ``.tmp`` beside it). When another program
     has changed the file meanwhile, the change is made again on top of that.
@@ -38,7 +39,7 @@ def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> An
         with _one_at_a_time:
             for _ in range(ATTEMPTS):
                 before = _fingerprint(path)
-                tmp, answer = _changed_copy(path, change)
+                tmp, answer = _changed_copy(path, room, change)
                 if _fingerprint(path) == before:
                     os.replace(tmp, path)  # noqa: PTH105 - the pair of os.fsync
                     sync_folder(path.parent)
@@ -56,15 +57,17 @@ def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> An
     )
 
 
-def _changed_copy(path: Path, change: Callable[[h5py.File], Answer]) -> tuple[Path, Answer]:
+def _changed_copy(path: Path, room: int, change: Callable[[h5py.File], Answer]) -> tuple[Path, Answer]:
     descriptor, name = tempfile.mkstemp(prefix=path.name + ".", suffix=layout.TMP_SUFFIX, dir=path.parent)
     os.close(descriptor)
     tmp = Path(name)
     try:
         shutil.copyfile(path, tmp)
         shutil.copymode(path, tmp)
+        extend_room(tmp, tmp.stat().st_size + room)
         with h5py.File(tmp, "r+", libver=layout.LIBVER, locking=False) as file:
             answer = change(file)
+        release_room(tmp)
         sync_file(tmp)
     except BaseException:
         tmp.unlink(missing_ok=True)

@@ -1,0 +1,123 @@
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+
+from acquisition.errors import RecordingError
+from acquisition.recording import RecordingState, create_recording, open_recording, recover
+from acquisition.recording.disk import PositionedFile
+from acquisition.recording.layout import part_of
+from acquisition.recording.preallocate import preallocate
+from acquisition.recording.writer import RecordingWriter
+
+
+@pytest.fixture
+def abandoned(tmp_path, make_header, make_block):
+    """What a dead program left: samples committed, a segment open, no ending."""
+
+    def make(folder):
+        path = folder / "a.h5"
+        writer = create_recording(path, make_header())
+        writer.begin_segment("steady", frequency_hz=260.0)
+        counts, block = make_block(0, 500)
+        writer.append(block)
+        writer._committer.close()
+        writer._disk.close()
+        return part_of(path), counts
+
+    return make
+
+
+def test_an_abandoned_recording_is_finished_with_all_its_samples(tmp_path, abandoned):
+    part, counts = abandoned(tmp_path)
+    with open_recording(part) as recording:
+        assert recording.state is RecordingState.INTERRUPTED
+    assert recover(part) == tmp_path / "a.h5"
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert recording.state is RecordingState.INTERRUPTED
+        assert "before it could say" in recording.reason
+        np.testing.assert_array_equal(recording.read_counts("m0_velocity"), counts[1])
+        (segment,) = recording.segments
+        assert (segment.start, segment.stop, segment.is_complete) == (0, 500, False)
+        assert [(event.kind, event.sample) for event in recording.events] == [("interrupted", 500)]
+    assert [each.name for each in tmp_path.iterdir()] == ["a.h5"]
+
+
+def test_either_name_can_be_given(tmp_path, abandoned):
+    abandoned(tmp_path)
+    assert recover(tmp_path / "a.h5") == tmp_path / "a.h5"
+
+
+def test_an_incomplete_copy_is_made_anew(tmp_path, abandoned):
+    part, _ = abandoned(tmp_path)
+    (tmp_path / "a.h5.tmp").write_bytes(b"half a copy")
+    recover(part)
+    assert [each.name for each in tmp_path.iterdir()] == ["a.h5"]
+
+
+def test_a_finished_copy_is_kept_and_only_the_part_goes(tmp_path, abandoned):
+    part, _ = abandoned(tmp_path)
+    saved = tmp_path / "saved"
+    shutil.copyfile(part, saved)
+    recover(part)
+    finished = (tmp_path / "a.h5").read_bytes()
+    shutil.copyfile(saved, part)
+    recover(part)
+    assert (tmp_path / "a.h5").read_bytes() == finished
+    assert not part.exists()
+
+
+def test_another_recording_of_that_name_is_not_overwritten(tmp_path, abandoned):
+    (tmp_path / "other").mkdir()
+    part, _ = abandoned(tmp_path)
+    other, _ = abandoned(tmp_path / "other")
+    shutil.move(recover(other), tmp_path / "a.h5")
+    with pytest.raises(RecordingError, match="another recording"):
+        recover(part)
+    assert part.exists()
+
+
+def test_a_living_recording_is_left_alone(tmp_path, make_header, make_block):
+    with create_recording(tmp_path / "a.h5", make_header()) as writer:
+        writer.append(make_block(0, 500)[1])
+        with pytest.raises(RecordingError, match="still being recorded"):
+            recover(tmp_path / "a.h5.part")
+        writer.append(make_block(500, 500)[1])
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert recording.samples == 1000
+        assert recording.state is RecordingState.COMPLETE
+
+
+def test_a_living_recording_can_be_read_by_h5py_alone(tmp_path, make_header, make_block):
+    with create_recording(tmp_path / "a.h5", make_header()) as writer:
+        writer.append(make_block(0, 500)[1])
+        with h5py.File(tmp_path / "a.h5.part", "r") as file:
+            assert file["m0_velocity"].attrs["units"] == b"m s-1"
+        with open_recording(tmp_path / "a.h5.part") as recording:
+            assert recording.state is RecordingState.RECORDING
+
+
+def test_nothing_to_recover_is_said(tmp_path):
+    with pytest.raises(RecordingError, match="nothing to recover"):
+        recover(tmp_path / "a.h5")
+
+
+def test_a_growing_recording_shows_what_is_committed(tmp_path, make_header, make_block):
+    path = tmp_path / "a.h5"
+    places = preallocate(path, part_of(path), make_header())
+    writer = RecordingWriter(
+        path, make_header(), places, PositionedFile(part_of(path)), commit_interval_s=0.0
+    )
+    seen = []
+    for first in range(0, 2000, 500):
+        writer.append(make_block(first, 500)[1])
+        with open_recording(part_of(path)) as recording:
+            seen.append(recording.samples)
+            assert len(recording.read("m0_velocity")) == recording.samples
+    writer._committer.close()
+    with open_recording(part_of(path)) as recording:
+        seen.append(recording.samples)
+    assert seen == sorted(seen)
+    assert seen[-1] == 2000
+    assert writer.finish(RecordingState.STOPPED).exists()
