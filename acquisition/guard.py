@@ -1,21 +1,16 @@
 """The watch over the running measurement: every block against the limits of the rig."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from .channel import Channel
 from .errors import LimitExceeded
-from .instruments import Block, Overload, Samples
+from .instruments import Block, Samples
 from .measurement import InRunLimits, OnOverload
 from .rig import Rig, Role
 
-OVERLOAD_FRACTION = 0.95
-"""A sensor past this share of its full scale counts as overloaded, as at the converter's inputs."""
-
 
 class Guard:
-    """Marks what is overloaded in a block, and says when the run must end.
+    """Says when the run must end.
 
     It sits in the loop that reads the samples, with nothing between it and the generator: no window
     and no other process has a say.
@@ -26,21 +21,8 @@ class Guard:
         self._channels = channels
         self._limits = limits
 
-    def marked(self, block: Block) -> Block:
-        """Add the overloads that the converter cannot know: a sensor past its own full scale."""
-        found = list(block.overloads)
-        for channel, volts in zip(self._channels, block.volts, strict=True):
-            beyond = np.flatnonzero(np.abs(volts) >= OVERLOAD_FRACTION * channel.full_scale_v)
-            known = any(overload.channel == channel.role.value for overload in block.overloads)
-            if len(beyond) and not known:
-                first, last = int(beyond[0]), int(beyond[-1])
-                found.append(
-                    Overload(channel.role.value, block.first_sample + first, block.first_sample + last)
-                )
-        return replace(block, overloads=tuple(found))
-
     def require_safe(self, block: Block) -> None:
-        """Raise LimitExceeded when a marked block passes a limit; the run then ramps down."""
+        """Raise LimitExceeded when a block passes a limit; the run then ramps down."""
         rig, fractions = self._rig, self._limits
         shaker = rig.shaker.limits
         acceleration = shaker.acceleration_m_per_s2
@@ -69,8 +51,8 @@ class Guard:
         if block.overloads and fractions.on_overload is OnOverload.STOP:
             first = block.overloads[0]
             raise LimitExceeded(
-                f"{first.channel} passed {OVERLOAD_FRACTION:.0%} of its range at sample "
-                f"{first.first_sample}. The run was ramped down and its recording kept; widen the range or lower amplitude_vpp"
+                f"{first.channel} was overloaded at sample {first.first_sample}. "
+                "The run was ramped down and its recording kept; widen the range or lower amplitude_vpp"
             )
 
     def _peak(self, block: Block, role: Role) -> float:

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConfigurationError
+from acquisition.errors import ConfigurationError
+
 from .steps import Samples
 
 MEMORY_POINTS = 8192

@@ -6,7 +6,8 @@ from typing import Annotated
 
 from pydantic import Field, PositiveFloat
 
-from ..toml_file import FrozenModel
+from acquisition.toml_file import FrozenModel
+
 from .preview import Preview
 from .steps import Step
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import ConfigurationError
+from acquisition.errors import ConfigurationError
+
 from .steps import Play, Samples, Step, Stream, Tone, Waveform
 
 

@@ -8,7 +8,8 @@ from typing import Literal, Self
 
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
-from ..toml_file import FrozenModel
+from acquisition.toml_file import FrozenModel
+
 from .plan import AbstractExcitation, FrequencyHz
 from .preview import Preview, preview_of
 from .steps import Segment, Step, Tone
