@@ -1,0 +1,96 @@
+"""Spectral densities and amplitude spectra: scaling, bounds, and peaks between lines."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import signal
+
+from analysis.errors import InvalidRequest, NotEnoughData
+from analysis.peaks import peaks
+from analysis.quantity import Quantity
+from analysis.spectra import amplitude_spectrum, spectral_density
+
+RATE = 2048.0
+
+
+def test_the_density_agrees_with_scipy():
+    x = np.random.default_rng(1).standard_normal(30_000)
+    ours = spectral_density(x, RATE, segment_samples=513, overlap=0.4)
+    frequency, theirs = signal.welch(x, RATE, nperseg=513, noverlap=int(0.4 * 513), detrend=False)
+    np.testing.assert_allclose(ours.density, theirs, rtol=1e-10)
+    np.testing.assert_allclose(ours.frequency_hz, frequency)
+
+
+def test_a_sine_on_a_line_holds_half_its_amplitude_squared():
+    x = np.sin(2 * np.pi * 64 * np.arange(8192) / RATE)
+    result = spectral_density(x, RATE, segment_samples=1024)
+    line = np.argmax(result.density)
+    assert result.density[line] * result.noise_bandwidth_hz == pytest.approx(0.5, rel=1e-12)
+    assert result.rms(50, 80) == pytest.approx(np.sqrt(0.5), rel=1e-9)
+
+
+@pytest.mark.parametrize("overlap", [0.0, 0.5, 0.75])
+def test_the_bounds_hold_the_density_as_often_as_they_say(overlap):
+    rng = np.random.default_rng(2)
+    inside = trials = 0
+    for _ in range(300):
+        result = spectral_density(rng.standard_normal(16 * 64), RATE, segment_samples=64, overlap=overlap)
+        truth = 2 / RATE
+        inner = slice(2, -2)
+        inside += np.count_nonzero((result.lower[inner] <= truth) & (result.upper[inner] >= truth))
+        trials += result.density[inner].size
+    assert inside / trials == pytest.approx(0.95, abs=0.012)
+
+
+@pytest.mark.parametrize("window", ["hann", "boxcar", "flattop", "blackmanharris"])
+def test_a_sine_of_amplitude_one_reads_one(window):
+    x = 3.0 + np.sin(2 * np.pi * 100 * np.arange(int(4 * RATE)) / RATE)
+    spectrum = amplitude_spectrum(x, RATE, last_s=2.0, window=window)
+    assert spectrum.amplitude.max() == pytest.approx(1, rel=1e-9)
+    assert spectrum.frequency_hz[np.argmax(spectrum.amplitude)] == 100
+    assert np.angle(spectrum.value[200]) == pytest.approx(-np.pi / 2, abs=1e-6)
+
+
+def test_a_flat_top_reads_a_sine_between_lines_within_a_hundredth_of_a_decibel():
+    x = np.sin(2 * np.pi * 100.5 * np.arange(2048) / RATE)
+    level = amplitude_spectrum(x, RATE, window="flattop").amplitude.max()
+    assert 20 * np.log10(level) == pytest.approx(0, abs=0.02)
+
+
+def test_velocity_over_i_omega_is_displacement():
+    x = 2 * np.pi * 100 * np.cos(2 * np.pi * 100 * np.arange(4096) / RATE)
+    spectrum = amplitude_spectrum(x, RATE).converted(Quantity.VELOCITY, Quantity.DISPLACEMENT)
+    assert spectrum.amplitude[200] == pytest.approx(1, rel=1e-9)
+    assert np.isnan(spectrum.value[0])
+
+
+@settings(deadline=None)
+@given(frequency_hz=st.floats(60, 900), phase=st.floats(0, 6.28))
+def test_a_peak_between_lines_is_placed_and_sized(frequency_hz, phase):
+    x = 0.7 * np.cos(2 * np.pi * frequency_hz * np.arange(4096) / RATE + phase)
+    (peak,) = peaks(amplitude_spectrum(x, RATE), low_hz=50, high_hz=950, count=1)
+    assert peak.frequency_hz == pytest.approx(frequency_hz, abs=2e-4)
+    assert peak.amplitude == pytest.approx(0.7, rel=1e-3)
+
+
+def test_the_stated_spread_of_a_peak_is_its_scatter():
+    rng = np.random.default_rng(3)
+    clean = np.cos(2 * np.pi * 300.3 * np.arange(2048) / RATE)
+    found = []
+    for _ in range(300):
+        spectrum = amplitude_spectrum(clean + 0.5 * rng.standard_normal(2048), RATE)
+        found.append(peaks(spectrum, low_hz=200, high_hz=400, count=1)[0])
+    scatter = np.std([peak.frequency_hz for peak in found])
+    assert np.mean([peak.sd_frequency_hz for peak in found]) == pytest.approx(scatter, rel=0.15)
+
+
+def test_noise_alone_has_no_peak_and_a_wrong_request_is_refused():
+    spectrum = amplitude_spectrum(np.random.default_rng(4).standard_normal(4096), RATE)
+    assert peaks(spectrum, low_hz=100, high_hz=900, count=5) == ()
+    with pytest.raises(InvalidRequest, match="no line"):
+        peaks(spectrum, low_hz=100.01, high_hz=100.02, count=5)
+    with pytest.raises(NotEnoughData, match="ask for less"):
+        amplitude_spectrum(np.zeros(100), RATE, last_s=5.0)
+    with pytest.raises(InvalidRequest, match="Hann"):
+        peaks(amplitude_spectrum(np.ones(100), RATE, window="boxcar"), low_hz=1, high_hz=9, count=1)
