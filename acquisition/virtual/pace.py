@@ -1,0 +1,155 @@
+"""How rig time passes: only when somebody asks for samples, or with the wall clock."""
+
+import threading
+import time
+from collections.abc import Callable
+from enum import Enum, auto
+from typing import Protocol
+
+QUESTION_S = 0.1
+"""Rig time that a question about progress takes when nothing else lets time pass [s].
+
+A program that polls ("how many samples are there?") would otherwise poll for ever.
+"""
+
+TICK_S = 0.01
+"""How often a rig on the wall clock is brought up to date [s]: well below the shortest usual read."""
+
+
+SLICE_S = 0.1
+"""Longest stretch of rig time computed without letting another caller in [s]."""
+
+YIELD_S = 1e-4
+"""Pause between two slices while behind the clock [s]."""
+
+
+class Overflow(Enum):
+    """What becomes of samples that find their buffer full."""
+
+    GROW = auto()
+    """The buffer grows: nothing is lost."""
+    LOSE = auto()
+    """The oldest samples are overwritten, as on the real device."""
+
+
+class RigClock(Protocol):
+    """The rig as a pace sees it."""
+
+    @property
+    def now_s(self) -> float:
+        """Rig time reached so far [s]."""
+
+    @property
+    def changed(self) -> threading.Condition:
+        """Held while the rig is used; notified whenever anything has changed."""
+
+    def advance_to(self, until_s: float) -> None:
+        """Let rig time pass up to ``until_s``; the caller holds ``changed``."""
+
+
+class Pace(Protocol):
+    """A rule for the passing of rig time. Every method is called with ``rig.changed`` held."""
+
+    @property
+    def overflow(self) -> Overflow:
+        """What a full buffer does."""
+
+    def open(self, rig: RigClock) -> None:
+        """Begin: rig time passes from here on."""
+
+    def close(self) -> None:
+        """End: rig time stands still. Called without the lock."""
+
+    def ask(self, rig: RigClock, until_s: float, is_there: Callable[[], bool], timeout_s: float) -> bool:
+        """Wait until ``is_there()``, which is expected at rig time ``until_s``; say whether it came to be.
+
+        ``timeout_s`` is wall time; negative waits for ever. An infinite ``until_s`` depends on somebody else.
+        """
+
+    def glance(self, rig: RigClock) -> None:
+        """Let a question about progress be answered with something newer than the last time."""
+
+
+def _wait(rig: RigClock, is_there: Callable[[], bool], timeout_s: float) -> bool:
+    return rig.changed.wait_for(is_there, None if timeout_s < 0 else timeout_s)
+
+
+class OnDemandPace:
+    """FREE: samples exist when asked for. Nothing waits, nothing is lost, two runs are equal bit for bit."""
+
+    overflow = Overflow.GROW
+
+    def open(self, rig: RigClock) -> None:
+        """Nothing to begin: time passes on request."""
+
+    def close(self) -> None:
+        """Nothing to end."""
+
+    def ask(self, rig: RigClock, until_s: float, is_there: Callable[[], bool], timeout_s: float) -> bool:
+        """Let time pass at once; wait only for what other calls must bring about, such as a trigger."""
+        if is_there():
+            return True
+        if until_s < float("inf"):
+            rig.advance_to(until_s)
+            return is_there()
+        return _wait(rig, is_there, timeout_s)
+
+    def glance(self, rig: RigClock) -> None:
+        """Let ``QUESTION_S`` of rig time pass."""
+        rig.advance_to(rig.now_s + QUESTION_S)
+
+
+class WallPace:
+    """WALL: rig time follows a clock, ``speed`` times as fast; late readers lose samples, early ones wait.
+
+    A world that cannot be computed that fast makes its samples come late, never wrong.
+    """
+
+    overflow = Overflow.LOSE
+
+    def __init__(self, speed: float = 1.0, clock: Callable[[], float] = time.monotonic) -> None:
+        """Follow ``clock`` [s], any clock that never runs backwards."""
+        if not 0 < speed < float("inf"):
+            message = f"the speed of a rig on the wall clock is {speed}; it must be above 0 and finite"
+            raise ValueError(message)
+        self.speed = speed
+        self._clock = clock
+        self._closing = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._began_s = (0.0, 0.0)
+
+    def open(self, rig: RigClock) -> None:
+        """Start the clock, and the thread that keeps the rig up to it."""
+        self._began_s = (self._clock(), rig.now_s)
+        self._closing.clear()
+        self._thread = threading.Thread(target=self._keep_up, args=(rig,), name="rig clock", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop the clock."""
+        self._closing.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def ask(self, rig: RigClock, until_s: float, is_there: Callable[[], bool], timeout_s: float) -> bool:  # noqa: ARG002 - this clock needs no hint
+        """Wait for the clock."""
+        self._step(rig)
+        return is_there() or _wait(rig, is_there, timeout_s)
+
+    def glance(self, rig: RigClock) -> None:
+        """Bring the rig up to the clock."""
+        self._step(rig)
+
+    def _keep_up(self, rig: RigClock) -> None:
+        pause_s = TICK_S
+        while not self._closing.wait(pause_s):
+            with rig.changed:
+                behind_s = self._step(rig)
+            pause_s = YIELD_S if behind_s > 0 else TICK_S
+
+    def _step(self, rig: RigClock) -> float:
+        """Compute one slice at most, so that nobody waits long for the rig; say how much is left."""
+        began_s, rig_began_s = self._began_s
+        target_s = rig_began_s + self.speed * (self._clock() - began_s)
+        rig.advance_to(min(target_s, rig.now_s + SLICE_S))
+        return target_s - rig.now_s
