@@ -68,11 +68,10 @@ def confirm_at_terminal(knobs: tuple[Knob, ...]) -> KnobSheet:
         wanted = "; ".join(_shown(knob) for knob in knobs)
         raise CheckFailed(
             f"these settings are made by hand and must be confirmed: {wanted}. Nobody sits at "
-            "this terminal and nothing was energised; confirm them at one, or give a knob sheet that is still valid"
+            "this terminal and nothing was energised; confirm them at one, or give a valid knob sheet"
         )
-    return confirm_by_asking(input, input("Who confirms the settings made by hand? ") or "at the terminal")(
-        knobs
-    )
+    operator = input("Who confirms the settings made by hand? ") or "at the terminal"
+    return confirm_by_asking(input, operator)(knobs)
 
 
 def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:

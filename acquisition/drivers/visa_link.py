@@ -1,5 +1,6 @@
 """Opening a VISA resource: the one place that makes pyvisa sessions, and says why one cannot be made."""
 
+import warnings
 from typing import Protocol, cast
 
 import pyvisa
@@ -52,9 +53,9 @@ def open_link(resource: str, visa_library: str, timeout_s: float = TIMEOUT_S) ->
             raise InstrumentBusy(
                 f"{resource} is held by another program; close that program and open the bench again"
             ) from error
-        raise _absent(resource, manager, error) from error
+        raise _absent(resource, error) from error
     except (ValueError, OSError) as error:  # pyvisa-py reports an absent or dead USB device so
-        raise _absent(resource, manager, error) from error
+        raise _absent(resource, error) from error
     message_link = cast("MessageBasedResource", link)
     message_link.timeout = timeout_s * _MS_PER_S
     message_link.write_termination = "\n"
@@ -66,7 +67,10 @@ def list_visa_resources(visa_library: str = "@py") -> tuple[str, ...]:
 
     pyvisa-py writes USB numbers in decimal: ``USB0::1689::851::C010101::0::INSTR`` is an AFG1022.
     """
-    return tuple(_manager(visa_library).list_resources("?*"))
+    with warnings.catch_warnings():
+        # pyvisa-py advises to install what would find more instruments on a network: not ours.
+        warnings.simplefilter("ignore", UserWarning)
+        return tuple(_manager(visa_library).list_resources("?*"))
 
 
 def _manager(visa_library: str) -> pyvisa.ResourceManager:
@@ -81,12 +85,9 @@ def _manager(visa_library: str) -> pyvisa.ResourceManager:
         ) from error
 
 
-def _absent(resource: str, manager: pyvisa.ResourceManager, error: Exception) -> InstrumentLost:
-    try:
-        seen = ", ".join(manager.list_resources("?*")) or "nothing"
-    except (pyvisa.VisaIOError, ValueError, OSError):
-        seen = "nothing that can be listed"
+def _absent(resource: str, error: Exception) -> InstrumentLost:
+    # What else the bus shows would help, but listing scans the network for seconds: not in an emergency.
     return InstrumentLost(
-        f"no instrument answers at {resource} ({error}); the bus shows {seen}. "
-        "Check its power and cable, and generator.resource in the hardware configuration"
+        f"no instrument answers at {resource} ({error}). Check its power and cable, and generator.resource "
+        "in the hardware configuration; `vibench bench list` shows what can be seen"
     )
