@@ -11,6 +11,7 @@ from .contact_flow import (
     CX,
     CZ,
     POINT,
+    SPARE,
     TRIAL,
     WIDTH,
     WORK_ROWS,
@@ -56,8 +57,17 @@ LANDING = 1e-11
 """An exit is found when |w| is below this part of its scale."""
 MOST_CORRECTIONS = 100
 """Bracketed Newton always ends by bisection before this."""
+APEX_SECANTS = 3
+"""Secant steps to the deepest point: there w is flat, so its own error is the square of theirs."""
 STANDARD_TOLERANCE = 1e-6
 """The tolerance for which the first step is tuned; it scales with the eighth root."""
+
+
+LOGGED, DEEPEST = 0, 1
+"""Places of a log's first row: how many steps' ends are in the rows below; the largest w so far."""
+LOG_TIME, LOG_X, LOG_VX, LOG_P, LOG_RATE = range(5)
+"""Columns of the rows below: time, x, vx, p and dp/dt at the ends of the accepted steps."""
+LOG_COLUMNS = 5
 
 
 @compiled
@@ -158,6 +168,44 @@ def _step_to_time(
 
 
 @compiled
+def _start_log(log: Table, work: Table, side: float, par: Parameters) -> None:
+    if len(log) > 0:
+        log[0, LOGGED] = 0.0
+        log[0, DEEPEST] = work[POINT, W]
+        _log_point(log, work, side, par)
+
+
+@compiled
+def _log_point(log: Table, work: Table, side: float, par: Parameters) -> None:
+    """Add the accepted point as the log's next row."""
+    at = work[POINT]
+    log[0, LOGGED] += 1.0
+    row = int(log[0, LOGGED])
+    log[row, LOG_TIME], log[row, LOG_X], log[row, LOG_VX] = at[T], at[CX], at[CVX]
+    log[row, LOG_P], log[row, LOG_RATE] = side * (par.gap + at[W] * at[W]), side * at[R]
+
+
+@compiled
+def _log_apex(
+    log: Table, work: Table, step: float, side: float, force: Vector, middle: float, par: Parameters
+) -> None:
+    """Note the deepest point of the step just taken; where r turns, step to r = 0 exactly."""
+    log[0, DEEPEST] = max(log[0, DEEPEST], work[TRIAL, W])
+    before, after = work[POINT, R], work[TRIAL, R]
+    if not before > 0.0 > after:
+        return
+    low, high = 0.0, step
+    for _ in range(APEX_SECANTS):
+        part = low + (high - low) * before / (before - after)
+        trial_step(work, part, SPARE, side, force, middle, par)
+        log[0, DEEPEST] = max(log[0, DEEPEST], work[SPARE, W])
+        if work[SPARE, R] > 0.0:
+            low, before = part, work[SPARE, R]
+        else:
+            high, after = part, work[SPARE, R]
+
+
+@compiled
 def _step_factor(error: float) -> float:
     """Next step over this one. The eighth root as three square roots; an error of NaN shrinks."""
     if not error < 1e300:
@@ -168,7 +216,7 @@ def _step_factor(error: float) -> float:
 
 
 @compiled
-def advance_contact(  # noqa: C901 - a step control and its three ends are one loop
+def advance_contact(  # noqa: C901, PLR0912 - a step control and its three ends are one loop
     state: Vector,
     tau: float,
     limit: float,
@@ -177,6 +225,7 @@ def advance_contact(  # noqa: C901 - a step control and its three ends are one l
     par: Parameters,
     tolerance: float,
     work: Table,
+    log: Table,
 ) -> tuple[int, float]:
     """Advance a contact until m1 leaves the stop or the time reaches ``limit``, whichever is first.
 
@@ -192,6 +241,9 @@ def advance_contact(  # noqa: C901 - a step control and its three ends are one l
         Relative error allowed in a step, on w and r.
     work
         From `contact_workspace`.
+    log
+        Filled with the accepted steps, for who observes the contact; no rows keep nothing. A full log
+        ends the call with HELD before the limit.
 
     Returns
     -------
@@ -201,6 +253,7 @@ def advance_contact(  # noqa: C901 - a step control and its three ends are one l
     side, step = state[SIDE], state[STEP]
     root_scale, rate_scale = state[ROOT_SCALE], state[RATE_SCALE]
     _gather(work, state, tau)
+    _start_log(log, work, side, par)
     if tau >= limit:
         return HELD, tau
     contact_rates(work[POINT], work[0], side, force, middle, par)
@@ -224,9 +277,15 @@ def advance_contact(  # noqa: C901 - a step control and its three ends are one l
             # Time runs backwards where w < 0: the step leapt over the exit and came back.
             step *= 0.5
             continue
+        if len(log) > 0:
+            _log_apex(log, work, taken, side, force, middle, par)
         work[POINT] = work[TRIAL]
         if code == LEFT:
             work[POINT, W] = 0.0
+        if len(log) > 0:
+            _log_point(log, work, side, par)
+            if code < 0 and log[0, LOGGED] + 1 == len(log):
+                code = HELD
         if code >= 0:
             _scatter(work, state, par)
             state[STEP] = step

@@ -1,5 +1,7 @@
 """The specimen without contact, solved exactly: state matrix, modes, transmissibility. SI units."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -53,3 +55,55 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
     forcing[:, 0, 0] = specimen.stiffnesses[0] + 1j * omega[:, 0, 0] * specimen.dampings[0]
     moved = np.linalg.solve(dynamic, forcing)[:, :, 0].astype(np.complex128)
     return np.column_stack([moved, moved[:, 1] - moved[:, 2]])
+
+
+class ModalForm(NamedTuple):
+    """Free motion without contact as s(t) = Re sum_j (rows_j . s0) shapes_j exp(rates_j t)."""
+
+    rates: Complex
+    """Shape (n,) [1/s]: one of each conjugate pair, and every real one; 3 <= n <= 6."""
+    shapes: Complex
+    """Shape (n, 6)."""
+    rows: Complex
+    """Shape (n, 6): left eigenvectors, doubled for a pair."""
+
+
+COINCIDENT = 1e7
+"""Condition of the eigenvectors beyond which two modes count as one (critical damping to 14 digits)."""
+
+
+def modal_form(specimen: Specimen) -> ModalForm:
+    """Diagonalise the state matrix, for any damping.
+
+    Raises ValueError when two modes coincide (critical damping): then no full set of modes exists.
+    """
+    system, _ = state_matrix(specimen)
+    # Mass-normalised and in units of the fastest mode: a balanced matrix, so that every digit counts.
+    speed = 2.0 * np.pi * float(specimen.natural_frequencies_hz[-1])
+    root = np.sqrt(np.asarray(specimen.masses))
+    units = np.concatenate([1.0 / root, speed / root])
+    values, vectors = np.linalg.eig(system / units[:, None] * units[None, :] / speed)
+    if np.linalg.cond(vectors) > COINCIDENT:
+        msg = "Two modes of this specimen coincide (critical damping): change a damping by 0.1 per cent."
+        raise ValueError(msg)
+    left = np.linalg.inv(vectors) / units[None, :]
+    kept = values.imag >= 0.0
+    weights = np.where(values.imag[kept] > 0.0, 2.0, 1.0)
+    # A passive structure does not grow: a positive real part is rounding.
+    rates = (np.minimum(values.real[kept], 0.0) + 1j * values.imag[kept]) * speed
+    return ModalForm(
+        rates=rates.astype(np.complex128),
+        shapes=np.ascontiguousarray((vectors * units[:, None]).T[kept], dtype=np.complex128),
+        rows=np.ascontiguousarray(left[kept] * weights[:, None], dtype=np.complex128),
+    )
+
+
+def harmonic_motion(specimen: Specimen, omega: float, amplitude_m: float) -> tuple[Complex, complex]:
+    """Phasors of the steady motion without contact under U = amplitude sin(omega t).
+
+    Returns the motion S, shape (6,), s(t) = Re(S exp(i omega t)), and the base force, likewise [N].
+    """
+    base = -1j * amplitude_m
+    displacement = base_transmissibility(specimen, omega / (2.0 * np.pi))[0, :3] * base
+    force = (specimen.stiffnesses[0] + 1j * omega * specimen.dampings[0]) * base
+    return np.concatenate([displacement, 1j * omega * displacement]), force

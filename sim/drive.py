@@ -1,0 +1,154 @@
+"""What moves the base: its displacement as a function of time, from time zero on. SI units."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict
+
+_STRICT = ConfigDict(extra="forbid")
+FEWEST_SAMPLES = 4
+"""A cubic spline without end conditions of its own needs four points."""
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """U = amplitude_m * sin(2 pi frequency_hz t + phase_rad)."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+
+    frequency_hz: float
+    amplitude_m: float
+    phase_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        _require_positive("Drive frequency", self.frequency_hz, "Hz")
+        _require_amplitude(self.amplitude_m)
+        if not math.isfinite(self.phase_rad):
+            msg = f"Drive phase {self.phase_rad} rad is not allowed: it must be finite."
+            raise ValueError(msg)
+
+
+@dataclass(frozen=True)
+class LinearSweep:
+    """A sine of constant displacement whose frequency changes by equal hertz in every second.
+
+    Starts at phase zero; up or down. The drive exists from 0 to ``duration_s``.
+    """
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+
+    start_hz: float
+    stop_hz: float
+    duration_s: float
+    amplitude_m: float
+
+    def __post_init__(self) -> None:
+        _require_sweep(self.start_hz, self.stop_hz, self.duration_s, self.amplitude_m)
+
+    @property
+    def highest_hz(self) -> float:
+        """The higher end of the sweep."""
+        return max(self.start_hz, self.stop_hz)
+
+    def turns(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Phase in turns: start t + (stop - start) t^2 / (2 duration)."""
+        return (self.start_hz + 0.5 * (self.stop_hz - self.start_hz) / self.duration_s * time_s) * time_s
+
+    def frequency_hz(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Frequency at each instant."""
+        return self.start_hz + (self.stop_hz - self.start_hz) / self.duration_s * time_s
+
+
+@dataclass(frozen=True)
+class LogarithmicSweep:
+    """A sine of constant displacement that spends equal times in every octave.
+
+    Starts at phase zero; up or down. The drive exists from 0 to ``duration_s``.
+    """
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+
+    start_hz: float
+    stop_hz: float
+    duration_s: float
+    amplitude_m: float
+
+    def __post_init__(self) -> None:
+        _require_sweep(self.start_hz, self.stop_hz, self.duration_s, self.amplitude_m)
+
+    @property
+    def highest_hz(self) -> float:
+        """The higher end of the sweep."""
+        return max(self.start_hz, self.stop_hz)
+
+    def turns(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Phase in turns: start (exp(g t) - 1) / g, with g = ln(stop/start) / duration."""
+        growth = math.log(self.stop_hz / self.start_hz) / self.duration_s
+        return self.start_hz * np.expm1(growth * time_s) / growth
+
+    def frequency_hz(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Frequency at each instant."""
+        growth = math.log(self.stop_hz / self.start_hz) / self.duration_s
+        return self.start_hz * np.exp(growth * time_s)
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """Measured or computed displacement, joined by the cubic spline on the sample grid (C2, not-a-knot).
+
+    Sample 0 is time zero; the drive exists up to its last sample.
+    """
+
+    displacement_m: NDArray[np.float64]
+    """Shape (samples,) [m]."""
+    sample_rate_hz: float
+
+    def __post_init__(self) -> None:
+        _require_positive("Sample rate of the drive", self.sample_rate_hz, "Hz")
+        samples = np.array(self.displacement_m, dtype=np.float64)
+        if samples.ndim != 1 or len(samples) < FEWEST_SAMPLES:
+            msg = (
+                f"A sampled drive of shape {samples.shape} is not allowed: "
+                f"give one row of {FEWEST_SAMPLES} samples or more."
+            )
+            raise ValueError(msg)
+        if not bool(np.all(np.isfinite(samples))):
+            bad = int(np.flatnonzero(~np.isfinite(samples))[0])
+            msg = f"Sample {bad} of the drive is {samples[bad]}: every displacement must be finite."
+            raise ValueError(msg)
+        samples.flags.writeable = False
+        object.__setattr__(self, "displacement_m", samples)
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the last sample."""
+        return (len(self.displacement_m) - 1) / self.sample_rate_hz
+
+
+Sweep = LinearSweep | LogarithmicSweep
+Drive = Harmonic | LinearSweep | LogarithmicSweep | Sampled
+
+
+def _require_positive(name: str, value: float, unit: str) -> None:
+    if not 0.0 < value < math.inf:
+        msg = f"{name} {value} {unit} is not allowed: it must be positive and finite."
+        raise ValueError(msg)
+
+
+def _require_amplitude(amplitude_m: float) -> None:
+    if not 0.0 <= amplitude_m < math.inf:
+        msg = f"Drive amplitude {amplitude_m} m is not allowed: it must be zero or positive, and finite."
+        raise ValueError(msg)
+
+
+def _require_sweep(start_hz: float, stop_hz: float, duration_s: float, amplitude_m: float) -> None:
+    _require_positive("Sweep start", start_hz, "Hz")
+    _require_positive("Sweep stop", stop_hz, "Hz")
+    _require_positive("Sweep duration", duration_s, "s")
+    _require_amplitude(amplitude_m)
+    if start_hz == stop_hz:
+        msg = f"A sweep from {start_hz} to {stop_hz} Hz is not allowed: for one frequency use Harmonic."
+        raise ValueError(msg)

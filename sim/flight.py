@@ -1,0 +1,204 @@
+"""Flight under a harmonic drive: exact, as a sum of turning phasors, up to the first touch. SI units.
+
+Between contacts every displacement is Re sum e_j V_j exp(l_j t): the specimen's modes, and the drive as
+one more term with l = i omega. March on a grid with one complex product a term, tracking only p; look
+closely (`sim.detection`) where the bound sum |e_j P_j| |l_j|^2 on |d2p/dt2| cannot exclude a touch.
+"""
+
+import cmath
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .clock import angle_at
+from .compiled import compiled
+from .detection import LONGEST_TURN, NEVER, SERIES_TERMS, first_contact
+from .drive import Harmonic
+from .modes import Complex, harmonic_motion, modal_form
+from .parameters import Parameters, Vector, X, Y, Z, parameters
+from .specimen import Specimen
+
+GRID_TURN = 0.5 * LONGEST_TURN
+"""Grid step as the fastest rate times its length [rad]."""
+RUN_OF_STEPS = 512
+"""Grid steps between two fresh exponentials: keeps the products' rounding below 1e-13."""
+
+
+class FlightTables(NamedTuple):
+    """Specimen and drive, diagonalised. Terms 0..n-1 are modes, term n is the drive."""
+
+    par: Parameters
+    frequency: float
+    omega: float
+    phase: complex
+    """exp(i phase) of the drive at time zero."""
+    force: complex
+    """Base force k0 U + c0 dU/dt = Re(force * exp(i omega t)) [N]."""
+    rates: Complex
+    """l_j, shape (n+1,) [1/s]; one of each conjugate pair."""
+    squares: NDArray[np.float64]
+    """abs(l_j)^2."""
+    shapes: Complex
+    """V_j, shape (n+1, 6): motion of a unit phasor."""
+    path: Complex
+    """V_jy - V_jz, shape (n+1,): what a unit phasor adds to p."""
+    across: Complex
+    """V_jx, shape (n+1,): what a unit phasor adds to x."""
+    rows: Complex
+    """Left rows, shape (n, 6), with the weight 2 of a pair: a state's phasors."""
+    grid: float
+    """Grid step [s]."""
+    factors: Complex
+    """exp(l_j grid), shape (n+1,)."""
+
+
+def flight_tables(specimen: Specimen, drive: Harmonic) -> FlightTables:
+    """Prepare flight for a specimen and a harmonic drive."""
+    modes = modal_form(specimen)
+    omega = 2.0 * math.pi * drive.frequency_hz
+    motion, force = harmonic_motion(specimen, omega, drive.amplitude_m)
+    rates = np.append(modes.rates, 1j * omega)
+    shapes = np.vstack([modes.shapes, motion])
+    grid = GRID_TURN / float(np.max(np.abs(rates)))
+    return FlightTables(
+        par=parameters(specimen),
+        frequency=drive.frequency_hz,
+        omega=omega,
+        phase=cmath.exp(1j * drive.phase_rad),
+        force=force,
+        rates=rates,
+        squares=np.abs(rates) ** 2,
+        shapes=shapes,
+        path=shapes[:, Y] - shapes[:, Z],
+        across=np.ascontiguousarray(shapes[:, X]),
+        rows=modes.rows,
+        grid=grid,
+        factors=np.exp(rates * grid),
+    )
+
+
+@compiled
+def drive_phasor(clock: Vector, later: float, tables: FlightTables) -> complex:
+    """exp(i (omega t + phase)) at clock time plus ``later``."""
+    angle = angle_at(clock, later, tables.frequency)
+    return complex(math.cos(angle), math.sin(angle)) * tables.phase
+
+
+@compiled
+def take_off(phasors: Complex, state: Vector, clock: Vector, tables: FlightTables) -> None:
+    """Write the phasors of the flight that starts from ``state`` now, shape (n+1,)."""
+    modes = len(tables.rows)
+    drive = drive_phasor(clock, 0.0, tables)
+    phasors[modes] = drive
+    for j in range(modes):
+        phasors[j] = 0.0
+    for i in range(6):
+        free = state[i] - (drive * tables.shapes[modes, i]).real
+        for j in range(modes):
+            phasors[j] += tables.rows[j, i] * free
+
+
+@compiled
+def turn_phasors(
+    turned: Complex, phasors: Complex, later: float, clock: Vector, tables: FlightTables
+) -> None:
+    """Write the phasors ``later`` seconds after take-off, by fresh exponentials."""
+    modes = len(tables.rows)
+    for j in range(modes):
+        turned[j] = phasors[j] * cmath.exp(tables.rates[j] * later)
+    turned[modes] = drive_phasor(clock, later, tables)
+
+
+@compiled
+def place_on_phasors(motion: Vector, phasors: Complex, tables: FlightTables) -> None:
+    """Write (x, y, z, vx, vy, vz) of the phasors to the first six places of ``motion``."""
+    for i in range(6):
+        value = 0.0
+        for j in range(len(phasors)):
+            value += (phasors[j] * tables.shapes[j, i]).real
+        motion[i] = value
+
+
+@compiled
+def fill_series(series: Vector, terms: Complex, rates: Complex) -> None:
+    """Taylor coefficients of Re sum terms_j exp(rates_j t), shape (SERIES_TERMS,)."""
+    for k in range(SERIES_TERMS):
+        series[k] = 0.0
+    for j in range(len(terms)):
+        term = terms[j]
+        for k in range(SERIES_TERMS):
+            series[k] += term.real
+            term *= rates[j] / (k + 1.0)
+
+
+@compiled
+def _march(terms: Complex, factors: Complex, steps: int, clear: float) -> int:
+    """Turn the terms of p in place, step by step, while abs(p) < clear; gives the steps that were."""
+    for made in range(steps):
+        p = 0.0
+        for j in range(len(terms)):
+            terms[j] *= factors[j]
+            p += terms[j].real
+        if not abs(p) < clear:
+            return made
+    return steps
+
+
+@compiled
+def fly(
+    phasors: Complex,
+    now: Complex,
+    terms: Complex,
+    series: Vector,
+    clock: Vector,
+    longest: float,
+    tables: FlightTables,
+) -> tuple[bool, float]:
+    """Find how long a flight lasts: to the first touch, or ``longest`` [s].
+
+    Parameters
+    ----------
+    phasors
+        At take-off, which is clock time.
+    now, terms, series
+        Workspaces of shapes (n+1,), (n+1,), (SERIES_TERMS,).
+    clock, longest, tables
+        As elsewhere.
+
+    Returns
+    -------
+    Whether it ends in a touch, and its length [s].
+
+    """
+    par, h = tables.par, tables.grid
+    elapsed = 0.0
+    while elapsed < longest:
+        turn_phasors(now, phasors, elapsed, clock, tables)
+        p, reach, bound = 0.0, 0.0, 0.0
+        for j in range(len(now)):
+            terms[j] = now[j] * tables.path[j]
+            size = abs(terms[j])
+            p += terms[j].real
+            reach += size
+            bound += size * tables.squares[j]
+        if reach < par.gap:
+            # The free phasors can only shrink: no touch, ever.
+            return False, longest
+        clear = par.gap - bound * h * h / 8.0
+        steps = min(RUN_OF_STEPS, int((longest - elapsed) / h))
+        if abs(p) < clear and steps > 0:
+            made = _march(terms, tables.factors, steps, clear)
+            if made > 0:
+                elapsed += made * h
+                continue
+            for j in range(len(now)):
+                terms[j] = now[j] * tables.path[j]
+        length = min(h, longest - elapsed)
+        fill_series(series, terms, tables.rates)
+        touch = first_contact(series, length, par.gap, bound, reach)
+        if touch != NEVER:
+            return True, elapsed + touch
+        elapsed = longest if length < h else elapsed + length
+    return False, longest

@@ -1,0 +1,153 @@
+"""A run under a harmonic drive: flight, contact, flight, ... up to an instant. SI units.
+
+One kernel advances a state and a clock in place, and on the way fills what it is given: samples, impact
+times, a tally. None of them changes a single step, so what is observed never changes the motion.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .clock import advance_clock, time_until
+from .compiled import compiled
+from .contact import HELD, LEFT, LOG_COLUMNS, NOT_FINITE, advance_contact, begin_contact, contact_workspace
+from .contact_flow import FORCE_TERMS
+from .detection import SERIES_TERMS
+from .flight import FlightTables, drive_phasor, fly, place_on_phasors, take_off, turn_phasors
+from .modes import Complex
+from .outcome import Outcome
+from .parameters import SIDE, Table, Vector, X, Y, Z
+from .tally import MODE, NOTHING, tally_contact, tally_flight
+
+REACHED_END = int(Outcome.REACHED_END)
+TOO_MANY_IMPACTS = int(Outcome.TOO_MANY_IMPACTS)
+LOST = int(Outcome.NOT_FINITE)
+STUCK = int(Outcome.STALLED)
+
+STRETCH_TURN = 0.3
+"""Longest stretch of a contact, as drive phase [rad]: the base force is a polynomial of degree 7 about
+its middle, whose first term left out is 0.15^8/8! = 6e-12 of the force."""
+LOG_ROWS = 256
+NEXT_SAMPLE, IMPACTS = 0, 1
+"""Places of `Record.counts`."""
+
+
+class Record(NamedTuple):
+    """What a run fills on its way."""
+
+    start: float
+    """Time of sample 0 [s]."""
+    sample_rate: float
+    samples: Table
+    """Shape (n, 6); n = 0 keeps none."""
+    impact_times: Vector
+    """Shape (most impacts,) [s]; a run ends when it is full."""
+    counts: NDArray[np.int64]
+    """Samples and impacts so far."""
+    tally: Vector
+
+
+@compiled
+def advance_harmonic(  # noqa: C901 - the two phases and their ends are one loop
+    state: Vector, clock: Vector, until: float, tables: FlightTables, tolerance: float, record: Record
+) -> int:
+    """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code."""
+    terms = len(tables.rates)
+    phasors, now = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
+    workspace = np.zeros(terms, np.complex128)
+    series, force, work = np.zeros(SERIES_TERMS), np.zeros(FORCE_TERMS), contact_workspace()
+    shadow = np.zeros(len(state))
+    log = np.zeros((LOG_ROWS if record.tally[MODE] != NOTHING else 0, LOG_COLUMNS))
+    counts = record.counts
+    while True:
+        longest = time_until(clock, until)
+        if longest <= 0.0:
+            return REACHED_END
+        if not math.isfinite(state[X] + state[Y] + state[Z]):
+            return LOST
+        if state[SIDE] == 0.0:
+            take_off(phasors, state, clock, tables)
+            touches, length = fly(phasors, now, workspace, series, clock, longest, tables)
+            tally_flight(record.tally, phasors, now, workspace, series, clock, length, tables)
+            _sample_flight(phasors, now, clock, length, tables, record)
+            turn_phasors(now, phasors, length, clock, tables)
+            place_on_phasors(state, now, tables)
+            if not touches:
+                clock[0], clock[1] = until, 0.0
+                continue
+            advance_clock(clock, length)
+            if counts[IMPACTS] == len(record.impact_times):
+                return TOO_MANY_IMPACTS
+            record.impact_times[counts[IMPACTS]] = clock[0]
+            counts[IMPACTS] += 1
+            begin_contact(state, math.copysign(1.0, state[Y] - state[Z]), tables.par, tolerance)
+        else:
+            middle = min(0.5 * longest, 0.5 * STRETCH_TURN / tables.omega)
+            limit = min(longest, 2.0 * middle)
+            _fill_base_force(force, clock, middle, tables)
+            shadow[:] = state
+            code, length = advance_contact(state, 0.0, limit, force, middle, tables.par, tolerance, work, log)
+            if code == NOT_FINITE:
+                return LOST
+            if code not in (LEFT, HELD):
+                return STUCK
+            if record.tally[MODE] != NOTHING:
+                tally_contact(record.tally, log, clock, tables)
+            _sample_contact(shadow, clock, length, force, middle, tables, tolerance, work, record)
+            if length >= longest:
+                clock[0], clock[1] = until, 0.0
+            else:
+                advance_clock(clock, length)
+
+
+@compiled
+def _fill_base_force(force: Vector, clock: Vector, middle: float, tables: FlightTables) -> None:
+    """Taylor coefficients of the base force about clock time plus ``middle``."""
+    term = tables.force * drive_phasor(clock, middle, tables)
+    for k in range(FORCE_TERMS):
+        force[k] = term.real
+        term *= complex(0.0, tables.omega / (k + 1.0))
+
+
+@compiled
+def _sample_flight(
+    phasors: Complex, now: Complex, clock: Vector, length: float, tables: FlightTables, record: Record
+) -> None:
+    """Keep the samples that fall into a flight of ``length`` from clock time on."""
+    counts = record.counts
+    while counts[NEXT_SAMPLE] < len(record.samples):
+        later = time_until(clock, record.start + counts[NEXT_SAMPLE] / record.sample_rate)
+        if later > length:
+            return
+        turn_phasors(now, phasors, later, clock, tables)
+        place_on_phasors(record.samples[counts[NEXT_SAMPLE]], now, tables)
+        counts[NEXT_SAMPLE] += 1
+
+
+@compiled
+def _sample_contact(
+    shadow: Vector,
+    clock: Vector,
+    length: float,
+    force: Vector,
+    middle: float,
+    tables: FlightTables,
+    tolerance: float,
+    work: Table,
+    record: Record,
+) -> None:
+    """Keep the samples that fall into a stretch of contact, by a second run that lands on each of them."""
+    counts, reached = record.counts, 0.0
+    none = np.zeros((0, LOG_COLUMNS))
+    while counts[NEXT_SAMPLE] < len(record.samples):
+        later = time_until(clock, record.start + counts[NEXT_SAMPLE] / record.sample_rate)
+        if later > length:
+            return
+        if shadow[SIDE] != 0.0 and later > reached:
+            _, reached = advance_contact(
+                shadow, reached, later, force, middle, tables.par, tolerance, work, none
+            )
+        record.samples[counts[NEXT_SAMPLE]] = shadow[:6]
+        counts[NEXT_SAMPLE] += 1

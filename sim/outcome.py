@@ -1,0 +1,26 @@
+"""How a simulation ended: a value, not an exception, whose text says what to change."""
+
+from enum import IntEnum
+
+_TEXTS = (
+    "reached the end time",
+    "more impacts than allowed: raise max_impact_rate_hz, or suspect chatter",
+    "the state is no longer finite: lower the drive, or check the specimen's numbers",
+    "a contact made no progress: ask for a less strict accuracy, or check the specimen's numbers",
+    "cancelled before the end time",
+)
+
+
+class Outcome(IntEnum):
+    """The codes that the kernels return."""
+
+    REACHED_END = 0
+    TOO_MANY_IMPACTS = 1
+    NOT_FINITE = 2
+    STALLED = 3
+    CANCELLED = 4
+
+    @property
+    def text(self) -> str:
+        """What happened and what to change, for the user."""
+        return _TEXTS[self]
