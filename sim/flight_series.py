@@ -1,18 +1,16 @@
 """Flight as a Taylor series in time: the exact motion over a short stretch, at any instant. SI units."""
 
+from .base_force import Cubic
 from .compiled import compiled
 from .detection import SERIES_TERMS
 from .parameters import VX, VY, VZ, Parameters, Table, Vector, X, Y, Z
 
 
 @compiled
-def fill_flight_series(
-    series: Table, path: Vector, state: Vector, f0: float, f1: float, f2: float, f3: float, par: Parameters
-) -> None:
+def fill_flight_series(series: Table, path: Vector, state: Vector, force: Cubic, par: Parameters) -> None:
     """Write the coefficients of the motion to ``series`` (terms, 6) and those of p to ``path`` (terms,).
 
-    Each coefficient follows from the one before by the equations of motion; the base force is
-    f0 + f1 tau + f2 tau^2 + f3 tau^3 [N].
+    Each coefficient follows from the one before by the equations of motion; the base force is a cubic.
     """
     for i in range(6):
         series[0, i] = state[i]
@@ -20,14 +18,14 @@ def fill_flight_series(
     for k in range(SERIES_TERMS - 1):
         x, y, z = series[k, X], series[k, Y], series[k, Z]
         vx, vy, vz = series[k, VX], series[k, VY], series[k, VZ]
-        force = f0 if k == 0 else f1 if k == 1 else f2 if k == 2 else f3 if k == 3 else 0.0
+        push = force[k] if k < 4 else 0.0
         pull = par.k2 * (z - x) + par.c2 * (vz - vx)
         hold = par.k1 * (y - z) + par.c1 * (vy - vz)
         share = 1.0 / (k + 1)
         series[k + 1, X] = share * vx
         series[k + 1, Y] = share * vy
         series[k + 1, Z] = share * vz
-        series[k + 1, VX] = share * (pull + force - par.k0 * x - par.c0 * vx) / par.mass0
+        series[k + 1, VX] = share * (pull + push - par.k0 * x - par.c0 * vx) / par.mass0
         series[k + 1, VY] = share * -hold / par.mass1
         series[k + 1, VZ] = share * (hold - pull) / par.mass2
         path[k + 1] = share * (vy - vz)

@@ -1,0 +1,117 @@
+"""One piece of an interval: one matrix product if clear of the stops, else resolved in full. SI units."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .base_force import Cubic, shifted
+from .compiled import compiled
+from .contact import HELD, LEFT, LOG_COLUMNS, advance_contact, begin_contact, contact_workspace
+from .contact_flow import FORCE_TERMS
+from .detection import NEVER, SERIES_TERMS, first_contact
+from .flight_series import fill_flight_series, place_on_series
+from .parameters import SIDE, VX, VY, VZ, Parameters, Table, Vector, X, Y, Z
+
+MOST_IMPACTS_IN_A_PIECE = 1000
+"""Far beyond any motion of a specimen; a search that reaches it has lost its way."""
+FAILED = -1
+"""Returned instead of impacts when the state is not finite or a contact made no progress."""
+
+
+class IntervalTables(NamedTuple):
+    """Everything about specimen and interval that does not change from interval to interval."""
+
+    par: Parameters
+    length: float
+    """One piece of the interval [s]: short enough for the Taylor series of detection."""
+    pieces: int
+    transition: Table
+    """Shape (6, 10): state and force coefficients before -> (x, y, z, vx, vy, vz) after one piece."""
+    bound_per_root_energy: float
+    """Largest abs(d2p/dt2) over sqrt(2 * energy) [m/s^2 / J^0.5]."""
+    tolerance: float
+
+
+@compiled
+def acceleration_bound(state: Vector, force: Cubic, tables: IntervalTables) -> float:
+    """Bound of abs(d2p/dt2) over one piece in flight, from the energy at its start [m/s^2].
+
+    The energy grows no faster than d/dt sqrt(2E) = |f| / sqrt(m0); damping only takes from it.
+    """
+    par, h = tables.par, tables.length
+    x, y, z, vx, vy, vz = state[0], state[1], state[2], state[3], state[4], state[5]
+    kinetic = par.mass0 * vx * vx + par.mass1 * vy * vy + par.mass2 * vz * vz
+    elastic = par.k0 * x * x + par.k2 * (z - x) * (z - x) + par.k1 * (y - z) * (y - z)
+    push = abs(force.f0) + h * (abs(force.f1) + h * (abs(force.f2) + h * abs(force.f3)))
+    return tables.bound_per_root_energy * (math.sqrt(kinetic + elastic) + h * push / math.sqrt(par.mass0))
+
+
+@compiled
+def carry_if_clear(state: Vector, force: Cubic, tables: IntervalTables) -> bool:
+    """Carry a flight across one piece, or leave ``state`` alone when a touch cannot be excluded."""
+    if state[SIDE] != 0.0:
+        return False
+    h, step = tables.length, tables.transition
+    clear = tables.par.gap - acceleration_bound(state, force, tables) * h * h / 8.0
+    y = _carried(step, 1, state, force)
+    z = _carried(step, 2, state, force)
+    if not (abs(state[Y] - state[Z]) < clear and abs(y - z) < clear):
+        return False
+    x = _carried(step, 0, state, force)
+    vx = _carried(step, 3, state, force)
+    vy = _carried(step, 4, state, force)
+    vz = _carried(step, 5, state, force)
+    state[X], state[Y], state[Z], state[VX], state[VY], state[VZ] = x, y, z, vx, vy, vz
+    return True
+
+
+@compiled
+def _carried(step: Table, i: int, s: Vector, force: Cubic) -> float:
+    """One row of the transition: a component of the state one piece later."""
+    free: float = (step[i, 0] * s[0] + step[i, 1] * s[1] + step[i, 2] * s[2]) + (
+        step[i, 3] * s[3] + step[i, 4] * s[4] + step[i, 5] * s[5]
+    )
+    forced: float = (step[i, 6] * force.f0 + step[i, 7] * force.f1) + (
+        step[i, 8] * force.f2 + step[i, 9] * force.f3
+    )
+    return free + forced
+
+
+@compiled
+def advance_part(
+    state: Vector, force: Cubic, length: float, tables: IntervalTables, times: Vector, kept: int
+) -> int:
+    """Advance over ``length`` [s], at most a piece, through every touch and every contact in it.
+
+    Impact times (since the start of the piece) go to ``times[kept:]`` while there is room. Returns the
+    impacts, or FAILED.
+    """
+    par = tables.par
+    work, no_log = contact_workspace(), np.zeros((0, LOG_COLUMNS))
+    series, path, pushing = np.empty((SERIES_TERMS, 6)), np.empty(SERIES_TERMS), np.zeros(FORCE_TERMS)
+    pushing[0], pushing[1], pushing[2], pushing[3] = force.f0, force.f1, force.f2, force.f3
+    tau, impacts = 0.0, 0
+    while impacts < MOST_IMPACTS_IN_A_PIECE:
+        if state[SIDE] != 0.0:
+            code, tau = advance_contact(state, tau, length, pushing, 0.0, par, tables.tolerance, work, no_log)
+            if code == HELD:
+                return impacts
+            if code != LEFT:
+                return FAILED
+        rest = shifted(force, tau)
+        bound = acceleration_bound(state, rest, tables)
+        if not bound < math.inf:
+            return FAILED
+        fill_flight_series(series, path, state, rest, par)
+        touch = first_contact(path, length - tau, par.gap, bound, abs(state[Y]) + abs(state[Z]))
+        if touch == NEVER:
+            place_on_series(state, series, length - tau)
+            return impacts
+        place_on_series(state, series, touch)
+        tau += touch
+        if kept + impacts < len(times):
+            times[kept + impacts] = tau
+        impacts += 1
+        begin_contact(state, math.copysign(1.0, state[Y] - state[Z]), par, tables.tolerance)
+    return FAILED
