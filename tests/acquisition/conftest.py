@@ -1,0 +1,252 @@
+"""A bench that behaves: what the generator plays comes back at the converter; both can be made to fail."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.channel import Channel, channels_of
+from acquisition.instruments import Block, Identity, Samples
+from acquisition.knobs import KnobSheet
+from acquisition.recording.layout import RecordingState
+from acquisition.rig import Rig, Role, load_rig
+from acquisition.rig_model import Quantity, RigModel
+
+ROOT = Path(__file__).parent.parent.parent
+SAMPLE_RATE_HZ = 5120.0
+Fault = Callable[[], BaseException]
+
+
+@dataclass
+class LoopbackWorld:
+    """What the fake instruments share: the output's state, the samples passed, and every call made."""
+
+    rig: Rig
+    samples: int = 0
+    is_on: bool = False
+    is_sampling: bool = False
+    amplitude_vpp: float = 0.0
+    cycles: float = 0.0
+    frequency_hz: float = 1.0
+    period: Samples | None = None
+    calls: list[tuple[str, object, int]] = field(default_factory=list)
+    faults: dict[str, list[Fault]] = field(default_factory=dict)
+    permanent: dict[str, Fault] = field(default_factory=dict)
+    drive_factor: float = 1.0
+    base_factor: float = 1.0
+    background_m_per_s2: float = 0.0
+    overloads: tuple = ()
+
+    def call(self, name: str, argument: object = None) -> None:
+        self.calls.append((name, argument, self.samples))
+        failure = None
+        if self.faults.get(name):
+            failure = self.faults[name].pop(0)()
+        elif name in self.permanent:
+            failure = self.permanent[name]()
+        if failure is not None:
+            raise failure
+
+    def amplitudes(self) -> list[tuple[int, float]]:
+        """Every amplitude setting, with the sample at which it was made."""
+        return [(at, value) for name, value, at in self.calls if name == "amplitude"]
+
+    def terminal(self, count: int) -> Samples:
+        """Next samples at the generator's terminal [V]; the phase goes on."""
+        cycles = self.cycles + self.frequency_hz * np.arange(count) / SAMPLE_RATE_HZ
+        self.cycles = (self.cycles + self.frequency_hz * count / SAMPLE_RATE_HZ) % 1.0
+        if not self.is_on:
+            return np.zeros(count)
+        if self.period is None:
+            shape = np.sin(2 * np.pi * cycles)
+        else:
+            place = np.floor(cycles * len(self.period) + 1e-9).astype(int) % len(self.period)
+            shape = self.period[place]
+        return 0.5 * self.amplitude_vpp * self.rig.generator.terminal_factor() * shape
+
+
+class LoopbackGenerator:
+    """A FunctionGenerator that remembers, and fails when told to."""
+
+    identity = Identity("MAKER", "GENERATOR", "1", "1.0", "MAKER,GENERATOR,1,1.0")
+
+    def __init__(self, world: LoopbackWorld) -> None:
+        self._world = world
+
+    def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
+        self._world.call("load_sine", frequency_hz)
+        self._world.period = None
+        self._world.frequency_hz = frequency_hz
+        self._set(amplitude_vpp)
+
+    def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
+        self._world.call("load_waveform", waveform)
+        assert np.max(np.abs(waveform)) <= 1.0
+        self._world.period = waveform
+        self._world.frequency_hz = repetition_hz
+        self._set(amplitude_vpp)
+
+    def set_frequency(self, frequency_hz: float) -> None:
+        self._world.call("set_frequency", frequency_hz)
+        assert self._world.period is None
+        self._world.frequency_hz = frequency_hz
+
+    def set_amplitude(self, amplitude_vpp: float) -> None:
+        self._world.call("set_amplitude", amplitude_vpp)
+        self._set(amplitude_vpp)
+
+    def start(self) -> None:
+        self._world.call("start")
+        self._world.is_on = True
+
+    def stop(self) -> None:
+        self._world.call("stop")
+        self._world.is_on = False
+
+    def close(self) -> None:
+        self.stop()
+
+    def _set(self, amplitude_vpp: float) -> None:
+        assert 2e-3 <= amplitude_vpp <= self._world.rig.generator.amplitude_limit_vpp
+        self._world.amplitude_vpp = amplitude_vpp
+        self._world.calls.append(("amplitude", amplitude_vpp, self._world.samples))
+
+
+class LoopbackDigitizer:
+    """A Digitizer on the loop: drive, amplifier and base follow the generator, the specimen does not move."""
+
+    identity = Identity("MAKER", "DIGITIZER", "2", "1.0", "DIGITIZER")
+    sample_rate_hz = SAMPLE_RATE_HZ
+
+    def __init__(self, world: LoopbackWorld, channels: tuple[Channel, ...]) -> None:
+        self._world = world
+        self._channels = channels
+        self._first = 0
+        self._accelerance = abs(complex(RigModel(world.rig).transfer(Quantity.ACCELERATION, 160.0)))
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        return tuple(channel.role.value for channel in self._channels)
+
+    @property
+    def volts_per_count(self) -> tuple[float | None, ...]:
+        return (None,) * len(self._channels)
+
+    def start(self) -> None:
+        self._world.call("digitizer.start")
+        self._world.samples = 0
+        self._world.is_sampling = True
+
+    def read(self, samples: int) -> Block:
+        world = self._world
+        world.call("digitizer.read", samples)
+        assert world.is_sampling
+        assert samples > 0
+        drive = world.terminal(samples)
+        angle = 2 * np.pi * 160.0 * (world.samples + np.arange(samples)) / SAMPLE_RATE_HZ
+        base = drive * self._accelerance * world.base_factor + world.background_m_per_s2 * np.sin(angle)
+        physical = {
+            Role.DRIVE_VOLTAGE: drive * world.drive_factor,
+            Role.AMPLIFIER_VOLTAGE: drive * world.rig.amplifier.gain,
+            Role.BASE_ACCELERATION: base,
+            Role.M0_VELOCITY: np.zeros(samples),
+        }
+        volts = np.stack([physical[channel.role] / channel.units_per_volt for channel in self._channels])
+        block = Block(world.samples, volts, world.overloads)
+        world.samples += samples
+        return block
+
+    def stop(self) -> None:
+        self._world.call("digitizer.stop")
+        self._world.is_sampling = False
+
+    def close(self) -> None:
+        self.stop()
+
+
+class MemoryRecorder:
+    """A recorder that keeps everything in memory."""
+
+    def __init__(self, world: LoopbackWorld) -> None:
+        self._world = world
+        self.header = None
+        self.path = None
+        self.blocks: list[Block] = []
+        self.events: list[tuple[int, str, str]] = []
+        self.segments: list[dict] = []
+        self.ending: tuple[RecordingState, str] | None = None
+
+    def create(self, path, header):
+        self._world.call("recorder.create")
+        self.path, self.header = path, header
+        return self
+
+    @property
+    def samples(self) -> int:
+        return sum(block.volts.shape[1] for block in self.blocks)
+
+    def append(self, block: Block) -> None:
+        self._world.call("recorder.append")
+        assert block.first_sample == self.samples
+        self.blocks.append(block)
+
+    def log(self, kind: str, text: str, sample: int | None = None) -> None:
+        self.events.append((self.samples if sample is None else sample, kind, text))
+
+    def begin_segment(self, label: str, **numbers) -> None:
+        assert not self.segments or self.segments[-1]["last"] is not None
+        self.segments.append({"label": label, "numbers": numbers, "first": self.samples, "last": None})
+
+    def end_segment(self) -> None:
+        assert self.segments[-1]["last"] is None
+        self.segments[-1]["last"] = self.samples - 1
+
+    def finish(self, state: RecordingState, reason: str = "") -> Path:
+        self._world.call("recorder.finish")
+        self.ending = (state, reason)
+        return self.path
+
+    def states(self) -> list[str]:
+        return [text for _, kind, text in self.events if kind == "state"]
+
+    def channel(self, row: int) -> Samples:
+        """All volts of one channel."""
+        return np.concatenate([block.volts[row] for block in self.blocks])
+
+
+class LoopbackBench:
+    """The fake instruments as a bench."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+        self.world = LoopbackWorld(rig)
+        self.channels = channels_of(rig)
+        self.generator = LoopbackGenerator(self.world)
+        self.digitizer = LoopbackDigitizer(self.world, self.channels)
+        self.identities = {"generator": self.generator.identity, "digitizer": self.digitizer.identity}
+        self.confirmations = KnobSheet(operator="test", confirmed=datetime.now(UTC), knobs=rig.knobs)
+        self.recorder = MemoryRecorder(self.world)
+
+
+@pytest.fixture
+def rig() -> Rig:
+    """The default rig, sampling slowly."""
+    shipped = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    return shipped.model_copy(
+        update={"daq": shipped.daq.model_copy(update={"sample_rate_hz": SAMPLE_RATE_HZ})}
+    )
+
+
+@pytest.fixture
+def bench(rig: Rig) -> LoopbackBench:
+    """A loop of fake instruments."""
+    return LoopbackBench(rig)
+
+
+@pytest.fixture
+def new_bench() -> Callable[[Rig], LoopbackBench]:
+    """Make benches, for tests that need more than one."""
+    return LoopbackBench
