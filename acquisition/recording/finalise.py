@@ -170,12 +170,19 @@ def _write_table(copy: h5py.File, table: Table, columns: Columns) -> None:
     scale = group.create_dataset(layout.ROW, data=np.arange(rows, dtype=layout.COUNT_DTYPE))
     scale.make_scale(layout.ROW)
     for column in table.columns:
-        kind = np.dtype(column.dtype)
-        stored = h5py.string_dtype("utf-8", kind.itemsize) if kind.kind == "S" else kind
-        dataset = group.create_dataset(column.name, shape=(rows,), dtype=stored)
+        dataset = group.create_dataset(column.name, shape=(rows,), dtype=_narrowest(columns[column.name]))
         if rows:
             dataset[:] = columns[column.name]
         dataset.dims[0].attach_scale(scale)
+
+
+def _narrowest(values: np.ndarray[tuple[int], np.dtype[np.generic]]) -> np.dtype[np.generic]:
+    """Find the type that holds a column's values; text no wider than its longest, for the reader's sake."""
+    if values.dtype.kind != "S":
+        return values.dtype
+    longest = max((len(value) for value in values.tolist()), default=0)
+    dtype: np.dtype[np.generic] = h5py.string_dtype("utf-8", max(longest, 1))
+    return dtype
 
 
 def _check(copy: h5py.File) -> None:

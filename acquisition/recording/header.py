@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, field, fields
 from ..errors import RecordingError
 from ..instruments import Identity
 from .attributes import Attribute
+from .json_text import json_text
 from .layout import RESERVED_NAMES, ROLE_WIDTH, Origin
 from .provenance import Provenance, collect_provenance
 
@@ -164,7 +165,7 @@ class RecordingHeader:
             "plan_json": self.plan_json,
             "bench_json": self.bench_json,
             "instruments_json": json.dumps(instruments),
-            "confirmations_json": json.dumps(dict(self.confirmations)),
+            "confirmations_json": json_text("What the operator confirmed", self.confirmations),
             "provenance_json": json.dumps(asdict(self.provenance)),
         }
 

@@ -1,6 +1,5 @@
 """What a recording says besides its samples: events, segments, overloads and gaps, row by row."""
 
-import json
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,6 +8,7 @@ from ..errors import RecordingError
 from ..instruments import Overload
 from . import layout
 from .committer import Batch
+from .json_text import json_text
 from .preallocate import TablePlaces
 from .table_writer import Cell, TableWriter
 
@@ -59,7 +59,7 @@ class Journal:
             raise RecordingError(
                 f"The segment {label!r} cannot begin: {self._open.label!r} has not ended. End it first."
             )
-        numbers_json = json.dumps(dict(numbers), allow_nan=False)
+        numbers_json = json_text(f"The numbers of segment {label!r}", numbers)
         if len(numbers_json) > layout.NUMBERS_WIDTH:
             raise RecordingError(
                 f"The numbers of segment {label!r} take {len(numbers_json)} bytes as JSON; at most"

@@ -19,6 +19,7 @@ from .counts import Counts
 from .disk import is_being_recorded
 from .fixed_text import decoded
 from .header import ChannelHeader
+from .json_text import json_text
 from .layout import Origin, RecordingState
 from .opening import open_hdf5
 from .replacing import replace_with_change
@@ -182,7 +183,7 @@ class Recording:
         room = RESULT_HEAD_BYTES * (1 + len(arrays)) + sum(
             np.asarray(each.values).nbytes for each in arrays.values()
         )
-        room += len(json.dumps(dict(settings)))
+        room += len(json_text(f"The settings of result {name!r}", settings))
         given = replace_with_change(
             self.path, room, lambda file: write_result(file, name, arrays, settings, used)
         )

@@ -30,6 +30,20 @@ def recover(path: Path | str) -> Path:
     part = layout.part_of(final)
     if not part.exists():
         raise RecordingError(f"{part} does not exist, so there is nothing to recover.")
+    try:
+        _finish(part, final)
+        discard(part)
+    except RecordingError:
+        raise
+    except OSError as error:
+        raise RecordingError(
+            f"{part} cannot be recovered: {error}. Nothing is lost; see that folder and file may be written,"
+            " and try again."
+        ) from error
+    return final
+
+
+def _finish(part: Path, final: Path) -> None:
     with sole_use(part):
         with opened_recording(part) as source:
             is_done = final.exists() and _holds(final, source)
@@ -37,8 +51,6 @@ def recover(path: Path | str) -> Path:
             # Left by a crash while the copy was made; everything in it is in the .part.
             layout.tmp_of(final).unlink(missing_ok=True)
             finalise(part)
-    discard(part)
-    return final
 
 
 def _holds(final: Path, source: h5py.File) -> bool:

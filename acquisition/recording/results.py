@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from . import layout
 from .attributes import read_attributes, read_text_dataset, write_attributes, write_text_dataset
+from .json_text import json_text
 from .provenance import collect_provenance
 
 REAL_SUFFIX, IMAG_SUFFIX = "_real", "_imag"
@@ -72,7 +73,7 @@ def write_result(
             **{RAW_SHA256 + role: read_attributes(file[role])["sha256"] for role in roles},
         },
     )
-    write_text_dataset(group, SETTINGS_JSON, json.dumps(dict(settings)))
+    write_text_dataset(group, SETTINGS_JSON, json_text(f"The settings of result {name!r}", settings))
     scalars = {key: value for key, value in settings.items() if type(value) in {int, float, str}}
     write_attributes(group.create_group(layout.SETTINGS), scalars)
     _write_arrays(group, arrays)

@@ -172,6 +172,16 @@ def test_a_segment_cannot_begin_inside_another(tmp_path, make_header):
             writer.end_segment()
 
 
+def test_numbers_that_json_cannot_hold_are_refused(tmp_path, make_header):
+    with create_recording(tmp_path / "a.h5", make_header()) as writer:
+        with pytest.raises(RecordingError, match="'steady' cannot be kept as JSON"):
+            writer.begin_segment("steady", frequency_hz=float("nan"))
+        writer.begin_segment("steady", frequency_hz=np.float64(260.0), realisation=np.int64(3))
+        writer.end_segment()
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert recording.segments[0].numbers == {"frequency_hz": 260.0, "realisation": 3}
+
+
 def test_an_overload_over_several_blocks_is_one_range(tmp_path, make_header, make_block):
     parts = [(0, 99), (100, 149), (200, 210)]
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
