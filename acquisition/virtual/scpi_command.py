@@ -139,10 +139,9 @@ class Number:
         number = self._meant(value, settings) if isinstance(value, Limit) else value
         infinite = number >= INFINITE and self.infinity_allowed(settings)
         low, high = self.limits(settings)
-        slack = _RANGE_ROUNDING * max(abs(low), abs(high))
         if infinite:
             number = math.inf
-        elif low - slack <= number <= high + slack:
+        elif low - _RANGE_ROUNDING * abs(low) <= number <= high + _RANGE_ROUNDING * abs(high):
             number = round(number, self.decimals)
         elif generator.quirks.out_of_range_becomes_default:
             number = min(max(self.default, low), high)

@@ -265,7 +265,14 @@ def _mean_over_pieces(signal: Signal, edges_s: Samples, cuts_s: Samples) -> Samp
     times = np.unique(np.concatenate((edges_s, cuts_s)))
     durations = np.diff(times)
     interval = np.searchsorted(edges_s, times[:-1], side="right") - 1
+    intervals = len(edges_s) - 1
+    means = signal.means(times)
+    pieces = np.bincount(interval, minlength=intervals)
+    sums = np.bincount(interval, weights=durations * means, minlength=intervals)
+    widths = np.bincount(interval, weights=durations, minlength=intervals)
     # Edges that coincide (a signal that begins on one) make empty intervals, which weigh nothing.
-    sums = np.bincount(interval, weights=durations * signal.means(times), minlength=len(edges_s) - 1)
-    widths = np.diff(edges_s)
-    return np.divide(sums, widths, out=np.zeros_like(sums), where=widths > 0)
+    result = np.divide(sums, widths, out=np.zeros_like(sums), where=widths > 0)
+    whole = interval[pieces[interval] == 1]
+    # An uncut interval keeps its mean to the last bit, as if no other interval had been cut.
+    result[whole] = means[pieces[interval] == 1]
+    return np.asarray(result, dtype=np.float64)
