@@ -203,15 +203,15 @@ class VirtualConfig(FrozenModel):
     generator_clock_ppm: float = Field(ge=-200, le=200)
     converter_clock_ppm: float = Field(ge=-200, le=200)
     generator_noise_v: NonNegativeFloat
-    """rms at the terminal while the output is on [V]."""
+    """White, rms from zero to 25.6 kHz, at the terminal while the output is on [V]."""
     amplifier_noise_v: NonNegativeFloat
-    """rms at the output [V]."""
+    """White, rms in the same band, at the output [V]."""
     accelerometer_noise_m_per_s2: NonNegativeFloat
-    """rms in the converter's full band [m/s2]."""
+    """White, rms in the same band [m/s2]."""
     vibrometer_noise_m_per_s_per_rthz: NonNegativeFloat
     vibrometer_dropouts_per_s: NonNegativeFloat
     converter_noise_v: NonNegativeFloat
-    """rms of each input [V]."""
+    """rms of each input at whatever rate it converts [V]."""
 
 
 class Knob(FrozenModel):

@@ -1,0 +1,157 @@
+"""The whole virtual rig, switched on: a generator on the USB bus, a DAQ server, and the world between."""
+
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Self
+
+from acquisition.errors import AcquisitionError, ConfigurationError
+from acquisition.rig import Rig, VirtualConfig
+
+from . import usb_bus
+from .afg1022 import AFG1022
+from .daqmx_server import LOOPBACK, DaqServer, serve
+from .output_signal import Panel
+from .pace import OnDemandPace, Pace, WallPace
+from .rig_faults import RigFaults
+from .scpi_command import Quirks
+from .scpi_socket import ScpiSocket
+from .terminal_voltage import Terminal
+from .time_grid import FULL_BAND_HZ, relative_clock_ppm
+from .usb_remote import usb_service
+from .usbtmc import UsbTmcInstrument
+from .world import World, virtual_section
+
+_USB_RESOURCE_FIELDS = 5
+
+
+class VirtualRig:
+    """Every simulated instrument of a rig, from entering its ``with`` to leaving it.
+
+    Any pyvisa program of this process finds the generator at ``visa_resource``, any nidaqmx program
+    the converter at ``daq_address``. Programs of other processes find both at ``daq_address``: the
+    generator after ``usb_bus.plug_in_remote(daq_address)``, or without it at ``socket_resource``.
+
+    Parameters
+    ----------
+    rig
+        With a ``[virtual]`` section.
+    address
+        ``"host:port"`` to serve on; port 0 takes a free one. Loopback by default: there is no password.
+    quirks, panel
+        Habits of the generator's firmware, and what only its front panel can set: a load that is told
+        to be 50 ohm there, and cannot be set remotely, doubles the voltage at the amplifier.
+
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        address: str = LOOPBACK,
+        *,
+        quirks: Quirks = Quirks(),  # noqa: B008 - frozen
+        panel: Panel = Panel(),  # noqa: B008 - frozen
+    ) -> None:
+        virtual = virtual_section(rig)
+        self.rig = rig
+        self._address = address
+        self._pace = _pace(virtual)
+        # The generator and the world need each other: the clock is looked up when it is asked for.
+        self.generator = AFG1022(
+            lambda: self.world.time_s,
+            serial=_serial(rig.generator.resource),
+            quirks=quirks,
+            panel=panel,
+            terminal=_terminal(rig, virtual),
+        )
+        """What is behind the USB cable."""
+        self.world = World(rig, self.generator)
+        """What is behind the terminals."""
+        self._usb = UsbTmcInstrument(self.generator)
+        self._running: _Running | None = None
+
+    @property
+    def visa_resource(self) -> str:
+        """VISA name of the generator."""
+        return self._usb.identification.resource_name
+
+    @property
+    def daq_address(self) -> str:
+        """``"host:port"`` of the DAQ server, which serves the generator's USB cable as well."""
+        return self._switched_on.daq.address
+
+    @property
+    def socket_resource(self) -> str:
+        """VISA name of the generator for programs that cannot use the USB bus in memory."""
+        return self._switched_on.socket.resource_name
+
+    @property
+    def faults(self) -> RigFaults:
+        """What can go wrong, on demand."""
+        return self._switched_on.faults
+
+    def __enter__(self) -> Self:
+        """Switch everything on, or nothing."""
+        with ExitStack() as starting:
+            usb_bus.plug_in(self._usb)
+            starting.callback(usb_bus.unplug, self._usb)
+            daq = starting.enter_context(
+                serve(self.world, self._pace, self._address, handlers=(usb_service(self._usb),))
+            )
+            socket = starting.enter_context(ScpiSocket(self.generator))
+            faults = RigFaults(self.world, self.generator, self._usb, daq)
+            self._running = _Running(daq, socket, faults, starting.pop_all())
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Switch everything off."""
+        running, self._running = self._running, None
+        if running is not None:
+            running.closing.close()
+
+    @property
+    def _switched_on(self) -> "_Running":
+        if self._running is None:
+            raise AcquisitionError(
+                "The virtual rig is switched off: enter it with 'with VirtualRig(rig) as ...'"
+            )
+        return self._running
+
+
+class _Running:
+    """What exists only while the rig is switched on."""
+
+    def __init__(self, daq: DaqServer, socket: ScpiSocket, faults: RigFaults, closing: ExitStack) -> None:
+        self.daq = daq
+        self.socket = socket
+        self.faults = faults
+        self.closing = closing
+
+
+def _pace(virtual: VirtualConfig) -> Pace:
+    match virtual.pace:
+        case "free":
+            return OnDemandPace()
+        case "wall":
+            return WallPace(virtual.speed)
+
+
+def _serial(resource: str) -> str:
+    """Take the serial number out of ``USB0::0x0699::0x0353::<serial>::INSTR``."""
+    fields = resource.split("::")
+    if not fields[0].startswith("USB") or len(fields) < _USB_RESOURCE_FIELDS:
+        raise ConfigurationError(
+            f"generator.resource = {resource!r}: the virtual generator sits on USB; "
+            "give USB0::0x0699::0x0353::<serial>::INSTR"
+        )
+    return fields[3]
+
+
+def _terminal(rig: Rig, virtual: VirtualConfig) -> Terminal:
+    return Terminal(
+        load_ohm=rig.generator.connected_ohm,
+        clock_error_ppm=relative_clock_ppm(virtual.generator_clock_ppm, virtual.converter_clock_ppm),
+        noise_v_per_rt_hz=virtual.generator_noise_v / FULL_BAND_HZ**0.5,
+        seed=virtual.seed,
+    )
