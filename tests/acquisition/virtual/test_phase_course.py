@@ -36,7 +36,8 @@ def test_a_day_at_25_mhz_loses_less_than_a_millionth_of_a_cycle(frequency_uhz, t
 def test_a_change_of_frequency_keeps_the_phase(first, second, time_s):
     before = SteadyPhase(first, 0.3)
     after = SteadyPhase.through(second, before.phase(time_s), time_s)
-    assert turn(before.phase(time_s), after.phase(time_s)) < 1e-9
+    # 25 million cycles within a second, in double precision, leave 4e-9 of one.
+    assert turn(before.phase(time_s), after.phase(time_s)) < 2e-8
 
 
 @pytest.mark.parametrize("spacing", Spacing)
