@@ -105,18 +105,13 @@ def _ask_phase(generator: Generator, channel: int, parameters: Parameters) -> by
 
 
 def _ask_load(generator: Generator, channel: int, parameters: Parameters) -> bytes:
-    ask = LOAD.command().ask
-    if ask is None:  # pragma: no cover - a number always has a query
-        raise ScpiError(ErrorCode.UNDEFINED_HEADER)
-    reply = ask(generator, channel, parameters)
+    reply = LOAD.ask(generator, channel, parameters)
     high_impedance = math.isinf(generator.settings(channel).declared_load_ohm) and not parameters
     return reply + GBK_OHM_SIGN if high_impedance and generator.quirks.high_impedance_has_ohm_sign else reply
 
 
 def _write_duty(generator: Generator, channel: int, parameters: Parameters) -> None:
-    write = DUTY.command().write
-    if write is not None:
-        write(generator, channel, parameters)
+    DUTY.write(generator, channel, parameters)
     if generator.quirks.duty_queues_error:
         raise ScpiError(ErrorCode.SYNTAX_ERROR)
 
@@ -217,7 +212,7 @@ SWEEP_COMMANDS = (
         lambda s, word: with_mode(RunMode.SWEEP, s, word is FrequencyMode.SWEEP),
     ),
 )
-LOAD_COMMANDS = (Command(HeaderPattern(LOAD.pattern), LOAD.command().write, _ask_load),)
+LOAD_COMMANDS = (Command(HeaderPattern(LOAD.pattern), LOAD.write, _ask_load),)
 CHANNEL_COMMANDS = (
     switch(
         "OUTPut#[:STATe]",
@@ -229,7 +224,7 @@ CHANNEL_COMMANDS = (
     AMPLITUDE.command(),
     OFFSET.command(),
     Command(HeaderPattern("[SOURce#:]PHASe[:ADJust]"), _write_phase, _ask_phase),
-    Command(HeaderPattern(DUTY.pattern), _write_duty, DUTY.command().ask),
+    Command(HeaderPattern(DUTY.pattern), _write_duty, DUTY.ask),
     switch(
         "[SOURce#:]BURSt[:STATe]",
         lambda s: s.mode is RunMode.BURST,

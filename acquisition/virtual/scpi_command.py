@@ -131,9 +131,10 @@ class Number:
 
     def command(self) -> Command:
         """Return the table entry."""
-        return Command(HeaderPattern(self.pattern), self._write, self._ask, self.channels)
+        return Command(HeaderPattern(self.pattern), self.write, self.ask, self.channels)
 
-    def _write(self, generator: Generator, channel: int, parameters: Parameters) -> None:
+    def write(self, generator: Generator, channel: int, parameters: Parameters) -> None:
+        """Take a number, or a word that stands for one."""
         settings = generator.settings(channel)
         value = self.read(only(parameters), self.units)
         number = self._meant(value, settings) if isinstance(value, Limit) else value
@@ -149,7 +150,8 @@ class Number:
             raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
         generator.configure(channel, self.put(settings, number))
 
-    def _ask(self, generator: Generator, channel: int, parameters: Parameters) -> bytes:
+    def ask(self, generator: Generator, channel: int, parameters: Parameters) -> bytes:
+        """Answer the value, or what MIN, MAX or DEF would be."""
         settings = generator.settings(channel)
         if not parameters:
             value = self.get(settings)

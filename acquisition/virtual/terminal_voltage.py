@@ -18,13 +18,14 @@ from .phase_course import NO_TIMES, Modulator, PhaseCourse, SteadyPhase
 Samples = NDArray[np.float64]
 
 OUTPUT_RESISTANCE_OHM = 50.0
+NO_BLOCK = -1
 NOISE_BLOCK = 4096
 """Samples of noise that one draw of the random generator makes; a block is drawn from its own seed."""
 PRN_BANDWIDTH_HZ = 25e6
 """Bandwidth of the built-in noise (hardware reference, unverified)."""
 PRN_PEAK_TO_RMS = 6.0
 """Peak-to-peak amplitude of the built-in noise over its rms (hardware reference, section 2)."""
-_CONTINUES = 1e-6
+_CONTINUES = 1e-3
 """A block whose start is this close (in intervals) to the end of the last one continues it."""
 
 
@@ -174,6 +175,7 @@ class Timeline:
         self._rendered = 0
         """Samples since ``_origin_s``, all of one interval."""
         self._noise_index = 0
+        self._noise_block = NO_BLOCK, np.empty(0)
         self._end_s = -np.inf
 
     @property
@@ -250,9 +252,16 @@ class Timeline:
         """Return unit noise that depends on the seed and the sample's number alone."""
         begin, self._noise_index = self._noise_index, self._noise_index + count
         blocks = range(begin // NOISE_BLOCK, (self._noise_index - 1) // NOISE_BLOCK + 1)
-        drawn = [np.random.default_rng((self.terminal.seed, b)).standard_normal(NOISE_BLOCK) for b in blocks]
+        drawn = np.concatenate([self._drawn(block) for block in blocks])
         skip = begin - blocks[0] * NOISE_BLOCK
-        return np.concatenate(drawn)[skip : skip + count]
+        return drawn[skip : skip + count]
+
+    def _drawn(self, block: int) -> Samples:
+        """Return a block of unit noise; the last one is kept, for renderings shorter than a block."""
+        if self._noise_block[0] != block:
+            generator = np.random.default_rng((self.terminal.seed, block))
+            self._noise_block = block, generator.standard_normal(NOISE_BLOCK)
+        return self._noise_block[1]
 
     def _forget_before(self, time_s: float) -> None:
         """Drop signals that ended before a rig time."""
