@@ -99,7 +99,7 @@ class AFG1022:
             delay_s, self._next_delay_s = self._next_delay_s, 0.0
             if self._next_is_corrupted:
                 self._next_is_corrupted = False
-                data = bytes(byte ^ BYTE if place % 2 else byte for place, byte in enumerate(data))
+                data = _spoiled(data)
             return Reply(data, delay_s)
 
     def report(self, code: ErrorCode) -> None:
@@ -172,7 +172,7 @@ class AFG1022:
             self._next_delay_s = delay_s
 
     def corrupt_next_reply(self) -> None:
-        """Spoil every second byte of the next reply."""
+        """Spoil the next reply: its first byte and every second one after it, but not its end."""
         with self._lock:
             self._next_is_corrupted = True
 
@@ -312,3 +312,8 @@ class AFG1022:
         sounding = self._channels[SOUNDING_CHANNEL]
         if memory_name(sounding.shape) is not None:
             self._play(sounding)
+
+
+def _spoiled(reply: bytes) -> bytes:
+    """Invert every second byte, from the first on, and leave the newline that frames the reply."""
+    return bytes(byte if place % 2 else byte ^ BYTE for place, byte in enumerate(reply[:-1])) + reply[-1:]

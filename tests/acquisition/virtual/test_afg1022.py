@@ -306,5 +306,7 @@ def test_a_corrupted_reply_is_followed_by_a_sound_one():
     device = generator()
     sound = device.execute(b"*IDN?").data
     device.corrupt_next_reply()
-    assert device.execute(b"*IDN?").data != sound
+    spoilt = device.execute(b"*IDN?").data
+    assert (len(spoilt), spoilt[-1:]) == (len(sound), b"\n")
+    assert not spoilt.isascii()
     assert device.execute(b"*IDN?").data == sound
