@@ -1,0 +1,174 @@
+"""Sweeps: the recorded drive is the clock, orders come apart, envelopes and responses are what was put in."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from analysis.decimation import Decimator
+from analysis.drive_phase import drive_phase
+from analysis.errors import InvalidRequest, NotEnoughData, UnusableData
+from analysis.order_tracking import tracked_orders
+from analysis.sweep import SweepSums, sweep_response
+
+RATE = 8192.0
+
+
+def sweep(duration_s, start_hz=150.0, stop_hz=350.0, clock_ppm=0.0, rate_hz=RATE):
+    """Time by the converter's clock and the phase of a sweep by the generator's."""
+    time = np.arange(int(duration_s * rate_hz)) / rate_hz
+    own = time * (1 + clock_ppm * 1e-6)
+    return time, 2 * np.pi * (start_hz * own + 0.5 * (stop_hz - start_hz) / duration_s * own**2)
+
+
+@pytest.mark.parametrize("factor", [1, 2, 5, 6])
+@pytest.mark.parametrize("blocks", [[5000], [1, 2, 3000, 1997], [70, 60, 4870]])
+def test_decimation_keeps_time_and_amplitude_however_the_blocks_fall(factor, blocks):
+    time = np.arange(5000)
+    x = np.cos(2 * np.pi * 0.3 / factor * time + 0.4)
+    decimator = Decimator(1, factor)
+    edges = np.cumsum([0, *blocks])
+    parts = [decimator.add(x[np.newaxis, a:b]) for a, b in pairwise(edges)]
+    y = np.concatenate([*parts, decimator.finish()], axis=1)[0]
+    assert y.size == -(-5000 // factor)
+    inner = slice(40, -40)
+    np.testing.assert_allclose(y[inner], x[::factor][inner], atol=3e-5)
+
+
+def test_what_would_alias_is_removed():
+    decimator = Decimator(1, 4)
+    x = np.cos(2 * np.pi * 0.18 * np.arange(20_000))[np.newaxis]
+    y = np.concatenate((decimator.add(x), decimator.finish()), axis=1)[0]
+    assert np.max(np.abs(y[50:-50])) < 3e-5
+
+
+def test_ten_ppm_between_the_clocks_is_250_degrees_on_a_nominal_sweep_and_nothing_on_the_recorded_one():
+    rate = 2048.0
+    _, recorded = sweep(200, clock_ppm=10, rate_hz=rate)
+    _, nominal = sweep(200, rate_hz=rate)
+    at = int(199 * rate)
+    turned = np.degrees(recorded[at] - nominal[at])
+    assert turned == pytest.approx(360 * 10e-6 * 199 * (150 + 199), rel=1e-3)
+    assert turned == pytest.approx(250, abs=0.3)
+    phase = drive_phase(np.cos(recorded), rate, low_hz=150, high_hz=350)
+    error = np.abs(np.angle(np.exp(1j * (phase.phase_rad - recorded))))
+    assert np.max(error[200:-200]) < np.radians(0.01)
+    assert np.max(error) < np.radians(1)
+    assert phase.frequency_hz[at] == pytest.approx(349 + 10e-6 * (150 + 2 * 199), abs=0.01)
+
+
+def test_all_orders_come_apart_although_no_interval_holds_whole_periods():
+    _, phase = sweep(20)
+    parts = {0.5: 0.2 - 0.1j, 1.0: 2.0 + 1j, 1.5: 0.05j, 2.0: -0.3 + 0j, 3.0: 0.1 + 0.2j}
+    x = 0.7 + sum(np.real(a * np.exp(1j * k * phase)) for k, a in parts.items())
+    tracked = tracked_orders(x, phase, interval_samples=701)
+    for order, value in parts.items():
+        np.testing.assert_allclose(tracked.order(order), value, atol=1e-9)
+    assert np.max(tracked.residual_rms) < 1e-9
+
+
+def test_the_stated_spread_of_an_order_is_its_scatter():
+    rng = np.random.default_rng(1)
+    time, phase = sweep(60)
+    x = np.cos(phase) + 0.3 * rng.standard_normal(time.size)
+    tracked = tracked_orders(x, phase, interval_samples=820)
+    for order in (0.5, 1.0, 3.0):
+        scatter = np.std(tracked.order(order).real)
+        assert np.mean(tracked.sd[tracked.orders.index(order)]) == pytest.approx(scatter, rel=0.1)
+    assert np.mean(tracked.residual_rms) == pytest.approx(0.3, rel=0.02)
+
+
+@pytest.mark.parametrize("direction", ["up", "down"])
+def test_a_linear_motion_has_equal_responses_and_its_envelope(direction):
+    """x = 3 exp(-0.5 i) U at every frequency, by its velocity and the base's acceleration."""
+    ends = (150.0, 350.0) if direction == "up" else (350.0, 150.0)
+    time, phase = sweep(20, *ends)
+    omega = np.gradient(phase) * RATE
+    base = -4e-6 * omega**2 * np.sin(phase)
+    velocity = 12e-6 * omega * np.cos(phase - 0.5)
+    rng = np.random.default_rng(2)
+    velocity += 1e-6 * rng.standard_normal(time.size)
+    result = sweep_response(np.sin(phase), base, velocity, RATE, low_hz=150, high_hz=350)
+    inner = slice(5, -5)
+    assert np.sign(result.sweep_rate_hz_per_s) == (1 if direction == "up" else -1)
+    np.testing.assert_allclose(
+        result.frequency_hz, np.interp(result.time_s, time, omega) / 2 / np.pi, atol=0.2
+    )
+    np.testing.assert_allclose(result.drive_amplitude_m[inner], 4e-6, rtol=2e-3)
+    np.testing.assert_allclose(result.response_ii[inner], 3, rtol=2e-3)
+    np.testing.assert_allclose(result.response_i[inner], 3, rtol=0.02)
+    np.testing.assert_allclose(result.phase_rad[inner], -0.5, atol=2e-3)
+    np.testing.assert_allclose(result.upper[inner], 12e-6 * 2 * np.pi * result.frequency_hz[inner], rtol=0.02)
+    np.testing.assert_allclose(result.lower[inner], -result.upper[inner], rtol=0.02)
+    assert result.noise_rms == pytest.approx(np.median(result.velocity.residual_rms), rel=0.2)
+
+
+def test_the_vibrometers_delay_is_removed_from_the_phase():
+    time, phase = sweep(20)
+    late = sweep(20)[1]
+    omega = np.gradient(phase) * RATE
+    delay = 400e-6
+    late = np.interp(time - delay, time, phase)
+    result = sweep_response(
+        np.sin(phase), -(omega**2) * np.sin(phase), omega * np.cos(late), RATE, low_hz=150, high_hz=350
+    )
+    straight = sweep_response(
+        np.sin(phase),
+        -(omega**2) * np.sin(phase),
+        omega * np.cos(late),
+        RATE,
+        low_hz=150,
+        high_hz=350,
+        delay_s=delay,
+    )
+    inner = slice(5, -5)
+    assert np.all(np.abs(result.phase_rad[inner]) > 0.3)
+    np.testing.assert_allclose(straight.phase_rad[inner], 0, atol=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("quality", "shift_hz", "amplitude"), [(10, 0.02, 1.001), (50, 0.12, 1.000), (250, 0.45, 0.943)]
+)
+def test_a_resonance_passed_at_one_hertz_a_second_shifts_as_theory_says(quality, shift_hz, amplitude):
+    """A 260 Hz resonator, exact step response between samples; the ISO 7626 limit at Q 250 is 0.97 Hz/s."""
+    _, phase = sweep(40, 240.0, 280.0)
+    natural = 2 * np.pi * 260
+    system = signal.cont2discrete(([natural**2], [1, natural / quality, natural**2]), 1 / RATE, method="foh")
+    x = signal.lfilter(np.ravel(system[0]), np.ravel(system[1]), np.sin(phase))
+    tracked = tracked_orders(x, phase, interval_samples=410)
+    frequency = 240 + (np.arange(tracked.residual_rms.size) + 0.5) * 410 / RATE
+    size = np.abs(tracked.order(1.0))
+    top = int(np.argmax(size[20:-20])) + 20
+    near = slice(top - 6, top + 7)
+    fit = np.polyfit(frequency[near] - frequency[top], size[near], 2)
+    peak_hz = frequency[top] - fit[1] / (2 * fit[0])
+    steady_hz = 260 * np.sqrt(1 - 1 / (2 * quality**2))
+    assert peak_hz - steady_hz == pytest.approx(shift_hz, abs=0.05)
+    hold = np.sinc(260 / RATE) ** 2  # straight lines between samples weaken the drive by this
+    steady = hold * quality / np.sqrt(1 - 1 / (4 * quality**2))
+    assert size[top] / steady == pytest.approx(amplitude, abs=0.004)
+
+
+def test_a_sweep_in_blocks_equals_the_sweep_at_once():
+    time, phase = sweep(10)
+    rows = np.stack((np.sin(phase), np.sin(phase), np.cos(phase)))
+    whole = sweep_response(*rows, RATE, low_hz=150, high_hz=350)
+    sums = SweepSums(RATE, low_hz=150, high_hz=350)
+    for first in range(0, time.size, 777):
+        sums.add(rows[:, first : first + 777])
+    parts = sums.response()
+    np.testing.assert_allclose(parts.response_ii, whole.response_ii, rtol=1e-9)
+    np.testing.assert_array_equal(parts.upper, whole.upper)
+
+
+def test_a_meaningless_sweep_is_refused():
+    with pytest.raises(InvalidRequest, match="ascending"):
+        SweepSums(RATE, low_hz=350, high_hz=150)
+    with pytest.raises(InvalidRequest, match="longer intervals or fewer orders"):
+        tracked_orders(np.zeros(1000), np.arange(1000) * 0.1, interval_samples=100)
+    with pytest.raises(NotEnoughData, match="at least 10"):
+        drive_phase(np.zeros(100), RATE, low_hz=150, high_hz=350)
+    noise = np.random.default_rng(3).standard_normal(8192)
+    with pytest.raises(UnusableData, match="no sine"):
+        drive_phase(noise, RATE, low_hz=150, high_hz=350)
