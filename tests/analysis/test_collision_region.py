@@ -1,0 +1,89 @@
+"""Collision regions, on simulated sweeps whose impacts are known."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from analysis.collision_region import collisions
+from analysis.sweep import sweep_response
+from sim.drive import LinearSweep
+from sim.integrate import integrate
+from sim.specimen import gong2025
+
+RATE = 12_800.0
+NOISE_DENSITY = 2e-7  # m/s per root hertz, a vibrometer's
+
+
+@cache
+def simulated(amplitude_m, start_hz, stop_hz, duration_s=32.0):
+    drive = LinearSweep(start_hz, stop_hz, duration_s, amplitude_m)
+    path = integrate(gong2025(), drive, duration_s, sample_rate_hz=RATE)
+    phase = 2 * np.pi * drive.turns(path.time_s)
+    omega = 2 * np.pi * drive.frequency_hz(path.time_s)
+    base = -amplitude_m * omega**2 * np.sin(phase)
+    # Amplifier and shaker distort by a tenth of a per cent, which the specimen sees little of.
+    base += 1e-3 * amplitude_m * omega**2 * (np.sin(2 * phase) + np.sin(3 * phase) + np.sin(5 * phase))
+    impacts_hz = drive.frequency_hz(path.impacts.times_s)
+    return np.sin(phase), base, path.states[:, 3], impacts_hz
+
+
+def found(amplitude_m, start_hz, stop_hz, spoil=lambda velocity, rng: velocity):
+    drive, base, velocity, impacts_hz = simulated(amplitude_m, start_hz, stop_hz)
+    rng = np.random.default_rng(1)
+    noisy = velocity + NOISE_DENSITY * np.sqrt(RATE / 2) * rng.standard_normal(velocity.size)
+    ends = sorted((start_hz, stop_hz))
+    result = sweep_response(drive, base, spoil(noisy, rng), RATE, low_hz=ends[0], high_hz=ends[1])
+    return collisions(result), impacts_hz
+
+
+@pytest.mark.parametrize(
+    ("amplitude_m", "start_hz", "stop_hz"),
+    [(5e-6, 225.0, 385.0), (2e-6, 225.0, 385.0), (5e-6, 385.0, 225.0)],
+)
+def test_the_region_reaches_from_the_first_impact_to_the_last(amplitude_m, start_hz, stop_hz):
+    result, impacts_hz = found(amplitude_m, start_hz, stop_hz)
+    assert impacts_hz.size > 1000
+    first, last = result.regions[0], result.regions[-1]
+    assert first.start.frequency_hz == pytest.approx(impacts_hz[0], abs=3)
+    assert last.stop.frequency_hz == pytest.approx(impacts_hz[-1], abs=3)
+    assert first.start.lower_hz - 0.5 <= impacts_hz[0] <= first.start.upper_hz + 0.5
+    assert not first.reaches_start
+    assert not last.reaches_stop
+
+
+def test_no_impact_no_region():
+    result, impacts_hz = found(2e-7, 225.0, 385.0)
+    assert impacts_hz.size == 0
+    assert result.regions == ()
+    assert not result.is_colliding.any()
+
+
+def test_collisions_all_along_are_a_region_that_reaches_both_ends():
+    result, _ = found(20e-6, 240.0, 300.0)
+    (region,) = result.regions
+    assert region.reaches_start
+    assert region.reaches_stop
+
+
+def test_noise_ten_times_as_high_moves_no_edge():
+    def spoil(velocity, rng):
+        return velocity + 10 * NOISE_DENSITY * np.sqrt(RATE / 2) * rng.standard_normal(velocity.size)
+
+    result, impacts_hz = found(5e-6, 225.0, 385.0, spoil)
+    assert result.regions[0].start.frequency_hz == pytest.approx(impacts_hz[0], abs=3)
+    assert result.regions[-1].stop.frequency_hz == pytest.approx(impacts_hz[-1], abs=3)
+
+
+def test_drop_outs_of_the_laser_are_outvoted():
+    def spoil(velocity, rng):
+        spoilt = velocity.copy()
+        for place in rng.integers(0, velocity.size - 20, 12):
+            spoilt[place : place + 20] = 0.2
+        return spoilt
+
+    result, impacts_hz = found(5e-6, 225.0, 385.0, spoil)
+    assert result.regions[0].start.frequency_hz == pytest.approx(impacts_hz[0], abs=3)
+    assert result.regions[-1].stop.frequency_hz == pytest.approx(impacts_hz[-1], abs=3)
+    quiet, _ = found(2e-7, 225.0, 385.0, spoil)
+    assert quiet.regions == ()
