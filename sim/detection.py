@@ -13,6 +13,8 @@ import numpy as np
 from .compiled import compiled
 from .parameters import Vector
 
+LARGEST_BOUND = 1e150
+"""Beyond it squares overflow, and nothing can be said about touches [m/s^2]."""
 SERIES_TERMS = 14
 """With |rate| * h <= `LONGEST_TURN` the first term left out is below 1e-18 of the sum."""
 LONGEST_TURN = 0.25
@@ -25,7 +27,7 @@ ROUNDING = 8.0 * float(np.finfo(np.float64).eps)
 """A gap below this part of the largest term of p is rounding, and counts as closed."""
 JUST_SHORT = 0.999
 """Part of the earliest possible return that is taken after leaving a stop."""
-SHORTEST_ADVANCE = 1e-12
+SHORTEST_ADVANCE = 1e-15
 """An advance is at least this long [s], so that a search always ends."""
 PATIENCE = 400
 """Advances after which the shortest one grows: a tangency followed for ever has no crossing."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from .clock import angle_at
 from .compiled import compiled
-from .detection import LONGEST_TURN, NEVER, SERIES_TERMS, first_contact
+from .detection import LARGEST_BOUND, LONGEST_TURN, NEVER, SERIES_TERMS, first_contact
 from .drive import Harmonic
 from .modes import Complex, harmonic_motion, modal_form
 from .parameters import Parameters, Vector, X, Y, Z, parameters
@@ -24,6 +24,10 @@ GRID_TURN = 0.5 * LONGEST_TURN
 """Grid step as the fastest rate times its length [rad]."""
 RUN_OF_STEPS = 512
 """Grid steps between two fresh exponentials: keeps the products' rounding below 1e-13."""
+
+
+CLEAR, TOUCHES, OUT_OF_RANGE = range(3)
+"""How a flight ends."""
 
 
 class FlightTables(NamedTuple):
@@ -155,7 +159,7 @@ def fly(
     clock: Vector,
     longest: float,
     tables: FlightTables,
-) -> tuple[bool, float]:
+) -> tuple[int, float]:
     """Find how long a flight lasts: to the first touch, or ``longest`` [s].
 
     Parameters
@@ -169,7 +173,7 @@ def fly(
 
     Returns
     -------
-    Whether it ends in a touch, and its length [s].
+    CLEAR, TOUCHES or OUT_OF_RANGE (too large for any statement), and its length [s].
 
     """
     par, h = tables.par, tables.grid
@@ -185,7 +189,9 @@ def fly(
             bound += size * tables.squares[j]
         if reach < par.gap:
             # The free phasors can only shrink: no touch, ever.
-            return False, longest
+            return CLEAR, longest
+        if not bound < LARGEST_BOUND:
+            return OUT_OF_RANGE, elapsed
         clear = par.gap - bound * h * h / 8.0
         steps = min(RUN_OF_STEPS, int((longest - elapsed) / h))
         if abs(p) < clear and steps > 0:
@@ -199,6 +205,6 @@ def fly(
         fill_series(series, terms, tables.rates)
         touch = first_contact(series, length, par.gap, bound, reach)
         if touch != NEVER:
-            return True, elapsed + touch
+            return TOUCHES, elapsed + touch
         elapsed = longest if length < h else elapsed + length
-    return False, longest
+    return CLEAR, longest

@@ -15,7 +15,16 @@ from .compiled import compiled
 from .contact import HELD, LEFT, LOG_COLUMNS, NOT_FINITE, advance_contact, begin_contact, contact_workspace
 from .contact_flow import FORCE_TERMS
 from .detection import SERIES_TERMS
-from .flight import FlightTables, drive_phasor, fly, place_on_phasors, take_off, turn_phasors
+from .flight import (
+    CLEAR,
+    OUT_OF_RANGE,
+    FlightTables,
+    drive_phasor,
+    fly,
+    place_on_phasors,
+    take_off,
+    turn_phasors,
+)
 from .modes import Complex
 from .outcome import Outcome
 from .parameters import SIDE, Table, Vector, X, Y, Z
@@ -50,7 +59,7 @@ class Record(NamedTuple):
 
 
 @compiled
-def advance_harmonic(  # noqa: C901 - the two phases and their ends are one loop
+def advance_harmonic(  # noqa: C901, PLR0912 - the two phases and their ends are one loop
     state: Vector, clock: Vector, until: float, tables: FlightTables, tolerance: float, record: Record
 ) -> int:
     """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code."""
@@ -69,12 +78,14 @@ def advance_harmonic(  # noqa: C901 - the two phases and their ends are one loop
             return LOST
         if state[SIDE] == 0.0:
             take_off(phasors, state, clock, tables)
-            touches, length = fly(phasors, now, workspace, series, clock, longest, tables)
+            ends, length = fly(phasors, now, workspace, series, clock, longest, tables)
+            if ends == OUT_OF_RANGE:
+                return LOST
             tally_flight(record.tally, phasors, now, workspace, series, clock, length, tables)
             _sample_flight(phasors, now, clock, length, tables, record)
             turn_phasors(now, phasors, length, clock, tables)
             place_on_phasors(state, now, tables)
-            if not touches:
+            if ends == CLEAR:
                 clock[0], clock[1] = until, 0.0
                 continue
             advance_clock(clock, length)

@@ -9,7 +9,7 @@ from .base_force import Cubic, shifted
 from .compiled import compiled
 from .contact import HELD, LEFT, LOG_COLUMNS, advance_contact, begin_contact, contact_workspace
 from .contact_flow import FORCE_TERMS
-from .detection import NEVER, SERIES_TERMS, first_contact
+from .detection import LARGEST_BOUND, NEVER, SERIES_TERMS, first_contact
 from .flight_series import fill_flight_series, place_on_series
 from .parameters import SIDE, VX, VY, VZ, Parameters, Table, Vector, X, Y, Z
 
@@ -101,7 +101,7 @@ def advance_part(
                 return FAILED
         rest = shifted(force, tau)
         bound = acceleration_bound(state, rest, tables)
-        if not bound < math.inf:
+        if not bound < LARGEST_BOUND:
             return FAILED
         fill_flight_series(series, path, state, rest, par)
         touch = first_contact(path, length - tau, par.gap, bound, abs(state[Y]) + abs(state[Z]))
