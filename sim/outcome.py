@@ -7,7 +7,6 @@ _TEXTS = (
     "more impacts than allowed: raise max_impact_rate_hz, or suspect chatter",
     "the state is no longer finite: lower the drive, or check the specimen's numbers",
     "a contact made no progress: ask for a less strict accuracy, or check the specimen's numbers",
-    "cancelled before the end time",
 )
 
 
@@ -18,7 +17,6 @@ class Outcome(IntEnum):
     TOO_MANY_IMPACTS = 1
     NOT_FINITE = 2
     STALLED = 3
-    CANCELLED = 4
 
     @property
     def text(self) -> str:

@@ -1,0 +1,111 @@
+import numpy as np
+import pytest
+from scipy.integrate import simpson
+
+from sim.accuracy import Accuracy
+from sim.drive import Harmonic
+from sim.integrate import integrate
+from sim.modes import base_transmissibility
+from sim.outcome import Outcome
+from sim.response import steady_response
+from sim.response_curve import response_curve
+from sim.specimen import gong2025
+
+
+@pytest.mark.parametrize("frequency_hz", [7.3, 60.0, 266.2, 601.7])
+def test_without_contact_both_responses_are_the_exact_transmissibility(frequency_hz):
+    specimen, drive = gong2025(contact="linear"), Harmonic(frequency_hz, 5e-6)
+    response = steady_response(specimen, drive)
+    x, _, _, p = base_transmissibility(specimen, frequency_hz)[0]
+    assert response.response_i == pytest.approx(abs(x), rel=1e-9)
+    assert response.response_ii == pytest.approx(abs(x), rel=1e-9)
+    assert response.relative_i == pytest.approx(abs(p), rel=1e-9)
+    assert response.relative_ii == pytest.approx(abs(p), rel=1e-9)
+    assert response.line_x_m == pytest.approx(-1j * x * drive.amplitude_m, rel=1e-9)
+    assert response.impacts == 0
+
+
+def test_a_periodic_impacting_motion_has_the_responses_of_its_trajectory():
+    specimen, drive = gong2025(damping_time_s=3e-5), Harmonic(130.0, 20e-6)
+    response = steady_response(specimen, drive, Accuracy.REFERENCE, duration_s=2.0, window_s=1.0)
+    run = integrate(specimen, drive, 2.0, Accuracy.REFERENCE, sample_rate_hz=5e5)
+    window = run.time_s > 1.0 - 1e-9
+    x, p = run.states[window, 0], (run.states[:, 1] - run.states[:, 2])[window]
+    against = 2.0 * np.exp(-2j * np.pi * drive.frequency_hz * run.time_s[window])
+    assert response.largest_x_m == pytest.approx(np.abs(x).max(), rel=1e-7)
+    assert response.largest_p_m == pytest.approx(np.abs(p).max(), rel=1e-6)
+    assert response.line_x_m == pytest.approx(simpson(x * against, x=run.time_s[window]), rel=1e-8)
+    assert response.line_p_m == pytest.approx(simpson(p * against, x=run.time_s[window]), rel=1e-6)
+    assert response.impacts == np.count_nonzero(run.impacts.times_s > 1.0)
+
+
+def test_the_known_periodic_state_is_reproduced():
+    response = steady_response(gong2025(damping_time_s=3e-5), Harmonic(130.0, 20e-6))
+    assert response.largest_x_m == pytest.approx(29.397e-6, abs=1e-9)
+    assert abs(response.line_x_m) == pytest.approx(31.4080e-6, abs=2e-10)
+
+
+def test_the_known_chaotic_state_is_reproduced_within_its_own_scatter():
+    response = steady_response(gong2025(damping_time_s=3e-5), Harmonic(260.0, 5e-6))
+    assert response.largest_x_m == pytest.approx(28.5e-6, rel=0.1)
+    assert abs(response.line_x_m) == pytest.approx(9.87e-6, rel=0.08)
+    assert response.impacts == pytest.approx(1570, rel=0.05)
+
+
+def test_a_run_that_did_not_end_has_no_response():
+    response = steady_response(gong2025(), Harmonic(130.0, 20e-6), max_impact_rate_hz=1.0)
+    assert response.outcome is Outcome.TOO_MANY_IMPACTS
+    assert np.isnan(response.response_i)
+    assert np.isnan(response.response_ii)
+
+
+def test_a_sweep_by_hand_goes_on_from_the_state_before():
+    specimen, drive = gong2025(damping_time_s=3e-5), Harmonic(130.0, 20e-6)
+    short = steady_response(specimen, drive, duration_s=2.0, window_s=0.5)
+    again = steady_response(specimen, drive, duration_s=0.5, window_s=0.5, initial_state=short.final_state)
+    assert again.response_i == pytest.approx(short.response_i, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("drive", "options", "sentence"),
+    [
+        (Harmonic(100.0, 0.0), {}, "amplitude 0 m has no response"),
+        (Harmonic(100.0, 1e-6), {"window_s": 31.0}, r"Window 31\.0 s is not allowed"),
+        (Harmonic(0.1, 1e-6), {}, "must hold one drive period"),
+    ],
+)
+def test_what_has_no_response_is_refused(drive, options, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        steady_response(gong2025(), drive, **options)
+
+
+def test_a_curve_keeps_the_order_of_its_frequencies_whatever_the_threads():
+    specimen, frequencies = gong2025(), [300.0, 100.0, 200.0, 90.0, 250.0]
+    options = {"duration_s": 0.4, "window_s": 0.2}
+    alone = response_curve(specimen, 5e-6, frequencies, workers=1, **options)
+    together = response_curve(specimen, 5e-6, frequencies, workers=3, **options)
+    np.testing.assert_array_equal(alone.frequency_hz, frequencies)
+    np.testing.assert_array_equal(alone.values("response_i"), together.values("response_i"))
+    assert together.is_complete
+
+
+def test_a_curve_tells_its_progress_and_stops_when_it_is_cancelled():
+    seen = []
+    curve = response_curve(
+        gong2025(),
+        1e-6,
+        np.linspace(50.0, 60.0, 200),
+        workers=1,
+        duration_s=0.4,
+        window_s=0.2,
+        progress=lambda done, asked: seen.append((done, asked)),
+        cancelled=lambda: len(seen) >= 3,
+    )
+    assert seen[:3] == [(1, 200), (2, 200), (3, 200)]
+    assert 3 <= len(curve.points) < 200
+    assert not curve.is_complete
+
+
+def test_a_curve_refuses_a_frequency_before_it_computes_anything():
+    with pytest.raises(ValueError, match=r"Drive frequency -1\.0 Hz"):
+        response_curve(gong2025(), 1e-6, [100.0, -1.0])
