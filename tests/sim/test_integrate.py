@@ -1,0 +1,280 @@
+"""Whole runs: against scipy, against each other, and against the laws of mechanics."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import simpson, solve_ivp
+
+from sim.accuracy import Accuracy
+from sim.base_motion import sweep_error_m
+from sim.drive import Harmonic, LinearSweep, LogarithmicSweep, Sampled
+from sim.integrate import integrate
+from sim.modes import base_transmissibility
+from sim.outcome import Outcome
+from sim.specimen import gong2025
+
+PERIODIC = Harmonic(130.0, 20e-6)
+"""Strikes about 260 times a second and settles on a stable period."""
+INDEPENDENT = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-14, "max_step": 2e-5}
+CHAOTIC = Harmonic(260.0, 5e-6)
+
+
+def paper(**options):
+    return gong2025(**{"damping_time_s": 3e-5, **options})
+
+
+def equations(specimen, displacement, velocity):
+    """Section 0 of the model as written, with the 3/2 power: an independent right-hand side."""
+    m0, m1, m2 = specimen.masses
+    k0, k1, k2 = specimen.stiffnesses
+    c0, c1, c2 = specimen.dampings
+
+    def rates(t, state):
+        x, y, z, vx, vy, vz = state
+        p, rate = y - z, vy - vz
+        force = np.sign(p) * specimen.contact.stiffness * max(abs(p) - specimen.gap_m, 0.0) ** 1.5
+        upper, inner = k2 * (z - x) + c2 * (vz - vx), k1 * p + c1 * rate + force
+        base = k0 * (displacement(t) - x) + c0 * (velocity(t) - vx)
+        return [vx, vy, vz, (upper + base) / m0, -inner / m1, (inner - upper) / m2]
+
+    return rates
+
+
+def distance(first, second):
+    """Largest difference of two states in units of 100 um and 0.1 m/s."""
+    return np.max(np.abs(first - second) / np.repeat([1e-4, 0.1], 3))
+
+
+def energy(specimen, state):
+    """Kinetic, elastic and contact energy [J], the base at rest."""
+    x, y, z, vx, vy, vz = state.T
+    m0, m1, m2 = specimen.masses
+    k0, k1, k2 = specimen.stiffnesses
+    pressed = np.maximum(np.abs(y - z) - specimen.gap_m, 0.0)
+    elastic = k0 * x**2 + k1 * (y - z) ** 2 + k2 * (z - x) ** 2
+    contact = 0.4 * specimen.contact.stiffness * pressed**2.5
+    return 0.5 * (m0 * vx**2 + m1 * vy**2 + m2 * vz**2 + elastic) + contact
+
+
+@pytest.mark.parametrize("drive", [PERIODIC, CHAOTIC])
+def test_an_independent_integrator_of_the_equations_as_written_agrees(drive):
+    specimen, omega = paper(), 2.0 * np.pi * drive.frequency_hz
+    rates = equations(
+        specimen,
+        lambda t: drive.amplitude_m * np.sin(omega * t),
+        lambda t: drive.amplitude_m * omega * np.cos(omega * t),
+    )
+    ours = integrate(specimen, drive, 0.03, Accuracy.REFERENCE)
+    theirs = solve_ivp(
+        rates, (0.0, 0.03), np.zeros(6), method="DOP853", rtol=1e-11, atol=1e-14, max_step=2e-5
+    )
+    assert ours.impacts.count > 2
+    assert distance(ours.final_state, theirs.y[:, -1]) < 2e-6
+
+
+def test_each_level_of_accuracy_is_nearer_to_the_reference_in_a_periodic_motion():
+    specimen = paper()
+    runs = {level: integrate(specimen, PERIODIC, 2.0, level) for level in Accuracy}
+    reference = runs[Accuracy.REFERENCE]
+    assert {run.impacts.count for run in runs.values()} == {523}
+    assert distance(runs[Accuracy.QUICK].final_state, reference.final_state) < 2e-5
+    assert distance(runs[Accuracy.STANDARD].final_state, reference.final_state) < 2e-6
+
+
+def test_without_contact_a_long_run_ends_on_the_exact_transmissibility():
+    specimen, drive = paper(contact="linear"), Harmonic(266.0, 50e-6)
+    run = integrate(specimen, drive, 1000.0 + 0.3 / drive.frequency_hz)
+    moved = base_transmissibility(specimen, drive.frequency_hz)[0, :3]
+    expected = (moved * drive.amplitude_m * np.exp(2j * np.pi * 0.3)).imag
+    np.testing.assert_allclose(run.final_state[:3], expected, rtol=1e-8, atol=1e-9 * abs(expected).max())
+
+
+def test_phase_does_not_drift_over_a_million_periods():
+    specimen, drive = paper(contact="linear"), Harmonic(256.0, 1e-6)
+    start = integrate(specimen, drive, 2.0).final_state
+    late = integrate(specimen, drive, 2.0, start_time_s=4096.0).final_state
+    np.testing.assert_allclose(late, start, rtol=1e-11, atol=0)
+
+
+def test_without_damping_and_drive_the_energy_stays_through_a_thousand_impacts():
+    specimen = gong2025(damping_time_s=0.0)
+    state = np.array([2e-5, 0.0, -4e-5, 0.1, 0.05, -0.2])
+    run = integrate(
+        specimen, Harmonic(100.0, 0.0), 2.0, Accuracy.REFERENCE, initial_state=state, sample_rate_hz=3e3
+    )
+    assert run.impacts.count > 1000
+    held = energy(specimen, run.states)
+    np.testing.assert_allclose(held, held[0], rtol=2e-10 * run.impacts.count)
+
+
+def test_in_a_periodic_motion_the_drive_does_the_work_that_the_dampers_take():
+    specimen, drive = paper(), PERIODIC
+    settled = integrate(specimen, drive, 10.0, Accuracy.REFERENCE).final_state
+    per_period = 20_000
+    run = integrate(
+        specimen,
+        drive,
+        2.0 / drive.frequency_hz,
+        Accuracy.REFERENCE,
+        initial_state=settled,
+        sample_rate_hz=per_period * drive.frequency_hz,
+    )
+    assert distance(run.final_state, settled) < 1e-9
+    x, _, _, vx, vy, vz = run.states.T
+    omega = 2.0 * np.pi * drive.frequency_hz
+    base = drive.amplitude_m * np.sin(omega * run.time_s)
+    base_rate = drive.amplitude_m * omega * np.cos(omega * run.time_s)
+    k0, (c0, c1, c2) = specimen.stiffnesses[0], specimen.dampings
+    work = simpson((k0 * (base - x) + c0 * (base_rate - vx)) * base_rate, x=run.time_s)
+    taken = simpson(c0 * (base_rate - vx) ** 2 + c1 * (vy - vz) ** 2 + c2 * (vz - vx) ** 2, x=run.time_s)
+    assert taken > 0.0
+    assert work == pytest.approx(taken, rel=1e-6)
+
+
+@pytest.mark.parametrize("drive", [PERIODIC, LinearSweep(100.0, 300.0, 1.0, 10e-6)])
+def test_sampling_does_not_change_the_motion_by_one_bit(drive):
+    plain = integrate(paper(), drive, 0.3)
+    for rate in (777.0, 48_000.0):
+        sampled = integrate(paper(), drive, 0.3, sample_rate_hz=rate)
+        np.testing.assert_array_equal(sampled.final_state, plain.final_state)
+        np.testing.assert_array_equal(sampled.impacts.times_s, plain.impacts.times_s)
+
+
+def test_samples_lie_on_the_motion_in_flight_and_in_contact():
+    specimen = paper()
+    run = integrate(specimen, PERIODIC, 0.1, Accuracy.REFERENCE, sample_rate_hz=50_000.0)
+    p = run.states[:, 1] - run.states[:, 2]
+    pressed = np.flatnonzero(np.abs(p) > specimen.gap_m)
+    assert len(run.time_s) == 5001
+    assert len(pressed) > 10
+    for index in (*pressed[:5], 1234):
+        there = integrate(specimen, PERIODIC, float(run.time_s[index]), Accuracy.REFERENCE)
+        assert distance(there.final_state, run.states[index]) < 1e-8
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(0.0, 0.25))
+def test_a_run_in_two_parts_ends_where_the_whole_does(first_s):
+    specimen = paper()
+    for drive in (PERIODIC, LogarithmicSweep(90.0, 150.0, 0.25, 20e-6)):
+        whole = integrate(specimen, drive, 0.25, Accuracy.REFERENCE)
+        first = integrate(specimen, drive, first_s, Accuracy.REFERENCE)
+        second = integrate(
+            specimen, drive, 0.25 - first_s, Accuracy.REFERENCE, first.final_state, start_time_s=first_s
+        )
+        assert first.impacts.count + second.impacts.count in range(
+            whole.impacts.count, whole.impacts.count + 2
+        )
+        assert distance(second.final_state, whole.final_state) < 1e-6
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(60.0, 500.0), st.floats(2e-6, 30e-6))
+def test_half_a_turn_of_the_drive_mirrors_the_motion(frequency_hz, amplitude_m):
+    here = integrate(paper(), Harmonic(frequency_hz, amplitude_m), 0.02, Accuracy.REFERENCE)
+    there = integrate(paper(), Harmonic(frequency_hz, amplitude_m, np.pi), 0.02, Accuracy.REFERENCE)
+    assert here.impacts.count == there.impacts.count
+    assert distance(here.final_state, -there.final_state) < 1e-6
+
+
+def test_a_sampled_sine_drives_like_the_sine_itself_with_order_four():
+    specimen = paper()
+    harmonic = integrate(specimen, PERIODIC, 0.25, Accuracy.REFERENCE)
+    errors = []
+    for rate in (2500.0, 5000.0, 10_000.0):
+        time_s = np.arange(round(0.26 * rate)) / rate
+        sine = PERIODIC.amplitude_m * np.sin(2.0 * np.pi * PERIODIC.frequency_hz * time_s)
+        sampled = integrate(specimen, Sampled(sine, rate), 0.25, Accuracy.REFERENCE)
+        assert sampled.impacts.count == harmonic.impacts.count
+        errors.append(distance(sampled.final_state, harmonic.final_state))
+    assert errors[-1] < 1e-6
+    assert np.log2(errors[0] / errors[2]) / 2.0 > 3.5
+
+
+def test_a_sweep_agrees_with_an_independent_integrator_within_its_stated_error():
+    specimen, sweep = paper(), LinearSweep(80.0, 300.0, 0.05, 20e-6)
+
+    def angle(t):
+        return 2.0 * np.pi * sweep.turns(np.asarray(t))
+
+    rates = equations(
+        specimen,
+        lambda t: sweep.amplitude_m * np.sin(angle(t)),
+        lambda t: 2.0 * np.pi * sweep.frequency_hz(np.asarray(t)) * sweep.amplitude_m * np.cos(angle(t)),
+    )
+    ours = integrate(specimen, sweep, 0.03, Accuracy.REFERENCE)
+    theirs = solve_ivp(
+        rates, (0.0, 0.03), np.zeros(6), method="DOP853", rtol=1e-11, atol=1e-14, max_step=2e-5
+    )
+    assert ours.impacts.count > 2
+    assert distance(ours.final_state, theirs.y[:, -1]) < 3e-6
+    assert sweep_error_m(sweep, Accuracy.REFERENCE) < 1e-11 * sweep.amplitude_m
+
+
+def test_a_drive_that_just_touches_strikes_and_one_a_hair_below_does_not():
+    specimen = paper()
+    frequency_hz = 130.0
+    reach = abs(base_transmissibility(specimen, frequency_hz)[0, 3])
+    threshold = specimen.gap_m / reach
+    for ratio, strikes in ((1.0 - 1e-9, False), (1.0 + 1e-9, True)):
+        drive = Harmonic(frequency_hz, threshold * ratio)
+        motion = base_transmissibility(specimen, frequency_hz)[0, :3] * drive.amplitude_m * -1j
+        steady = np.concatenate([motion, 2j * np.pi * frequency_hz * motion]).real
+        run = integrate(specimen, drive, 3.3 / frequency_hz, initial_state=steady)
+        assert (run.impacts.count > 0) is strikes
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(60.0, 550.0), st.floats(1.5e-6, 10e-6))
+def test_no_impact_is_missed_that_a_fine_grid_of_samples_sees(frequency_hz, amplitude_m):
+    specimen = paper()
+    run = integrate(specimen, Harmonic(frequency_hz, amplitude_m), 0.05, sample_rate_hz=1e6)
+    pressed = np.abs(run.states[:, 1] - run.states[:, 2]) > specimen.gap_m
+    onsets = run.time_s[1:][pressed[1:] & ~pressed[:-1]]
+    for onset in onsets:
+        assert np.min(np.abs(run.impacts.times_s - onset)) <= 1.1e-6
+    assert run.impacts.count >= len(onsets)
+
+
+def test_a_run_may_start_in_contact():
+    specimen = paper()
+    p = specimen.gap_m + 1e-6
+    run = integrate(specimen, Harmonic(100.0, 0.0), 1e-3, initial_state=(0.0, p, 0.0, 0.0, 0.0, 0.0))
+    assert run.outcome is Outcome.REACHED_END
+    assert abs(run.final_state[1] - run.final_state[2]) < specimen.gap_m
+
+
+def test_too_many_impacts_end_the_run_and_say_what_to_change():
+    run = integrate(paper(), PERIODIC, 30.0, max_impact_rate_hz=10.0)
+    assert run.outcome is Outcome.TOO_MANY_IMPACTS
+    assert run.end_time_s < 30.0
+    assert run.impacts.count == 400
+    assert "max_impact_rate_hz" in run.outcome.text
+
+
+def test_a_motion_beyond_all_numbers_is_an_outcome_and_does_not_hang():
+    run = integrate(paper(), Harmonic(200.0, 1e300), 1.0)
+    assert run.outcome is not Outcome.REACHED_END
+
+
+@pytest.mark.parametrize("amplitude_m", [1e-3, 1e-1])
+def test_a_violent_drive_is_allowed(amplitude_m):
+    run = integrate(paper(), Harmonic(200.0, amplitude_m), 0.1)
+    assert run.outcome is Outcome.REACHED_END
+    assert run.impacts.count > 0
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"duration_s": -1.0}, r"Duration -1\.0 s is not allowed"),
+        ({"duration_s": 2.0}, r"The run ends at 2\.0 s, the drive at 1\.0 s"),
+        ({"duration_s": 0.5, "start_time_s": float("nan")}, "Start time nan s is not allowed"),
+        ({"duration_s": 0.5, "sample_rate_hz": 0.0}, r"Sample rate 0\.0 Hz is not allowed"),
+        ({"duration_s": 0.5, "initial_state": [0.0, 1.0]}, "give six finite numbers"),
+    ],
+)
+def test_what_cannot_be_run_is_refused_in_one_sentence(options, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        integrate(paper(), LinearSweep(50.0, 100.0, 1.0, 1e-6), **options)

@@ -1,0 +1,79 @@
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sim.modes import base_transmissibility, modal_form, state_matrix
+from sim.specimen import gong2025
+
+DAMPINGS = st.floats(0.0, 1e-2)
+
+
+def test_at_zero_frequency_everything_follows_the_base():
+    np.testing.assert_allclose(base_transmissibility(gong2025(), 0.0), [[1.0, 1.0, 1.0, 0.0]], atol=1e-14)
+
+
+def test_the_transmissibility_satisfies_the_equations_of_motion():
+    specimen = gong2025(damping_time_s=3e-5)
+    m0, m1, m2 = specimen.masses
+    k0, k1, k2 = specimen.stiffnesses
+    c0, c1, c2 = specimen.dampings
+    frequency = np.array([20.0, 94.6, 266.2, 499.6, 800.0])
+    x, y, z, p = base_transmissibility(specimen, frequency).T
+    s = 2j * np.pi * frequency
+    upper = (k2 + c2 * s) * (z - x)
+    np.testing.assert_allclose(m0 * s**2 * x, upper + (k0 + c0 * s) * (1.0 - x), rtol=1e-10)
+    np.testing.assert_allclose(m1 * s**2 * y, -(k1 + c1 * s) * p, rtol=1e-10)
+    np.testing.assert_allclose(m2 * s**2 * z, (k1 + c1 * s) * p - upper, rtol=1e-10)
+
+
+def test_the_peaks_lie_at_the_modes():
+    frequency = np.arange(50.0, 600.0, 0.1)
+    size = np.abs(base_transmissibility(gong2025(), frequency)[:, 0])
+    peaks = frequency[1:-1][(size[1:-1] > size[:-2]) & (size[1:-1] > size[2:])]
+    np.testing.assert_allclose(peaks, [94.4, 266.0, 500.5], atol=0.15)
+
+
+@given(DAMPINGS, DAMPINGS, DAMPINGS)
+def test_the_modes_rebuild_any_state_and_its_rate(first, second, third):
+    k0, k1, k2 = gong2025().stiffnesses
+    specimen = dataclasses.replace(gong2025(), dampings=(first * k0, second * k1, third * k2))
+    form = modal_form(specimen)
+    state = np.array([1e-5, -3e-5, 2e-5, 0.01, 0.02, -0.04])
+    phasors = form.rows @ state
+    system, _ = state_matrix(specimen)
+    np.testing.assert_allclose((phasors @ form.shapes).real, state, rtol=1e-7, atol=1e-12)
+    rate = system @ state
+    np.testing.assert_allclose(
+        ((phasors * form.rates) @ form.shapes).real, rate, rtol=1e-6, atol=1e-6 * abs(rate).max()
+    )
+    assert (form.rates.real <= 0.0).all()
+
+
+def test_the_decay_rates_add_up_to_the_trace_of_the_damping():
+    form = modal_form(gong2025(damping_time_s=3e-5))
+    assert 2.0 * form.rates.real.sum() == pytest.approx(-390.081, abs=1e-3)
+
+
+def test_a_specimen_without_damping_has_modes_that_do_not_decay():
+    assert np.abs(modal_form(gong2025(damping_time_s=0.0)).rates.real).max() < 1e-10
+
+
+def test_modes_that_coincide_are_refused_with_a_remedy():
+    # m0 alone, critically damped: c2 and c1 of zero leave it coupled only through a vanishing spring.
+    k0, m0 = 1000.0, 1e-3
+    critical = dataclasses.replace(
+        gong2025(),
+        masses=(m0, 1e-3, 1e-3),
+        stiffnesses=(k0, 1.0, 1e-20),
+        dampings=(2.0 * np.sqrt(k0 * m0), 0.0, 0.0),
+    )
+    with pytest.raises(ValueError, match="coincide"):
+        modal_form(critical)
+
+
+def test_a_negative_frequency_is_refused():
+    with pytest.raises(ValueError, match="zero or positive"):
+        base_transmissibility(gong2025(), [-1.0])
