@@ -84,7 +84,11 @@ class DataCalls:
             _require_width(task, bits)
             reading = _read_what_fits(task, request)
             counts = _laid_out(_counts(task, reading).astype(np.float64), request).astype(np.int64)
-            return {"status": reading.status, "read_array": counts, "samps_per_chan_read": reading.samples}
+            return {
+                "status": reading.status,
+                "read_array": counts.ravel().tolist(),
+                "samps_per_chan_read": reading.samples,
+            }
 
         return read_binary
 

@@ -118,6 +118,7 @@ def _read_buffered(task: Task, wanted: int, timeout_s: float) -> Reading:
             status = int(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE)
         blocks.append(acquisition.read_at(first + taken, piece))
         taken += piece
+        task.rig.changed.notify_all()
         if not has_come:
             break
     return Reading(np.concatenate(blocks, axis=1) if blocks else np.empty((len(task.inputs), 0)), status)

@@ -1,0 +1,245 @@
+"""Channels of a simulated task: units, ranges, coupling, excitation, and what a device refuses."""
+
+import numpy as np
+import pytest
+from nidaqmx import DaqError, Task
+from nidaqmx.constants import (
+    AccelSensitivityUnits,
+    AccelUnits,
+    AcquisitionType,
+    ChannelType,
+    Coupling,
+    ExcitationSource,
+    ForceUnits,
+    TaskMode,
+    TerminalConfiguration,
+    UsageTypeAI,
+    VelocityIEPESensorSensitivityUnits,
+    VelocityUnits,
+    VoltageUnits,
+)
+from nidaqmx.error_codes import DAQmxErrors
+from nidaqmx.scale import Scale
+
+MODULE = "cDAQ1Mod1/ai1"
+
+
+@pytest.fixture
+def task(daq):
+    return daq.task()
+
+
+def verify(task):
+    task.control(TaskMode.TASK_VERIFY)
+
+
+def volts(task, daq, samples=64):
+    task.timing.cfg_samp_clk_timing(51200, sample_mode=AcquisitionType.CONTINUOUS)
+    values = np.array(task.read(samples))
+    wired = daq.world.wirings[-1][0]
+    return values, daq.world.voltage(wired, np.arange(samples) / 51200)
+
+
+def test_an_accelerometer_reads_in_g_by_its_sensitivity(task, daq):
+    task.ai_channels.add_ai_accel_chan(
+        MODULE, min_val=-50, max_val=50, sensitivity=98.0, current_excit_val=0.002
+    )
+    values, wired_v = volts(task, daq)
+    np.testing.assert_allclose(values, wired_v / 0.098, rtol=1e-12)
+
+
+def test_an_accelerometer_reads_in_si_if_asked(task, daq):
+    task.ai_channels.add_ai_accel_chan(
+        MODULE,
+        min_val=-500,
+        max_val=500,
+        units=AccelUnits.METERS_PER_SECOND_SQUARED,
+        sensitivity=0.0980665,
+        sensitivity_units=AccelSensitivityUnits.VOLTS_PER_G,
+        current_excit_val=0.002,
+    )
+    values, wired_v = volts(task, daq)
+    np.testing.assert_allclose(values, wired_v / 0.01, rtol=1e-12)
+
+
+def test_velocity_force_and_pressure_sensors_read_in_their_units(daq):
+    adders = [
+        (
+            lambda task: task.ai_channels.add_ai_velocity_iepe_chan(
+                MODULE, units=VelocityUnits.METERS_PER_SECOND, sensitivity=4.0, current_excit_val=0.002,
+                sensitivity_units=VelocityIEPESensorSensitivityUnits.MILLIVOLTS_PER_MILLIMETER_PER_SECOND,
+                min_val=-1, max_val=1,
+            ),
+            4.0,
+        ),
+        (
+            lambda task: task.ai_channels.add_ai_force_iepe_chan(
+                MODULE, units=ForceUnits.NEWTONS, sensitivity=2.25, current_excit_val=0.002,
+                min_val=-2000, max_val=2000,
+            ),
+            2.25e-3,
+        ),
+        (
+            lambda task: task.ai_channels.add_ai_microphone_chan(
+                MODULE, mic_sensitivity=50.0, max_snd_press_level=120.0, current_excit_val=0.002
+            ),
+            0.05,
+        ),
+    ]  # fmt: skip
+    for add, volts_per_unit in adders:
+        task = Task(grpc_options=daq.options)
+        add(task)
+        values, _ = volts(task, daq)
+        first_s = daq.world.time_s - 64 / 51200
+        wired_v = daq.world.voltage(daq.world.wirings[-1][0], first_s + np.arange(64) / 51200)
+        np.testing.assert_allclose(values, wired_v / volts_per_unit, rtol=1e-6, atol=1e-9)
+        task.close()
+
+
+def test_excitation_and_coupling_reach_the_world(task, daq):
+    channel = task.ai_channels.add_ai_accel_chan(MODULE, min_val=-50, max_val=50, sensitivity=100.0,
+                                                 current_excit_val=0.002)  # fmt: skip
+    assert channel.ai_coupling is Coupling.AC
+    task.read(10)
+    assert daq.world.wirings[-1][0].iepe_current_a == 0.002
+    assert daq.world.wirings[-1][0].coupling == "AC"
+
+
+def test_a_voltage_channel_has_no_excitation_until_it_is_given_one(task, daq):
+    channel = task.ai_channels.add_ai_voltage_chan(MODULE)
+    assert channel.ai_coupling is Coupling.DC
+    assert channel.ai_excit_src is ExcitationSource.NONE
+    channel.ai_coupling = Coupling.AC
+    channel.ai_excit_src = ExcitationSource.INTERNAL
+    channel.ai_excit_val = 0.002
+    task.read(10)
+    assert daq.world.wirings[-1][0].iepe_current_a == 0.002
+
+
+def test_excitation_needs_ac_coupling(task):
+    channel = task.ai_channels.add_ai_accel_chan(MODULE, current_excit_val=0.002)
+    channel.ai_coupling = Coupling.DC
+    with pytest.raises(DaqError, match="IEPE") as caught:
+        verify(task)
+    assert caught.value.error_code == DAQmxErrors.INVALID_ATTRIBUTE_VALUE
+
+
+def test_a_current_the_device_does_not_have_is_refused_with_those_it_has(task):
+    task.ai_channels.add_ai_accel_chan(MODULE, current_excit_val=0.004)
+    with pytest.raises(DaqError, match=r"0\.004\nPossible Values: 0, 0\.002") as caught:
+        verify(task)
+    assert caught.value.error_code == DAQmxErrors.INVALID_ATTRIBUTE_VALUE
+
+
+def test_the_smallest_range_that_fits_is_taken(task):
+    channel = task.ai_channels.add_ai_voltage_chan("Dev2/ai0", min_val=-0.7, max_val=0.5)
+    assert (channel.ai_rng_low, channel.ai_rng_high) == (-1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("limits", "allowed"),
+    [((-10, 10), "5 on cDAQ1Mod1/ai1"), ((1, 1), "below AI_Max"), ((2, -2), "below AI_Max")],
+)
+def test_limits_no_range_holds_are_refused_with_what_is_allowed(task, limits, allowed):
+    task.ai_channels.add_ai_voltage_chan(MODULE, min_val=limits[0], max_val=limits[1])
+    with pytest.raises(DaqError, match=allowed) as caught:
+        verify(task)
+    assert caught.value.error_code == DAQmxErrors.INVALID_ATTRIBUTE_VALUE
+
+
+def test_a_terminal_configuration_the_device_does_not_have_is_refused(task):
+    task.ai_channels.add_ai_voltage_chan(MODULE, terminal_config=TerminalConfiguration.RSE)
+    with pytest.raises(DaqError, match="PSEUDO_DIFF"):
+        verify(task)
+
+
+@pytest.mark.parametrize("rate_hz", [0.0, -1.0, 100.0, 51201.0])
+def test_a_rate_out_of_reach_is_refused_with_the_rates_there_are(task, rate_hz):
+    task.ai_channels.add_ai_voltage_chan(MODULE)
+    task.timing.cfg_samp_clk_timing(rate_hz)
+    with pytest.raises(DaqError, match=r"1651\.61 to 51200") as caught:
+        verify(task)
+    assert caught.value.error_code == DAQmxErrors.INVALID_ATTRIBUTE_VALUE
+
+
+def test_a_multiplexer_shares_its_rate_among_the_channels(task):
+    task.ai_channels.add_ai_voltage_chan("Dev2/ai0:4")
+    task.timing.cfg_samp_clk_timing(60e3)
+    with pytest.raises(DaqError, match="50000"):
+        verify(task)
+
+
+def test_a_linear_scale_maps_volts(daq, task):
+    Scale.create_lin_scale("vibrometer", 0.025, 0.1, grpc_options=daq.options)
+    task.ai_channels.add_ai_voltage_chan(
+        MODULE, min_val=-0.025, max_val=0.225, units=VoltageUnits.FROM_CUSTOM_SCALE,
+        custom_scale_name="vibrometer",
+    )  # fmt: skip
+    values, wired_v = volts(task, daq)
+    np.testing.assert_allclose(values, 0.025 * wired_v + 0.1, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("names", "code"),
+    [
+        ("Dev1/ai9", DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST),
+        ("cDAQ1Mod1/ao0", DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST),
+        ("Dev9/ai0", DAQmxErrors.INVALID_DEVICE_ID),
+        ("Dev1/ao0", DAQmxErrors.INVALID_PHYS_CHAN_TYPE),
+        ("Dev1/ai0, Dev2/ai0", DAQmxErrors.MULTI_DEVS_IN_TASK),
+        ("Dev1/ai0, Dev1/ai0", DAQmxErrors.VIRTUAL_CHAN_NAME_USED),
+    ],
+)
+def test_inputs_that_do_not_exist_or_do_not_go_together_are_refused(task, names, code):
+    with pytest.raises(DaqError) as caught:
+        task.ai_channels.add_ai_voltage_chan(names)
+    assert caught.value.error_code == code
+
+
+def test_sensors_need_a_device_with_excitation(task):
+    with pytest.raises(DaqError) as caught:
+        task.ai_channels.add_ai_accel_chan("Dev2/ai0")
+    assert caught.value.error_code == DAQmxErrors.PHYS_CHAN_MEAS_TYPE
+
+
+def test_a_later_channel_of_a_list_may_leave_out_its_device(task):
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai0, ai2")
+    assert task.channel_names == ["Dev1/ai0", "Dev1/ai2"]
+
+
+def test_channels_are_called_what_the_program_calls_them(task):
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai0:1", name_to_assign_to_channel="base")
+    assert task.channel_names == ["base0", "base1"]
+    channel = task.ai_channels["base1"]
+    assert channel.physical_channel.name == "Dev1/ai1"
+    assert channel.chan_type is ChannelType.ANALOG_INPUT
+    assert channel.ai_meas_type is UsageTypeAI.VOLTAGE
+    assert [device.name for device in task.devices] == ["Dev1"]
+
+
+def test_a_setting_of_a_list_of_channels_reaches_all_of_them(task):
+    both = task.ai_channels.add_ai_voltage_chan("Dev1/ai0:1")
+    both.ai_coupling = Coupling.AC
+    assert [task.ai_channels[name].ai_coupling for name in task.channel_names] == [Coupling.AC] * 2
+
+
+def test_only_the_device_that_detects_overloads_tells_them_and_only_while_running(task, daq):
+    daq.world.gain = 6.0  # 12 V on ai1
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai0:1", min_val=-10, max_val=10)
+    task.timing.cfg_samp_clk_timing(25600, sample_mode=AcquisitionType.CONTINUOUS)
+    with pytest.raises(DaqError) as caught:
+        _ = task.in_stream.overloaded_chans_exist
+    assert caught.value.error_code == DAQmxErrors.CANT_GET_PROPERTY_TASK_NOT_RUNNING
+    assert np.max(task.read(2560)) == 10.0
+    assert task.in_stream.overloaded_chans_exist
+    assert task.in_stream.overloaded_chans == ["Dev1/ai1"]
+    assert not task.in_stream.overloaded_chans_exist
+
+
+def test_the_module_says_that_it_does_not_detect_overloads(task):
+    task.ai_channels.add_ai_voltage_chan(MODULE)
+    task.timing.cfg_samp_clk_timing(25600, sample_mode=AcquisitionType.CONTINUOUS)
+    task.start()
+    with pytest.raises(DaqError, match="NI 9234") as caught:
+        _ = task.in_stream.overloaded_chans_exist
+    assert caught.value.error_code == DAQmxErrors.ATTR_NOT_SUPPORTED

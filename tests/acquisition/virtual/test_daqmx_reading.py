@@ -1,0 +1,220 @@
+"""Samples that a program reads from the simulated DAQ."""
+
+import numpy as np
+import pytest
+from nidaqmx import DaqError
+from nidaqmx.constants import (
+    READ_ALL_AVAILABLE,
+    AcquisitionType,
+    FillMode,
+    OverwriteMode,
+    ReadRelativeTo,
+    SampleTimingType,
+    TaskMode,
+)
+from nidaqmx.error_codes import DAQmxErrors
+from nidaqmx.stream_readers import AnalogMultiChannelReader, AnalogUnscaledReader
+
+RATE_HZ = 10240.0
+
+
+def expected(numbers, first, count, rate_hz=RATE_HZ):
+    """The closed form of what channels of that number show, from a sample on."""
+    time_s = (first + np.arange(count)) / rate_hz
+    return np.stack([0.5 + (n + 1) * np.sin(2 * np.pi * 40 * (n + 1) * time_s) for n in numbers])
+
+
+@pytest.fixture
+def task(daq):
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai1:3")
+    task.timing.cfg_samp_clk_timing(10000, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=5000)
+    return task
+
+
+def test_the_rate_read_back_is_the_rate_of_the_samples(task):
+    assert task.timing.samp_clk_rate == RATE_HZ
+    np.testing.assert_allclose(task.read(300), expected((1, 2, 3), 0, 300), atol=1e-9)
+
+
+@pytest.mark.parametrize("samples", [1, 512, 5120, 51200])
+def test_nothing_is_lost_or_repeated_between_reads_of_any_size(task, samples):
+    reader = AnalogMultiChannelReader(task.in_stream)
+    block = np.empty((3, samples))
+    for number in range(4):
+        reader.read_many_sample(block, samples)
+        np.testing.assert_allclose(block, expected((1, 2, 3), number * samples, samples), atol=1e-7)
+
+
+def test_a_long_run_keeps_its_memory_and_its_place(daq):
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai1:2")
+    task.timing.cfg_samp_clk_timing(51200, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=51200)
+    reader = AnalogMultiChannelReader(task.in_stream)
+    reader.verify_array_shape = False
+    block = np.empty((2, 51200))
+    for _ in range(100):
+        reader.read_many_sample(block, 51200)
+    np.testing.assert_allclose(block, expected((1, 2), 99 * 51200, 51200, 51200.0), atol=1e-7)
+    assert task.in_stream.curr_read_pos == 100 * 51200
+    assert task.in_stream.input_buf_size == 100_000
+
+
+def test_two_runs_are_equal_bit_for_bit(connect):
+    runs = []
+    for _ in range(2):
+        daq = connect()
+        task = daq.task()
+        task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0:1")
+        task.timing.cfg_samp_clk_timing(51200, sample_mode=AcquisitionType.CONTINUOUS)
+        runs.append(np.hstack([task.read(700), task.read(READ_ALL_AVAILABLE)]))
+    assert np.array_equal(*runs)
+
+
+def test_scans_and_channels_are_laid_out_as_asked(task, daq):
+    by_channel, by_scan = np.empty((3, 10)), np.empty((10, 3))
+    interpreter = task._interpreter
+    interpreter.read_analog_f64(task._handle, 10, 1.0, FillMode.GROUP_BY_CHANNEL.value, by_channel)
+    interpreter.read_analog_f64(task._handle, 10, 1.0, FillMode.GROUP_BY_SCAN_NUMBER.value, by_scan)
+    np.testing.assert_allclose(by_channel, expected((1, 2, 3), 0, 10), atol=1e-9)
+    np.testing.assert_allclose(by_scan.T, expected((1, 2, 3), 10, 10), atol=1e-9)
+
+
+def test_a_finite_task_gives_its_samples_and_no_more(daq):
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai1")
+    task.timing.cfg_samp_clk_timing(RATE_HZ, samps_per_chan=200)
+    task.start()
+    task.wait_until_done()
+    assert task.is_task_done()
+    assert task.in_stream.avail_samp_per_chan == 200
+    np.testing.assert_allclose(task.read(READ_ALL_AVAILABLE), expected((1,), 0, 200)[0], atol=1e-9)
+    with pytest.raises(DaqError) as caught:
+        task.read(1)
+    assert caught.value.error_code == DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE
+
+
+def test_a_finite_task_that_a_read_starts_can_be_read_again_and_again(daq):
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai1")
+    task.timing.cfg_samp_clk_timing(RATE_HZ, samps_per_chan=200)
+    first = task.read(200)
+    second = task.read(200)
+    np.testing.assert_allclose(first, expected((1,), 0, 200)[0], atol=1e-9)
+    np.testing.assert_allclose(second, expected((1,), 200, 200)[0], atol=1e-9)
+
+
+def test_polling_for_samples_makes_them_come(task):
+    task.start()
+    questions = 0
+    while task.in_stream.avail_samp_per_chan < 100:
+        questions += 1
+        assert questions < 5
+    assert len(task.read(READ_ALL_AVAILABLE)[0]) >= 100
+
+
+def test_polling_for_the_end_makes_it_come(daq):
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai1")
+    task.timing.cfg_samp_clk_timing(1000, samps_per_chan=500)
+    task.start()
+    questions = 0
+    while not task.is_task_done():
+        questions += 1
+        assert questions < 10
+
+
+def test_a_task_without_a_clock_reads_on_demand_where_the_device_can(daq):
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("Dev2/ai1:2")
+    assert task.timing.samp_timing_type is SampleTimingType.ON_DEMAND
+    assert task.read() == pytest.approx([0.5, 0.5])
+    assert np.shape(task.read(5)) == (2, 5)
+
+
+def test_a_delta_sigma_device_runs_its_clock_at_the_default_rate_without_being_asked(daq):
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai1")
+    assert task.timing.samp_timing_type is SampleTimingType.SAMPLE_CLOCK
+    assert task.timing.samp_clk_rate == pytest.approx(51200 / 31)
+    assert task.read() == pytest.approx(0.5)
+
+
+def test_raw_counts_scale_back_to_volts(daq):
+    task = daq.task()
+    channel = task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai1")
+    task.timing.cfg_samp_clk_timing(RATE_HZ, sample_mode=AcquisitionType.CONTINUOUS)
+    counts = np.empty((1, 50), dtype=np.int32)
+    AnalogUnscaledReader(task.in_stream).read_int32(counts, 50)
+    step_v = channel.ai_dev_scaling_coeff[1]
+    assert step_v == 5 / 2**23
+    assert channel.ai_resolution == 24
+    np.testing.assert_allclose(counts * step_v, expected((1,), 0, 50), atol=step_v)
+    with pytest.raises(DaqError, match="24-bit"):
+        AnalogUnscaledReader(task.in_stream).read_int16(np.empty((1, 5), dtype=np.int16), 5)
+
+
+def test_waveforms_carry_samples_and_period(task):
+    waveforms = task.read_waveform(64)
+    np.testing.assert_allclose([w.scaled_data for w in waveforms], expected((1, 2, 3), 0, 64), atol=1e-9)
+
+
+def test_a_part_of_the_channels_can_be_read(task):
+    task.in_stream.channels_to_read = task.ai_channels["cDAQ1Mod1/ai3"]
+    np.testing.assert_allclose(task.read(20), expected((3,), 0, 20)[0], atol=1e-9)
+
+
+def test_the_newest_samples_can_be_read_first(task):
+    task.in_stream.overwrite = OverwriteMode.OVERWRITE_UNREAD_SAMPLES
+    task.in_stream.relative_to = ReadRelativeTo.MOST_RECENT_SAMPLE
+    task.in_stream.offset = -100
+    task.start()
+    newest = np.array(task.read(100))
+    first = task.in_stream.curr_read_pos - 100
+    np.testing.assert_allclose(newest, expected((1, 2, 3), first, 100), atol=1e-9)
+    assert first > 0
+
+
+def test_stopping_and_starting_begins_at_sample_zero_again(task):
+    task.start()
+    task.read(100)
+    task.stop()
+    task.stop()
+    task.start()
+    assert task.in_stream.curr_read_pos == 0
+    np.testing.assert_allclose(task.read(10), expected((1, 2, 3), 100, 10), atol=1e-9)
+
+
+def test_a_task_stays_reserved_through_a_stop_if_it_was_reserved_before(task, daq):
+    task.control(TaskMode.TASK_COMMIT)
+    task.start()
+    task.stop()
+    rival = daq.task()
+    rival.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")
+    with pytest.raises(DaqError) as caught:
+        rival.start()
+    assert caught.value.error_code == DAQmxErrors.PAL_RESOURCE_RESERVED
+    task.control(TaskMode.TASK_UNRESERVE)
+    rival.start()
+
+
+def test_the_world_is_told_to_stop_converting(task, daq):
+    task.read(10)
+    assert len(daq.world.conversions) == 1
+    task.stop()
+    assert not daq.world.conversions
+
+
+def test_two_devices_sample_the_same_stretch_of_rig_time(daq):
+    tasks = []
+    for name in ("Dev1/ai1", "cDAQ1Mod1/ai1"):
+        task = daq.task()
+        task.ai_channels.add_ai_voltage_chan(name)
+        task.timing.cfg_samp_clk_timing(25600, sample_mode=AcquisitionType.CONTINUOUS)
+        tasks.append(task)
+    for task in tasks:
+        task.start()
+    for _ in range(3):
+        first, second = (task.read(2560) for task in tasks)
+        np.testing.assert_allclose(first, second, atol=1e-9)
+    assert daq.world.time_s == pytest.approx(0.3)

@@ -1,0 +1,188 @@
+"""Samples that a program plays through the simulated DAQ, seen on an input they are wired to."""
+
+import numpy as np
+import pytest
+from nidaqmx import DaqError
+from nidaqmx.constants import AcquisitionType, RegenerationMode, TaskMode
+from nidaqmx.error_codes import DAQmxErrors
+from nidaqmx.errors import DaqWriteError
+from nidaqmx.stream_writers import AnalogMultiChannelWriter, AnalogSingleChannelWriter
+
+RATE_HZ = 20000.0
+OUTPUT = "Dev1/ao0"
+
+
+def ramp(samples):
+    return np.linspace(-3, 3, samples)
+
+
+@pytest.fixture
+def pair(daq):
+    """An output that waits for the input's start, and the input wired to it."""
+    inputs, outputs = daq.task(), daq.task()
+    inputs.ai_channels.add_ai_voltage_chan("Dev1/ai0", min_val=-10, max_val=10)
+    outputs.ao_channels.add_ao_voltage_chan(OUTPUT, min_val=-3.5, max_val=3.5)
+    inputs.timing.cfg_samp_clk_timing(RATE_HZ, sample_mode=AcquisitionType.CONTINUOUS)
+    outputs.timing.cfg_samp_clk_timing(RATE_HZ, sample_mode=AcquisitionType.CONTINUOUS)
+    outputs.triggers.start_trigger.cfg_dig_edge_start_trig(inputs.triggers.start_trigger.term)
+    return inputs, outputs
+
+
+def test_a_triggered_output_begins_with_the_first_sample_of_the_input_and_repeats(pair):
+    inputs, outputs = pair
+    assert outputs.write(ramp(1500)) == 1500
+    outputs.start()
+    inputs.start()
+    np.testing.assert_allclose(inputs.read(4500), np.tile(ramp(1500), 3), atol=1e-12)
+
+
+def test_an_output_without_its_trigger_stays_silent(pair, daq):
+    _, outputs = pair
+    outputs.write(ramp(100))
+    outputs.start()
+    daq.world.advance(1.0)
+    assert outputs.out_stream.total_samp_per_chan_generated == 0
+    assert not outputs.is_task_done()
+    assert not daq.world.played
+
+
+def test_blocks_written_in_time_are_played_without_a_gap(pair):
+    inputs, outputs = pair
+    outputs.out_stream.regen_mode = RegenerationMode.DONT_ALLOW_REGENERATION
+    outputs.out_stream.output_buf_size = 8000
+    rng = np.random.default_rng(7)
+    played = rng.uniform(-3, 3, 40000)
+    outputs.write(played[:8000])
+    outputs.start()
+    inputs.start()
+    heard = []
+    for first in range(8000, 40000, 2000):
+        heard.append(inputs.read(2000))
+        outputs.write(played[first : first + 2000])
+    heard = np.concatenate(heard)
+    np.testing.assert_allclose(heard, played[: heard.size], atol=1e-12)
+
+
+def test_writing_into_a_full_buffer_waits_for_the_output_to_play(pair):
+    inputs, outputs = pair
+    outputs.out_stream.regen_mode = RegenerationMode.DONT_ALLOW_REGENERATION
+    outputs.out_stream.output_buf_size = 4000
+    outputs.write(np.zeros(4000))
+    outputs.start()
+    inputs.start()
+    assert outputs.out_stream.space_avail < 4000
+    outputs.write(np.ones(10000))
+    assert outputs.out_stream.total_samp_per_chan_generated >= 9000
+    heard = np.array(inputs.read(12000))
+    assert np.flatnonzero(heard)[0] == 4000
+
+
+def test_samples_that_are_not_written_in_time_stop_the_output(pair, daq):
+    inputs, outputs = pair
+    outputs.out_stream.regen_mode = RegenerationMode.DONT_ALLOW_REGENERATION
+    outputs.write(np.ones(1000))
+    outputs.start()
+    inputs.start()
+    heard = np.array(inputs.read(4000))
+    assert np.flatnonzero(heard).tolist() == list(range(1000))
+    with pytest.raises(DaqWriteError) as caught:
+        outputs.write(np.ones(10))
+    assert caught.value.error_code == DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES
+    assert caught.value.samps_per_chan_written == 0
+    with pytest.raises(DaqError) as caught:
+        outputs.is_task_done()
+    assert caught.value.error_code == DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES
+
+
+def test_a_finite_output_ends_and_leaves_zero(daq):
+    task = daq.task()
+    task.ao_channels.add_ao_voltage_chan(OUTPUT, min_val=-3.5, max_val=3.5)
+    task.timing.cfg_samp_clk_timing(RATE_HZ, samps_per_chan=300)
+    task.write(ramp(300), auto_start=True)
+    task.wait_until_done()
+    assert task.is_task_done()
+    assert task.out_stream.total_samp_per_chan_generated == 300
+    first_s = daq.world.played[OUTPUT][0].start_s
+    np.testing.assert_allclose(daq.world.output(OUTPUT, first_s + np.arange(300) / RATE_HZ), ramp(300))
+    assert daq.world.output(OUTPUT, np.array([first_s + 301 / RATE_HZ, daq.world.time_s + 1.0])).tolist() == [
+        0,
+        0,
+    ]
+
+
+def test_a_buffer_can_be_rewritten_while_it_repeats(pair):
+    inputs, outputs = pair
+    outputs.write(np.zeros(1000))
+    outputs.start()
+    inputs.start()
+    inputs.read(1500)
+    outputs.write(np.ones(1000))
+    heard = np.array(inputs.read(3000))
+    assert np.all(heard[-1000:] == 1.0)
+
+
+def test_stopping_silences_the_output_at_once(pair, daq):
+    inputs, outputs = pair
+    outputs.write(np.ones(1000))
+    outputs.start()
+    inputs.start()
+    inputs.read(500)
+    outputs.stop()
+    heard = np.array(inputs.read(500))
+    assert np.flatnonzero(heard).size <= 1
+
+
+def test_a_value_beyond_the_limits_is_refused_and_nothing_is_played(pair, daq):
+    _, outputs = pair
+    with pytest.raises(DaqWriteError, match=r"3\.6") as caught:
+        outputs.write(np.array([0.0, 3.6]))
+    assert caught.value.error_code == DAQmxErrors.INVALID_AO_DATA_WRITE
+    with pytest.raises(DaqError) as caught:
+        outputs.start()
+    assert caught.value.error_code == DAQmxErrors.OUTPUT_BUFFER_EMPTY
+
+
+def test_limits_beyond_the_device_are_refused(daq):
+    task = daq.task()
+    task.ao_channels.add_ao_voltage_chan(OUTPUT, min_val=-10, max_val=10)
+    with pytest.raises(DaqError, match=r"-3\.5 to 3\.5 V") as caught:
+        task.control(TaskMode.TASK_VERIFY)
+    assert caught.value.error_code == DAQmxErrors.INVALID_ATTRIBUTE_VALUE
+
+
+def test_more_than_a_given_buffer_holds_is_refused_before_the_start(pair):
+    _, outputs = pair
+    outputs.out_stream.output_buf_size = 100
+    with pytest.raises(DaqWriteError, match="100 samples") as caught:
+        outputs.write(np.zeros(101))
+    assert caught.value.error_code == DAQmxErrors.NO_MORE_SPACE
+
+
+def test_a_software_timed_output_holds_its_value(daq):
+    inputs, outputs = daq.task(), daq.task()
+    outputs.ao_channels.add_ao_voltage_chan("Dev2/ao0")
+    inputs.ai_channels.add_ai_voltage_chan("Dev2/ai0", min_val=-10, max_val=10)
+    AnalogSingleChannelWriter(outputs.out_stream, auto_start=True).write_one_sample(1.25)
+    assert daq.world.played["Dev2/ao0"][-1].volts.tolist() == [1.25]
+    assert inputs.read() == 1.25
+
+
+def test_two_outputs_play_their_own_rows(daq):
+    task = daq.task()
+    task.ao_channels.add_ao_voltage_chan("Dev2/ao0:1")
+    task.timing.cfg_samp_clk_timing(10000, samps_per_chan=200)
+    rows = np.stack([ramp(200), -ramp(200)])
+    AnalogMultiChannelWriter(task.out_stream).write_many_sample(rows)
+    task.start()
+    task.wait_until_done()
+    for channel, row in zip(("Dev2/ao0", "Dev2/ao1"), rows, strict=True):
+        start_s = daq.world.played[channel][0].start_s
+        np.testing.assert_allclose(daq.world.output(channel, start_s + np.arange(200) / 10000), row)
+
+
+def test_writing_to_a_task_of_inputs_is_refused(daq):
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai0")
+    with pytest.raises(DaqError) as caught:
+        AnalogSingleChannelWriter(task.out_stream).write_many_sample(np.zeros(3))
+    assert caught.value.error_code == DAQmxErrors.WRITE_NO_OUTPUT_CHANS_IN_TASK
