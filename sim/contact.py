@@ -138,7 +138,7 @@ def _step_to_exit(
             step = 0.5 * (low + high)
             if not low < step < high:
                 break
-        trial_step(work, step, TRIAL, side, force, middle, par)
+        trial_step(work, step, side, force, middle, par)
     return step
 
 
@@ -163,7 +163,7 @@ def _step_to_time(
             step = 0.5 * (low + high)
             if not low < step < high:
                 break
-        trial_step(work, step, TRIAL, side, force, middle, par)
+        trial_step(work, step, side, force, middle, par)
     work[TRIAL, T] = limit
 
 
@@ -194,15 +194,17 @@ def _log_apex(
     before, after = work[POINT, R], work[TRIAL, R]
     if not before > 0.0 > after:
         return
+    work[SPARE] = work[TRIAL]
     low, high = 0.0, step
     for _ in range(APEX_SECANTS):
         part = low + (high - low) * before / (before - after)
-        trial_step(work, part, SPARE, side, force, middle, par)
-        log[0, DEEPEST] = max(log[0, DEEPEST], work[SPARE, W])
-        if work[SPARE, R] > 0.0:
-            low, before = part, work[SPARE, R]
+        trial_step(work, part, side, force, middle, par)
+        log[0, DEEPEST] = max(log[0, DEEPEST], work[TRIAL, W])
+        if work[TRIAL, R] > 0.0:
+            low, before = part, work[TRIAL, R]
         else:
-            high, after = part, work[SPARE, R]
+            high, after = part, work[TRIAL, R]
+    work[TRIAL] = work[SPARE]
 
 
 @compiled
@@ -258,7 +260,7 @@ def advance_contact(  # noqa: C901, PLR0912 - a step control and its three ends 
         return HELD, tau
     contact_rates(work[POINT], work[0], side, force, middle, par)
     for _ in range(MOST_STEPS):
-        trial_step(work, step, TRIAL, side, force, middle, par)
+        trial_step(work, step, side, force, middle, par)
         error = step_error(work, step, root_scale, rate_scale, tolerance)
         factor = _step_factor(error)
         if not error <= 1.0:

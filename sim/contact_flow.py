@@ -84,13 +84,13 @@ def contact_rates(
 
 @compiled
 def trial_step(  # noqa: C901 - the twelve stages of one formula, in order
-    work: Table, step: float, target: int, side: float, force: Vector, middle: float, par: Parameters
+    work: Table, step: float, side: float, force: Vector, middle: float, par: Parameters
 ) -> None:
-    """Step from ``work[POINT]``, whose rates are in ``work[0]``, and write the end to ``work[target]``."""
+    """Step from ``work[POINT]``, whose rates are in ``work[0]``, and write the end to ``work[TRIAL]``."""
     h = step
     k1, k2, k3, k4, k5, k6 = work[0], work[1], work[2], work[3], work[4], work[5]
     k7, k8, k9, k10, k11, k12 = work[6], work[7], work[8], work[9], work[10], work[11]
-    u, y, end = work[ARGUMENT], work[POINT], work[target]
+    u, y, end = work[ARGUMENT], work[POINT], work[TRIAL]
     for i in range(WIDTH):
         u[i] = y[i] + h * (A21 * k1[i])
     contact_rates(u, k2, side, force, middle, par)

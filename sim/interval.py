@@ -117,7 +117,7 @@ def advance_interval(state: Vector, base: Vector, tables: IntervalTables) -> int
         if piece > 0:
             force = shifted(force, tables.length)
         if not carry_if_clear(state, force, tables):
-            fresh = advance_part(state, force, tables.length, tables, np.empty(0), 0)
+            fresh = advance_part(state, force, tables.length, tables, np.empty(0))
             if fresh < 0:
                 return FAILED
             impacts += fresh

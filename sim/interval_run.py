@@ -72,7 +72,7 @@ def _advance_step(
     _sample(state, clock, force, length, tables, record)
     fresh = 0
     if not (is_whole and carry_if_clear(state, force, tables)):
-        fresh = advance_part(state, force, length, tables, times, kept)
+        fresh = advance_part(state, force, length, tables, times[kept:])
     if fresh < 0:
         return LOST
     counts[IMPACTS] = min(kept + fresh, len(times))
@@ -102,6 +102,6 @@ def _sample(
             return
         shadow = state.copy()
         if later > 0.0:
-            advance_part(shadow, force, later, tables, np.empty(0), 0)
+            advance_part(shadow, force, later, tables, np.empty(0))
         record.samples[counts[NEXT_SAMPLE]] = shadow[:6]
         counts[NEXT_SAMPLE] += 1

@@ -79,12 +79,10 @@ def _carried(step: Table, i: int, s: Vector, force: Cubic) -> float:
 
 
 @compiled
-def advance_part(
-    state: Vector, force: Cubic, length: float, tables: IntervalTables, times: Vector, kept: int
-) -> int:
+def advance_part(state: Vector, force: Cubic, length: float, tables: IntervalTables, times: Vector) -> int:
     """Advance over ``length`` [s], at most a piece, through every touch and every contact in it.
 
-    Impact times (since the start of the piece) go to ``times[kept:]`` while there is room. Returns the
+    Impact times (since the start of the piece) go to ``times`` while there is room. Returns the
     impacts, or FAILED.
     """
     par = tables.par
@@ -110,8 +108,8 @@ def advance_part(
             return impacts
         place_on_series(state, series, touch)
         tau += touch
-        if kept + impacts < len(times):
-            times[kept + impacts] = tau
+        if impacts < len(times):
+            times[impacts] = tau
         impacts += 1
         begin_contact(state, math.copysign(1.0, state[Y] - state[Z]), par, tables.tolerance)
     return FAILED
