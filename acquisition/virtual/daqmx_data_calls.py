@@ -38,6 +38,7 @@ class DataCalls:
             "ReadRaw": self._read_raw,
             "WriteAnalogF64": self._write,
             "WriteAnalogScalarF64": self._write_scalar,
+            "WriteAnalogWaveforms": self._write_waveforms,
             **binary_reads,
             **binary_writes,
         }
@@ -105,6 +106,13 @@ class DataCalls:
         _check_size(task, 1, 1)
         write(task, np.array([[request.value]]), _start(request), request.timeout)
         return NOTHING
+
+    def _write_waveforms(self, request: Any) -> Fields:
+        task = self._task(request)
+        require_outputs(task)
+        rows = [np.array(waveform.y_data) for waveform in request.waveforms]
+        _check_size(task, sum(row.size for row in rows), rows[0].size if rows else 0)
+        return {"samps_per_chan_written": write(task, np.stack(rows), _start(request), request.timeout)}
 
     def _binary_writer(self, bits: int) -> Call:
         def write_binary(request: Any) -> Fields:

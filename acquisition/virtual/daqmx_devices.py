@@ -6,11 +6,12 @@ minimum rate and the rate steps of the USB-4431, the default couplings, and the 
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 
 from nidaqmx.constants import BusType, ProductCategory, TerminalConfiguration, TriggerUsage, UsageTypeAI
 
+from ..errors import ConfigurationError
 from .analogue import Coupling
 
 _NI_9234_RATE_HZ = 13.1072e6 / 256
@@ -234,3 +235,34 @@ class Catalogue:
     def find(self, name: str) -> Device | None:
         """Look up a device by name; a terminal's leading slash does not matter."""
         return self._by_name.get(name.strip("/").lower())
+
+
+def catalogue_with(product_type: str, name: str) -> Catalogue:
+    """Give the default system, in which the device of that product bears that name.
+
+    Raises
+    ------
+    ConfigurationError
+        When there is no such product, or the name is taken by another one.
+
+    """
+    devices = Catalogue().devices
+    old = next((device for device in devices if device.product_type == product_type), None)
+    if old is None:
+        known = ", ".join(device.product_type for device in devices)
+        raise ConfigurationError(
+            f"The simulated DAQ has no {product_type!r}: it has {known}; "
+            "nothing was started, choose one of these"
+        )
+    if any(device.name.lower() == name.lower() and device is not old for device in devices):
+        raise ConfigurationError(
+            f"The simulated {product_type} cannot be called {name!r}: another device is; "
+            "nothing was started, choose another name"
+        )
+    return Catalogue(tuple(_renamed(device, old.name, name) for device in devices))
+
+
+def _renamed(device: Device, old: str, new: str) -> Device:
+    modules = tuple(new if module == old else module for module in device.modules)
+    chassis = new if device.chassis == old else device.chassis
+    return replace(device, name=new if device.name == old else device.name, modules=modules, chassis=chassis)

@@ -28,15 +28,14 @@ class Source(Stream, Protocol):
 class Rig:
     """Moves the world and every running task through rig time together.
 
-    ``changed`` guards everything: the world, the tasks, the trigger lines. Whoever touches the world
-    from outside (the generator's command side, for example) holds it too.
+    ``changed`` guards the tasks and the trigger lines. The world guards itself: others use it too.
     """
 
-    def __init__(self, world: AnalogueWorld, pace: Pace, turn: "threading.RLock | None" = None) -> None:
-        """``turn``: the lock that others who use the same world hold, if there are any."""
+    def __init__(self, world: AnalogueWorld, pace: Pace) -> None:
+        """Begin at the world's time, with nothing running."""
         self.world = world
         self.pace = pace
-        self.changed = threading.Condition(turn or threading.RLock())
+        self.changed = threading.Condition(threading.RLock())
         self._acquisitions: list[Stream] = []
         self._generations: list[Source] = []
         self._armed: dict[str, list[Callable[[], None]]] = {}

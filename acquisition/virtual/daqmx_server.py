@@ -1,6 +1,5 @@
 """The simulated DAQmx system on a port: any nidaqmx program can connect to it."""
 
-import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
@@ -51,12 +50,11 @@ class DaqServer:
         address: str,
         catalogue: Catalogue,
         handlers: Iterable[grpc.GenericRpcHandler],
-        turn: "threading.RLock | None",
     ) -> None:
         """See `serve`."""
         self.faults = Faults()
         self._pace = pace
-        self._rig = Rig(world, pace, turn)
+        self._rig = Rig(world, pace)
         self._system = DaqmxSystem(self._rig, catalogue)
         self._workers = ThreadPoolExecutor(_WORKERS, thread_name_prefix="daqmx")
         self._server = grpc.server(self._workers, options=_OPTIONS)
@@ -107,6 +105,8 @@ class DaqServer:
         with self._rig.changed:
             self._system.reset()
         self._server.stop(grace=None).wait()
+        with self._rig.changed:  # a call that was still under way may have made and begun another task
+            self._system.reset()
         self._pace.close()
         self._workers.shutdown(wait=True)
 
@@ -220,7 +220,6 @@ def serve(
     *,
     catalogue: Catalogue | None = None,
     handlers: Iterable[grpc.GenericRpcHandler] = (),
-    turn: "threading.RLock | None" = None,
 ) -> DaqServer:
     """Serve the simulated DAQmx system until the returned server is closed; use it in a ``with``.
 
@@ -236,8 +235,6 @@ def serve(
         The devices; default: a cDAQ with an NI 9234, a USB-4431 and a USB-6211.
     handlers
         Further gRPC services for the same port.
-    turn
-        Lock held during every call, for others who use the same world.
 
     Raises
     ------
@@ -245,4 +242,4 @@ def serve(
         When the address cannot be used.
 
     """
-    return DaqServer(world, pace or OnDemandPace(), address, catalogue or Catalogue(), handlers, turn)
+    return DaqServer(world, pace or OnDemandPace(), address, catalogue or Catalogue(), handlers)

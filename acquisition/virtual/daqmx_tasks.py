@@ -6,6 +6,7 @@ from typing import Protocol
 from nidaqmx.constants import SampleTimingType, TaskMode
 from nidaqmx.error_codes import DAQmxErrors
 
+from ..errors import AcquisitionError
 from .daqmx_acquisition import Acquisition
 from .daqmx_channels import Channel, InputChannel, OutputChannel
 from .daqmx_devices import AnalogInputs, AnalogOutputs, Device
@@ -13,13 +14,11 @@ from .daqmx_errors import DaqmxRefusal
 from .daqmx_generation import Generation, OutputBuffer
 from .daqmx_names import expand
 from .daqmx_rig import Rig
+from .daqmx_terminals import SAMPLE_CLOCK, START_TRIGGER, awaited_terminal, terminal
 from .daqmx_timing import InputSettings, OutputSettings, Timing, actual_rate, input_buffer_size, kind_of
 
 INPUT_SIDE = "ai"
 OUTPUT_SIDE = "ao"
-_START_TRIGGER = "StartTrigger"
-_SAMPLE_CLOCK = "SampleClock"
-_OWN_CLOCKS = ("", "onboardclock")
 
 
 class TaskState(IntEnum):
@@ -116,33 +115,19 @@ class Task:
         """Whether its timing engine is only known once it is reserved."""
         return any(device.chassis for device in self.devices)
 
-    def terminal(self, signal: str) -> str:
-        """Name of the terminal that carries one of this task's signals."""
-        side = INPUT_SIDE if self.inputs else OUTPUT_SIDE
+    def _terminal(self, signal: str) -> str:
         self.require_channels()
-        return f"/{self.devices[0].clock_name}/{side}/{signal}"
+        return terminal(self.devices[0], INPUT_SIDE if self.inputs else OUTPUT_SIDE, signal)
 
     @property
     def start_terminal(self) -> str:
         """Terminal of its own start trigger."""
-        return self.terminal(_START_TRIGGER)
+        return self._terminal(START_TRIGGER)
 
     @property
     def clock_terminal(self) -> str:
         """Terminal of its own sample clock."""
-        return self.terminal(_SAMPLE_CLOCK)
-
-    @property
-    def awaited_terminal(self) -> str:
-        """Terminal whose edge makes it begin; empty: its own start.
-
-        Another task's sample clock begins to tick with that task, so waiting for it is waiting for its start.
-        """
-        if self.timing.trigger_source:
-            return self.timing.trigger_source
-        source = self.timing.clock_source
-        is_own = source.lower() in _OWN_CLOCKS or source.lower() == self.clock_terminal.lower()
-        return "" if is_own else source.replace(_SAMPLE_CLOCK, _START_TRIGGER)
+        return self._terminal(SAMPLE_CLOCK)
 
     def find(self, names: str) -> list[Channel]:
         """Find the channels named; all of them for an empty list."""
@@ -238,10 +223,15 @@ class Task:
         self.state = TaskState.RUNNING
         if self.kind is SampleTimingType.ON_DEMAND:
             return
-        if self.awaited_terminal:
-            self.rig.arm(self.awaited_terminal, self._begin)
-        else:
+        awaited = awaited_terminal(self.timing, self.clock_terminal)
+        if awaited:
+            self.rig.arm(awaited, self._begin)
+            return
+        try:
             self._begin()
+        except AcquisitionError:  # what is wired to it cannot do what the device could
+            self.stop()
+            raise
 
     @property
     def output_buffer(self) -> OutputBuffer:

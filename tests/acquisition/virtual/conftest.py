@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from nidaqmx import GrpcSessionOptions, Task
 
+from acquisition.errors import ConfigurationError
 from acquisition.virtual.analogue import Coupling, Input
 from acquisition.virtual.daqmx_server import DaqServer, serve
 from acquisition.virtual.pace import Pace
@@ -71,6 +72,7 @@ class LoopbackWorld:
 
     time_s: float = 0.0
     gain: float = 1.0
+    slowest_hz: float = 0.0
     played: dict[str, list[Played]] = field(default_factory=dict)
     conversions: list[Sampling] = field(default_factory=list)
     wirings: list[tuple[Input, ...]] = field(default_factory=list)
@@ -79,6 +81,8 @@ class LoopbackWorld:
         self.time_s += duration_s
 
     def sample(self, inputs: tuple[Input, ...], sample_rate_hz: float) -> Sampling:
+        if sample_rate_hz < self.slowest_hz:
+            raise ConfigurationError(f"{sample_rate_hz:g} Hz; {self.slowest_hz:g} Hz is possible")
         conversion = Sampling(self, inputs, sample_rate_hz, self.time_s)
         self.conversions.append(conversion)
         self.wirings.append(inputs)

@@ -10,7 +10,8 @@ from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.scale import Scale
 from nidaqmx.system import System
 
-from acquisition.virtual.daqmx_devices import NI_9234, USB_6211
+from acquisition.errors import ConfigurationError
+from acquisition.virtual.daqmx_devices import NI_9234, USB_6211, catalogue_with
 from acquisition.virtual.daqmx_names import assigned_names, expand
 
 
@@ -96,6 +97,19 @@ def test_a_scale_keeps_its_parameters(daq):
     assert (scale.lin_slope, scale.lin_y_intercept, scale.scaled_units) == (2.0, 1.0, "m/s")
     with pytest.raises(DaqError, match=r"Scale\.POLY"):
         _ = scale.poly_forward_coeff
+
+
+def test_a_device_can_bear_the_name_a_configuration_gives_it(connect):
+    daq = connect(catalogue=catalogue_with("NI 9234", "cDAQ2Mod5"))
+    system = System.remote(daq.options)
+    assert system.devices["cDAQ2Mod5"].product_type == "NI 9234"
+    assert [each.name for each in system.devices["cDAQ1"].chassis_module_devices] == ["cDAQ2Mod5"]
+
+
+@pytest.mark.parametrize(("product", "name"), [("NI 9999", "Dev1"), ("NI 9234", "dev1")])
+def test_an_impossible_system_is_refused(product, name):
+    with pytest.raises(ConfigurationError, match="nothing was started"):
+        catalogue_with(product, name)
 
 
 @given(st.floats(NI_9234.inputs.rates.minimum_hz, NI_9234.inputs.rates.maximum_hz))

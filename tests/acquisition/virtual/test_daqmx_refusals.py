@@ -103,6 +103,16 @@ def test_a_missing_trigger_times_out_without_samples(daq, task):
     assert np.shape(task.read(10)) == (2, 10)
 
 
+def test_a_task_on_another_ones_clock_begins_with_it(daq, task):
+    output = daq.task()
+    output.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-1, max_val=1)
+    output.timing.cfg_samp_clk_timing(1000, source="/Dev1/ai/SampleClock")
+    output.write(np.ones(1000), auto_start=True)
+    daq.world.advance(0.25)
+    task.start()
+    assert daq.world.played["Dev1/ao0"][0].start_s == 0.25
+
+
 def test_a_read_past_the_end_brings_what_there_is_and_says_so(daq):
     task = daq.task()
     task.ai_channels.add_ai_voltage_chan("Dev1/ai1")
@@ -129,6 +139,20 @@ def test_resetting_a_device_stops_its_tasks_and_frees_it(daq, task):
     assert not daq.world.conversions
     rival = daq.task()
     rival.ai_channels.add_ai_voltage_chan("Dev1/ai0")
+    rival.start()
+
+
+def test_a_world_that_cannot_begin_leaves_the_device_free(daq):
+    daq.world.slowest_hz = 2000.0
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai0")
+    task.timing.cfg_samp_clk_timing(1000)
+    with pytest.raises(DaqError, match="2000 Hz") as caught:
+        task.start()
+    assert caught.value.error_code == DAQmxErrors.INVALID_ATTRIBUTE_VALUE
+    rival = daq.task()
+    rival.ai_channels.add_ai_voltage_chan("Dev1/ai0")
+    rival.timing.cfg_samp_clk_timing(4000)
     rival.start()
 
 
