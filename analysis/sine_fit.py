@@ -78,3 +78,8 @@ def fitted_sine(samples: Reals, sample_rate_hz: float, near_hz: float) -> Fitted
         sd_phase_rad=float(np.hypot(sd_middle / amplitude, sd_omega * to_start)),
         residual_rms=float(np.sqrt(np.mean(residual**2))),
     )
+
+
+def steady_phase(samples: int, cycles_per_sample: float, phase_rad: float) -> Reals:
+    """Phase of a steady sine at every sample [rad]."""
+    return 2 * np.pi * cycles_per_sample * np.arange(samples, dtype=np.float64) + phase_rad

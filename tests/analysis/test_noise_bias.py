@@ -2,12 +2,16 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.special import erf
 
 from analysis.noise_bias import noise_bias
 
 
 def test_noise_alone_reaches_four_and_a_half_standard_deviations_in_a_second():
-    assert noise_bias(np.zeros(51_200), 1.0, 51_200) == pytest.approx(4.43, abs=0.03)
+    exact, _ = quad(lambda z: 1 - erf(z / np.sqrt(2)) ** 51_200, 0, 8, limit=200)
+    assert noise_bias(np.zeros(51_200), 1.0, 51_200) == pytest.approx(exact, abs=2e-3)
+    assert exact == pytest.approx(4.4, abs=0.05)
 
 
 @pytest.mark.parametrize("noise_sd", [0.02, 0.2])

@@ -1,0 +1,160 @@
+"""Dwells: responses, lines and points of motions that are known, and of the simulated specimen."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from analysis.drive_level import drive_level, noise_drive_level
+from analysis.dwell import dwell_response
+from analysis.errors import InvalidRequest, NotEnoughData, UnusableData
+from analysis.stroboscope import stroboscope
+from sim.drive import Harmonic
+from sim.integrate import integrate
+from sim.specimen import gong2025
+
+RATE = 12_800.0
+DRIVE_HZ = 260.0031  # the generator's 260 Hz by the converter's clock
+
+
+def dwell(duration_s, orders, noise=0.0, drive_hz=DRIVE_HZ, seed=1):
+    """Drive, base and response of a motion x = Re(sum a_k exp(i k phase)), U = 5 um cos(phase)."""
+    time = np.arange(int(duration_s * RATE)) / RATE
+    omega = 2 * np.pi * drive_hz
+    velocity = sum(np.real(1j * k * omega * a * np.exp(1j * k * omega * time)) for k, a in orders.items())
+    velocity = velocity + noise * np.sqrt(RATE / 2) * np.random.default_rng(seed).standard_normal(time.size)
+    return np.cos(omega * time), -5e-6 * omega**2 * np.cos(omega * time), velocity
+
+
+def test_both_responses_of_a_linear_motion_are_its_amplitude_over_the_bases():
+    drive, base, velocity = dwell(4, {1: 15e-6 * np.exp(-0.7j)})
+    result = dwell_response(drive, base, velocity, RATE, near_hz=260, window_s=3)
+    assert result.drive.frequency_hz == pytest.approx(DRIVE_HZ, rel=1e-9)
+    assert result.drive.amplitude_m == pytest.approx(5e-6, rel=1e-9)
+    assert result.response_ii == pytest.approx(3, rel=1e-9)
+    assert result.phase_rad == pytest.approx(-0.7, abs=1e-9)
+    assert result.response_i == pytest.approx(3, rel=2e-3)
+    assert result.drive.distortion < 1e-9
+
+
+def test_other_orders_do_not_leak_into_response_ii():
+    """The window is no whole number of subharmonic periods; a one-term estimate would be off by 1e-4."""
+    parts = {0.5: 3e-6, 1: 15e-6, 1.5: 2e-6j, 2: 1e-6, 3: -4e-6}
+    drive, base, velocity = dwell(3, parts)
+    result = dwell_response(drive, base, velocity, RATE, near_hz=260, window_s=1.2345)
+    assert result.response_ii == pytest.approx(3, rel=1e-8)
+    np.testing.assert_allclose(np.abs(result.order_displacement), [3e-6, 15e-6, 2e-6, 1e-6, 4e-6], rtol=1e-6)
+    line = {each.label: each for each in result.lines}
+    assert line["order 1"].decibel == 0
+    assert line["order 3"].decibel == pytest.approx(20 * np.log10(4 / 15), abs=1e-6)
+    assert line["order 1/2"].frequency_hz == pytest.approx(DRIVE_HZ / 2)
+    time = np.arange(0, 1, 1e-5) / DRIVE_HZ * 2
+    exact = sum(np.real(a * np.exp(2j * np.pi * k * DRIVE_HZ * time)) for k, a in parts.items())
+    assert result.response_i == pytest.approx(np.max(np.abs(exact)) / 5e-6, rel=3e-3)
+
+
+def test_the_spectrum_and_its_peaks_are_displacements():
+    drive, base, velocity = dwell(6, {1: 10e-6, 201.3 / DRIVE_HZ: 0.5e-6, 436.2 / DRIVE_HZ: 0.2e-6})
+    result = dwell_response(drive, base, velocity, RATE, near_hz=260, window_s=5, towards_hz=(201.0, 435.0))
+    line = {each.label: each for each in result.lines}
+    low, high = line["peak towards 201 Hz"], line["peak towards 435 Hz"]
+    assert low.frequency_hz == pytest.approx(201.3, abs=0.01)
+    assert low.amplitude_m == pytest.approx(0.5e-6, rel=2e-3)
+    assert high.decibel == pytest.approx(20 * np.log10(0.02), abs=0.05)
+
+
+def test_the_stated_noise_bias_and_spread_are_what_repeated_dwells_show():
+    found = [
+        dwell_response(*dwell(1.6, {1: 1e-7}, noise=1e-6, seed=seed), RATE, near_hz=260, window_s=1)
+        for seed in range(40)
+    ]
+    lifted = np.array([each.response_i for each in found]) - 0.02
+    assert np.mean([each.noise_bias_i for each in found]) == pytest.approx(np.mean(lifted), rel=0.15)
+    assert found[0].noise_density == pytest.approx(1e-6, rel=0.1)
+    stated = np.sqrt(np.mean([each.sd_response_ii**2 for each in found]))
+    assert stated == pytest.approx(np.std([each.response_ii for each in found]), rel=0.4)
+
+
+@cache
+def simulated(amplitude_m):
+    specimen = gong2025()
+    path = integrate(specimen, Harmonic(260.0, amplitude_m), 8.0, sample_rate_hz=RATE)
+    omega = 2 * np.pi * 260.0
+    base = -amplitude_m * omega**2 * np.sin(omega * path.time_s)
+    return np.sin(omega * path.time_s), base, path.states[:, 0], path.states[:, 3], path.impacts.count
+
+
+def test_the_linear_specimen_answers_with_the_closed_form():
+    drive, base, _, velocity, impacts = simulated(1e-7)
+    assert impacts == 0
+    result = dwell_response(drive, base, velocity, RATE, near_hz=260, window_s=3)
+    assert result.response_ii == pytest.approx(abs(transmission_of_the_specimen(260.0)), rel=1e-6)
+    assert result.phase_rad == pytest.approx(np.angle(transmission_of_the_specimen(260.0)), abs=1e-5)
+
+
+def transmission_of_the_specimen(frequency_hz):
+    """X / U of equation 1 without contact, c_i = 2e-5 s k_i, written out independently of the simulation."""
+    s = 2j * np.pi * frequency_hz
+    masses = np.array([5.8e-3, 2.1e-3, 2e-3])
+    k0, k1, k2 = masses * (2 * np.pi * np.array([322.0, 100.0, 390.6])) ** 2 * (1 + 2e-5 * s)
+    matrix = np.array([[k0 + k2, 0, -k2], [0, k1, -k1], [-k2, -k1, k1 + k2]]) + np.diag(masses) * s**2
+    return np.linalg.solve(matrix, [k0, 0, 0])[0]
+
+
+def test_an_impacting_dwell_has_a_larger_response_i_than_ii_and_the_motions_own_maximum():
+    drive, base, displacement, velocity, impacts = simulated(20e-6)
+    assert impacts > 1000
+    result = dwell_response(drive, base, velocity, RATE, near_hz=260, window_s=3)
+    stop = displacement.size - result.displacement.edge_samples
+    window = displacement[stop - int(3 * RATE) : stop]
+    assert result.response_i == pytest.approx(np.max(np.abs(window)) / 20e-6, rel=0.01)
+    assert result.response_i > 1.2 * result.response_ii
+    assert result.sd_response_ii > 0.001 * result.response_ii
+
+
+def test_a_periodic_motion_is_one_point_and_a_half_order_two():
+    for parts, points in (({1: 10e-6j, 2: 3e-6}, 1), ({0.5: 4e-6, 1: 10e-6}, 2)):
+        drive, _, velocity = dwell(4, parts)
+        section = stroboscope(drive, velocity, RATE, near_hz=260, phase_rad=1.0)
+        x, v = section.displacement_m, section.velocity_m_per_s
+        # What the ends of the record leave is a few 1e-4 of the amplitude.
+        for start in range(points):
+            assert np.ptp(x[start::points]) < 1e-8
+            assert np.ptp(v[start::points]) < 2e-5
+        if points == 2:
+            assert abs(x[0] - x[1]) > 1e-6
+        omega = 2 * np.pi * DRIVE_HZ
+        at = (1.0 + 2 * np.pi * np.arange(2)) / omega
+        exact = sorted(sum(np.real(a * np.exp(1j * k * omega * at)) for k, a in parts.items()))
+        np.testing.assert_allclose(sorted(x[:2]), exact, atol=1e-8)
+
+
+def test_the_noise_drive_level_is_the_rms_in_the_band():
+    rng = np.random.default_rng(3)
+    base = 2.0 * rng.standard_normal(200_000)
+    level = noise_drive_level(base, RATE, low_hz=100, high_hz=1000, segment_samples=4096)
+    density = 2 * 4.0 / RATE
+    assert level.rms_acceleration == pytest.approx(np.sqrt(900 * density), rel=4 * level.relative_sd + 0.002)
+    integral = (100.0**-3 - 1000.0**-3) / 3 / (2 * np.pi) ** 4
+    assert level.rms_displacement_m == pytest.approx(np.sqrt(density * integral), rel=0.1)
+
+
+def test_distortion_of_the_base_is_stated():
+    time = np.arange(12_800) / RATE
+    omega = 2 * np.pi * 260
+    base = omega**2 * (np.cos(omega * time) + 4 * 0.01 * np.cos(2 * omega * time))
+    assert drive_level(np.cos(omega * time), base, RATE, near_hz=260).distortion == pytest.approx(
+        0.01, rel=1e-6
+    )
+
+
+def test_a_dwell_that_cannot_be_analysed_is_refused():
+    drive, base, velocity = dwell(1, {1: 1e-6})
+    with pytest.raises(NotEnoughData, match="record longer"):
+        dwell_response(drive, base, velocity, RATE, near_hz=260, window_s=5)
+    with pytest.raises(InvalidRequest, match="more than 0"):
+        dwell_response(drive, base, velocity, RATE, near_hz=260, window_s=0)
+    with pytest.raises(UnusableData, match="no sine"):
+        dwell_response(0 * drive, base, velocity, RATE, near_hz=260, window_s=0.5)
+    with pytest.raises(InvalidRequest, match="equally long"):
+        stroboscope(drive, velocity[1:], RATE, near_hz=260)
