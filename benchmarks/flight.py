@@ -1,0 +1,84 @@
+"""How fast and how exact the engine is on this machine: ``python benchmarks/flight.py``."""
+
+import time
+
+import numpy as np
+
+from sim.accuracy import Accuracy
+from sim.compiled import compiled
+from sim.drive import Harmonic, LinearSweep, Sampled
+from sim.integrate import integrate
+from sim.interval import advance_interval, interval_tables, new_state
+from sim.specimen import gong2025
+
+REPEATS = 3
+UNITS = np.repeat([1e-4, 0.1], 3)
+"""Errors are in units of 100 um and 0.1 m/s."""
+
+RUNS = ((Harmonic(130.0, 20e-6), 2.0), (Harmonic(260.0, 5e-6), 0.05), (Harmonic(260.0, 5e-6), 30.0))
+"""Periodic; chaotic, while runs can agree; chaotic, when they cannot."""
+
+
+def best(job):
+    """Shortest of a few runs [s], and the last result."""
+    times = []
+    for _ in range(REPEATS):
+        start = time.perf_counter()
+        result = job()
+        times.append(time.perf_counter() - start)
+    return min(times), result
+
+
+@compiled
+def carry(state, pieces, tables):
+    """Advance over many intervals as a rig's own kernel would."""
+    impacts = 0
+    for index in range(len(pieces)):
+        impacts += advance_interval(state, pieces[index], tables)
+    return impacts
+
+
+def report_first_use():
+    """Compile, or load what is cached."""
+    start = time.perf_counter()
+    integrate(gong2025(), Harmonic(130.0, 20e-6), 0.01)
+    integrate(gong2025(), LinearSweep(100.0, 110.0, 0.1, 20e-6), 0.1)
+    carry(new_state(gong2025()), np.zeros((1, 4)), interval_tables(gong2025(), 1e-5))
+    print(f"first use of the kernels: {time.perf_counter() - start:.1f} s")
+
+
+def report_runs():
+    """Time and error at each accuracy, against the strictest level."""
+    specimen = gong2025(damping_time_s=3e-5)
+    for drive, duration_s in (
+        (Harmonic(130.0, 20e-6), 2.0),
+        (Harmonic(260.0, 5e-6), 0.05),
+        (Harmonic(260.0, 5e-6), 30.0),
+    ):
+        reference = integrate(specimen, drive, duration_s, Accuracy.REFERENCE).final_state
+        for accuracy in Accuracy:
+            taken, run = best(lambda d=drive, t=duration_s, a=accuracy: integrate(specimen, d, t, a))
+            error = np.max(np.abs(run.final_state - reference) / UNITS)
+            print(
+                f"{drive.frequency_hz:.0f} Hz {drive.amplitude_m * 1e6:.0f} um, {duration_s} s, "
+                f"{accuracy:9}: {taken * 1e3:8.2f} ms, {taken / duration_s * 1e3:.2f} ms/s, {run.impacts.count} impacts, "
+                f"from reference {error:.1e}"
+            )
+
+
+def report_intervals():
+    """Cost of an interval of a sampled drive."""
+    tables = interval_tables(gong2025(), 1e-5)
+    pieces = np.zeros((200_000, 4))
+    taken, _ = best(lambda: carry(new_state(gong2025()), pieces, tables))
+    print(f"interval of 10 us, clear of the stops: {taken / len(pieces) * 1e9:.0f} ns")
+    rate = 1e5
+    sine = 20e-6 * np.sin(2.0 * np.pi * 130.0 * np.arange(200_001) / rate)
+    taken, run = best(lambda: integrate(gong2025(damping_time_s=3e-5), Sampled(sine, rate), 2.0))
+    print(f"sampled 130 Hz 20 um, 2 s at 100 kHz: {taken * 1e3:.1f} ms, {run.impacts.count} impacts")
+
+
+if __name__ == "__main__":
+    report_first_use()
+    report_runs()
+    report_intervals()
