@@ -59,11 +59,11 @@ def report_runs():
         for accuracy in Accuracy:
             taken, run = best(lambda d=drive, t=duration_s, a=accuracy: integrate(specimen, d, t, a))
             error = np.max(np.abs(run.final_state - reference) / UNITS)
-            print(
-                f"{drive.frequency_hz:.0f} Hz {drive.amplitude_m * 1e6:.0f} um, {duration_s} s, "
-                f"{accuracy:9}: {taken * 1e3:8.2f} ms, {taken / duration_s * 1e3:.2f} ms/s, {run.impacts.count} impacts, "
-                f"from reference {error:.1e}"
+            name = (
+                f"{drive.frequency_hz:.0f} Hz {drive.amplitude_m * 1e6:.0f} um, {duration_s} s, {accuracy:9}"
             )
+            cost = f"{taken * 1e3:.2f} ms, {taken / duration_s * 1e3:.2f} ms/s, {run.impacts.count} impacts"
+            print(f"{name}: {cost}, from reference {error:.1e}")
 
 
 def report_intervals():
