@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .decimation import Decimator, decimator
-from .input_stage import InputStage, clip_v
+from .input_stage import InputStage
 from .noise import NoiseStream
 from .wiring import Cable
 
@@ -17,8 +17,8 @@ CONVERTER_BITS = 24
 
 
 def volts_per_count(range_v: float) -> float:
-    """Smallest step of an input of that nominal range [V]: its span, over-range and all, in 24 bits."""
-    return clip_v(range_v) / float(2 ** (CONVERTER_BITS - 1))
+    """Smallest step of an input [V]: its range, plus and minus, in 24 bits, as the driver reports it."""
+    return range_v / float(2 ** (CONVERTER_BITS - 1))
 
 
 class ConverterInput:

@@ -20,11 +20,11 @@ SOURCE_OHM = 50.0
 COMPLIANCE_V = 19.0
 """What an open input rises to when its excitation finds no sensor."""
 OVER_RANGE = 1.02
-"""The converter goes this much beyond its nominal range (NI 9234: 5.1 V typical) before it clips."""
+"""The modulator follows this much beyond the range, whose end is where the numbers end."""
 
 
 def clip_v(range_v: float) -> float:
-    """Voltage at which an input of that nominal range clips [V]."""
+    """Return the voltage at which the modulator of an input of that range clips [V]."""
     return range_v * OVER_RANGE
 
 

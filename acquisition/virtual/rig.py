@@ -9,6 +9,7 @@ from acquisition.rig import Rig, VirtualConfig
 
 from . import usb_bus
 from .afg1022 import AFG1022
+from .daqmx_devices import catalogue_with
 from .daqmx_server import LOOPBACK, DaqServer, serve
 from .output_signal import Panel
 from .pace import OnDemandPace, Pace, WallPace
@@ -94,9 +95,7 @@ class VirtualRig:
         with ExitStack() as starting:
             usb_bus.plug_in(self._usb)
             starting.callback(usb_bus.unplug, self._usb)
-            daq = starting.enter_context(
-                serve(self.world, self._pace, self._address, handlers=(usb_service(self._usb),))
-            )
+            daq = starting.enter_context(self._serve())
             socket = starting.enter_context(ScpiSocket(self.generator))
             faults = RigFaults(self.world, self.generator, self._usb, daq)
             self._running = _Running(daq, socket, faults, starting.pop_all())
@@ -109,6 +108,15 @@ class VirtualRig:
         running, self._running = self._running, None
         if running is not None:
             running.closing.close()
+
+    def _serve(self) -> DaqServer:
+        return serve(
+            self.world,
+            self._pace,
+            self._address,
+            catalogue=catalogue_with(self.rig.daq.product, self.rig.daq.device),
+            handlers=(usb_service(self._usb),),
+        )
 
     @property
     def _switched_on(self) -> "_Running":

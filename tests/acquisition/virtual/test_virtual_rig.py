@@ -270,3 +270,26 @@ def test_an_address_in_use_starts_nothing():
         with pytest.raises(ConfigurationError, match="cannot listen"), VirtualRig(other, first.daq_address):
             pass
         assert serials_on_the_bus() == ["C060606"]
+
+
+def test_the_drivers_scale_says_the_step_that_the_samples_really_have(switch_on):
+    program = switch_on()
+    program.play(260, 1.0)
+    task = program.task()
+    volts = program.read(task, 2000)
+    for row, channel in zip(volts, task.ai_channels, strict=True):
+        coefficients = channel.ai_dev_scaling_coeff
+        assert coefficients[0] == 0
+        assert np.array_equal(np.rint(row / coefficients[1]) * coefficients[1], row)
+
+
+def test_the_devices_bear_the_names_that_the_rig_gives_them(switch_on):
+    named = RIG.model_copy(update={"daq": RIG.daq.model_copy(update={"device": "ShakerDaq"})})
+    program = switch_on(named)
+    system = nidaqmx.system.System.remote(program.options)
+    assert "ShakerDaq" in system.devices.device_names
+    program.play(160, 0.2)
+    task = program._resources.enter_context(nidaqmx.Task(grpc_options=program.options))
+    task.ai_channels.add_ai_voltage_chan("ShakerDaq/ai0", min_val=-5, max_val=5)
+    task.timing.cfg_samp_clk_timing(RATE_HZ, sample_mode=AcquisitionType.CONTINUOUS)
+    assert amplitude(np.array(task.read(6400, timeout=20.0))) == pytest.approx(0.05, rel=0.02)
