@@ -1,0 +1,135 @@
+"""Resonances: exact on exact curves, as scattered as stated on noisy ones, silent where there is none."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import signal
+
+from analysis.confidence import student_half_width
+from analysis.errors import InvalidRequest
+from analysis.resonance import resonances
+from analysis.results import Estimator, Transmission, TransmissionSettings
+from analysis.transmission import transmission
+
+
+def curve(frequency_hz, value, relative=1e-4, resolution_hz=0.0, coherence=0.99):
+    return Transmission(
+        frequency_hz=frequency_hz,
+        value=value,
+        coherence=np.full(frequency_hz.size, coherence),
+        n_eff=50.0,
+        relative_sd_magnitude=np.full(frequency_hz.size, relative),
+        sd_phase_rad=np.full(frequency_hz.size, relative),
+        half_width=student_half_width(np.full(frequency_hz.size, relative), 50.0, 0.95),
+        coherence_significance=0.06,
+        resolution_hz=resolution_hz,
+        segments_used=50,
+        segments_excluded=0,
+        settings=TransmissionSettings(Estimator.H1, 5120.0, 5120, "hann", 0.5, 0.95),
+    )
+
+
+def single(frequency_hz, natural_hz, damping):
+    ratio = frequency_hz / natural_hz
+    return 1 / (1 - ratio**2 + 2j * damping * ratio)
+
+
+def specimen(frequency_hz):
+    """X / U of the paper's equation 1 without contact, c_i = 2e-5 s k_i."""
+    masses = np.array([5.8e-3, 2.1e-3, 2e-3])
+    stiffness = masses * (2 * np.pi * np.array([322.0, 100.0, 390.6])) ** 2
+    result = []
+    for f in frequency_hz:
+        s = 2j * np.pi * f
+        k0, k1, k2 = stiffness * (1 + 2e-5 * s)
+        matrix = np.array([[k0 + k2, 0, -k2], [0, k1, -k1], [-k2, -k1, k1 + k2]]) + np.diag(masses) * s**2
+        result.append(np.linalg.solve(matrix, [k0, 0, 0])[0])
+    return np.array(result)
+
+
+def modes():
+    """Natural frequencies and damping ratios of the specimen from its eigenvalue problem."""
+    masses = np.array([5.8e-3, 2.1e-3, 2e-3])
+    k0, k1, k2 = masses * (2 * np.pi * np.array([322.0, 100.0, 390.6])) ** 2
+    matrix = np.array([[k0 + k2, 0, -k2], [0, k1, -k1], [-k2, -k1, k1 + k2]])
+    omega = np.sqrt(np.linalg.eigvals(matrix / masses[:, None]).real)
+    return np.sort(omega) / (2 * np.pi), 2e-5 * np.sort(omega) / 2
+
+
+@settings(deadline=None, max_examples=30)
+@given(natural_hz=st.floats(150, 350), damping=st.floats(0.003, 0.08))
+def test_a_single_mode_is_recovered_exactly(natural_hz, damping):
+    frequency_hz = np.arange(50, 500, 0.5)
+    (found,) = resonances(
+        curve(frequency_hz, single(frequency_hz, natural_hz, damping)), low_hz=60, high_hz=490
+    )
+    assert found.frequency_hz == pytest.approx(natural_hz, rel=1e-5)
+    assert found.damping_ratio == pytest.approx(damping, rel=1e-3)
+    exact = 1 / (2 * damping * np.sqrt(1 - damping**2))
+    assert found.peak_magnitude == pytest.approx(exact, rel=2e-3)
+    assert found.peak_frequency_hz == pytest.approx(natural_hz * np.sqrt(1 - 2 * damping**2), abs=0.1)
+    assert found.quality_factor == pytest.approx(0.5 / damping, rel=1e-3)
+    assert found.half_power_bandwidth_hz == pytest.approx(2 * damping * natural_hz, rel=2e-3)
+
+
+def test_the_three_modes_of_the_specimen_are_found_where_its_eigenvalues_are():
+    frequency_hz = np.arange(20.0, 600.0, 0.5)
+    found = resonances(curve(frequency_hz, specimen(frequency_hz), 1e-3), low_hz=30, high_hz=590)
+    exact_hz, damping = modes()
+    assert len(found) == 3
+    for one, f, zeta in zip(found, exact_hz, damping, strict=True):
+        assert one.frequency_hz == pytest.approx(f, rel=5e-4)
+        assert one.damping_ratio == pytest.approx(zeta, rel=0.03)
+        assert one.is_resolved
+
+
+def test_the_stated_spreads_are_the_scatter():
+    rng = np.random.default_rng(1)
+    frequency_hz = np.arange(200, 330, 1.0)
+    clean = single(frequency_hz, 266.0, 0.02)
+    found = []
+    for _ in range(150):
+        noise = rng.standard_normal((2, clean.size))
+        noisy = clean * (1 + 0.03 * (noise[0] + 1j * noise[1]))
+        fits = resonances(curve(frequency_hz, noisy, 0.03), low_hz=210, high_hz=320)
+        assert len(fits) == 1
+        found.append(fits[0])
+    for value, spread in (
+        ("frequency_hz", "sd_frequency_hz"),
+        ("damping_ratio", "sd_damping_ratio"),
+        ("peak_magnitude", "sd_peak_magnitude"),
+    ):
+        scatter = np.std([getattr(each, value) for each in found])
+        assert np.mean([getattr(each, spread) for each in found]) == pytest.approx(scatter, rel=0.25)
+    assert np.mean([each.reduced_chi_square for each in found]) == pytest.approx(1, abs=0.1)
+
+
+def test_a_resonance_is_found_in_noise_records_and_its_resolution_is_judged():
+    rate, natural = 5120.0, 2 * np.pi * 260
+    section = signal.bilinear([natural**2], [1, 2 * 0.02 * natural, natural**2], fs=rate)
+    x, extra = np.random.default_rng(2).standard_normal((2, 600_000))
+    y = signal.lfilter(*section, x) + 0.05 * extra
+    warped_hz = rate / np.pi * np.arctan(260 * np.pi / rate)
+    fine = transmission(x, y, rate, segment_samples=5120)
+    (found,) = resonances(fine, low_hz=100, high_hz=800)
+    assert found.frequency_hz == pytest.approx(warped_hz, abs=max(4 * found.sd_frequency_hz, 0.2))
+    assert found.damping_ratio == pytest.approx(0.02, rel=0.08)
+    assert found.is_resolved
+    coarse = transmission(x, y, rate, segment_samples=1024)
+    (smeared,) = resonances(coarse, low_hz=100, high_hz=800)
+    assert not smeared.is_resolved
+    assert smeared.damping_ratio > found.damping_ratio
+
+
+def test_noise_has_no_resonance():
+    x, y = np.random.default_rng(3).standard_normal((2, 100_000))
+    assert resonances(transmission(x, y, 5120.0, segment_samples=2048), low_hz=50, high_hz=2000) == ()
+    flat = transmission(x, x + 0.5 * y, 5120.0, segment_samples=2048)
+    assert len(resonances(flat, low_hz=50, high_hz=2000)) <= 2
+
+
+def test_a_band_with_too_few_lines_is_refused():
+    frequency_hz = np.arange(50, 500, 10.0)
+    with pytest.raises(InvalidRequest, match="at least 8"):
+        resonances(curve(frequency_hz, single(frequency_hz, 266, 0.02)), low_hz=250, high_hz=280)
