@@ -1,0 +1,105 @@
+"""Speed and memory of the averaged spectra against scipy on the whole array.
+
+Run as ``python benchmarks/transmission.py [MINUTES]``. Each contestant runs in a process of its own, so that
+its peak memory is its own; the recording (4 channels at 51.2 kS/s) lies in a file, as it does in the lab.
+"""
+
+import multiprocessing
+import resource
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from scipy import signal
+
+from analysis.segment_spectra import SegmentSpectra
+
+RATE_HZ = 51_200
+CHANNELS = 4
+SEGMENT = 51_200
+BLOCK = 1 << 19
+BYTES_PER_MEGABYTE = 1 << 20
+KILOBYTES = 1 << 10
+
+
+def channel_file(folder, channel):
+    """Where one channel lies."""
+    return folder / f"channel{channel}.f64"
+
+
+def write_recording(folder, samples):
+    """Write noise, one file a channel."""
+    rng = np.random.default_rng(1)
+    for channel in range(CHANNELS):
+        with channel_file(folder, channel).open("wb") as file:
+            for first in range(0, samples, BLOCK):
+                rng.standard_normal(min(BLOCK, samples - first)).tofile(file)
+
+
+def ours(folder, samples):
+    """Average all ten spectra and cross-spectra of four channels, block by block."""
+    spectra = SegmentSpectra(CHANNELS, SEGMENT)
+    for first in range(0, samples, BLOCK):
+        count = min(BLOCK, samples - first)
+        rows = [
+            np.fromfile(channel_file(folder, channel), np.float64, count, offset=first * np.float64().nbytes)
+            for channel in range(CHANNELS)
+        ]
+        spectra.add(np.stack(rows))
+    return spectra.averages().density(0, 1, RATE_HZ)
+
+
+def theirs(folder, _samples):
+    """Average the same ten by scipy, on the whole arrays in memory."""
+    record = [np.fromfile(channel_file(folder, channel), np.float64) for channel in range(CHANNELS)]
+    settings = {"fs": RATE_HZ, "nperseg": SEGMENT, "detrend": False}
+    result = None
+    for i in range(CHANNELS):
+        signal.welch(record[i], **settings)
+        for j in range(i + 1, CHANNELS):
+            _, cross = signal.csd(record[i], record[j], **settings)
+            result = cross if (i, j) == (0, 1) else result
+    return result
+
+
+def measured(contestant, folder, samples, pipe):
+    """Run one contestant and send its time, its peak memory and its result."""
+    idle = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    begin = time.perf_counter()
+    result = contestant(folder, samples)
+    duration = time.perf_counter() - begin
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    pipe.send((duration, (peak - idle) * KILOBYTES / BYTES_PER_MEGABYTE, result))
+
+
+def run(contestant, folder, samples):
+    """Give a contestant a process of its own."""
+    context = multiprocessing.get_context("spawn")
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=measured, args=(contestant, folder, samples, sender))
+    process.start()
+    answer = receiver.recv()
+    process.join()
+    return answer
+
+
+def main():
+    """Compare and print."""
+    minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 3.0
+    samples = int(minutes * 60 * RATE_HZ)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_recording(folder, samples)
+        our_s, our_mb, our_result = run(ours, folder, samples)
+        their_s, their_mb, their_result = run(theirs, folder, samples)
+    difference = np.max(np.abs(our_result / their_result - 1))
+    print(f"{minutes:g} minutes of {CHANNELS} channels, segments of {SEGMENT}, all spectra and cross-spectra")
+    print(f"vibench: {our_s:6.2f} s, {our_mb:7.0f} MB above the idle process")
+    print(f"scipy:   {their_s:6.2f} s, {their_mb:7.0f} MB above the idle process")
+    print(f"scipy takes {their_s / our_s:.1f} times as long; largest relative difference {difference:.1e}")
+
+
+if __name__ == "__main__":
+    main()
