@@ -25,6 +25,7 @@ _STALE_REPLY_MS = 100.0
 _QUIET = frozenset({pyvisa.constants.StatusCode.error_timeout})
 # pyvisa-py lets the ValueError and OSError of PyUSB through when the device is gone.
 _LOST = (ValueError, OSError, pyvisa.errors.InvalidSession)
+_QUEUE_ENTRY = re.compile(r'([+-]?\d+)\s*,\s*"?([^"]*)"?')
 _LEADING_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 
 
@@ -151,10 +152,15 @@ class ScpiPort:
     def _drain(self) -> Iterator[Complaint]:
         for _ in range(_LONGEST_QUEUE):
             reply = self.query_patiently("SYST:ERR?")
-            code = int(number_in(reply, f"{self._name}: SYST:ERR?"))
-            if code == NO_ERROR:
+            entry = _QUEUE_ENTRY.fullmatch(reply)
+            if entry is None:
+                raise InstrumentError(
+                    f"{self._name} answered SYST:ERR? with {reply!r}, which is no entry of an error queue; "
+                    "check the cable, and try again"
+                )
+            if int(entry[1]) == NO_ERROR:
                 return
-            yield Complaint(code, reply.partition(",")[2].strip().strip('"'))
+            yield Complaint(int(entry[1]), entry[2])
         raise InstrumentError(
             f"{self._name} reports errors without end ({_LONGEST_QUEUE} read); "
             "switch it off and on, and open the bench again"

@@ -1,0 +1,124 @@
+"""A simulated AFG1022 on the simulated USB bus, with a log of what it was told and what came of it."""
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import pytest
+
+from acquisition.rig import GeneratorConfig
+from acquisition.virtual import usb_bus
+from acquisition.virtual.afg1022 import AFG1022, Reply
+from acquisition.virtual.afg1022_settings import ChannelSettings
+from acquisition.virtual.output_signal import Panel
+from acquisition.virtual.scpi_command import Quirks
+from acquisition.virtual.scpi_status import ErrorCode, StatusByte
+from acquisition.virtual.usbtmc import UsbTmcInstrument
+
+_SERIALS = (f"C02{number:04d}" for number in itertools.count(1))
+
+
+def _nothing(message: bytes) -> None:
+    """Leave the bench alone."""
+
+
+class Logged:
+    """Listens in between the USB interface and the instrument."""
+
+    def __init__(self, instrument: AFG1022) -> None:
+        self.serial = instrument.serial
+        self.messages: list[str] = []
+        self.states: list[ChannelSettings] = []
+        self.before: Callable[[bytes], None] = _nothing
+        """What happens on the bench just before a message arrives."""
+        self.after: Callable[[bytes], None] = _nothing
+        self._instrument = instrument
+
+    def execute(self, message: bytes) -> Reply:
+        self.before(message)
+        reply = self._instrument.execute(message)
+        self.after(message)
+        self.messages.append(message.decode("latin-1").strip())
+        self.states.append(self._instrument.settings(1))
+        return reply
+
+    def report(self, code: ErrorCode) -> None:
+        self._instrument.report(code)
+
+    @property
+    def status_byte(self) -> StatusByte:
+        return self._instrument.status_byte
+
+    def commands(self) -> list[str]:
+        """What was told, without the questions."""
+        return [message for message in self.messages if "?" not in message]
+
+    def forget(self) -> None:
+        self.messages.clear()
+        self.states.clear()
+
+
+class Impostor(Logged):
+    """Another model with the same USB address, as an AFG1062 would be."""
+
+    def execute(self, message: bytes) -> Reply:
+        reply = super().execute(message)
+        return Reply(b"TEKTRONIX,AFG1062,C1,FV:1\n") if message.startswith(b"*IDN?") else reply
+
+
+@dataclass
+class Plugged:
+    """A generator on the bus."""
+
+    instrument: AFG1022
+    usb: UsbTmcInstrument
+    log: Logged
+
+    @property
+    def config(self) -> GeneratorConfig:
+        return GeneratorConfig(
+            resource=f"USB0::0x0699::0x0353::{self.instrument.serial}::INSTR",
+            connected_ohm=15e3,
+            amplitude_limit_vpp=10.0,
+        )
+
+    @property
+    def is_on(self) -> bool:
+        return self.instrument.settings(1).relay.value == "closed"
+
+
+@dataclass
+class Bus:
+    """Plugs generators in, and all out at the end."""
+
+    plugged: list[Plugged] = field(default_factory=list)
+
+    def plug_in(
+        self, quirks: Quirks | None = None, panel: Panel | None = None, listener: type[Logged] = Logged
+    ) -> Plugged:
+        instrument = AFG1022(
+            lambda: 0.0, serial=next(_SERIALS), quirks=quirks or Quirks(), panel=panel or Panel()
+        )
+        log = listener(instrument)
+        usb = UsbTmcInstrument(log)
+        usb_bus.plug_in(usb)
+        self.plugged.append(Plugged(instrument, usb, log))
+        return self.plugged[-1]
+
+
+@pytest.fixture
+def bus() -> Iterator[Bus]:
+    made = Bus()
+    yield made
+    for plugged in made.plugged:
+        usb_bus.unplug(plugged.usb)
+
+
+@pytest.fixture
+def plugged(bus: Bus) -> Plugged:
+    return bus.plug_in()
+
+
+@pytest.fixture
+def impostor(bus: Bus) -> Plugged:
+    return bus.plug_in(listener=Impostor)

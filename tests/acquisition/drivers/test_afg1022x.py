@@ -1,0 +1,378 @@
+"""The AFG1022 driver over real pyvisa, against a simulated AFG1022 on a USB bus in memory."""
+
+import math
+
+import numpy as np
+import pytest
+
+from acquisition.drivers.afg1022_limits import Shape
+from acquisition.drivers.afg1022_modes import SweepSupport, Unsupported
+from acquisition.drivers.afg1022x import AFG1022X
+from acquisition.errors import InstrumentBusy, InstrumentError, InstrumentLost, LimitExceeded, SettingRefused
+from acquisition.rig import Knob
+from acquisition.virtual.afg1022_settings import OPEN_AMPLITUDE_RANGE_VPP
+from acquisition.virtual.output_signal import Panel
+from acquisition.virtual.scpi_command import Quirks
+
+SINE = np.sin(2 * np.pi * np.arange(1024) / 1024)
+
+
+@pytest.fixture
+def generator(plugged):
+    opened = AFG1022X.open(plugged.config)
+    plugged.log.forget()
+    yield opened
+    plugged.usb.plug_cable()
+    opened.close()
+
+
+def largest_peak_v(states):
+    return max(abs(state.offset_v) + state.amplitude_vpp / 2 for state in states)
+
+
+class TestOpening:
+    def test_the_first_command_is_to_be_silent(self, plugged):
+        AFG1022X.open(plugged.config).close()
+        assert plugged.log.messages[0] == "OUTP1:STAT OFF"
+
+    def test_the_identity_is_found_behind_an_empty_first_answer(self, plugged):
+        generator = AFG1022X.open(plugged.config)
+        assert plugged.log.messages.count("*IDN?") == 2
+        assert generator.identity.model == "AFG1022"
+        assert generator.identity.serial == plugged.instrument.serial
+        assert generator.identity.reply.startswith("TEKTRONIX,AFG1022,")
+        generator.close()
+
+    def test_whatever_it_was_before_it_is_a_quiet_sine_without_modes_afterwards(self, plugged):
+        for message in (
+            "SOUR1:VOLT 3VPP",
+            "SOUR1:VOLT:OFFS 0.5",
+            "SOUR1:FUNC RAMP",
+            "SOUR1:AM:STAT ON",
+            "OUTP1 ON",
+        ):
+            plugged.instrument.execute(message.encode())
+        generator = AFG1022X.open(plugged.config)
+        state = plugged.instrument.settings(1)
+        assert not plugged.is_on
+        assert (state.shape, state.mode.value, state.offset_v) == ("SIN", "CW", 0.0)
+        assert state.amplitude_vpp == pytest.approx(OPEN_AMPLITUDE_RANGE_VPP[0])
+        generator.close()
+
+    def test_old_complaints_do_not_keep_it_from_opening(self, plugged):
+        plugged.instrument.execute(b"NONSENSE")
+        AFG1022X.open(plugged.config).close()
+
+    def test_nothing_on_the_bus_is_an_instrument_that_is_lost(self, bus):
+        config = bus.plug_in().config.model_copy(update={"resource": "USB0::0x0699::0x0353::NOBODY::INSTR"})
+        with pytest.raises(InstrumentLost, match=r"NOBODY.*power and cable"):
+            AFG1022X.open(config)
+
+    def test_another_instrument_is_named_and_left_alone(self, impostor):
+        with pytest.raises(InstrumentError, match=r"AFG1062.*TEKTRONIX,AFG1022 is needed"):
+            AFG1022X.open(impostor.config)
+        assert impostor.log.commands() == ["OUTP1:STAT OFF", "*CLS"]
+
+    def test_a_second_program_is_told_that_the_first_one_holds_it(self, plugged, generator):
+        with pytest.raises((InstrumentBusy, InstrumentLost), match=plugged.instrument.serial):
+            AFG1022X.open(plugged.config)
+        generator.load_sine(100.0, 1.0)
+
+
+class TestLoad:
+    def test_high_impedance_is_set_and_its_ohm_sign_read(self, plugged, generator):
+        assert math.isinf(plugged.instrument.settings(1).declared_load_ohm)
+        assert generator.unconfirmed == ()
+
+    def test_a_load_that_only_the_panel_knows_is_for_the_operator_to_confirm(self, bus):
+        plugged = bus.plug_in(Quirks(load_is_panel_only=True), Panel(declared_load_ohm=math.inf))
+        generator = AFG1022X.open(plugged.config)
+        assert generator.unconfirmed == (Knob(instrument="generator", setting="output load", value="high-z"),)
+        generator.close()
+
+    def test_fifty_ohm_halve_the_range_of_amplitudes(self, bus):
+        config = bus.plug_in().config.model_copy(update={"load_ohm": 50.0, "amplitude_limit_vpp": 20.0})
+        generator = AFG1022X.open(config)
+        assert generator.amplitude_range_vpp == (1e-3, 10.0)
+        generator.close()
+
+
+class TestPlaying:
+    def test_a_sine_is_set_and_read_back(self, plugged, generator):
+        generator.load_sine(266.2, 1.5)
+        state = plugged.instrument.settings(1)
+        assert (state.frequency_hz, state.amplitude_vpp, state.offset_v) == (266.2, 1.5, 0.0)
+        assert (generator.playing.frequency_hz, generator.playing.panel_vpp) == (266.2, 1.5)
+        assert not plugged.is_on
+
+    def test_the_dialogue_is_the_manuals(self, plugged, generator):
+        generator.load_sine(260.0, 1.5)
+        generator.start()
+        assert plugged.log.commands() == [
+            "SOUR1:VOLT:OFFS 0.0000",
+            "SOUR1:FREQ 260.000000",
+            "SOUR1:VOLT 1.5000VPP",
+            "OUTP1:STAT ON",
+        ]
+
+    def test_every_setting_is_read_back_and_the_error_queue_emptied(self, plugged, generator):
+        generator.set_frequency(261.0)
+        assert plugged.log.messages == ["SOUR1:FREQ 261.000000", "SYST:ERR?", "SOUR1:FREQ?"]
+
+    def test_start_turns_on_and_stop_turns_off_and_may_be_repeated(self, plugged, generator):
+        generator.load_sine(260.0, 0.1)
+        generator.start()
+        assert plugged.is_on
+        generator.stop()
+        generator.stop()
+        assert not plugged.is_on
+
+    def test_frequency_and_amplitude_change_while_it_plays(self, plugged, generator):
+        generator.load_sine(260.0, 0.1)
+        generator.start()
+        generator.set_frequency(260.1)
+        generator.set_amplitude(0.2)
+        state = plugged.instrument.settings(1)
+        assert plugged.is_on
+        assert (state.frequency_hz, state.amplitude_vpp) == (260.1, 0.2)
+
+    @pytest.mark.parametrize("points", [2, 3, 1024, 8191, 8192])
+    def test_the_memory_holds_what_was_asked_for(self, plugged, generator, points):
+        values = np.cos(2 * np.pi * np.arange(points) / points)
+        generator.load_waveform(values, 2.0, 0.5)
+        held = plugged.instrument.memory.codes("EMEM")
+        playing = generator.playing
+        assert playing.shape is Shape.EDIT_MEMORY
+        assert held.tolist() == playing.codes.codes.tolist()
+        volts = (held / 8191.5 - 1) * playing.panel_vpp / 2
+        assert np.max(np.abs(volts - 0.25 * (values - values.mean()))) < 0.5 / 16383 + 0.5e-4
+
+    def test_an_uneven_waveform_keeps_its_volts_when_the_amplitude_changes(self, plugged, generator):
+        values = np.array([1.0, -0.2, -0.2, -0.2, -0.2])
+        generator.load_waveform(values, 2.0, 1.0)
+        generator.set_amplitude(2.0)
+        held = plugged.instrument.memory.codes("EMEM")
+        volts = (held / 8191.5 - 1) * plugged.instrument.settings(1).amplitude_vpp / 2
+        assert volts == pytest.approx(values - values.mean(), abs=2 / 16383)
+
+    def test_from_one_thing_to_the_next_no_step_is_larger_than_the_larger_of_them(self, plugged, generator):
+        generator.load_sine(20e6, 2.0)
+        generator.start()
+        for change in (
+            lambda: generator.load_waveform(SINE, 1.0, 1.0),
+            lambda: generator.load_waveform(-SINE, 5.0, 0.2),
+            lambda: generator.load_sine(20e6, 2.0),
+            lambda: generator.load_sine(10.0, 0.1),
+            lambda: generator.load_sine(300.0, 3.0),
+        ):
+            before = plugged.instrument.settings(1)
+            plugged.log.forget()
+            change()
+            allowed = largest_peak_v([before, plugged.instrument.settings(1)])
+            assert largest_peak_v(plugged.log.states) <= allowed + 1e-9
+            assert plugged.is_on
+
+    def test_the_memory_never_changes_while_it_is_heard(self, plugged, generator):
+        generator.load_waveform(SINE, 1.0, 3.0)
+        generator.start()
+        plugged.log.forget()
+        generator.load_waveform(SINE[::-1], 1.0, 3.0)
+        told = zip(plugged.log.messages, plugged.log.states, strict=True)
+        heard = [
+            state.amplitude_vpp for message, state in told if message.startswith(("DATA:", "SOUR1:FUNC"))
+        ]
+        assert max(heard) == pytest.approx(OPEN_AMPLITUDE_RANGE_VPP[0])
+
+    def test_offset_and_phase_reach_the_instrument(self, plugged, generator):
+        generator.load_sine(100.0, 1.0)
+        generator.set_offset(-0.25)
+        generator.set_phase(31)
+        state = plugged.instrument.settings(1)
+        assert (state.offset_v, state.phase_deg) == (-0.25, 31)
+
+    def test_a_burst_counts_its_cycles_and_ends(self, plugged, generator):
+        generator.load_sine(100.0, 1.0)
+        generator.arm_burst(7)
+        state = plugged.instrument.settings(1)
+        assert (state.mode.value, state.burst_cycles, state.burst_mode.value) == ("BURS", 7, "TRIGgered")
+        generator.trigger()
+        generator.end_burst()
+        assert plugged.instrument.settings(1).mode.value == "CW"
+
+    def test_the_second_channel_plays_and_has_no_bursts(self, plugged):
+        config = plugged.config.model_copy(update={"channel": 2})
+        generator = AFG1022X.open(config)
+        generator.load_sine(123.0, 0.5)
+        assert plugged.instrument.settings(2).frequency_hz == 123.0
+        with pytest.raises(Unsupported, match=r"channel 2"):
+            generator.arm_burst(3)
+        generator.close()
+
+    def test_the_time_of_one_verified_change_is_measured(self, plugged, generator):
+        generator.load_sine(100.0, 0.1)
+        plugged.log.forget()
+        assert 0 < generator.measured_latency_s() < 1.0
+        assert plugged.log.commands().count("SOUR1:VOLT 0.1000VPP") == 9
+
+
+class TestSweep:
+    def test_a_firmware_that_takes_the_commands_is_found_out_with_the_output_off(self, plugged, generator):
+        generator.load_sine(100.0, 0.1)
+        generator.start()
+        assert generator.probe_sweep(150.0, 350.0) is SweepSupport.SUPPORTED
+        assert not plugged.is_on
+        assert plugged.instrument.settings(1).mode.value == "CW"
+
+    def test_a_firmware_that_does_not_is_left_in_order(self, bus):
+        plugged = bus.plug_in(Quirks(sweep_is_unknown=True))
+        generator = AFG1022X.open(plugged.config)
+        assert generator.probe_sweep(150.0, 350.0) is SweepSupport.UNSUPPORTED
+        generator.load_sine(100.0, 0.1)
+        generator.start()
+        assert plugged.is_on
+        generator.close()
+
+
+class TestLimits:
+    @pytest.mark.parametrize(
+        ("act", "complaint"),
+        [
+            (lambda g: g.load_sine(25.1e6, 1.0), r"2.51e\+07 Hz"),
+            (lambda g: g.load_sine(math.nan, 1.0), "nan Hz"),
+            (lambda g: g.load_sine(100.0, 10.1), "amplitude_limit_vpp = 10"),
+            (lambda g: g.load_sine(100.0, math.nan), "nan Vpp"),
+            (lambda g: g.load_sine(100.0, 0.001), "0.002 to 10 Vpp"),
+            (lambda g: g.load_waveform(SINE, 10.1e6, 1.0), "EMEM"),
+            (lambda g: g.set_amplitude(10.5), "10.5 Vpp"),
+            (lambda g: g.set_frequency(0.0), "0 Hz"),
+            (lambda g: g.set_offset(5.0), "peaks at"),
+            (lambda g: g.set_phase(360), "0 to 359"),
+            (lambda g: g.arm_burst(0), "0 cycles"),
+        ],
+    )
+    def test_what_is_not_allowed_is_refused_before_anything_is_sent(self, plugged, generator, act, complaint):
+        generator.load_sine(100.0, 1.0)
+        plugged.log.forget()
+        with pytest.raises(LimitExceeded, match=complaint):
+            act(generator)
+        assert plugged.log.messages == []
+
+    def test_the_bench_allows_less_than_the_instrument_and_is_obeyed(self, plugged):
+        generator = AFG1022X.open(plugged.config.model_copy(update={"amplitude_limit_vpp": 0.5}))
+        generator.load_sine(100.0, 0.5)
+        with pytest.raises(LimitExceeded, match=r"amplitude_limit_vpp = 0.5"):
+            generator.set_amplitude(0.51)
+        generator.close()
+
+
+class TestFaults:
+    def test_a_default_that_slipped_in_is_a_fault_and_silences(self, plugged, generator):
+        generator.load_sine(260.0, 0.1)
+        generator.start()
+        # Somebody turns to 10 ohm at the panel: 10 Vpp is now out of range, and silently becomes 1 Vpp.
+        plugged.instrument.execute(b"OUTP1:IMP 10")
+        with pytest.raises(SettingRefused, match=r"10\.0000VPP.*reads back '1") as caught:
+            generator.set_amplitude(10.0)
+        assert not plugged.is_on
+        assert "The output was switched off." in caught.value.__notes__
+
+    def test_a_complaint_is_a_fault_and_silences(self, bus):
+        plugged = bus.plug_in(Quirks(out_of_range_becomes_default=False))
+        generator = AFG1022X.open(plugged.config)
+        generator.load_sine(260.0, 0.1)
+        generator.start()
+        plugged.instrument.execute(b"OUTP1:IMP 1")
+        with pytest.raises(InstrumentError, match=r"refused.*-222"):
+            generator.set_amplitude(9.0)
+        assert not plugged.is_on
+        generator.close()
+
+    def test_a_memory_that_reads_back_differently_is_a_fault(self, plugged, generator):
+        def spoil(message):
+            if message.startswith(b"DATA:DATA EMEM"):
+                plugged.instrument.execute(b"DATA:VAL EMEM,5,0")
+
+        plugged.log.after = spoil
+        with pytest.raises(SettingRefused, match=r"1024 points were put in its memory.*1023 agree"):
+            generator.load_waveform(SINE, 1.0, 0.1)
+
+    def test_a_spoilt_answer_is_an_error_and_silences(self, plugged, generator):
+        generator.load_sine(260.0, 0.1)
+        generator.start()
+        plugged.instrument.corrupt_next_reply()
+        with pytest.raises(InstrumentError, match=r"answered SYST:ERR\?"):
+            generator.set_frequency(261.0)
+        assert not plugged.is_on
+
+    def test_after_a_fault_the_next_sine_starts_from_a_known_state(self, plugged, generator):
+        generator.load_sine(260.0, 0.1)
+        plugged.instrument.corrupt_next_reply()
+        with pytest.raises(InstrumentError):
+            generator.set_frequency(261.0)
+        with pytest.raises(InstrumentError, match=r"no known settings"):
+            generator.start()
+        generator.load_sine(262.0, 0.1)
+        generator.start()
+        assert plugged.is_on
+        assert plugged.instrument.settings(1).frequency_hz == 262.0
+
+    def test_a_late_answer_is_an_error_and_silences(self, plugged, generator):
+        generator.load_sine(260.0, 0.1)
+        generator.start()
+        plugged.instrument.delay_next_reply(10.0)
+        with pytest.raises(InstrumentError, match=r"did not answer"):
+            generator.set_frequency(261.0)
+        assert not plugged.is_on
+
+    def test_a_pulled_cable_tells_the_operator_to_switch_the_amplifier_off(self, plugged, generator):
+        generator.load_sine(260.0, 0.1)
+        generator.start()
+        plugged.usb.pull_cable()
+        with pytest.raises(InstrumentLost, match=r"MAY STILL BE ON.*Turn the amplifier"):
+            generator.set_amplitude(0.2)
+        with pytest.raises(InstrumentLost, match=r"MAY STILL BE ON"):
+            generator.stop()
+
+    def test_a_cable_that_was_out_for_a_moment_ends_in_silence(self, plugged, generator):
+        generator.load_sine(260.0, 0.1)
+        generator.start()
+        plugged.usb.pull_cable()
+        with pytest.raises(InstrumentLost):
+            generator.set_amplitude(0.2)
+        assert plugged.is_on
+        plugged.usb.plug_cable()
+        generator.stop()
+        assert not plugged.is_on
+
+    def test_closing_without_the_instrument_complains_and_a_later_stop_still_works(self, plugged, generator):
+        generator.load_sine(260.0, 0.1)
+        generator.start()
+        plugged.usb.pull_cable()
+        with pytest.raises(InstrumentLost):
+            generator.close()
+        plugged.usb.plug_cable()
+        generator.stop()
+        assert not plugged.is_on
+
+    def test_closing_silences_and_what_comes_after_is_legal(self, plugged, generator):
+        generator.load_sine(260.0, 0.1)
+        generator.start()
+        generator.close()
+        generator.stop()
+        generator.close()
+        assert not plugged.is_on
+
+    def test_a_failure_while_opening_leaves_silence_and_a_free_instrument(self, plugged):
+        plugged.instrument.execute(b"OUTP1 ON")
+        interrupted = []
+
+        def interrupt(message):
+            if message.startswith(b"SOUR1:FUNC:SHAP SIN") and not interrupted:
+                interrupted.append(message)
+                raise KeyboardInterrupt
+
+        plugged.log.before = interrupt
+        with pytest.raises(KeyboardInterrupt):
+            AFG1022X.open(plugged.config)
+        assert not plugged.is_on
+        AFG1022X.open(plugged.config).close()

@@ -1,0 +1,64 @@
+"""The mapping from values to codes: what the terminal plays is what was asked for, within one step."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from acquisition.drivers.arbitrary_codes import HIGHEST_CODE, arbitrary_codes
+from acquisition.errors import LimitExceeded
+
+waveforms = arrays(np.float64, st.integers(2, 300), elements=st.floats(-1, 1, allow_subnormal=False)).filter(
+    lambda values: np.ptp(values) > 1e-6
+)
+
+
+@given(waveforms)
+def test_what_the_codes_play_is_the_waveform_without_its_mean_within_half_a_step(values):
+    made = arbitrary_codes(values)
+    assert np.max(np.abs(made.achieved - (values - values.mean()))) <= made.step / 2 * (1 + 1e-9)
+
+
+@given(waveforms)
+def test_the_largest_magnitude_takes_an_outermost_code_and_none_is_beyond(values):
+    codes = arbitrary_codes(values).codes
+    assert codes.min() == 0 or codes.max() == HIGHEST_CODE
+    assert codes.max() <= HIGHEST_CODE
+
+
+@given(waveforms)
+def test_the_dc_that_is_left_is_less_than_half_a_step(values):
+    made = arbitrary_codes(values)
+    assert abs(made.residual_mean) <= made.step / 2 * (1 + 1e-9)
+
+
+def test_a_sine_of_full_range_needs_no_other_amplitude_on_the_panel():
+    made = arbitrary_codes(np.sin(2 * np.pi * np.arange(4096) / 4096))
+    assert made.panel_factor == pytest.approx(1.0, abs=1e-12)
+    assert (made.codes.min(), made.codes.max()) == (0, HIGHEST_CODE)
+    assert abs(made.residual_mean) < 1e-7
+
+
+def test_an_uneven_waveform_tells_by_how_much_the_panel_must_be_higher():
+    values = np.array([1.0, -0.2, -0.2, -0.2, -0.2])
+    made = arbitrary_codes(values)
+    assert made.removed_mean == pytest.approx(0.04)
+    assert made.panel_factor == pytest.approx(0.96)
+
+
+@pytest.mark.parametrize(
+    ("values", "complaint"),
+    [
+        (np.zeros(1), "2 to 8192"),
+        (np.sin(np.arange(8193.0)), "2 to 8192"),
+        (np.zeros((2, 8)), "one period"),
+        (np.array([0.0, np.nan]), "from -1 to 1"),
+        (np.array([0.0, np.inf]), "from -1 to 1"),
+        (np.array([0.0, 1.01]), "1.01"),
+        (np.full(8, 0.3), "constant"),
+    ],
+)
+def test_what_the_memory_cannot_play_is_refused_before_anything_is_sent(values, complaint):
+    with pytest.raises(LimitExceeded, match=complaint):
+        arbitrary_codes(values)

@@ -1,0 +1,35 @@
+"""Where an input was past its range."""
+
+import numpy as np
+import pytest
+
+from acquisition.drivers.overload_ranges import overload_ranges
+from acquisition.instruments import Overload
+
+
+def ranges(row, first_sample=0, full_scale_v=1.0):
+    return overload_ranges(np.array([row]), ("m0_velocity",), (full_scale_v,), first_sample)
+
+
+def test_a_block_within_range_has_no_overload():
+    assert ranges(0.949 * np.ones(100)) == ()
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_range_names_first_and_last_sample_of_the_run_inclusive(sign):
+    row = np.zeros(1000)
+    row[10:20] = sign * 0.95
+    assert ranges(row, first_sample=5000) == (Overload("m0_velocity", 5010, 5019),)
+
+
+def test_pauses_shorter_than_the_converter_needs_to_recover_do_not_end_a_range():
+    row = np.zeros(1000)
+    row[[100, 164, 300]] = 1.0
+    assert ranges(row) == (Overload("m0_velocity", 100, 164), Overload("m0_velocity", 300, 300))
+
+
+def test_each_channel_is_held_against_its_own_full_scale():
+    volts = np.full((2, 10), 4.0)
+    assert overload_ranges(volts, ("drive_voltage", "m0_velocity"), (5.0, 4.0), 0) == (
+        Overload("m0_velocity", 0, 9),
+    )

@@ -1,0 +1,174 @@
+"""The SCPI port: the dialogue, and everything that can go wrong in it."""
+
+import errno
+from collections import deque
+
+import numpy as np
+import pytest
+import pyvisa
+
+from acquisition.drivers.scpi import ScpiPort
+from acquisition.errors import InstrumentError, InstrumentLost
+
+TIMEOUT = pyvisa.VisaIOError(pyvisa.constants.StatusCode.error_timeout)
+LOST = pyvisa.VisaIOError(pyvisa.constants.StatusCode.error_connection_lost)
+
+
+class Instrument:
+    """Answers questions from a table, keeps an error queue, and drops dead when told to."""
+
+    def __init__(self, **answers):
+        self.timeout = 3000.0
+        self.answers = {name.replace("_", " "): list(replies) for name, replies in answers.items()}
+        self.errors = deque()
+        self.written = []
+        self.due = deque()
+        self.dies_with = None
+
+    def _live(self):
+        if self.dies_with is not None:
+            raise self.dies_with
+
+    def write(self, message):
+        self._live()
+        self.written.append(message)
+        if message == "SYST:ERR?":
+            self.due.append(self.errors.popleft() if self.errors else b'0,"No error"\n')
+        elif message.endswith("?"):
+            replies = self.answers[message]
+            self.due.append(replies.pop(0) if len(replies) > 1 else replies[0])
+        return len(message)
+
+    def write_raw(self, message):
+        self._live()
+        self.written.append(message)
+        return len(message)
+
+    def read_raw(self):
+        self._live()
+        if not self.due:
+            raise TIMEOUT
+        reply = self.due.popleft()
+        if isinstance(reply, BaseException):
+            raise reply
+        return reply
+
+    def close(self):
+        self._live()
+
+
+def port(instrument, **options):
+    return ScpiPort(instrument, "the generator", **options)
+
+
+def test_a_refused_command_names_itself_and_every_complaint():
+    instrument = Instrument()
+    instrument.errors.extend([b'-222,"Data out of range"\n', b'-102,"Syntax error"\n'])
+    with pytest.raises(
+        InstrumentError, match=r"'FREQ -1'.*Data out of range \(-222\); Syntax error \(-102\)"
+    ):
+        port(instrument).command("FREQ -1")
+    assert instrument.written == ["FREQ -1", "SYST:ERR?", "SYST:ERR?", "SYST:ERR?"]
+
+
+def test_a_command_without_complaint_leaves_an_empty_queue_behind():
+    instrument = Instrument()
+    assert port(instrument).send("FREQ 1") == ()
+    assert instrument.written == ["FREQ 1", "SYST:ERR?"]
+
+
+def test_errors_without_end_are_an_error_and_no_endless_loop():
+    instrument = Instrument()
+    instrument.errors.extend([b'-102,"Syntax error"\n'] * 1000)
+    with pytest.raises(InstrumentError, match=r"without end"):
+        port(instrument).command("FREQ 1")
+
+
+def test_an_empty_first_answer_is_asked_for_again():
+    instrument = Instrument(IDN=[b"\n", b"TEKTRONIX,AFG1022\n"])
+    instrument.answers["*IDN?"] = instrument.answers.pop("IDN")
+    assert port(instrument).query_patiently("*IDN?") == "TEKTRONIX,AFG1022"
+
+
+def test_an_answer_outside_ascii_is_read_and_its_number_found():
+    instrument = Instrument()
+    instrument.answers["OUTP1:IMP?"] = [b"9.9E+37\xa6\xb8\n"]
+    assert port(instrument).query("OUTP1:IMP?") == "9.9E+37Ω"
+    assert port(instrument).query_number("OUTP1:IMP?") == 9.9e37
+
+
+@pytest.mark.parametrize("reply", [b"\n", b"volts\n", b"\xff\xfe\n"])
+def test_an_answer_that_is_no_number_is_an_error_naming_question_and_answer(reply):
+    instrument = Instrument()
+    instrument.answers["FREQ?"] = [reply]
+    with pytest.raises(InstrumentError, match=r"FREQ\?.*not a number"):
+        port(instrument).query_number("FREQ?")
+
+
+def test_a_timeout_is_an_error_that_says_how_long_was_waited():
+    instrument = Instrument()
+    instrument.answers["FREQ?"] = [TIMEOUT]
+    with pytest.raises(InstrumentError, match=r"'FREQ\?' within 3 s") as caught:
+        port(instrument).query("FREQ?")
+    assert not isinstance(caught.value, InstrumentLost)
+
+
+@pytest.mark.parametrize("death", [LOST, ValueError("[Errno 19] No such device"), OSError(errno.EIO, "I/O")])
+@pytest.mark.parametrize("act", ["command", "query", "query_codes"])
+def test_a_lost_device_is_lost_however_the_library_puts_it(death, act):
+    instrument = Instrument()
+    instrument.answers["FREQ?"] = [b"1\n"]
+    instrument.dies_with = death
+    with pytest.raises(InstrumentLost, match=r"output state is unknown"):
+        getattr(port(instrument), act)("FREQ?")
+
+
+def test_an_interrupted_question_does_not_give_its_answer_to_the_next():
+    instrument = Instrument()
+    instrument.answers["FREQ?"] = [KeyboardInterrupt()]
+    instrument.answers["VOLT?"] = [b"1.5\n"]
+    ours = port(instrument)
+    with pytest.raises(KeyboardInterrupt):
+        ours.query("FREQ?")
+    instrument.due.append(b"1000\n")  # the answer to FREQ? that nobody fetched
+    assert ours.query("VOLT?") == "1.5"
+    assert instrument.timeout == 3000.0
+
+
+def test_a_question_after_a_timeout_waits_for_no_answer_that_never_came():
+    instrument = Instrument()
+    instrument.answers["FREQ?"] = [TIMEOUT, b"1000\n"]
+    ours = port(instrument)
+    with pytest.raises(InstrumentError):
+        ours.query("FREQ?")
+    assert ours.query("FREQ?") == "1000"
+
+
+def test_codes_go_out_big_endian_in_a_block_of_known_length():
+    instrument = Instrument()
+    port(instrument).write_codes("DATA:DATA EMEM,", np.array([0, 10, 16383], dtype=np.uint16))
+    assert instrument.written[0] == b"DATA:DATA EMEM,#16\x00\x00\x00\x0a\x3f\xff\n"
+
+
+def test_codes_come_back_even_when_a_byte_is_a_newline():
+    instrument = Instrument()
+    instrument.answers["DATA:DATA? EMEM?"] = [b"#16\x00\x00\x00\x0a\x3f\xff\n"]
+    assert port(instrument).query_codes("DATA:DATA? EMEM?").tolist() == [0, 10, 16383]
+
+
+@pytest.mark.parametrize(
+    "reply", [b"\n", b"123\n", b"#\n", b"#0\n", b"#2x4\x00\x01\n", b"#16\x00\x01\n", b"#13\x00\x01\x02\n"]
+)
+def test_a_broken_block_is_an_error(reply):
+    instrument = Instrument()
+    instrument.answers["DATA?"] = [reply]
+    with pytest.raises(InstrumentError, match=r"block|announced"):
+        port(instrument).query_codes("DATA?")
+
+
+def test_the_pause_that_an_instrument_needs_follows_every_message():
+    pauses = []
+    instrument = Instrument()
+    port(instrument, settle_s=0.1, pause=pauses.append).command("FREQ 1")
+    assert pauses == [0.1, 0.1]
+    assert instrument.written == ["FREQ 1", "SYST:ERR?"]
