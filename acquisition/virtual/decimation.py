@@ -33,6 +33,8 @@ _DROOP_FIT_POINTS = 200
 
 _PHASES_PER_SAMPLE = 512
 """Rows of the table per output sample: linear interpolation between them is 110 dB below the signal."""
+_TOGETHER = 256
+"""Samples that go through the weights together: their sums stay in the nearest cache."""
 _LANES = 8
 """Partial sums of the inner product, so that the processor need not wait for each addition."""
 
@@ -77,13 +79,22 @@ class Decimator:
         whole = len(self.table) == 1
         if whole:
             start = self.first_step(sample) - means_first_step
-            _weigh(self.table[0], means, start, round(self.ratio), result)
+            _weigh(self.table[0], self._by_phase(means[start:], count), result)
         else:
             # Counted from the first sample of the conversion: equal for every size of block.
             origin = self.start_step - means_first_step + self._newest_offset - self.reach + 1
             centres = np.asarray((np.arange(sample, sample + count) + 1.0) * self.ratio + self.centre(-1))
             _weigh_between(self.table, means, origin, centres, result)
         return result
+
+    def _by_phase(self, means: FloatArray, samples: int) -> FloatArray:
+        """Sort the steps of whole samples: shape (steps per sample, samples and the weights' reach)."""
+        stride = round(self.ratio)
+        rows = samples + ceil(self.reach / stride)
+        steps = np.zeros(rows * stride)
+        used = means[: rows * stride]
+        steps[: len(used)] = used
+        return np.ascontiguousarray(steps.reshape(rows, stride).T)
 
 
 def decimator(ratio: float, start_step: int, delay_steps: float) -> Decimator:
@@ -139,9 +150,25 @@ def _droop_correction() -> FloatArray:
 
 
 @compiled
-def _weigh(weights: FloatArray, means: FloatArray, start: int, stride: int, result: FloatArray) -> None:
-    for k in range(result.size):
-        result[k] = _inner_product(weights, means, start + k * stride)
+def _weigh(weights: FloatArray, phases: FloatArray, result: FloatArray) -> None:
+    """Weigh for a whole number of steps per sample; ``phases[i, k]`` is the step i of the k-th sample.
+
+    Many samples advance together through the weights, two at a time: the inner loop runs over
+    neighbours in memory, and the sum of every sample keeps its order whatever the size of the block.
+    """
+    stride = phases.shape[0]
+    sums = np.empty(_TOGETHER)
+    for begin in range(0, result.size, _TOGETHER):
+        count = min(_TOGETHER, result.size - begin)
+        sums[:] = 0.0
+        for j in range(0, weights.size, 2):
+            first, second = weights[j], weights[j + 1]
+            at, behind = begin + j // stride, begin + (j + 1) // stride
+            one = phases[j % stride, at : at + count]
+            other = phases[(j + 1) % stride, behind : behind + count]
+            for k in range(count):
+                sums[k] += first * one[k] + second * other[k]
+        result[begin : begin + count] = sums[:count]
 
 
 @compiled

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.random import Generator, Philox, SeedSequence
 from numpy.typing import NDArray
 
-PAGE = 4096
+PAGE = 16_384
 """Samples drawn together: a compromise between the cost of a generator and of what is thrown away."""
 
 
