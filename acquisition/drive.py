@@ -26,6 +26,7 @@ class Drive:
         self._play: Play | None = None
         self._level = 0.0
         self._is_on = False
+        self._setting_vpp = 0.0
 
     @property
     def level(self) -> float:
@@ -39,9 +40,14 @@ class Drive:
 
     @property
     def amplitude_vpp(self) -> float:
-        """The setting that belongs to the level [V]."""
+        """The setting that belongs to the level [V], for what is played."""
         quiet_vpp = self._quiet_vpp()
         return quiet_vpp + self._level * (self._amplitude_vpp - quiet_vpp)
+
+    @property
+    def setting_vpp(self) -> float:
+        """What the output plays now [V]; 0 while it is off."""
+        return self._setting_vpp if self._is_on else 0.0
 
     def play(self, play: Play) -> None:
         """Change what is played; the output keeps its state, and from tone to tone the phase goes on.
@@ -60,6 +66,7 @@ class Drive:
                 self._generator.load_sine(frequency_hz, self.amplitude_vpp)
             case _, Waveform(values, repetition_hz):
                 self._generator.load_waveform(values, repetition_hz, self.amplitude_vpp)
+        self._setting_vpp = self.amplitude_vpp
 
     def start(self) -> None:
         """Turn the output on."""
@@ -71,12 +78,14 @@ class Drive:
         """Play a tone at an amplitude of its own, as the bench check does."""
         self._generator.load_sine(frequency_hz, amplitude_vpp)
         self._play = None
+        self._setting_vpp = amplitude_vpp
         self.start()
 
     def set_level(self, level: float) -> None:
         """Set the level at once; a ramp is a staircase of these."""
         self._level = level
-        self._generator.set_amplitude(self.amplitude_vpp)
+        self._setting_vpp = self.amplitude_vpp
+        self._generator.set_amplitude(self._setting_vpp)
 
     def stop(self) -> None:
         """Turn the output off, now."""

@@ -227,7 +227,7 @@ class Run:
             if into is not None:
                 into.append(block.volts)
             yield Progress(
-                self._state, tape.segment, block, tape.elapsed_s, self._total_s, self._drive.amplitude_vpp
+                self._state, tape.segment, block, tape.elapsed_s, self._total_s, self._drive.setting_vpp
             )
             self._look(block)
 

@@ -21,7 +21,7 @@ class Progress:
     total_s: float
     """Planned, from the first sample to the last [s]."""
     amplitude_vpp: float
-    """Setting of the generator [V]."""
+    """Setting of the generator, peak to peak [V]; 0 while its output is off."""
 
 
 @dataclass(frozen=True)

@@ -100,6 +100,10 @@ class TestThePlanIsCarriedOut:
         assert shown[-1].elapsed_s == pytest.approx(shown[-1].total_s)
         assert all(a.elapsed_s < b.elapsed_s for a, b in pairwise(shown))
         assert max(progress.block.volts.shape[1] for progress in shown) <= 0.1 * RATE
+        settings = {progress.state: progress.amplitude_vpp for progress in shown}
+        assert shown[0].amplitude_vpp == 0.0
+        assert settings[RunState.CHECKING] == pytest.approx(0.02 * AMPLITUDE_VPP)
+        assert settings[RunState.RECORDING] == AMPLITUDE_VPP
 
     def test_the_recorded_drive_is_the_planned_sine(self, bench, tmp_path):
         play(run_of(bench, tmp_path))
