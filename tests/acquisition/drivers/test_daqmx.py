@@ -1,0 +1,318 @@
+"""The DAQmx driver over the real nidaqmx client, against the virtual rig's DAQ."""
+
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from nidaqmx.error_codes import DAQmxErrors
+from nidaqmx.errors import DaqError
+
+from acquisition.drivers.daqmx import DaqmxDigitizer
+from acquisition.drivers.daqmx_errors import MEANINGS, from_code
+from acquisition.drivers.daqmx_inputs import InputScaling
+from acquisition.errors import (
+    AcquisitionError,
+    ConfigurationError,
+    DataLost,
+    InstrumentBusy,
+    InstrumentError,
+    InstrumentLost,
+)
+from acquisition.rig import load_rig
+from acquisition.virtual.rig import VirtualRig
+
+ROOT = Path(__file__).parents[3]
+RATE_HZ = 5120.0
+# Step in a sine of 100 Hz and 0.5 V where one sample is missing: 61 mV. Two clocks that differ by
+# some ppm leave 1.4 mV in half a second.
+A_LOST_SAMPLE_V = 0.5 * 2 * np.pi * 100.0 / RATE_HZ
+
+
+def with_daq(rig, **changes):
+    return rig.model_copy(update={"daq": rig.daq.model_copy(update=changes)})
+
+
+def with_channel(rig, number, **changes):
+    channels = list(rig.daq.channels)
+    channels[number] = channels[number].model_copy(update=changes)
+    return with_daq(rig, channels=tuple(channels))
+
+
+@pytest.fixture(scope="module")
+def configured():
+    rig = with_daq(load_rig(ROOT / "hardware_configs" / "virtual_rig.toml"), sample_rate_hz=RATE_HZ)
+    return rig.model_copy(
+        update={
+            "generator": rig.generator.model_copy(update={"resource": "USB0::0x0699::0x0353::DAQ1::INSTR"})
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def running(configured):
+    with VirtualRig(configured) as virtual:
+        yield virtual
+
+
+@pytest.fixture
+def virtual(running):
+    yield running
+    running.faults.heal_daq()
+    running.generator.execute(b"OUTP1 OFF")
+
+
+@pytest.fixture
+def rig(configured, virtual):
+    return with_daq(configured, server=virtual.daq_address)
+
+
+@pytest.fixture
+def opened():
+    """Opens digitizers, and closes them whatever becomes of the test."""
+    with ExitStack() as closing:
+
+        def open_one(rig):
+            digitizer = DaqmxDigitizer.open(rig)
+            closing.callback(digitizer.close)
+            return digitizer
+
+        yield open_one
+
+
+@pytest.fixture
+def digitizer(rig, opened):
+    return opened(rig)
+
+
+class TestReading:
+    def test_the_identity_names_product_serial_and_driver(self, digitizer):
+        assert digitizer.identity.model == "NI 9234"
+        assert digitizer.identity.firmware.startswith("NI-DAQmx ")
+        assert digitizer.roles == ("drive_voltage", "amplifier_voltage", "base_acceleration", "m0_velocity")
+
+    def test_the_rate_is_the_one_that_the_hardware_takes(self, rig, opened):
+        digitizer = opened(with_daq(rig, sample_rate_hz=10_000))
+        assert digitizer.sample_rate_hz == pytest.approx(10_240.0)
+        assert digitizer.requested_rate_hz == 10_000
+
+    def test_blocks_follow_each_other_without_a_gap(self, digitizer):
+        digitizer.start()
+        firsts = [digitizer.read(samples).first_sample for samples in (100, 1, 700, 100)]
+        assert firsts == [0, 100, 101, 801]
+
+    def test_cutting_the_stream_into_blocks_changes_no_sample(self, digitizer, virtual):
+        virtual.generator.execute(b"SOUR1:FREQ 100;:SOUR1:VOLT 1VPP;:OUTP1 ON")
+        digitizer.start()
+        digitizer.read(5120)
+        row = np.concatenate([digitizer.read(samples).volts[0] for samples in (7, 512, 1, 1000, 1000)])
+        assert np.max(np.abs(row - sine_fit(row, 100.0))) < A_LOST_SAMPLE_V / 10
+
+    def test_a_read_longer_than_one_piece_is_whole(self, rig, virtual, opened):
+        digitizer = opened(with_daq(rig, buffer_s=0.2))
+        virtual.generator.execute(b"SOUR1:FREQ 100;:SOUR1:VOLT 1VPP;:OUTP1 ON")
+        digitizer.start()
+        digitizer.read(5120)
+        row = digitizer.read(2600).volts[0]
+        assert np.max(np.abs(row - sine_fit(row, 100.0))) < A_LOST_SAMPLE_V / 10
+        assert digitizer.read(1).first_sample == 7720
+
+    def test_a_new_run_starts_at_sample_zero(self, digitizer):
+        digitizer.start()
+        digitizer.read(10)
+        digitizer.stop()
+        digitizer.start()
+        assert digitizer.read(10).first_sample == 0
+
+    def test_the_volts_are_whole_counts_of_the_step_that_the_device_tells(self, digitizer):
+        digitizer.start()
+        block = digitizer.read(2000)
+        for row, step_v in zip(block.volts, digitizer.volts_per_count, strict=True):
+            counts = row / step_v
+            assert np.max(np.abs(counts - np.rint(counts))) < 1e-6
+            assert np.ptp(counts) > 1
+
+    def test_two_blocks_share_no_memory(self, digitizer):
+        digitizer.start()
+        first = digitizer.read(100)
+        kept = first.volts.copy()
+        second = digitizer.read(100)
+        assert not np.shares_memory(first.volts, second.volts)
+        assert np.array_equal(first.volts, kept)
+
+    def test_an_input_past_its_range_is_flagged_with_its_samples(self, rig, virtual, opened):
+        # The channel believes in a range of 1 V; the device measures on 5 V all the same.
+        digitizer = opened(with_channel(rig, 0, range_v=1.0))
+        virtual.generator.execute(b"SOUR1:FREQ 100;:SOUR1:VOLT 8VPP;:OUTP1 ON")
+        digitizer.start()
+        digitizer.read(5120)
+        block = digitizer.read(512)
+        found = [overload for overload in block.overloads if overload.channel == "drive_voltage"]
+        assert found
+        assert all(5120 <= o.first_sample <= o.last_sample < 5632 for o in found)
+
+
+class TestStates:
+    @pytest.mark.parametrize("samples", [0, -1])
+    def test_no_samples_are_an_error(self, digitizer, samples):
+        digitizer.start()
+        with pytest.raises(InstrumentError, match=r"1 or more"):
+            digitizer.read(samples)
+
+    def test_reading_before_the_start_and_after_the_stop_is_an_error(self, digitizer):
+        with pytest.raises(InstrumentError, match=r"not sampling"):
+            digitizer.read(10)
+        digitizer.start()
+        digitizer.stop()
+        with pytest.raises(InstrumentError, match=r"not sampling"):
+            digitizer.read(10)
+
+    def test_a_second_start_is_an_error(self, digitizer):
+        digitizer.start()
+        with pytest.raises(InstrumentError, match=r"sampling already"):
+            digitizer.start()
+
+    def test_stop_and_close_are_legal_at_any_time(self, digitizer):
+        digitizer.stop()
+        digitizer.start()
+        digitizer.stop()
+        digitizer.stop()
+        digitizer.close()
+        digitizer.stop()
+        digitizer.close()
+        with pytest.raises(InstrumentError, match=r"closed"):
+            digitizer.start()
+
+    def test_a_closed_device_is_free_again(self, rig):
+        for _ in range(3):
+            digitizer = DaqmxDigitizer.open(rig)
+            digitizer.start()
+            digitizer.close()
+
+
+class TestConfiguration:
+    def test_coupling_and_sensor_current_reach_the_device(self, rig, digitizer):
+        # The accelerometer shows its bias, or nothing, unless it is AC-coupled and fed.
+        digitizer.start()
+        digitizer.read(5120)
+        assert np.ptp(digitizer.read(1000).volts[2]) > 0
+
+    @pytest.mark.parametrize(
+        ("change", "kind", "complaint"),
+        [
+            (lambda rig: with_daq(rig, device="Dev9"), ConfigurationError, r"no device of that name"),
+            (lambda rig: with_daq(rig, product="USB-6211"), ConfigurationError, r"is a NI 9234"),
+            (lambda rig: with_channel(rig, 0, physical="ai7"), ConfigurationError, r"no such channel"),
+            (lambda rig: with_channel(rig, 0, range_v=50.0), ConfigurationError, r"does not support"),
+            (lambda rig: with_channel(rig, 2, iepe_current_a=0.5), ConfigurationError, r"does not support"),
+            (lambda rig: with_daq(rig, sample_rate_hz=1e6), ConfigurationError, r"does not support"),
+        ],
+    )
+    def test_what_the_device_cannot_do_is_told_when_the_bench_opens(self, rig, change, kind, complaint):
+        with pytest.raises(kind, match=complaint):
+            DaqmxDigitizer.open(change(rig))
+        DaqmxDigitizer.open(rig).close()  # nothing stayed reserved
+
+    def test_no_server_is_an_instrument_that_is_lost(self, configured):
+        with pytest.raises(InstrumentLost, match=r"127\.0\.0\.1:9"):
+            DaqmxDigitizer.open(with_daq(configured, server="127.0.0.1:9"))
+
+    def test_no_driver_on_this_computer_is_said_plainly(self, configured):
+        with pytest.raises(InstrumentError, match=r"no NI-DAQmx driver.*daq\.server"):
+            DaqmxDigitizer.open(configured)
+
+
+class TestFaults:
+    def test_a_device_that_another_task_holds_is_busy(self, rig, digitizer):
+        with pytest.raises(InstrumentBusy, match=r"another program, or a task that was never closed"):
+            DaqmxDigitizer.open(rig)
+
+    @pytest.mark.parametrize(
+        ("code", "kind", "complaint"),
+        [
+            (-200279, DataLost, r"overwritten before they were read"),
+            (-200361, DataLost, r"memory of the device overflowed"),
+            (-200284, InstrumentError, r"did not come in time"),
+            (-201003, InstrumentLost, r"cannot be reached"),
+            (-88710, InstrumentLost, r"reset while it ran"),
+            (-200088, InstrumentLost, r"no longer knows the task"),
+        ],
+    )
+    def test_a_failed_read_says_what_happened_and_ends_the_run(
+        self, rig, virtual, digitizer, code, kind, complaint
+    ):
+        digitizer.start()
+        digitizer.read(100)
+        virtual.faults.fail_daq("ReadAnalogF64", code)
+        with pytest.raises(kind, match=complaint):
+            digitizer.read(100)
+        virtual.faults.heal_daq()
+        with pytest.raises(InstrumentError, match=r"not sampling"):
+            digitizer.read(100)
+        digitizer.stop()
+        digitizer.start()
+        assert digitizer.read(100).first_sample == 0
+
+    @pytest.mark.parametrize("call", ["CreateAIVoltageChan", "CfgSampClkTiming", "TaskControl"])
+    def test_whatever_fails_while_opening_nothing_stays_reserved(self, rig, virtual, call):
+        virtual.faults.fail_daq(call, -50103)
+        with pytest.raises(InstrumentBusy):
+            DaqmxDigitizer.open(rig)
+        virtual.faults.heal_daq()
+        DaqmxDigitizer.open(rig).close()
+
+    def test_a_server_that_dies_is_lost_and_closing_is_still_possible(self, configured, opened):
+        dying = configured.generator.model_copy(update={"resource": "USB0::0x0699::0x0353::DAQ2::INSTR"})
+        with VirtualRig(configured.model_copy(update={"generator": dying})) as virtual:
+            digitizer = opened(with_daq(configured, server=virtual.daq_address))
+            digitizer.start()
+            virtual.faults.lose_daq_server()
+            for act in (lambda: digitizer.read(100), digitizer.stop, digitizer.close):
+                with pytest.raises(InstrumentLost, match=r"device server does not answer"):
+                    act()
+            digitizer.close()
+            digitizer.stop()
+
+
+class TestErrors:
+    @pytest.mark.parametrize("code", MEANINGS)
+    def test_every_error_in_the_table_says_what_was_done_what_happened_and_what_to_do(self, code):
+        error = from_code(DaqError("said", code.value), "reading Dev1")
+        assert isinstance(error, AcquisitionError)
+        assert str(error).startswith("reading Dev1 failed: ")
+        assert f"({code.name}, {code.value}: said" in str(error)
+        assert "To do: " in str(error)
+
+    def test_an_error_outside_the_table_keeps_number_and_text(self):
+        error = from_code(DaqError("Something rare", -200001), "reading Dev1")
+        assert "Something rare" in str(error)
+        assert "-200001" in str(error)
+
+    def test_every_error_of_the_hardware_reference_is_in_the_table(self):
+        numbers = (
+            -200279, -200361, -200010, -200714, -200284, -200278, -50103, -200022, -200077, -200220,
+            -200170, -201003, -88705, -88708, -88710, -200290, -200018, -200621, -200016, -200292,
+            -200560, -200983, -50405,
+        )  # fmt: skip
+        assert {DAQmxErrors(number) for number in numbers} <= MEANINGS.keys()
+
+
+class TestScaling:
+    @given(step_v=st.floats(1e-8, 1e-3), shift=st.integers(-1000, 1000))
+    def test_a_straight_scaling_through_a_whole_count_has_a_step(self, step_v, shift):
+        assert InputScaling((shift * step_v, step_v)).volts_per_count(5.0) == step_v
+
+    @pytest.mark.parametrize(
+        "coefficients",
+        [(), (0.0,), (0.0, 0.0), (0.0, -1e-6), (3.3e-7, 6e-7), (0.0, 6e-7, 1e-13), (0.0, 6e-7, 0.0, 1e-20)],
+    )
+    def test_a_shifted_or_bent_scaling_has_none(self, coefficients):
+        assert InputScaling(coefficients).volts_per_count(5.0) is None
+
+
+def sine_fit(row, frequency_hz):
+    angle = 2 * np.pi * frequency_hz * np.arange(row.size) / RATE_HZ
+    basis = np.stack([np.cos(angle), np.sin(angle), np.ones_like(angle)], axis=1)
+    return basis @ np.linalg.lstsq(basis, row)[0]
