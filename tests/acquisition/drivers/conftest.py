@@ -66,6 +66,16 @@ class Impostor(Logged):
         return Reply(b"TEKTRONIX,AFG1062,C1,FV:1\n") if message.startswith(b"*IDN?") else reply
 
 
+class PanelLoad(Logged):
+    """A firmware that tells its load, and lets nobody but the operator set it."""
+
+    def execute(self, message: bytes) -> Reply:
+        if message.startswith(b"OUTP1:IMP "):
+            self.report(ErrorCode.SYNTAX_ERROR)
+            return Reply(b"")
+        return super().execute(message)
+
+
 @dataclass
 class Plugged:
     """A generator on the bus."""
@@ -117,6 +127,11 @@ def bus() -> Iterator[Bus]:
 @pytest.fixture
 def plugged(bus: Bus) -> Plugged:
     return bus.plug_in()
+
+
+@pytest.fixture
+def panel_load(bus: Bus) -> Plugged:
+    return bus.plug_in(listener=PanelLoad)
 
 
 @pytest.fixture

@@ -90,6 +90,18 @@ class TestLoad:
         assert generator.unconfirmed == (Knob(instrument="generator", setting="output load", value="high-z"),)
         generator.close()
 
+    def test_a_load_that_is_wrong_at_the_panel_keeps_it_closed_and_says_what_to_do(self, panel_load):
+        with pytest.raises(
+            SettingRefused, match=r"expects a load of 50 ohm.*factor of two.*high-z on its panel"
+        ):
+            AFG1022X.open(panel_load.config)
+        assert not panel_load.is_on
+
+    def test_a_load_that_is_right_at_the_panel_needs_no_confirmation(self, panel_load):
+        generator = AFG1022X.open(panel_load.config.model_copy(update={"load_ohm": 50.0}))
+        assert generator.unconfirmed == ()
+        generator.close()
+
     def test_fifty_ohm_halve_the_range_of_amplitudes(self, bus):
         config = bus.plug_in().config.model_copy(update={"load_ohm": 50.0, "amplitude_limit_vpp": 20.0})
         generator = AFG1022X.open(config)

@@ -1,0 +1,280 @@
+"""A bench opens all or nothing, and leaving it silences the generator whatever happened."""
+
+import itertools
+from contextlib import contextmanager
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.bench import Reality, open_bench
+from acquisition.calibration import CalibrationRule, calibrations, check_calibrations
+from acquisition.drivers.afg1022x import AFG1022X
+from acquisition.drivers.daqmx import DaqmxDigitizer
+from acquisition.errors import (
+    CheckFailed,
+    ConfigurationError,
+    DataLost,
+    InstrumentBusy,
+    InstrumentError,
+    InstrumentLost,
+)
+from acquisition.instruments import Digitizer, FunctionGenerator
+from acquisition.knobs import confirm_by_asking, confirm_by_sheet, confirm_simulated, save_knob_sheet
+from acquisition.rig import load_rig
+from acquisition.virtual.output_signal import Panel
+from acquisition.virtual.rig import VirtualRig
+from acquisition.virtual.scpi_command import Quirks
+
+ROOT = Path(__file__).parents[2]
+CONFIGS = ROOT / "hardware_configs"
+_serials = itertools.count(1)
+
+
+@pytest.fixture
+def rig():
+    """The virtual rig at a low rate, with a generator of its own on the bus."""
+    rig = load_rig(CONFIGS / "virtual_rig.toml")
+    resource = f"USB0::0x0699::0x0353::B{next(_serials):04d}::INSTR"
+    return rig.model_copy(
+        update={
+            "daq": rig.daq.model_copy(update={"sample_rate_hz": 5120}),
+            "generator": rig.generator.model_copy(update={"resource": resource}),
+        }
+    )
+
+
+@pytest.fixture
+def virtual(rig):
+    with VirtualRig(rig) as running:
+        yield running
+
+
+@pytest.fixture
+def laboratory(rig, virtual):
+    """The same rig as a laboratory sees it: instruments at addresses, nothing said of a simulation."""
+    return rig.model_copy(
+        update={"virtual": None, "daq": rig.daq.model_copy(update={"server": virtual.daq_address})}
+    )
+
+
+@contextmanager
+def laboratory_bench(laboratory):
+    with open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED) as bench:
+        bench.generator.load_sine(160.0, 0.1)
+        bench.generator.start()
+        bench.digitizer.start()
+        yield bench
+
+
+def read_after(laboratory, *faults):
+    with laboratory_bench(laboratory) as bench:
+        for fault in faults:
+            fault()
+        bench.digitizer.read(512)
+
+
+def output_of(virtual):
+    return virtual.generator.execute(b"OUTP1?").data
+
+
+class TestOpening:
+    def test_a_virtual_bench_needs_nothing_but_its_configuration(self, rig):
+        with open_bench(rig) as bench:
+            assert bench.reality is Reality.SIMULATED
+            assert bench.identities["generator"].model == "AFG1022"
+            assert bench.identities["digitizer"].model == "NI 9234"
+            assert bench.confirmations.operator == "simulated"
+            assert bench.confirmations.knobs == rig.knobs
+            assert [channel.role.value for channel in bench.channels] == list(bench.digitizer.roles)
+
+    def test_a_bench_opens_from_a_file(self):
+        with open_bench(CONFIGS / "virtual_rig.toml") as bench:
+            assert bench.digitizer.sample_rate_hz == 51200
+
+    def test_what_the_generator_plays_is_what_the_converter_reads(self, rig):
+        with open_bench(rig) as bench:
+            bench.generator.load_sine(160.0, 1.0)
+            bench.generator.start()
+            bench.digitizer.start()
+            bench.digitizer.read(5120)
+            drive_v = bench.digitizer.read(5120).volts[0] * bench.channels[0].units_per_volt
+        assert np.std(drive_v) * np.sqrt(2) == pytest.approx(0.5 * rig.generator.terminal_factor(), rel=2e-3)
+
+    def test_the_drivers_keep_the_promises_of_the_bench(self, rig):
+        with open_bench(rig) as bench:
+            generator: FunctionGenerator = bench.generator
+            digitizer: Digitizer = bench.digitizer
+            assert isinstance(generator, AFG1022X)
+            assert isinstance(digitizer, DaqmxDigitizer)
+
+    def test_a_missing_converter_leaves_the_generator_free(self, laboratory, virtual):
+        lost = laboratory.model_copy(
+            update={"daq": laboratory.daq.model_copy(update={"server": "127.0.0.1:9"})}
+        )
+        with pytest.raises(InstrumentLost, match=r"127\.0\.0\.1:9"):
+            open_bench(lost, confirm_simulated, CalibrationRule.WAIVED)
+        open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED).close()
+
+    def test_a_missing_generator_leaves_the_converter_free(self, laboratory, virtual):
+        virtual.faults.pull_usb_cable()
+        with pytest.raises(InstrumentLost, match=r"no instrument answers"):
+            open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED)
+        virtual.faults.plug_usb_cable()
+        open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED).close()
+
+    def test_a_knob_that_is_not_confirmed_leaves_everything_closed_and_silent(self, laboratory, virtual):
+        with pytest.raises(CheckFailed, match=r"gain of the Bruel & Kjaer 2706 was not confirmed at 10 dB"):
+            open_bench(laboratory, confirm_by_asking(lambda _: "no", "somebody"), CalibrationRule.WAIVED)
+        assert output_of(virtual) == b"0\n"
+        open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED).close()
+
+    def test_a_second_bench_on_the_same_converter_is_told_that_it_is_busy(self, laboratory):
+        with laboratory_bench(laboratory), pytest.raises(InstrumentBusy):
+            open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED)
+
+    def test_a_load_that_only_the_operator_knows_is_asked_for(self, rig):
+        asked = []
+
+        def confirm(knobs):
+            asked.extend(knobs)
+            return confirm_simulated(knobs)
+
+        panel = Panel(declared_load_ohm=float("inf"))
+        with VirtualRig(rig, quirks=Quirks(load_is_panel_only=True), panel=panel) as virtual:
+            daq = rig.daq.model_copy(update={"server": virtual.daq_address})
+            laboratory = rig.model_copy(update={"virtual": None, "daq": daq})
+            open_bench(laboratory, confirm, CalibrationRule.WAIVED).close()
+        assert "output load" in [knob.setting for knob in asked]
+
+
+class TestLeaving:
+    def test_leaving_silences_and_frees_everything(self, laboratory, virtual):
+        for _ in range(2):
+            with laboratory_bench(laboratory):
+                assert output_of(virtual) == b"1\n"
+            assert output_of(virtual) == b"0\n"
+
+    def test_closing_twice_is_legal(self, rig):
+        bench = open_bench(rig)
+        bench.close()
+        bench.close()
+
+    @pytest.mark.parametrize("error", [RuntimeError("mine"), KeyboardInterrupt(), SystemExit(3)])
+    def test_whatever_error_is_under_way_silences_and_goes_on(self, laboratory, virtual, error):
+        with pytest.raises(type(error)) as caught, laboratory_bench(laboratory):
+            raise error
+        assert caught.value is error
+        assert output_of(virtual) == b"0\n"
+
+    def test_an_overrun_silences(self, laboratory, virtual):
+        with (
+            pytest.raises(DataLost, match=r"has a hole and ends here"),
+            laboratory_bench(laboratory) as bench,
+        ):
+            virtual.faults.overrun()
+            bench.digitizer.read(512)
+        assert output_of(virtual) == b"0\n"
+
+    def test_a_dead_daq_server_silences_and_its_failure_to_close_is_a_note(self, laboratory, virtual):
+        with pytest.raises(InstrumentLost) as caught:
+            read_after(laboratory, virtual.faults.lose_daq_server)
+        assert str(caught.value).startswith("reading samples 0 to 511")
+        assert any("releasing" in note for note in caught.value.__notes__)
+        assert output_of(virtual) == b"0\n"
+
+    def test_a_pulled_cable_does_not_hide_the_first_error(self, laboratory, virtual):
+        with pytest.raises(DataLost) as caught:
+            read_after(laboratory, virtual.faults.overrun, virtual.faults.pull_usb_cable)
+        assert any("MAY STILL BE ON" in note for note in caught.value.__notes__)
+
+    def test_a_pulled_cable_alone_is_shouted(self, laboratory, virtual):
+        with pytest.raises(InstrumentLost, match=r"MAY STILL BE ON"), laboratory_bench(laboratory):
+            virtual.faults.pull_usb_cable()
+
+    def test_the_converter_is_released_although_the_generator_is_gone(self, laboratory, virtual):
+        with pytest.raises(InstrumentLost), laboratory_bench(laboratory):
+            virtual.faults.pull_usb_cable()
+        virtual.faults.plug_usb_cable()
+        with laboratory_bench(laboratory):
+            pass
+        assert output_of(virtual) == b"0\n"
+
+
+class TestCalibration:
+    def test_a_calibration_that_has_run_out_keeps_the_bench_closed(self, laboratory):
+        with pytest.raises(CheckFailed, match=r"Polytec PSV-500 was calibrated on 2001-01-01.*730 days"):
+            open_bench(aged(laboratory, "2001-01-01"), confirm_simulated)
+
+    def test_it_may_be_waived(self, laboratory):
+        open_bench(aged(laboratory, "2001-01-01"), confirm_simulated, CalibrationRule.WAIVED).close()
+
+    def test_a_virtual_rig_needs_no_calibration(self, rig):
+        open_bench(aged(rig, "2001-01-01")).close()
+
+    @pytest.mark.parametrize(("age_days", "is_valid"), [(-1, False), (0, True), (730, True), (731, False)])
+    def test_it_holds_from_its_day_for_as_long_as_the_rig_says(self, rig, age_days, is_valid):
+        today = rig.vibrometer.calibrated + timedelta(days=age_days)
+        assert calibrations(rig, today)[0].is_valid is is_valid
+
+    def test_every_sensor_and_every_input_is_looked_at(self, rig):
+        today = rig.vibrometer.calibrated + timedelta(days=10_000)
+        with pytest.raises(CheckFailed) as caught:
+            check_calibrations(rig, today)
+        for what in ("PSV-500", "IEPE", *(channel.physical for channel in rig.daq.channels)):
+            assert what in str(caught.value)
+
+
+class TestKnobs:
+    def test_every_knob_is_asked_for_once(self, rig):
+        asked = []
+        sheet = confirm_by_asking(lambda question: asked.append(question) or "y", "B. Kjaer")(rig.knobs)
+        assert len(asked) == len(rig.knobs)
+        assert "2706: is the gain at 10 dB?" in asked[0]
+        assert (sheet.operator, sheet.knobs) == ("B. Kjaer", rig.knobs)
+
+    def test_a_sheet_survives_its_file_and_confirms(self, rig, tmp_path):
+        path = tmp_path / "knobs.toml"
+        sheet = confirm_by_asking(lambda _: "yes", 'O. "Quote" \\ Back\nslash')(rig.knobs)
+        save_knob_sheet(sheet, path)
+        assert confirm_by_sheet(path)(rig.knobs) == sheet
+
+    def test_a_sheet_about_another_setting_does_not_confirm(self, rig, tmp_path):
+        path = tmp_path / "knobs.toml"
+        save_knob_sheet(confirm_simulated(rig.knobs), path)
+        turned = rig.model_copy(update={"amplifier": rig.amplifier.model_copy(update={"gain_db": 20.0})})
+        with pytest.raises(CheckFailed, match=r"does not confirm Bruel & Kjaer 2706 gain at 20 dB"):
+            confirm_by_sheet(path)(turned.knobs)
+
+    @pytest.mark.parametrize("age", [timedelta(hours=-1), timedelta(hours=37)])
+    def test_a_sheet_from_another_day_does_not_confirm(self, rig, tmp_path, age):
+        path = tmp_path / "knobs.toml"
+        old = confirm_simulated(rig.knobs).model_copy(update={"confirmed": datetime.now(UTC) - age})
+        save_knob_sheet(old, path)
+        with pytest.raises(CheckFailed, match=r"it is valid for"):
+            confirm_by_sheet(path)(rig.knobs)
+
+    def test_a_real_bench_without_an_operator_is_refused_with_the_list_of_its_knobs(self, laboratory):
+        # pytest gives its tests no terminal.
+        with pytest.raises(CheckFailed, match=r"Nobody sits at this terminal") as caught:
+            open_bench(laboratory, calibration=CalibrationRule.WAIVED)
+        assert all(f"{knob.setting} at {knob.value}" in str(caught.value) for knob in laboratory.knobs)
+
+
+class TestConfigurationFiles:
+    def test_the_laboratory_configuration_is_valid_and_real(self):
+        assert load_rig(CONFIGS / "lab_rig.toml").virtual is None
+
+    def test_a_missing_file_is_named(self, tmp_path):
+        with pytest.raises(ConfigurationError, match=r"nowhere\.toml"):
+            open_bench(tmp_path / "nowhere.toml")
+
+    def test_the_laboratory_bench_says_which_instrument_it_misses(self):
+        with pytest.raises(InstrumentError, match=r"no NI-DAQmx driver"):
+            open_bench(CONFIGS / "lab_rig.toml", confirm_simulated, CalibrationRule.WAIVED)
+
+
+def aged(rig, day):
+    vibrometer = rig.vibrometer.model_copy(update={"calibrated": datetime.fromisoformat(day).date()})
+    return rig.model_copy(update={"vibrometer": vibrometer})
