@@ -169,12 +169,8 @@ class TestLeaving:
         assert output_of(virtual) == b"0\n"
 
     def test_an_overrun_silences(self, laboratory, virtual):
-        with (
-            pytest.raises(DataLost, match=r"has a hole and ends here"),
-            laboratory_bench(laboratory) as bench,
-        ):
-            virtual.faults.overrun()
-            bench.digitizer.read(512)
+        with pytest.raises(DataLost, match=r"has a hole and ends here"):
+            read_after(laboratory, virtual.faults.overrun)
         assert output_of(virtual) == b"0\n"
 
     def test_a_dead_daq_server_silences_and_its_failure_to_close_is_a_note(self, laboratory, virtual):

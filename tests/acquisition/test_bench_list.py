@@ -1,0 +1,39 @@
+"""What can be put on a bench is found, and what cannot be searched is said."""
+
+from pathlib import Path
+
+import pytest
+
+from acquisition.bench_list import list_instruments
+from acquisition.rig import load_rig
+from acquisition.virtual.rig import VirtualRig
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def virtual():
+    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    generator = rig.generator.model_copy(update={"resource": "USB0::0x0699::0x0353::L0001::INSTR"})
+    with VirtualRig(rig.model_copy(update={"generator": generator})) as running:
+        yield running
+
+
+def test_generator_and_converter_are_found_under_the_names_that_a_configuration_needs(virtual):
+    found = list_instruments(server=virtual.daq_address)
+    assert any("1689::851::L0001" in resource for resource in found.visa_resources)
+    module = next(device for device in found.daq_devices if device.name == "cDAQ1Mod1")
+    assert module.product == "NI 9234"
+    assert module.inputs == tuple(f"cDAQ1Mod1/ai{number}" for number in range(4))
+    assert found.remarks == ()
+
+
+def test_a_computer_without_the_driver_lists_the_rest_and_says_so(virtual):
+    found = list_instruments()
+    assert found.visa_resources
+    assert found.daq_devices == ()
+    assert any("no NI-DAQmx driver" in remark for remark in found.remarks)
+
+
+def test_a_server_that_does_not_answer_is_named(virtual):
+    assert any("127.0.0.1:9" in remark for remark in list_instruments(server="127.0.0.1:9").remarks)
