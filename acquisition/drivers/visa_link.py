@@ -68,8 +68,9 @@ def list_visa_resources(visa_library: str = "@py") -> tuple[str, ...]:
     pyvisa-py writes USB numbers in decimal: ``USB0::1689::851::C010101::0::INSTR`` is an AFG1022.
     """
     with warnings.catch_warnings():
-        # pyvisa-py advises to install what would find more instruments on a network: not ours.
+        # On its search of the network pyvisa-py advises to install more, and forgets a socket: not ours.
         warnings.simplefilter("ignore", UserWarning)
+        warnings.simplefilter("ignore", ResourceWarning)
         return tuple(_manager(visa_library).list_resources("?*"))
 
 
