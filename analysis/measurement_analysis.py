@@ -1,0 +1,164 @@
+"""From one recording to its result, by what was played."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.excitation.dwell import Dwell
+from acquisition.excitation.multisine_noise import MultisineNoise
+from acquisition.excitation.odd_multisine import OddMultisine
+from acquisition.excitation.sine_sweep import SineSweep
+from acquisition.excitation.stepped_sine import SteppedSine
+from acquisition.excitation.streamed_noise import StreamedNoise
+from acquisition.recording import Recording
+
+from .collision_region import Collisions, collisions
+from .dwell import DwellResponse, dwell_response
+from .envelope import Envelope, envelope
+from .errors import AnalysisError, NotEnoughData
+from .measurement_checks import Check, measurement_checks
+from .noise_response import Noise, NoiseResponse, noise_response
+from .recorded_channels import Channels, RecordedChannels, only_stretch, read_whole
+from .recording_facts import RecordingFacts, recording_facts, specimen_of
+from .stepped_response import SteppedResponse, stepped_response
+from .sweep import SweepResponse, SweepSums
+
+WINDOW_S = 5.0
+"""The paper's window: the last 5 s of a dwell."""
+_DWELL_EDGE_PERIODS = 121
+"""Drive periods that integration disturbs, both ends together."""
+_SHORTEST_WINDOW_PERIODS = 50
+_BLOCK = 1 << 20
+_TIME_BINS = 3000
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseAnalysis:
+    """A noise measurement: transmission base to m0."""
+
+    facts: RecordingFacts
+    checks: tuple[Check, ...]
+    response: NoiseResponse
+
+
+@dataclass(frozen=True, eq=False)
+class SweepAnalysis:
+    """A sweep: envelope, responses and where the masses collide."""
+
+    facts: RecordingFacts
+    checks: tuple[Check, ...]
+    response: SweepResponse
+    collisions: Collisions
+
+
+@dataclass(frozen=True, eq=False)
+class DwellAnalysis:
+    """A dwell: time signal, spectrum, responses and lines."""
+
+    facts: RecordingFacts
+    checks: tuple[Check, ...]
+    response: DwellResponse
+    displacement: Envelope
+    """x over the dwell [m], without the ends that integration disturbs."""
+
+
+@dataclass(frozen=True, eq=False)
+class SteppedSineAnalysis:
+    """A stepped sine: responses at every frequency."""
+
+    facts: RecordingFacts
+    checks: tuple[Check, ...]
+    response: SteppedResponse
+
+
+RecordingAnalysis = NoiseAnalysis | SweepAnalysis | DwellAnalysis | SteppedSineAnalysis
+
+
+def analyse_recording(recording: Recording) -> RecordingAnalysis:
+    """Analyse a recording, complete or not, by the excitation that its plan names.
+
+    Raises
+    ------
+    AnalysisError
+        With one sentence that names the file, when nothing in it is usable.
+
+    """
+    facts = recording_facts(recording)
+    try:
+        return _analysed(facts, RecordedChannels(recording))
+    except AnalysisError as error:
+        ended = f"{facts.state.value}" + (f": {facts.reason}" if facts.reason else "")
+        raise type(error)(f"{recording.path.name} ({ended}): {error}") from error
+
+
+def _analysed(facts: RecordingFacts, channels: Channels) -> RecordingAnalysis:
+    checks = measurement_checks(facts)
+    match facts.measurement.excitation:
+        case MultisineNoise() | OddMultisine() | StreamedNoise() as noise:
+            return NoiseAnalysis(facts, checks, measured_noise(channels, noise))
+        case SineSweep() as sweep:
+            response = measured_sweep(channels, sweep)
+            return SweepAnalysis(facts, checks, response, collisions(response))
+        case Dwell() as dwell:
+            found = measured_dwell(channels, dwell, bound_frequencies_hz(facts))
+            return DwellAnalysis(facts, checks, found, settled_envelope(found))
+        case SteppedSine() as stepped:
+            return SteppedSineAnalysis(facts, checks, stepped_response(channels, stepped))
+
+
+def bound_frequencies_hz(facts: RecordingFacts) -> tuple[float, ...]:
+    """Frequencies of the specimen with m1 stuck to m2: where strong collisions move the motion to."""
+    return tuple(float(each) for each in specimen_of(facts.bench).bound_frequencies_hz)
+
+
+def measured_noise(channels: Channels, noise: Noise) -> NoiseResponse:
+    """Estimate the transmission; the same for samples that were recorded and that were simulated."""
+    return noise_response(channels, noise)
+
+
+def measured_sweep(channels: Channels, sweep: SineSweep) -> SweepResponse:
+    """Analyse what there is of a sweep, whichever way it ran."""
+    stretch = only_stretch(channels, "sweep")
+    ends = sorted((sweep.start_hz, sweep.stop_hz))
+    sums = SweepSums(channels.sample_rate_hz, low_hz=ends[0], high_hz=ends[1])
+    for first in range(stretch.start, stretch.stop, _BLOCK):
+        last = min(first + _BLOCK, stretch.stop)
+        block = channels.read(first, last)
+        if np.isnan(block).any():
+            lost_s = (first - stretch.start) / channels.sample_rate_hz
+            raise NotEnoughData(
+                f"samples were lost after {lost_s:.3g} s of the sweep, and its phase cannot be followed "
+                "across a hole; measure again"
+            )
+        sums.add(block)
+    return sums.response(delay_s=channels.response_delay_s)
+
+
+def measured_dwell(channels: Channels, dwell: Dwell, towards_hz: tuple[float, ...]) -> DwellResponse:
+    """Analyse the last 5 s of a dwell, or what there is of them."""
+    stretch = only_stretch(channels, "dwell")
+    drive, base, response = read_whole(channels, stretch)
+    rate = channels.sample_rate_hz
+    clear_s = stretch.samples / rate - _DWELL_EDGE_PERIODS / dwell.frequency_hz
+    if clear_s < _SHORTEST_WINDOW_PERIODS / dwell.frequency_hz:
+        raise NotEnoughData(
+            f"{stretch.samples / rate:.3g} s of the dwell were recorded; without the ends that integration "
+            f"disturbs too little is left at {dwell.frequency_hz:g} Hz: measure longer"
+        )
+    return dwell_response(
+        drive,
+        base,
+        response,
+        rate,
+        near_hz=dwell.frequency_hz,
+        window_s=min(WINDOW_S, clear_s),
+        towards_hz=towards_hz,
+        delay_s=channels.response_delay_s,
+    )
+
+
+def settled_envelope(response: DwellResponse) -> Envelope:
+    """Give x over the dwell as a plot shows it."""
+    motion = response.displacement
+    start_s = motion.edge_samples / motion.sample_rate_hz
+    return envelope(motion.settled, motion.sample_rate_hz, bins=_TIME_BINS, start_s=start_s)
