@@ -54,7 +54,7 @@ class ScpiPort:
     name
         What to call the instrument in errors.
     settle_s
-        Pause after each message that the instrument needs [s].
+        Pause that the instrument needs after each command [s]; after a question its answer is the sign.
 
     """
 
@@ -131,13 +131,12 @@ class ScpiPort:
         with self._dialogue(message):
             self._reply_due = True
             self._link.write(message)
-            self._settle()
             reply = self._link.read_raw()
             self._reply_due = False
             return reply
 
     def _settle(self) -> None:
-        # The instrument drops messages that come too soon and has no flag to wait for.
+        # Some firmware drops messages that come too soon after a command, and has no flag to wait for.
         if self._settle_s > 0:
             self._pause(self._settle_s)
 

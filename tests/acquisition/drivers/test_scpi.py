@@ -166,9 +166,9 @@ def test_a_broken_block_is_an_error(reply):
         port(instrument).query_codes("DATA?")
 
 
-def test_the_pause_that_an_instrument_needs_follows_every_message():
+def test_the_pause_that_an_instrument_needs_follows_every_command_and_no_question():
     pauses = []
     instrument = Instrument()
     port(instrument, settle_s=0.1, pause=pauses.append).command("FREQ 1")
-    assert pauses == [0.1, 0.1]
+    assert pauses == [0.1]
     assert instrument.written == ["FREQ 1", "SYST:ERR?"]
