@@ -41,8 +41,9 @@ class Drive:
     @property
     def amplitude_vpp(self) -> float:
         """The setting that belongs to the level [V], for what is played."""
-        quiet_vpp = self._quiet_vpp()
-        return quiet_vpp + self._level * (self._amplitude_vpp - quiet_vpp)
+        planned_vpp = self._planned_vpp()
+        quiet_vpp = min(planned_vpp, self._quiet_vpp())
+        return quiet_vpp + self._level * (planned_vpp - quiet_vpp)
 
     @property
     def setting_vpp(self) -> float:
@@ -60,13 +61,21 @@ class Drive:
         match before, play:
             case _, Stream():
                 require_playable(play)
-            case Tone(), Tone(frequency_hz):
-                self._generator.set_frequency(frequency_hz)
-            case _, Tone(frequency_hz):
+            case Tone(_, level_before), Tone(frequency_hz, level):
+                self._change_tone(frequency_hz, level_before, level)
+            case _, Tone(frequency_hz, _):
                 self._generator.load_sine(frequency_hz, self.amplitude_vpp)
             case _, Waveform(values, repetition_hz):
                 self._generator.load_waveform(values, repetition_hz, self.amplitude_vpp)
         self._setting_vpp = self.amplitude_vpp
+
+    def _change_tone(self, frequency_hz: float, level_before: float, level: float) -> None:
+        """Lower the amplitude before the frequency changes, or raise it after: never too loud on the way."""
+        if level < level_before:
+            self._generator.set_amplitude(self.amplitude_vpp)
+        self._generator.set_frequency(frequency_hz)
+        if level > level_before:
+            self._generator.set_amplitude(self.amplitude_vpp)
 
     def start(self) -> None:
         """Turn the output on."""
@@ -112,13 +121,20 @@ class Drive:
         for stair in range(1, self._stairs + 1):
             self.set_level(top * half_cosine(1 - stair / self._stairs))
 
+    def _planned_vpp(self) -> float:
+        match self._play:
+            case Tone(_, level):
+                return self._amplitude_vpp * level
+            case _:
+                return self._amplitude_vpp
+
     def _quiet_vpp(self) -> float:
         match self._play:
             case Waveform(values):
                 # Generators stretch a waveform to their full range: their setting is then this much lower.
-                return min(self._amplitude_vpp, QUIET_VPP / float(np.max(np.abs(values))))
+                return QUIET_VPP / float(np.max(np.abs(values)))
             case _:
-                return min(self._amplitude_vpp, QUIET_VPP)
+                return QUIET_VPP
 
 
 def require_playable(play: Play) -> None:

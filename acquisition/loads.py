@@ -7,7 +7,7 @@ import numpy as np
 
 from .excitation.kinds import Excitation
 from .excitation.multisine import held_lines
-from .excitation.steps import Play, Samples, SampleSource, Stream, Tone, Waveform
+from .excitation.steps import Play, SampleSource, Stream, Tone, Waveform
 from .rig import Rig
 from .rig_model import Quantity, RigModel
 
@@ -39,10 +39,10 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> dict[Quantity, Load]:
     """
     terminal_v = 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
     model = RigModel(rig)
-    tones_hz, waveforms, sources = _sorted(step.play for step in excitation.steps())
+    tones, waveforms, sources = _sorted(step.play for step in excitation.steps())
 
     def worst(quantity: Quantity) -> Load:
-        loads = [_of_tones(model, quantity, tones_hz)] if len(tones_hz) else []
+        loads = [_of_tones(model, quantity, tones)] if tones else []
         loads += [_of_waveform(model, quantity, each, number) for number, each in enumerate(waveforms)]
         loads += [_of_source(model, quantity, each) for each in sources]
         per_volt = max(loads, key=lambda load: load.peak)
@@ -51,27 +51,28 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> dict[Quantity, Load]:
     return {quantity: worst(quantity) for quantity in Quantity}
 
 
-def _sorted(plays: Iterable[Play]) -> tuple[Samples, list[Waveform], list[SampleSource]]:
-    """Split plays by kind: frequencies of all tones, waveforms, sources of streams."""
-    tones_hz: set[float] = set()
+def _sorted(plays: Iterable[Play]) -> tuple[list[Tone], list[Waveform], list[SampleSource]]:
+    """Split plays by kind: all different tones, waveforms, sources of streams."""
+    tones: set[Tone] = set()
     waveforms: list[Waveform] = []
     sources: list[SampleSource] = []
     for play in plays:
         match play:
-            case Tone(frequency_hz):
-                tones_hz.add(frequency_hz)
+            case Tone():
+                tones.add(play)
             case Waveform():
                 waveforms.append(play)
             case Stream(source):
                 sources.append(source)
-    return np.array(sorted(tones_hz)), waveforms, sources
+    return sorted(tones, key=lambda tone: tone.frequency_hz), waveforms, sources
 
 
-def _of_tones(model: RigModel, quantity: Quantity, tones_hz: Samples) -> Load:
-    peaks = np.abs(model.transfer(quantity, tones_hz))
+def _of_tones(model: RigModel, quantity: Quantity, tones: list[Tone]) -> Load:
+    levels = np.array([tone.level for tone in tones])
+    peaks = levels * np.abs(model.transfer(quantity, np.array([tone.frequency_hz for tone in tones])))
     worst = int(np.argmax(peaks))
     peak = float(peaks[worst])
-    return Load(peak, peak / np.sqrt(2), f"at {tones_hz[worst]:g} Hz")
+    return Load(peak, peak / np.sqrt(2), f"at {tones[worst].frequency_hz:g} Hz")
 
 
 def _of_waveform(model: RigModel, quantity: Quantity, waveform: Waveform, number: int) -> Load:

@@ -79,8 +79,8 @@ def _sampled(steps: Iterable[Step], sample_rate_hz: float) -> Samples:
 
 def _values(play: Play, since_s: Samples, first: int, sample_rate_hz: float, cycles: float) -> Samples:
     match play:
-        case Tone(frequency_hz):
-            return np.asarray(np.sin(2 * np.pi * (frequency_hz * since_s + cycles)))
+        case Tone(frequency_hz, level):
+            return np.asarray(level * np.sin(2 * np.pi * (frequency_hz * since_s + cycles)))
         case Waveform(values, repetition_hz):
             # A sample that falls on the edge between two held values belongs to the later one: the
             # small shift keeps rounding from handing it to the earlier one.
@@ -93,7 +93,7 @@ def _values(play: Play, since_s: Samples, first: int, sample_rate_hz: float, cyc
 
 def _cycles_of(play: Play) -> float:
     match play:
-        case Tone(frequency_hz):
+        case Tone(frequency_hz, _):
             return frequency_hz
         case Waveform() | Stream():
             return 0.0

@@ -7,7 +7,7 @@ from typing import Literal, Self
 
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
-from .plan import AbstractExcitation, FrequencyHz
+from .plan import LOWEST_AMPLITUDE_VPP, AbstractExcitation, FrequencyHz
 from .preview import Preview, preview_of
 from .steps import Segment, Step, Tone
 
@@ -19,6 +19,26 @@ class Spacing(StrEnum):
     """The same number of hertz in every second."""
     LOGARITHMIC = "logarithmic"
     """The same time in every octave."""
+
+
+class Hold(StrEnum):
+    """Which motion of the base stays about constant along a sweep, on a shaker that drives a mass.
+
+    Above its suspension resonance a shaker turns voltage into acceleration. What is held is only as
+    constant as that: what the base really did is in the recording.
+    """
+
+    ACCELERATION = "acceleration"
+    """The amplitude setting stays as it is."""
+    VELOCITY = "velocity"
+    """The setting grows in proportion to frequency."""
+    DISPLACEMENT = "displacement"
+    """The setting grows with the square of frequency: a constant base displacement, as in the paper's model."""
+
+    @property
+    def power(self) -> int:
+        """Power of the frequency that the amplitude setting follows."""
+        return {Hold.ACCELERATION: 0, Hold.VELOCITY: 1, Hold.DISPLACEMENT: 2}[self]
 
 
 class SineSweep(AbstractExcitation):
@@ -37,6 +57,8 @@ class SineSweep(AbstractExcitation):
     duration_s: PositiveFloat
     """Time from start to stop [s]."""
     spacing: Spacing = Spacing.LINEAR
+    hold: Hold = Hold.ACCELERATION
+    """What stays constant; ``amplitude_vpp`` is then the setting at the highest frequency."""
     step_s: PositiveFloat = 0.1
     """Time at one frequency [s]; the last step may be shorter."""
     settle_s: NonNegativeFloat = 3.0
@@ -55,6 +77,21 @@ class SineSweep(AbstractExcitation):
                 "give a shorter step"
             )
         return self
+
+    @model_validator(mode="after")
+    def _quietest_step_is_playable(self) -> Self:
+        lowest_hz = min(self.start_hz, self.stop_hz)
+        quietest_vpp = self.amplitude_vpp * self.level(lowest_hz)
+        if quietest_vpp < LOWEST_AMPLITUDE_VPP:
+            raise ValueError(
+                f"holding the {self.hold} needs a setting of {quietest_vpp:.3g} Vpp at {lowest_hz:g} Hz, and the "
+                f"generator's smallest is {LOWEST_AMPLITUDE_VPP:g} Vpp; raise amplitude_vpp or narrow the band"
+            )
+        return self
+
+    def level(self, frequency_hz: float) -> float:
+        """Amplitude at a frequency as a fraction of ``amplitude_vpp``."""
+        return float((frequency_hz / self.highest_frequency_hz) ** self.hold.power)
 
     @property
     def highest_frequency_hz(self) -> float:
@@ -88,6 +125,7 @@ class SineSweep(AbstractExcitation):
                 "duration_s": self.duration_s,
                 "step_s": self.step_s,
                 "spacing": self.spacing.value,
+                "hold": self.hold.value,
             },
         )
         for number in range(count):
@@ -95,7 +133,7 @@ class SineSweep(AbstractExcitation):
             end_s = min(begin_s + self.step_s, self.duration_s)
             mean_hz = (self.cycles(end_s) - self.cycles(begin_s)) / (end_s - begin_s)
             settle_s = self.settle_s if number == 0 else 0.0
-            yield Step(Tone(mean_hz), settle_s, end_s - begin_s, segment)
+            yield Step(Tone(mean_hz, self.level(mean_hz)), settle_s, end_s - begin_s, segment)
 
     def preview(self, sample_rate_hz: float) -> Preview:
         """Show the whole sweep, without the wait before it."""

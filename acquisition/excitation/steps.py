@@ -15,6 +15,8 @@ class Tone:
     """A sine at one frequency."""
 
     frequency_hz: float
+    level: float = 1.0
+    """Its amplitude as a fraction of the amplitude setting, above 0 and at most 1."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -108,7 +108,7 @@ def test_a_violation_names_quantity_value_limit_source_and_remedy(rig):
 def test_all_violations_are_in_one_message(rig):
     with pytest.raises(LimitExceeded) as refused:
         require_within_limits(
-            plan(Dwell(amplitude_vpp=18, frequency_hz=5000, duration_s=1), ramp_s=0.1, ramp_step_s=0.02), rig
+            plan(Dwell(amplitude_vpp=18, frequency_hz=5000, duration_s=1), ramp_s=0.05, ramp_step_s=0.01), rig
         )
     text = str(refused.value)
     for quantity in (

@@ -217,6 +217,23 @@ def test_a_logarithmic_sweep_passes_the_geometric_mean_at_half_time():
     assert step.play.frequency_hz == pytest.approx(200.0, rel=1e-3)
 
 
+@pytest.mark.parametrize(("hold", "power"), [("acceleration", 0), ("velocity", 1), ("displacement", 2)])
+def test_a_sweep_that_holds_a_motion_follows_that_power_of_frequency(hold, power):
+    sweep = SineSweep(amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=20, hold=hold)
+    tones = [step.play for step in sweep.steps()]
+    for tone in tones:
+        assert tone.level == pytest.approx((tone.frequency_hz / 350) ** power, rel=1e-12)
+    shown = sweep.preview(5120.0)
+    first, last = shown.volts[:5120], shown.volts[-5120:]
+    ratio = (tones[9].frequency_hz / tones[-1].frequency_hz) ** power
+    assert np.max(np.abs(first)) / np.max(np.abs(last)) == pytest.approx(ratio, rel=0.02)
+
+
+def test_a_sweep_too_quiet_for_the_generator_at_its_low_end_is_refused():
+    with pytest.raises(ValidationError, match=r"holding the displacement needs .* at 10 Hz"):
+        SineSweep(amplitude_vpp=1.5, start_hz=10, stop_hz=350, duration_s=20, hold="displacement")
+
+
 def test_a_sweep_down_mirrors_the_sweep_up():
     up = SineSweep(amplitude_vpp=1, start_hz=150, stop_hz=350, duration_s=10)
     down = SineSweep(amplitude_vpp=1, start_hz=350, stop_hz=150, duration_s=10)

@@ -1,7 +1,8 @@
 """The default rig's levels: at the paper's voltages the specimen does what the paper's did.
 
 Gong et al. 2025, section 5: white noise and dwells at 0.05, 1.5 and 10 V, a sweep from 150 to 350 Hz
-in 200 s at 1.5 V. The generator's setting is taken as peak to peak, the peak of noise as all of it.
+in 200 s at 1.5 V. The generator's setting is taken as peak to peak, the peak of noise as all of it; the
+sweep's setting grows with the square of frequency (constant base displacement) to 1.5 V at its end.
 """
 
 from pathlib import Path
@@ -98,8 +99,8 @@ def test_strong_noise_shows_the_two_terminal_resonances_and_none_of_the_linear_o
     weak, _ = transmission(WEAK_VPP, 4)
     strong, plant = transmission(STRONG_VPP, 24)
     assert plant.impacts > 500
-    assert peak_hz(strong, 150, 250) == pytest.approx(201, abs=12)
-    assert peak_hz(strong, 350, 480) == pytest.approx(436, abs=25)
+    assert peak_hz(strong, 150, 250) == pytest.approx(201, rel=0.02)
+    assert peak_hz(strong, 350, 480) == pytest.approx(436, rel=0.02)
     ratio = {hz: (strong / weak)[hz == BAND_HZ][0] for hz in (201, 266, 436)}
     assert ratio[266] < 0.05
     assert ratio[201] > 2
@@ -111,24 +112,25 @@ def test_strong_noise_shows_the_two_terminal_resonances_and_none_of_the_linear_o
 
 
 @pytest.mark.slow
-def test_a_sweep_at_the_moderate_level_collides_around_the_middle_resonance_only():
-    plant, start_hz, seconds, ramp_s = switched_on(), 150.0, 200, 2
+def test_a_sweep_at_the_moderate_level_collides_from_below_the_middle_resonance_on_and_not_before():
+    plant, start_hz, stop_hz, seconds, ramp_s = switched_on(), 150.0, 350.0, 200, 2
     ramp = 0.5 - 0.5 * np.cos(np.pi * np.arange(ramp_s * SECOND) / (ramp_s * SECOND))
-    moved(plant, ramp * sine(MODERATE_VPP, start_hz, -ramp_s, ramp_s))
+    moved(plant, ramp * sine(MODERATE_VPP * (start_hz / stop_hz) ** 2, start_hz, -ramp_s, ramp_s))
     colliding = []
     for second in range(seconds):
         time_s = second + STEP_S * np.arange(SECOND)
         before = plant.impacts
-        moved(plant, 0.5 * MODERATE_VPP * np.sin(2 * np.pi * (start_hz + 0.5 * time_s) * time_s))
+        held = ((start_hz + time_s) / stop_hz) ** 2
+        moved(plant, 0.5 * MODERATE_VPP * held * np.sin(2 * np.pi * (start_hz + 0.5 * time_s) * time_s))
         colliding.append(plant.impacts > before)
     hit_hz = start_hz + np.flatnonzero(colliding)
-    assert 235 < hit_hz[0] < 255  # the paper: about 240
-    assert 280 < hit_hz[-1] < 335  # the paper: about 290
+    assert 225 < hit_hz[0] < 240  # the paper: about 240
+    assert hit_hz[-1] > 290  # the paper: about 290; at this level the colliding state lasts to the end
     assert np.mean(np.diff(hit_hz) <= 2) > 0.95
 
 
 def test_dwells_go_from_linear_to_strongly_colliding_with_lines_growing_beside_the_drive():
-    impacts, beside = [], []
+    impacts, beside, clear = [], [], []
     for amplitude_vpp in (WEAK_VPP, MODERATE_VPP, STRONG_VPP):
         plant = switched_on()
         moved(plant, sine(amplitude_vpp, DWELL_HZ, 0, 6))
@@ -138,8 +140,10 @@ def test_dwells_go_from_linear_to_strongly_colliding_with_lines_growing_beside_t
         near = (frequency_hz > 150) & (frequency_hz < 240)
         at_drive = np.abs(frequency_hz - DWELL_HZ) < 2
         impacts.append(plant.impacts / 11)
-        beside.append(np.max(spectrum[near]) / np.max(spectrum[at_drive]))
+        beside.append(np.max(spectrum[near]))
+        clear.append(beside[-1] / np.max(spectrum[at_drive]))
     assert impacts[0] == 0
-    assert 100 < impacts[1] < 600 < impacts[2]
-    assert beside[0] < 1e-4
-    assert 0.02 < beside[1] < beside[2]
+    assert 100 < impacts[1] < 0.8 * impacts[2]
+    assert clear[0] < 1e-4
+    assert min(clear[1:]) > 0.02
+    assert beside[0] < 1e-3 * beside[1] < 1e-3 * beside[2]
