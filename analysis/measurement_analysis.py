@@ -22,6 +22,7 @@ from .recorded_channels import Channels, RecordedChannels, only_stretch, read_wh
 from .recording_facts import RecordingFacts, recording_facts, specimen_of
 from .stepped_response import SteppedResponse, stepped_response
 from .sweep import SweepResponse, SweepSums
+from .terminal_level import TerminalLevel, terminal_levels
 
 WINDOW_S = 5.0
 """The paper's window: the last 5 s of a dwell."""
@@ -38,6 +39,7 @@ class NoiseAnalysis:
 
     facts: RecordingFacts
     checks: tuple[Check, ...]
+    excitation: Noise
     response: NoiseResponse
 
 
@@ -47,6 +49,7 @@ class SweepAnalysis:
 
     facts: RecordingFacts
     checks: tuple[Check, ...]
+    excitation: SineSweep
     response: SweepResponse
     collisions: Collisions
 
@@ -57,9 +60,12 @@ class DwellAnalysis:
 
     facts: RecordingFacts
     checks: tuple[Check, ...]
+    excitation: Dwell
     response: DwellResponse
     displacement: Envelope
     """x over the dwell [m], without the ends that integration disturbs."""
+    terminal: tuple[TerminalLevel, ...]
+    """How much of the motion went to the bands of the bound modes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +74,7 @@ class SteppedSineAnalysis:
 
     facts: RecordingFacts
     checks: tuple[Check, ...]
+    excitation: SteppedSine
     response: SteppedResponse
 
 
@@ -95,25 +102,22 @@ def _analysed(facts: RecordingFacts, channels: Channels) -> RecordingAnalysis:
     checks = measurement_checks(facts)
     match facts.measurement.excitation:
         case MultisineNoise() | OddMultisine() | StreamedNoise() as noise:
-            return NoiseAnalysis(facts, checks, measured_noise(channels, noise))
+            return NoiseAnalysis(facts, checks, noise, noise_response(channels, noise))
         case SineSweep() as sweep:
             response = measured_sweep(channels, sweep)
-            return SweepAnalysis(facts, checks, response, collisions(response))
+            return SweepAnalysis(facts, checks, sweep, response, collisions(response))
         case Dwell() as dwell:
-            found = measured_dwell(channels, dwell, bound_frequencies_hz(facts))
-            return DwellAnalysis(facts, checks, found, settled_envelope(found))
+            towards_hz = bound_frequencies_hz(facts)
+            found = measured_dwell(channels, dwell, towards_hz)
+            terminal = terminal_levels(found, towards_hz)
+            return DwellAnalysis(facts, checks, dwell, found, settled_envelope(found), terminal)
         case SteppedSine() as stepped:
-            return SteppedSineAnalysis(facts, checks, stepped_response(channels, stepped))
+            return SteppedSineAnalysis(facts, checks, stepped, stepped_response(channels, stepped))
 
 
 def bound_frequencies_hz(facts: RecordingFacts) -> tuple[float, ...]:
     """Frequencies of the specimen with m1 stuck to m2: where strong collisions move the motion to."""
     return tuple(float(each) for each in specimen_of(facts.bench).bound_frequencies_hz)
-
-
-def measured_noise(channels: Channels, noise: Noise) -> NoiseResponse:
-    """Estimate the transmission; the same for samples that were recorded and that were simulated."""
-    return noise_response(channels, noise)
 
 
 def measured_sweep(channels: Channels, sweep: SineSweep) -> SweepResponse:
