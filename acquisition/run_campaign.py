@@ -111,7 +111,7 @@ def run_campaign(
 
     """
     _require_all_within_limits(campaign, bench)
-    folder.mkdir(parents=True, exist_ok=True)
+    _make(folder)
     plan = planned_recordings(campaign, folder, existing)
     items: list[CampaignItem] = []
     for number, planned in enumerate(plan, start=1):
@@ -201,6 +201,16 @@ def _carried_out(
         return CampaignItem(planned.name, Item.FAILED, planned.path, str(error))
     result = Item.RECORDED if outcome.state is RunState.FINISHED else Item.STOPPED
     return CampaignItem(planned.name, result, planned.path, outcome.reason)
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(
+            f"{folder} cannot be made a folder for recordings ({error.strerror}). Nothing was played; "
+            "give a folder that exists, or the name of a new one"
+        ) from error
 
 
 def _require_all_within_limits(campaign: Campaign, bench: RunBench) -> None:

@@ -43,6 +43,15 @@ def failing_in(bench, name, fault):
     return watch
 
 
+def test_a_file_where_the_folder_should_be_is_refused_before_anything_plays(bench, tmp_path):
+    taken = tmp_path / "taken"
+    taken.write_text("mine")
+    with pytest.raises(RecordingError, match=r"taken cannot be made a folder .* Nothing was played"):
+        run_campaign(bench, CAMPAIGN, taken)
+    assert taken.read_text() == "mine"
+    assert not any(name == "start" for name, _, _ in bench.world.calls)
+
+
 def test_every_measurement_becomes_one_complete_recording(bench, tmp_path):
     items = run_campaign(bench, CAMPAIGN, tmp_path / "out")
     assert results(items) == [(name, Item.RECORDED) for name in ("one", "two", "three")]

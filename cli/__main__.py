@@ -1,0 +1,50 @@
+"""The `vibench` command: its list of commands, and the one place where an error becomes a sentence."""
+
+import sys
+
+import typer
+from rich.console import Console
+
+from acquisition.errors import AcquisitionError
+
+from .bench import bench
+from .measure import measure
+from .recover import recover_recording
+from .serve_rig import serve_rig
+
+app = typer.Typer(
+    name="vibench",
+    help="Vibro-impact shaker experiments: run them, record them, and say what they mean.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.command()(measure)
+app.command(name="recover")(recover_recording)
+app.command(name="serve-rig")(serve_rig)
+app.add_typer(bench, name="bench")
+
+
+def main() -> None:
+    """Run the command line. An error that a user can mend is one sentence and a non-zero exit."""
+    try:
+        app()
+    except AcquisitionError as error:
+        complain(error)
+        sys.exit(1)
+
+
+def complain(error: BaseException) -> None:
+    """Show an error on standard error: its sentence, then what else went wrong on the way out."""
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    console.print(f"[bold red]error:[/] {_plain(str(error))}")
+    for note in getattr(error, "__notes__", ()):
+        console.print(f"  {_plain(note)}")
+
+
+def _plain(text: str) -> str:
+    return text.replace("[", r"\[")
+
+
+if __name__ == "__main__":
+    main()

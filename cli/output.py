@@ -1,0 +1,15 @@
+"""What commands print: people's text on one console, JSON on standard output alone."""
+
+import json
+import sys
+from collections.abc import Mapping
+
+from rich.console import Console
+
+console = Console(highlight=False)
+
+
+def print_json(document: Mapping[str, object]) -> None:
+    """Print one JSON document on standard output, and nothing else."""
+    json.dump(document, sys.stdout, indent=2, allow_nan=False)
+    sys.stdout.write("\n")

@@ -1,0 +1,19 @@
+"""Options that several commands share."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .shipped import shipped
+
+BenchPath = Annotated[
+    Path | None,
+    typer.Option("--bench", metavar="BENCH.toml", help="Hardware configuration; the virtual rig if absent."),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+
+
+def bench_path(given: Path | None) -> Path:
+    """Path of the hardware configuration: what was given, or the virtual rig."""
+    return shipped("hardware_configs/virtual_rig.toml") if given is None else given

@@ -1,0 +1,41 @@
+"""`vibench serve-rig`: the virtual instruments alone, for other programs."""
+
+import signal
+import threading
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from acquisition.rig import load_rig
+from acquisition.virtual.rig import VirtualRig
+
+from .output import console
+from .paths import bench_path
+
+
+def serve_rig(
+    bench: Annotated[
+        Path | None, typer.Option("--bench", metavar="BENCH.toml", help="A rig with a [virtual] table.")
+    ] = None,
+    address: Annotated[
+        str, typer.Option("--address", metavar="HOST:PORT", help="Where to listen; there is no password.")
+    ] = "127.0.0.1:31763",
+) -> None:
+    """Serve the virtual rig to any pyvisa and nidaqmx program until Ctrl-C."""
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    with VirtualRig(load_rig(bench_path(bench)), address) as rig:
+        console.print(f"[bold]{rig.rig.name}[/] is on. Stop it with Ctrl-C.\n")
+        console.print("The converter, for nidaqmx:")
+        console.print(f'  grpc.insecure_channel("{rig.daq_address}")  # GrpcSessionOptions(channel, "")')
+        console.print("The generator, for pyvisa in Python (one line before the resource manager):")
+        console.print(
+            f'  from acquisition.virtual import usb_bus; usb_bus.plug_in_remote("{rig.daq_address}")'
+        )
+        console.print(f'  ResourceManager("@py").open_resource("{rig.visa_resource}")')
+        console.print("The generator, for any other VISA program:")
+        console.print(f"  {rig.socket_resource}")
+        stop.wait()
+    console.print("The virtual rig is off.")

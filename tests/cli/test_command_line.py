@@ -1,0 +1,123 @@
+"""The command line as a user meets it: real processes, one sentence for every wrong input, exit codes."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from acquisition.recording import RecordingState, open_recording
+
+ROOT = Path(__file__).resolve().parents[2]
+QUICK = """
+name = "short"
+[[measurements]]
+name = "dwell"
+ramp_s = 0.2
+ramp_step_s = 0.02
+excitation = { kind = "dwell", amplitude_vpp = 1.5, frequency_hz = 260, settle_s = 0.1, duration_s = 1.5 }
+"""
+
+
+def command(*arguments):
+    return [sys.executable, "-m", "cli", *map(str, arguments)]
+
+
+def vibench(*arguments, cwd):
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
+    return subprocess.run(
+        command(*arguments),
+        cwd=cwd,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=100,
+    )
+
+
+def campaign(folder, text=QUICK):
+    path = folder / "campaign.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(tmp_path):
+    plan = campaign(tmp_path)
+    first = vibench("measure", plan, "--out", "recordings", cwd=tmp_path)
+    assert first.returncode == 0, first.stderr
+    with open_recording(tmp_path / "recordings" / "dwell.h5") as recording:
+        assert recording.state is RecordingState.COMPLETE
+    before = (tmp_path / "recordings" / "dwell.h5").read_bytes()
+    second = vibench("measure", plan, "--out", "recordings", cwd=tmp_path)
+    assert second.returncode == 1
+    assert "dwell.h5 exist already, and nothing is ever overwritten" in second.stderr
+    resumed = vibench("measure", plan, "--out", "recordings", "--resume", cwd=tmp_path)
+    assert resumed.returncode == 0
+    assert "kept" in resumed.stdout
+    assert (tmp_path / "recordings" / "dwell.h5").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("amplitude_vpp = 1.5", "amplitude_v = 1.5", "amplitude_v is not a known key"),
+        ("amplitude_vpp = 1.5", "amplitude_vpp = 15", "at most 10 Vpp"),
+        ("amplitude_vpp = 1.5", 'amplitude_vpp = "1.5 V"', "valid number"),
+        ('kind = "dwell"', 'kind = "dwel"', "multisine_noise"),
+        ("[[measurements]]", "[[measurements]", "not valid TOML"),
+    ],
+)
+def test_a_wrong_campaign_is_one_sentence_and_plays_nothing(tmp_path, old, new, said):
+    result = vibench(
+        "measure", campaign(tmp_path, QUICK.replace(old, new)), "--out", "recordings", cwd=tmp_path
+    )
+    assert result.returncode == 1
+    assert said in result.stderr
+    assert result.stderr.startswith("error: ")
+    assert "Traceback" not in result.stderr
+    assert not list(tmp_path.glob("recordings/*"))
+
+
+def test_a_bench_without_its_instruments_is_one_sentence(tmp_path):
+    text = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text(encoding="utf-8")
+    bench = tmp_path / "bench.toml"
+    bench.write_text(text.split("\n[virtual]\n")[0].replace("2026-02-10", "2999-01-01"), encoding="utf-8")
+    result = vibench("measure", campaign(tmp_path), "--bench", bench, "--out", "recordings", cwd=tmp_path)
+    assert result.returncode == 1
+    assert "Traceback" not in result.stderr
+    assert "NI-DAQmx" in result.stderr
+
+
+def test_a_bench_check_says_what_it_found_as_one_json_document(tmp_path):
+    result = vibench("bench", "check", "--json", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    report = json.loads(result.stdout)
+    assert {finding["verdict"] for finding in report["findings"]} == {"ok"}
+
+
+def test_a_recording_that_was_cut_off_is_recovered(tmp_path):
+    plan = campaign(tmp_path, QUICK.replace("duration_s = 1.5", "duration_s = 3000"))
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    arguments = command("measure", plan, "--out", "recordings")
+    part = tmp_path / "recordings" / "dwell.h5.part"
+    with subprocess.Popen(arguments, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL) as running:
+        while running.poll() is None:
+            if part.exists() and committed(part) > 0:
+                running.send_signal(signal.SIGKILL)
+    result = vibench("recover", part, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    with open_recording(part.with_suffix("")) as recording:
+        assert recording.state is RecordingState.INTERRUPTED
+        assert recording.samples > 0
+
+
+def committed(part):
+    try:
+        with open_recording(part) as recording:
+            return recording.samples
+    except OSError:  # not written far enough to be opened
+        return 0
