@@ -30,7 +30,7 @@ _DWELL_EDGE_PERIODS = 121
 """Drive periods that integration disturbs, both ends together."""
 _SHORTEST_WINDOW_PERIODS = 50
 _BLOCK = 1 << 20
-_TIME_BINS = 3000
+_TIME_BINS = 1200
 
 
 @dataclass(frozen=True, eq=False)

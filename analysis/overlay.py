@@ -10,6 +10,7 @@ from acquisition.recording import Recording
 from sim.accuracy import Accuracy
 from sim.specimen import Specimen
 
+from .arrays import Reals
 from .collision_region import Collisions, collisions
 from .difference import Difference, logarithmic_difference
 from .dwell import DwellResponse
@@ -35,6 +36,7 @@ from .sweep import SweepResponse
 from .terminal_level import TerminalLevel, terminal_levels
 
 PREDICTION_STEP_HZ = 2.0
+_FINE_STEP_HZ = 0.25
 _HIGHEST_PREDICTED_HZ = 700.0
 """Above the highest mode (500 Hz) the curves fall smoothly; predicting there shows nothing."""
 
@@ -186,7 +188,7 @@ def _noise(analysis: NoiseAnalysis, channels: SimulatedChannels) -> NoiseOverlay
     measured, simulated = analysis.response.transmission, response.transmission
     amplitude_m, basis = equivalent_amplitude(analysis)
     stop_hz = min(noise.band_stop_hz, _HIGHEST_PREDICTED_HZ)
-    grid = np.arange(noise.band_start_hz, stop_hz + PREDICTION_STEP_HZ / 2, PREDICTION_STEP_HZ)
+    grid = prediction_grid(channels.simulated.specimen, noise.band_start_hz, stop_hz)
     return NoiseOverlay(
         run=_run(channels, "noise" if analysis.response.periodic is None else "realisation"),
         response=response,
@@ -198,6 +200,15 @@ def _noise(analysis: NoiseAnalysis, channels: SimulatedChannels) -> NoiseOverlay
         prediction=predicted(channels.simulated.specimen, grid, amplitude_m),
         amplitude_basis=basis,
     )
+
+
+def prediction_grid(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
+    """Frequencies to predict at: every 2 Hz, and closer around the resonances, which are narrower."""
+    coarse = np.arange(low_hz, high_hz + PREDICTION_STEP_HZ / 2, PREDICTION_STEP_HZ)
+    near = np.arange(-PREDICTION_STEP_HZ, PREDICTION_STEP_HZ + _FINE_STEP_HZ / 2, _FINE_STEP_HZ)
+    middles = (*specimen.natural_frequencies_hz, *specimen.bound_frequencies_hz)
+    grid = np.unique(np.concatenate([coarse, *(middle + near for middle in middles)]))
+    return np.asarray(grid[(grid >= low_hz) & (grid <= high_hz)])
 
 
 def equivalent_amplitude(analysis: NoiseAnalysis) -> tuple[float, str]:
@@ -215,7 +226,7 @@ def _sweep(analysis: SweepAnalysis, channels: SimulatedChannels) -> SweepOverlay
     measured = analysis.response
     rising = np.argsort(measured.frequency_hz)
     low, high = sorted((float(measured.frequency_hz[0]), float(measured.frequency_hz[-1])))
-    grid = np.arange(low, high, PREDICTION_STEP_HZ)
+    grid = prediction_grid(channels.simulated.specimen, low, high)
     amplitude_m = np.interp(grid, measured.frequency_hz[rising], measured.drive_amplitude_m[rising])
     return SweepOverlay(
         run=_run(channels, "sweep"),

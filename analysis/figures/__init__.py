@@ -1,0 +1,1 @@
+"""The figures of a report: one a file, drawn without a display, each with its caption and its numbers."""

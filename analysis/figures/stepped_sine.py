@@ -1,0 +1,109 @@
+"""Responses I and II at every frequency of a stepped sine, up and down apart."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..measurement_analysis import SteppedSineAnalysis
+from ..overlay import SteppedSineOverlay
+from ..tables import table
+from .drawn import DrawnFigure
+from .style import LINEAR, MEASURED, PREDICTED, SIMULATED, legend_above, magnitude_axis, new_figure, styled
+
+_HEIGHT_IN = 4.6
+_MARKERS = {"up": "^", "down": "v"}
+
+
+def stepped_sine_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None = None) -> DrawnFigure:
+    """Draw Response I and II against frequency, one marker a direction."""
+    with styled():
+        figure = new_figure(_HEIGHT_IN)
+        first, second = figure.subplots(2, 1, sharex=True)
+        _responses(first, analysis, laid, "response_i")
+        _responses(second, analysis, laid, "response_ii")
+        first.set_ylabel("Response I\nmax |x| / A0")
+        second.set_ylabel("Response II\n|x at f| / A0")
+        second.set_xlabel("drive frequency [Hz]")
+        legend_above(figure, [first])
+    found = analysis.response
+    columns = {
+        "frequency_hz": found.frequency_hz,
+        "direction": np.asarray(found.direction),
+        "drive_amplitude_m": found.drive_amplitude_m,
+        "response_i": found.response_i,
+        "response_ii": found.response_ii,
+        "sd_response_ii": found.sd_response_ii,
+        "phase_rad": found.phase_rad,
+    }
+    if laid is not None:
+        columns["response_i_simulated"] = laid.response.response_i
+        columns["response_ii_simulated"] = laid.response.response_ii
+    name = f"stepped_sine_{analysis.facts.name}"
+    return DrawnFigure(
+        name=name,
+        title=f"Stepped sine, {analysis.excitation.amplitude_vpp:g} Vpp",
+        caption=stepped_sine_caption(analysis, laid),
+        figure=figure,
+        tables=(table(name, **columns),),
+    )
+
+
+def _responses(axes: Axes, analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, what: str) -> None:
+    found = analysis.response
+    rising = np.argsort(found.frequency_hz)
+    if laid is not None:
+        sines = laid.prediction
+        axes.plot(
+            sines.frequency_hz[rising],
+            sines.linear[rising],
+            color=LINEAR,
+            linestyle="--",
+            label="without contact",
+        )
+        axes.plot(
+            sines.frequency_hz[rising],
+            getattr(sines, what)[rising],
+            color=PREDICTED,
+            linewidth=0.8,
+            label="steady sines from rest",
+        )
+    for direction in sorted(set(found.direction)):
+        chosen = np.array([each == direction for each in found.direction])
+        marker = _MARKERS.get(direction, "o")
+        axes.plot(
+            found.frequency_hz[chosen],
+            getattr(found, what)[chosen],
+            color=MEASURED,
+            label=f"measured, {direction}",
+            linestyle="none",
+            marker=marker,
+            markersize=4,
+        )
+        if laid is not None:
+            axes.plot(
+                found.frequency_hz[chosen],
+                getattr(laid.response, what)[chosen],
+                color=SIMULATED,
+                markerfacecolor="none",
+                label=f"simulated under the recorded base, {direction}",
+                linestyle="none",
+                marker=marker,
+                markersize=4,
+            )
+    magnitude_axis(axes)
+
+
+def stepped_sine_caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None) -> str:
+    """Say where the largest response was, and how far the simulation lies from it."""
+    found = analysis.response
+    top = int(np.argmax(found.response_ii))
+    text = (
+        f"Stepped sine at {analysis.excitation.amplitude_vpp:g} Vpp, {found.frequency_hz.size} steps from "
+        f"{np.min(found.frequency_hz):.4g} to {np.max(found.frequency_hz):.4g} Hz. Response II is largest "
+        f"at {found.frequency_hz[top]:.4g} Hz: {found.response_ii[top]:.3g} ± {2 * found.sd_response_ii[top]:.2g}."
+    )
+    if laid is None:
+        return text
+    return (
+        f"{text} Simulated under the recorded base motion: median difference "
+        f"{laid.difference.median_abs_db:.2g} dB, {laid.run.impacts} impacts within the steps."
+    )

@@ -1,0 +1,125 @@
+"""How all figures look: one set of colours that colour-blind readers tell apart, one set of sizes."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from types import MappingProxyType
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
+
+MEASURED = "#1b1b1b"
+SIMULATED = "#d55e00"
+"""Under the recorded base motion (vermillion of Okabe & Ito's palette)."""
+PREDICTED = "#0072b2"
+"""Under sines (blue)."""
+LINEAR = "#56b4e9"
+"""Without contact (sky blue, always dashed)."""
+TERMINAL = "#8a3b7a"
+"""Resonances with m1 stuck to m2 (purple, always dotted)."""
+BOUNDS = "#9a9a9a"
+COLLIDING = "#d9d9d9"
+LEVELS = ("#0072b2", "#009e73", "#d55e00", "#cc79a7", "#e69f00", "#56b4e9")
+"""For several levels in one figure, weak to strong, beside different line styles."""
+LEVEL_STYLES = ("-", "--", "-.", ":", "-", "--")
+
+WIDTH_IN = 7.2
+"""Fits the text width of A4 and a report's column."""
+PNG_DPI = 160
+_EDGE = 1e-3
+"""The axis reaches so far past its ends: measured lines lie a few ppm off round numbers."""
+_LINEAR_BELOW = 5.0
+_FEW_MARKS_ABOVE = 60.0
+"""Ratios of the ends of a frequency axis, between which marks at 3 and 7 help and fit."""
+_POWERS_BELOW = 1e-3
+_PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"))
+
+STYLE: Mapping[Any, Any] = MappingProxyType(
+    {
+        "font.family": "DejaVu Sans",
+        "font.size": 9.0,
+        "axes.labelsize": 9.0,
+        "axes.titlesize": 9.0,
+        "axes.linewidth": 0.7,
+        "axes.grid": True,
+        "axes.axisbelow": True,
+        "grid.color": "#e3e3e3",
+        "grid.linewidth": 0.5,
+        "lines.linewidth": 1.2,
+        "legend.fontsize": 8.0,
+        "legend.frameon": False,
+        "xtick.labelsize": 8.0,
+        "ytick.labelsize": 8.0,
+        "xtick.direction": "out",
+        "ytick.direction": "out",
+        "figure.facecolor": "white",
+        "axes.facecolor": "white",
+        "savefig.facecolor": "white",
+        "svg.fonttype": "path",
+        "svg.hashsalt": "vibench",
+        "path.simplify": True,
+        "axes.formatter.useoffset": False,
+    }
+)
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw inside this: the style holds for what is drawn here and changes nothing elsewhere."""
+    with mpl.rc_context(dict(STYLE)):
+        yield
+
+
+def new_figure(height_in: float) -> Figure:
+    """Begin a figure of the common width, with a layout that lets nothing overlap."""
+    figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def legend_above(figure: Figure, axes: Sequence[Axes], columns: int = 3) -> None:
+    """Put one legend over the whole figure, outside of every axis: it never covers data."""
+    found = {
+        label: handle
+        for each in axes
+        for handle, label in zip(*each.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(list(found.values()), list(found), loc="outside upper left", ncols=columns)
+
+
+def frequency_axis(axes: Axes, low_hz: float, high_hz: float) -> None:
+    """Scale an axis logarithmically, with marks that read 20, 50, 100; a narrow band stays linear."""
+    axes.set_xlim(low_hz * (1 - _EDGE), high_hz * (1 + _EDGE))
+    if high_hz < _LINEAR_BELOW * low_hz:
+        return
+    axes.set_xscale("log")
+    digits = (1, 2, 3, 5, 7) if high_hz < _FEW_MARKS_ABOVE * low_hz else (1, 2, 5)
+    marks = [digit * 10**power for power in range(5) for digit in digits]
+    shown = [each for each in marks if low_hz * (1 - _EDGE) <= each <= high_hz * (1 + _EDGE)]
+    axes.xaxis.set_major_locator(FixedLocator(shown))
+    axes.xaxis.set_major_formatter(FuncFormatter(_plain))
+    axes.xaxis.set_minor_locator(NullLocator())
+
+
+def magnitude_axis(axes: Axes) -> None:
+    """Scale the vertical axis logarithmically, with marks that read 0.1, 1, 10."""
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter(FuncFormatter(_plain))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _plain(value: float, _place: int | None = None) -> str:
+    if 0 < value < _POWERS_BELOW:
+        return f"$10^{{{round(math.log10(value))}}}$"
+    return f"{value:g}"
+
+
+def prefixed(largest: float, unit: str) -> tuple[float, str]:
+    """Give the factor and the unit with SI prefix in which a quantity reads 1 to 1000."""
+    fitting = [each for each in _PREFIXES if each[0] <= abs(largest)] or [_PREFIXES[0]]
+    scale, prefix = fitting[-1]
+    return 1 / scale, f"{prefix}{unit}"
