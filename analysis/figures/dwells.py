@@ -98,7 +98,7 @@ def spectrum_columns(response: DwellResponse) -> tuple[Reals, Reals]:
     last = round(_HIGHEST_ORDER * response.drive.frequency_hz / spectrum.spacing_hz)
     starts = np.arange(first, last, width)
     largest = np.maximum.reduceat(spectrum.amplitude[:last], starts)
-    middle = (starts + 0.5 * (width - 1)) * spectrum.spacing_hz
+    middle: Reals = np.asarray((starts + 0.5 * (width - 1)) * spectrum.spacing_hz, dtype=np.float64)
     return middle, largest / response.drive.amplitude_m
 
 

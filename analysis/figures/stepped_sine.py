@@ -99,7 +99,8 @@ def stepped_sine_caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay
     text = (
         f"Stepped sine at {analysis.excitation.amplitude_vpp:g} Vpp, {found.frequency_hz.size} steps from "
         f"{np.min(found.frequency_hz):.4g} to {np.max(found.frequency_hz):.4g} Hz. Response II is largest "
-        f"at {found.frequency_hz[top]:.4g} Hz: {found.response_ii[top]:.3g} ± {2 * found.sd_response_ii[top]:.2g}."
+        f"at {found.frequency_hz[top]:.4g} Hz: {found.response_ii[top]:.3g} ± "
+        f"{2 * found.sd_response_ii[top]:.2g}."
     )
     if laid is None:
         return text

@@ -79,10 +79,10 @@ def _frequency_on_top(axes: Axes, found: SweepResponse) -> None:
     order = np.argsort(found.frequency_hz)
 
     def to_frequency(time_s: ArrayLike) -> Reals:
-        return np.interp(np.asarray(time_s), found.time_s, found.frequency_hz)
+        return np.asarray(np.interp(np.asarray(time_s), found.time_s, found.frequency_hz))
 
     def to_time(frequency_hz: ArrayLike) -> Reals:
-        return np.interp(np.asarray(frequency_hz), found.frequency_hz[order], found.time_s[order])
+        return np.asarray(np.interp(np.asarray(frequency_hz), found.frequency_hz[order], found.time_s[order]))
 
     top = axes.secondary_xaxis("top", functions=(to_frequency, to_time))
     top.set_xlabel("drive frequency [Hz]")
