@@ -198,7 +198,7 @@ def _paired(analysis: RecordingAnalysis, laid: Overlay | None) -> Result:
 
 
 def recordings_in(folder: Path) -> tuple[Path, ...]:
-    """Recordings in a folder, finished or interrupted, in the order they were begun.
+    """List the recordings in a folder, finished or interrupted, in the order they were begun.
 
     Raises
     ------

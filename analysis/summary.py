@@ -26,7 +26,7 @@ Json = dict[str, Any]
 
 def summary(result: Result) -> Json:
     """Say a result in numbers that JSON can hold; what is not finite becomes null."""
-    document = {
+    document: Json = {
         "recording": _facts(result.analysis.facts),
         "checks": [
             {"what": each.what, "verdict": each.verdict.value, "text": each.text}
@@ -195,6 +195,7 @@ def _stepped(result: SteppedSineResult) -> Json:
 
 
 def _simulated(result: Result) -> Json | None:
+    found: Json
     match result:
         case NoiseResult(laid=laid) if laid is not None:
             found = {"resonances": [_resonance(each) for each in laid.response.resonances]}
@@ -237,7 +238,7 @@ def _difference(found: Difference) -> Json:
     }
 
 
-def _plain(value: Any) -> Any:  # noqa: PLR0911 - one line a type
+def _plain(value: Any) -> Any:
     """Turn numpy's numbers into Python's, and what is not finite into None: JSON has neither."""
     match value:
         case bool() | str() | int() | None:

@@ -1,0 +1,39 @@
+"""Which figures a report shows, in which order."""
+
+from collections.abc import Iterator
+from itertools import groupby
+
+from ..campaign_results import CampaignResults, DwellResult, Result
+from ..figures.bench_levels import bench_levels_figure
+from ..figures.drawn import DrawnFigure
+from ..figures.dwells import dwells_figure
+from ..figures.excitation import excitation_figure
+from ..figures.stepped_sine import stepped_sine_figure
+from ..figures.sweep import sweep_figure
+from ..figures.transmission import transmission_figure
+from ..figures.transmission_levels import transmission_levels_figure
+
+
+def result_figures(results: CampaignResults) -> Iterator[DrawnFigure]:
+    """Draw what was found: transmissions, sweeps, dwells, stepped sines."""
+    noise = results.noise
+    if len(noise) > 1:
+        yield transmission_levels_figure([each.analysis for each in noise])
+    for each in noise:
+        yield transmission_figure(each.analysis, each.laid)
+    for sweep in results.sweeps:
+        yield sweep_figure(sweep.analysis, sweep.laid)
+    for _, group in groupby(results.dwells, key=_dwell_frequency):
+        yield dwells_figure([(each.analysis, each.laid) for each in group])
+    for stepped in results.stepped:
+        yield stepped_sine_figure(stepped.analysis, stepped.laid)
+
+
+def _dwell_frequency(result: DwellResult) -> float:
+    return result.analysis.excitation.frequency_hz
+
+
+def recording_figures(result: Result) -> tuple[DrawnFigure, ...]:
+    """Draw what was planned and what every channel recorded."""
+    facts = result.analysis.facts
+    return excitation_figure(facts.measurement), bench_levels_figure(facts)
