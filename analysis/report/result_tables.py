@@ -177,20 +177,18 @@ def line_table(dwells: Sequence[DwellResult]) -> ReportTable:
         for line in each.analysis.response.lines:
             if line.amplitude_m > 2 * line.sd_amplitude_m:
                 size = f"{1e6 * line.amplitude_m:.3g} ± {2e6 * line.sd_amplitude_m:.1g}"
-                rows.append(
-                    (name, line.label, f"{line.frequency_hz:.2f}", size, f"{line.decibel:.1f}", ABSENT)
-                )
+                place = f"{line.frequency_hz:.2f}"
+                rows.append((name, line.label, place, size, f"{line.decibel:.1f}", ABSENT))
         for band in each.analysis.terminal:
+            what = f"band around {band.towards_hz:.0f} Hz"
+            place = f"{band.low_hz:.0f} to {band.high_hz:.0f}"
             size = f"{1e6 * band.rms_m:.3g} rms ± {200 * band.relative_sd:.1g} %"
             simulated = f"{beside[band.towards_hz]:.1f}" if band.towards_hz in beside else ABSENT
-            place = f"{band.low_hz:.0f} to {band.high_hz:.0f}"
-            rows.append(
-                (name, f"band around {band.towards_hz:.0f} Hz", place, size, f"{band.decibel:.1f}", simulated)
-            )
+            rows.append((name, what, place, size, f"{band.decibel:.1f}", simulated))
     return ReportTable(
         "Dwells: lines and terminal bands of the displacement",
         ("dwell", "what", "frequency [Hz]", "displacement [µm]", "re drive line [dB]", "simulated [dB]"),
         tuple(rows),
-        "Lines below two standard deviations are left out. Chaos fills bands, not lines: a band's figure is its "
-        "rms over the rms of the line at the drive frequency.",
+        "Lines below two standard deviations are left out. Chaos fills bands, not lines: a band's figure is "
+        "its rms over the rms of the line at the drive frequency.",
     )

@@ -1,0 +1,127 @@
+"""Recordings for the tests of analysis: made once, of a specimen whose answer is known."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.excitation.dwell import Dwell
+from acquisition.excitation.multisine_noise import MultisineNoise
+from acquisition.excitation.sine_sweep import SineSweep
+from acquisition.excitation.stepped_sine import SteppedSine
+
+
+def _load(name):
+    """The tests are no package: a module beside this file is loaded by its path."""
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+synthetic = _load("synthetic_recordings")
+A0_WEAK, A0_STRONG = 0.5e-6, 5e-6
+DELAY_SAMPLES = 1
+SETTLE_S, DWELL_S = 2.0, 3.0
+SWEEP = {"start_hz": 225.0, "stop_hz": 305.0, "duration_s": 16.0}
+NOISE = {"band_start_hz": 60.0, "band_stop_hz": 560.0, "repetition_hz": 4.0, "periods": 2}
+
+
+@pytest.fixture(scope="session")
+def dwell_motions():
+    """Base and velocity of a weak and a colliding dwell at 260 Hz."""
+    found = {}
+    for name, amplitude_m in (("weak", A0_WEAK), ("strong", A0_STRONG)):
+        motion = synthetic.sine(SETTLE_S + DWELL_S, 260.0, amplitude_m)
+        found[name] = (motion, *synthetic.response_of(motion, DELAY_SAMPLES))
+    return found
+
+
+def dwell_plan(amplitude_m, duration_s=DWELL_S):
+    return Dwell(
+        amplitude_vpp=2 * synthetic.VOLTS_PER_METRE * amplitude_m,
+        frequency_hz=260.0,
+        settle_s=SETTLE_S,
+        duration_s=duration_s,
+    )
+
+
+DWELL_PART = synthetic.Part("dwell", SETTLE_S, SETTLE_S + DWELL_S, {"frequency_hz": 260.0})
+
+
+@pytest.fixture
+def dwell_file(dwell_motions, tmp_path):
+    """Write a dwell, whole or not."""
+
+    def write(level="weak", **how):
+        motion, velocity, _ = dwell_motions[level]
+        plan = dwell_plan({"weak": A0_WEAK, "strong": A0_STRONG}[level])
+        delay_s = DELAY_SAMPLES / synthetic.RATE
+        return synthetic.write_recording(
+            tmp_path, plan, motion, velocity, [DWELL_PART], **{"name": level, "delay_s": delay_s, **how}
+        )
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def sweep_file(tmp_path_factory):
+    """A sweep through the colliding region, at a rate that leaves a clear jump."""
+    motion = synthetic.chirp(SWEEP["duration_s"], SWEEP["start_hz"], SWEEP["stop_hz"], A0_STRONG)
+    velocity, _ = synthetic.response_of(motion)
+    plan = SineSweep(amplitude_vpp=2 * synthetic.VOLTS_PER_METRE * A0_STRONG, settle_s=0.0, **SWEEP)
+    part = synthetic.Part("sweep", 0.0, SWEEP["duration_s"], {"start_hz": SWEEP["start_hz"]})
+    folder = tmp_path_factory.mktemp("sweep")
+    return synthetic.write_recording(folder, plan, motion, velocity, [part], name="sweep")
+
+
+@pytest.fixture(scope="session")
+def noise_motion():
+    """Two realisations of weak noise, one after the other, each from rest."""
+    lines = np.arange(NOISE["band_start_hz"], NOISE["band_stop_hz"] + 1, NOISE["repetition_hz"])
+    settle_s, played_s = 3.0, NOISE["periods"] / NOISE["repetition_hz"]
+    motions, velocities, parts = [], [], []
+    for number in range(2):
+        motion = synthetic.multisine(settle_s + played_s, lines, 1e-8, number)
+        motions.append(motion)
+        velocities.append(synthetic.response_of(motion)[0])
+        start_s = number * (settle_s + played_s) + settle_s
+        parts.append(synthetic.Part("realisation", start_s, start_s + played_s, {"realisation": number}))
+    base = synthetic.Motion(
+        np.concatenate([each.displacement_m for each in motions]),
+        np.concatenate([each.acceleration for each in motions]),
+    )
+    return base, np.concatenate(velocities), parts
+
+
+@pytest.fixture
+def noise_file(noise_motion, tmp_path):
+    """Write noise, whole or not."""
+
+    def write(**how):
+        plan = MultisineNoise(amplitude_vpp=0.05, realisations=2, settle_s=3.0, **NOISE)
+        return synthetic.write_recording(tmp_path, plan, *noise_motion, **{"name": "noise", **how})
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def stepped_file(tmp_path_factory):
+    """Two steps of a stepped sine, up, each from rest so that both are in closed form."""
+    frequencies = (150.0, 180.0)
+    motions = [synthetic.sine(4.0, each, A0_WEAK) for each in frequencies]
+    base = synthetic.Motion(
+        np.concatenate([each.displacement_m for each in motions]),
+        np.concatenate([each.acceleration for each in motions]),
+    )
+    velocity = np.concatenate([synthetic.response_of(each)[0] for each in motions])
+    parts = [
+        synthetic.Part("step", 4.0 * n + 2.5, 4.0 * n + 3.5, {"frequency_hz": each, "direction": "up"})
+        for n, each in enumerate(frequencies)
+    ]
+    plan = SteppedSine(amplitude_vpp=0.05, frequencies_hz=frequencies, settle_s=2.5, record_s=1.0)
+    folder = tmp_path_factory.mktemp("stepped")
+    return synthetic.write_recording(folder, plan, base, velocity, parts, name="stepped")

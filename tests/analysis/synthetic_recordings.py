@@ -1,0 +1,165 @@
+"""Recordings of a bench without faults: the base moves as told, the specimen as simulated, the file is real."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.instruments import Block, Identity
+from acquisition.measurement import Measurement
+from acquisition.recording import ChannelHeader, Origin, RecordingHeader, RecordingState, create_recording
+from acquisition.recording.provenance import Provenance
+from sim.drive import Sampled
+from sim.integrate import integrate
+from sim.specimen import gong2025
+
+RATE = 6400.0
+RAMP_S = 0.5
+VOLTS_PER_METRE = 1e4
+"""What a drive of 1 V does to the base: 0.1 mm."""
+BENCH = {
+    "name": "synthetic bench",
+    "calibration_valid_days": 730,
+    "amplifier": {"model": "amplifier", "serial": "A1", "gain_db": 10.0},
+    "specimen": {"model": "gong2025", "contact": "hertz", "damping_time_s": 2e-5, "gap_m": 45e-6},
+}
+PROVENANCE = Provenance(
+    "2026-03-01T12:00:00.000000+00:00", "lab", "Linux", 1, "3.11", {"vibench": "0.1.0"}, "0123abc"
+)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What the base does: a sum of signals under a ramp, in closed form up to its second derivative."""
+
+    displacement_m: np.ndarray
+    acceleration: np.ndarray
+
+
+@dataclass(frozen=True)
+class Part:
+    """A named stretch of a recording, in seconds."""
+
+    label: str
+    start_s: float
+    stop_s: float
+    numbers: dict
+
+
+def ramped(time_s, phase, rate, curvature, amplitude_m):
+    """amplitude * sin(phase), raised by a half cosine; phase' = rate, phase'' = curvature."""
+    x = np.clip(time_s / RAMP_S, 0, 1)
+    w = 0.5 * (1 - np.cos(np.pi * x))
+    inside = (x > 0) & (x < 1)
+    dw = np.where(inside, 0.5 * np.pi / RAMP_S * np.sin(np.pi * x), 0)
+    ddw = np.where(inside, 0.5 * (np.pi / RAMP_S) ** 2 * np.cos(np.pi * x), 0)
+    s, c = np.sin(phase), np.cos(phase)
+    return Motion(
+        amplitude_m * w * s,
+        amplitude_m * (ddw * s + 2 * dw * rate * c + w * (curvature * c - rate**2 * s)),
+    )
+
+
+def sine(duration_s, frequency_hz, amplitude_m):
+    time_s = np.arange(round(duration_s * RATE)) / RATE
+    omega = 2 * np.pi * frequency_hz
+    return ramped(time_s, omega * time_s, omega, 0.0, amplitude_m)
+
+
+def chirp(duration_s, start_hz, stop_hz, amplitude_m):
+    time_s = np.arange(round(duration_s * RATE)) / RATE
+    growth = (stop_hz - start_hz) / duration_s
+    phase = 2 * np.pi * (start_hz * time_s + 0.5 * growth * time_s**2)
+    return ramped(time_s, phase, 2 * np.pi * (start_hz + growth * time_s), 2 * np.pi * growth, amplitude_m)
+
+
+def multisine(duration_s, lines_hz, amplitude_m, seed):
+    time_s = np.arange(round(duration_s * RATE)) / RATE
+    phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines_hz))
+    parts = [
+        ramped(time_s, 2 * np.pi * f * time_s + p, 2 * np.pi * f, 0.0, amplitude_m)
+        for f, p in zip(lines_hz, phases, strict=True)
+    ]
+    return Motion(sum(each.displacement_m for each in parts), sum(each.acceleration for each in parts))
+
+
+def response_of(motion, delay_samples=0):
+    """Velocity of m0 under a base motion; a delay shows it late."""
+    drive = Sampled(np.append(motion.displacement_m, motion.displacement_m[-1]), RATE)
+    path = integrate(gong2025(), drive, (motion.displacement_m.size - 1) / RATE, sample_rate_hz=RATE)
+    return np.roll(path.states[:, 3], delay_samples), path.impacts.times_s
+
+
+def header(measurement, samples, delay_s=0.0):
+    def channel(role, quantity, unit, per_volt, **more):
+        return ChannelHeader(
+            role=role,
+            physical_channel=f"dev/{role}",
+            quantity=quantity,
+            unit=unit,
+            physical_per_volt=per_volt,
+            range_v=10.0,
+            calibration_date="2026-01-10",
+            serial=f"S-{role}",
+            sensitivity=1 / per_volt,
+            sensitivity_unit=f"V/({unit})",
+            **more,
+        )
+
+    return RecordingHeader(
+        channels=(
+            channel("drive_voltage", "voltage", "V", 1.0),
+            channel("base_acceleration", "acceleration", "m s-2", 10.0),
+            channel("m0_velocity", "velocity", "m s-1", 0.1, delay_s=delay_s),
+        ),
+        sample_rate_hz=RATE,
+        expected_samples=samples,
+        origin=Origin.SIMULATED,
+        plan_json=measurement.model_dump_json(),
+        bench_json=json.dumps(BENCH),
+        instruments={"generator": Identity("MAKER", "GEN", "G-7", "1.0", "MAKER,GEN,G-7,1.0")},
+        confirmations={"operator": "somebody", "amplifier gain": "10 dB"},
+        provenance=PROVENANCE,
+    )
+
+
+def write_recording(
+    folder: Path,
+    excitation,
+    motion,
+    velocity,
+    parts,
+    *,
+    name="run",
+    state=RecordingState.COMPLETE,
+    reason="the plan was carried out",
+    hole=None,
+    samples=None,
+    delay_s=0.0,
+):
+    """Write a recording; ``hole`` is a range of samples that were lost, ``samples`` cuts the end off."""
+    planned = velocity.size
+    kept = planned if samples is None else samples
+    measurement = Measurement(name=name, excitation=excitation)
+    drive = VOLTS_PER_METRE * motion.displacement_m
+    volts = np.stack((drive, motion.acceleration / 10.0, velocity / 0.1))
+    edges = {0, kept}
+    for each in parts:
+        edges |= {min(round(each.start_s * RATE), kept), min(round(each.stop_s * RATE), kept)}
+    if hole is not None:
+        edges |= set(hole)
+    starts = {round(each.start_s * RATE): each for each in parts}
+    stops = {round(each.stop_s * RATE) for each in parts}
+    writer = create_recording(folder / f"{name}.h5", header(measurement, planned, delay_s))
+    ordered = sorted(edges)
+    for begin, end in zip(ordered, [*ordered[1:], kept], strict=True):
+        if begin in stops:
+            writer.end_segment()
+        if begin in starts and begin < kept:
+            writer.begin_segment(starts[begin].label, **starts[begin].numbers)
+        if hole is not None and hole[0] <= begin < hole[1]:
+            continue
+        if end > begin:
+            writer.append(Block(begin, volts[:, begin:end]))
+    return writer.finish(state, reason)

@@ -1,0 +1,136 @@
+"""Recordings of a known specimen: each excitation gives the closed form, and what is missing is said."""
+
+import numpy as np
+import pytest
+
+from acquisition.recording import RecordingState, open_recording
+from analysis.errors import NotEnoughData, UnusableData
+from analysis.measurement_analysis import (
+    DwellAnalysis,
+    NoiseAnalysis,
+    SteppedSineAnalysis,
+    SweepAnalysis,
+    analyse_recording,
+)
+from analysis.measurement_checks import Verdict
+from sim.modes import base_transmissibility
+from sim.specimen import gong2025
+
+RATE = 6400.0
+
+
+def analysed(path):
+    with open_recording(path) as recording:
+        return analyse_recording(recording)
+
+
+def truth(frequency_hz):
+    return base_transmissibility(gong2025(), frequency_hz)[:, 0]
+
+
+def verdict(analysis, what):
+    return next(each.verdict for each in analysis.checks if each.what == what)
+
+
+def test_a_weak_dwell_gives_the_closed_form_in_amplitude_and_phase(dwell_file):
+    found = analysed(dwell_file("weak"))
+    assert isinstance(found, DwellAnalysis)
+    assert found.response.drive.frequency_hz == pytest.approx(260.0, rel=1e-8)
+    assert found.response.drive.amplitude_m == pytest.approx(0.5e-6, rel=1e-4)
+    exact = truth(260.0)[0]
+    assert found.response.response_ii == pytest.approx(abs(exact), rel=1e-3)
+    # Without a collision both responses are the same, but for what lies between two samples.
+    assert found.response.response_i == pytest.approx(found.response.response_ii, rel=1e-2)
+    # The channel's delay of one sample would be 14.6 degrees.
+    assert found.response.phase_rad == pytest.approx(np.angle(exact), abs=2e-3)
+
+
+def test_a_colliding_dwell_has_a_lower_response_ii_and_fills_the_terminal_bands(dwell_file):
+    weak, strong = analysed(dwell_file("weak")), analysed(dwell_file("strong"))
+    assert strong.response.response_ii < 0.3 * weak.response.response_ii
+    assert strong.response.response_i > 2 * strong.response.response_ii
+    for quiet, loud in zip(weak.terminal, strong.terminal, strict=True):
+        assert loud.decibel > quiet.decibel + 30
+
+
+def test_noise_gives_the_closed_form_on_every_line_by_all_three_estimators(noise_file):
+    found = analysed(noise_file())
+    assert isinstance(found, NoiseAnalysis)
+    estimate = found.response
+    lines = estimate.transmission.frequency_hz
+    assert lines.size == 126
+    # What settling leaves of the first mode, exp(-11), shows at its sharp flanks.
+    for each in (estimate.transmission, estimate.h1, estimate.h2):
+        np.testing.assert_allclose(each.value, truth(lines), rtol=2e-3)
+    assert estimate.left_out == 0
+    assert estimate.used_s == pytest.approx(1.0)
+    middle = [each for each in estimate.resonances if 250 < each.frequency_hz < 280]
+    assert middle[0].frequency_hz == pytest.approx(gong2025().natural_frequencies_hz[1], rel=1e-3)
+
+
+def test_a_sweep_finds_where_the_simulated_masses_began_to_collide(sweep_file):
+    found = analysed(sweep_file)
+    assert isinstance(found, SweepAnalysis)
+    region = found.collisions.regions[0]
+    before = found.response.frequency_hz < region.low_hz - 5
+    quiet = found.response.response_ii[before][5:]
+    # A sweep of 5 Hz/s lags the steady curve by a little.
+    exact = np.abs(truth(found.response.frequency_hz[before][5:]))
+    np.testing.assert_allclose(quiet, exact, rtol=0.03)
+    assert found.response.drive_amplitude_m[20:-5] == pytest.approx(5e-6, rel=1e-3)
+
+
+def test_every_step_of_a_stepped_sine_is_a_dwell_of_its_own(stepped_file):
+    found = analysed(stepped_file)
+    assert isinstance(found, SteppedSineAnalysis)
+    assert found.response.frequency_hz == pytest.approx([150.0, 180.0], rel=1e-7)
+    assert found.response.response_ii == pytest.approx(np.abs(truth([150.0, 180.0])), rel=1e-3)
+    assert found.response.direction == ("up", "up")
+
+
+def test_a_stopped_dwell_is_analysed_over_what_there_is_and_warns(dwell_file):
+    path = dwell_file("weak", state=RecordingState.STOPPED, reason="cancelled", samples=round(4 * RATE))
+    found = analysed(path)
+    assert found.response.window_s < 2.0
+    assert found.response.response_ii == pytest.approx(abs(truth(260.0)[0]), rel=2e-3)
+    assert verdict(found, "How it ended") is Verdict.WARNING
+    assert verdict(found, "Parts") is Verdict.WARNING
+
+
+def test_a_recording_that_ended_before_its_dwell_says_so_with_its_name_and_its_reason(dwell_file):
+    path = dwell_file("weak", state=RecordingState.FAILED, reason="cable out", samples=round(1 * RATE))
+    with pytest.raises(NotEnoughData, match=r"weak\.h5 \(failed: cable out\).*before its dwell began"):
+        analysed(path)
+
+
+def test_a_dwell_with_a_hole_is_refused_with_the_number_of_lost_samples(dwell_file):
+    path = dwell_file("weak", hole=(round(3 * RATE), round(3 * RATE) + 40))
+    with pytest.raises(UnusableData, match="40 of 19200 samples were lost"):
+        analysed(path)
+
+
+def test_a_realisation_with_a_hole_is_left_out_and_the_other_one_stands(noise_file):
+    first = round(3.1 * RATE)
+    found = analysed(noise_file(hole=(first, first + 10)))
+    assert found.response.left_out == 1
+    assert found.response.periodic.realisations == 1
+    assert found.facts.lost_samples == 10
+    assert verdict(found, "Lost samples") is Verdict.WARNING
+    np.testing.assert_allclose(
+        found.response.transmission.value, truth(found.response.transmission.frequency_hz), rtol=2e-3
+    )
+
+
+def test_a_faultless_recording_passes_its_checks(dwell_file):
+    found = analysed(dwell_file("weak"))
+    assert {each.verdict for each in found.checks} <= {Verdict.PASSED, Verdict.NOTE}
+    assert verdict(found, "Calibration") is Verdict.PASSED
+
+
+def test_a_channels_level_is_its_largest_magnitude_and_its_root_mean_square(dwell_file, dwell_motions):
+    found = analysed(dwell_file("weak"))
+    velocity = dwell_motions["weak"][1]
+    level = found.facts.level("m0_velocity")
+    assert level.peak == pytest.approx(np.max(np.abs(velocity)), rel=1e-6)
+    assert level.rms == pytest.approx(np.sqrt(np.mean(velocity**2)), rel=1e-6)
+    assert level.share_of_range == pytest.approx(level.peak / 1.0)
