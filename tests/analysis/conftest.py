@@ -88,7 +88,7 @@ def noise_motion():
         motion = synthetic.multisine(settle_s + played_s, lines, 1e-8, number)
         motions.append(motion)
         velocities.append(synthetic.response_of(motion)[0])
-        start_s = number * (settle_s + played_s) + settle_s
+        start_s = number * (settle_s + played_s + synthetic.RAMP_S) + settle_s
         parts.append(synthetic.Part("realisation", start_s, start_s + played_s, {"realisation": number}))
     base = synthetic.Motion(
         np.concatenate([each.displacement_m for each in motions]),
@@ -119,7 +119,7 @@ def stepped_file(tmp_path_factory):
     )
     velocity = np.concatenate([synthetic.response_of(each)[0] for each in motions])
     parts = [
-        synthetic.Part("step", 4.0 * n + 2.5, 4.0 * n + 3.5, {"frequency_hz": each, "direction": "up"})
+        synthetic.Part("step", 4.5 * n + 2.5, 4.5 * n + 3.5, {"frequency_hz": each, "direction": "up"})
         for n, each in enumerate(frequencies)
     ]
     plan = SteppedSine(amplitude_vpp=0.05, frequencies_hz=frequencies, settle_s=2.5, record_s=1.0)

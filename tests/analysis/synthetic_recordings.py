@@ -1,4 +1,4 @@
-"""Recordings of a bench without faults: the base moves as told, the specimen as simulated, the file is real."""
+"""Recordings of a faultless bench: the base moves as told, the specimen as simulated, the file is real."""
 
 import json
 from dataclasses import dataclass
@@ -48,11 +48,13 @@ class Part:
 
 
 def ramped(time_s, phase, rate, curvature, amplitude_m):
-    """amplitude * sin(phase), raised by a half cosine; phase' = rate, phase'' = curvature."""
-    x = np.clip(time_s / RAMP_S, 0, 1)
+    """amplitude * sin(phase), raised and lowered by half cosines; phase' = rate, phase'' = curvature."""
+    left_s = time_s[-1] - time_s
+    rising = time_s < left_s
+    x = np.clip(np.where(rising, time_s, left_s) / RAMP_S, 0, 1)
     w = 0.5 * (1 - np.cos(np.pi * x))
     inside = (x > 0) & (x < 1)
-    dw = np.where(inside, 0.5 * np.pi / RAMP_S * np.sin(np.pi * x), 0)
+    dw = np.where(rising, 1, -1) * np.where(inside, 0.5 * np.pi / RAMP_S * np.sin(np.pi * x), 0)
     ddw = np.where(inside, 0.5 * (np.pi / RAMP_S) ** 2 * np.cos(np.pi * x), 0)
     s, c = np.sin(phase), np.cos(phase)
     return Motion(
@@ -61,21 +63,26 @@ def ramped(time_s, phase, rate, curvature, amplitude_m):
     )
 
 
+def times(duration_s):
+    """Times of a motion that lasts so long and is then lowered."""
+    return np.arange(round((duration_s + RAMP_S) * RATE)) / RATE
+
+
 def sine(duration_s, frequency_hz, amplitude_m):
-    time_s = np.arange(round(duration_s * RATE)) / RATE
+    time_s = times(duration_s)
     omega = 2 * np.pi * frequency_hz
     return ramped(time_s, omega * time_s, omega, 0.0, amplitude_m)
 
 
 def chirp(duration_s, start_hz, stop_hz, amplitude_m):
-    time_s = np.arange(round(duration_s * RATE)) / RATE
+    time_s = times(duration_s)
     growth = (stop_hz - start_hz) / duration_s
     phase = 2 * np.pi * (start_hz * time_s + 0.5 * growth * time_s**2)
     return ramped(time_s, phase, 2 * np.pi * (start_hz + growth * time_s), 2 * np.pi * growth, amplitude_m)
 
 
 def multisine(duration_s, lines_hz, amplitude_m, seed):
-    time_s = np.arange(round(duration_s * RATE)) / RATE
+    time_s = times(duration_s)
     phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines_hz))
     parts = [
         ramped(time_s, 2 * np.pi * f * time_s + p, 2 * np.pi * f, 0.0, amplitude_m)

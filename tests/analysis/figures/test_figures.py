@@ -1,0 +1,175 @@
+"""Figures show the data they claim, name it with units, and their captions carry the results' numbers."""
+
+import csv
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+from acquisition.excitation.dwell import Dwell
+from acquisition.excitation.multisine_noise import MultisineNoise
+from acquisition.excitation.sine_sweep import SineSweep
+from acquisition.excitation.stepped_sine import SteppedSine
+from acquisition.excitation.streamed_noise import StreamedNoise
+from acquisition.measurement import Measurement
+from acquisition.recording import open_recording
+from analysis.campaign_results import Simulation, result_of
+from analysis.figures.bench_levels import bench_levels_figure
+from analysis.figures.dwells import dwells_figure, spectrum_columns
+from analysis.figures.excitation import excitation_figure
+from analysis.figures.stepped_sine import stepped_sine_figure
+from analysis.figures.style import SIMULATED, prefixed
+from analysis.figures.sweep import sweep_figure
+from analysis.figures.transmission import transmission_figure
+from analysis.figures.transmission_levels import transmission_levels_figure
+
+PNG_HEAD = b"\x89PNG\r\n\x1a\n"
+
+
+def result(path, simulation=Simulation.LAID_OVER):
+    with open_recording(path) as recording:
+        return result_of(recording, simulation)[0]
+
+
+def line(axes, label):
+    return next(each for each in axes.get_lines() if each.get_label() == label)
+
+
+def numbers(path):
+    with path.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    return {heading: np.array([float(row[heading] or "nan") for row in rows]) for heading in rows[0]}
+
+
+def test_a_transmission_figure_draws_the_measured_magnitude_under_its_simulation(noise_file):
+    found = result(noise_file())
+    drawn = transmission_figure(found.analysis, found.laid)
+    top, strip, difference = drawn.figure.axes
+    measured = line(top, "measured")
+    np.testing.assert_array_equal(measured.get_ydata(), found.analysis.response.transmission.magnitude)
+    np.testing.assert_array_equal(measured.get_xdata(), found.analysis.response.transmission.frequency_hz)
+    simulated = line(top, "simulated under the recorded base")
+    np.testing.assert_array_equal(simulated.get_ydata(), found.laid.response.transmission.magnitude)
+    assert measured.get_color() != simulated.get_color() == SIMULATED
+    assert difference.get_xlabel() == "frequency [Hz]"
+    assert strip.get_ylabel() == "coherence"
+    assert top.get_legend() is None  # it stands outside, where it covers no data
+    assert len(drawn.figure.legends) == 1
+
+
+def test_a_transmission_caption_names_every_resonance_with_its_uncertainty(noise_file):
+    found = result(noise_file())
+    caption = transmission_figure(found.analysis, found.laid).caption
+    for each in found.analysis.response.resonances:
+        assert f"{each.frequency_hz:.2f} ± {2 * each.sd_frequency_hz:.2g} Hz" in caption
+    assert f"{found.laid.difference.median_abs_db:.2g} dB" in caption
+
+
+def test_files_beside_a_figure_hold_its_numbers(noise_file, tmp_path):
+    found = result(noise_file())
+    png, svg, table, sines = transmission_figure(found.analysis, found.laid).save(tmp_path / "figures")
+    assert png.read_bytes().startswith(PNG_HEAD)
+    assert ET.fromstring(svg.read_text(encoding="utf-8")).tag.endswith("svg")
+    columns = numbers(table)
+    transmission = found.analysis.response.transmission
+    np.testing.assert_allclose(columns["magnitude"], transmission.magnitude, rtol=1e-9)
+    np.testing.assert_allclose(columns["magnitude_upper"], transmission.magnitude_upper, rtol=1e-9)
+    assert numbers(sines)["response_i"].size == found.laid.prediction.frequency_hz.size
+
+
+def test_the_same_figure_drawn_twice_is_the_same_file(noise_file):
+    found = result(noise_file(), Simulation.LEFT_OUT)
+    drawn = [transmission_figure(found.analysis).svg() for _ in range(2)]
+    assert drawn[0] == drawn[1]
+
+
+def test_levels_are_drawn_weak_to_strong(noise_file, tmp_path):
+    found = result(noise_file(), Simulation.LEFT_OUT).analysis
+    drawn = transmission_levels_figure([found, found])
+    labels = [each.get_label() for each in drawn.figure.axes[0].get_lines()]
+    assert sum("0.05 Vpp" in each for each in labels) == 2
+    assert "at 2 noise levels" in drawn.caption
+
+
+def test_a_sweep_figure_shades_the_measured_collision_region(sweep_file):
+    found = result(sweep_file)
+    drawn = sweep_figure(found.analysis, found.laid)
+    region = found.analysis.collisions.regions[0]
+    spans = [
+        each.get_extents().bounds for each in (patch.get_path() for patch in drawn.figure.axes[1].patches)
+    ]
+    assert spans is not None
+    shaded = drawn.figure.axes[1].patches[0]
+    assert shaded.get_x() == pytest.approx(region.low_hz)
+    assert shaded.get_x() + shaded.get_width() == pytest.approx(region.high_hz)
+    measured = line(drawn.figure.axes[1], "measured response")
+    np.testing.assert_array_equal(measured.get_ydata(), found.analysis.response.response_i)
+    assert drawn.figure.axes[0].get_xlabel() == "time of the sweep [s]"
+    assert f"{region.start.frequency_hz:.1f} ±" in drawn.caption
+    assert f"{found.laid.run.impacts} impacts" in drawn.caption
+
+
+def test_dwells_stand_in_rows_weak_to_strong_with_their_responses_in_the_caption(dwell_file):
+    strong, weak = result(dwell_file("strong")), result(dwell_file("weak"))
+    drawn = dwells_figure([(each.analysis, each.laid) for each in (strong, weak)])
+    assert len(drawn.figure.axes) == 6
+    assert drawn.figure.axes[0].get_ylabel().startswith("0.01 Vpp")
+    spectrum = drawn.figure.axes[2].get_lines()[-2]
+    np.testing.assert_array_equal(spectrum.get_ydata(), spectrum_columns(weak.analysis.response)[1])
+    for each in (weak, strong):
+        assert f"Response I {each.analysis.response.response_i:.3g}" in drawn.caption
+
+
+def test_the_largest_column_of_a_spectrum_is_response_ii(dwell_file):
+    found = result(dwell_file("weak"), Simulation.LEFT_OUT).analysis.response
+    frequency_hz, size = spectrum_columns(found)
+    # A Hann line between two lines reads up to 15 % low.
+    assert np.max(size) == pytest.approx(found.response_ii, rel=0.16)
+    assert frequency_hz[np.argmax(size)] == pytest.approx(260.0, abs=1.0)
+
+
+def test_a_stepped_sine_figure_has_one_marker_a_step(stepped_file):
+    found = result(stepped_file)
+    drawn = stepped_sine_figure(found.analysis, found.laid)
+    measured = line(drawn.figure.axes[1], "measured, up")
+    np.testing.assert_array_equal(measured.get_ydata(), found.analysis.response.response_ii)
+    assert "2 steps" in drawn.caption
+
+
+def test_levels_of_all_channels_carry_their_units(dwell_file):
+    facts = result(dwell_file("strong"), Simulation.LEFT_OUT).analysis.facts
+    drawn = bench_levels_figure(facts)
+    labels = [each.get_ylabel() for each in drawn.figure.axes]
+    assert [label.split("[")[1] for label in labels] == ["mV]", "m/s²]", "mm/s]"]
+    assert f"{100 * facts.channels[0].share_of_range:.2g} % of its range" in drawn.caption
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [
+        Dwell(amplitude_vpp=2, frequency_hz=260, duration_s=1),
+        SineSweep(amplitude_vpp=2, start_hz=150, stop_hz=350, duration_s=2),
+        MultisineNoise(amplitude_vpp=2, band_start_hz=20, band_stop_hz=800),
+        StreamedNoise(amplitude_vpp=2, band_start_hz=50, band_stop_hz=600, duration_s=2),
+        SteppedSine(amplitude_vpp=2, frequencies_hz=(200, 210), record_s=0.5, settle_s=0.1),
+    ],
+    ids=lambda plan: plan.kind,
+)
+def test_every_excitation_can_be_shown_before_it_plays(plan):
+    drawn = excitation_figure(Measurement(name="plan", excitation=plan))
+    signal, spectrum = drawn.figure.axes
+    assert signal.get_ylabel().startswith("planned voltage [")
+    low, high = spectrum.get_xlim()
+    assert low < plan.highest_frequency_hz < high
+    assert "2 Vpp" in drawn.caption
+    assert drawn.png().startswith(PNG_HEAD)
+
+
+@pytest.mark.parametrize(
+    ("largest", "expected"),
+    [(5e-6, (1e6, "µm")), (0.02, (1e3, "mm")), (3.0, (1.0, "m")), (1e-12, (1e9, "nm"))],
+)
+def test_quantities_get_the_prefix_in_which_they_read_one_to_a_thousand(largest, expected):
+    factor, unit = prefixed(largest, "m")
+    assert factor == pytest.approx(expected[0])
+    assert unit == expected[1]

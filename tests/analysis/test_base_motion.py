@@ -1,0 +1,80 @@
+"""Base displacement from recorded acceleration: what was put in comes out, without drift or delay."""
+
+import numpy as np
+import pytest
+
+from acquisition.excitation.dwell import Dwell
+from acquisition.excitation.multisine_noise import MultisineNoise
+from acquisition.excitation.sine_sweep import SineSweep
+from acquisition.excitation.stepped_sine import FrequencyGrid, SteppedSine
+from acquisition.measurement import Measurement
+from acquisition.recording import open_recording
+from analysis.base_motion import advanced, lowest_frequency_hz, recorded_base_motion
+from analysis.errors import UnusableData
+from analysis.recording_facts import plan_of
+from analysis.simulated_channels import shaken
+from sim.accuracy import Accuracy
+from sim.drive import Sampled
+from sim.integrate import integrate
+from sim.specimen import gong2025
+
+RATE = 6400.0
+
+
+def motion_of(path):
+    with open_recording(path) as recording:
+        return recorded_base_motion(recording, plan_of(recording))
+
+
+def test_the_displacement_is_the_one_that_was_played_within_a_thousandth(dwell_file, dwell_motions):
+    found = motion_of(dwell_file("strong"))
+    true = dwell_motions["strong"][0].displacement_m
+    assert found.low_hz == 65.0
+    inner = slice(round(0.6 * RATE), -round(0.2 * RATE))
+    np.testing.assert_allclose(found.displacement_m[inner], true[inner], atol=1e-3 * 5e-6)
+    assert abs(np.mean(found.displacement_m)) < 1e-4 * 5e-6
+
+
+def test_a_hole_in_the_base_is_refused_with_the_number_of_lost_samples(dwell_file):
+    with pytest.raises(UnusableData, match="30 samples of the base's acceleration were lost"):
+        motion_of(dwell_file("weak", hole=(9000, 9030)))
+
+
+def test_a_signal_is_advanced_by_a_fraction_of_a_sample():
+    time = np.arange(512)
+    shown = np.cos(2 * np.pi * 16 / 512 * (time - 0.3))
+    np.testing.assert_allclose(advanced(shown, 0.3), np.cos(2 * np.pi * 16 / 512 * time), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("plan", "lowest_hz"),
+    [
+        (Dwell(amplitude_vpp=1, frequency_hz=260, duration_s=1), 260),
+        (SineSweep(amplitude_vpp=1, start_hz=350, stop_hz=150, duration_s=1), 150),
+        (MultisineNoise(amplitude_vpp=1, band_start_hz=20, band_stop_hz=800), 20),
+        (SteppedSine(amplitude_vpp=1, frequencies_hz=(90, 95)), 90),
+        (SteppedSine(amplitude_vpp=1, grid=FrequencyGrid(start_hz=80, stop_hz=90, step_hz=5)), 80),
+    ],
+)
+def test_the_lowest_frequency_played_sets_the_band(plan, lowest_hz):
+    assert lowest_frequency_hz(Measurement(name="m", excitation=plan)) == lowest_hz
+
+
+def test_a_run_in_pieces_is_the_run_in_one(dwell_motions):
+    base = np.tile(dwell_motions["weak"][0].displacement_m[round(4 * RATE) :], 8)[: round(7 * RATE)]
+    base = base * np.clip(np.arange(base.size) / RATE, 0, 1)
+    velocity, impacts = shaken(gong2025(), base, RATE, Accuracy.STANDARD)
+    whole = integrate(gong2025(), Sampled(base, RATE), (base.size - 1) / RATE, sample_rate_hz=RATE)
+    assert impacts.size == whole.impacts.count == 0
+    np.testing.assert_allclose(velocity, whole.states[:, 3], atol=1e-9 * np.max(np.abs(velocity)))
+
+
+def test_impacts_keep_their_times_across_pieces(dwell_motions):
+    motion = dwell_motions["strong"][0].displacement_m
+    first = shaken(gong2025(), motion, RATE, Accuracy.STANDARD)[1]
+    # A rest of ten seconds ahead moves the same impacts into a later piece.
+    later = shaken(gong2025(), np.concatenate((np.zeros(round(10 * RATE)), motion)), RATE, Accuracy.STANDARD)[
+        1
+    ]
+    early = slice(20)
+    np.testing.assert_allclose(later[early], first[early] + 10.0, atol=1e-6)

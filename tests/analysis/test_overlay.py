@@ -1,0 +1,88 @@
+"""The simulation over a recording of that same simulation: where the motion is regular they are one."""
+
+import numpy as np
+import pytest
+
+from acquisition.recording import open_recording
+from analysis.difference import logarithmic_difference
+from analysis.measurement_analysis import analyse_recording
+from analysis.overlay import DwellOverlay, NoiseOverlay, SweepOverlay, equivalent_amplitude, overlay
+from analysis.prediction import paper_amplitude_m, predicted
+from sim.modes import base_transmissibility
+from sim.specimen import gong2025
+
+
+def laid_over(path, **how):
+    with open_recording(path) as recording:
+        analysis = analyse_recording(recording)
+        return analysis, overlay(recording, analysis, **how)
+
+
+def test_a_weak_dwell_and_its_simulation_differ_by_less_than_a_hundredth_of_a_decibel(dwell_file):
+    analysis, laid = laid_over(dwell_file("weak"))
+    assert isinstance(laid, DwellOverlay)
+    assert laid.run.impacts == 0
+    assert abs(laid.difference.decibel[0]) < 0.01
+    assert abs(laid.response_i_db) < 0.05
+    # Delays are aligned: the simulated response has none, the recorded one was taken out.
+    assert laid.response.phase_rad == pytest.approx(analysis.response.phase_rad, abs=2e-3)
+    assert laid.prediction.response_ii[0] == pytest.approx(analysis.response.response_ii, rel=1e-3)
+
+
+def test_a_colliding_dwell_counts_impacts_and_agrees_in_its_statistics(dwell_file, dwell_motions):
+    analysis, laid = laid_over(dwell_file("strong"))
+    true = dwell_motions["strong"][2]
+    assert laid.run.impacts == pytest.approx(np.count_nonzero(true > 2.0), rel=0.15)
+    assert laid.run.impact_rate_hz == pytest.approx(laid.run.impacts / 3.0)
+    for measured, simulated in zip(analysis.terminal, laid.terminal, strict=True):
+        assert simulated.decibel == pytest.approx(measured.decibel, abs=4)
+
+
+def test_a_sweep_and_its_simulation_begin_to_collide_within_a_hertz_and_agree_before(sweep_file):
+    analysis, laid = laid_over(sweep_file)
+    assert isinstance(laid, SweepOverlay)
+    measured, simulated = analysis.collisions.regions[0], laid.collisions.regions[0]
+    assert simulated.low_hz == pytest.approx(measured.low_hz, abs=1.0)
+    before = (laid.difference.frequency_hz < measured.low_hz - 3) & (laid.difference.frequency_hz > 230)
+    assert np.max(np.abs(laid.difference.decibel[before])) < 0.02
+
+
+def test_weak_noise_and_its_simulation_agree_on_every_line(noise_file):
+    analysis, laid = laid_over(noise_file())
+    assert isinstance(laid, NoiseOverlay)
+    assert laid.run.impacts == 0
+    assert laid.run.played_s == pytest.approx(1.0)
+    assert laid.difference.rms_db < 0.01
+    linear = np.abs(base_transmissibility(gong2025(), laid.prediction.frequency_hz)[:, 0])
+    np.testing.assert_allclose(laid.prediction.linear, linear)
+    amplitude_m, basis = equivalent_amplitude(analysis)
+    assert amplitude_m == 1e-6
+    assert "0.05" in basis
+
+
+def test_another_specimen_can_be_laid_over(dwell_file):
+    _, laid = laid_over(dwell_file("weak"), specimen=gong2025(damping_time_s=1e-4))
+    exact = np.abs(base_transmissibility(gong2025(damping_time_s=1e-4), 260.0)[0, 0])
+    assert laid.response.response_ii == pytest.approx(exact, rel=2e-3)
+    assert laid.difference.decibel[0] > 1
+
+
+def test_a_prediction_below_the_gap_is_the_linear_one():
+    found = predicted(gong2025(), np.array([120.0, 200.0, 330.0]), 1e-7)
+    assert not found.is_colliding.any()
+    np.testing.assert_allclose(found.response_ii, found.linear, rtol=1e-6)
+    np.testing.assert_allclose(found.response_i, found.linear, rtol=1e-6)
+
+
+def test_the_paper_names_three_amplitudes_and_no_other():
+    assert [paper_amplitude_m(each) for each in (0.05, 1.5, 10.0)] == [1e-6, 5e-6, 50e-6]
+    assert paper_amplitude_m(2.0) is None
+
+
+def test_a_difference_is_in_decibels_and_in_standard_errors_of_both():
+    ones = np.ones(2)
+    found = logarithmic_difference(ones, (ones * 10, ones * 0.3), (ones, ones * 0.4))
+    assert found.decibel == pytest.approx([20.0, 20.0])
+    assert found.standard_errors == pytest.approx(np.log(10) / 0.5 * ones)
+    assert found.share_within_two == 0.0
+    assert found.rms_db == found.median_abs_db == pytest.approx(20.0)

@@ -1,0 +1,24 @@
+"""The level of a band is the level of what was put into it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition.recording import open_recording
+from analysis.measurement_analysis import analyse_recording
+from analysis.terminal_level import terminal_levels
+
+
+def test_a_line_in_the_band_reads_its_own_level_re_the_drives_line(dwell_file):
+    with open_recording(dwell_file("weak")) as recording:
+        response = analyse_recording(recording).response
+    motion = response.displacement
+    line_m = abs(response.order_displacement[response.orders.index(1.0)])
+    time_s = np.arange(motion.samples.size) / motion.sample_rate_hz
+    added = motion.samples + 0.1 * line_m * np.sin(2 * np.pi * 200.0 * time_s)
+    with_line = replace(response, displacement=replace(motion, samples=added))
+    found = terminal_levels(with_line, (201.5, 260.0))
+    assert [each.towards_hz for each in found] == [201.5]
+    assert found[0].decibel == pytest.approx(-20.0, abs=0.2)
+    assert found[0].peak_hz == pytest.approx(200.0, abs=2.0)
