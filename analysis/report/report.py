@@ -15,6 +15,7 @@ from ..figures.drawn import DrawnFigure
 from ..measurement_checks import Verdict
 from ..recording_facts import RecordingFacts
 from .figure_choice import recording_figures, result_figures
+from .findings import findings
 from .limits import limits
 from .recording_section import (
     CHANNEL_HEADINGS,
@@ -99,6 +100,7 @@ def write_report(results: CampaignResults, path: Path, figures_folder: Path | No
         sections=sections,
         benches=_benches(results),
         channel_headings=CHANNEL_HEADINGS,
+        findings=tuple(findings(results)),
         limits=tuple(limits(results)),
         failures=results.failures,
     )

@@ -52,16 +52,21 @@ def dwell_plan(amplitude_m, duration_s=DWELL_S):
 DWELL_PART = synthetic.Part("dwell", SETTLE_S, SETTLE_S + DWELL_S, {"frequency_hz": 260.0})
 
 
-@pytest.fixture
-def dwell_file(dwell_motions, tmp_path):
-    """Write a dwell, whole or not."""
+@pytest.fixture(scope="session")
+def dwell_file(dwell_motions, tmp_path_factory):
+    """Write a dwell, whole or not, in a folder of its own."""
 
     def write(level="weak", **how):
         motion, velocity, _ = dwell_motions[level]
         plan = dwell_plan({"weak": A0_WEAK, "strong": A0_STRONG}[level])
         delay_s = DELAY_SAMPLES / synthetic.RATE
         return synthetic.write_recording(
-            tmp_path, plan, motion, velocity, [DWELL_PART], **{"name": level, "delay_s": delay_s, **how}
+            tmp_path_factory.mktemp("dwell"),
+            plan,
+            motion,
+            velocity,
+            [DWELL_PART],
+            **{"name": level, "delay_s": delay_s, **how},
         )
 
     return write
@@ -97,13 +102,14 @@ def noise_motion():
     return base, np.concatenate(velocities), parts
 
 
-@pytest.fixture
-def noise_file(noise_motion, tmp_path):
-    """Write noise, whole or not."""
+@pytest.fixture(scope="session")
+def noise_file(noise_motion, tmp_path_factory):
+    """Write noise, whole or not, in a folder of its own."""
 
     def write(**how):
         plan = MultisineNoise(amplitude_vpp=0.05, realisations=2, settle_s=3.0, **NOISE)
-        return synthetic.write_recording(tmp_path, plan, *noise_motion, **{"name": "noise", **how})
+        folder = tmp_path_factory.mktemp("noise")
+        return synthetic.write_recording(folder, plan, *noise_motion, **{"name": "noise", **how})
 
     return write
 

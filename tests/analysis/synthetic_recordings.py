@@ -1,7 +1,7 @@
 """Recordings of a faultless bench: the base moves as told, the specimen as simulated, the file is real."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -98,7 +98,7 @@ def response_of(motion, delay_samples=0):
     return np.roll(path.states[:, 3], delay_samples), path.impacts.times_s
 
 
-def header(measurement, samples, delay_s=0.0):
+def header(measurement, samples, delay_s, started_utc):
     def channel(role, quantity, unit, per_volt, **more):
         return ChannelHeader(
             role=role,
@@ -127,7 +127,7 @@ def header(measurement, samples, delay_s=0.0):
         bench_json=json.dumps(BENCH),
         instruments={"generator": Identity("MAKER", "GEN", "G-7", "1.0", "MAKER,GEN,G-7,1.0")},
         confirmations={"operator": "somebody", "amplifier gain": "10 dB"},
-        provenance=PROVENANCE,
+        provenance=replace(PROVENANCE, started_utc=started_utc),
     )
 
 
@@ -144,6 +144,7 @@ def write_recording(
     hole=None,
     samples=None,
     delay_s=0.0,
+    started_utc=PROVENANCE.started_utc,
 ):
     """Write a recording; ``hole`` is a range of samples that were lost, ``samples`` cuts the end off."""
     planned = velocity.size
@@ -158,7 +159,7 @@ def write_recording(
         edges |= set(hole)
     starts = {round(each.start_s * RATE): each for each in parts}
     stops = {round(each.stop_s * RATE) for each in parts}
-    writer = create_recording(folder / f"{name}.h5", header(measurement, planned, delay_s))
+    writer = create_recording(folder / f"{name}.h5", header(measurement, planned, delay_s, started_utc))
     ordered = sorted(edges)
     for begin, end in zip(ordered, [*ordered[1:], kept], strict=True):
         if begin in stops:

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from html.parser import HTMLParser
 
 import pytest
@@ -43,17 +44,22 @@ class Page(HTMLParser):
         return re.sub(r"\s+", " ", "".join(self.texts))
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def campaign(dwell_file, noise_file, sweep_file):
     broken = dwell_file("weak", name="stopped", state=RecordingState.FAILED, reason="cable out", samples=6400)
     paths = [noise_file(), sweep_file, dwell_file("weak"), dwell_file("strong"), broken]
     return analyse_files(paths, "a <b>campaign</b> & more")
 
 
-@pytest.fixture
-def page(campaign, tmp_path):
-    path = write_report(campaign, tmp_path / "out" / "report.html", tmp_path / "out" / "figures")
-    return Page(path.read_text(encoding="utf-8"))
+@pytest.fixture(scope="module")
+def written(campaign, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("out")
+    return write_report(campaign, folder / "report.html", folder / "figures")
+
+
+@pytest.fixture(scope="module")
+def page(written):
+    return Page(written.read_text(encoding="utf-8"))
 
 
 def test_a_report_needs_no_other_file_and_no_network(page):
@@ -66,6 +72,8 @@ def test_a_report_needs_no_other_file_and_no_network(page):
 def test_a_report_holds_the_results_numbers(page, campaign):
     for found in campaign.noise[0].analysis.response.resonances:
         assert f"{found.frequency_hz:.2f} ± {2 * found.sd_frequency_hz:.2g}" in page.text
+    middle = campaign.noise[0].analysis.response.resonances[0].frequency_hz
+    assert f"resonances at {middle:.1f}" in page.text
     region = campaign.sweeps[0].analysis.collisions.regions[0]
     assert f"{region.start.frequency_hz:.1f} ({region.start.lower_hz:.1f} to" in page.text
     for dwell in campaign.dwells:
@@ -88,8 +96,8 @@ def test_text_from_a_plan_is_shown_as_text(page):
     assert "a <b>campaign</b> & more" in page.text
 
 
-def test_figures_are_saved_beside_the_report_with_their_numbers(page, tmp_path):
-    names = {each.suffix for each in (tmp_path / "out" / "figures").iterdir()}
+def test_figures_are_saved_beside_the_report_with_their_numbers(written):
+    names = {each.suffix for each in (written.parent / "figures").iterdir()}
     assert names == {".png", ".svg", ".csv"}
 
 
@@ -109,10 +117,10 @@ def test_a_report_of_nothing_is_refused(tmp_path):
 
 
 def test_recordings_in_a_folder_come_in_the_order_they_were_begun(dwell_file, noise_file, tmp_path):
-    dwell_file("weak", name="b")
-    noise_file(name="a")
+    shutil.copy(dwell_file("weak", name="b", started_utc="2026-02-28T12:00:00+00:00"), tmp_path)
+    shutil.copy(noise_file(name="a"), tmp_path)
     (tmp_path / "broken.h5").write_bytes(b"nothing")
-    assert [each.name for each in recordings_in(tmp_path)] == ["a.h5", "b.h5", "broken.h5"]
+    assert [each.name for each in recordings_in(tmp_path)] == ["b.h5", "a.h5", "broken.h5"]
     failed = analyse_files(recordings_in(tmp_path)[2:], "x").failures
     assert failed[0].name == "broken.h5"
 
