@@ -82,6 +82,10 @@ def ignore_campaign_progress(progress: CampaignProgress) -> None:
     """Watch nothing."""
 
 
+def ignore_item(item: CampaignItem) -> None:
+    """Do nothing about a recording."""
+
+
 def run_campaign(
     bench: RunBench,
     campaign: Campaign,
@@ -89,11 +93,13 @@ def run_campaign(
     existing: Existing = Existing.REFUSE,
     after_failure: AfterFailure = AfterFailure.STOP,
     on_progress: Callable[[CampaignProgress], None] = ignore_campaign_progress,
+    on_item: Callable[[CampaignItem], None] = ignore_item,
 ) -> tuple[CampaignItem, ...]:
     """Make every recording of ``campaign`` in ``folder``, in order, on an open bench.
 
     All measurements are held against the limits of the rig before the first one begins. Ctrl-C
-    ends the running measurement softly, and the campaign with it.
+    ends the running measurement softly, and the campaign with it. ``on_progress`` is called after every
+    block, ``on_item`` after every recording.
 
     Returns
     -------
@@ -121,6 +127,7 @@ def run_campaign(
 
         item = _carried_out(bench, planned, after_failure, tell)
         items.append(item)
+        on_item(item)
         if item.result is Item.STOPPED:
             break
     return tuple(items)

@@ -158,6 +158,15 @@ def analyse_files(
     return CampaignResults(name, tuple(results), tuple(failures))
 
 
+def assembled(name: str, parts: Sequence[CampaignResults]) -> CampaignResults:
+    """Put results that were made one by one together as one campaign's."""
+    return CampaignResults(
+        name,
+        tuple(result for part in parts for result in part.results),
+        tuple(failure for part in parts for failure in part.failures),
+    )
+
+
 def result_of(
     recording: Recording,
     simulation: Simulation = Simulation.LAID_OVER,

@@ -22,9 +22,9 @@ PAPER_RESONANCES_HZ = (95.0, 266.0, 500.0)
 """Without contact; same place."""
 PAPER_TERMINAL_RESONANCES_HZ = (201.0, 435.0)
 """With m1 stuck to m2; same place."""
-PREDICTION_S = 12.0
+PREDICTION_S = 8.0
 WINDOW_S = 5.0
-"""The last 5 s are observed, as in the paper; 7 s before them leave 1e-11 of the slowest transient, so that
+"""The last 5 s are observed, as in the paper; 3 s before them leave 3e-5 of the slowest transient, so that
 the paper's 30 s would say nothing else. In chaos each value is one draw, whatever the duration."""
 
 Progress = Callable[[int, int], None]

@@ -6,8 +6,11 @@ import typer
 from rich.console import Console
 
 from acquisition.errors import AcquisitionError
+from analysis.errors import AnalysisError
 
+from .analyse import analyse
 from .bench import bench
+from .demo import demo
 from .measure import measure
 from .recover import recover_recording
 from .serve_rig import serve_rig
@@ -19,7 +22,9 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+app.command()(demo)
 app.command()(measure)
+app.command()(analyse)
 app.command(name="recover")(recover_recording)
 app.command(name="serve-rig")(serve_rig)
 app.add_typer(bench, name="bench")
@@ -29,7 +34,7 @@ def main() -> None:
     """Run the command line. An error that a user can mend is one sentence and a non-zero exit."""
     try:
         app()
-    except AcquisitionError as error:
+    except (AcquisitionError, AnalysisError) as error:
         complain(error)
         sys.exit(1)
 

@@ -17,3 +17,12 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document an
 def bench_path(given: Path | None) -> Path:
     """Path of the hardware configuration: what was given, or the virtual rig."""
     return shipped("hardware_configs/virtual_rig.toml") if given is None else given
+
+
+def unused(path: Path) -> Path:
+    """Give a path that is not taken: the wish itself, or with -2, -3, ... before its suffix."""
+    candidate, number = path, 1
+    while candidate.exists():
+        number += 1
+        candidate = path.with_name(f"{path.stem}-{number}{path.suffix}")
+    return candidate

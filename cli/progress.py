@@ -1,9 +1,17 @@
 """Progress bars of a campaign: one for the measurement that runs, one for the whole."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 from acquisition.campaign import Campaign
 from acquisition.run_campaign import CampaignProgress, Item
@@ -60,3 +68,12 @@ def campaign_bars(campaign: Campaign) -> Iterator[CampaignBars]:
     with Progress(*columns, console=console, speed_estimate_period=10) as bars:
         whole = bars.add_task(f"campaign {campaign.name}", total=campaign.duration_s, state="of rig time")
         yield CampaignBars(bars, whole)
+
+
+@contextmanager
+def analysis_bar(recordings: int) -> Iterator[Callable[[], None]]:
+    """Show how many of the recordings are analysed; call what it gives after each."""
+    columns = (TextColumn("{task.description:<24}"), BarColumn(bar_width=30), MofNCompleteColumn())
+    with Progress(*columns, TimeElapsedColumn(), console=console) as bars:
+        bar = bars.add_task("analysis and simulation", total=recordings)
+        yield lambda: bars.advance(bar)

@@ -22,30 +22,13 @@ excitation = { kind = "dwell", amplitude_vpp = 1.5, frequency_hz = 260, settle_s
 """
 
 
-def command(*arguments):
-    return [sys.executable, "-m", "cli", *map(str, arguments)]
-
-
-def vibench(*arguments, cwd):
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
-    return subprocess.run(
-        command(*arguments),
-        cwd=cwd,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=100,
-    )
-
-
 def campaign(folder, text=QUICK):
     path = folder / "campaign.toml"
     path.write_text(text, encoding="utf-8")
     return path
 
 
-def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(tmp_path):
+def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(vibench, tmp_path):
     plan = campaign(tmp_path)
     first = vibench("measure", plan, "--out", "recordings", cwd=tmp_path)
     assert first.returncode == 0, first.stderr
@@ -71,7 +54,7 @@ def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(tmp
         ("[[measurements]]", "[[measurements]", "not valid TOML"),
     ],
 )
-def test_a_wrong_campaign_is_one_sentence_and_plays_nothing(tmp_path, old, new, said):
+def test_a_wrong_campaign_is_one_sentence_and_plays_nothing(vibench, tmp_path, old, new, said):
     result = vibench(
         "measure", campaign(tmp_path, QUICK.replace(old, new)), "--out", "recordings", cwd=tmp_path
     )
@@ -82,7 +65,7 @@ def test_a_wrong_campaign_is_one_sentence_and_plays_nothing(tmp_path, old, new, 
     assert not list(tmp_path.glob("recordings/*"))
 
 
-def test_a_bench_without_its_instruments_is_one_sentence(tmp_path):
+def test_a_bench_without_its_instruments_is_one_sentence(vibench, tmp_path):
     text = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text(encoding="utf-8")
     bench = tmp_path / "bench.toml"
     real = text.split("\n[virtual]\n")[0]
@@ -93,17 +76,17 @@ def test_a_bench_without_its_instruments_is_one_sentence(tmp_path):
     assert "NI-DAQmx" in result.stderr
 
 
-def test_a_bench_check_says_what_it_found_as_one_json_document(tmp_path):
+def test_a_bench_check_says_what_it_found_as_one_json_document(vibench, tmp_path):
     result = vibench("bench", "check", "--json", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     report = json.loads(result.stdout)
     assert {finding["verdict"] for finding in report["findings"]} == {"ok"}
 
 
-def test_a_recording_that_was_cut_off_is_recovered(tmp_path):
+def test_a_recording_that_was_cut_off_is_recovered(vibench, tmp_path):
     plan = campaign(tmp_path, QUICK.replace("duration_s = 1.5", "duration_s = 3000"))
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    arguments = command("measure", plan, "--out", "recordings")
+    arguments = [sys.executable, "-m", "cli", "measure", str(plan), "--out", "recordings"]
     part = tmp_path / "recordings" / "dwell.h5.part"
     with subprocess.Popen(arguments, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL) as running:
         while running.poll() is None:

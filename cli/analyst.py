@@ -1,0 +1,52 @@
+"""A second process that analyses each recording while the next one is measured."""
+
+import signal
+from collections.abc import Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+
+from analysis.campaign_results import CampaignResults, analyse_files, assembled
+
+
+class Analyst:
+    """Takes recordings as they are finished, and gives their results in the same order."""
+
+    def __init__(self, pool: ProcessPoolExecutor, name: str) -> None:
+        self._pool = pool
+        self._name = name
+        self._parts: list[Future[CampaignResults]] = []
+
+    def take(self, recording: Path) -> None:
+        """Analyse this one next."""
+        self._parts.append(self._pool.submit(analyse_files, [recording], self._name))
+
+    @property
+    def asked(self) -> int:
+        """Recordings taken so far."""
+        return len(self._parts)
+
+    def results(self) -> Iterator[CampaignResults]:
+        """Give the results one by one; waits for those that are not ready."""
+        for part in self._parts:
+            yield part.result()
+
+    def together(self) -> CampaignResults:
+        """Give the results as one campaign's."""
+        return assembled(self._name, tuple(self.results()))
+
+
+@contextmanager
+def second_process(name: str) -> Iterator[Analyst]:
+    """Keep an analyst at work while inside; what it has not begun when an error leaves is dropped."""
+    # A fresh interpreter: a fork would copy the threads' locks of the instrument libraries.
+    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_leave_ctrl_c_to_the_parent)
+    try:
+        yield Analyst(pool, name)
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _leave_ctrl_c_to_the_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,0 +1,54 @@
+"""`vibench demo`: the paper's experiment on the virtual rig, from the first volt to the report."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from acquisition.bench import open_bench
+from acquisition.campaign import load_campaign
+from acquisition.run_campaign import CampaignItem, Item, run_campaign
+from analysis.report.report import write_report
+from analysis.summary import campaign_summary
+
+from .analyst import second_process
+from .measure import STOPPED_EXIT_CODE, tell
+from .output import console, write_json
+from .paths import unused
+from .progress import analysis_bar, campaign_bars
+from .shipped import shipped
+
+
+def demo(
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="New folder for everything; vibench_demo if absent."),
+    ] = None,
+) -> None:
+    """Run the paper's experiment on the virtual rig: measure, analyse, simulate, and write a report."""
+    folder = unused(Path("vibench_demo")) if out is None else out
+    campaign = load_campaign(shipped("campaigns/paper.toml"))
+    console.print(
+        "The experiment of Gong et al. (2025), section 5, on a virtual rig. The first time, the simulation\n"
+        "is compiled: it starts slowly and then runs many times faster than real time.\n"
+    )
+    with second_process(campaign.name) as analyst:
+
+        def recorded(item: CampaignItem) -> None:
+            if item.result is Item.RECORDED:
+                analyst.take(item.path)
+
+        rig = shipped("hardware_configs/virtual_rig.toml")
+        with open_bench(rig) as bench, campaign_bars(campaign) as bars:
+            items = run_campaign(bench, campaign, folder / "recordings", on_progress=bars, on_item=recorded)
+            bars.finish(items[-1].result)
+        tell(items)
+        if any(item.result is not Item.RECORDED for item in items):
+            raise typer.Exit(STOPPED_EXIT_CODE)
+        with analysis_bar(analyst.asked) as step:
+            for _ in analyst.results():
+                step()
+        results = analyst.together()
+    report = write_report(results, folder / "report.html", folder / "figures")
+    write_json(campaign_summary(results), folder / "results.json")
+    console.print(f"\nThe report: [bold]{report.resolve()}[/]")

@@ -1,0 +1,103 @@
+"""The main job as a newcomer runs it, held against what the paper reports (Gong et al. 2025, section 5)."""
+
+import json
+
+import numpy as np
+import pytest
+
+from acquisition.recording import RecordingState, open_recording
+from analysis.measurement_analysis import analyse_recording
+from sim.modes import base_transmissibility
+from sim.specimen import gong2025
+
+LINEAR_HZ = (95.0, 266.0, 500.0)
+TERMINAL_HZ = (201.0, 436.0)
+NAMES = (
+    "noise_weak",
+    "noise_moderate",
+    "noise_strong",
+    "sweep_moderate",
+    "dwell_weak",
+    "dwell_moderate",
+    "dwell_strong",
+)
+
+pytestmark = pytest.mark.timeout(400)
+
+
+@pytest.fixture(scope="module")
+def demo(vibench, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("demo")
+    result = vibench("demo", "--out", "demo", cwd=folder, timeout_s=390)
+    assert result.returncode == 0, result.stderr
+    assert str(folder / "demo" / "report.html") in result.stdout.replace("\n", "")
+    return folder / "demo"
+
+
+@pytest.fixture(scope="module")
+def results(demo):
+    document = json.loads((demo / "results.json").read_text(encoding="utf-8"))
+    assert document["failures"] == []
+    return {result["recording"]["name"]: result for result in document["results"]}
+
+
+def resonances_hz(result):
+    return [found["frequency_hz"] for found in result["measured"]["resonances"]]
+
+
+def test_every_measurement_is_a_complete_recording_without_overload(demo, results):
+    assert set(results) == set(NAMES)
+    for name in NAMES:
+        with open_recording(demo / "recordings" / f"{name}.h5") as recording:
+            assert recording.state is RecordingState.COMPLETE
+            assert not recording.overloads
+            assert not recording.gaps
+
+
+def test_weak_noise_shows_the_three_linear_resonances_within_one_percent(results):
+    assert resonances_hz(results["noise_weak"]) == pytest.approx(LINEAR_HZ, rel=0.01)
+
+
+def test_strong_noise_shows_the_two_terminal_resonances_within_two_percent_and_no_other(results):
+    assert resonances_hz(results["noise_strong"]) == pytest.approx(TERMINAL_HZ, rel=0.02)
+
+
+def test_the_linear_transmission_is_the_exact_one_within_tight_bounds_of_its_own(demo):
+    with open_recording(demo / "recordings" / "noise_weak.h5") as recording:
+        measured = analyse_recording(recording).response.transmission
+    exact = np.abs(base_transmissibility(gong2025(), measured.frequency_hz)[:, 0])
+    inside = (measured.magnitude_lower <= exact) & (exact <= measured.magnitude_upper)
+    # 95 % of the lines, within twice the standard error of a share of 551 independent lines.
+    assert np.mean(inside) == pytest.approx(0.95, abs=2 * np.sqrt(0.95 * 0.05 / inside.size))
+    assert np.median(measured.half_width) < 0.002
+    assert np.max(measured.half_width) < 0.03
+
+
+def test_the_collision_region_is_where_the_simulation_of_the_recorded_base_motion_has_it(results):
+    sweep = results["sweep_moderate"]
+    (measured,) = sweep["measured"]["collision_regions"]
+    (simulated,) = sweep["simulated"]["collision_regions"]
+    for edge in ("start", "stop"):
+        assert measured[edge]["frequency_hz"] == pytest.approx(simulated[edge]["frequency_hz"], abs=3.0)
+    assert measured["start"]["frequency_hz"] < 266 < measured["stop"]["frequency_hz"]
+
+
+def test_dwells_grow_lines_towards_the_terminal_resonances_with_level(results):
+    weak, moderate, strong = (
+        results[f"dwell_{level}"]["measured"]["terminal_bands"] for level in ("weak", "moderate", "strong")
+    )
+    for quiet, lively in zip(weak, moderate, strict=True):
+        assert lively["rms_m"] > 1000 * quiet["rms_m"]
+        assert lively["decibel_re_drive_line"] > quiet["decibel_re_drive_line"] + 40
+    for band, hz in zip(strong, TERMINAL_HZ, strict=True):
+        assert band["peak_hz"] == pytest.approx(hz, rel=0.04)
+    upper_moderate, upper_strong = moderate[1]["peak_hz"], strong[1]["peak_hz"]
+    assert abs(upper_strong - TERMINAL_HZ[1]) < abs(upper_moderate - TERMINAL_HZ[1])
+
+
+def test_the_report_is_one_file_with_every_figure_inside(demo):
+    page = (demo / "report.html").read_text(encoding="utf-8")
+    assert page.count("<figure") >= 6
+    assert 'src="http' not in page
+    assert "simulated instruments" in page
+    assert len(list((demo / "figures").glob("*.png"))) >= 6
