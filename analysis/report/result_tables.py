@@ -12,6 +12,8 @@ from ..resonance import Resonance
 _NEAR = 0.08
 """Two resonances are set beside each other when they lie within 8 %: the modes lie at least 9 % apart."""
 ABSENT = "–"
+_SMALLEST_BIAS = 1e-3
+"""Below this a bias says only that noise plays no part."""
 _PAPER_COLLISION = "about 240 to 290 Hz"
 """Gong et al. 2025, section 5: the grey area of the sweep."""
 
@@ -153,11 +155,14 @@ def dwell_table(dwells: Sequence[DwellResult]) -> ReportTable:
 def _dwell_row(result: DwellResult) -> tuple[str, ...]:
     found, laid = result.analysis.response, result.laid
     plan = result.analysis.excitation
+    amplitude_m = found.drive.amplitude_m
+    is_small = abs(found.noise_bias_i) < _SMALLEST_BIAS
+    bias = f"below {_SMALLEST_BIAS:g}" if is_small else f"{found.noise_bias_i:.1g}"
     return (
         f"{plan.amplitude_vpp:g} Vpp, {plan.frequency_hz:g} Hz",
-        f"{1e6 * found.drive.amplitude_m:.4g} ± {2e6 * found.drive.sd_amplitude_m:.1g}",
+        f"{1e6 * amplitude_m:.4g} ± {200 * found.drive.sd_amplitude_m / amplitude_m:.1g} %",
         f"{found.response_i:.4g}",
-        f"{found.noise_bias_i:.1g}",
+        bias,
         f"{found.response_ii:.4g} ± {2 * found.sd_response_ii:.1g}",
         ABSENT if laid is None else f"{laid.response.response_i:.4g}",
         ABSENT

@@ -70,8 +70,9 @@ def test_another_specimen_can_be_laid_over(dwell_file):
 def test_a_prediction_below_the_gap_is_the_linear_one():
     found = predicted(gong2025(), np.array([120.0, 200.0, 330.0]), 1e-7)
     assert not found.is_colliding.any()
-    np.testing.assert_allclose(found.response_ii, found.linear, rtol=1e-6)
-    np.testing.assert_allclose(found.response_i, found.linear, rtol=1e-6)
+    # What is left of the transient from rest.
+    np.testing.assert_allclose(found.response_ii, found.linear, rtol=1e-4)
+    np.testing.assert_allclose(found.response_i, found.linear, rtol=1e-4)
 
 
 def test_the_paper_names_three_amplitudes_and_no_other():
