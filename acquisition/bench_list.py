@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from .drivers.daqmx_discovery import FoundDevice, list_daqmx_devices
 from .drivers.visa_link import list_visa_resources
 from .errors import InstrumentError
+from .rig import Rig
 
 
 @dataclass(frozen=True)
@@ -41,3 +42,14 @@ def list_instruments(visa_library: str = "@py", server: str | None = None) -> In
     except InstrumentError as error:
         remarks.append(str(error))
     return InstrumentList(resources, devices, tuple(remarks))
+
+
+def list_rig_instruments(rig: Rig) -> InstrumentList:
+    """Search where a rig's instruments are; those of a virtual rig are switched on for it."""
+    if rig.virtual is None:
+        return list_instruments(rig.generator.visa_library, rig.daq.server)
+    # Only when a rig asks for it: a real bench must not load the simulation.
+    from .virtual.rig import VirtualRig  # noqa: PLC0415
+
+    with VirtualRig(rig) as virtual:
+        return list_instruments(rig.generator.visa_library, virtual.daq_address)

@@ -7,9 +7,10 @@ import typer
 from rich.markup import escape
 
 from acquisition.bench import open_bench
-from acquisition.bench_list import list_instruments
+from acquisition.bench_list import list_instruments, list_rig_instruments
 from acquisition.bench_report import check_bench
 from acquisition.finding import Verdict
+from acquisition.rig import load_rig
 
 from .output import console, print_json
 from .paths import AsJson, BenchPath, bench_path
@@ -19,16 +20,16 @@ bench = typer.Typer(help="Look at the instruments.", no_args_is_help=True)
 
 @bench.command("list")
 def list_bench(
-    server: Annotated[
-        str | None, typer.Option("--server", metavar="HOST:PORT", help="A DAQmx device server to ask.")
+    bench: Annotated[
+        Path | None,
+        typer.Option(
+            "--bench", metavar="BENCH.toml", help="Search where this rig's are; this computer if absent."
+        ),
     ] = None,
-    visa: Annotated[
-        str, typer.Option("--visa", help="VISA library: @py, or empty for the system's.")
-    ] = "@py",
     as_json: AsJson = False,
 ) -> None:
-    """List every instrument that can be seen from this computer."""
-    found = list_instruments(visa, server)
+    """List every instrument that can be seen, by name."""
+    found = list_instruments() if bench is None else list_rig_instruments(load_rig(bench))
     devices = [f"{device.name}: {device.product}, serial {device.serial}" for device in found.daq_devices]
     if as_json:
         print_json({"visa": list(found.visa_resources), "daq": devices, "remarks": list(found.remarks)})

@@ -83,6 +83,15 @@ def test_a_bench_check_says_what_it_found_as_one_json_document(vibench, tmp_path
     assert {finding["verdict"] for finding in report["findings"]} == {"ok"}
 
 
+def test_the_instruments_of_the_virtual_rig_are_listed_by_name(vibench, tmp_path):
+    rig = ROOT / "hardware_configs" / "virtual_rig.toml"
+    result = vibench("bench", "list", "--bench", rig, "--json", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    found = json.loads(result.stdout)
+    assert any("1689::851" in name for name in found["visa"])
+    assert any(device.startswith("cDAQ1Mod1: NI 9234") for device in found["daq"])
+
+
 def test_a_recording_that_was_cut_off_is_recovered(vibench, tmp_path):
     plan = campaign(tmp_path, QUICK.replace("duration_s = 1.5", "duration_s = 3000"))
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
