@@ -33,7 +33,7 @@ class Hold(StrEnum):
     VELOCITY = "velocity"
     """The setting grows in proportion to frequency."""
     DISPLACEMENT = "displacement"
-    """The setting grows with the square of frequency: a constant base displacement, as in the paper's model."""
+    """The setting grows with the square of frequency: the base displacement of the paper's model."""
 
     @property
     def power(self) -> int:
@@ -84,8 +84,9 @@ class SineSweep(AbstractExcitation):
         quietest_vpp = self.amplitude_vpp * self.level(lowest_hz)
         if quietest_vpp < LOWEST_AMPLITUDE_VPP:
             raise ValueError(
-                f"holding the {self.hold} needs a setting of {quietest_vpp:.3g} Vpp at {lowest_hz:g} Hz, and the "
-                f"generator's smallest is {LOWEST_AMPLITUDE_VPP:g} Vpp; raise amplitude_vpp or narrow the band"
+                f"holding the {self.hold} needs a setting of {quietest_vpp:.3g} Vpp at {lowest_hz:g} Hz, "
+                f"and the generator's smallest is {LOWEST_AMPLITUDE_VPP:g} Vpp; raise amplitude_vpp, or "
+                "narrow the band"
             )
         return self
 
