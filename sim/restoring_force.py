@@ -10,6 +10,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from .contact_law import Hertz, NoContact
+from .specimen import Specimen
+
 Floats = NDArray[np.float64]
 
 
@@ -178,3 +181,15 @@ class NoForce:
     def damping(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - zero everywhere
         """Zero."""
         return np.zeros_like(p)
+
+
+HERTZ_EXPONENT = 1.5
+
+
+def spring_of(specimen: Specimen) -> RestoringForce:
+    """Turn a specimen's stops into the function that harmonic balance needs."""
+    match specimen.contact:
+        case Hertz(stiffness=stiffness):
+            return GapSpring(stiffness, HERTZ_EXPONENT, specimen.gap_m, specimen.gap_m)
+        case NoContact():
+            return NoForce()
