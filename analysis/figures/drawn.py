@@ -1,6 +1,7 @@
 """A figure with what belongs to it: a name, a caption that says what is seen, and the plotted numbers."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 
@@ -24,12 +25,14 @@ class DrawnFigure:
     figure: Figure
     tables: tuple[Table, ...]
 
+    @cached_property
     def png(self) -> bytes:
-        """Draw as PNG."""
+        """The figure as PNG, drawn once."""
         return self._drawn("png")
 
+    @cached_property
     def svg(self) -> bytes:
-        """Draw as SVG."""
+        """The figure as SVG, drawn once."""
         return self._drawn("svg")
 
     def _drawn(self, kind: str) -> bytes:
@@ -37,12 +40,14 @@ class DrawnFigure:
         metadata = _NO_DATE if kind == "svg" else None
         with styled():
             self.figure.savefig(target, format=kind, dpi=PNG_DPI, metadata=metadata)
+        # The layout is found while drawing and costs as much: the next format takes it over.
+        self.figure.set_layout_engine("none")
         return target.getvalue()
 
     def save(self, folder: Path) -> tuple[Path, ...]:
         """Write PNG, SVG and the plotted numbers as CSV; an older figure of that name is replaced."""
         folder.mkdir(parents=True, exist_ok=True)
         png, svg = folder / f"{self.name}.png", folder / f"{self.name}.svg"
-        png.write_bytes(self.png())
-        svg.write_bytes(self.svg())
+        png.write_bytes(self.png)
+        svg.write_bytes(self.svg)
         return (png, svg, *write_tables(self.tables, folder))

@@ -122,8 +122,8 @@ def _environment() -> Environment:
 def _embedded(number: int, drawn: DrawnFigure, folder: Path | None) -> EmbeddedFigure:
     if folder is not None:
         drawn.save(folder)
-    svg = drawn.svg()
-    kind, content = ("svg+xml", svg) if len(svg) <= _LARGEST_SVG_BYTES else ("png", drawn.png())
+    svg = drawn.svg
+    kind, content = ("svg+xml", svg) if len(svg) <= _LARGEST_SVG_BYTES else ("png", drawn.png)
     source = f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
     return EmbeddedFigure(number, drawn.title, drawn.caption, source)
 

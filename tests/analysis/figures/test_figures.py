@@ -79,7 +79,7 @@ def test_files_beside_a_figure_hold_its_numbers(noise_file, tmp_path):
 
 def test_the_same_figure_drawn_twice_is_the_same_file(noise_file):
     found = result(noise_file(), Simulation.LEFT_OUT)
-    drawn = [transmission_figure(found.analysis).svg() for _ in range(2)]
+    drawn = [transmission_figure(found.analysis).svg for _ in range(2)]
     assert drawn[0] == drawn[1]
 
 
@@ -158,7 +158,7 @@ def test_every_excitation_can_be_shown_before_it_plays(plan):
     low, high = spectrum.get_xlim()
     assert low < plan.highest_frequency_hz < high
     assert "2 Vpp" in drawn.caption
-    assert drawn.png().startswith(PNG_HEAD)
+    assert drawn.png.startswith(PNG_HEAD)
 
 
 @pytest.mark.parametrize(
