@@ -70,6 +70,7 @@ class BalanceFamily:
             amplitude_m=found.amplitude_m,
             response_i=found.response_i,
             response_ii=found.response_ii,
+            state=found.state,
             signs=orbit_signs(self.problem.structure, self.problem.spring, found, self.options.kept),
             left_out=found.left_out,
         )

@@ -36,13 +36,15 @@ class Happening(StrEnum):
     """A contact begins or ends at zero speed."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BranchEvent:
     """A special point."""
 
     kind: Happening
     frequency_hz: float
     amplitude_m: float
+    state: Floats
+    """Displacements and velocities at the drive's time zero, shape (2 n,): to go on from there."""
     index: int
     """It lies after this point of the branch, and before the next."""
 
@@ -61,6 +63,8 @@ class Branch:
     shape (m, n + 1)."""
     response_ii: Floats
     """Amplitude of the component at the drive frequency, likewise."""
+    states: Floats
+    """Displacements and velocities at the drive's time zero, shape (m, 2 n)."""
     multipliers: Complex
     """Floquet multipliers over one period of the motion, largest first, shape (m, 2 n)."""
     left_out: Floats

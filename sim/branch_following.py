@@ -23,6 +23,8 @@ class OrbitReport:
     """Shape (n + 1,)."""
     response_ii: Vector
     """Shape (n + 1,)."""
+    state: Vector
+    """Displacements and velocities at the drive's time zero, shape (2 n,)."""
     signs: OrbitSigns
     left_out: float
 
@@ -63,7 +65,7 @@ class _Gathered:
 
     def add_event(self, kind: Happening, report: OrbitReport) -> None:
         last = len(self.reports) - 1
-        self.events.append(BranchEvent(kind, report.frequency_hz, report.amplitude_m, last))
+        self.events.append(BranchEvent(kind, report.frequency_hz, report.amplitude_m, report.state, last))
 
 
 def follow(
@@ -170,6 +172,7 @@ def _branch(gathered: _Gathered, parameter: Parameter, end: ArcEnd) -> Branch:
         amplitudes_m=np.array([r.amplitude_m for r in reports]),
         response_i=np.array([r.response_i for r in reports]),
         response_ii=np.array([r.response_ii for r in reports]),
+        states=np.array([r.state for r in reports]),
         multipliers=np.array([r.signs.over_period for r in reports]),
         left_out=np.array([r.left_out for r in reports]),
         events=tuple(gathered.events),

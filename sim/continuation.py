@@ -245,29 +245,42 @@ def locate(
 
     None when a point between them cannot be found on the curve.
     """
-    low, high = 0.0, float(before.tangent @ (after.point - before.point))
+    low, high = before, after
     value_low, value_high = measure(before), measure(after)
     found, moved = after, 0
     for _ in range(LOCATING_ITERATIONS):
-        part = low + (high - low) * value_low / (value_low - value_high)
-        point, iterations = correct(curve, before.point + part * before.tangent, before.tangent, tolerance)
-        if iterations == 0:
-            return None
-        arc = before.arc + float(np.linalg.norm(point - before.point))
-        found = ArcPoint(point, tangent_at(curve, point, before.tangent), arc)
+        between = _between(curve, low, high, value_low / (value_low - value_high), tolerance)
+        if between is None:
+            return None if found is after else found
+        found = between
         value = measure(found)
-        if abs(value) < LOCATED or high - low < SHORTEST_BRACKET:
+        if abs(value) < LOCATED or float(np.linalg.norm(high.point - low.point)) < SHORTEST_BRACKET:
             break
         # Illinois: an end that stays twice counts half, so that both ends close in.
         if value * value_low < 0.0:
-            high, value_high = part, value
+            high, value_high = found, value
             value_low *= 0.5 if moved > 0 else 1.0
             moved = 1
         else:
-            low, value_low = part, value
+            low, value_low = found, value
             value_high *= 0.5 if moved < 0 else 1.0
             moved = -1
     return found
+
+
+def _between(curve: Curve, low: ArcPoint, high: ArcPoint, part: float, tolerance: float) -> ArcPoint | None:
+    """Find the point on the curve at a part of the chord between two; elsewhere where a kink hinders."""
+    chord = high.point - low.point
+    length = float(np.linalg.norm(chord))
+    if length == 0.0:
+        return None
+    chord = chord / length
+    for share in (part, 0.5 * (1.0 + part), 0.5 * part, 0.9, 0.1, 0.99, 0.01):
+        point, iterations = correct(curve, low.point + share * length * chord, chord, tolerance)
+        if iterations > 0 and float(np.linalg.norm(point - low.point)) <= 2.0 * length:
+            arc = low.arc + float(np.linalg.norm(point - low.point))
+            return ArcPoint(point, tangent_at(curve, point, chord), arc)
+    return None
 
 
 def _at_bound(

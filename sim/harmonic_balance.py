@@ -135,6 +135,13 @@ class Balance:
     outcome: BalanceEnd
 
     @property
+    def state(self) -> Vector:
+        """Displacements and velocities at the drive's time zero, shape (2 n,)."""
+        turning = 2j * math.pi * self.frequency_hz * self.harmonics[:, None]
+        velocities = turning * self.displacements
+        return np.concatenate([self.displacements.real.sum(axis=0), velocities.real.sum(axis=0)])
+
+    @property
     def response_ii(self) -> Vector:
         """Fundamental of every displacement and of p, over the drive amplitude, shape (n + 1,)."""
         first = int(np.searchsorted(self.harmonics, 1))

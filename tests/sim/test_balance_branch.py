@@ -10,8 +10,8 @@ from sim.branch import Happening, Parameter
 from sim.condensation import Structure, structure_of
 from sim.continuation import ArcEnd, ArcSteps
 from sim.first_order_balance import jump_frequencies
-from sim.harmonic_balance import BalanceEnd
-from sim.restoring_force import NoForce, PowerSpring, spring_of
+from sim.harmonic_balance import BalanceEnd, HarmonicSet
+from sim.restoring_force import GapSpring, NoForce, PowerSpring, spring_of
 from sim.specimen import gong2025
 
 ONE = np.array([[1.0]])
@@ -98,8 +98,8 @@ def periodic_defect(damping, cubic, found, omega, force):
     return float(np.abs(end - start).max())
 
 
-def test_where_symmetry_breaks_an_even_harmonic_can_begin():
-    # Ueda's oscillator x'' + 0.05 x' + x^3 = B sin t at small B; the broken branch is followed apart.
+def test_a_mirrored_duffing_motion_loses_or_gains_stability_where_its_symmetry_breaks():
+    # x-double-dot + 0.2 x-dot + x^3 = B sin t with B from 0 to 6.
     structure, spring = oscillator(0.2, 1e-9), PowerSpring(1.0, ((3, 1.0),))
     options = BalanceOptions(fewest=15, tolerance=1e-8)
     _, branch = raised_balance(structure, spring, 1.0 / (2 * math.pi), 6.0, options, ArcSteps(longest=0.1))
@@ -108,3 +108,29 @@ def test_where_symmetry_breaks_an_even_harmonic_can_begin():
     before = branch.multipliers[broken[0].index, :2]
     after = branch.multipliers[broken[0].index + 1, :2]
     assert (np.abs(before).max() - 1.0) * (np.abs(after).max() - 1.0) < 0.0
+
+
+@pytest.mark.slow
+def test_the_two_mass_unilateral_stop_of_nlvib_doubles_its_period_and_loses_it_on_a_torus():
+    # Krack and Gross, NLvib, example 03: 21 harmonics, from 0.8 to 0.5 rad/s. Its authors report turning
+    # points, period doubling near the peak, a stable motion at 0.635, and a Neimark-Sacker point above 0.60.
+    stiffness = np.array([[1.0, -1.0], [-1.0, 2.0]])
+    structure = Structure(
+        np.eye(2), 0.03 * stiffness, stiffness, np.array([1.0, 0.0]), np.array([0.0, 1.0]), np.zeros(2)
+    )
+    spring = GapSpring(100.0, 1.0, 1.0, math.inf)
+    options = BalanceOptions(HarmonicSet.ALL, fewest=21, most=21, tolerance=1e-2)
+    start = balance(structure, spring, 0.8 / (2 * math.pi), 0.1, options)
+    steps = ArcSteps(first=0.05, longest=0.3, most_points=1500)
+    branch = balance_branch(
+        structure, spring, start, Parameter.FREQUENCY, 0.5 / (2 * math.pi), options, steps
+    )
+    omega = 2 * math.pi * branch.frequencies_hz
+    assert Happening.FOLD in kinds(branch)
+    doublings = [e for e in branch.events if e.kind is Happening.PERIOD_DOUBLING]
+    assert len(doublings) == 2
+    torus = next(e for e in branch.events if e.kind is Happening.NEIMARK_SACKER)
+    assert 0.60 < 2 * math.pi * torus.frequency_hz < 0.62
+    between = slice(doublings[1].index + 1, torus.index)
+    assert np.all(branch.is_stable[between])
+    assert omega[between].min() < 0.635 < omega[between].max()
