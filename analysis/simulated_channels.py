@@ -8,11 +8,10 @@ from acquisition.measurement import Measurement
 from acquisition.recording import Recording
 from sim.accuracy import Accuracy
 from sim.drive import Sampled
-from sim.integrate import integrate
-from sim.outcome import Outcome
+from sim.sample_by_sample import follow_samples
 from sim.specimen import Specimen
 
-from .arrays import Reals
+from .arrays import Integers, Reals
 from .base_motion import RecordedBaseMotion, recorded_base_motion
 from .errors import UnusableData
 from .recorded_channels import BASE, Channels, RecordedChannels, Stretch
@@ -22,6 +21,7 @@ _PIECE_S = 5.0
 _OVERLAP = 48
 """Samples on either side of a piece: a spline forgets its ends by a factor of 0.27 per sample (1e-27)."""
 _VX = 3
+_STATE = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +33,12 @@ class SimulatedSpecimen:
     base: RecordedBaseMotion
     velocity: Reals
     """Of m0 on the recording's sample grid, without sensor delay or noise, shape (samples,) [m/s]."""
-    impact_times_s: Reals
-    """Since the first sample of the recording; ascending."""
+    impacts: Integers
+    """Contacts that began up to each sample, shape (samples,)."""
 
-    def impacts_between(self, start_s: float, stop_s: float) -> int:
-        """Count the contacts that began in a stretch of time."""
-        return int(np.diff(np.searchsorted(self.impact_times_s, (start_s, stop_s)))[0])
+    def impacts_between(self, start: int, stop: int) -> int:
+        """Count the contacts that began between two samples."""
+        return int(self.impacts[stop - 1] - self.impacts[start])
 
 
 def simulated_specimen(
@@ -64,35 +64,27 @@ def simulated_specimen(
 
 def shaken(
     specimen: Specimen, displacement_m: Reals, sample_rate_hz: float, accuracy: Accuracy
-) -> tuple[Reals, Reals]:
-    """Give m0's velocity at every sample of the base's displacement, and the times of all impacts."""
+) -> tuple[Reals, Integers]:
+    """Give m0's velocity at every sample of the base's displacement, and the impacts up to every sample."""
     count = displacement_m.size
     velocity = np.zeros(count)
-    impacts: list[Reals] = []
-    state = np.zeros(6)
+    impacts = np.zeros(count, dtype=np.int64)
+    state = np.zeros(_STATE)
     piece = round(_PIECE_S * sample_rate_hz)
     for first in range(0, count - 1, piece):
         last = min(first + piece, count - 1)
-        before = min(_OVERLAP, first)
-        part = displacement_m[first - before : last + 1 + _OVERLAP]
-        path = integrate(
-            specimen,
-            Sampled(part, sample_rate_hz),
-            (last - first) / sample_rate_hz,
-            accuracy,
-            state,
-            sample_rate_hz,
-            start_time_s=before / sample_rate_hz,
-        )
-        if path.outcome is not Outcome.REACHED_END:
+        before, behind = min(_OVERLAP, first), min(_OVERLAP, count - 1 - last)
+        part = Sampled(displacement_m[first - before : last + 1 + behind], sample_rate_hz)
+        path = follow_samples(specimen, part, accuracy, state, first=before, last=before + last - first)
+        if not path.reached_end:
             raise UnusableData(
-                f"the simulation under the recorded base motion ended after {first / sample_rate_hz:.3g} s "
-                f"or later: {path.outcome.text}"
+                f"the simulation under the recorded base motion became meaningless after "
+                f"{(first + len(path.states)) / sample_rate_hz:.3g} s: the base moves too much"
             )
-        velocity[first : last + 1] = path.states[: last + 1 - first, _VX]
-        impacts.append(path.impacts.times_s + (first - before) / sample_rate_hz)
-        state = path.final_state
-    return velocity, np.concatenate([*impacts, np.empty(0)])
+        velocity[first : last + 1] = path.states[:, _VX]
+        impacts[first + 1 : last + 1] = path.impacts
+        state = path.states[-1]
+    return velocity, np.cumsum(impacts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,5 +124,5 @@ def played_impacts(channels: Channels, simulated: SimulatedSpecimen, label: str)
     """Count impacts inside the stretches of one label, and give the time those took [s]."""
     rate = channels.sample_rate_hz
     stretches = channels.stretches(label)
-    count = sum(simulated.impacts_between(each.start / rate, each.stop / rate) for each in stretches)
+    count = sum(simulated.impacts_between(each.start, each.stop) for each in stretches)
     return count, sum(each.samples for each in stretches) / rate
