@@ -32,7 +32,7 @@ def orbit_guess(orbit: PeriodicOrbit) -> Guess:
 def balance_specimen(
     specimen: Specimen,
     drive: Harmonic,
-    options: BalanceOptions = BalanceOptions(),
+    options: BalanceOptions = BalanceOptions(),  # noqa: B008 - frozen
 ) -> Balance:
     """Find the periodic motion of a specimen by harmonic balance.
 
