@@ -8,14 +8,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from .calibration import CalibrationRule, check_calibrations
-from .channel import Channel, channels_of
 from .drivers.afg1022x import AFG1022X
 from .drivers.daqmx import DaqmxDigitizer
 from .errors import AcquisitionError
 from .instruments import Identity
-from .knobs import Confirm, KnobSheet, confirm_at_terminal, confirm_simulated
-from .rig import Rig, load_rig
+from .rig.calibration import CalibrationRule, check_calibrations
+from .rig.channel import Channel, channels_of
+from .rig.configuration import Rig, load_rig
+from .rig.knobs import Confirm, KnobSheet, confirm_at_terminal, confirm_simulated
 
 
 class Reality(StrEnum):

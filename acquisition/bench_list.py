@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from .drivers.daqmx_discovery import FoundDevice, list_daqmx_devices
 from .drivers.visa_link import list_visa_resources
 from .errors import InstrumentError
-from .rig import Rig
+from .rig.configuration import Rig
 
 
 @dataclass(frozen=True)

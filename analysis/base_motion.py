@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.measurement import Measurement
+from acquisition.plan.measurement import Measurement
 from acquisition.recording import Recording
 
 from .arrays import Reals

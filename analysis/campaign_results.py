@@ -17,14 +17,7 @@ from .measurement_analysis import (
     SweepAnalysis,
     analyse_recording,
 )
-from .overlay import (
-    DwellOverlay,
-    NoiseOverlay,
-    Overlay,
-    SteppedSineOverlay,
-    SweepOverlay,
-    overlay,
-)
+from .overlay import DwellOverlay, NoiseOverlay, Overlay, SteppedSineOverlay, SweepOverlay, overlay
 from .recording_facts import RecordingFacts
 
 Stage = Callable[[str, str], None]

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from acquisition.instruments import Identity
-from acquisition.measurement import Measurement
+from acquisition.plan.measurement import Measurement
 from acquisition.recording import Origin, Recording, RecordingState
 from sim.specimen import Specimen, gong2025
 

@@ -5,15 +5,7 @@ import numpy as np
 from .arrays import Complexes, Flags, Reals
 from .confidence import DEFAULT_CONFIDENCE, coherence_significance, relative_sd, student_half_width
 from .errors import InvalidRequest, NotEnoughData
-from .estimators import (
-    coherence,
-    drive_referenced,
-    drive_referenced_relative_sd,
-    h1,
-    h2,
-    hv,
-    named_estimator,
-)
+from .estimators import coherence, drive_referenced, drive_referenced_relative_sd, h1, h2, hv, named_estimator
 from .results import Estimator, Transmission, TransmissionSettings
 from .segment_spectra import SegmentSpectra, SpectralAverages, pieces
 from .window import Window

@@ -14,10 +14,10 @@ from pathlib import Path
 
 from acquisition.bench import open_bench
 from acquisition.excitation.dwell import Dwell
-from acquisition.measurement import Measurement
+from acquisition.plan.measurement import Measurement
 from acquisition.recording import open_recording
-from acquisition.run_measurement import run_measurement
-from acquisition.run_progress import Progress
+from acquisition.run.progress import Progress
+from acquisition.run.run_measurement import run_measurement
 
 ROOT = Path(__file__).resolve().parent.parent
 MINUTE_S = 60.0

@@ -16,13 +16,13 @@ import pyvisa
 from nidaqmx.constants import AcquisitionType
 from nidaqmx.stream_readers import AnalogMultiChannelReader
 
-from acquisition.rig import Rig, load_rig
-from acquisition.virtual.afg1022 import AFG1022
+from acquisition.rig.configuration import Rig, load_rig
 from acquisition.virtual.analogue import Coupling, Input
+from acquisition.virtual.generator.afg1022 import AFG1022
+from acquisition.virtual.generator.terminal_voltage import Terminal
 from acquisition.virtual.rig import VirtualRig
-from acquisition.virtual.terminal_voltage import Terminal
-from acquisition.virtual.time_grid import GRID_RATE_HZ
-from acquisition.virtual.world import World
+from acquisition.virtual.world.time_grid import GRID_RATE_HZ
+from acquisition.virtual.world.world import World
 
 RATE_HZ = 51_200
 BLOCK = 5120

@@ -8,9 +8,9 @@ from rich.markup import escape
 
 from acquisition.bench import open_bench
 from acquisition.bench_list import list_instruments, list_rig_instruments
-from acquisition.bench_report import check_bench
-from acquisition.finding import Verdict
-from acquisition.rig import load_rig
+from acquisition.check.bench_report import check_bench
+from acquisition.check.finding import Verdict
+from acquisition.rig.configuration import load_rig
 
 from .output import console, print_json
 from .paths import AsJson, BenchPath, bench_path

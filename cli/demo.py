@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from acquisition.bench import open_bench
-from acquisition.campaign import load_campaign
-from acquisition.run_campaign import CampaignItem, Item, run_campaign
+from acquisition.plan.campaign import load_campaign
+from acquisition.run.run_campaign import CampaignItem, Item, run_campaign
 from analysis.report.report import write_report
 from analysis.summary import campaign_summary
 

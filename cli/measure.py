@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from acquisition.bench import open_bench
-from acquisition.campaign import load_campaign
-from acquisition.run_campaign import CampaignItem, Existing, Item, run_campaign
+from acquisition.plan.campaign import load_campaign
+from acquisition.run.run_campaign import CampaignItem, Existing, Item, run_campaign
 
 from .output import console
 from .paths import BenchPath, bench_path

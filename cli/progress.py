@@ -13,8 +13,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from acquisition.campaign import Campaign
-from acquisition.run_campaign import CampaignProgress, Item
+from acquisition.plan.campaign import Campaign
+from acquisition.run.run_campaign import CampaignProgress, Item
 
 from .output import console
 

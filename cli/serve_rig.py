@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from acquisition.rig import load_rig
+from acquisition.rig.configuration import load_rig
 from acquisition.virtual.rig import VirtualRig
 
 from .output import console
@@ -32,7 +32,7 @@ def serve_rig(
         console.print(f'  grpc.insecure_channel("{rig.daq_address}")  # GrpcSessionOptions(channel, "")')
         console.print("The generator, for pyvisa in Python (one line before the resource manager):")
         console.print(
-            f'  from acquisition.virtual import usb_bus; usb_bus.plug_in_remote("{rig.daq_address}")'
+            f'  from acquisition.virtual.usb import usb_bus; usb_bus.plug_in_remote("{rig.daq_address}")'
         )
         console.print(f'  ResourceManager("@py").open_resource("{rig.visa_resource}")')
         console.print("The generator, for any other VISA program:")

@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acquisition.errors import InstrumentError, SettingRefused
-
+from ..errors import InstrumentError, SettingRefused
 from .afg1022_limits import Shape
 from .afg1022_modes import switch_off_modes
 from .arbitrary_codes import ArbitraryCodes

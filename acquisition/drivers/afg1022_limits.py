@@ -4,8 +4,8 @@ from enum import StrEnum
 from math import inf
 from typing import Literal
 
-from acquisition.errors import LimitExceeded
-from acquisition.rig import HIGH_Z, GeneratorConfig
+from ..errors import LimitExceeded
+from ..rig.configuration import HIGH_Z, GeneratorConfig
 
 Load = Literal["high-z"] | float
 

@@ -1,8 +1,7 @@
 """Which load the generator believes to see: set it, ask for it, or leave it to the operator."""
 
-from acquisition.errors import InstrumentError, SettingRefused
-from acquisition.rig import HIGH_Z, Knob
-
+from ..errors import InstrumentError, SettingRefused
+from ..rig.configuration import HIGH_Z, Knob
 from .afg1022_limits import Load
 from .scpi import ScpiPort, number_in
 

@@ -3,8 +3,7 @@
 from enum import StrEnum
 from math import degrees
 
-from acquisition.errors import InstrumentError, LimitExceeded, SettingRefused
-
+from ..errors import InstrumentError, LimitExceeded, SettingRefused
 from .afg1022_limits import BURST_CYCLES, Shape, check_frequency
 from .scpi import number_in
 from .verified_settings import Tolerance, VerifiedSettings

@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Self
 
-from acquisition.errors import InstrumentError, InstrumentLost
-from acquisition.instruments import Identity, Samples
-from acquisition.rig import GeneratorConfig, Knob
-
+from ..errors import InstrumentError, InstrumentLost
+from ..instruments import Identity, Samples
+from ..rig.configuration import GeneratorConfig, Knob
 from .afg1022_channel import Afg1022Channel, Playing
 from .afg1022_limits import Shape, amplitude_range_vpp, check_amplitude, check_frequency
 from .afg1022_load import agree_on_load

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.errors import LimitExceeded
-from acquisition.instruments import Samples
+from ..errors import LimitExceeded
+from ..instruments import Samples
 
 # AFG1022 edit memory: hardware reference 1.2 (IVI driver tkafg1k; drivers that read it back).
 FEWEST_POINTS = 2

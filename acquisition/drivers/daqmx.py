@@ -8,11 +8,10 @@ from nidaqmx import DaqError, Task
 from nidaqmx.constants import AcquisitionType, TaskMode
 from nidaqmx.stream_readers import AnalogMultiChannelReader
 
-from acquisition.channel import Channel, channels_of
-from acquisition.errors import ConfigurationError, InstrumentError, SettingRefused
-from acquisition.instruments import Block, Identity, Overload, Samples
-from acquisition.rig import DaqConfig, Rig
-
+from ..errors import ConfigurationError, InstrumentError, SettingRefused
+from ..instruments import Block, Identity, Overload, Samples
+from ..rig.channel import Channel, channels_of
+from ..rig.configuration import DaqConfig, Rig
 from .daqmx_errors import NOT_OFFERED, daqmx_call
 from .daqmx_inputs import InputScaling, add_input
 from .daqmx_session import DaqmxSession, daqmx_session

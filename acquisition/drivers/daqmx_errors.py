@@ -12,7 +12,7 @@ import grpc
 from nidaqmx.error_codes import DAQmxErrors as Code
 from nidaqmx.errors import DaqError, Error, RpcError
 
-from acquisition.errors import (
+from ..errors import (
     AcquisitionError,
     ConfigurationError,
     DataLost,

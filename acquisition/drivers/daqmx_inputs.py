@@ -6,10 +6,9 @@ from nidaqmx import DaqError, Task
 from nidaqmx.constants import Coupling, ExcitationSource, ExcitationVoltageOrCurrent, TerminalConfiguration
 from nidaqmx.task.channels import AIChannel
 
-from acquisition.channel import Channel
-from acquisition.errors import SettingRefused
-from acquisition.rig import ChannelConfig
-
+from ..errors import SettingRefused
+from ..rig.channel import Channel
+from ..rig.configuration import ChannelConfig
 from .daqmx_errors import NOT_OFFERED
 
 _TERMINALS = {

@@ -9,9 +9,8 @@ from nidaqmx import Task
 from nidaqmx.constants import AcquisitionType, RegenerationMode
 from nidaqmx.stream_writers import AnalogSingleChannelWriter
 
-from acquisition.errors import InstrumentError, LimitExceeded, SettingRefused
-from acquisition.instruments import Samples
-
+from ..errors import InstrumentError, LimitExceeded, SettingRefused
+from ..instruments import Samples
 from .daqmx import DaqmxDigitizer
 from .daqmx_errors import daqmx_call
 

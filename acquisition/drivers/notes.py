@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from acquisition.errors import AcquisitionError
+from ..errors import AcquisitionError
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from acquisition.instruments import Overload, Samples
+from ..instruments import Overload, Samples
 
 # Vibrometers and converters distort before they clip: hardware reference 4.
 OVERLOAD_FRACTION = 0.95

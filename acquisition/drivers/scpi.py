@@ -11,8 +11,7 @@ import numpy as np
 import pyvisa
 from numpy.typing import NDArray
 
-from acquisition.errors import InstrumentError, InstrumentLost
-
+from ..errors import InstrumentError, InstrumentLost
 from .visa_link import Link
 
 Codes = NDArray[np.uint16]

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from acquisition.errors import SettingRefused
-
+from ..errors import SettingRefused
 from .scpi import ScpiPort, number_in
 
 

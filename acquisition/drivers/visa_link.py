@@ -6,7 +6,7 @@ from typing import Protocol, cast
 import pyvisa
 from pyvisa.resources import MessageBasedResource
 
-from acquisition.errors import InstrumentBusy, InstrumentError, InstrumentLost
+from ..errors import InstrumentBusy, InstrumentError, InstrumentLost
 
 # A reply later than this is a failure. The slowest known: the read-back of 8192 points.
 TIMEOUT_S = 3.0

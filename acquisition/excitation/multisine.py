@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.errors import ConfigurationError
-
+from ..errors import ConfigurationError
 from .steps import Samples
 
 MEMORY_POINTS = 8192

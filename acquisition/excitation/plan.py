@@ -6,8 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, PositiveFloat
 
-from acquisition.toml_file import FrozenModel
-
+from ..toml_file import FrozenModel
 from .preview import Preview
 from .steps import Step
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.errors import ConfigurationError
-
+from ..errors import ConfigurationError
 from .steps import Play, Samples, Step, Stream, Tone, Waveform
 
 

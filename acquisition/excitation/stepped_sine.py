@@ -8,8 +8,7 @@ from typing import Literal, Self
 
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
-from acquisition.toml_file import FrozenModel
-
+from ..toml_file import FrozenModel
 from .plan import AbstractExcitation, FrequencyHz
 from .preview import Preview, preview_of
 from .steps import Segment, Step, Tone

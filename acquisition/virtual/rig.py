@@ -4,23 +4,22 @@ from contextlib import ExitStack
 from types import TracebackType
 from typing import Self
 
-from acquisition.errors import AcquisitionError, ConfigurationError
-from acquisition.rig import Rig, VirtualConfig
-
-from . import usb_bus
-from .afg1022 import AFG1022
-from .daqmx_devices import catalogue_with
-from .daqmx_server import LOOPBACK, DaqServer, serve
-from .output_signal import Panel
-from .pace import OnDemandPace, Pace, WallPace
-from .rig_faults import RigFaults
-from .scpi_command import Quirks
-from .scpi_socket import ScpiSocket
-from .terminal_voltage import Terminal
-from .time_grid import FULL_BAND_HZ, relative_clock_ppm
-from .usb_remote import usb_service
-from .usbtmc import UsbTmcInstrument
-from .world import World, virtual_section
+from ..errors import AcquisitionError, ConfigurationError
+from ..rig.configuration import Rig, VirtualConfig
+from .daqmx.devices import catalogue_with
+from .daqmx.pace import OnDemandPace, Pace, WallPace
+from .daqmx.server import LOOPBACK, DaqServer, serve
+from .faults import RigFaults
+from .generator.afg1022 import AFG1022
+from .generator.output_signal import Panel
+from .generator.scpi_command import Quirks
+from .generator.scpi_socket import ScpiSocket
+from .generator.terminal_voltage import Terminal
+from .usb import usb_bus
+from .usb.usb_remote import usb_service
+from .usb.usbtmc import UsbTmcInstrument
+from .world.time_grid import FULL_BAND_HZ, relative_clock_ppm
+from .world.world import World, virtual_section
 
 _USB_RESOURCE_FIELDS = 5
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from acquisition.excitation.preview import Preview
-from acquisition.measurement import Measurement
+from acquisition.plan.measurement import Measurement
 
 from ..arrays import Reals
 from ..envelope import envelope

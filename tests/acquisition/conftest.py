@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.channel import Channel, channels_of
 from acquisition.instruments import Block, Identity, Samples
-from acquisition.knobs import KnobSheet
 from acquisition.recording.layout import RecordingState
-from acquisition.rig import Rig, Role, load_rig
-from acquisition.rig_model import Quantity, RigModel
+from acquisition.rig.channel import Channel, channels_of
+from acquisition.rig.configuration import Rig, Role, load_rig
+from acquisition.rig.knobs import KnobSheet
+from acquisition.rig.model import Quantity, RigModel
 
 ROOT = Path(__file__).parent.parent.parent
 SAMPLE_RATE_HZ = 5120.0

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from acquisition.bench import Reality, open_bench
-from acquisition.calibration import CalibrationRule, calibrations, check_calibrations
 from acquisition.drivers.afg1022x import AFG1022X
 from acquisition.drivers.daqmx import DaqmxDigitizer
 from acquisition.errors import (
@@ -21,11 +20,12 @@ from acquisition.errors import (
     InstrumentLost,
 )
 from acquisition.instruments import Digitizer, FunctionGenerator
-from acquisition.knobs import confirm_by_asking, confirm_by_sheet, confirm_simulated, save_knob_sheet
-from acquisition.rig import load_rig
-from acquisition.virtual.output_signal import Panel
+from acquisition.rig.calibration import CalibrationRule, calibrations, check_calibrations
+from acquisition.rig.configuration import load_rig
+from acquisition.rig.knobs import confirm_by_asking, confirm_by_sheet, confirm_simulated, save_knob_sheet
+from acquisition.virtual.generator.output_signal import Panel
+from acquisition.virtual.generator.scpi_command import Quirks
 from acquisition.virtual.rig import VirtualRig
-from acquisition.virtual.scpi_command import Quirks
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = ROOT / "hardware_configs"

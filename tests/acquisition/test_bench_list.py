@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from acquisition.bench_list import list_instruments
-from acquisition.rig import load_rig
+from acquisition.rig.configuration import load_rig
 from acquisition.virtual.rig import VirtualRig
 
 ROOT = Path(__file__).parents[2]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.instruments import Block, Identity
-from acquisition.measurement import Measurement
+from acquisition.plan.measurement import Measurement
 from acquisition.recording import ChannelHeader, Origin, RecordingHeader, RecordingState, create_recording
 from acquisition.recording.provenance import Provenance
 from sim.drive import Sampled

@@ -7,7 +7,7 @@ from acquisition.excitation.dwell import Dwell
 from acquisition.excitation.multisine_noise import MultisineNoise
 from acquisition.excitation.sine_sweep import SineSweep
 from acquisition.excitation.stepped_sine import FrequencyGrid, SteppedSine
-from acquisition.measurement import Measurement
+from acquisition.plan.measurement import Measurement
 from acquisition.recording import open_recording
 from analysis.base_motion import advanced, lowest_frequency_hz, recorded_base_motion
 from analysis.errors import UnusableData

@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from acquisition.rig import GeneratorConfig
-from acquisition.virtual import usb_bus
-from acquisition.virtual.afg1022 import AFG1022, Reply
-from acquisition.virtual.afg1022_settings import ChannelSettings
-from acquisition.virtual.output_signal import Panel
-from acquisition.virtual.scpi_command import Quirks
-from acquisition.virtual.scpi_status import ErrorCode, StatusByte
-from acquisition.virtual.usbtmc import UsbTmcInstrument
+from acquisition.rig.configuration import GeneratorConfig
+from acquisition.virtual.generator.afg1022 import AFG1022, Reply
+from acquisition.virtual.generator.afg1022_settings import ChannelSettings
+from acquisition.virtual.generator.output_signal import Panel
+from acquisition.virtual.generator.scpi_command import Quirks
+from acquisition.virtual.generator.scpi_status import ErrorCode, StatusByte
+from acquisition.virtual.usb import usb_bus
+from acquisition.virtual.usb.usbtmc import UsbTmcInstrument
 
 _SERIALS = (f"C02{number:04d}" for number in itertools.count(1))
 

@@ -21,7 +21,7 @@ from acquisition.errors import (
     InstrumentError,
     InstrumentLost,
 )
-from acquisition.rig import load_rig
+from acquisition.rig.configuration import load_rig
 from acquisition.virtual.rig import VirtualRig
 
 ROOT = Path(__file__).parents[3]

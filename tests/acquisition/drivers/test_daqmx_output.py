@@ -9,7 +9,7 @@ import pytest
 from acquisition.drivers.daqmx import DaqmxDigitizer
 from acquisition.drivers.daqmx_output import DaqmxOutput, OutputConfig
 from acquisition.errors import DataLost, InstrumentError, LimitExceeded
-from acquisition.rig import load_rig
+from acquisition.rig.configuration import load_rig
 from acquisition.virtual.rig import VirtualRig
 
 ROOT = Path(__file__).parents[3]

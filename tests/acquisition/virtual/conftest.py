@@ -11,8 +11,8 @@ from nidaqmx import GrpcSessionOptions, Task
 
 from acquisition.errors import ConfigurationError
 from acquisition.virtual.analogue import Coupling, Input
-from acquisition.virtual.daqmx_server import DaqServer, serve
-from acquisition.virtual.pace import Pace
+from acquisition.virtual.daqmx.pace import Pace
+from acquisition.virtual.daqmx.server import DaqServer, serve
 
 OFFSET_V = 0.5
 LOOPED_BACK = {"Dev1/ai0": "Dev1/ao0", "Dev2/ai0": "Dev2/ao0"}

@@ -14,12 +14,12 @@ from nidaqmx.errors import DaqError, DaqReadError, RpcError
 from nidaqmx.stream_readers import AnalogMultiChannelReader
 
 from acquisition.errors import AcquisitionError, ConfigurationError
-from acquisition.rig import load_rig
-from acquisition.rig_model import Quantity, RigModel
-from acquisition.virtual.output_signal import Panel
+from acquisition.rig.configuration import load_rig
+from acquisition.rig.model import Quantity, RigModel
+from acquisition.virtual.generator.output_signal import Panel
+from acquisition.virtual.generator.scpi_command import Quirks
 from acquisition.virtual.rig import VirtualRig
-from acquisition.virtual.scpi_command import Quirks
-from acquisition.virtual.usb_remote import RemoteUsbDevice
+from acquisition.virtual.usb.usb_remote import RemoteUsbDevice
 
 SHIPPED = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 RIG = SHIPPED.model_copy(

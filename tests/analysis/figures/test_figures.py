@@ -11,7 +11,7 @@ from acquisition.excitation.multisine_noise import MultisineNoise
 from acquisition.excitation.sine_sweep import SineSweep
 from acquisition.excitation.stepped_sine import SteppedSine
 from acquisition.excitation.streamed_noise import StreamedNoise
-from acquisition.measurement import Measurement
+from acquisition.plan.measurement import Measurement
 from acquisition.recording import open_recording
 from analysis.campaign_results import Simulation, result_of
 from analysis.figures.bench_levels import bench_levels_figure

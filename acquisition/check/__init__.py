@@ -1,0 +1,1 @@
+"""Looking at the bench before it is trusted."""

@@ -1,0 +1,144 @@
+"""The check of a whole bench before a day's work: silence first, then a small sine, then silence again."""
+
+import shutil
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from ..bench import Bench
+from ..instruments import Samples
+from ..rig.calibration import calibrations
+from ..rig.channel import Channel
+from ..run.schedule import CHECK_FREQUENCY_HZ
+from .finding import BenchReport, Bounds, Finding, Verdict, judged
+from .loop import LoopCheck
+
+CHECK_SHARE = 0.02
+"""Level of the sine, of the bench's amplitude limit: far below anything that collides or clips."""
+# An AC coupling of 0.5 Hz has forgotten a step after this time.
+_SETTLE_S = 1.5
+_LISTEN_S = 2.0
+_BYTES_PER_SAMPLE = 4
+_SECONDS_PER_HOUR = 3600.0
+
+
+NOISE_SHARE = Bounds(1e-3, 2e-2)
+"""rms of a silent channel, of its full scale."""
+OFFSET_SHARE = Bounds(1e-2, 1e-1)
+"""Mean of a silent channel, of its full scale."""
+LATENCY_S = Bounds(0.5, 5.0)
+"""Of one verified setting: it bounds how fast the generator can be stopped."""
+ROOM_H = Bounds(-10.0, -1.0)
+"""Recording time that the disk should hold, negative since more is better [h]."""
+
+
+def check_bench(bench: Bench, folder: Path) -> BenchReport:
+    """Look at everything that can be known before a measurement; the generator is silent afterwards.
+
+    Listens in silence, plays two per cent of the amplitude limit at 160 Hz for some seconds, and
+    listens in silence again.
+
+    Parameters
+    ----------
+    bench
+        Open, and not sampling.
+    folder
+        Where recordings will go.
+
+    Raises
+    ------
+    InstrumentError
+        When an instrument fails; what is merely wrong is a finding.
+
+    """
+    findings = [*_identified(bench), *_calibrated(bench), _room(bench, folder)]
+    amplitude_vpp = CHECK_SHARE * bench.rig.generator.amplitude_limit_vpp
+    bench.generator.stop()
+    quiet = _listen(bench)
+    try:
+        bench.generator.load_sine(CHECK_FREQUENCY_HZ, amplitude_vpp)
+        findings.append(_latency(bench))
+        bench.generator.start()
+        heard = _listen(bench)
+    finally:
+        bench.generator.stop()
+    after = _listen(bench)
+    for channel, row in zip(bench.channels, quiet, strict=True):
+        findings += [_noise(channel, row), _offset(channel, row)]
+    findings += LoopCheck(bench, amplitude_vpp, heard, after).findings()
+    return BenchReport(findings=tuple(findings))
+
+
+def _listen(bench: Bench) -> Samples:
+    rate_hz = bench.digitizer.sample_rate_hz
+    bench.digitizer.start()
+    try:
+        bench.digitizer.read(round(_SETTLE_S * rate_hz))
+        return bench.digitizer.read(round(_LISTEN_S * rate_hz)).volts
+    finally:
+        bench.digitizer.stop()
+
+
+def _identified(bench: Bench) -> list[Finding]:
+    return [
+        Finding(name=part, value=identity.reply, expected="an answer", verdict=Verdict.OK)
+        for part, identity in bench.identities.items()
+    ]
+
+
+def _calibrated(bench: Bench) -> list[Finding]:
+    today = datetime.now(UTC).astimezone().date()
+    return [
+        Finding(
+            name=f"calibration of {one.what}",
+            value=f"{one.calibrated}",
+            expected=f"at most {one.valid_days} days ago",
+            verdict=Verdict.OK if one.is_valid else Verdict.WARN,
+            number=one.age_days,
+            unit="d",
+            advice="" if one.is_valid else "have it calibrated, and enter the date in the configuration",
+        )
+        for one in calibrations(bench.rig, today)
+    ]
+
+
+def _room(bench: Bench, folder: Path) -> Finding:
+    bytes_per_s = bench.digitizer.sample_rate_hz * len(bench.channels) * _BYTES_PER_SAMPLE
+    hours = shutil.disk_usage(folder).free / bytes_per_s / _SECONDS_PER_HOUR
+    return judged(
+        "room on the disk",
+        hours,
+        "h",
+        f"{-ROOM_H.well:g} h or more",
+        ROOM_H.verdict(-hours),
+        "make room, or record elsewhere",
+    )
+
+
+def _latency(bench: Bench) -> Finding:
+    latency_s = bench.generator.measured_latency_s()
+    verdict = LATENCY_S.verdict(latency_s)
+    advice = "shorten generator.settle_s, or look for what keeps the bus busy: a stop takes as long"
+    return judged("time of one setting", latency_s, "s", f"{LATENCY_S.well:g} s or less", verdict, advice)
+
+
+def _noise(channel: Channel, row: Samples) -> Finding:
+    rms_v = float(np.std(row))
+    verdict = NOISE_SHARE.verdict(rms_v / channel.full_scale_v)
+    advice = "look for hum, a loose shield, or a cable that picks it up"
+    if rms_v == 0.0:
+        verdict, advice = (
+            Verdict.FAIL,
+            "a living input is never quite still: see whether it is sampled at all",
+        )
+    expected = f"{NOISE_SHARE.well * channel.full_scale_v:.3g} V or less"
+    return judged(f"noise of {channel.role.value}", rms_v, "V", expected, verdict, advice)
+
+
+def _offset(channel: Channel, row: Samples) -> Finding:
+    mean_v = float(np.mean(row))
+    verdict = OFFSET_SHARE.verdict(abs(mean_v) / channel.full_scale_v)
+    advice = "look for an open input, a sensor's bias on DC coupling, or a shaker off its centre"
+    expected = f"0 V within {OFFSET_SHARE.well * channel.full_scale_v:.3g} V"
+    return judged(f"offset of {channel.role.value}", mean_v, "V", expected, verdict, advice)

@@ -1,0 +1,1 @@
+"""What is to be measured: measurements, campaigns, and what they will do to the rig."""

@@ -1,0 +1,184 @@
+"""The safety envelope: what a plan would do to the rig, next to what the rig survives."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from ..errors import LimitExceeded
+from ..rig.channel import channels_of
+from ..rig.configuration import Rig, Role
+from ..rig.model import Quantity, suspended_mass_kg
+from .loads import predicted_loads
+from .measurement import Measurement
+
+RAMP_PERIODS = 3.0
+"""A ramp must take this many periods of the shaker's suspension, or it shakes like a step."""
+USABLE_BANDWIDTH = 0.45
+"""Share of the sample rate below which a converter with an anti-alias filter is flat (NI 9234: 0.45)."""
+
+
+class Side(StrEnum):
+    """Which side of the limit is allowed."""
+
+    AT_MOST = "at most"
+    AT_LEAST = "at least"
+
+
+@dataclass(frozen=True)
+class LimitCheck:
+    """One predicted value beside its limit."""
+
+    what: str
+    value: float
+    limit: float
+    unit: str
+    source: str
+    """Where the limit comes from."""
+    remedy: str
+    """What to change when it is exceeded."""
+    side: Side = Side.AT_MOST
+
+    @property
+    def use(self) -> float:
+        """How much of the limit is used: above 1 is too much."""
+        match self.side:
+            case Side.AT_MOST:
+                return self.value / self.limit
+            case Side.AT_LEAST:
+                return self.limit / self.value
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the value is allowed; a value on the limit is, but for rounding."""
+        return self.use <= 1 + 1e-9
+
+    def complaint(self) -> str:
+        """Say the violation in one clause."""
+        return (
+            f"{self.what} would be {self.value:.4g} {self.unit}, allowed is {self.side.value} "
+            f"{self.limit:.4g} {self.unit} ({self.source}): {self.remedy}"
+        )
+
+
+def limit_checks(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
+    """Every predicted load of ``measurement`` beside the limit of ``rig`` it must keep."""
+    return (*_settings(measurement, rig), *_loads(measurement, rig))
+
+
+def require_within_limits(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
+    """Refuse a measurement that would pass any limit of the rig.
+
+    Raises
+    ------
+    LimitExceeded
+        Naming every violation with value, limit, source and remedy. Nothing was moved.
+
+    """
+    checks = limit_checks(measurement, rig)
+    violations = [check.complaint() for check in checks if not check.is_kept]
+    if violations:
+        raise LimitExceeded(f"{measurement.name}: {'; '.join(violations)}. Nothing was played.")
+    return checks
+
+
+def limit_table(checks: tuple[LimitCheck, ...]) -> str:
+    """Lay out the checks for a person, the most used limit first."""
+    rows = [("quantity", "predicted", "limit", "used", "source of the limit")]
+    rows += [
+        (
+            check.what,
+            f"{check.value:.4g} {check.unit}",
+            f"{check.side.value} {check.limit:.4g} {check.unit}",
+            f"{100 * check.use:.1f} %",
+            check.source,
+        )
+        for check in sorted(checks, key=lambda each: each.use, reverse=True)
+    ]
+    widths = [max(len(row[column]) for row in rows) for column in range(4)]
+    lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)) for row in rows)
+    return "\n".join(f"{line}  {row[4]}" for line, row in zip(lines, rows, strict=True))
+
+
+def shortest_ramp_s(rig: Rig) -> float:
+    """Three periods of the loaded shaker on its suspension [s]."""
+    shaker = rig.shaker
+    resonance = np.sqrt(shaker.suspension_stiffness_n_per_m / suspended_mass_kg(shaker)) / (2 * np.pi)
+    return float(RAMP_PERIODS / resonance)
+
+
+def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
+    excitation = measurement.excitation
+    yield LimitCheck(
+        "the generator's setting",
+        excitation.amplitude_vpp,
+        rig.generator.amplitude_limit_vpp,
+        "Vpp",
+        "amplitude_limit_vpp of the hardware configuration",
+        "lower amplitude_vpp",
+    )
+    yield LimitCheck(
+        "the highest frequency",
+        excitation.highest_frequency_hz,
+        USABLE_BANDWIDTH * rig.daq.sample_rate_hz,
+        "Hz",
+        f"{USABLE_BANDWIDTH:g} of the sample rate",
+        "lower the frequency or raise sample_rate_hz",
+    )
+    yield LimitCheck(
+        "the ramp",
+        measurement.ramp_s,
+        shortest_ramp_s(rig),
+        "s",
+        f"{RAMP_PERIODS:g} periods of the shaker's suspension",
+        "lengthen ramp_s",
+        Side.AT_LEAST,
+    )
+
+
+def _loads(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
+    loads = predicted_loads(measurement.excitation, rig)
+    limits = rig.shaker.limits
+    less = "lower amplitude_vpp"
+    gentler = "lower amplitude_vpp or raise the lowest frequency"
+    for quantity, what, limit, unit, remedy in (
+        (Quantity.STROKE, "the stroke", limits.stroke_m, "m", gentler),
+        (Quantity.VELOCITY, "the table's velocity", limits.velocity_m_per_s, "m/s", gentler),
+        (Quantity.ACCELERATION, "the table's acceleration", limits.acceleration_m_per_s2, "m/s2", less),
+        (Quantity.FORCE, "the force", limits.force_n, "N", less),
+        (Quantity.CURRENT, "the coil current", limits.current_a, "A", less),
+    ):
+        load = loads[quantity]
+        name = f"{what} ({load.cause}, peak)"
+        yield LimitCheck(name, load.peak, limit.value, unit, limit.source, remedy)
+    current, volts = loads[Quantity.CURRENT], loads[Quantity.AMPLIFIER_VOLTAGE]
+    limiter = rig.amplifier.current_limit_a
+    yield LimitCheck(
+        f"the current ({current.cause}, rms)", current.rms, limiter.value, "A", limiter.source, less
+    )
+    clip = f"clipping of the {rig.amplifier.model}"
+    name = f"the amplifier's voltage ({volts.cause}, peak)"
+    yield LimitCheck(name, volts.peak, rig.amplifier.clip_v, "V", clip, "lower amplitude_vpp or the gain")
+    yield from _inputs(
+        rig, measurement.excitation.amplitude_vpp, volts.peak, loads[Quantity.ACCELERATION].peak
+    )
+
+
+def _inputs(rig: Rig, amplitude_vpp: float, amplifier_v: float, acceleration: float) -> Iterator[LimitCheck]:
+    """Whether the converter can show what is predicted; the vibrometer depends on the specimen."""
+    peaks = {
+        Role.DRIVE_VOLTAGE: 0.5 * amplitude_vpp * rig.generator.terminal_factor(),
+        Role.AMPLIFIER_VOLTAGE: amplifier_v,
+        Role.BASE_ACCELERATION: acceleration,
+    }
+    for channel in channels_of(rig):
+        if channel.role in peaks:
+            yield LimitCheck(
+                f"the {channel.role.value.replace('_', ' ')} at the converter",
+                peaks[channel.role],
+                channel.full_scale_v * channel.units_per_volt,
+                channel.unit,
+                f"range of {channel.physical} and its sensor",
+                "lower amplitude_vpp or widen the range",
+            )

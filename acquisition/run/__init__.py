@@ -1,0 +1,1 @@
+"""Carrying out a measurement: ramps, phases, limits, and the way out."""

@@ -1,0 +1,45 @@
+"""What a run needs of a bench: open instruments, and who they are."""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from ..instruments import Digitizer, FunctionGenerator, Identity
+from ..rig.channel import Channel
+from ..rig.configuration import Rig
+from ..rig.knobs import KnobSheet
+
+
+class CountingDigitizer(Digitizer, Protocol):
+    """A digitizer that knows the step of its converter."""
+
+    @property
+    def volts_per_count(self) -> tuple[float | None, ...]:
+        """Step for each channel [V]; None where volts are no whole multiples of one step."""
+
+
+class RunBench(Protocol):
+    """The open instruments of a rig, as `acquisition.bench.open_bench` gives them."""
+
+    @property
+    def rig(self) -> Rig:
+        """The configuration that the bench was opened from."""
+
+    @property
+    def generator(self) -> FunctionGenerator:
+        """What plays."""
+
+    @property
+    def digitizer(self) -> CountingDigitizer:
+        """What listens."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What is recorded, in the order of the rows of a block."""
+
+    @property
+    def identities(self) -> Mapping[str, Identity]:
+        """Who answered, by the instrument's part in the bench."""
+
+    @property
+    def confirmations(self) -> KnobSheet:
+        """What the operator confirmed by hand."""

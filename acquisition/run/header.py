@@ -1,0 +1,53 @@
+"""What a recording says before its first sample, taken from the bench and the plan."""
+
+from ..plan.measurement import Measurement
+from ..recording.header import ChannelHeader, RecordingHeader
+from ..recording.layout import Origin
+from ..rig.channel import Channel
+from ..rig.knobs import KnobSheet
+from .bench_protocol import RunBench
+from .schedule import CHECK_S, duration_s
+
+
+def run_header(bench: RunBench, measurement: Measurement) -> RecordingHeader:
+    """Describe the recording that a run of ``measurement`` on ``bench`` is going to make."""
+    rig = bench.rig
+    steps = bench.digitizer.volts_per_count
+    sample_rate_hz = bench.digitizer.sample_rate_hz
+    return RecordingHeader(
+        channels=tuple(_channel(channel, step) for channel, step in zip(bench.channels, steps, strict=True)),
+        sample_rate_hz=sample_rate_hz,
+        expected_samples=round((CHECK_S + duration_s(measurement)) * sample_rate_hz),
+        origin=Origin.REAL if rig.virtual is None else Origin.SIMULATED,
+        plan_json=measurement.model_dump_json(),
+        bench_json=rig.model_dump_json(),
+        requested_sample_rate_hz=rig.daq.sample_rate_hz,
+        instruments=bench.identities,
+        confirmations=_confirmations(bench.confirmations),
+    )
+
+
+def _channel(channel: Channel, volts_per_count: float | None) -> ChannelHeader:
+    calibrated = channel.sensor_calibrated or channel.converter_calibrated
+    return ChannelHeader(
+        role=channel.role.value,
+        physical_channel=channel.physical,
+        quantity=channel.quantity,
+        unit=channel.unit,
+        physical_per_volt=channel.units_per_volt,
+        range_v=channel.range_v,
+        volts_per_count=volts_per_count,
+        coupling=channel.coupling,
+        iepe_current_a=channel.iepe_current_a,
+        sensitivity=1 / channel.units_per_volt,
+        sensitivity_unit=f"V/({channel.unit})",
+        serial=channel.serial,
+        calibration_date=calibrated.isoformat(),
+        delay_s=channel.delay_s,
+        long_name=f"{channel.role.value.replace('_', ' ')} ({channel.sensor})",
+    )
+
+
+def _confirmations(sheet: KnobSheet) -> dict[str, str]:
+    knobs = {f"{knob.instrument} {knob.setting}": knob.value for knob in sheet.knobs}
+    return {"operator": sheet.operator, "confirmed": sheet.confirmed.isoformat(), **knobs}

@@ -1,0 +1,44 @@
+"""One measurement from beginning to end, as a script or a command wants it."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from ..check.low_level import BenchCheck
+from ..plan.measurement import Measurement
+from ..recording.writer import create_recording
+from .bench_protocol import RunBench
+from .cancel_on_signal import cancel_on_signal
+from .progress import Outcome, Progress
+from .run import CreateRecording, Run
+
+
+def ignore_progress(progress: Progress) -> None:
+    """Watch nothing."""
+
+
+def run_measurement(
+    bench: RunBench,
+    measurement: Measurement,
+    path: Path,
+    bench_check: BenchCheck = BenchCheck.AT_LOW_LEVEL,
+    on_progress: Callable[[Progress], None] = ignore_progress,
+    create: CreateRecording = create_recording,
+) -> Outcome:
+    """Carry out ``measurement`` on an open bench and record it at ``path`` (``NAME.h5``).
+
+    ``on_progress`` is called after every block. Ctrl-C ramps down and returns an outcome whose
+    state is ``stopped``; a second Ctrl-C raises KeyboardInterrupt.
+
+    Raises
+    ------
+    AcquisitionError
+        As `run.Run` says; the generator is silent then, and the recording, if it had begun, is
+        finished as failed.
+
+    """
+    run = Run(bench, measurement, path, bench_check, create)
+    # The signals stay caught until the run has been left: impatience must not interrupt the silencing.
+    with cancel_on_signal(run), run:
+        for progress in run:
+            on_progress(progress)
+    return run.outcome

@@ -1,0 +1,88 @@
+"""A measurement laid out in time: phases with a state, something to play, and a duration."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import ceil, cos, pi
+
+from ..excitation.steps import Play, Segment, Step, Tone
+from ..plan.measurement import Measurement
+from .state import RunState
+
+CHECK_FREQUENCY_HZ = 160.0
+"""The bench check's sine: where accelerometers are calibrated (159.2 Hz, 1000 rad/s, ISO 16063-21)."""
+CHECK_FRACTION = 0.02
+"""Level of the bench check over the planned amplitude."""
+CHECK_LOWEST_VPP = 0.01
+"""The check is not done below this, as far as the plan allows: hum would take part [V]."""
+CHECK_QUIET_S = 0.1
+"""How long the check listens before anything plays [s]."""
+CHECK_SETTLE_S = 0.2
+CHECK_LISTEN_S = 0.3
+"""How long the check measures: 48 periods [s]."""
+CHECK_S = CHECK_QUIET_S + CHECK_SETTLE_S + CHECK_LISTEN_S
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A stretch of time in one state, playing one thing."""
+
+    state: RunState
+    play: Play
+    duration_s: float
+    segment: Segment | None = None
+    """The named stretch of the recording that this phase belongs to."""
+
+
+def phases(measurement: Measurement) -> Iterator[Phase]:
+    """Lay out ``measurement`` from the first ramp up to the last ramp down, without the bench check.
+
+    A change of waveform is a change of everything at once: it happens in silence, between a ramp
+    down and a ramp up. A change of frequency keeps the phase and the amplitude and needs neither.
+    """
+    previous: Step | None = None
+    for step in measurement.excitation.steps():
+        if previous is None or not _follows_without_a_jump(previous.play, step.play):
+            if previous is not None:
+                yield _ramp(RunState.RAMPING_DOWN, previous.play, measurement)
+            yield _ramp(RunState.RAMPING_UP, step.play, measurement)
+        if step.settle_s > 0:
+            yield Phase(RunState.SETTLING, step.play, step.settle_s)
+        yield Phase(RunState.RECORDING, step.play, step.record_s, step.segment)
+        previous = step
+    if previous is not None:
+        yield _ramp(RunState.RAMPING_DOWN, previous.play, measurement)
+
+
+def _follows_without_a_jump(before: Play, after: Play) -> bool:
+    match before, after:
+        case Tone(), Tone():
+            return True
+        case _:
+            return before is after
+
+
+def _ramp(state: RunState, play: Play, measurement: Measurement) -> Phase:
+    return Phase(state, play, measurement.ramp_s, Segment(_RAMP_LABELS[state]))
+
+
+_RAMP_LABELS = {RunState.RAMPING_UP: "ramp_up", RunState.RAMPING_DOWN: "ramp_down"}
+
+
+def duration_s(measurement: Measurement) -> float:
+    """Time from the first ramp up to the end of the last ramp down, without the bench check [s]."""
+    return sum(phase.duration_s for phase in phases(measurement))
+
+
+def stairs(measurement: Measurement) -> int:
+    """Amplitude settings of one ramp."""
+    return ceil(measurement.ramp_s / measurement.ramp_step_s * (1 - 1e-9))
+
+
+def half_cosine(progress: float) -> float:
+    """Level of a ramp from 0 to 1, with no kink at either end."""
+    return 0.5 * (1 - cos(pi * progress))
+
+
+def check_amplitude_vpp(amplitude_vpp: float) -> float:
+    """Amplitude of the bench check for a plan at ``amplitude_vpp``, never above it [V]."""
+    return min(amplitude_vpp, max(CHECK_FRACTION * amplitude_vpp, CHECK_LOWEST_VPP))

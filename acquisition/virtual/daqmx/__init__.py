@@ -1,0 +1,1 @@
+"""The simulated DAQ: NI's DAQmx service over gRPC, for the unmodified nidaqmx."""

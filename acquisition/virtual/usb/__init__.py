@@ -1,0 +1,1 @@
+"""The USB cable of the simulated generator, for the unmodified PyUSB."""

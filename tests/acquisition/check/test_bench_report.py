@@ -1,0 +1,157 @@
+"""The check of the bench: a healthy one passes, every fault is found by name, and the output ends silent."""
+
+import itertools
+from contextlib import contextmanager
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.bench import open_bench
+from acquisition.check.bench_report import check_bench
+from acquisition.check.finding import BenchReport, Bounds, Verdict
+from acquisition.check.sine_fit import clock_ratio, fit_sine
+from acquisition.errors import InstrumentLost
+from acquisition.rig.calibration import CalibrationRule
+from acquisition.rig.configuration import load_rig
+from acquisition.rig.knobs import confirm_simulated
+from acquisition.virtual.generator.output_signal import Panel
+from acquisition.virtual.generator.scpi_command import Quirks
+from acquisition.virtual.rig import VirtualRig
+
+ROOT = Path(__file__).parents[3]
+_serials = itertools.count(1)
+
+
+@pytest.fixture
+def rig():
+    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    resource = f"USB0::0x0699::0x0353::R{next(_serials):04d}::INSTR"
+    return rig.model_copy(
+        update={
+            "daq": rig.daq.model_copy(update={"sample_rate_hz": 5120}),
+            "generator": rig.generator.model_copy(update={"resource": resource}),
+        }
+    )
+
+
+@contextmanager
+def bench_of(rig, **habits):
+    with VirtualRig(rig, **habits) as virtual:
+        daq = rig.daq.model_copy(update={"server": virtual.daq_address})
+        laboratory = rig.model_copy(update={"virtual": None, "daq": daq})
+        with open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED) as bench:
+            yield bench, virtual
+
+
+def checked(rig, tmp_path, fault=lambda virtual: None, **habits):
+    with bench_of(rig, **habits) as (bench, virtual):
+        fault(virtual)
+        report = check_bench(bench, tmp_path)
+        assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
+    return report
+
+
+def failed(report):
+    return {finding.name for finding in report.findings if finding.verdict is Verdict.FAIL}
+
+
+def test_a_healthy_bench_fails_nothing_and_its_figures_are_those_of_the_configuration(rig, tmp_path):
+    report = checked(rig, tmp_path)
+    assert failed(report) == set()
+    clock = report["generator's clock"]
+    told_ppm = rig.virtual.generator_clock_ppm - rig.virtual.converter_clock_ppm
+    assert abs(clock.number - told_ppm) < 5 * clock.uncertainty + 0.01
+    assert report["amplifier gain"].number == pytest.approx(rig.amplifier.gain_db, abs=0.05)
+    assert report["drive over setting"].number == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("fault", "name", "advice"),
+    [
+        (lambda v: v.faults.turn_amplifier_gain(20.0), "amplifier gain", "set the gain"),
+        (lambda v: v.faults.turn_amplifier_gain(20.0), "base acceleration", "gain"),
+        (lambda v: v.faults.drop_laser(60.0), "m0_velocity hears the sine", "laser"),
+        (lambda v: v.faults.disconnect("cDAQ1Mod1/ai2"), "base_acceleration hears the sine", "accelerometer"),
+        (lambda v: v.faults.disconnect("cDAQ1Mod1/ai1"), "amplifier_voltage hears the sine", "cable"),
+        (lambda v: v.faults.disconnect("cDAQ1Mod1/ai0"), "drive over setting", "cable"),
+        (lambda v: v.faults.over_range(60.0), "offset of m0_velocity", "bias"),
+        (lambda v: v.faults.stick_output(), "drive left after stop", "switch the amplifier off"),
+    ],
+)
+def test_a_fault_is_found_by_name_with_advice(rig, tmp_path, fault, name, advice):
+    report = checked(rig, tmp_path, fault)
+    assert name in failed(report)
+    assert advice in report[name].advice
+    assert report.verdict is Verdict.FAIL
+
+
+def test_a_wrong_load_at_the_panel_is_named_as_such(rig, tmp_path):
+    # Told 50 ohm at the panel, and nobody can ask: every amplitude is twice what was set.
+    panel_only = Quirks(load_is_panel_only=True)
+    report = checked(rig, tmp_path, quirks=panel_only, panel=Panel(declared_load_ohm=50.0))
+    assert report["drive over setting"].number == pytest.approx(2.0, rel=2e-2)
+    assert "a factor of 2 is a wrong load" in report["drive over setting"].advice
+
+
+def test_a_right_load_that_nobody_can_ask_for_passes(rig, tmp_path):
+    panel_only = Quirks(load_is_panel_only=True)
+    assert failed(checked(rig, tmp_path, quirks=panel_only, panel=Panel(declared_load_ohm=inf))) == set()
+
+
+def test_a_lost_generator_is_an_error_and_no_finding(rig, tmp_path):
+    with bench_of(rig) as (bench, virtual):
+        virtual.faults.pull_usb_cable()
+        with pytest.raises(InstrumentLost):
+            check_bench(bench, tmp_path)
+        virtual.faults.plug_usb_cable()
+
+
+def test_the_report_reads_as_a_table_and_survives_json(rig, tmp_path):
+    report = checked(rig, tmp_path, lambda virtual: virtual.faults.turn_amplifier_gain(20.0))
+    assert BenchReport.model_validate_json(report.model_dump_json()) == report
+    lines = report.text().splitlines()
+    at = next(index for index, line in enumerate(lines) if "amplifier gain" in line)
+    assert lines[at].startswith("FAIL")
+    assert lines[at + 1].strip().startswith("-> set the gain")
+    with pytest.raises(KeyError, match=r"amplifier gain"):
+        report["nonsense"]
+
+
+@pytest.mark.parametrize(
+    ("deviation", "verdict"),
+    [
+        (1.0, Verdict.OK),
+        (1.1, Verdict.WARN),
+        (3.0, Verdict.WARN),
+        (3.1, Verdict.FAIL),
+        (np.nan, Verdict.FAIL),
+    ],
+)
+def test_a_deviation_is_judged_by_its_bounds(deviation, verdict):
+    assert Bounds(1.0, 3.0).verdict(deviation) is verdict
+
+
+class TestSineFit:
+    def test_amplitude_and_phase_of_a_pure_sine_are_exact(self):
+        time_s = np.arange(1000) / 5000.0
+        fit = fit_sine(0.3 + 2.0 * np.cos(2 * np.pi * 160.0 * time_s + 0.7), 160.0, 5000.0)
+        assert (fit.amplitude, fit.phase_rad) == pytest.approx((2.0, 0.7), rel=1e-12)
+        assert fit.residual_rms < 1e-12
+
+    def test_the_uncertainty_is_how_far_the_amplitude_scatters_in_noise(self):
+        rng = np.random.default_rng(7)
+        sine = np.sin(2 * np.pi * 160.0 * np.arange(1000) / 5000.0)
+        fits = [fit_sine(sine + 0.1 * rng.standard_normal(1000), 160.0, 5000.0) for _ in range(400)]
+        scatter = np.std([fit.amplitude for fit in fits])
+        assert scatter == pytest.approx(np.mean([fit.uncertainty for fit in fits]), rel=0.15)
+
+    @pytest.mark.parametrize("ppm", [-60.0, 0.0, 17.0])
+    def test_the_clock_ratio_is_found_within_its_uncertainty(self, ppm):
+        rng = np.random.default_rng(11)
+        time_s = np.arange(100_000) / 51_200.0
+        sine = np.sin(2 * np.pi * 160.0 * (1 + ppm * 1e-6) * time_s + 3.0)
+        found = clock_ratio(sine + 1e-3 * rng.standard_normal(time_s.size), 160.0, 51_200.0)
+        assert abs(found.ppm - ppm) < 4 * found.uncertainty_ppm
+        assert found.uncertainty_ppm < 1.0

@@ -1,0 +1,201 @@
+"""Campaign files: defaults, refusals, exact round trips, and the two that are shipped."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.errors import ConfigurationError
+from acquisition.excitation.dwell import Dwell
+from acquisition.excitation.multisine_noise import MultisineNoise
+from acquisition.excitation.odd_multisine import OddMultisine
+from acquisition.excitation.sine_sweep import SineSweep
+from acquisition.excitation.stepped_sine import FrequencyGrid, SteppedSine
+from acquisition.excitation.streamed_noise import StreamedNoise
+from acquisition.plan.campaign import Campaign, load_campaign
+from acquisition.plan.limits import require_within_limits
+from acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
+from acquisition.rig.configuration import load_rig
+from acquisition.toml_text import toml_text
+
+ROOT = Path(__file__).parent.parent.parent.parent
+SHIPPED = sorted((ROOT / "campaigns").glob("*.toml"))
+
+DWELL_TABLE = """
+[[measurements]]
+name = "dwell"
+[measurements.excitation]
+kind = "dwell"
+amplitude_vpp = 1.5
+frequency_hz = 260
+duration_s = 2
+"""
+
+
+def loaded(tmp_path, text):
+    path = tmp_path / "campaign.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_campaign(path)
+
+
+EXCITATIONS = st.one_of(
+    st.builds(
+        Dwell,
+        amplitude_vpp=st.floats(0.002, 20),
+        frequency_hz=st.floats(1e-3, 1e5),
+        duration_s=st.floats(1e-3, 1e4),
+    ),
+    st.builds(
+        SteppedSine,
+        amplitude_vpp=st.floats(0.002, 20),
+        frequencies_hz=st.lists(st.floats(1, 1e4), min_size=1, max_size=9, unique=True).map(
+            lambda values: tuple(sorted(values))
+        ),
+    ),
+    st.just(SteppedSine(amplitude_vpp=1, grid=FrequencyGrid(start_hz=1, stop_hz=9, step_hz=0.1))),
+    st.just(OddMultisine(amplitude_vpp=1, band_start_hz=20, band_stop_hz=90)),
+    st.just(MultisineNoise(amplitude_vpp=0.05, band_start_hz=20, band_stop_hz=800)),
+    st.just(SineSweep(amplitude_vpp=1.5, start_hz=350, stop_hz=150, duration_s=20)),
+    st.just(StreamedNoise(amplitude_vpp=1.5, band_start_hz=20, band_stop_hz=800, duration_s=9)),
+)
+# Lone surrogates are no text: no file can hold them.
+TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=40)
+MEASUREMENTS = st.builds(
+    Measurement,
+    name=st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_-]{0,10}", fullmatch=True),
+    excitation=EXCITATIONS,
+    ramp_s=st.floats(0.3, 60),
+    notes=TEXT,
+    limits=st.builds(InRunLimits, on_overload=st.sampled_from(OnOverload), current=st.floats(0.01, 1)),
+)
+
+
+class TestRoundTrips:
+    @given(
+        measurements=st.lists(
+            MEASUREMENTS, min_size=1, max_size=4, unique_by=lambda measurement: measurement.name.lower()
+        ),
+        notes=TEXT,
+    )
+    def test_a_campaign_comes_back_from_its_toml_text_as_it_was(self, tmp_path_factory, measurements, notes):
+        campaign = Campaign(name="c", notes=notes, measurements=tuple(measurements))
+        path = tmp_path_factory.mktemp("toml") / "c.toml"
+        path.write_bytes(toml_text(campaign).encode())
+        assert load_campaign(path) == campaign
+
+    @given(measurement=MEASUREMENTS)
+    def test_a_measurement_comes_back_from_json_as_it_was(self, measurement):
+        assert Measurement.model_validate_json(measurement.model_dump_json()) == measurement
+
+    @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+    def test_a_shipped_campaign_written_out_is_the_same(self, tmp_path, path):
+        campaign = load_campaign(path)
+        assert loaded(tmp_path, toml_text(campaign)) == campaign
+
+
+class TestDefaults:
+    def test_they_fill_in_what_a_measurement_leaves_out(self, tmp_path):
+        text = 'name = "c"\n[defaults]\nramp_s = 0.7\n[defaults.dwell]\nsettle_s = 9.0\n' + DWELL_TABLE
+        (measurement,) = loaded(tmp_path, text).measurements
+        assert measurement.ramp_s == 0.7
+        assert measurement.excitation.settle_s == 9.0
+
+    def test_a_measurement_s_own_value_comes_first(self, tmp_path):
+        text = 'name = "c"\n[defaults.dwell]\nduration_s = 9.0\n' + DWELL_TABLE
+        (measurement,) = loaded(tmp_path, text).measurements
+        assert measurement.excitation.duration_s == 2.0
+
+    def test_they_say_nothing_to_another_kind(self, tmp_path):
+        text = 'name = "c"\n[defaults.sine_sweep]\nstep_s = 9.0\n' + DWELL_TABLE
+        assert len(loaded(tmp_path, text).measurements) == 1
+
+    def test_a_misspelt_default_is_refused(self, tmp_path):
+        text = 'name = "c"\n[defaults]\nramp_ms = 9.0\n' + DWELL_TABLE
+        with pytest.raises(ConfigurationError, match=r"measurements\.0\.ramp_ms is not a known key"):
+            loaded(tmp_path, text)
+
+    def test_a_default_for_an_unknown_kind_is_refused(self, tmp_path):
+        text = 'name = "c"\n[defaults.dwel]\nsettle_s = 9.0\n' + DWELL_TABLE
+        with pytest.raises(ConfigurationError, match=r"measurements\.0\.dwel is not a known key"):
+            loaded(tmp_path, text)
+
+
+class TestRefusals:
+    def test_the_file_the_key_and_what_is_allowed_are_named(self, tmp_path):
+        text = 'name = "c"\n' + DWELL_TABLE.replace("1.5", "50")
+        with pytest.raises(ConfigurationError) as refused:
+            loaded(tmp_path, text)
+        said = str(refused.value)
+        assert said.startswith(str(tmp_path / "campaign.toml"))
+        assert "measurements.0.excitation.dwell.amplitude_vpp = 50" in said
+        assert "less than or equal to 20" in said
+
+    def test_two_measurements_of_one_name_are_refused(self, tmp_path):
+        with pytest.raises(ConfigurationError, match="two measurements would be recorded as 'dwell'"):
+            loaded(tmp_path, 'name = "c"\n' + DWELL_TABLE + DWELL_TABLE.replace('"dwell"\n[', '"Dwell"\n['))
+
+    def test_a_repeat_may_not_take_another_measurement_s_name(self, tmp_path):
+        twice = DWELL_TABLE.replace("[measurements.exc", "repeats = 2\n[measurements.exc")
+        with pytest.raises(ConfigurationError, match="recorded as 'dwell-2'"):
+            loaded(
+                tmp_path, 'name = "c"\n' + twice + DWELL_TABLE.replace('name = "dwell"', 'name = "dwell-2"')
+            )
+
+    @pytest.mark.parametrize("name", ["", "a b", "../up", ".hidden", "a.b", "ü", "x" * 65])
+    def test_a_name_that_is_no_file_name_everywhere_is_refused(self, name):
+        with pytest.raises(ValueError, match="name"):
+            Measurement(name=name, excitation=Dwell(amplitude_vpp=1, frequency_hz=1, duration_s=1))
+
+    def test_an_empty_campaign_is_refused(self, tmp_path):
+        with pytest.raises(ConfigurationError, match="measurements"):
+            loaded(tmp_path, 'name = "c"\nmeasurements = []\n')
+
+    def test_a_ramp_without_stairs_is_refused(self):
+        with pytest.raises(ValueError, match=r"ramp_step_s = 0\.1 leaves fewer than 4 stairs.*at most 0\.05"):
+            Measurement(
+                name="a",
+                excitation=Dwell(amplitude_vpp=1, frequency_hz=1, duration_s=1),
+                ramp_s=0.2,
+                ramp_step_s=0.1,
+            )
+
+
+class TestEstimates:
+    def test_repeats_count_in_names_and_time(self):
+        plan = Measurement(
+            name="a", excitation=Dwell(amplitude_vpp=1, frequency_hz=1, duration_s=7, settle_s=3), repeats=3
+        )
+        campaign = Campaign(name="c", measurements=(plan,))
+        assert campaign.recording_names() == ("a-1", "a-2", "a-3")
+        # Each: 0.6 s of check, a second of ramp, 3 s of settling, 7 s of dwell, a second of ramp.
+        assert campaign.duration_s == pytest.approx(3 * 12.6)
+        assert campaign.size_bytes(1000.0, 2) == 3 * 12600 * 2 * 4
+
+    def test_a_change_of_waveform_costs_a_ramp_down_and_up(self):
+        noise = MultisineNoise(
+            amplitude_vpp=1, band_start_hz=20, band_stop_hz=90, realisations=4, periods=2, settle_s=1
+        )
+        campaign = Campaign(name="c", measurements=(Measurement(name="a", excitation=noise, ramp_s=0.5),))
+        assert campaign.duration_s == pytest.approx(0.6 + 4 * (0.5 + 1 + 2 + 0.5))
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_a_shipped_campaign_keeps_the_limits_of_the_virtual_rig(path):
+    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    for measurement in load_campaign(path).measurements:
+        require_within_limits(measurement, rig)
+
+
+def test_the_paper_s_campaign_has_its_levels_band_and_times():
+    plans = {
+        each.name: each.excitation for each in load_campaign(ROOT / "campaigns" / "paper.toml").measurements
+    }
+    noise = [plan.amplitude_vpp for plan in plans.values() if plan.kind == "multisine_noise"]
+    dwells = [plan for plan in plans.values() if plan.kind == "dwell"]
+    sweep = plans["sweep_moderate"]
+    assert noise == [0.05, 1.5, 10]
+    assert [plan.amplitude_vpp for plan in dwells] == [0.05, 1.5, 10]
+    assert {plan.frequency_hz for plan in dwells} == {260}
+    assert min(plan.duration_s for plan in dwells) >= 10
+    assert (sweep.start_hz, sweep.stop_hz, sweep.duration_s, sweep.amplitude_vpp) == (150, 350, 200, 1.5)

@@ -1,0 +1,142 @@
+"""Predicted loads against closed forms, and what is refused."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.signal import lsim
+
+from acquisition.errors import LimitExceeded
+from acquisition.excitation.dwell import Dwell
+from acquisition.excitation.multisine_noise import MultisineNoise
+from acquisition.excitation.sine_sweep import SineSweep
+from acquisition.excitation.steps import Waveform
+from acquisition.excitation.streamed_noise import StreamedNoise
+from acquisition.plan.limits import limit_checks, limit_table, require_within_limits, shortest_ramp_s
+from acquisition.plan.loads import predicted_loads
+from acquisition.plan.measurement import Measurement
+from acquisition.rig.model import Quantity, RigModel
+
+
+def plan(excitation, **fields):
+    return Measurement(name="plan", excitation=excitation, **fields)
+
+
+def test_a_sine_s_loads_are_its_amplitude_times_the_model(rig):
+    loads = predicted_loads(Dwell(amplitude_vpp=3.0, frequency_hz=260, duration_s=1), rig)
+    for quantity in Quantity:
+        expected = 1.5 * rig.generator.terminal_factor() * abs(RigModel(rig).transfer(quantity, 260.0))
+        assert loads[quantity].peak == pytest.approx(float(expected), rel=1e-12)
+        assert loads[quantity].rms == pytest.approx(float(expected) / np.sqrt(2), rel=1e-12)
+
+
+def test_far_above_the_suspension_the_acceleration_is_force_over_mass(rig):
+    loads = predicted_loads(Dwell(amplitude_vpp=1.0, frequency_hz=1500, duration_s=1), rig)
+    mass = rig.shaker.moving_mass_kg + rig.shaker.fixture_mass_kg
+    assert loads[Quantity.ACCELERATION].peak == pytest.approx(loads[Quantity.FORCE].peak / mass, rel=1e-3)
+
+
+def test_a_sweep_is_judged_where_the_rig_answers_most(rig):
+    sweep = SineSweep(amplitude_vpp=1, start_hz=10, stop_hz=100, duration_s=100)
+    loads = predicted_loads(sweep, rig)
+    grid_hz = np.linspace(10, 100, 20_000)
+    highest = np.max(np.abs(RigModel(rig).transfer(Quantity.STROKE, grid_hz)))
+    expected = 0.5 * rig.generator.terminal_factor() * highest
+    assert loads[Quantity.STROKE].peak == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_waveform_s_peaks_are_those_of_an_integration_in_time(rig):
+    """The Fourier prediction against a step-by-step solution of the shaker's equations."""
+    noise = MultisineNoise(
+        amplitude_vpp=2.0, band_start_hz=20, band_stop_hz=200, repetition_hz=2, realisations=1
+    )
+    loads = predicted_loads(noise, rig)
+    (step,) = noise.steps()
+    assert isinstance(step.play, Waveform)
+    fine = 8
+    held = np.tile(np.repeat(step.play.values, fine), 3)
+    time_s = np.arange(len(held)) / (8192 * fine * 2)
+    model = RigModel(rig)
+    space = model.shaker_equations()
+    terminal_v = held * 0.5 * 2.0 * rig.generator.terminal_factor()
+    # The amplifier's band edges are far outside 20 to 200 Hz: its gain alone stands for it here.
+    voltage = terminal_v * rig.amplifier.gain
+    _, _, states = lsim((space.A, space.B[:, :1], np.eye(3), np.zeros((3, 1))), voltage, time_s, interp=False)
+    last = states[-len(held) // 3 :]
+    assert loads[Quantity.STROKE].peak == pytest.approx(np.max(np.abs(last[:, 0])), rel=0.02)
+    assert loads[Quantity.VELOCITY].peak == pytest.approx(np.max(np.abs(last[:, 1])), rel=0.02)
+    assert loads[Quantity.CURRENT].peak == pytest.approx(np.max(np.abs(last[:, 2])), rel=0.02)
+
+
+def test_streamed_noise_reaches_the_terminal_s_range_and_no_more(rig):
+    noise = StreamedNoise(amplitude_vpp=2.0, band_start_hz=50, band_stop_hz=800, duration_s=1)
+    volts = predicted_loads(noise, rig)[Quantity.AMPLIFIER_VOLTAGE]
+    assert volts.peak == pytest.approx(rig.generator.terminal_factor() * rig.amplifier.gain, rel=2e-3)
+    assert volts.rms == pytest.approx(volts.peak / 4.5)
+
+
+@given(factor=st.floats(0.01, 5))
+def test_loads_grow_with_the_setting(factor):
+    from pathlib import Path
+
+    from acquisition.rig.configuration import load_rig
+
+    rig = load_rig(Path(__file__).parent.parent.parent.parent / "hardware_configs" / "virtual_rig.toml")
+    one = predicted_loads(Dwell(amplitude_vpp=1.0, frequency_hz=50, duration_s=1), rig)
+    more = predicted_loads(Dwell(amplitude_vpp=factor, frequency_hz=50, duration_s=1), rig)
+    for quantity in Quantity:
+        assert more[quantity].peak == pytest.approx(factor * one[quantity].peak, rel=1e-12)
+
+
+def test_a_wrong_load_setting_doubles_every_load(rig):
+    at_50_ohm = rig.model_copy(update={"generator": rig.generator.model_copy(update={"load_ohm": 50.0})})
+    sine = Dwell(amplitude_vpp=1.0, frequency_hz=260, duration_s=1)
+    open_load = predicted_loads(sine, rig)[Quantity.FORCE].peak
+    assert predicted_loads(sine, at_50_ohm)[Quantity.FORCE].peak == pytest.approx(2 * open_load, rel=1e-12)
+
+
+def test_a_violation_names_quantity_value_limit_source_and_remedy(rig):
+    with pytest.raises(LimitExceeded) as refused:
+        require_within_limits(plan(Dwell(amplitude_vpp=10, frequency_hz=20, duration_s=1)), rig)
+    text = str(refused.value)
+    assert text.startswith("plan: the stroke (at 20 Hz, peak) would be 0.00")
+    assert "allowed is at most 0.004 m (4809 manual: 8 mm peak to peak between the rubber stops)" in text
+    assert "lower amplitude_vpp or raise the lowest frequency" in text
+    assert text.endswith("Nothing was played.")
+
+
+def test_all_violations_are_in_one_message(rig):
+    with pytest.raises(LimitExceeded) as refused:
+        require_within_limits(
+            plan(Dwell(amplitude_vpp=18, frequency_hz=5000, duration_s=1), ramp_s=0.05, ramp_step_s=0.01), rig
+        )
+    text = str(refused.value)
+    for quantity in (
+        "the generator's setting",
+        "the highest frequency",
+        "the ramp",
+        "the amplifier's voltage",
+    ):
+        assert f"{quantity} " in text
+
+
+def test_a_value_on_its_limit_is_allowed(rig):
+    setting = rig.generator.amplitude_limit_vpp
+    checks = limit_checks(plan(Dwell(amplitude_vpp=setting, frequency_hz=400, duration_s=1)), rig)
+    assert checks[0].use == 1.0
+    assert checks[0].is_kept
+
+
+def test_the_shortest_ramp_is_three_periods_of_the_loaded_suspension(rig):
+    shaker = rig.shaker
+    mass = shaker.moving_mass_kg + shaker.fixture_mass_kg
+    period_s = 2 * np.pi * np.sqrt(mass / shaker.suspension_stiffness_n_per_m)
+    assert shortest_ramp_s(rig) == pytest.approx(3 * period_s)
+
+
+def test_the_table_puts_the_most_used_limit_first(rig):
+    checks = limit_checks(plan(Dwell(amplitude_vpp=5, frequency_hz=20, duration_s=1)), rig)
+    lines = limit_table(checks).splitlines()
+    shares = [float(line.split("%")[0].split()[-1]) for line in lines[1:]]
+    assert shares == sorted(shares, reverse=True)
+    assert len(lines) == len(checks) + 1

@@ -1,0 +1,82 @@
+"""A hardware configuration is right, or is refused with file, key, what was given and what is allowed."""
+
+from pathlib import Path
+
+import pytest
+
+from acquisition.errors import ConfigurationError
+from acquisition.rig.channel import channels_of
+from acquisition.rig.configuration import Rig, Role, load_rig
+
+CONFIGS = Path(__file__).resolve().parents[3] / "hardware_configs"
+VIRTUAL = CONFIGS / "virtual_rig.toml"
+
+
+@pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.toml")), ids=lambda path: path.name)
+def test_every_configuration_that_we_ship_is_valid(path):
+    assert load_rig(path).name
+
+
+def edited(tmp_path: Path, old: str, new: str) -> Path:
+    text = VIRTUAL.read_text(encoding="utf-8")
+    assert old in text
+    path = tmp_path / "bench.toml"
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "gain_db = 10.0",
+            "gain_db = 100.0",
+            r"bench\.toml: amplifier\.gain_db = 100\.0: .*less than or equal to 60",
+        ),
+        ("gain_db = 10.0", 'gain_db = "10 dB"', r"amplifier\.gain_db = '10 dB': .*valid number"),
+        (
+            "gain_db = 10.0",
+            "gain = 10.0",
+            r"amplifier\.gain_db is missing.*amplifier\.gain is not a known key",
+        ),
+        ("delay_s = 8e-6", "delay_s = -1.0", r"vibrometer\.delay_s = -1\.0: .*greater than or equal to 0"),
+        ("delay_s = 8e-6", "delay_s = nan", r"vibrometer\.delay_s = nan: .*finite"),
+        ('resource = "USB0', 'resource = "COM3', r"generator\.resource = 'COM3.*match pattern"),
+        ('physical = "ai1"', 'physical = "ai0"', r"daq = .*physical ai0 is given twice"),
+        ("calibrated = 2026-02-10", "calibrated = 2026-02-30", r"not valid TOML.*line"),
+        ("[specimen]", "[specimen", r"not valid TOML"),
+    ],
+)
+def test_a_wrong_configuration_is_refused_with_its_key(tmp_path, old, new, said):
+    with pytest.raises(ConfigurationError, match=said):
+        load_rig(edited(tmp_path, old, new))
+
+
+def test_a_missing_file_is_refused_with_its_path(tmp_path):
+    with pytest.raises(ConfigurationError, match=r"nowhere\.toml: cannot be read"):
+        load_rig(tmp_path / "nowhere.toml")
+
+
+def test_a_configuration_comes_back_from_json_as_it_was():
+    rig = load_rig(VIRTUAL)
+    assert Rig.model_validate_json(rig.model_dump_json()) == rig
+
+
+@pytest.mark.parametrize(("load", "factor"), [('"high-z"', 1.0), ("50.0", 2.0)])
+def test_a_generator_told_of_50_ohm_gives_twice_what_it_shows(tmp_path, load, factor):
+    rig = load_rig(edited(tmp_path, 'load_ohm = "high-z"', f"load_ohm = {load}"))
+    loading = 15000 / 15050
+    assert rig.generator.terminal_factor() == pytest.approx(factor * loading)
+
+
+def test_the_vibrometer_range_scales_its_channel():
+    rig = load_rig(VIRTUAL)
+    velocity = {channel.role: channel for channel in channels_of(rig)}[Role.M0_VELOCITY]
+    assert velocity.units_per_volt == pytest.approx(rig.vibrometer.range_mm_per_s_per_v * 1e-3)
+    assert velocity.full_scale_v == 4.0
+    assert velocity.delay_s == rig.vibrometer.delay_s
+
+
+def test_a_divider_is_taken_out_of_its_channel():
+    drive = {channel.role: channel for channel in channels_of(load_rig(VIRTUAL))}[Role.DRIVE_VOLTAGE]
+    assert drive.units_per_volt == 2.0

@@ -1,0 +1,219 @@
+"""What goes wrong in a laboratory, on the virtual rig: a clear error, a silent generator, a kept recording.
+
+Silence is looked at in the simulated world, at the generator's terminal, not in what a driver believes.
+"""
+
+import re
+
+import numpy as np
+import pytest
+
+from acquisition.bench import open_bench
+from acquisition.errors import (
+    AcquisitionError,
+    CheckFailed,
+    DataLost,
+    InstrumentBusy,
+    InstrumentError,
+    InstrumentLost,
+    SettingRefused,
+)
+from acquisition.excitation.dwell import Dwell
+from acquisition.excitation.sine_sweep import SineSweep
+from acquisition.plan.measurement import Measurement
+from acquisition.recording import RecordingState, open_recording
+from acquisition.rig.calibration import CalibrationRule
+from acquisition.rig.knobs import confirm_simulated
+from acquisition.run.run_measurement import run_measurement
+from acquisition.run.state import RunState
+from acquisition.virtual.generator.output_signal import Panel
+from acquisition.virtual.generator.scpi_command import Quirks
+from acquisition.virtual.rig import VirtualRig
+
+DWELL = Measurement(
+    name="run",
+    excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.2, duration_s=3),
+    ramp_s=0.3,
+    ramp_step_s=0.03,
+)
+SWEEP = DWELL.model_copy(
+    update={"excitation": SineSweep(amplitude_vpp=1.5, start_hz=200, stop_hz=230, duration_s=3, settle_s=0.2)}
+)
+
+
+@pytest.fixture
+def laboratory(rig):
+    """Start a rig with faults on demand, and the bench on it as on any real one: by its addresses."""
+    opened = []
+
+    def start(**habits):
+        virtual = VirtualRig(rig, **habits)
+        virtual.__enter__()
+        opened.append(virtual)
+        connected = rig.model_copy(
+            update={
+                "virtual": None,
+                "daq": rig.daq.model_copy(update={"server": virtual.daq_address}),
+                "generator": rig.generator.model_copy(update={"resource": virtual.visa_resource}),
+            }
+        )
+        return virtual, connected
+
+    yield start
+    for virtual in opened:
+        virtual.__exit__(None, None, None)
+
+
+def bench_on(connected):
+    return open_bench(connected, confirm=confirm_simulated, calibration=CalibrationRule.WAIVED)
+
+
+def terminal_v(virtual, duration_s=0.1):
+    """Largest voltage at the generator's terminal during the next tenth of a second."""
+    start_s = virtual.world.time_s
+    virtual.world.advance(duration_s)
+    interval_s = 1e-4
+    count = round(duration_s / interval_s)
+    return np.max(np.abs(virtual.generator.render(start_s + duration_s, interval_s, count)))
+
+
+def when_recording(act):
+    """Do ``act`` once, at the first block that belongs to the record."""
+    done = []
+
+    def watch(progress):
+        if progress.state is RunState.RECORDING and not done:
+            done.append(True)
+            act()
+
+    return watch
+
+
+def kept(path, state, reason):
+    with open_recording(path) as recording:
+        assert recording.state is state
+        assert re.search(reason, recording.reason, re.IGNORECASE), recording.reason
+        assert recording.samples > 0
+        assert np.max(np.abs(recording.read("drive_voltage"))) > 0
+        return recording.samples
+
+
+@pytest.mark.parametrize(
+    ("code", "kind", "said"),
+    [
+        (-200279, DataLost, "overwritten"),
+        (-200361, DataLost, "buffer|memory|overflow"),
+        (-200284, InstrumentError, "in time|not arrive|wait"),
+        (-201003, InstrumentLost, "gone|cannot be accessed|reached"),
+    ],
+)
+def test_a_converter_that_fails_leaves_silence_and_the_record_so_far(laboratory, tmp_path, code, kind, said):
+    virtual, connected = laboratory()
+    fail = when_recording(lambda: virtual.faults.fail_daq("ReadAnalogF64", code))
+    with bench_on(connected) as bench:
+        with pytest.raises(kind) as failure:
+            run_measurement(bench, DWELL, tmp_path / "run.h5", on_progress=fail)
+        virtual.faults.heal_daq()
+        assert terminal_v(virtual) < 1e-2
+    assert re.search(said, str(failure.value), re.IGNORECASE), str(failure.value)
+    kept(tmp_path / "run.h5", RecordingState.FAILED, type(failure.value).__name__)
+
+
+def test_a_device_in_another_programs_hands_is_named_before_anything_plays(laboratory):
+    virtual, connected = laboratory()
+    with bench_on(connected):
+        # The generator is let go of first, so that it is the converter that is found busy.
+        with pytest.raises(InstrumentError), bench_on(connected):
+            pass
+        virtual.faults.heal_daq()
+    virtual.faults.fail_daq("CfgSampClkTiming", -50103)
+    with pytest.raises(InstrumentBusy, match="another program"):
+        bench_on(connected)
+    assert terminal_v(virtual) < 1e-2
+
+
+def test_a_pulled_usb_cable_tells_the_operator_to_switch_the_amplifier_off(laboratory, tmp_path):
+    virtual, connected = laboratory()
+    pull = when_recording(virtual.faults.pull_usb_cable)
+    with pytest.raises(InstrumentLost, match="amplifier") as failure, bench_on(connected) as bench:
+        run_measurement(bench, SWEEP, tmp_path / "run.h5", on_progress=pull)
+    # Nobody can silence what cannot be reached: it is said, and the next program can.
+    assert "MAY STILL BE ON" in "".join([str(failure.value), *getattr(failure.value, "__notes__", [])])
+    kept(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentLost")
+    virtual.faults.plug_usb_cable()
+    with bench_on(connected):
+        assert terminal_v(virtual) < 1e-2
+
+
+def test_a_server_that_dies_is_lost_and_the_generator_silent(laboratory, tmp_path):
+    virtual, connected = laboratory()
+    die = when_recording(virtual.faults.lose_daq_server)
+    with pytest.raises(InstrumentLost), bench_on(connected) as bench:
+        run_measurement(bench, DWELL, tmp_path / "run.h5", on_progress=die)
+    assert terminal_v(virtual) < 1e-2
+    kept(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentLost")
+
+
+def test_a_reply_that_comes_too_late_silences(laboratory, tmp_path):
+    virtual, connected = laboratory()
+    delay = when_recording(lambda: virtual.faults.delay_next_reply(60.0))
+    with bench_on(connected) as bench:
+        with pytest.raises(InstrumentError, match="did not answer"):
+            run_measurement(bench, SWEEP, tmp_path / "run.h5", on_progress=delay)
+        assert terminal_v(virtual) < 1e-2
+    kept(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentError")
+
+
+def test_a_setting_that_the_instrument_replaced_in_silence_is_a_fault(laboratory, tmp_path):
+    virtual, connected = laboratory()
+    # A bench that allows more than the instrument can: 25 Vpp become its default without a word.
+    bold = connected.model_copy(
+        update={"generator": connected.generator.model_copy(update={"amplitude_limit_vpp": 20.0})}
+    )
+    with bench_on(bold) as bench:
+        virtual.generator.execute(b"OUTP1:IMP 50\n")
+        with pytest.raises((SettingRefused, InstrumentError)) as failure:
+            bench.generator.load_sine(260.0, 18.0)
+        assert terminal_v(virtual) < 1e-2
+    assert "18" in str(failure.value)
+
+
+def test_a_wrong_load_at_the_panel_is_found_before_the_full_level(laboratory, tmp_path):
+    virtual, connected = laboratory(
+        quirks=Quirks(load_is_panel_only=True), panel=Panel(declared_load_ohm=50.0)
+    )
+    with pytest.raises(AcquisitionError) as failure, bench_on(connected) as bench:
+        run_measurement(bench, DWELL, tmp_path / "run.h5")
+    assert isinstance(failure.value, CheckFailed | SettingRefused | InstrumentError)
+    assert re.search("load|50 ohm|twice|factor", str(failure.value), re.IGNORECASE)
+    assert terminal_v(virtual) < 1e-2
+
+
+def test_a_laser_dropout_and_an_over_range_are_flagged_and_the_run_goes_on(laboratory, tmp_path):
+    virtual, connected = laboratory()
+    blind = when_recording(lambda: virtual.faults.over_range(0.2))
+    with bench_on(connected) as bench:
+        outcome = run_measurement(bench, DWELL, tmp_path / "run.h5", on_progress=blind)
+        assert terminal_v(virtual) < 1e-2
+    assert outcome.state is RunState.FINISHED
+    with open_recording(tmp_path / "run.h5") as recording:
+        assert recording.state is RecordingState.COMPLETE
+        flagged = [overload for overload in recording.overloads if overload.channel == "m0_velocity"]
+        samples = sum(overload.last_sample - overload.first_sample + 1 for overload in flagged)
+        assert samples / recording.sample_rate_hz == pytest.approx(0.2, abs=0.05)
+
+
+def test_an_output_relay_that_sticks_is_seen_by_the_bench_check(laboratory, tmp_path):
+    from acquisition.check.bench_report import check_bench
+    from acquisition.check.finding import Verdict
+
+    virtual, connected = laboratory()
+    with bench_on(connected) as bench:
+        bench.generator.load_sine(160.0, 0.1)
+        bench.generator.start()
+        virtual.faults.stick_output()
+        bench.generator.stop()
+        report = check_bench(bench, tmp_path)
+        assert report.verdict is Verdict.FAIL
+        assert report["drive left after stop"].verdict is Verdict.FAIL
+        virtual.faults.free_output()

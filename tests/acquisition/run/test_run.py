@@ -1,0 +1,483 @@
+"""The run as a state machine: what it plays and records, and every way out of every state."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from acquisition.check.low_level import BenchCheck, sine_amplitude
+from acquisition.errors import (
+    CheckFailed,
+    ConfigurationError,
+    DataLost,
+    InstrumentLost,
+    LimitExceeded,
+    RecordingError,
+)
+from acquisition.excitation.dwell import Dwell
+from acquisition.excitation.multisine_noise import MultisineNoise
+from acquisition.excitation.sine_sweep import SineSweep
+from acquisition.excitation.stepped_sine import SteppedSine
+from acquisition.excitation.streamed_noise import StreamedNoise
+from acquisition.instruments import Overload
+from acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
+from acquisition.recording.layout import RecordingState
+from acquisition.run.run import Run
+from acquisition.run.schedule import CHECK_S
+from acquisition.run.state import RunState
+
+RATE = 5120.0
+AMPLITUDE_VPP = 1.0
+DWELL = Measurement(
+    name="dwell",
+    excitation=Dwell(amplitude_vpp=AMPLITUDE_VPP, frequency_hz=260, settle_s=0.35, duration_s=0.5),
+    ramp_s=0.2,
+    ramp_step_s=0.02,
+)
+RECORDED_STATES = [
+    RunState.CHECKING,
+    RunState.RAMPING_UP,
+    RunState.SETTLING,
+    RunState.RECORDING,
+    RunState.RAMPING_DOWN,
+]
+every_state = pytest.mark.parametrize("state", RECORDED_STATES)
+
+
+def run_of(bench, tmp_path, measurement=DWELL, check=BenchCheck.AT_LOW_LEVEL):
+    return Run(bench, measurement, tmp_path / "run.h5", check, bench.recorder.create)
+
+
+def play(run):
+    return list(run)
+
+
+def upto(run, state):
+    """Iterate until the run yields a block in ``state``."""
+    return next(progress for progress in run if progress.state is state)
+
+
+def assert_silent_and_finished(bench, state):
+    assert not bench.world.is_on
+    assert not bench.world.is_sampling
+    assert bench.recorder.ending[0] is state
+    generator = [name for name, _, _ in bench.world.calls if "." not in name and name != "amplitude"]
+    assert generator[-1] == "stop"
+    order = [name for name, _, _ in bench.world.calls]
+    assert len(order) - order[::-1].index("stop") <= order.index("recorder.finish")
+
+
+def assert_ended_without_a_jump(bench):
+    """While the output was on, no amplitude setting was more than one stair below the last."""
+    settings = [value for _, value in bench.world.amplitudes()]
+    top = max(settings)
+    largest_stair = top * np.pi / 2 / 10 * 1.05
+    assert np.max(-np.diff(settings[settings.index(top) :]), initial=0.0) <= largest_stair
+    assert settings[-1] <= 2.5e-3 + 1e-12
+
+
+class TestThePlanIsCarriedOut:
+    def test_all_states_are_passed_in_order(self, bench, tmp_path):
+        run = run_of(bench, tmp_path)
+        assert run.state is RunState.IDLE
+        seen = [progress.state for progress in run]
+        assert list(dict.fromkeys(seen)) == RECORDED_STATES
+        assert bench.recorder.states() == ["armed", "ramping_up", "settling", "recording", "ramping_down"]
+        assert run.state is RunState.FINISHED
+        assert_silent_and_finished(bench, RecordingState.COMPLETE)
+
+    def test_every_stretch_has_exactly_its_samples(self, bench, tmp_path):
+        play(run_of(bench, tmp_path))
+        lengths = {each["label"]: each["last"] - each["first"] + 1 for each in bench.recorder.segments}
+        expected = {"check": CHECK_S, "ramp_up": 0.2, "dwell": 0.5, "ramp_down": 0.2}
+        assert lengths == {label: round(seconds * RATE) for label, seconds in expected.items()}
+        assert bench.recorder.samples == round((CHECK_S + 0.2 + 0.35 + 0.5 + 0.2) * RATE)
+
+    def test_the_blocks_tell_the_progress(self, bench, tmp_path):
+        shown = play(run_of(bench, tmp_path))
+        assert shown[-1].elapsed_s == pytest.approx(shown[-1].total_s)
+        assert all(a.elapsed_s < b.elapsed_s for a, b in pairwise(shown))
+        assert max(progress.block.volts.shape[1] for progress in shown) <= 0.1 * RATE
+        settings = {progress.state: progress.amplitude_vpp for progress in shown}
+        assert shown[0].amplitude_vpp == 0.0
+        assert settings[RunState.CHECKING] == pytest.approx(0.02 * AMPLITUDE_VPP)
+        assert settings[RunState.RECORDING] == AMPLITUDE_VPP
+
+    def test_the_recorded_drive_is_the_planned_sine(self, bench, tmp_path):
+        play(run_of(bench, tmp_path))
+        dwell = bench.recorder.segments[2]
+        volts = (
+            bench.recorder.channel(0)[dwell["first"] : dwell["last"] + 1] * bench.channels[0].units_per_volt
+        )
+        expected = AMPLITUDE_VPP / 2 * bench.rig.generator.terminal_factor()
+        assert sine_amplitude(volts, 260.0, RATE) == pytest.approx(expected, rel=1e-9)
+
+    def test_the_ramp_is_a_staircase_on_a_half_cosine(self, bench, tmp_path):
+        play(run_of(bench, tmp_path))
+        ramp = next(each for each in bench.recorder.segments if each["label"] == "ramp_up")
+        stairs = [
+            (at - ramp["first"], value) for at, value in bench.world.amplitudes() if ramp["first"] <= at
+        ]
+        begins = np.array([at for at, _ in stairs[1:11]])
+        values = np.array([value for _, value in stairs[1:11]])
+        quiet = 2.5e-3
+        expected = quiet + (AMPLITUDE_VPP - quiet) * (1 - np.cos(np.pi * np.arange(1, 11) / 10)) / 2
+        np.testing.assert_allclose(values, expected, rtol=1e-12)
+        np.testing.assert_allclose(begins, np.round(np.arange(10) * 0.02 * RATE), atol=1)
+        assert stairs[0] == (0, pytest.approx(quiet))
+
+    def test_the_output_is_turned_on_at_the_quiet_amplitude_only(self, bench, tmp_path):
+        play(run_of(bench, tmp_path))
+        amplitude = None
+        at_start = []
+        for name, value, _ in bench.world.calls:
+            if name == "amplitude":
+                amplitude = value
+            if name == "start":
+                at_start.append(amplitude)
+        assert at_start == [pytest.approx(0.02 * AMPLITUDE_VPP), pytest.approx(2.5e-3)]
+
+    def test_a_checked_bench_is_not_checked_again(self, bench, tmp_path):
+        play(run_of(bench, tmp_path, check=BenchCheck.RECENTLY_PASSED))
+        assert [each["label"] for each in bench.recorder.segments] == ["ramp_up", "dwell", "ramp_down"]
+        assert bench.recorder.events[0][1:] == ("check", "left out: the bench was checked shortly before")
+
+    def test_the_header_holds_plan_bench_and_confirmations(self, bench, tmp_path):
+        play(run_of(bench, tmp_path))
+        header = bench.recorder.header
+        assert Measurement.model_validate_json(header.plan_json) == DWELL
+        assert type(bench.rig).model_validate_json(header.bench_json) == bench.rig
+        assert header.confirmations["Bruel & Kjaer 2706 gain"] == "10 dB"
+        assert header.instruments["generator"].model == "GENERATOR"
+        assert header.expected_samples == bench.recorder.samples
+
+
+class TestSweepsAndSteps:
+    def test_a_sweep_is_one_segment_of_many_frequencies(self, bench, tmp_path):
+        sweep = SineSweep(
+            amplitude_vpp=1, start_hz=150, stop_hz=350, duration_s=1, step_s=0.0123, settle_s=0.2
+        )
+        plan = DWELL.model_copy(update={"excitation": sweep})
+        play(run_of(bench, tmp_path, plan))
+        segments = [each for each in bench.recorder.segments if each["label"] == "sweep"]
+        assert len(segments) == 1
+        assert segments[0]["last"] - segments[0]["first"] + 1 == round(RATE)
+        changes = [at for name, _, at in bench.world.calls if name == "set_frequency"]
+        expected = segments[0]["first"] + np.arange(1, 82) * 0.0123 * RATE
+        # Steps that are no whole number of samples do not drift: each change is at the nearest one.
+        np.testing.assert_allclose(changes, expected, atol=0.5 + 1e-6)
+
+    def test_a_sweep_never_jumps_in_phase_or_amplitude(self, bench, tmp_path):
+        sweep = SineSweep(amplitude_vpp=2, start_hz=50, stop_hz=80, duration_s=1, step_s=0.01, settle_s=0.1)
+        play(run_of(bench, tmp_path, DWELL.model_copy(update={"excitation": sweep})))
+        segment = next(each for each in bench.recorder.segments if each["label"] == "sweep")
+        volts = bench.recorder.channel(0)[segment["first"] : segment["last"] + 1]
+        assert np.max(np.abs(np.diff(volts * bench.channels[0].units_per_volt))) <= 2 * np.pi * 80 / RATE
+
+    def test_stepped_sine_settles_at_every_frequency(self, bench, tmp_path):
+        steps = SteppedSine(amplitude_vpp=1, frequencies_hz=(100, 150, 260), settle_s=0.13, record_s=0.2)
+        play(run_of(bench, tmp_path, DWELL.model_copy(update={"excitation": steps})))
+        segments = [each for each in bench.recorder.segments if each["label"] == "step"]
+        assert [each["numbers"]["frequency_hz"] for each in segments] == [100, 150, 260]
+        gaps = [b["first"] - a["last"] - 1 for a, b in pairwise(segments)]
+        assert all(abs(gap - 0.13 * RATE) <= 1 for gap in gaps)
+        assert bench.recorder.states().count("ramping_up") == 1
+
+    def test_a_new_waveform_is_loaded_only_when_the_drive_is_quiet(self, bench, tmp_path):
+        noise = MultisineNoise(
+            amplitude_vpp=2,
+            band_start_hz=20,
+            band_stop_hz=800,
+            realisations=3,
+            periods=1,
+            settle_s=0.1,
+            repetition_hz=2,
+        )
+        play(run_of(bench, tmp_path, DWELL.model_copy(update={"excitation": noise})))
+        amplitude, before, after = None, [], []
+        for name, value, _ in bench.world.calls:
+            if name == "load_waveform":
+                before.append(amplitude)
+            if name == "amplitude":
+                if len(after) < len(before):
+                    after.append(value)
+                amplitude = value
+        assert len(before) == 3
+        assert max(before[1:] + after) < 4e-3
+        realisations = [each for each in bench.recorder.segments if each["label"] == "realisation"]
+        assert [each["numbers"]["realisation"] for each in realisations] == [0, 1, 2]
+        assert all(each["last"] - each["first"] + 1 == RATE / 2 for each in realisations)
+
+    @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+    @given(settle_s=st.floats(0.0, 0.4), record_s=st.floats(0.01, 0.4))
+    def test_no_sum_of_stretches_drifts_by_more_than_one_sample(
+        self, rig, new_bench, tmp_path, settle_s, record_s
+    ):
+        bench = new_bench(rig)
+        steps = SteppedSine(
+            amplitude_vpp=1, frequencies_hz=(100, 150, 260), settle_s=settle_s, record_s=record_s
+        )
+        play(run_of(bench, tmp_path, DWELL.model_copy(update={"excitation": steps})))
+        total_s = CHECK_S + 0.4 + 3 * (settle_s + record_s)
+        assert abs(bench.recorder.samples - total_s * RATE) <= 0.5 + 1e-6
+
+
+class TestEveryWayOut:
+    @every_state
+    def test_a_cancel_ramps_down(self, bench, tmp_path, state):
+        run = run_of(bench, tmp_path)
+        upto(run, state)
+        run.cancel("the operator pressed stop")
+        play(run)
+        assert run.outcome.state is run.state is RunState.STOPPED
+        assert bench.recorder.ending == (RecordingState.STOPPED, "the operator pressed stop")
+        assert_silent_and_finished(bench, RecordingState.STOPPED)
+        if state is not RunState.CHECKING:
+            assert_ended_without_a_jump(bench)
+
+    def test_a_cancel_is_heeded_within_a_block(self, bench, tmp_path):
+        run = run_of(bench, tmp_path)
+        shown = upto(run, RunState.RECORDING)
+        run.cancel()
+        rest = play(run)
+        assert all(progress.state is RunState.RAMPING_DOWN for progress in rest)
+        assert rest[-1].elapsed_s - shown.elapsed_s == pytest.approx(DWELL.ramp_s, abs=1e-3)
+
+    def test_a_cancelled_segment_stays_incomplete(self, bench, tmp_path):
+        run = run_of(bench, tmp_path)
+        upto(run, RunState.RECORDING)
+        run.cancel()
+        play(run)
+        assert bench.recorder.segments[-1]["label"] == "dwell"
+        assert bench.recorder.segments[-1]["last"] is None
+
+    def test_a_run_cancelled_before_it_begins_plays_nothing(self, bench, tmp_path):
+        run = run_of(bench, tmp_path)
+        run.cancel()
+        play(run)
+        assert run.state is RunState.STOPPED
+        assert "start" not in [name for name, _, _ in bench.world.calls]
+
+    def test_cancelling_a_run_that_has_ended_changes_nothing(self, bench, tmp_path):
+        run = run_of(bench, tmp_path)
+        play(run)
+        run.cancel()
+        assert run.outcome.state is RunState.FINISHED
+
+    @every_state
+    def test_an_exceeded_limit_ramps_down_and_is_named(self, bench, tmp_path, state):
+        run = run_of(bench, tmp_path)
+        upto(run, state)
+        bench.world.base_factor, bench.world.background_m_per_s2 = 1.0, 1000.0
+        with pytest.raises(LimitExceeded, match=r"base acceleration reached 1.*736 m/s2 \(4809, bare table"):
+            play(run)
+        assert run.state is RunState.FAILED
+        assert "base acceleration" in bench.recorder.ending[1]
+        assert_silent_and_finished(bench, RecordingState.FAILED)
+        if state is not RunState.CHECKING:
+            assert_ended_without_a_jump(bench)
+
+    @every_state
+    @pytest.mark.parametrize(
+        ("call", "fault"),
+        [
+            ("digitizer.read", DataLost),
+            ("digitizer.read", InstrumentLost),
+            ("recorder.append", RecordingError),
+            ("digitizer.read", RuntimeError),
+        ],
+    )
+    def test_a_failure_silences_and_says_why(self, bench, tmp_path, state, call, fault):
+        run = run_of(bench, tmp_path)
+        upto(run, state)
+        bench.world.faults[call] = [lambda: fault("it broke")]
+        with pytest.raises(fault, match="it broke"):
+            play(run)
+        assert run.state is RunState.FAILED
+        assert "it broke" in bench.recorder.ending[1]
+        assert_silent_and_finished(bench, RecordingState.FAILED)
+        if state is not RunState.CHECKING:
+            assert_ended_without_a_jump(bench)
+
+    @every_state
+    def test_a_lost_generator_is_still_told_to_stop(self, bench, tmp_path, state):
+        run = run_of(bench, tmp_path)
+        upto(run, state)
+        for name in ("set_amplitude", "set_frequency", "load_sine"):
+            bench.world.permanent[name] = lambda: InstrumentLost("no answer")
+        with pytest.raises(InstrumentLost, match="no answer"):
+            play(run)
+        assert_silent_and_finished(bench, RecordingState.FAILED)
+
+    @every_state
+    def test_a_generator_that_does_not_stop_is_shouted_out(self, bench, tmp_path, state):
+        run = run_of(bench, tmp_path)
+        upto(run, state)
+        bench.world.permanent["stop"] = lambda: InstrumentLost("THE OUTPUT MAY STILL BE ON")
+        with pytest.raises(InstrumentLost, match="MAY STILL BE ON"):
+            play(run)
+        assert run.state is RunState.FAILED
+        assert "MAY STILL BE ON" in bench.recorder.ending[1]
+        assert not bench.world.is_sampling
+
+    @every_state
+    @pytest.mark.parametrize("call", ["digitizer.read", "set_amplitude"])
+    def test_a_keyboard_interrupt_inside_a_driver_silences(self, bench, tmp_path, state, call):
+        run = run_of(bench, tmp_path)
+        upto(run, state)
+        bench.world.faults[call] = [KeyboardInterrupt]
+        with pytest.raises(KeyboardInterrupt):
+            play(run)
+        assert bench.recorder.ending == (RecordingState.STOPPED, "interrupted from the keyboard")
+        assert_silent_and_finished(bench, RecordingState.STOPPED)
+
+    @every_state
+    def test_an_abandoned_iterator_ramps_down(self, bench, tmp_path, state):
+        with run_of(bench, tmp_path) as run:
+            upto(run, state)
+        assert run.state is RunState.STOPPED
+        assert "left it" in bench.recorder.ending[1]
+        assert_silent_and_finished(bench, RecordingState.STOPPED)
+        if state is not RunState.CHECKING:
+            assert_ended_without_a_jump(bench)
+
+    @every_state
+    def test_an_error_of_whoever_watches_ends_the_run(self, bench, tmp_path, state):
+        def watch():
+            with run_of(bench, tmp_path) as run:
+                upto(run, state)
+                raise ZeroDivisionError
+
+        with pytest.raises(ZeroDivisionError):
+            watch()
+        assert_silent_and_finished(bench, RecordingState.STOPPED)
+
+    def test_a_recording_that_cannot_be_finished_leaves_silence(self, bench, tmp_path):
+        bench.world.permanent["recorder.finish"] = lambda: RecordingError("disk full")
+        run = run_of(bench, tmp_path)
+        with pytest.raises(RecordingError, match="disk full"):
+            play(run)
+        assert not bench.world.is_on
+        assert run.outcome.state is RunState.FAILED
+
+    def test_the_first_failure_stays_in_front_when_the_converter_cannot_stop_either(self, bench, tmp_path):
+        bench.world.permanent["digitizer.stop"] = lambda: InstrumentLost("cannot stop")
+        run = run_of(bench, tmp_path)
+        upto(run, RunState.RECORDING)
+        bench.world.faults["digitizer.read"] = [lambda: DataLost("a hole")]
+        with pytest.raises(DataLost, match="a hole"):
+            play(run)
+        assert bench.recorder.ending[1] == "DataLost: a hole; then: cannot stop"
+
+    def test_a_limit_passed_while_ramping_down_does_not_stop_the_ramp(self, bench, tmp_path):
+        run = run_of(bench, tmp_path)
+        upto(run, RunState.RECORDING)
+        run.cancel()
+        bench.world.background_m_per_s2 = 1000.0
+        play(run)
+        assert run.state is RunState.STOPPED
+        assert_ended_without_a_jump(bench)
+
+
+class TestRefusals:
+    def refused(self, bench, tmp_path, measurement, error):
+        run = run_of(bench, tmp_path, measurement)
+        with pytest.raises(error) as caught:
+            play(run)
+        assert run.state is RunState.FAILED
+        assert "start" not in [name for name, _, _ in bench.world.calls]
+        assert bench.recorder.path is None
+        return str(caught.value)
+
+    def test_a_plan_past_a_limit_is_refused_before_anything_moves(self, bench, tmp_path):
+        hard = Dwell(amplitude_vpp=10, frequency_hz=20, duration_s=1)
+        text = self.refused(bench, tmp_path, DWELL.model_copy(update={"excitation": hard}), LimitExceeded)
+        assert "the stroke (at 20 Hz, peak) would be" in text
+
+    def test_streamed_noise_needs_an_analogue_output(self, bench, tmp_path):
+        noise = StreamedNoise(amplitude_vpp=1, band_start_hz=50, band_stop_hz=800, duration_s=1)
+        text = self.refused(
+            bench, tmp_path, DWELL.model_copy(update={"excitation": noise}), ConfigurationError
+        )
+        assert "use multisine_noise with more realisations" in text
+
+    def test_a_bench_without_a_recorded_drive_is_refused(self, bench, tmp_path):
+        bench.channels = bench.channels[1:]
+        assert "no drive_voltage channel" in self.refused(bench, tmp_path, DWELL, CheckFailed)
+
+
+class TestTheBenchCheck:
+    @pytest.mark.parametrize(
+        ("fault", "sentence"),
+        [
+            ({"drive_factor": 2.0}, "a factor of 2 is a wrong load"),
+            ({"drive_factor": 0.5}, "a factor of 2 is a wrong load"),
+            ({"drive_factor": 0.0}, "check the wire from the generator"),
+            ({"base_factor": 1.5}, "the base moves with"),
+            ({"base_factor": 0.6}, "check the amplifier's gain"),
+            ({"background_m_per_s2": 10.0}, "before anything plays"),
+        ],
+    )
+    def test_a_bench_that_does_not_fit_its_configuration_stays_silent(self, bench, tmp_path, fault, sentence):
+        for name, value in fault.items():
+            setattr(bench.world, name, value)
+        run = run_of(bench, tmp_path)
+        with pytest.raises(CheckFailed, match=sentence):
+            play(run)
+        assert_silent_and_finished(bench, RecordingState.FAILED)
+        loudest = max(value for _, value in bench.world.amplitudes())
+        assert loudest == pytest.approx(0.02 * AMPLITUDE_VPP)
+
+    @pytest.mark.parametrize("fault", [{"drive_factor": 1.1}, {"base_factor": 1.35}, {"base_factor": 0.75}])
+    def test_small_differences_pass(self, bench, tmp_path, fault):
+        for name, value in fault.items():
+            setattr(bench.world, name, value)
+        run = run_of(bench, tmp_path)
+        play(run)
+        assert run.state is RunState.FINISHED
+
+    @given(
+        frequency_hz=st.floats(20, 2000),
+        amplitude=st.floats(1e-3, 10),
+        phase=st.floats(0, 6.28),
+        offset=st.floats(-5, 5),
+        drift=st.floats(-1, 1),
+    )
+    def test_a_sine_is_measured_beside_offset_and_drift(self, frequency_hz, amplitude, phase, offset, drift):
+        time_s = np.arange(2000) / RATE
+        volts = amplitude * np.sin(2 * np.pi * frequency_hz * time_s + phase) + offset + drift * time_s
+        assert sine_amplitude(volts, frequency_hz, RATE) == pytest.approx(amplitude, rel=1e-6, abs=1e-9)
+
+
+class TestOverloads:
+    def test_an_overload_is_kept_and_the_run_goes_on(self, bench, tmp_path):
+        bench.world.overloads = (Overload("m0_velocity", 3, 5),)
+        run = run_of(bench, tmp_path)
+        play(run)
+        assert run.state is RunState.FINISHED
+        assert bench.recorder.blocks[0].overloads == bench.world.overloads
+
+    def test_an_overload_ends_the_run_when_the_plan_says_so(self, bench, tmp_path):
+        strict = DWELL.model_copy(update={"limits": InRunLimits(on_overload=OnOverload.STOP)})
+        run = run_of(bench, tmp_path, strict)
+        upto(run, RunState.RECORDING)
+        bench.world.overloads = (Overload("m0_velocity", 3, 5),)
+        with pytest.raises(LimitExceeded, match="m0_velocity was overloaded at sample 3"):
+            play(run)
+        assert_ended_without_a_jump(bench)
+
+    @pytest.mark.parametrize(
+        ("limits", "named"),
+        [
+            (InRunLimits(base_acceleration=0.005), "the base acceleration"),
+            (InRunLimits(amplifier_voltage=0.05), "the amplifier voltage"),
+            (InRunLimits(current=0.05), "the coil current"),
+        ],
+    )
+    def test_a_plan_may_set_tighter_limits_than_the_rig(self, bench, tmp_path, limits, named):
+        run = run_of(bench, tmp_path, DWELL.model_copy(update={"limits": limits}))
+        with pytest.raises(LimitExceeded, match=named):
+            play(run)
+        assert_silent_and_finished(bench, RecordingState.FAILED)

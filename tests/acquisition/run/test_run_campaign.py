@@ -1,0 +1,182 @@
+"""Campaigns on a loop of fake instruments, into real files."""
+
+import signal
+
+import pytest
+
+from acquisition.errors import DataLost, InstrumentLost, LimitExceeded, RecordingError
+from acquisition.excitation.dwell import Dwell
+from acquisition.plan.campaign import Campaign
+from acquisition.plan.measurement import Measurement
+from acquisition.recording.layout import RecordingState
+from acquisition.recording.reader import open_recording
+from acquisition.run.run_campaign import AfterFailure, Existing, Item, run_campaign
+from acquisition.run.run_measurement import run_measurement
+from acquisition.run.state import RunState
+
+
+def dwell(name, amplitude_vpp=1.0, frequency_hz=260.0):
+    return Measurement(
+        name=name,
+        excitation=Dwell(
+            amplitude_vpp=amplitude_vpp, frequency_hz=frequency_hz, settle_s=0.2, duration_s=0.5
+        ),
+        ramp_s=0.2,
+        ramp_step_s=0.02,
+    )
+
+
+CAMPAIGN = Campaign(name="c", measurements=(dwell("one"), dwell("two"), dwell("three")))
+
+
+def results(items):
+    return [(item.name, item.result) for item in items]
+
+
+def failing_in(bench, name, fault):
+    """Let the next read fail as soon as the recording ``name`` is running."""
+
+    def watch(progress):
+        if progress.name == name and progress.run.state is RunState.RECORDING:
+            bench.world.faults["digitizer.read"] = [fault]
+
+    return watch
+
+
+def test_a_file_where_the_folder_should_be_is_refused_before_anything_plays(bench, tmp_path):
+    taken = tmp_path / "taken"
+    taken.write_text("mine")
+    with pytest.raises(RecordingError, match=r"taken cannot be made a folder .* Nothing was played"):
+        run_campaign(bench, CAMPAIGN, taken)
+    assert taken.read_text() == "mine"
+    assert not any(name == "start" for name, _, _ in bench.world.calls)
+
+
+def test_every_measurement_becomes_one_complete_recording(bench, tmp_path):
+    items = run_campaign(bench, CAMPAIGN, tmp_path / "out")
+    assert results(items) == [(name, Item.RECORDED) for name in ("one", "two", "three")]
+    for item in items:
+        with open_recording(item.path) as recording:
+            assert recording.state is RecordingState.COMPLETE
+            assert [segment.label for segment in recording.segments] == [
+                "check",
+                "ramp_up",
+                "dwell",
+                "ramp_down",
+            ]
+            assert recording.plan["name"] == item.name
+
+
+def test_progress_counts_the_recordings(bench, tmp_path):
+    seen = set()
+    run_campaign(bench, CAMPAIGN, tmp_path, on_progress=lambda p: seen.add((p.name, p.number, p.count)))
+    assert seen == {("one", 1, 3), ("two", 2, 3), ("three", 3, 3)}
+
+
+def test_a_second_campaign_in_the_same_folder_is_refused_and_changes_nothing(bench, tmp_path):
+    run_campaign(bench, CAMPAIGN, tmp_path)
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    with pytest.raises(RecordingError, match="give another folder, or resume the campaign"):
+        run_campaign(bench, CAMPAIGN, tmp_path)
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_resuming_keeps_what_is_complete_and_makes_another_attempt_at_what_is_not(bench, tmp_path):
+    with pytest.raises(DataLost):
+        run_campaign(
+            bench, CAMPAIGN, tmp_path, on_progress=failing_in(bench, "two", lambda: DataLost("a hole"))
+        )
+    items = run_campaign(bench, CAMPAIGN, tmp_path, Existing.RESUME)
+    assert results(items) == [("one", Item.KEPT), ("two", Item.RECORDED), ("three", Item.RECORDED)]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.h5", "three.h5", "two.2.h5", "two.h5"]
+    with open_recording(tmp_path / "two.h5") as first:
+        assert first.state is RecordingState.FAILED
+        assert "a hole" in first.reason
+    assert results(run_campaign(bench, CAMPAIGN, tmp_path, Existing.RESUME)) == [
+        (name, Item.KEPT) for name in ("one", "two", "three")
+    ]
+
+
+def test_resuming_with_another_plan_is_refused(bench, tmp_path):
+    run_campaign(bench, CAMPAIGN, tmp_path)
+    changed = Campaign(name="c", measurements=(dwell("one", amplitude_vpp=2.0),))
+    with pytest.raises(RecordingError, match=r"one\.h5 is complete, but was made by another plan"):
+        run_campaign(bench, changed, tmp_path, Existing.RESUME)
+
+
+def test_a_campaign_told_to_go_on_passes_a_failed_measurement(bench, tmp_path):
+    items = run_campaign(
+        bench,
+        CAMPAIGN,
+        tmp_path,
+        after_failure=AfterFailure.GO_ON,
+        on_progress=failing_in(bench, "one", lambda: DataLost("a hole")),
+    )
+    assert results(items) == [("one", Item.FAILED), ("two", Item.RECORDED), ("three", Item.RECORDED)]
+    assert items[0].reason == "a hole"
+
+
+def test_a_lost_instrument_ends_a_campaign_even_when_told_to_go_on(bench, tmp_path):
+    with pytest.raises(InstrumentLost):
+        run_campaign(
+            bench,
+            CAMPAIGN,
+            tmp_path,
+            after_failure=AfterFailure.GO_ON,
+            on_progress=failing_in(bench, "one", lambda: InstrumentLost("gone")),
+        )
+    assert [path.name for path in tmp_path.iterdir()] == ["one.h5"]
+
+
+def test_a_campaign_with_one_plan_past_a_limit_does_not_begin(bench, tmp_path):
+    campaign = Campaign(
+        name="c", measurements=(dwell("one"), dwell("hard", 10, 20.0), dwell("harder", 10, 21.0))
+    )
+    with pytest.raises(LimitExceeded, match=r"hard: the stroke.*harder: the stroke"):
+        run_campaign(bench, campaign, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    assert bench.world.calls == []
+
+
+def test_ctrl_c_ends_the_measurement_softly_and_the_campaign_with_it(bench, tmp_path):
+    def press_once(progress):
+        if progress.name == "two" and progress.run.state is RunState.SETTLING:
+            signal.raise_signal(signal.SIGINT)
+
+    before = signal.getsignal(signal.SIGINT)
+    items = run_campaign(bench, CAMPAIGN, tmp_path, on_progress=press_once)
+    assert results(items) == [("one", Item.RECORDED), ("two", Item.STOPPED)]
+    assert not bench.world.is_on
+    assert signal.getsignal(signal.SIGINT) is before
+    with open_recording(tmp_path / "two.h5") as recording:
+        assert recording.state is RecordingState.STOPPED
+        assert recording.reason.startswith("SIGINT")
+
+
+def test_a_second_ctrl_c_insists_and_further_ones_cannot_disturb_the_silencing(bench, tmp_path):
+    def press_on(progress):
+        if progress.state is RunState.RECORDING or progress.state is RunState.RAMPING_DOWN:
+            signal.raise_signal(signal.SIGINT)
+
+    original = bench.generator.stop
+
+    def stop_under_fire():
+        signal.raise_signal(signal.SIGINT)
+        original()
+
+    bench.generator.stop = stop_under_fire
+    with pytest.raises(KeyboardInterrupt):
+        run_measurement(bench, dwell("one"), tmp_path / "one.h5", on_progress=press_on)
+    assert not bench.world.is_on
+    with open_recording(tmp_path / "one.h5") as recording:
+        assert recording.state is RecordingState.STOPPED
+
+
+def test_a_terminated_run_ramps_down(bench, tmp_path):
+    def terminate(progress):
+        if progress.state is RunState.RECORDING:
+            signal.raise_signal(signal.SIGTERM)
+
+    outcome = run_measurement(bench, dwell("one"), tmp_path / "one.h5", on_progress=terminate)
+    assert outcome.state is RunState.STOPPED
+    assert bench.world.amplitudes()[-1][1] == pytest.approx(2.5e-3)

@@ -1,0 +1,191 @@
+"""The whole path: plans, unmodified pyvisa and nidaqmx, simulated instruments, files."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.bench import open_bench
+from acquisition.check.low_level import sine_amplitude
+from acquisition.errors import CheckFailed
+from acquisition.excitation.dwell import Dwell
+from acquisition.excitation.multisine_noise import MultisineNoise
+from acquisition.excitation.sine_sweep import SineSweep
+from acquisition.plan.campaign import load_campaign
+from acquisition.plan.measurement import Measurement
+from acquisition.recording.layout import RecordingState
+from acquisition.recording.reader import open_recording
+from acquisition.rig.configuration import load_rig
+from acquisition.run.run import Run
+from acquisition.run.run_campaign import Item, run_campaign
+from acquisition.run.run_measurement import run_measurement
+from acquisition.run.state import RunState
+
+ROOT = Path(__file__).parent.parent.parent.parent
+VIRTUAL = ROOT / "hardware_configs" / "virtual_rig.toml"
+TERMINAL = load_rig(VIRTUAL).generator.terminal_factor()
+
+
+@pytest.fixture
+def virtual_bench():
+    with open_bench(VIRTUAL) as bench:
+        yield bench
+
+
+def measured(bench, folder, excitation, **fields):
+    """Carry out a plan and open its recording."""
+    plan = Measurement(name="run", excitation=excitation, **{"ramp_s": 0.4, "ramp_step_s": 0.02, **fields})
+    outcome = run_measurement(bench, plan, folder / "run.h5")
+    assert outcome.state is RunState.FINISHED
+    return open_recording(outcome.path)
+
+
+def segment(recording, label):
+    found = next(each for each in recording.segments if each.label == label)
+    return recording.read("drive_voltage", found.first_sample, found.last_sample + 1)
+
+
+def test_a_dwell_arrives_with_its_frequency_and_amplitude(virtual_bench, tmp_path):
+    dwell = Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.2, duration_s=1)
+    with measured(virtual_bench, tmp_path, dwell) as recording:
+        drive = segment(recording, "dwell")
+        rate_hz = recording.sample_rate_hz
+    assert len(drive) == rate_hz
+    assert sine_amplitude(drive, 260.0, rate_hz) == pytest.approx(0.75 * TERMINAL, rel=1e-3)
+    # Beside the sine there is noise of the generator and the converter, and nothing else.
+    rms = np.sqrt(np.mean(drive**2))
+    assert rms == pytest.approx(0.75 * TERMINAL / np.sqrt(2), rel=1e-3)
+
+
+def test_the_ramps_rise_and_fall_on_a_half_cosine(virtual_bench, tmp_path):
+    dwell = Dwell(amplitude_vpp=1.5, frequency_hz=500, settle_s=0.1, duration_s=0.2)
+    with measured(virtual_bench, tmp_path, dwell) as recording:
+        rate_hz = recording.sample_rate_hz
+        up, down = segment(recording, "ramp_up"), segment(recording, "ramp_down")
+    stair = round(0.02 * rate_hz)
+    expected = 0.75 * TERMINAL * (1 - np.cos(np.pi * np.arange(1, 21) / 20)) / 2
+    for ramp, heights in ((up, expected), (down, np.append(expected[-2::-1], 0.0))):
+        # The converter's filter shows a stair some 40 samples late: leave the beginning of each out.
+        settled = ramp.reshape(-1, stair)[:, stair // 8 :]
+        levels = [sine_amplitude(piece, 500.0, rate_hz) for piece in settled]
+        # The quiet level of 2.5 mVpp is where a ramp begins and ends.
+        np.testing.assert_allclose(levels, heights, atol=2e-3)
+
+
+def test_noise_arrives_flat_and_whole_periods_hold_its_lines(virtual_bench, tmp_path):
+    noise = MultisineNoise(
+        amplitude_vpp=1.0, band_start_hz=20, band_stop_hz=800, realisations=1, periods=1, settle_s=0.2
+    )
+    with measured(virtual_bench, tmp_path, noise) as recording:
+        drive = segment(recording, "realisation")
+    lines = np.abs(np.fft.rfft(drive))[:2000] * 2 / len(drive)
+    inside = lines[20:801]
+    values = next(noise.steps()).play.values
+    planned = np.sqrt(2 * np.mean(values**2) / 781) * 0.5 * TERMINAL
+    assert np.mean(inside) == pytest.approx(planned, rel=0.01)
+    # The two clocks differ by 17 ppm: in a second the lines slip by 17e-6 cycles per hertz and leak
+    # that share of themselves into their neighbours, 1.4 % at 800 Hz and 0.3 % at 200 Hz.
+    low = lines[20:201]
+    assert np.ptp(low) / np.mean(low) < 0.03
+    assert np.ptp(inside) / np.mean(inside) < 0.12
+    assert np.max(lines[900:]) < 0.02 * np.mean(inside)
+
+
+def test_a_sweep_arrives_with_the_cycles_of_the_ideal_one(virtual_bench, tmp_path):
+    sweep = SineSweep(amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=2, step_s=0.05, settle_s=0.2)
+    with measured(virtual_bench, tmp_path, sweep) as recording:
+        drive = segment(recording, "sweep")
+    rising = np.flatnonzero((drive[:-1] < 0) & (drive[1:] >= 0))
+    assert len(rising) == pytest.approx(sweep.cycles(2.0), abs=1)
+    assert np.max(np.abs(drive)) == pytest.approx(0.75 * TERMINAL, rel=0.01)
+
+
+def test_the_quick_campaign_is_recorded_without_an_overload(virtual_bench, tmp_path):
+    items = run_campaign(virtual_bench, load_campaign(ROOT / "campaigns" / "quick.toml"), tmp_path)
+    assert [item.result for item in items] == [Item.RECORDED] * 3
+    for item in items:
+        with open_recording(item.path) as recording:
+            assert recording.state is RecordingState.COMPLETE
+            assert not recording.overloads
+            assert not recording.gaps
+
+
+def test_an_amplifier_turned_up_is_found_before_the_full_level(tmp_path):
+    """The rig says 10 dB; the simulated knob stands at 20 dB."""
+    rig = load_rig(VIRTUAL)
+    turned = rig.model_copy(update={"amplifier": rig.amplifier.model_copy(update={"gain_db": 20.0})})
+    with open_bench(turned) as bench:
+        bench.rig = rig
+        plan = Measurement(name="run", excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, duration_s=1))
+        with pytest.raises(CheckFailed, match="check the amplifier's gain"):
+            run_measurement(bench, plan, tmp_path / "run.h5")
+    with open_recording(tmp_path / "run.h5") as recording:
+        assert recording.state is RecordingState.FAILED
+        drive = recording.read("drive_voltage")
+        # Nothing but the check was ever played: 2 % of 1.5 Vpp.
+        assert np.max(np.abs(drive)) < 0.02
+
+
+def test_a_cancelled_run_ends_with_a_ramp_to_silence(virtual_bench, tmp_path):
+    plan = Measurement(
+        name="run", excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, duration_s=60), ramp_s=0.4
+    )
+    with Run(virtual_bench, plan, tmp_path / "run.h5") as run:
+        for progress in run:
+            if progress.state is RunState.RECORDING:
+                run.cancel("enough")
+    with open_recording(tmp_path / "run.h5") as recording:
+        assert (recording.state, recording.reason) == (RecordingState.STOPPED, "enough")
+        assert recording.duration_s < 10
+        last = recording.read("drive_voltage", recording.samples - 512)
+        dwell = recording.segments[-1]
+        assert (dwell.label, dwell.is_complete) == ("dwell", False)
+    assert np.max(np.abs(last)) < 5e-3
+
+
+CHILD = """
+import sys
+from pathlib import Path
+from acquisition.bench import open_bench
+from acquisition.excitation.dwell import Dwell
+from acquisition.plan.measurement import Measurement
+from acquisition.run.run_measurement import run_measurement
+from acquisition.run.state import RunState
+
+told = []
+
+def tell(progress):
+    if progress.state is RunState.RECORDING and not told:
+        told.append(True)
+        print("recording", flush=True)
+
+if __name__ == "__main__":
+    plan = Measurement(
+        name="run", excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.1, duration_s=20000)
+    )
+    with open_bench(Path(sys.argv[1])) as bench:
+        outcome = run_measurement(bench, plan, Path(sys.argv[2]), on_progress=tell)
+    print(outcome.state.value, flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for another process")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_from_outside_ends_a_run_softly(tmp_path, number):
+    script, path = tmp_path / "child.py", tmp_path / "run.h5"
+    script.write_text(CHILD)
+    with subprocess.Popen(
+        [sys.executable, str(script), str(VIRTUAL), str(path)], stdout=subprocess.PIPE, text=True, cwd=ROOT
+    ) as child:
+        assert child.stdout.readline() == "recording\n"
+        child.send_signal(number)
+        out, _ = child.communicate(timeout=60)
+    assert child.returncode == 0
+    assert out == "stopped\n"
+    with open_recording(path) as recording:
+        assert recording.state is RecordingState.STOPPED
+        assert recording.reason.startswith(number.name)
+        assert np.max(np.abs(recording.read("drive_voltage", recording.samples - 512))) < 5e-3
