@@ -7,7 +7,14 @@ from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 
+import numpy as np
+
 from analysis.campaign_results import CampaignResults, analyse_files, assembled
+from sim.accuracy import Accuracy
+from sim.drive import Harmonic, Sampled
+from sim.response import steady_response
+from sim.sample_by_sample import follow_samples
+from sim.specimen import gong2025
 
 
 class Analyst:
@@ -42,10 +49,18 @@ def second_process(name: str) -> Iterator[Analyst]:
     """Keep an analyst at work while inside; what it has not begun when an error leaves is dropped."""
     # A fresh interpreter: a fork would copy the threads' locks of the instrument libraries.
     pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_leave_ctrl_c_to_the_parent)
+    pool.submit(_compile)
     try:
         yield Analyst(pool, name)
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _compile() -> None:
+    """Have the simulation compiled while the first measurement runs."""
+    specimen = gong2025()
+    steady_response(specimen, Harmonic(260.0, 5e-6), Accuracy.QUICK, duration_s=0.2, window_s=0.1)
+    follow_samples(specimen, Sampled(np.zeros(100), 51_200.0))
 
 
 def _leave_ctrl_c_to_the_parent() -> None:
