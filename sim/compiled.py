@@ -42,3 +42,8 @@ def compiled(kernel: Kernel) -> Kernel:
     and the step control must see one.
     """
     return cast("Kernel", njit(cache=True, nogil=True, error_model="numpy")(kernel))
+
+
+def inlined(kernel: Kernel) -> Kernel:
+    """Compile like `compiled` and copy into every caller: for what costs less than its call."""
+    return cast("Kernel", njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(kernel))

@@ -1,4 +1,4 @@
-"""The contact phase: from touching the stop to leaving it, with controlled error. SI units."""
+"""Contact with a stop that yields: from touching it to leaving it, with controlled error. SI units."""
 
 import math
 
@@ -65,15 +65,22 @@ STANDARD_TOLERANCE = 1e-6
 
 LOGGED, DEEPEST = 0, 1
 """Places of a log's first row: how many steps' ends are in the rows below; the largest w so far."""
-LOG_TIME, LOG_X, LOG_VX, LOG_P, LOG_RATE = range(5)
-"""Columns of the rows below: time, x, vx, p and dp/dt at the ends of the accepted steps."""
-LOG_COLUMNS = 5
+LOG_TIME, LOG_X, LOG_VX, LOG_P, LOG_RATE, LOG_AX, LOG_AP = range(7)
+"""Columns of the rows below: time, x, vx, p and dp/dt at the ends of the accepted steps; under a power law,
+whose steps are long, the accelerations of x and p too."""
+LOG_COLUMNS = 7
 
 
 @compiled
 def contact_workspace() -> Table:
     """Memory that one run (one thread) hands to every contact."""
     return np.zeros((WORK_ROWS, WIDTH))
+
+
+@compiled
+def gap_of(side: float, par: Parameters) -> float:
+    """Clearance of the stop on one side [m]."""
+    return par.upper if side > 0.0 else par.lower
 
 
 @compiled
@@ -84,15 +91,18 @@ def begin_contact(state: Vector, side: float, par: Parameters, tolerance: float)
     4.8 w_max/v), or the other springs pressing a slow contact (w'' = -(a/2) w).
     """
     p = state[Y] - state[Z]
-    root = math.sqrt(max(side * p - par.gap, 0.0))
+    gap = gap_of(side, par)
+    root = math.sqrt(max(side * p - gap, 0.0))
     rate = side * (state[VY] - state[VZ])
     if root == 0.0:
         rate = max(rate, SLOWEST_TOUCH)
-    collision = 0.8 * par.contact_stiffness / par.reduced_mass
-    speed = math.sqrt(rate * rate + collision * root**5)
-    deepest = (speed * speed / collision) ** 0.2
+    # In a collision with the speed v: m v^2 / 2 = k1 d^2 / 2 + 2 k d^(5/2) / 5, each spring taken alone.
+    hertz = 0.8 * par.contact_stiffness / par.reduced_mass
+    linear = par.linear_stiffness / par.reduced_mass
+    speed = math.sqrt(rate * rate + hertz * root**5 + linear * root**4)
+    deepest = min((speed * speed / hertz) ** 0.2, math.sqrt(speed / math.sqrt(linear)))
     pull = par.k2 * (state[Z] - state[X]) + par.c2 * (state[VZ] - state[VX])
-    pressing = par.k1 * par.gap + par.c1 * rate
+    pressing = par.k1 * gap + par.c1 * rate
     press = abs(side * pull / par.mass2 - pressing / par.reduced_mass)
     tuned = min(1.0, (tolerance / STANDARD_TOLERANCE) ** 0.125)
     state[SIDE] = side
@@ -115,7 +125,7 @@ def _scatter(work: Table, state: Vector, par: Parameters) -> None:
     at, side = work[POINT], state[SIDE]
     state[ROOT], state[RATE] = at[W], at[R]
     state[X], state[Z], state[VX], state[VZ] = at[CX], at[CZ], at[CVX], at[CVZ]
-    state[Y] = at[CZ] + side * (par.gap + at[W] * at[W])
+    state[Y] = at[CZ] + side * (gap_of(side, par) + at[W] * at[W])
     state[VY] = at[CVZ] + side * at[R]
 
 
@@ -182,7 +192,7 @@ def _log_point(log: Table, work: Table, side: float, par: Parameters) -> None:
     log[0, LOGGED] += 1.0
     row = int(log[0, LOGGED])
     log[row, LOG_TIME], log[row, LOG_X], log[row, LOG_VX] = at[T], at[CX], at[CVX]
-    log[row, LOG_P], log[row, LOG_RATE] = side * (par.gap + at[W] * at[W]), side * at[R]
+    log[row, LOG_P], log[row, LOG_RATE] = side * (gap_of(side, par) + at[W] * at[W]), side * at[R]
 
 
 @compiled
@@ -208,7 +218,7 @@ def _log_apex(
 
 
 @compiled
-def _step_factor(error: float) -> float:
+def step_factor(error: float) -> float:
     """Next step over this one. The eighth root as three square roots; an error of NaN shrinks."""
     if not error < 1e300:
         return SHRINK
@@ -262,7 +272,7 @@ def advance_contact(  # noqa: C901, PLR0912 - a step control and its three ends 
     for _ in range(MOST_STEPS):
         trial_step(work, step, side, force, middle, par)
         error = step_error(work, step, root_scale, rate_scale, tolerance)
-        factor = _step_factor(error)
+        factor = step_factor(error)
         if not error <= 1.0:
             step *= min(factor, 1.0)
             if step < 1e-300:

@@ -10,8 +10,11 @@ of the processor. The base enters as one polynomial, base_force = k0 U + c0 dU/d
 """
 
 import math
+from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
+from numba.extending import overload
 from numpy.typing import NDArray
 from scipy.integrate._ivp import dop853_coefficients as _dop
 
@@ -46,6 +49,8 @@ ERROR_5: NDArray[np.float64] = np.ascontiguousarray(_dop.E5[:STAGES])
 ERROR_3: NDArray[np.float64] = np.ascontiguousarray(_dop.E3[:STAGES])
 BLEND = 0.01
 """Weight of the third-order estimate in DOP853's error."""
+LARGEST_SQUARE = 1e300
+"""A squared error beyond this is one that no step may have."""
 
 
 @compiled
@@ -68,8 +73,10 @@ def contact_rates(
     motion is mirrored to the last bit.
     """
     w, r, vx, vz = at[0], at[1], at[4], at[5]
+    gap = par.upper if side > 0.0 else par.lower
     penetration = w * w
-    pressing = par.k1 * (par.gap + penetration) + par.c1 * r + par.contact_stiffness * penetration * w
+    reaction = penetration * (par.linear_stiffness + par.contact_stiffness * w) * (1.0 + par.loss * r)
+    pressing = par.k1 * (gap + penetration) + par.c1 * r + reaction
     pull = par.k2 * (at[3] - at[2]) + par.c2 * (vz - vx)
     drive = base_force_at(force, at[6] - middle) - par.k0 * at[2] - par.c0 * vx
     rates[0] = 0.5 * r
@@ -82,9 +89,39 @@ def contact_rates(
     rates[7] = 0.0
 
 
+System = TypeVar("System", bound=tuple[object, ...])
+
+
+def motion_rates(
+    at: Vector, rates: Vector, side: float, force: Vector, middle: float, system: System
+) -> None:
+    """Write the rates of a system, chosen by its type when a kernel is compiled.
+
+    One source of the twelve stages serves every law, and none pays for another's.
+    """
+    raise NotImplementedError
+
+
+@overload(motion_rates)
+def _choose_contact_rates(
+    at: Vector, rates: Vector, side: float, force: Vector, middle: float, system: Parameters
+) -> Callable[..., None] | None:
+    # numba calls this with types, not values, and wants the names of what it returns.
+    del at, rates, side, force, middle
+    if getattr(system, "instance_class", None) is not Parameters:
+        return None
+
+    def chosen(
+        at: Vector, rates: Vector, side: float, force: Vector, middle: float, system: Parameters
+    ) -> None:
+        contact_rates(at, rates, side, force, middle, system)
+
+    return chosen
+
+
 @compiled
 def trial_step(  # noqa: C901 - the twelve stages of one formula, in order
-    work: Table, step: float, side: float, force: Vector, middle: float, par: Parameters
+    work: Table, step: float, side: float, force: Vector, middle: float, system: System
 ) -> None:
     """Step from ``work[POINT]``, whose rates are in ``work[0]``, and write the end to ``work[TRIAL]``."""
     h = step
@@ -93,41 +130,41 @@ def trial_step(  # noqa: C901 - the twelve stages of one formula, in order
     u, y, end = work[ARGUMENT], work[POINT], work[TRIAL]
     for i in range(WIDTH):
         u[i] = y[i] + h * (A21 * k1[i])
-    contact_rates(u, k2, side, force, middle, par)
+    motion_rates(u, k2, side, force, middle, system)
     for i in range(WIDTH):
         u[i] = y[i] + h * (A31 * k1[i] + A32 * k2[i])
-    contact_rates(u, k3, side, force, middle, par)
+    motion_rates(u, k3, side, force, middle, system)
     for i in range(WIDTH):
         u[i] = y[i] + h * (A41 * k1[i] + A43 * k3[i])
-    contact_rates(u, k4, side, force, middle, par)
+    motion_rates(u, k4, side, force, middle, system)
     for i in range(WIDTH):
         u[i] = y[i] + h * (A51 * k1[i] + A53 * k3[i] + A54 * k4[i])
-    contact_rates(u, k5, side, force, middle, par)
+    motion_rates(u, k5, side, force, middle, system)
     for i in range(WIDTH):
         u[i] = y[i] + h * (A61 * k1[i] + A64 * k4[i] + A65 * k5[i])
-    contact_rates(u, k6, side, force, middle, par)
+    motion_rates(u, k6, side, force, middle, system)
     for i in range(WIDTH):
         u[i] = y[i] + h * (A71 * k1[i] + A74 * k4[i] + A75 * k5[i] + A76 * k6[i])
-    contact_rates(u, k7, side, force, middle, par)
+    motion_rates(u, k7, side, force, middle, system)
     for i in range(WIDTH):
         u[i] = y[i] + h * (A81 * k1[i] + A84 * k4[i] + A85 * k5[i] + A86 * k6[i] + A87 * k7[i])
-    contact_rates(u, k8, side, force, middle, par)
+    motion_rates(u, k8, side, force, middle, system)
     for i in range(WIDTH):
         early = A91 * k1[i] + A94 * k4[i] + A95 * k5[i]
         u[i] = y[i] + h * (early + A96 * k6[i] + A97 * k7[i] + A98 * k8[i])
-    contact_rates(u, k9, side, force, middle, par)
+    motion_rates(u, k9, side, force, middle, system)
     for i in range(WIDTH):
         early = A101 * k1[i] + A104 * k4[i] + A105 * k5[i] + A106 * k6[i]
         u[i] = y[i] + h * (early + A107 * k7[i] + A108 * k8[i] + A109 * k9[i])
-    contact_rates(u, k10, side, force, middle, par)
+    motion_rates(u, k10, side, force, middle, system)
     for i in range(WIDTH):
         early = A111 * k1[i] + A114 * k4[i] + A115 * k5[i] + A116 * k6[i]
         u[i] = y[i] + h * (early + A117 * k7[i] + A118 * k8[i] + A119 * k9[i] + A1110 * k10[i])
-    contact_rates(u, k11, side, force, middle, par)
+    motion_rates(u, k11, side, force, middle, system)
     for i in range(WIDTH):
         early = A121 * k1[i] + A124 * k4[i] + A125 * k5[i] + A126 * k6[i] + A127 * k7[i]
         u[i] = y[i] + h * (early + A128 * k8[i] + A129 * k9[i] + A1210 * k10[i] + A1211 * k11[i])
-    contact_rates(u, k12, side, force, middle, par)
+    motion_rates(u, k12, side, force, middle, system)
     for i in range(WIDTH):
         early = B1 * k1[i] + B6 * k6[i] + B7 * k7[i] + B8 * k8[i]
         end[i] = y[i] + h * (early + B9 * k9[i] + B10 * k10[i] + B11 * k11[i] + B12 * k12[i])
@@ -137,7 +174,7 @@ def trial_step(  # noqa: C901 - the twelve stages of one formula, in order
 def step_error(work: Table, step: float, root_scale: float, rate_scale: float, tolerance: float) -> float:
     """Error of the step just tried, over what is allowed: on w and r, the two fast unknowns.
 
-    NaN when a stage overflowed; the caller's comparison must be written so that NaN fails it.
+    Infinite when a stage ran away or overflowed.
     """
     fifth_w = fifth_r = third_w = third_r = 0.0
     for stage in range(STAGES):
@@ -152,4 +189,7 @@ def step_error(work: Table, step: float, root_scale: float, rate_scale: float, t
     blended = fifth + BLEND * third
     if blended == 0.0:
         return 0.0
+    if not blended < LARGEST_SQUARE:
+        # A stage ran away: fifth over infinity would pass for no error at all.
+        return math.inf
     return step * fifth / math.sqrt(2.0 * blended)

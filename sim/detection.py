@@ -55,15 +55,18 @@ def _earliest(gap: float, approach: float, bound: float) -> float:
 
 
 @compiled
-def first_contact(series: Vector, length: float, gap: float, bound: float, scale: float) -> float:
+def first_contact(
+    series: Vector, length: float, lowest: float, highest: float, bound: float, scale: float
+) -> float:
     """Find the first touch of p with either stop on [0, length].
 
     Parameters
     ----------
     series
         p as a polynomial in the time since the start of the stretch [m, s].
-    length, gap, bound
-        Length of the stretch [s]; distance of the stops [m]; bound on abs(d2p/dt2) [m/s^2].
+    length, lowest, highest, bound
+        Length of the stretch [s]; distances of the stops at negative and positive p [m], infinite for none;
+        bound on abs(d2p/dt2) [m/s^2].
     scale
         Size of the terms that p was summed from [m]; its rounding decides what is a touch.
 
@@ -72,13 +75,16 @@ def first_contact(series: Vector, length: float, gap: float, bound: float, scale
     The time of the touch [s], or NEVER. A stop that is being left at the start is no touch.
 
     """
-    touch = TOUCH * gap + ROUNDING * scale
+    nearer = min(lowest, highest)
+    if nearer == math.inf:
+        return NEVER
+    touch = TOUCH * nearer + ROUNDING * scale
     shortest = min(SHORTEST_ADVANCE, IMPATIENT * length)
     positive = bound + 1e-300
     tau, advances = 0.0, 0
     while tau < length:
         p, rate = polynomial_at(series, tau)
-        upper, lower = gap - p, gap + p
+        upper, lower = highest - p, lowest + p
         if (upper <= touch and rate > 0.0) or (lower <= touch and rate < 0.0):
             return tau
         advance = min(_earliest(max(upper, 0.0), rate, positive), _earliest(max(lower, 0.0), -rate, positive))

@@ -17,7 +17,7 @@ from .compiled import compiled
 from .detection import LARGEST_BOUND, LONGEST_TURN, NEVER, SERIES_TERMS, first_contact
 from .drive import Harmonic
 from .modes import Complex, harmonic_motion, modal_form
-from .parameters import Parameters, Vector, X, Y, Z, parameters
+from .parameters import Parameters, PowerTerms, Vector, X, Y, Z, parameters, power_terms
 from .specimen import Specimen
 
 GRID_TURN = 0.5 * LONGEST_TURN
@@ -34,6 +34,8 @@ class FlightTables(NamedTuple):
     """Specimen and drive, diagonalised. Terms 0..n-1 are modes, term n is the drive."""
 
     par: Parameters
+    power: PowerTerms
+    """Of a power law; no terms for other laws."""
     frequency: float
     omega: float
     phase: complex
@@ -68,6 +70,7 @@ def flight_tables(specimen: Specimen, drive: Harmonic) -> FlightTables:
     grid = GRID_TURN / float(np.max(np.abs(rates)))
     return FlightTables(
         par=parameters(specimen),
+        power=power_terms(specimen),
         frequency=drive.frequency_hz,
         omega=omega,
         phase=cmath.exp(1j * drive.phase_rad),
@@ -138,14 +141,14 @@ def fill_series(series: Vector, terms: Complex, rates: Complex) -> None:
 
 
 @compiled
-def _march(terms: Complex, factors: Complex, steps: int, clear: float) -> int:
-    """Turn the terms of p in place, step by step, while abs(p) < clear; gives the steps that were."""
+def _march(terms: Complex, factors: Complex, steps: int, low: float, high: float) -> int:
+    """Turn the terms of p in place, step by step, while low < p < high; gives the steps that were."""
     for made in range(steps):
         p = 0.0
         for j in range(len(terms)):
             terms[j] *= factors[j]
             p += terms[j].real
-        if not abs(p) < clear:
+        if not low < p < high:
             return made
     return steps
 
@@ -177,7 +180,7 @@ def fly(
 
     """
     par, h = tables.par, tables.grid
-    elapsed = 0.0
+    elapsed, nearer = 0.0, min(par.lower, par.upper)
     while elapsed < longest:
         turn_phasors(now, phasors, elapsed, clock, tables)
         p, reach, bound = 0.0, 0.0, 0.0
@@ -187,15 +190,15 @@ def fly(
             p += terms[j].real
             reach += size
             bound += size * tables.squares[j]
-        if reach < par.gap:
+        if reach < nearer:
             # The free phasors can only shrink: no touch, ever.
             return CLEAR, longest
         if not bound < LARGEST_BOUND:
             return OUT_OF_RANGE, elapsed
-        clear = par.gap - bound * h * h / 8.0
+        margin = bound * h * h / 8.0
         steps = min(RUN_OF_STEPS, int((longest - elapsed) / h))
-        if abs(p) < clear and steps > 0:
-            made = _march(terms, tables.factors, steps, clear)
+        if margin - par.lower < p < par.upper - margin and steps > 0:
+            made = _march(terms, tables.factors, steps, margin - par.lower, par.upper - margin)
             if made > 0:
                 elapsed += made * h
                 continue
@@ -203,7 +206,7 @@ def fly(
                 terms[j] = now[j] * tables.path[j]
         length = min(h, longest - elapsed)
         fill_series(series, terms, tables.rates)
-        touch = first_contact(series, length, par.gap, bound, reach)
+        touch = first_contact(series, length, par.lower, par.upper, bound, reach)
         if touch != NEVER:
             return TOUCHES, elapsed + touch
         elapsed = longest if length < h else elapsed + length

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .clock import advance_clock, time_until
 from .compiled import compiled
-from .contact import HELD, LEFT, LOG_COLUMNS, NOT_FINITE, advance_contact, begin_contact, contact_workspace
+from .contact import HELD, LEFT, LOG_COLUMNS, NOT_FINITE, contact_workspace
 from .contact_flow import FORCE_TERMS
 from .detection import SERIES_TERMS
 from .flight import (
@@ -27,8 +27,11 @@ from .flight import (
 )
 from .modes import Complex
 from .outcome import Outcome
-from .parameters import SIDE, Table, Vector, X, Y, Z
+from .parameters import POWER, SIDE, Table, Vector, X, Y, Z
+from .smooth import smooth_turn
+from .smooth_tally import tally_smooth
 from .tally import MODE, NOTHING, tally_contact, tally_flight
+from .touch import advance_touching, strike
 
 REACHED_END = int(Outcome.REACHED_END)
 TOO_MANY_IMPACTS = int(Outcome.TOO_MANY_IMPACTS)
@@ -70,6 +73,7 @@ def advance_harmonic(  # noqa: C901, PLR0912 - the two phases and their ends are
     shadow = np.zeros(len(state))
     log = np.zeros((LOG_ROWS if record.tally[MODE] != NOTHING else 0, LOG_COLUMNS))
     counts = record.counts
+    turn = smooth_turn(tolerance) if tables.par.law == POWER else STRETCH_TURN
     while True:
         longest = time_until(clock, until)
         if longest <= 0.0:
@@ -93,18 +97,22 @@ def advance_harmonic(  # noqa: C901, PLR0912 - the two phases and their ends are
                 return TOO_MANY_IMPACTS
             record.impact_times[counts[IMPACTS]] = clock[0]
             counts[IMPACTS] += 1
-            begin_contact(state, math.copysign(1.0, state[Y] - state[Z]), tables.par, tolerance)
+            strike(state, tables.par, tolerance)
         else:
-            middle = min(0.5 * longest, 0.5 * STRETCH_TURN / tables.omega)
+            middle = min(0.5 * longest, 0.5 * turn / tables.omega)
             limit = min(longest, 2.0 * middle)
             _fill_base_force(force, clock, middle, tables)
             shadow[:] = state
-            code, length = advance_contact(state, 0.0, limit, force, middle, tables.par, tolerance, work, log)
+            code, length = advance_touching(
+                state, 0.0, limit, force, middle, tables.par, tables.power, tolerance, work, log
+            )
             if code == NOT_FINITE:
                 return LOST
             if code not in (LEFT, HELD):
                 return STUCK
-            if record.tally[MODE] != NOTHING:
+            if record.tally[MODE] != NOTHING and tables.par.law == POWER:
+                tally_smooth(record.tally, log, clock, tables)
+            elif record.tally[MODE] != NOTHING:
                 tally_contact(record.tally, log, clock, tables)
             _sample_contact(shadow, clock, length, force, middle, tables, tolerance, work, record)
             if length >= longest:
@@ -157,8 +165,8 @@ def _sample_contact(
         if later > length:
             return
         if shadow[SIDE] != 0.0 and later > reached:
-            _, reached = advance_contact(
-                shadow, reached, later, force, middle, tables.par, tolerance, work, none
+            _, reached = advance_touching(
+                shadow, reached, later, force, middle, tables.par, tables.power, tolerance, work, none
             )
         record.samples[counts[NEXT_SAMPLE]] = shadow[:6]
         counts[NEXT_SAMPLE] += 1

@@ -23,8 +23,24 @@ from .compiled import compiled
 from .contact import begin_contact
 from .detection import LONGEST_TURN
 from .modes import state_matrix
-from .parameters import SIDE, STATE_SIZE, VX, VY, VZ, Parameters, Table, Vector, X, Y, Z, parameters
+from .parameters import (
+    POWER,
+    SIDE,
+    STATE_SIZE,
+    VX,
+    VY,
+    VZ,
+    Parameters,
+    Table,
+    Vector,
+    X,
+    Y,
+    Z,
+    parameters,
+    power_terms,
+)
 from .piece import FAILED, IntervalTables, advance_part, carry_if_clear
+from .smooth import begin_smooth
 from .specimen import Specimen
 
 CUBIC_TERMS = 4
@@ -47,6 +63,7 @@ def interval_tables(
     length = interval_s / pieces
     return IntervalTables(
         par=par,
+        power=power_terms(specimen),
         length=length,
         pieces=pieces,
         transition=_transition(system, entry, length),
@@ -85,7 +102,7 @@ def _bound_per_root_energy(specimen: Specimen, system: Table) -> float:
 def new_state(
     specimen: Specimen, motion: ArrayLike = (0.0,) * 6, accuracy: Accuracy = Accuracy.STANDARD
 ) -> Vector:
-    """Make a state, shape (12,), from (x, y, z, vx, vy, vz) [m, m/s], absolute; at rest by default.
+    """Make a state, shape (STATE_SIZE,), from (x, y, z, vx, vy, vz) [m, m/s], absolute; at rest by default.
 
     A motion with abs(y - z) beyond the gap starts in contact.
     """
@@ -100,7 +117,9 @@ def place_on_its_side(state: Vector, par: Parameters, tolerance: float) -> None:
     """Decide from the displacements whether a state is in flight or in contact."""
     p = state[Y] - state[Z]
     state[SIDE] = 0.0
-    if abs(p) > par.gap:
+    if par.law == POWER:
+        begin_smooth(state)
+    elif p > par.upper or p < -par.lower:
         begin_contact(state, math.copysign(1.0, p), par, tolerance)
 
 

@@ -7,11 +7,12 @@ import numpy as np
 
 from .base_force import Cubic, shifted
 from .compiled import compiled
-from .contact import HELD, LEFT, LOG_COLUMNS, advance_contact, begin_contact, contact_workspace
+from .contact import HELD, LEFT, LOG_COLUMNS, contact_workspace
 from .contact_flow import FORCE_TERMS
 from .detection import LARGEST_BOUND, NEVER, SERIES_TERMS, first_contact
 from .flight_series import fill_flight_series, place_on_series
-from .parameters import SIDE, VX, VY, VZ, Parameters, Table, Vector, X, Y, Z
+from .parameters import SIDE, VX, VY, VZ, Parameters, PowerTerms, Table, Vector, X, Y, Z
+from .touch import advance_touching, strike
 
 MOST_IMPACTS_IN_A_PIECE = 1000
 """Far beyond any motion of a specimen; a search that reaches it has lost its way."""
@@ -23,6 +24,8 @@ class IntervalTables(NamedTuple):
     """Everything about specimen and interval that does not change from interval to interval."""
 
     par: Parameters
+    power: PowerTerms
+    """Of a power law; no terms for other laws."""
     length: float
     """One piece of the interval [s]: short enough for the Taylor series of detection."""
     pieces: int
@@ -53,10 +56,11 @@ def carry_if_clear(state: Vector, force: Cubic, tables: IntervalTables) -> bool:
     if state[SIDE] != 0.0:
         return False
     h, step = tables.length, tables.transition
-    clear = tables.par.gap - acceleration_bound(state, force, tables) * h * h / 8.0
+    margin = acceleration_bound(state, force, tables) * h * h / 8.0
+    low, high = margin - tables.par.lower, tables.par.upper - margin
     y = _carried(step, 1, state, force)
     z = _carried(step, 2, state, force)
-    if not (abs(state[Y] - state[Z]) < clear and abs(y - z) < clear):
+    if not (low < state[Y] - state[Z] < high and low < y - z < high):
         return False
     x = _carried(step, 0, state, force)
     vx = _carried(step, 3, state, force)
@@ -92,7 +96,9 @@ def advance_part(state: Vector, force: Cubic, length: float, tables: IntervalTab
     tau, impacts = 0.0, 0
     while impacts < MOST_IMPACTS_IN_A_PIECE:
         if state[SIDE] != 0.0:
-            code, tau = advance_contact(state, tau, length, pushing, 0.0, par, tables.tolerance, work, no_log)
+            code, tau = advance_touching(
+                state, tau, length, pushing, 0.0, par, tables.power, tables.tolerance, work, no_log
+            )
             if code == HELD:
                 return impacts
             if code != LEFT:
@@ -102,7 +108,7 @@ def advance_part(state: Vector, force: Cubic, length: float, tables: IntervalTab
         if not bound < LARGEST_BOUND:
             return FAILED
         fill_flight_series(series, path, state, rest, par)
-        touch = first_contact(path, length - tau, par.gap, bound, abs(state[Y]) + abs(state[Z]))
+        touch = first_contact(path, length - tau, par.lower, par.upper, bound, abs(state[Y]) + abs(state[Z]))
         if touch == NEVER:
             place_on_series(state, series, length - tau)
             return impacts
@@ -111,5 +117,5 @@ def advance_part(state: Vector, force: Cubic, length: float, tables: IntervalTab
         if impacts < len(times):
             times[impacts] = tau
         impacts += 1
-        begin_contact(state, math.copysign(1.0, state[Y] - state[Z]), par, tables.tolerance)
+        strike(state, par, tables.tolerance)
     return FAILED

@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 def state_scales(specimen: Specimen, drive: Harmonic) -> Floats:
     """Measure of a state, shape (6,): the gap for displacements, gap times 2 pi f for velocities."""
     speed = 2.0 * np.pi * drive.frequency_hz
-    return specimen.gap_m * np.repeat([1.0, speed], 3)
+    return min(specimen.gaps_m) * np.repeat([1.0, speed], 3)
 
 
 def stroboscopic_section(

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .contact_law import Hertz, NoContact
+from .contact_law import Hertz, HuntCrossley, LinearGap, NoContact, PowerLaw, RigidStops
 from .specimen import Specimen
 
 Floats = NDArray[np.float64]
@@ -188,8 +188,18 @@ HERTZ_EXPONENT = 1.5
 
 def spring_of(specimen: Specimen) -> RestoringForce:
     """Turn a specimen's stops into the function that harmonic balance needs."""
+    lower, upper = specimen.gaps_m
     match specimen.contact:
         case Hertz(stiffness=stiffness):
-            return GapSpring(stiffness, HERTZ_EXPONENT, specimen.gap_m, specimen.gap_m)
+            return GapSpring(stiffness, HERTZ_EXPONENT, upper, lower)
+        case HuntCrossley(stiffness=stiffness, loss=loss):
+            return GapSpring(stiffness, HERTZ_EXPONENT, upper, lower, loss)
+        case LinearGap(stiffness=stiffness):
+            return GapSpring(stiffness, 1.0, upper, lower)
+        case PowerLaw(reference=reference, terms=terms):
+            return PowerSpring(reference, terms)
         case NoContact():
             return NoForce()
+        case RigidStops():
+            msg = "Rigid stops push with no finite force: follow the motion in time instead, or use Hertz."
+            raise ValueError(msg)

@@ -7,15 +7,18 @@ the order (x, y, z), the absolute displacements of m0, m1, m2 (Gong et al. 2025,
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict
 
-from .contact_law import ContactLaw, Elasticity, Hertz, NoContact, hertz_stiffness
+from .contact_law import ContactLaw, Elasticity, Hertz, hertz_stiffness
+from .model_name import model_named
 
 Triple = tuple[float, float, float]
+Gaps = tuple[float, float]
+"""Clearances at negative and at positive p [m]; one of them may be infinite."""
 Matrix = NDArray[np.float64]
 
 
@@ -32,8 +35,10 @@ class Specimen:
     dampings: Triple
     """c0, c1, c2 [N s/m]; zero is allowed."""
     gap_m: float
-    """Clearance between m1 and each stop at rest [m]."""
+    """Clearance between m1 and each stop at rest [m]; infinite for no stop at positive p."""
     contact: ContactLaw
+    lower_gap_m: float | None = None
+    """Clearance of the stop at negative p where it differs; infinite for none there."""
 
     def __post_init__(self) -> None:
         _refuse_unless_positive("mass m", "kg", self.masses)
@@ -42,9 +47,19 @@ class Specimen:
             if not 0.0 <= damping < math.inf:
                 msg = f"Damping c{index} = {damping} N s/m is not allowed: it must be zero or positive."
                 raise ValueError(msg)
-        if not 0.0 < self.gap_m < math.inf:
-            msg = f"Gap {self.gap_m} m is not allowed: it must be positive; for no stops use NoContact."
+        lower, upper = self.gaps_m
+        if not (lower > 0.0 and upper > 0.0 and min(lower, upper) < math.inf):
+            msg = (
+                f"Gap {self.gap_m if self.lower_gap_m is None else self.gaps_m} m is not allowed: "
+                "it must be positive, and one side finite; "
+                "for no stops use NoContact."
+            )
             raise ValueError(msg)
+
+    @property
+    def gaps_m(self) -> Gaps:
+        """Clearances of the stops at negative and at positive p, both positive [m]."""
+        return (self.gap_m if self.lower_gap_m is None else self.lower_gap_m), self.gap_m
 
     @property
     def mass_matrix(self) -> Matrix:
@@ -99,8 +114,8 @@ PAPER_RADIUS_M = 4.4e-3
 
 def gong2025(
     damping_time_s: float = 2e-5,
-    gap_m: float = 45e-6,
-    contact: Literal["hertz", "linear"] = "hertz",
+    gap_m: float | Gaps = 45e-6,
+    contact: str = "hertz",
 ) -> Specimen:
     """Build the specimen of Gong et al. 2025, section 2.
 
@@ -110,21 +125,17 @@ def gong2025(
         c_i = damping_time_s * k_i [s]. The paper leaves it open; the default is the one reading
         found under which both of its statements on chaos hold.
     gap_m
-        Clearance at each stop [m].
+        Clearance at each stop [m], or (lower, upper); a power law is fitted at the nearer.
     contact
-        ``"hertz"``: the paper's stops. ``"linear"``: no stops.
+        ``"hertz"``: the paper's stops; ``"linear"``: none; ``"power:5"`` and others as `sim.model_name` says.
 
     """
     if not 0.0 <= damping_time_s < math.inf:
         msg = f"Damping time {damping_time_s} s is not allowed: it must be zero or positive."
         raise ValueError(msg)
-    laws: dict[str, ContactLaw] = {
-        "hertz": Hertz(hertz_stiffness(STEEL, ALUMINIUM, PAPER_RADIUS_M)),
-        "linear": NoContact(),
-    }
-    if contact not in laws:
-        msg = f"Contact {contact!r} is not known: choose one of {', '.join(laws)}."
-        raise ValueError(msg)
+    hertz = Hertz(hertz_stiffness(STEEL, ALUMINIUM, PAPER_RADIUS_M))
+    lower, upper = gap_m if isinstance(gap_m, tuple) else (None, gap_m)
+    law = model_named(contact, hertz, upper if lower is None else min(lower, upper))
     m0, m1, m2 = PAPER_MASSES
     f0, f1, f2 = PAPER_FREQUENCIES_HZ
     k0, k1, k2 = (m * (2.0 * math.pi * f) ** 2 for m, f in ((m0, f0), (m1, f1), (m2, f2)))
@@ -132,8 +143,9 @@ def gong2025(
         masses=PAPER_MASSES,
         stiffnesses=(k0, k1, k2),
         dampings=(damping_time_s * k0, damping_time_s * k1, damping_time_s * k2),
-        gap_m=gap_m,
-        contact=laws[contact],
+        gap_m=upper,
+        contact=law,
+        lower_gap_m=lower,
     )
 
 

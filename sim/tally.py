@@ -8,7 +8,7 @@ closed form over flights, and by the corrected trapezoidal rule (error ~ step^4)
 import cmath
 
 from .compiled import compiled
-from .contact import DEEPEST, LOG_P, LOG_RATE, LOG_TIME, LOG_VX, LOG_X, LOGGED
+from .contact import DEEPEST, LOG_P, LOG_RATE, LOG_TIME, LOG_VX, LOG_X, LOGGED, gap_of
 from .detection import polynomial_at
 from .flight import RUN_OF_STEPS, FlightTables, drive_phasor, fill_series, turn_phasors
 from .modes import Complex
@@ -52,9 +52,9 @@ def tally_flight(
 def tally_contact(tally: Vector, log: Table, clock: Vector, tables: FlightTables) -> None:
     """Add the steps of a contact, whose log counts time from clock time."""
     rows = int(log[0, LOGGED])
-    gap = tables.par.gap
     deepest = log[0, DEEPEST]
-    tally[PEAK_P] = max(tally[PEAK_P], gap + deepest * deepest)
+    side = 1.0 if log[1, LOG_P] > 0.0 else -1.0
+    tally[PEAK_P] = max(tally[PEAK_P], gap_of(side, tables.par) + deepest * deepest)
     at = drive_phasor(clock, log[1, LOG_TIME], tables).conjugate()
     for row in range(1, rows):
         start, end = log[row, LOG_TIME], log[row + 1, LOG_TIME]
@@ -114,7 +114,7 @@ def _hermite_peak(best: float, x0: float, v0: float, x1: float, v1: float, step:
 
 
 @compiled
-def _series_peak(best: float, series: Vector, low: float, high: float) -> float:
+def series_peak(best: float, series: Vector, low: float, high: float) -> float:
     """Largest magnitude of a polynomial on [low, high], which holds at most one extreme."""
     value_low, slope_low = polynomial_at(series, low)
     value_high, slope_high = polynomial_at(series, high)
@@ -166,7 +166,7 @@ def _flight_peak(
         steps = min(RUN_OF_STEPS, int((length - done) / h))
         if steps == 0:
             fill_series(series, terms, tables.rates)
-            return _series_peak(best, series, 0.0, length - done)
+            return series_peak(best, series, 0.0, length - done)
         for _ in range(steps):
             after = 0.0
             for j in range(len(terms)):
@@ -174,7 +174,7 @@ def _flight_peak(
                 after += terms[j].real
             if max(abs(before), abs(after)) + excess > best:
                 fill_series(series, terms, tables.rates)
-                best = _series_peak(best, series, -h, 0.0)
+                best = series_peak(best, series, -h, 0.0)
             before = after
         done += steps * h
 

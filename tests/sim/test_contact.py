@@ -28,7 +28,7 @@ def free_collision(speed, tolerance, limit=1.0):
     par = parameters(gong2025())._replace(**LOOSE)
     state = np.zeros(STATE_SIZE)
     total = par.mass1 + par.mass2
-    state[Y], state[VY], state[VZ] = par.gap, speed * par.mass2 / total, -speed * par.mass1 / total
+    state[Y], state[VY], state[VZ] = par.upper, speed * par.mass2 / total, -speed * par.mass1 / total
     begin_contact(state, 1.0, par, tolerance)
     log = np.zeros((64, LOG_COLUMNS))
     code, duration = advance_contact(

@@ -1,7 +1,7 @@
 """No touch is missed, however short: polynomials whose peak is known to the last digit."""
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.detection import NEVER, SERIES_TERMS, first_contact
@@ -17,6 +17,7 @@ def parabola(peak, at, bend):
     return series
 
 
+@settings(deadline=None)
 @given(
     over=st.floats(1e-16, 1e-7),
     at=st.floats(1e-6, LENGTH),
@@ -28,12 +29,13 @@ def test_a_peak_beyond_the_stop_is_found_at_its_first_crossing(over, at, bend, s
     crossing = at - np.sqrt(2.0 * over / bend)
     if crossing <= 0.0:
         return
-    found = first_contact(side * parabola(GAP + over, at, bend), LENGTH, GAP, slack * bend, GAP)
+    found = first_contact(side * parabola(GAP + over, at, bend), LENGTH, GAP, GAP, slack * bend, GAP)
     assert 0.0 < found <= crossing + 1e-14
     short = 0.5 * bend * ((at - found) ** 2 - (at - crossing) ** 2)
     assert short < 2e-16, "the touch was called before the gap had closed"
 
 
+@settings(deadline=None)
 @given(
     under=st.floats(1e-15, 1e-6),
     at=st.floats(0.0, LENGTH),
@@ -41,15 +43,16 @@ def test_a_peak_beyond_the_stop_is_found_at_its_first_crossing(over, at, bend, s
     slack=st.floats(1.0, 30.0),
 )
 def test_a_peak_short_of_the_stop_is_no_touch(under, at, bend, slack):
-    assert first_contact(parabola(GAP - under, at, bend), LENGTH, GAP, slack * bend, GAP) == NEVER
+    assert first_contact(parabola(GAP - under, at, bend), LENGTH, GAP, GAP, slack * bend, GAP) == NEVER
 
 
+@settings(deadline=None)
 @given(speed=st.floats(1e-6, 1.0), slack=st.floats(1.0, 10.0))
 def test_a_stop_that_is_being_left_is_no_touch_until_the_return(speed, slack):
     pull = -1e5
     series = np.zeros(SERIES_TERMS)
     series[:3] = [GAP, -speed, -0.5 * pull]
-    found = first_contact(series, LENGTH, GAP, slack * abs(pull), GAP)
+    found = first_contact(series, LENGTH, GAP, GAP, slack * abs(pull), GAP)
     back = 2.0 * speed / abs(pull)
     deepest = speed**2 / (2.0 * abs(pull))
     if back < LENGTH * 0.999 and deepest < GAP:
@@ -62,5 +65,5 @@ def test_a_stop_that_is_being_left_is_no_touch_until_the_return(speed, slack):
 def test_the_opposite_stop_is_watched_while_p_runs_away_from_the_near_one():
     series = np.zeros(SERIES_TERMS)
     series[:2] = [0.5 * GAP, -10.0]
-    found = first_contact(series, LENGTH, GAP, 1.0, GAP)
+    found = first_contact(series, LENGTH, GAP, GAP, 1.0, GAP)
     assert abs(found - 1.5 * GAP / 10.0) < 1e-15

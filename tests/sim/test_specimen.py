@@ -61,5 +61,5 @@ def test_a_specimen_that_cannot_be_says_which_number_is_wrong(field, value, sent
 
 
 def test_an_unknown_contact_names_the_known_ones():
-    with pytest.raises(ValueError, match="'rubber' is not known: choose one of hertz, linear"):
+    with pytest.raises(ValueError, match="'rubber' is not known: give one of hertz, linear"):
         gong2025(contact="rubber")

@@ -1,0 +1,34 @@
+"""Where a law acts: what a touch does to the motion, and how it goes on while the force lasts. SI units."""
+
+import math
+
+from .compiled import compiled
+from .contact import advance_contact, begin_contact
+from .parameters import POWER, VY, VZ, Parameters, PowerTerms, Table, Vector
+from .power_flow import PowerSystem
+from .smooth import advance_smooth
+
+
+@compiled
+def strike(state: Vector, par: Parameters, tolerance: float) -> None:
+    """Touch the stop that m1 moves towards; the state is placed on it."""
+    begin_contact(state, math.copysign(1.0, state[VY] - state[VZ]), par, tolerance)
+
+
+@compiled
+def advance_touching(
+    state: Vector,
+    tau: float,
+    limit: float,
+    force: Vector,
+    middle: float,
+    par: Parameters,
+    power: PowerTerms,
+    tolerance: float,
+    work: Table,
+    log: Table,
+) -> tuple[int, float]:
+    """Advance while the law's force acts, to its end or to ``limit``; see `sim.contact.advance_contact`."""
+    if par.law == POWER:
+        return advance_smooth(state, tau, limit, force, middle, PowerSystem(par, power), tolerance, work, log)
+    return advance_contact(state, tau, limit, force, middle, par, tolerance, work, log)

@@ -1,0 +1,124 @@
+"""Contact laws: their numbers, their fits, and the names by which a user asks for them."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import TypeAdapter
+
+from sim.contact_law import (
+    ContactLaw,
+    Hertz,
+    HuntCrossley,
+    LinearGap,
+    NoContact,
+    PowerLaw,
+    RigidStops,
+    fitted_linear_gap,
+    fitted_power_law,
+)
+from sim.model_name import model_named
+from sim.parameters import power_terms
+from sim.power_flow import power_force
+from sim.restoring_force import spring_of
+from sim.specimen import gong2025
+
+HERTZ = Hertz(4.9e9)
+GAP = 45e-6
+
+
+@pytest.mark.parametrize("name", ["power:3", "power:5", "power:47", "power:201", "power:3+5+7"])
+def test_a_fitted_power_law_has_the_force_of_hertz_at_one_micrometre(name):
+    spring = spring_of(gong2025(contact=name))
+    hertz = spring_of(gong2025())
+    there, still = np.array([GAP + 1e-6]), np.zeros(1)
+    assert spring.force(there, still) == pytest.approx(hertz.force(there, still), rel=1e-12)
+
+
+@settings(deadline=None)
+@given(st.floats(1e-6, 60e-6))
+def test_the_sum_of_three_powers_lies_between_its_lowest_and_its_highest(p):
+    at, still = np.array([p]), np.zeros(1)
+    third, sum_, seventh = (
+        float(spring_of(gong2025(contact=name)).force(at, still)[0])
+        for name in ("power:3", "power:3+5+7", "power:7")
+    )
+    assert min(third, seventh) <= sum_ * (1 + 1e-12)
+    assert sum_ <= max(third, seventh) * (1 + 1e-12)
+
+
+@settings(deadline=None)
+@given(st.floats(-80e-6, 80e-6), st.sampled_from(["power:3", "power:7", "power:3@0.2+5@0.5+11@0.3"]))
+def test_the_kernel_and_the_harmonic_balance_know_the_same_power_law(p, name):
+    specimen = gong2025(contact=name)
+    kernel = power_force(p, power_terms(specimen))
+    assert kernel == pytest.approx(spring_of(specimen).force(np.array([p]), np.zeros(1))[0], rel=1e-12)
+
+
+def test_a_high_power_neither_overflows_below_its_reference_nor_lies_beyond_all_numbers():
+    terms = power_terms(gong2025(contact="power:201"))
+    assert power_force(46e-6, terms) == pytest.approx(HERTZ.stiffness * 1e-9, rel=1e-2)
+    assert power_force(1e-9, terms) == 0.0
+    assert not math.isfinite(power_force(1.0, terms))
+
+
+@pytest.mark.parametrize(
+    ("text", "law"),
+    [
+        ("hertz", HERTZ),
+        ("linear", NoContact()),
+        ("linear_gap:2e6", LinearGap(2e6)),
+        ("linear_gap", fitted_linear_gap(HERTZ)),
+        ("hunt_crossley:0.3", HuntCrossley(HERTZ.stiffness, 0.3)),
+        ("rigid:0.8", RigidStops(0.8)),
+        ("power:5", fitted_power_law([5], HERTZ, GAP)),
+        ("power:7+3", fitted_power_law([3, 7], HERTZ, GAP)),
+        ("power:3@0.25+7@0.75", fitted_power_law([3, 7], HERTZ, GAP, shares=[0.25, 0.75])),
+    ],
+)
+def test_a_name_gives_its_law(text, law):
+    assert model_named(text, HERTZ, GAP) == law
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("steel", r"Contact 'steel' is not known: give one of hertz, linear"),
+        ("power:", r"Contact 'power:' is not known"),
+        ("power:x", r"Contact 'power:x' is not known"),
+        ("power:4", r"Exponents \[4\] are not allowed: odd"),
+        ("power:1", r"Exponents \[1\] are not allowed"),
+        ("power:3+3", r"Exponents \[3, 3\] are not allowed"),
+        ("power:3+5+7+9+11+13+15", "at most 6"),
+        ("power:3@0.5+5@0.6", "adding up to 1"),
+        ("rigid:1.2", r"Restitution 1\.2 is not allowed"),
+        ("rigid", r"Contact 'rigid' is not known"),
+        ("hunt_crossley:-1", r"loss -1\.0 s/m is not allowed"),
+        ("linear_gap:nan", "Stop stiffness nan N/m is not allowed"),
+    ],
+)
+def test_a_wrong_name_is_refused_in_one_sentence(text, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        model_named(text, HERTZ, GAP)
+
+
+@pytest.mark.parametrize(
+    "name", ["hertz", "linear", "linear_gap", "hunt_crossley:0.5", "rigid:0.7", "power:3+5+7"]
+)
+def test_a_law_survives_a_file(name):
+    law = gong2025(contact=name).contact
+    adapter = TypeAdapter(ContactLaw)
+    assert adapter.validate_json(adapter.dump_json(law)) == law
+
+
+@pytest.mark.parametrize("gap", [(0.0, 1e-5), (math.inf, math.inf), (1e-5, math.nan), -1e-6])
+def test_a_gap_that_is_none_is_refused(gap):
+    with pytest.raises(ValueError, match="is not allowed: it must be positive, and one side finite"):
+        gong2025(gap_m=gap)
+
+
+def test_a_power_law_without_terms_is_refused():
+    with pytest.raises(ValueError, match="without terms is not allowed"):
+        PowerLaw(46e-6, ())

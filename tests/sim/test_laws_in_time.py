@@ -1,0 +1,262 @@
+"""Every contact law followed in time: against the equations as written, closed forms, and mechanics."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import simpson, solve_ivp
+
+from sim.accuracy import Accuracy
+from sim.contact_law import HuntCrossley, LinearGap, PowerLaw
+from sim.drive import Harmonic, LinearSweep, Sampled
+from sim.integrate import integrate
+from sim.outcome import Outcome
+from sim.response import steady_response
+from sim.restoring_force import spring_of
+from sim.specimen import Specimen, gong2025
+
+DRIVE = Harmonic(130.0, 20e-6)
+STILL = Harmonic(100.0, 0.0)
+POWERS = ["power:3", "power:7", "power:3+5+7", "power:29"]
+STOPS = ["linear_gap", "hunt_crossley:0.5", "hertz"]
+
+
+def paper(contact, **options):
+    return gong2025(**{"damping_time_s": 3e-5, "contact": contact, **options})
+
+
+def as_written(specimen, drive, duration_s, start=(0.0,) * 6):
+    """Final state by scipy, from the paper's equations and the force as harmonic balance knows it."""
+    m0, m1, m2 = specimen.masses
+    k0, k1, k2 = specimen.stiffnesses
+    c0, c1, c2 = specimen.dampings
+    spring, omega = spring_of(specimen), 2.0 * math.pi * drive.frequency_hz
+
+    def rates(t, state):
+        x, y, z, vx, vy, vz = state
+        force = spring.force(np.array([y - z]), np.array([vy - vz]))[0]
+        upper, inner = k2 * (z - x) + c2 * (vz - vx), k1 * (y - z) + c1 * (vy - vz) + force
+        base = k0 * (drive.amplitude_m * math.sin(omega * t) - x)
+        base += c0 * (drive.amplitude_m * omega * math.cos(omega * t) - vx)
+        return [vx, vy, vz, (upper + base) / m0, -inner / m1, (inner - upper) / m2]
+
+    run = solve_ivp(rates, (0.0, duration_s), start, method="DOP853", rtol=1e-11, atol=1e-14, max_step=2e-5)
+    return run.y[:, -1]
+
+
+def distance(first, second):
+    """Largest difference of two states in units of 100 um and 0.1 m/s."""
+    return np.max(np.abs(first - second) / np.repeat([1e-4, 0.1], 3))
+
+
+def pair(contact, gap_m=45e-6):
+    """Masses m1 and m2 that collide while nothing else happens to them: all other springs are faint."""
+    faint = (1e-2, 2e-2, 3e-2)
+    return Specimen((1.0, 2.1e-3, 2.0e-3), faint, (0.0, 0.0, 0.0), gap_m, contact)
+
+
+@pytest.mark.parametrize("contact", [*POWERS, *STOPS])
+def test_an_independent_integrator_of_the_equations_as_written_agrees(contact):
+    specimen = paper(contact)
+    ours = integrate(specimen, DRIVE, 0.02, Accuracy.REFERENCE)
+    assert ours.outcome is Outcome.REACHED_END
+    assert distance(ours.final_state, as_written(specimen, DRIVE, 0.02)) < 2e-6
+
+
+@pytest.mark.parametrize("gap_m", [(30e-6, 45e-6), (20e-6, math.inf), (math.inf, 20e-6)])
+@pytest.mark.parametrize("contact", ["hertz", "linear_gap"])
+def test_unequal_stops_agree_with_the_equations_as_written(contact, gap_m):
+    specimen = paper(contact, gap_m=gap_m)
+    ours = integrate(specimen, DRIVE, 0.02, Accuracy.REFERENCE, sample_rate_hz=1e5)
+    p = ours.states[:, 1] - ours.states[:, 2]
+    assert ours.impacts.count > 2
+    assert -gap_m[0] - 5e-6 < p.min()
+    assert p.max() < gap_m[1] + 5e-6
+    assert distance(ours.final_state, as_written(specimen, DRIVE, 0.02)) < 2e-6
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.floats(60.0, 500.0), st.floats(2e-6, 30e-6), st.sampled_from(["hertz", "linear_gap"]))
+def test_exchanged_stops_mirror_the_motion(frequency_hz, amplitude_m, contact):
+    here = paper(contact, gap_m=(20e-6, 50e-6))
+    there = paper(contact, gap_m=(50e-6, 20e-6))
+    # Short: chaos makes of the rounding of pi ten thousand times more in 10 ms, and its square in 20 ms.
+    one = integrate(here, Harmonic(frequency_hz, amplitude_m), 0.01, Accuracy.REFERENCE)
+    other = integrate(there, Harmonic(frequency_hz, amplitude_m, math.pi), 0.01, Accuracy.REFERENCE)
+    assert one.impacts.count == other.impacts.count
+    assert distance(one.final_state, -other.final_state) < 1e-6
+
+
+@pytest.mark.parametrize("exponent", [3, 5, 7, 29, 47])
+def test_a_free_power_oscillator_has_the_period_of_its_closed_form(exponent):
+    amplitude, force, specimen = 40e-6, 5.0, pair(PowerLaw(46e-6, ((exponent, 5.0),)))
+    m1, m2 = specimen.masses[1:]
+    mass = m1 * m2 / (m1 + m2)
+    stiff = force / 46e-6**exponent if exponent < 40 else None
+    coefficient = (
+        stiff * amplitude ** (exponent - 1)
+        if stiff
+        else force / 46e-6 * (amplitude / 46e-6) ** (exponent - 1)
+    )
+    inverse = 1.0 / (exponent + 1)
+    # T = 4 sqrt((n+1)/2) / sqrt(k A^(n-1) / m) times the integral of du/sqrt(1 - u^(n+1)), a beta function.
+    quarter = math.sqrt(math.pi) * math.gamma(inverse) * inverse / math.gamma(inverse + 0.5)
+    period = 4.0 * math.sqrt((exponent + 1) / 2.0) * quarter / math.sqrt(coefficient / mass)
+    start = np.array([0.0, amplitude * m2 / (m1 + m2), -amplitude * m1 / (m1 + m2), 0.0, 0.0, 0.0])
+    run = integrate(specimen, STILL, 10.0 * period, Accuracy.REFERENCE, start)
+    p, rate = run.final_state[1] - run.final_state[2], run.final_state[4] - run.final_state[5]
+    speed = math.sqrt(2.0 * coefficient * amplitude**2 / ((exponent + 1) * mass))
+    assert p == pytest.approx(amplitude, rel=1e-7)
+    assert abs(rate) < 1e-5 * speed
+
+
+def test_a_linear_stop_returns_the_bilinear_frequency():
+    stiffness = 4e5
+    specimen = replace(pair(LinearGap(stiffness), 1e-12), stiffnesses=(1e-2, 2e4, 3e-2))
+    specimen = replace(specimen, lower_gap_m=math.inf)
+    m1, m2 = specimen.masses[1:]
+    mass = m1 * m2 / (m1 + m2)
+    soft, stiff = math.sqrt(2e4 / mass), math.sqrt((2e4 + stiffness) / mass)
+    period = math.pi / soft + math.pi / stiff
+    start = np.array([0.0, -20e-6 * m2 / (m1 + m2), 20e-6 * m1 / (m1 + m2), 0.0, 0.0, 0.0])
+    run = integrate(specimen, STILL, 20.0 * period, Accuracy.REFERENCE, start)
+    assert run.impacts.count == 20
+    assert np.diff(run.impacts.times_s) == pytest.approx(period, rel=1e-6)
+    assert run.final_state[1] - run.final_state[2] == pytest.approx(-20e-6, rel=1e-6)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(1e-2, 1.0), st.floats(0.0, 2.0))
+def test_the_speed_after_a_lossy_collision_solves_its_closed_form(speed, loss):
+    specimen = replace(pair(HuntCrossley(4.9e9, loss)), lower_gap_m=math.inf)
+    m1, m2 = specimen.masses[1:]
+    p = 44.999e-6
+    share = np.array([0.0, m2 / (m1 + m2), -m1 / (m1 + m2)])
+    run = integrate(
+        specimen, STILL, 1e-9 / speed + 3e-4, Accuracy.REFERENCE, np.concatenate([p * share, speed * share])
+    )
+    after = run.final_state[5] - run.final_state[4]
+
+    # d(r^2/2)/dd = -(k/m) d^1.5 (1 + loss r): r - ln(1 + loss r)/loss changes by the same each way.
+    def held(r):
+        return (
+            (loss * r - math.log1p(loss * r)) / loss**2
+            if loss * abs(r) > 1e-3
+            else r**2 / 2 - loss * r**3 / 3
+        )
+
+    assert run.impacts.count == 1
+    assert 0.0 < after <= speed * (1.0 + 1e-4)
+    assert held(-after) == pytest.approx(held(speed), rel=1e-3)
+
+
+@pytest.mark.parametrize("contact", POWERS)
+def test_each_level_of_accuracy_is_nearer_to_the_reference(contact):
+    specimen = paper(contact)
+    finals = {level: integrate(specimen, DRIVE, 0.03, level).final_state for level in Accuracy}
+    reference = finals[Accuracy.REFERENCE]
+    quick, standard = (distance(finals[level], reference) for level in (Accuracy.QUICK, Accuracy.STANDARD))
+    assert standard < 0.1 * quick
+    assert standard < 1e-4
+
+
+@pytest.mark.parametrize("contact", ["power:3", "power:47", "linear_gap"])
+def test_without_damping_and_drive_the_energy_stays(contact):
+    specimen = gong2025(damping_time_s=0.0, contact=contact)
+    start = np.array([2e-5, 0.0, -3e-5, 0.1, 0.05, -0.2])
+    run = integrate(specimen, STILL, 1.0, Accuracy.REFERENCE, start, sample_rate_hz=2e3)
+    x, y, z, vx, vy, vz = run.states.T
+    (m0, m1, m2), (k0, k1, k2) = specimen.masses, specimen.stiffnesses
+    kinetic = 0.5 * (m0 * vx**2 + m1 * vy**2 + m2 * vz**2)
+    elastic = 0.5 * (k0 * x**2 + k1 * (y - z) ** 2 + k2 * (z - x) ** 2)
+    if isinstance(specimen.contact, PowerLaw):
+        ((exponent, force),) = specimen.contact.terms
+        reference = specimen.contact.reference
+        stored = force * reference / (exponent + 1) * ((y - z) / reference) ** (exponent + 1)
+    else:
+        stored = 0.5 * specimen.contact.stiffness * np.maximum(np.abs(y - z) - specimen.gap_m, 0.0) ** 2
+    held = kinetic + elastic + stored
+    np.testing.assert_allclose(held, held[0], rtol=1e-5)
+
+
+@pytest.mark.parametrize("contact", ["power:5", "power:29"])
+def test_the_responses_of_a_power_law_are_those_of_its_trajectory(contact):
+    specimen = paper(contact, damping_time_s=1e-4)
+    response = steady_response(specimen, DRIVE, Accuracy.STANDARD, duration_s=2.0, window_s=0.5)
+    run = integrate(specimen, DRIVE, 2.0, Accuracy.STANDARD, sample_rate_hz=2e5)
+    window = run.time_s > 1.5 - 1e-9
+    x, p = run.states[window, 0], (run.states[:, 1] - run.states[:, 2])[window]
+    against = 2.0 * np.exp(-2j * np.pi * DRIVE.frequency_hz * run.time_s[window])
+    assert response.largest_x_m == pytest.approx(np.abs(x).max(), rel=1e-5)
+    assert response.largest_p_m == pytest.approx(np.abs(p).max(), rel=1e-4)
+    assert response.line_x_m == pytest.approx(simpson(x * against, x=run.time_s[window]) / 0.5, rel=1e-5)
+    assert response.line_p_m == pytest.approx(simpson(p * against, x=run.time_s[window]) / 0.5, rel=1e-4)
+
+
+def test_a_small_motion_under_a_power_law_is_the_linear_one():
+    drive = Harmonic(77.0, 1e-12)
+    power = steady_response(paper("power:7"), drive, duration_s=5.0, window_s=1.0)
+    linear = steady_response(paper("linear"), drive, duration_s=5.0, window_s=1.0)
+    assert power.response_i == pytest.approx(linear.response_i, rel=1e-5)
+    assert power.line_x_m == pytest.approx(linear.line_x_m, rel=1e-5)
+
+
+@pytest.mark.parametrize("contact", ["power:5", "linear_gap", "hunt_crossley:0.5"])
+def test_a_sampled_sine_drives_any_law_like_the_sine_itself(contact):
+    specimen, rate = paper(contact), 20_000.0
+    sine = DRIVE.amplitude_m * np.sin(2.0 * np.pi * DRIVE.frequency_hz * np.arange(1300) / rate)
+    sampled = integrate(specimen, Sampled(sine, rate), 0.05, Accuracy.REFERENCE)
+    harmonic = integrate(specimen, DRIVE, 0.05, Accuracy.REFERENCE)
+    assert distance(sampled.final_state, harmonic.final_state) < 1e-5
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.floats(0.0, 0.05), st.sampled_from(["power:7", "power:47"]))
+def test_a_run_in_two_parts_ends_where_the_whole_does(first_s, contact):
+    specimen = paper(contact)
+    for drive in (DRIVE, LinearSweep(90.0, 150.0, 0.05, 20e-6)):
+        whole = integrate(specimen, drive, 0.05, Accuracy.REFERENCE)
+        first = integrate(specimen, drive, first_s, Accuracy.REFERENCE)
+        second = integrate(
+            specimen, drive, 0.05 - first_s, Accuracy.REFERENCE, first.final_state, start_time_s=first_s
+        )
+        assert distance(second.final_state, whole.final_state) < 1e-6
+
+
+def test_sampling_does_not_change_a_power_laws_motion_by_one_bit():
+    plain = integrate(paper("power:29"), DRIVE, 0.3)
+    sampled = integrate(paper("power:29"), DRIVE, 0.3, sample_rate_hz=7777.0)
+    np.testing.assert_array_equal(sampled.final_state, plain.final_state)
+
+
+@pytest.mark.parametrize("contact", ["power:29", "power:47", "power:201"])
+@pytest.mark.parametrize("accuracy", list(Accuracy))
+def test_a_step_tried_into_a_wall_of_high_power_is_taken_back(contact, accuracy):
+    for drive in (Harmonic(260.0, 5e-6), Harmonic(430.0, 50e-6), Harmonic(210.0, 1e-3)):
+        run = integrate(paper(contact), drive, 1.0, accuracy, sample_rate_hz=1e4)
+        assert run.outcome is Outcome.REACHED_END
+        assert np.max(np.abs(run.states[:, 1] - run.states[:, 2])) < 80e-6
+
+
+@pytest.mark.parametrize("contact", ["power:5", "hertz", "linear_gap", "hunt_crossley:1"])
+@pytest.mark.parametrize(
+    "drive",
+    [Harmonic(0.01, 1e-2), Harmonic(50e3, 1e-6), Harmonic(100.0, 1e-2), Harmonic(100.0, 1e-12)],
+)
+def test_extreme_drives_end_finite(contact, drive):
+    run = integrate(paper(contact), drive, 0.05)
+    assert run.outcome is Outcome.REACHED_END
+    assert np.all(np.isfinite(run.final_state))
+
+
+@pytest.mark.parametrize("contact", ["power:5", "hertz"])
+@pytest.mark.parametrize("masses", [(5.8e3, 2.1e-3, 2e-3), (5.8e-3, 2.1e-9, 2e-3), (5.8e-9, 2.1e-3, 2e-3)])
+def test_masses_in_a_ratio_of_a_million_agree_between_levels(contact, masses):
+    specimen = replace(paper(contact), masses=masses)
+    ours = integrate(specimen, DRIVE, 0.003, Accuracy.STANDARD)
+    strict = integrate(specimen, DRIVE, 0.003, Accuracy.REFERENCE)
+    assert ours.outcome is Outcome.REACHED_END
+    assert distance(ours.final_state, strict.final_state) < 1e-3
