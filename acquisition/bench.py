@@ -10,6 +10,7 @@ from typing import Self
 
 from .drivers.afg1022x import AFG1022X
 from .drivers.daqmx import DaqmxDigitizer
+from .drivers.daqmx_output import DaqmxOutput
 from .errors import AcquisitionError
 from .instruments import Identity
 from .rig.calibration import CalibrationRule, check_calibrations
@@ -28,8 +29,8 @@ class Reality(StrEnum):
 class Bench:
     """The open instruments of a rig. Use it in a ``with``, or `close` it.
 
-    Leaving silences the generator first, then closes everything, whatever happened; an error that
-    is under way stays in front, and what fails while leaving becomes a note on it.
+    Leaving silences generator and analogue output first, then closes everything, whatever happened; an
+    error that is under way stays in front, and what fails while leaving becomes a note on it.
     """
 
     def __init__(
@@ -37,12 +38,14 @@ class Bench:
         rig: Rig,
         generator: AFG1022X,
         digitizer: DaqmxDigitizer,
+        output: DaqmxOutput | None,
         confirmations: KnobSheet,
         closing: ExitStack,
     ) -> None:
         self.rig = rig
         self.generator = generator
         self.digitizer = digitizer
+        self.output = output
         self.confirmations = confirmations
         self._closing = closing
 
@@ -62,7 +65,7 @@ class Bench:
         return Reality.REAL if self.rig.virtual is None else Reality.SIMULATED
 
     def close(self) -> None:
-        """Silence the generator, then close everything. Legal at any time."""
+        """Silence everything that plays, then close everything. Legal at any time."""
         self._closing.close()
 
     def __enter__(self) -> Self:
@@ -79,7 +82,7 @@ def open_bench(
     confirm: Confirm | None = None,
     calibration: CalibrationRule = CalibrationRule.ENFORCED,
 ) -> Bench:
-    """Open every instrument of a rig, with the generator silent.
+    """Open every instrument of a rig, with generator and analogue output silent.
 
     Parameters
     ----------
@@ -117,11 +120,23 @@ def _opened(rig: Rig, confirm: Confirm | None, closing: ExitStack) -> Bench:
     connected = rig if rig.virtual is None else _virtual(rig, closing)
     digitizer = DaqmxDigitizer.open(connected)
     closing.callback(digitizer.close)
+    output = _output(connected, digitizer, closing)
     generator = AFG1022X.open(connected.generator)
     closing.callback(generator.close)
     closing.callback(generator.stop)  # the last to enter is the first to happen
+    if output is not None:
+        closing.callback(output.stop)
     ask = confirm or _usual_confirmation(rig)
-    return Bench(rig, generator, digitizer, ask((*rig.knobs, *generator.unconfirmed)), closing)
+    return Bench(rig, generator, digitizer, output, ask((*rig.knobs, *generator.unconfirmed)), closing)
+
+
+def _output(rig: Rig, digitizer: DaqmxDigitizer, closing: ExitStack) -> DaqmxOutput | None:
+    config, physical = rig.daq.output, rig.daq.output_channel
+    if config is None or physical is None:
+        return None
+    output = DaqmxOutput.open(physical, config, digitizer)
+    closing.callback(output.close)
+    return output
 
 
 def _usual_confirmation(rig: Rig) -> Callable[..., KnobSheet]:

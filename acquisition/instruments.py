@@ -110,3 +110,36 @@ class Digitizer(Protocol):
 
     def close(self) -> None:
         """Release the device. Legal at any time."""
+
+
+class AnalogOutput(Protocol):
+    """An output that streams samples written ahead of their time, from the digitizer's start on."""
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """The rate that the hardware really runs at."""
+
+    @property
+    def ahead_samples(self) -> int:
+        """How many samples can be written in front of what is being played."""
+
+    def write(self, volts: Samples) -> None:
+        """Put samples behind those that are still to be played; wait for room when there is none.
+
+        Raises
+        ------
+        LimitExceeded
+            When a sample is past the limit of the bench. Nothing was written.
+        DataLost
+            When the output ran dry: it has stopped.
+
+        """
+
+    def arm(self) -> None:
+        """Wait, with the first stretch written, for the digitizer's start: both then begin with sample 0."""
+
+    def stop(self) -> None:
+        """Go to zero volts at once. Legal at any time; the next `write` begins a new stream."""
+
+    def close(self) -> None:
+        """Zero volts, device released. Legal at any time."""

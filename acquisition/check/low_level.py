@@ -135,7 +135,10 @@ def _require_drive(figures: CheckFigures) -> None:
     if abs(ratio / WRONG_LOAD - 1) <= DRIVE_TOLERANCE or abs(ratio * WRONG_LOAD - 1) <= DRIVE_TOLERANCE:
         advice = "a factor of 2 is a wrong load: compare the generator's load setting with load_ohm"
     else:
-        advice = "check the wire from the generator to the drive_voltage input, its range and attenuation"
+        advice = (
+            "check the wire from the generator (or analogue output, if that plays) to the drive_voltage "
+            "input, its range and attenuation"
+        )
     raise CheckFailed(
         f"{measured}, {DRIVE_TOLERANCE:.0%} off is allowed. The output was turned off; {advice}"
     )

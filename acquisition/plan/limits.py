@@ -7,8 +7,9 @@ from enum import StrEnum
 import numpy as np
 
 from ..errors import LimitExceeded
+from ..excitation.steps import is_stream
 from ..rig.channel import channels_of
-from ..rig.configuration import Rig, Role
+from ..rig.configuration import OutputConfig, Rig, Role
 from ..rig.model import Quantity, suspended_mass_kg
 from .loads import predicted_loads
 from .measurement import Measurement
@@ -126,6 +127,8 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
         f"{USABLE_BANDWIDTH:g} of the sample rate",
         "lower the frequency or raise sample_rate_hz",
     )
+    if rig.daq.output is not None and any(is_stream(step.play) for step in excitation.steps()):
+        yield from _streaming(measurement, rig, rig.daq.output)
     yield LimitCheck(
         "the ramp",
         measurement.ramp_s,
@@ -134,6 +137,27 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
         f"{RAMP_PERIODS:g} periods of the shaker's suspension",
         "lengthen ramp_s",
         Side.AT_LEAST,
+    )
+
+
+def _streaming(measurement: Measurement, rig: Rig, output: OutputConfig) -> Iterator[LimitCheck]:
+    """Check what only the analogue output limits."""
+    excitation = measurement.excitation
+    yield LimitCheck(
+        "the analogue output's voltage (peak)",
+        0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor(),
+        output.limit_v,
+        "V",
+        output.source,
+        "lower amplitude_vpp",
+    )
+    yield LimitCheck(
+        "the highest frequency of the analogue output",
+        excitation.highest_frequency_hz,
+        USABLE_BANDWIDTH * output.sample_rate_hz,
+        "Hz",
+        f"{USABLE_BANDWIDTH:g} of the output's sample rate",
+        "lower the frequency or raise daq.output.sample_rate_hz",
     )
 
 

@@ -155,6 +155,31 @@ class ChannelConfig(FrozenModel):
     """Date of the converter's last calibration."""
 
 
+class OutputConfig(FrozenModel):
+    """An analogue output that drives the amplifier with what a function generator cannot hold.
+
+    It plays the voltage that the generator's terminal would have at the same setting, so that
+    ``amplitude_vpp`` means the same whoever plays. Plug one of the two into the amplifier at a time: even
+    at zero volts, an output of 50 ohm beside it would halve what the generator gives. The check at low
+    level before every run finds the wrong one plugged in.
+    """
+
+    physical: str
+    """Name on the device: ``"ao0"``."""
+    device: str | None = None
+    """The module of the output in the driver, when it is not the converter's own; both must be able
+    to share a start trigger, as modules of one chassis are."""
+    limit_v: PositiveFloat = Field(le=10.0)
+    """Largest voltage that this bench allows, plus and minus [V]."""
+    sample_rate_hz: PositiveFloat
+    """Rate of the output; it must take this rate exactly."""
+    ahead_s: float = Field(default=0.5, ge=0.3, le=5.0)
+    """How much is written ahead [s]: what a pause of this computer may last, and how long what is
+    written already plays on before an early ramp down begins."""
+    source: str = Field(min_length=1)
+    """Where limit and rate come from."""
+
+
 class DaqConfig(FrozenModel):
     """The converter."""
 
@@ -168,6 +193,15 @@ class DaqConfig(FrozenModel):
     """Rate to ask for; the rate that the hardware takes is read back and stored beside it."""
     buffer_s: PositiveFloat = 10.0
     channels: tuple[ChannelConfig, ...] = Field(min_length=1)
+    output: OutputConfig | None = None
+    """An analogue output for streamed noise; absent when there is none."""
+
+    @property
+    def output_channel(self) -> str | None:
+        """Full name of the analogue output: ``"Dev1/ao0"``; None without one."""
+        if self.output is None:
+            return None
+        return f"{self.output.device or self.device}/{self.output.physical}"
 
     @model_validator(mode="after")
     def _channels_differ(self) -> Self:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Protocol
 
-from ..instruments import Digitizer, FunctionGenerator, Identity
+from ..instruments import AnalogOutput, Digitizer, FunctionGenerator, Identity
 from ..rig.channel import Channel
 from ..rig.configuration import Rig
 from ..rig.knobs import KnobSheet
@@ -26,7 +26,11 @@ class RunBench(Protocol):
 
     @property
     def generator(self) -> FunctionGenerator:
-        """What plays."""
+        """What plays sines and waveforms."""
+
+    @property
+    def output(self) -> AnalogOutput | None:
+        """What plays signals that never repeat; None where the rig has no analogue output."""
 
     @property
     def digitizer(self) -> CountingDigitizer:

@@ -1,7 +1,7 @@
 """Carrying out a measurement: check, ramp up, settle, record, ramp down, and silence whatever happens."""
 
 from collections import deque
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -11,7 +11,6 @@ import numpy as np
 
 from ..check.low_level import BenchCheck, judged, require_checkable
 from ..errors import AcquisitionError, LimitExceeded
-from ..excitation.steps import Segment
 from ..instruments import Block, Samples
 from ..plan.limits import require_within_limits
 from ..plan.measurement import Measurement
@@ -19,22 +18,17 @@ from ..recording.header import RecordingHeader
 from ..recording.layout import RecordingState
 from ..recording.writer import create_recording
 from .bench_protocol import RunBench
-from .drive import Drive, require_playable
+from .drive import Drive, drive_for
 from .guard import Guard
 from .header import run_header
 from .progress import Outcome, Progress
 from .schedule import (
-    CHECK_FREQUENCY_HZ,
-    CHECK_LISTEN_S,
-    CHECK_QUIET_S,
     CHECK_S,
-    CHECK_SETTLE_S,
     Phase,
     check_amplitude_vpp,
+    check_phases,
     duration_s,
-    half_cosine,
     phases,
-    stairs,
 )
 from .state import RunState
 from .tape import Recorder, Tape
@@ -76,7 +70,7 @@ class Run:
         self._path = path
         self._bench_check = bench_check
         self._create = create
-        self._drive = Drive(bench.generator, measurement)
+        self._drive: Drive  # chosen when the plan is admitted; nothing plays before
         self._guard = Guard(bench.rig, bench.channels, measurement.limits)
         self._total_s = (CHECK_S if bench_check is BenchCheck.AT_LOW_LEVEL else 0.0) + duration_s(measurement)
         self._state = RunState.IDLE
@@ -150,8 +144,7 @@ class Run:
         try:
             require_checkable(self._bench.channels)
             require_within_limits(self._measurement, self._bench.rig)
-            for step in self._measurement.excitation.steps():
-                require_playable(step.play)
+            self._drive = drive_for(self._bench, self._measurement)
             return self._create(self._path, run_header(self._bench, self._measurement))
         except AcquisitionError as error:
             self._ending = (RunState.FAILED, str(error))
@@ -159,68 +152,56 @@ class Run:
             raise
 
     def _played(self, tape: Tape) -> Iterator[Progress]:
-        self._bench.digitizer.start()
         match self._bench_check:
             case BenchCheck.AT_LOW_LEVEL:
+                self._begin(check_phases(self._measurement))
                 yield from self._checked(tape)
+                self._drive.announce(phases(self._measurement))
             case BenchCheck.RECENTLY_PASSED:
+                self._begin(phases(self._measurement))
                 tape.log("check", "left out: the bench was checked shortly before")
+        yield from self._perform(tape, Phase(RunState.ARMED, None, self._drive.lead_s))
         for phase in phases(self._measurement):
-            yield from self._phase(tape, phase)
+            yield from self._perform(tape, phase)
         tape.enter(None)
 
+    def _begin(self, coming: Iterable[Phase]) -> None:
+        """Start sampling, and with it what plays by the digitizer's trigger."""
+        self._drive.arm(coming)
+        self._bench.digitizer.start()
+
     def _checked(self, tape: Tape) -> Iterator[Progress]:
-        amplitude_vpp = check_amplitude_vpp(self._measurement.excitation.amplitude_vpp)
         quiet: list[Samples] = []
         heard: list[Samples] = []
-        numbers = {"frequency_hz": CHECK_FREQUENCY_HZ, "amplitude_vpp": amplitude_vpp}
-        tape.enter(Segment("check", numbers))
-        yield from self._read(tape, CHECK_QUIET_S, quiet)
-        self._drive.start_tone(CHECK_FREQUENCY_HZ, amplitude_vpp)
-        yield from self._read(tape, CHECK_SETTLE_S)
-        yield from self._read(tape, CHECK_LISTEN_S, heard)
-        self._drive.stop()
+        listening, settling, measuring = check_phases(self._measurement)
+        yield from self._perform(tape, listening, quiet)
+        yield from self._perform(tape, settling)
+        yield from self._perform(tape, measuring, heard)
         figures = judged(
             self._bench.rig,
             self._bench.channels,
             np.concatenate(quiet, axis=1),
             np.concatenate(heard, axis=1),
             self._bench.digitizer.sample_rate_hz,
-            amplitude_vpp,
+            check_amplitude_vpp(self._measurement.excitation.amplitude_vpp),
         )
-        tape.enter(None)
         tape.log("check", figures.text())
 
-    def _phase(self, tape: Tape, phase: Phase) -> Iterator[Progress]:
-        self._drive.play(phase.play)
-        if not self._drive.is_on:
-            self._enter(tape, RunState.ARMED)
-            self._drive.start()
+    def _perform(self, tape: Tape, phase: Phase, into: list[Samples] | None = None) -> Iterator[Progress]:
         self._enter(tape, phase.state)
         tape.enter(phase.segment)
-        match phase.state:
-            case RunState.RAMPING_UP:
-                yield from self._ramp(tape, 1.0)
-            case RunState.RAMPING_DOWN:
-                yield from self._ramp(tape, 0.0)
-            case _:
-                yield from self._read(tape, phase.duration_s)
-
-    def _ramp(self, tape: Tape, target: float) -> Iterator[Progress]:
-        count = stairs(self._measurement)
-        begin = self._drive.level
-        for stair in range(1, count + 1):
-            self._drive.set_level(begin + (target - begin) * half_cosine(stair / count))
-            yield from self._read(tape, self._measurement.ramp_s / count)
+        for wait_s in self._drive.perform(phase):
+            yield from self._read(tape, wait_s, into)
 
     def _ramped_down_early(self, tape: Tape) -> Iterator[Progress]:
         """Ramp down from wherever the run is, unwatched; a segment that is open stays incomplete."""
         self._look = _look_away
         tape.log("end", self._ending[1])
         tape.cut()
-        if self._drive.is_on and self._drive.level > 0.0:
+        if self._drive.is_heard:
             self._enter(tape, RunState.RAMPING_DOWN)
-            yield from self._ramp(tape, 0.0)
+            for wait_s in self._drive.ramp_down():
+                yield from self._read(tape, wait_s)
 
     def _read(self, tape: Tape, duration_s: float, into: list[Samples] | None = None) -> Iterator[Progress]:
         for block in tape.read_for(duration_s):

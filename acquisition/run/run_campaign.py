@@ -13,6 +13,7 @@ from ..plan.measurement import Measurement
 from ..recording.layout import SUFFIX, RecordingState, part_of, tmp_of
 from ..recording.reader import open_recording
 from .bench_protocol import RunBench
+from .drive import drive_for
 from .progress import Progress
 from .run_measurement import run_measurement
 from .state import RunState
@@ -225,6 +226,7 @@ def _require_all_within_limits(campaign: Campaign, bench: RunBench) -> None:
     for measurement in campaign.measurements:
         try:
             require_within_limits(measurement, bench.rig)
+            drive_for(bench, measurement)  # refuses what nothing on this bench can play
         except LimitExceeded as error:
             complaints.append(str(error))
     if complaints:

@@ -27,10 +27,29 @@ class Phase:
     """A stretch of time in one state, playing one thing."""
 
     state: RunState
-    play: Play
+    play: Play | None
+    """None for silence."""
     duration_s: float
     segment: Segment | None = None
     """The named stretch of the recording that this phase belongs to."""
+
+    @property
+    def end_level(self) -> float:
+        """Where the level stands at its end, from 0 (quiet) to 1 (as planned); only ramps change it."""
+        return 0.0 if self.play is None or self.state is RunState.RAMPING_DOWN else 1.0
+
+
+def check_phases(measurement: Measurement) -> tuple[Phase, Phase, Phase]:
+    """Lay out the check of the bench: listen in silence, let a small sine settle, listen to it."""
+    planned_vpp = measurement.excitation.amplitude_vpp
+    amplitude_vpp = check_amplitude_vpp(planned_vpp)
+    tone = Tone(CHECK_FREQUENCY_HZ, amplitude_vpp / planned_vpp)
+    segment = Segment("check", {"frequency_hz": CHECK_FREQUENCY_HZ, "amplitude_vpp": amplitude_vpp})
+    return (
+        Phase(RunState.CHECKING, None, CHECK_QUIET_S, segment),
+        Phase(RunState.CHECKING, tone, CHECK_SETTLE_S, segment),
+        Phase(RunState.CHECKING, tone, CHECK_LISTEN_S, segment),
+    )
 
 
 def phases(measurement: Measurement) -> Iterator[Phase]:

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from acquisition.errors import DataLost
 from acquisition.instruments import Block, Identity, Samples
 from acquisition.recording.layout import RecordingState
 from acquisition.rig.channel import Channel, channels_of
-from acquisition.rig.configuration import Rig, Role, load_rig
+from acquisition.rig.configuration import OutputConfig, Rig, Role, load_rig
 from acquisition.rig.knobs import KnobSheet
 from acquisition.rig.model import Quantity, RigModel
 
@@ -35,6 +36,9 @@ class LoopbackWorld:
     calls: list[tuple[str, object, int]] = field(default_factory=list)
     faults: dict[str, list[Fault]] = field(default_factory=dict)
     permanent: dict[str, Fault] = field(default_factory=dict)
+    streamed: list[float] = field(default_factory=list)
+    streams: bool = False
+    played: int = 0
     drive_factor: float = 1.0
     base_factor: float = 1.0
     background_m_per_s2: float = 0.0
@@ -58,6 +62,8 @@ class LoopbackWorld:
         """Next samples at the generator's terminal [V]; the phase goes on."""
         cycles = self.cycles + self.frequency_hz * np.arange(count) / SAMPLE_RATE_HZ
         self.cycles = (self.cycles + self.frequency_hz * count / SAMPLE_RATE_HZ) % 1.0
+        if self.streams:
+            return self.stream(count)
         if not self.is_on:
             return np.zeros(count)
         if self.period is None:
@@ -66,6 +72,14 @@ class LoopbackWorld:
             place = np.floor(cycles * len(self.period) + 1e-9).astype(int) % len(self.period)
             shape = self.period[place]
         return 0.5 * self.amplitude_vpp * self.rig.generator.terminal_factor() * shape
+
+    def stream(self, count: int) -> Samples:
+        """Next samples of the analogue output [V], which began with the digitizer; zero when it runs dry."""
+        heard = np.zeros(count)
+        written = np.array(self.streamed[self.samples : self.samples + count])
+        heard[: written.size] = written
+        self.played = max(self.played, self.samples + count)
+        return heard
 
 
 class LoopbackGenerator:
@@ -113,6 +127,38 @@ class LoopbackGenerator:
         assert 2e-3 <= amplitude_vpp <= self._world.rig.generator.amplitude_limit_vpp
         self._world.amplitude_vpp = amplitude_vpp
         self._world.calls.append(("amplitude", amplitude_vpp, self._world.samples))
+
+
+class LoopbackOutput:
+    """An AnalogOutput that keeps what it was given, with room for half a second, and fails when told to."""
+
+    sample_rate_hz = SAMPLE_RATE_HZ
+    ahead_samples = 2560
+
+    def __init__(self, world: LoopbackWorld) -> None:
+        self._world = world
+
+    def write(self, volts: Samples) -> None:
+        world = self._world
+        world.call("write", volts.size)
+        if world.streams and world.played > len(world.streamed):
+            raise DataLost("the output ran out of samples")
+        world.streamed.extend(volts)
+        # No room: the output plays on by itself until there is.
+        world.played = max(world.played, len(world.streamed) - self.ahead_samples)
+
+    def arm(self) -> None:
+        self._world.call("arm")
+        assert self._world.streamed
+        assert not self._world.is_sampling
+        self._world.streams = True
+
+    def stop(self) -> None:
+        self._world.call("output.stop")
+        self._world.streams = False
+
+    def close(self) -> None:
+        self.stop()
 
 
 class LoopbackDigitizer:
@@ -226,6 +272,7 @@ class LoopbackBench:
         self.channels = channels_of(rig)
         self.generator = LoopbackGenerator(self.world)
         self.digitizer = LoopbackDigitizer(self.world, self.channels)
+        self.output = None
         self.identities = {"generator": self.generator.identity, "digitizer": self.digitizer.identity}
         self.confirmations = KnobSheet(operator="test", confirmed=datetime.now(UTC), knobs=rig.knobs)
         self.recorder = MemoryRecorder(self.world)
@@ -244,6 +291,16 @@ def rig() -> Rig:
 def bench(rig: Rig) -> LoopbackBench:
     """A loop of fake instruments."""
     return LoopbackBench(rig)
+
+
+@pytest.fixture
+def streaming_bench(rig: Rig) -> LoopbackBench:
+    """The same loop with an analogue output."""
+    output = OutputConfig(physical="ao0", limit_v=5.0, sample_rate_hz=SAMPLE_RATE_HZ, source="test")
+    with_output = rig.model_copy(update={"daq": rig.daq.model_copy(update={"output": output})})
+    bench = LoopbackBench(with_output)
+    bench.output = LoopbackOutput(bench.world)
+    return bench
 
 
 @pytest.fixture

@@ -7,8 +7,7 @@ from ...rig.configuration import Rig, Role
 
 SECOND_DEVICE = "Dev1"
 """The second converter of the virtual system: the same cables end at it, by way of T-pieces."""
-AMPLIFIER_INPUT = f"{SECOND_DEVICE}/ao0"
-"""The analogue output that is added to the generator's voltage at the amplifier's input."""
+_USUAL_OUTPUT = f"{SECOND_DEVICE}/ao0"
 
 
 class Signal(IntEnum):
@@ -47,6 +46,11 @@ _SIGNAL_OF_ROLE = {
     Role.BASE_ACCELERATION: Signal.BASE_ACCELERATION,
     Role.M0_VELOCITY: Signal.M0_VELOCITY,
 }
+
+
+def amplifier_input(rig: Rig) -> str:
+    """Name the analogue output whose voltage is added to the generator's at the amplifier's input."""
+    return rig.daq.output_channel or _USUAL_OUTPUT
 
 
 def cables_of(rig: Rig, vibrometer_delay_steps: float) -> dict[str, Cable]:

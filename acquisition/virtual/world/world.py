@@ -21,7 +21,7 @@ from .noise import NoiseStream
 from .plant import TRUTH_COLUMNS, Plant
 from .sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer
 from .time_grid import GRID_RATE_HZ, PPM, STEP_S, physical_step_s, rms_per_step, step_at
-from .wiring import AMPLIFIER_INPUT, OPEN_INPUT, Cable, Signal, cables_of
+from .wiring import OPEN_INPUT, Cable, Signal, amplifier_input, cables_of
 
 FloatArray = NDArray[np.float64]
 
@@ -73,6 +73,7 @@ class World:
         self._converter_noise_v = virtual.converter_noise_v
         self._plan = cables_of(rig, self.vibrometer.delay_steps)
         self._cables = dict(self._plan)
+        self._amplifier_input = amplifier_input(rig)
         self._outputs: dict[str, AnalogueOutput] = {}
         self._conversions: list[Conversion] = []
         self._history = np.zeros((len(Signal), _HISTORY_STEPS))
@@ -203,7 +204,7 @@ class World:
         drive = np.array(self._terminal.render(first * STEP_S, STEP_S, steps), dtype=np.float64)
         for channel, output in self._outputs.items():
             played = output.render(first, steps)
-            if channel == AMPLIFIER_INPUT:
+            if channel == self._amplifier_input:
                 drive += played
         noise = self._amplifier_noise_v * self._amplifier_noise.draw(first, steps)
         motion = self.plant.move(drive, noise, steps if self._truth is not None else 0)

@@ -1,25 +1,39 @@
 """The streamed output over the real nidaqmx client, heard through the virtual rig's own inputs."""
 
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from acquisition.drivers.daqmx import DaqmxDigitizer
-from acquisition.drivers.daqmx_output import DaqmxOutput, OutputConfig
-from acquisition.errors import DataLost, InstrumentError, LimitExceeded
-from acquisition.rig.configuration import load_rig
+from acquisition.drivers.daqmx_output import DaqmxOutput
+from acquisition.errors import (
+    DataLost,
+    InstrumentBusy,
+    InstrumentError,
+    InstrumentLost,
+    LimitExceeded,
+    SettingRefused,
+)
+from acquisition.instruments import AnalogOutput
+from acquisition.rig.configuration import OutputConfig, load_rig
 from acquisition.virtual.rig import VirtualRig
 
 ROOT = Path(__file__).parents[3]
 RATE_HZ = 12_800.0
-CONFIG = OutputConfig("Dev1/ao0", limit_v=2.0, sample_rate_hz=RATE_HZ, ahead_s=0.5)
+CONFIG = OutputConfig(physical="ao0", limit_v=2.0, sample_rate_hz=RATE_HZ, ahead_s=0.5, source="test")
 NOISE_V = 5e-3
 
 
 @pytest.fixture
-def digitizer():
+def virtual(rig):
+    with VirtualRig(rig) as running:
+        yield running
+
+
+@pytest.fixture
+def rig():
     rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
     # Only the drive is wanted, and the USB-4431 feeds sensors with another current than the NI 9234.
     daq = rig.daq.model_copy(
@@ -31,17 +45,25 @@ def digitizer():
         }
     )
     generator = rig.generator.model_copy(update={"resource": "USB0::0x0699::0x0353::AO1::INSTR"})
-    rig = rig.model_copy(update={"daq": daq, "generator": generator})
-    with VirtualRig(rig) as virtual, ExitStack() as closing:
-        served = rig.model_copy(update={"daq": daq.model_copy(update={"server": virtual.daq_address})})
-        opened = DaqmxDigitizer.open(served)
+    return rig.model_copy(update={"daq": daq, "generator": generator})
+
+
+@pytest.fixture
+def digitizer(rig, virtual):
+    daq = rig.daq.model_copy(update={"server": virtual.daq_address})
+    with ExitStack() as closing:
+        opened = DaqmxDigitizer.open(rig.model_copy(update={"daq": daq}))
         closing.callback(opened.close)
         yield opened
 
 
+def opened_output(digitizer, **changes):
+    return DaqmxOutput.open("Dev1/ao0", CONFIG.model_copy(update=changes), digitizer)
+
+
 @pytest.fixture
 def output(digitizer):
-    opened = DaqmxOutput.open(CONFIG, digitizer)
+    opened = opened_output(digitizer)
     yield opened
     opened.close()
 
@@ -59,9 +81,8 @@ def test_what_is_streamed_is_heard_from_the_first_sample_on_without_a_gap(digiti
     heard = []
     for _ in range(20):
         heard.append(digitizer.read(1280).volts[0])
-        count = min(1280, output.space)
-        output.write(tone(written, count))
-        written += count
+        output.write(tone(written, 1280))
+        written += 1280
     drive_v = 2.0 * np.concatenate(heard)  # the channel's divider
     angle = 2 * np.pi * 100.0 * np.arange(drive_v.size) / RATE_HZ
     late = slice(256, None)  # past the filter of the converter
@@ -78,8 +99,7 @@ def test_an_output_that_runs_dry_is_lost_data_and_ends_at_zero(digitizer, output
     digitizer.read(6400)
     with pytest.raises(DataLost, match=r"ran out of samples"):
         output.write(np.zeros(1280))
-    with suppress(DataLost):  # some drivers tell it again when the task is stopped
-        output.stop()
+    output.stop()
     assert np.max(np.abs(digitizer.read(2560).volts[0][-640:])) < NOISE_V
 
 
@@ -96,7 +116,8 @@ def test_stopping_goes_to_zero_at_once(digitizer, output):
 def test_samples_past_the_limit_are_refused_before_they_are_written(output, volts):
     with pytest.raises(LimitExceeded, match=r"2 V are allowed"):
         output.write(volts)
-    assert output.space == output.ahead_samples
+    with pytest.raises(InstrumentError, match=r"nothing to play"):
+        output.arm()
 
 
 def test_nothing_can_be_armed_before_something_is_written(output):
@@ -106,7 +127,57 @@ def test_nothing_can_be_armed_before_something_is_written(output):
 
 def test_stop_and_close_are_legal_at_any_time_and_free_the_output(digitizer, output):
     output.stop()
+    output.stop()
     output.close()
-    with pytest.raises(InstrumentError, match=r"stopped"):
+    output.close()
+    with pytest.raises(InstrumentError, match=r"closed"):
         output.write(np.zeros(10))
-    DaqmxOutput.open(CONFIG, digitizer).close()
+    opened_output(digitizer).close()
+
+
+def test_a_stopped_output_streams_again_from_sample_0(digitizer, output):
+    for amplitude_v in (0.5, 1.0):
+        output.write(tone(0, 6400, amplitude_v))
+        output.arm()
+        digitizer.start()
+        heard = 2.0 * digitizer.read(6400).volts[0]
+        output.stop()
+        digitizer.stop()
+        delay = 40  # of the converter's filter
+        expected = tone(0, 6400 - delay, amplitude_v)
+        np.testing.assert_allclose(heard[delay + 256 :], expected[256:], atol=0.03 * amplitude_v)
+
+
+def test_opening_sets_an_output_to_zero_that_another_program_left_high(digitizer, virtual):
+    virtual.world.play("Dev1/ao0", np.full(51_200, 1.0), 51_200.0)
+    digitizer.start()
+    opened_output(digitizer).close()
+    assert np.max(np.abs(digitizer.read(2560).volts[0][-640:])) < NOISE_V
+
+
+def test_a_held_output_is_busy_for_a_second_program(digitizer, output):
+    with pytest.raises(InstrumentBusy, match=r"Dev1/ao0"):
+        opened_output(digitizer)
+
+
+def test_a_rate_that_the_output_coerces_is_refused_and_nothing_stays_reserved(digitizer):
+    # The USB-6211 divides 20 MHz: it has no 12 345.6 Hz.
+    with pytest.raises(SettingRefused, match=r"daq\.output\.sample_rate_hz"):
+        DaqmxOutput.open("Dev2/ao0", CONFIG.model_copy(update={"sample_rate_hz": 12_345.6}), digitizer)
+    DaqmxOutput.open("Dev2/ao0", CONFIG.model_copy(update={"sample_rate_hz": 12_500.0}), digitizer).close()
+
+
+def test_a_server_that_is_gone_leaves_an_output_that_may_still_play_and_says_so(digitizer, output, virtual):
+    output.write(np.full(6400, 1.0))
+    output.arm()
+    digitizer.start()
+    digitizer.read(1280)
+    virtual.faults.lose_daq_server()
+    with pytest.raises(InstrumentLost, match=r"MAY STILL BE PLAYING.*0\.5 s.*switch the amplifier off"):
+        output.stop()
+    virtual.faults.heal_daq()
+
+
+def test_the_driver_keeps_the_promises_of_an_analogue_output(output):
+    promised: AnalogOutput = output
+    assert (promised.sample_rate_hz, promised.ahead_samples) == (RATE_HZ, 6400)
