@@ -19,6 +19,10 @@ def _fingerprint_of_sources() -> str:
     return digest.hexdigest()[:16]
 
 
+SOURCES = _fingerprint_of_sources()
+"""What this process runs, whatever is changed on the disk meanwhile."""
+
+
 def _cache_directory() -> str:
     """Name a directory of its own for every state of the sources.
 
@@ -27,7 +31,7 @@ def _cache_directory() -> str:
     numba cannot write to makes it fall back on its own choice.
     """
     chosen = Path(config.CACHE_DIR or Path(__file__).parent / "__pycache__")  # type: ignore[attr-defined]
-    return str(chosen / f"kernels-{_fingerprint_of_sources()}")
+    return str(chosen / f"kernels-{SOURCES}")
 
 
 # numba fills its configuration at run time, out of sight of a checker.
