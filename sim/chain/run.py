@@ -1,0 +1,285 @@
+"""A run of a chain under a harmonic drive, window by window. SI units.
+
+In a window every cell moves as if the others were free: its own force acts on it with nothing left out,
+another's only from the window's end on. What this leaves out is bounded when the windows are chosen
+(`sim.chain.tables`), so that simultaneous contacts need no common time: each is followed in its own.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..clock import advance_clock, time_until
+from ..compiled import compiled
+from ..detection import LARGEST_BOUND
+from ..modes import Complex
+from ..outcome import Outcome
+from ..parameters import POWER, Table, Vector
+from .cell_contact import CELL_SIZE, MEMORY, SIDE, begin_power
+from .cell_window import COUNT, cross_window
+from .tables import KIND, LOWER, OBSERVED, PATH, UPPER, ChainTables
+from .tally import NOTHING, PEAKS_AND_LINES, ChainTally, tally_busy, tally_forces, tally_idle
+from .windows import (
+    Space,
+    deposit,
+    drive_term,
+    fill_observed,
+    find_busy,
+    law_of,
+    march,
+    neighbours_clash,
+    place_motion,
+    place_observed,
+    set_ceilings,
+    space_for,
+    turn_window,
+    weigh,
+)
+
+REACHED_END = int(Outcome.REACHED_END)
+TOO_MANY_IMPACTS = int(Outcome.TOO_MANY_IMPACTS)
+LOST = int(Outcome.NOT_FINITE)
+
+RUN_OF_WINDOWS = 512
+"""Windows between two fresh values of the drive's term: keeps its rounding below 1e-13."""
+NEXT_SAMPLE, IMPACTS = 0, 1
+"""Places of `ChainRecord.counts`."""
+
+
+class ChainRecord(NamedTuple):
+    """What a run fills on its way."""
+
+    start: float
+    """Time of sample 0 [s]."""
+    sample_rate: float
+    samples: Table
+    """Shape (n, 6 cells); n = 0 keeps none."""
+    impact_times: Vector
+    """Shape (most impacts,) [s], ascending but within a window; a run ends in the window that fills it."""
+    impact_cells: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    """Samples and impacts so far."""
+
+
+@compiled
+def advance_chain(
+    cells: Table,
+    phasors: Complex,
+    clock: Vector,
+    until: float,
+    tables: ChainTables,
+    tolerance: float,
+    record: ChainRecord,
+    tally: ChainTally,
+) -> int:
+    """Advance cells, phasors and clock in place to the instant ``until`` [s]; returns an `Outcome` code."""
+    space = space_for(tables)
+    observed = 1 if tally.mode == NOTHING else OBSERVED
+    count, drive = len(cells), len(phasors) - 1
+    phasors[drive] = drive_term(clock, 0.0, tables)
+    while True:
+        longest = time_until(clock, until)
+        if longest <= 0.0:
+            return REACHED_END
+        if count > 0:
+            # A force has acted: what was known of the paths to come is void.
+            place_observed(space.motion, phasors, observed, tables)
+            weigh(space, phasors, observed, tables)
+            if not np.max(space.curvature[PATH]) < LARGEST_BOUND:
+                return LOST
+        is_watched = observed > 1 or record.counts[NEXT_SAMPLE] < len(record.samples)
+        if count == 0 and not is_watched and is_quiet(space, cells, tables) == 1:
+            turn_window(space, phasors, clock, longest, 0, tables)
+            phasors[:] = space.turned
+            clock[0], clock[1] = until, 0.0
+            return REACHED_END
+        if _march_on(space, phasors, cells, clock, longest, tally, record, observed, tables) > 0:
+            count = 0
+            continue
+        length, count = _choose_window(space, cells, phasors, clock, longest, observed, tables)
+        space.before[:] = cells
+        code = _cross(space, cells, phasors, count, length, clock, tables, tolerance, record, tally)
+        _sample(space, phasors, count, clock, length, tables, tolerance, record)
+        for k in range(count):
+            deposit(space.turned, cells[space.busy[k]], space.busy[k], tables)
+        phasors[:] = space.turned
+        space.motion[:] = space.motion_end
+        if length >= longest:
+            clock[0], clock[1] = until, 0.0
+        else:
+            advance_clock(clock, length)
+        if code != REACHED_END:
+            return code
+
+
+@compiled
+def _march_on(
+    space: Space,
+    phasors: Complex,
+    cells: Table,
+    clock: Vector,
+    longest: float,
+    tally: ChainTally,
+    record: ChainRecord,
+    observed: int,
+    tables: ChainTables,
+) -> int:
+    """Advance over whole windows in which nothing can happen; gives how many there were."""
+    for i in range(len(cells)):
+        if cells[i, SIDE] != 0.0:
+            return 0
+    window, free = tables.windows[0], longest
+    if record.counts[NEXT_SAMPLE] < len(record.samples):
+        free = min(free, time_until(clock, record.start + record.counts[NEXT_SAMPLE] / record.sample_rate))
+    steps = min(RUN_OF_WINDOWS, int(free / window))
+    if steps == 0:
+        return 0
+    set_ceilings(space, tally.peaks, observed, window, tables)
+    for what in range(observed):
+        for i in range(len(cells)):
+            if not space.floor[what, i] < space.motion[what, i] < space.ceiling[what, i]:
+                return 0
+    made = march(
+        phasors, space.turned, space.motion, space.motion_end, tables.factors[0], tables.real,
+        tables.imaginary, space.floor, space.ceiling, observed, steps,
+    )  # fmt: skip
+    if made > 0:
+        advance_clock(clock, made * window)
+        phasors[len(phasors) - 1] = drive_term(clock, 0.0, tables)
+    return made
+
+
+@compiled
+def _choose_window(
+    space: Space,
+    cells: Table,
+    phasors: Complex,
+    clock: Vector,
+    longest: float,
+    observed: int,
+    tables: ChainTables,
+) -> tuple[float, int]:
+    """Take the longest window in which no two busy cells feel each other, and turn the phasors to its end.
+
+    Gives its length [s], and how many cells are busy.
+    """
+    length, count = longest, 0
+    for level in range(len(tables.windows)):
+        length = min(longest, tables.windows[level])
+        turn_window(space, phasors, clock, length, level, tables)
+        place_observed(space.motion_end, space.turned, observed, tables)
+        count = find_busy(space, cells, length, tables)
+        if neighbours_clash(space.busy, count, tables.clash[level]) == 0:
+            break
+    return length, count
+
+
+@compiled
+def is_quiet(space: Space, cells: Table, tables: ChainTables) -> int:
+    """Say (1 or 0) whether no cell can ever touch: free phasors only shrink."""
+    for i in range(len(cells)):
+        law = tables.laws[i]
+        if cells[i, SIDE] != 0.0 or law[KIND] == POWER or space.reach[PATH, i] >= min(law[LOWER], law[UPPER]):
+            return 0
+    return 1
+
+
+@compiled
+def _cross(
+    space: Space,
+    cells: Table,
+    phasors: Complex,
+    count: int,
+    length: float,
+    clock: Vector,
+    tables: ChainTables,
+    tolerance: float,
+    record: ChainRecord,
+    tally: ChainTally,
+) -> int:
+    """Take every cell through the window and observe it."""
+    observed = 1 if tally.mode == NOTHING else OBSERVED
+    log = space.no_log if tally.mode == NOTHING else space.log
+    worst, busy = REACHED_END, 0
+    for i in range(len(cells)):
+        if busy == count or space.busy[busy] != i:
+            if tally.mode != NOTHING:
+                tally_idle(tally, i, space, phasors, length, tables)
+            continue
+        busy += 1
+        cell, series, markov = cells[i], space.series[i], tables.markov[i, PATH]
+        law = law_of(tables.laws[i])
+        fill_observed(series, phasors, i, observed, space.terms, tables)
+        cell[MEMORY:] = 0.0
+        if law.kind == POWER:
+            begin_power(cell, series[PATH], markov, law, length)
+        space.before[i] = cell
+        space.touches[COUNT] = 0.0
+        code = cross_window(
+            cell, 0.0, length, series[PATH], markov, space.reach[PATH, i], law, tolerance,
+            space.later, space.work, space.touches, log,
+        )  # fmt: skip
+        if code == REACHED_END:
+            code = _record_touches(space.touches, i, clock, record)
+        if tally.mode != NOTHING:
+            tally_busy(tally, i, series, log, tables)
+        if tally.mode == PEAKS_AND_LINES:
+            tally_forces(tally, cell, i, space.turned[len(phasors) - 1], tables.omega)
+        worst = max(worst, code)
+    return worst
+
+
+@compiled
+def _record_touches(touches: Vector, place: int, clock: Vector, record: ChainRecord) -> int:
+    for k in range(1, int(touches[COUNT]) + 1):
+        impact = record.counts[IMPACTS]
+        if impact == len(record.impact_times):
+            return TOO_MANY_IMPACTS
+        record.impact_times[impact] = clock[0] + touches[k]
+        record.impact_cells[impact] = place
+        record.counts[IMPACTS] += 1
+    return REACHED_END
+
+
+@compiled
+def _sample(
+    space: Space,
+    phasors: Complex,
+    count: int,
+    clock: Vector,
+    length: float,
+    tables: ChainTables,
+    tolerance: float,
+    record: ChainRecord,
+) -> None:
+    """Keep the samples that fall into a window, by a second run of the busy cells that lands on each."""
+    counts, reached = record.counts, 0.0
+    drive = len(phasors) - 1
+    while counts[NEXT_SAMPLE] < len(record.samples):
+        later = time_until(clock, record.start + counts[NEXT_SAMPLE] / record.sample_rate)
+        if later > length:
+            return
+        now = space.terms
+        for j in range(drive):
+            now[j] = phasors[j] * np.exp(tables.rates[j] * later)
+        now[drive] = drive_term(clock, later, tables)
+        for k in range(count):
+            i = space.busy[k]
+            space.touches[COUNT] = 0.0
+            if later > reached:
+                cross_window(
+                    space.before[i], reached, later, space.series[i, PATH], tables.markov[i, PATH],
+                    space.reach[PATH, i], law_of(tables.laws[i]), tolerance,
+                    space.later, space.work, space.touches, space.no_log,
+                )  # fmt: skip
+            deposit(now, space.before[i], i, tables)
+        reached = max(reached, later)
+        place_motion(record.samples[counts[NEXT_SAMPLE]], now, tables)
+        counts[NEXT_SAMPLE] += 1
+
+
+@compiled
+def chain_cells(count: int) -> Table:
+    """Make the rows of cells in flight."""
+    return np.zeros((count, CELL_SIZE))

@@ -1,0 +1,255 @@
+"""One window of a whole chain: who is busy in it, and how the phasors come to its end. SI units."""
+
+import cmath
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..clock import angle_at
+from ..compiled import compiled
+from ..contact_law import MOST_TERMS
+from ..detection import SERIES_TERMS
+from ..flight import fill_series
+from ..modes import Complex
+from ..parameters import POWER, PowerTerms, Table, Vector
+from .cell_contact import CELL_SIZE, MEMORY, SIDE, cell_workspace
+from .cell_flow import MOMENTS, WIDTH, CellLaw
+from .cell_window import LOG_ROWS, MOST_TOUCHES
+from .tables import (
+    CONTACT,
+    HALVES,
+    INVERSE_REFERENCE,
+    KIND,
+    LINEAR,
+    LOSS,
+    LOWER,
+    OBSERVED,
+    PATH,
+    UPPER,
+    ChainTables,
+)
+
+
+class Space(NamedTuple):
+    """Workspaces of one run."""
+
+    turned: Complex
+    """Phasors at the window's end, shape (n+1,)."""
+    terms: Complex
+    weights: Vector
+    """abs of the phasors, shape (n+1,)."""
+    motion: Table
+    """p, x, y, z of every cell at the window's start, shape (4, cells); at its end, without forces in it."""
+    motion_end: Table
+    reach: Table
+    """Bounds of p, x, y, z of every cell from now on, while no force acts, shape (4, cells)."""
+    curvature: Table
+    """The same of their accelerations."""
+    busy: NDArray[np.int64]
+    """Cells that press or may touch in this window, ascending; shape (cells,)."""
+    series: NDArray[np.float64]
+    """p, x, y, z of the busy cells without forces in the window, shape (cells, 4, SERIES_TERMS)."""
+    floor: Table
+    """Between floor and ceiling at both ends of a window a motion calls for no closer look; (4, cells)."""
+    ceiling: Table
+    before: Table
+    """Rows of all cells at the window's start."""
+    later: Vector
+    work: Table
+    touches: Vector
+    log: Table
+    no_log: Table
+
+
+@compiled
+def space_for(tables: ChainTables) -> Space:
+    """Allocate the workspaces."""
+    terms, _, cells = tables.real.shape
+    return Space(
+        np.zeros(terms, np.complex128),
+        np.zeros(terms, np.complex128),
+        np.zeros(terms),
+        np.zeros((OBSERVED, cells)),
+        np.zeros((OBSERVED, cells)),
+        np.zeros((OBSERVED, cells)),
+        np.zeros((OBSERVED, cells)),
+        np.zeros(cells, np.int64),
+        np.zeros((cells, OBSERVED, SERIES_TERMS)),
+        np.zeros((OBSERVED, cells)),
+        np.zeros((OBSERVED, cells)),
+        np.zeros((cells, CELL_SIZE)),
+        np.zeros(SERIES_TERMS),
+        cell_workspace(),
+        np.zeros(MOST_TOUCHES + 1),
+        np.zeros((LOG_ROWS, WIDTH)),
+        np.zeros((0, WIDTH)),
+    )
+
+
+@compiled
+def law_of(row: Vector) -> CellLaw:
+    """Read a cell's law from its row of numbers."""
+    h, f = HALVES, HALVES + MOST_TERMS
+    halves = (
+        int(row[h]),
+        int(row[h + 1]),
+        int(row[h + 2]),
+        int(row[h + 3]),
+        int(row[h + 4]),
+        int(row[h + 5]),
+    )
+    forces = (row[f], row[f + 1], row[f + 2], row[f + 3], row[f + 4], row[f + 5])
+    power = PowerTerms(row[INVERSE_REFERENCE], halves, forces)
+    return CellLaw(int(row[KIND]), row[LOWER], row[UPPER], row[LINEAR], row[CONTACT], row[LOSS], power)
+
+
+@compiled
+def drive_term(clock: Vector, later: float, tables: ChainTables) -> complex:
+    """exp(i (omega t + phase)) at clock time plus ``later``."""
+    return cmath.exp(complex(0.0, angle_at(clock, later, tables.frequency))) * tables.phase
+
+
+@compiled
+def place_observed(motion: Table, phasors: Complex, observed: int, tables: ChainTables) -> None:
+    """Write the first ``observed`` of p, x, y, z of every cell."""
+    motion[:observed] = 0.0
+    for j in range(len(phasors)):
+        real, imaginary = phasors[j].real, phasors[j].imag
+        for what in range(observed):
+            for i in range(motion.shape[1]):
+                motion[what, i] += real * tables.real[j, what, i] - imaginary * tables.imaginary[j, what, i]
+
+
+@compiled
+def weigh(space: Space, phasors: Complex, observed: int, tables: ChainTables) -> None:
+    """Bound the motion and acceleration of the first ``observed`` of p, x, y, z, until a force acts."""
+    space.reach[:observed] = 0.0
+    space.curvature[:observed] = 0.0
+    for j in range(len(phasors)):
+        weight = abs(phasors[j])
+        space.weights[j] = weight
+        for what in range(observed):
+            for i in range(space.reach.shape[1]):
+                space.reach[what, i] += weight * tables.reaches[j, what, i]
+                space.curvature[what, i] += weight * tables.curvatures[j, what, i]
+
+
+@compiled
+def turn_window(
+    space: Space, phasors: Complex, clock: Vector, length: float, level: int, tables: ChainTables
+) -> None:
+    """Write the phasors at the window's end, as if no force acted in it."""
+    modes = len(phasors) - 1
+    if length == tables.windows[level]:
+        for j in range(modes):
+            space.turned[j] = phasors[j] * tables.factors[level, j]
+    else:
+        for j in range(modes):
+            space.turned[j] = phasors[j] * cmath.exp(tables.rates[j] * length)
+    space.turned[modes] = drive_term(clock, length, tables)
+
+
+@compiled
+def set_ceilings(space: Space, peaks: Table, observed: int, length: float, tables: ChainTables) -> None:
+    """Work out between which values at the ends of windows of ``length`` nothing can happen within them.
+
+    Nothing is: no touch, and no motion larger than the largest so far, if that is observed.
+    """
+    for what in range(observed):
+        for i in range(peaks.shape[1]):
+            margin = space.curvature[what, i] * length * length / 8.0
+            space.ceiling[what, i] = np.inf if observed == 1 else peaks[what, i] - margin
+            space.floor[what, i] = -space.ceiling[what, i]
+            if what == PATH:
+                law = tables.laws[i]
+                space.ceiling[what, i] = min(space.ceiling[what, i], law[UPPER] - margin)
+                space.floor[what, i] = max(space.floor[what, i], margin - law[LOWER])
+
+
+@compiled
+def march(
+    phasors: Complex,
+    turned: Complex,
+    motion: Table,
+    motion_end: Table,
+    factors: Complex,
+    real: Table,
+    imaginary: Table,
+    floor: Table,
+    ceiling: Table,
+    observed: int,
+    steps: int,
+) -> int:
+    """Turn the phasors window by window while nothing can happen; gives the windows that were."""
+    cells = motion.shape[1]
+    for made in range(steps):
+        motion_end[:observed] = 0.0
+        for j in range(len(phasors)):
+            term = phasors[j] * factors[j]
+            turned[j] = term
+            for what in range(observed):
+                for i in range(cells):
+                    motion_end[what, i] += term.real * real[j, what, i] - term.imag * imaginary[j, what, i]
+        for what in range(observed):
+            for i in range(cells):
+                if not floor[what, i] < motion_end[what, i] < ceiling[what, i]:
+                    return made
+        phasors[:] = turned
+        motion[:observed] = motion_end[:observed]
+    return steps
+
+
+@compiled
+def find_busy(space: Space, cells: Table, length: float, tables: ChainTables) -> int:
+    """List the cells that press, or whose touch within the window is not excluded; gives how many."""
+    count = 0
+    for i in range(len(cells)):
+        law = tables.laws[i]
+        margin = space.curvature[PATH, i] * length * length / 8.0
+        low, high = margin - law[LOWER], law[UPPER] - margin
+        is_clear = low < space.motion[PATH, i] < high and low < space.motion_end[PATH, i] < high
+        if cells[i, SIDE] != 0.0 or law[KIND] == POWER or not is_clear:
+            space.busy[count] = i
+            count += 1
+    return count
+
+
+@compiled
+def neighbours_clash(busy: NDArray[np.int64], count: int, distance: int) -> int:
+    """Say (1 or 0) whether two busy cells are at most so far apart."""
+    for k in range(1, count):
+        if busy[k] - busy[k - 1] <= distance:
+            return 1
+    return 0
+
+
+@compiled
+def fill_observed(
+    series: Table, phasors: Complex, cell: int, observed: int, terms: Complex, tables: ChainTables
+) -> None:
+    """Write p (and x, y, z) of a cell as polynomials in the time since the window began."""
+    for what in range(observed):
+        for j in range(len(phasors)):
+            terms[j] = phasors[j] * tables.observed[cell, what, j]
+        fill_series(series[what], terms, tables.rates)
+
+
+@compiled
+def deposit(turned: Complex, cell: Vector, place: int, tables: ChainTables) -> None:
+    """Add to the phasors at the window's end what the force of a cell did: its moments."""
+    for j in range(len(turned) - 1):
+        rate, total = tables.rates[j], complex(0.0, 0.0)
+        for k in range(MOMENTS - 1, -1, -1):
+            total = total * rate + cell[MEMORY + k]
+        turned[j] -= tables.push[place, j] * total
+
+
+@compiled
+def place_motion(motion: Vector, phasors: Complex, tables: ChainTables) -> None:
+    """Write displacements and velocities, shape (6 cells,)."""
+    motion[:] = 0.0
+    for j in range(len(phasors)):
+        real, imaginary = phasors[j].real, phasors[j].imag
+        for i in range(len(motion)):
+            motion[i] += real * tables.shapes[j, i].real - imaginary * tables.shapes[j, i].imag
