@@ -1,0 +1,105 @@
+"""Verdicts on motions whose nature is known, simulated and synthetic."""
+
+import numpy as np
+import pytest
+
+from analysis.chaos.period import Points, shortest_period
+from analysis.chaos.verdict import MotionKind, motion_verdict
+from sim.drive import Harmonic
+from sim.poincare import stroboscopic_section
+from sim.specimen import gong2025
+
+DRIVE_HZ = 260.0
+QUIET = np.array([1e-5, 1e-5])
+
+
+def section(rng, period=1, scatter=0.0, count=1200):
+    """Give points that repeat after ``period``, with white scatter."""
+    centres = rng.standard_normal((period, 2))
+    return centres[np.arange(count) % period] + scatter * rng.standard_normal((count, 2))
+
+
+@pytest.mark.parametrize("period", [1, 2, 3, 7, 32])
+def test_a_motion_that_repeats_is_periodic_with_its_own_period(period):
+    rng = np.random.default_rng(period)
+    noise = 1e-3
+    found = motion_verdict(Points(section(rng, period, noise), np.full(2, noise)), DRIVE_HZ)
+    assert (found.kind, found.period) == (MotionKind.PERIODIC, period)
+
+
+def test_a_periodic_motion_with_sixty_decibels_of_noise_is_not_chaotic():
+    rng = np.random.default_rng(1)
+    points = section(rng, 1, 1e-3)
+    stated = motion_verdict(Points(points, np.full(2, 1e-3)), DRIVE_HZ)
+    # Even where the noise is thought to be a hundredth of what it is.
+    hidden = motion_verdict(Points(30 * (points - points.mean(axis=0)), np.full(2, 3e-4)), DRIVE_HZ)
+    assert stated.kind is MotionKind.PERIODIC
+    assert hidden.kind is not MotionKind.CHAOTIC
+
+
+def test_narrow_band_noise_is_not_chaotic():
+    rng = np.random.default_rng(2)
+    series = np.zeros((1600, 2))
+    for step in range(2, 1600):
+        series[step] = 1.6 * series[step - 1] - 0.9 * series[step - 2] + rng.standard_normal(2)
+    found = motion_verdict(Points(series[100:] / 5, QUIET), DRIVE_HZ)
+    assert found.kind is MotionKind.UNDECIDED
+    assert found.evidence.zero_one is not None
+    assert found.evidence.zero_one.k > 0.9, "the naive test is fooled, or this test says nothing"
+
+
+def test_a_motion_on_a_closed_curve_is_quasi_periodic_and_its_rotation_is_found():
+    turns = (np.sqrt(5) - 1) / 2 / 2
+    angle = 2 * np.pi * turns * np.arange(1000)
+    points = np.column_stack((np.cos(angle) + 0.2 * np.cos(3 * angle), np.sin(angle + 0.4)))
+    found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
+    assert found.kind is MotionKind.QUASI_PERIODIC
+    assert found.evidence.rotation is not None
+    assert found.evidence.rotation.turns_per_period == pytest.approx(turns, abs=1e-6)
+
+
+def test_a_motion_that_still_dies_out_is_undecided():
+    decay = np.exp(-np.arange(1200) / 400)[:, np.newaxis] * np.array([1.0, 0.5])
+    found = motion_verdict(Points(1 + decay, QUIET), DRIVE_HZ)
+    assert (found.kind, found.evidence.is_settled) == (MotionKind.UNDECIDED, False)
+    assert "settle" in found.why
+
+
+def test_a_short_record_carries_no_verdict():
+    found = motion_verdict(Points(np.ones((150, 2)), QUIET), DRIVE_HZ)
+    assert found.kind is MotionKind.UNDECIDED
+    assert "150 drive periods" in found.why
+
+
+def test_scatter_close_to_the_noise_carries_no_verdict():
+    rng = np.random.default_rng(3)
+    found = motion_verdict(Points(section(rng, 1, 0.3), np.full(2, 0.1)), DRIVE_HZ)
+    assert found.kind is MotionKind.UNDECIDED
+    assert "times their noise" in found.why
+
+
+@pytest.mark.parametrize(
+    ("frequency_hz", "amplitude_m", "kind", "period"),
+    [
+        (260.0, 0.2e-6, MotionKind.PERIODIC, 1),
+        (130.0, 20e-6, MotionKind.PERIODIC, None),
+        (260.0, 5e-6, MotionKind.CHAOTIC, None),
+    ],
+    ids=["no contact", "impacts that repeat", "chaos"],
+)
+def test_the_specimen_moves_as_its_points_say(frequency_hz, amplitude_m, kind, period):
+    states = stroboscopic_section(gong2025(), Harmonic(frequency_hz, amplitude_m), 2600)[1100:]
+    points = states[:, [0, 3]] / np.array([1.0, 2 * np.pi * frequency_hz])
+    size = np.sqrt(np.mean(points**2))
+    rng = np.random.default_rng(5)
+    noise = 1e-3
+    seen = points / size + noise * rng.standard_normal(points.shape)
+    found = motion_verdict(Points(seen, np.full(2, noise)), frequency_hz)
+    assert found.kind is kind, found.why
+    assert period is None or found.period == period
+
+
+def test_a_period_is_the_shortest_and_needs_several_repeats():
+    points = section(np.random.default_rng(6), 5)
+    assert shortest_period(Points(points, QUIET)) == 5
+    assert shortest_period(Points(points[:18], QUIET)) is None

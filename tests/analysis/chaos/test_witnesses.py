@@ -1,0 +1,139 @@
+"""The single tests for chaos, against maps and flows whose exponents are known, and against noise."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from analysis.chaos.divergence import divergence
+from analysis.chaos.embedding import embedded, nearest_neighbours
+from analysis.chaos.surrogates import surrogate, surrogate_test
+from analysis.chaos.zero_one import zero_one
+from analysis.errors import InvalidRequest, NotEnoughData
+
+
+def logistic(growth, count):
+    series, x = np.empty(count + 500), 0.3
+    for step in range(count + 500):
+        x = growth * x * (1 - x)
+        series[step] = x
+    return series[500:]
+
+
+def henon(count):
+    series, x, y = np.empty(count + 500), 0.1, 0.1
+    for step in range(count + 500):
+        x, y = 1 - 1.4 * x * x + y, 0.3 * x
+        series[step] = x
+    return series[500:]
+
+
+@pytest.fixture(scope="module")
+def lorenz():
+    def rates(_, at):
+        x, y, z = at
+        return [10 * (y - x), x * (28 - z) - y, x * y - 8 / 3 * z]
+
+    time_s = 50 + 0.01 * np.arange(40_000)
+    return solve_ivp(rates, (0, time_s[-1]), [1, 1, 1], "DOP853", time_s, rtol=1e-8, atol=1e-8).y[0]
+
+
+def autoregression(rng, count):
+    series = np.zeros(count + 500)
+    for step in range(2, count + 500):
+        series[step] = 1.6 * series[step - 1] - 0.9 * series[step - 2] + rng.standard_normal()
+    return series[500:]
+
+
+@pytest.mark.parametrize(("growth", "k"), [(4.0, 1.0), (3.55, 0.0)])
+def test_the_zero_one_test_tells_chaos_from_period_eight(growth, k):
+    assert zero_one(logistic(growth, 2000)).k == pytest.approx(k, abs=0.01)
+
+
+@pytest.mark.parametrize(("stride", "is_oversampled"), [(1, True), (5, True), (20, False)])
+def test_an_oversampled_flow_is_known_for_it(lorenz, stride, is_oversampled):
+    found = zero_one(lorenz[::stride][:2000])
+    assert found.is_oversampled is is_oversampled
+    assert (found.k > 0.9) is not is_oversampled
+
+
+def test_the_zero_one_test_does_not_mind_a_shift_or_a_scale():
+    series = logistic(3.9, 1000)
+    assert zero_one(3 * series + 40).k == pytest.approx(zero_one(series).k, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("series", "delays", "exponent"),
+    [(logistic(4.0, 3000), 1, np.log(2)), (henon(5000), 2, 0.41922)],
+    ids=["logistic", "henon"],
+)
+def test_neighbours_part_at_the_rate_of_the_exponent(series, delays, exponent):
+    found = divergence(embedded(series, delays), steps=25)
+    assert found.is_resolved
+    assert found.exponent == pytest.approx(exponent, rel=0.03)
+    assert abs(found.exponent - exponent) < 3 * found.sd_exponent
+
+
+def test_neighbours_of_a_flow_part_at_the_rate_of_the_exponent(lorenz):
+    points = np.column_stack([lorenz[lag : len(lorenz) - 22 + lag] for lag in (0, 11, 22)])
+    found = divergence(points, steps=400, apart=100)
+    # 400 s of this flow have an exponent of their own, some per cent from that of all time.
+    assert found.exponent / 0.01 == pytest.approx(0.9056, rel=0.08)
+
+
+def test_there_is_no_exponent_where_noise_fills_the_room_below_saturation():
+    noise = np.random.default_rng(0).standard_normal((2000, 3))
+    assert not divergence(noise, steps=8).is_resolved
+    clean, noisy = henon(3000), henon(3000) + 0.2 * np.random.default_rng(1).standard_normal(3000)
+    assert divergence(embedded(clean, 2), steps=20).is_resolved
+    assert not divergence(embedded(noisy, 2), steps=20, noise=0.2).is_resolved
+
+
+def test_henon_with_noise_is_more_than_linear_noise_and_an_autoregression_is_not():
+    rng = np.random.default_rng(2)
+    series = henon(2000)
+    noisy = series + 0.1 * series.std() * rng.standard_normal(2000)
+    assert surrogate_test(noisy).rejects_linear_noise
+    assert not surrogate_test(autoregression(rng, 2000)).rejects_linear_noise
+
+
+def test_linear_noise_is_rejected_no_more_often_than_the_test_says():
+    rejected = sum(
+        surrogate_test(autoregression(np.random.default_rng(seed), 400), seed=seed).rejects_linear_noise
+        for seed in range(60)
+    )
+    # Each has a chance of 1/40: more than 5 of 60 happen in 0.2 % of all cases.
+    assert rejected <= 5
+
+
+def test_a_series_whose_surrogates_miss_its_spectrum_is_not_judged():
+    found = surrogate_test(autoregression(np.random.default_rng(3), 2000) ** 3)
+    assert not found.is_valid
+    assert not found.rejects_linear_noise
+
+
+def test_a_surrogate_has_the_values_and_the_spectrum_but_not_the_order():
+    series = henon(1000)
+    made, error = surrogate(series, np.random.default_rng(4))
+    assert np.array_equal(np.sort(made), np.sort(series))
+    assert error < 0.01
+    assert abs(np.corrcoef(made, series)[0, 1]) < 0.2
+
+
+def test_a_neighbour_is_the_nearest_point_that_is_not_near_in_time():
+    rng = np.random.default_rng(5)
+    points = rng.standard_normal((300, 2))
+    found = nearest_neighbours(points, apart=10, last=280, floor=0.05)
+    for point, neighbour, distance in zip(found.point, found.neighbour, found.distance, strict=True):
+        reach = np.linalg.norm(points[:280] - points[point], axis=1)
+        allowed = (np.abs(np.arange(280) - point) >= 10) & (reach > 0.05)
+        assert distance == pytest.approx(reach[allowed].min())
+        assert reach[neighbour] == pytest.approx(distance)
+
+
+def test_what_is_too_short_is_refused():
+    with pytest.raises(NotEnoughData, match="200 values"):
+        zero_one(np.ones(100))
+    with pytest.raises(NotEnoughData, match="neighbour"):
+        divergence(np.ones((30, 2)), steps=20)
+    with pytest.raises(InvalidRequest, match="delays"):
+        embedded(np.ones(10), 0)
