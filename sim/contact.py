@@ -12,6 +12,7 @@ from .contact_flow import (
     CZ,
     POINT,
     SPARE,
+    STAGES,
     TRIAL,
     WIDTH,
     WORK_ROWS,
@@ -63,12 +64,18 @@ STANDARD_TOLERANCE = 1e-6
 """The tolerance for which the first step is tuned; it scales with the eighth root."""
 
 
-LOGGED, DEEPEST = 0, 1
-"""Places of a log's first row: how many steps' ends are in the rows below; the largest w so far."""
+LOGGED, DEEPEST, STAGES_ONLY = range(3)
+"""Places of a log's first row: how many steps' ends are in the rows below; the largest w so far; 1 when no
+deepest point is wanted, only the stages."""
 LOG_TIME, LOG_X, LOG_VX, LOG_P, LOG_RATE, LOG_AX, LOG_AP = range(7)
 """Columns of the rows below: time, x, vx, p and dp/dt at the ends of the accepted steps; under a power law,
 whose steps are long, the accelerations of x and p too."""
 LOG_COLUMNS = 7
+LOG_STEP = 7
+LOG_STAGE_T, LOG_STAGE_W = LOG_STEP + 1, LOG_STEP + 1 + STAGES
+"""Further columns of a wide log, about the step that begins at a row: its length in s, and the rates of t and
+w at its stages, from which a small change of the motion is carried along exactly as the motion was."""
+WIDE_LOG_COLUMNS = LOG_STEP + 1 + 2 * STAGES
 
 
 @compiled
@@ -155,8 +162,8 @@ def _step_to_exit(
 @compiled
 def _step_to_time(
     work: Table, longest: float, limit: float, side: float, force: Vector, middle: float, par: Parameters
-) -> None:
-    """Shorten the trial step until it ends at the time limit; ``work[TRIAL]`` is past it."""
+) -> float:
+    """Shorten the trial step until it ends at the time limit; ``work[TRIAL]`` is past it. Gives the step."""
     low, high, step = 0.0, longest, longest
     # A few units in the last place of the stretch: closer than that, time itself has no digits.
     close = 4.0 * np.finfo(np.float64).eps * (abs(limit) + abs(work[POINT, T]))
@@ -175,6 +182,7 @@ def _step_to_time(
                 break
         trial_step(work, step, side, force, middle, par)
     work[TRIAL, T] = limit
+    return step
 
 
 @compiled
@@ -193,6 +201,16 @@ def _log_point(log: Table, work: Table, side: float, par: Parameters) -> None:
     row = int(log[0, LOGGED])
     log[row, LOG_TIME], log[row, LOG_X], log[row, LOG_VX] = at[T], at[CX], at[CVX]
     log[row, LOG_P], log[row, LOG_RATE] = side * (gap_of(side, par) + at[W] * at[W]), side * at[R]
+
+
+@compiled
+def log_stages(log: Table, work: Table, step: float) -> None:
+    """Add the stages of the step just taken to the row of its start, if the log is wide enough."""
+    if log.shape[1] == WIDE_LOG_COLUMNS:
+        row = log[int(log[0, LOGGED])]
+        row[LOG_STEP] = step
+        for stage in range(STAGES):
+            row[LOG_STAGE_T + stage], row[LOG_STAGE_W + stage] = work[stage, T], work[stage, W]
 
 
 @compiled
@@ -283,14 +301,16 @@ def advance_contact(  # noqa: C901, PLR0912 - a step control and its three ends 
             taken = _step_to_exit(work, step, side, force, middle, par, LANDING * root_scale)
             code = LEFT
         if work[TRIAL, T] >= limit:
-            _step_to_time(work, taken, limit, side, force, middle, par)
+            taken = _step_to_time(work, taken, limit, side, force, middle, par)
             code = HELD
         if work[TRIAL, T] < work[POINT, T]:
             # Time runs backwards where w < 0: the step leapt over the exit and came back.
             step *= 0.5
             continue
         if len(log) > 0:
-            _log_apex(log, work, taken, side, force, middle, par)
+            log_stages(log, work, taken)
+            if log[0, STAGES_ONLY] == 0.0:
+                _log_apex(log, work, taken, side, force, middle, par)
         work[POINT] = work[TRIAL]
         if code == LEFT:
             work[POINT, W] = 0.0

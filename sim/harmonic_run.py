@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 
 from .clock import advance_clock, time_until
 from .compiled import compiled
-from .contact import HELD, LEFT, LOG_COLUMNS, NOT_FINITE, contact_workspace
+from .contact import (
+    HELD,
+    LEFT,
+    LOG_COLUMNS,
+    NOT_FINITE,
+    STAGES_ONLY,
+    WIDE_LOG_COLUMNS,
+    contact_workspace,
+)
 from .contact_flow import FORCE_TERMS
 from .detection import SERIES_TERMS
 from .flight import (
@@ -31,6 +39,8 @@ from .parameters import POWER, SIDE, Table, Vector, X, Y, Z
 from .smooth import smooth_turn
 from .smooth_tally import tally_smooth
 from .tally import MODE, NOTHING, tally_contact, tally_flight
+from .tangent_contact import carry_through_steps
+from .tangent_flight import carry_through_flight
 from .touch import advance_touching, strike
 
 REACHED_END = int(Outcome.REACHED_END)
@@ -59,6 +69,9 @@ class Record(NamedTuple):
     counts: NDArray[np.int64]
     """Samples and impacts so far."""
     tally: Vector
+    tangent: Table
+    """Small changes of the state that are carried along, as `sim.tangent` says, shape (m, TANGENT_SIZE);
+    m = 0 carries none."""
 
 
 @compiled
@@ -71,7 +84,7 @@ def advance_harmonic(  # noqa: C901, PLR0912 - the two phases and their ends are
     workspace = np.zeros(terms, np.complex128)
     series, force, work = np.zeros(SERIES_TERMS), np.zeros(FORCE_TERMS), contact_workspace()
     shadow = np.zeros(len(state))
-    log = np.zeros((LOG_ROWS if record.tally[MODE] != NOTHING else 0, LOG_COLUMNS))
+    log, has_tangent = _log_for(record), len(record.tangent) > 0
     counts = record.counts
     turn = smooth_turn(tolerance) if tables.par.law == POWER else STRETCH_TURN
     while True:
@@ -86,6 +99,8 @@ def advance_harmonic(  # noqa: C901, PLR0912 - the two phases and their ends are
             if ends == OUT_OF_RANGE:
                 return LOST
             tally_flight(record.tally, phasors, now, workspace, series, clock, length, tables)
+            if has_tangent:
+                carry_through_flight(record.tangent, length, tables)
             _sample_flight(phasors, now, clock, length, tables, record)
             turn_phasors(now, phasors, length, clock, tables)
             place_on_phasors(state, now, tables)
@@ -114,11 +129,23 @@ def advance_harmonic(  # noqa: C901, PLR0912 - the two phases and their ends are
                 tally_smooth(record.tally, log, clock, tables)
             elif record.tally[MODE] != NOTHING:
                 tally_contact(record.tally, log, clock, tables)
+            if has_tangent:
+                carry_through_steps(record.tangent, log, tables.par, tables.power)
             _sample_contact(shadow, clock, length, force, middle, tables, tolerance, work, record)
             if length >= longest:
                 clock[0], clock[1] = until, 0.0
             else:
                 advance_clock(clock, length)
+
+
+@compiled
+def _log_for(record: Record) -> Table:
+    """Make the log of contacts that the tally or the tangent needs."""
+    if len(record.tangent) > 0:
+        wide = np.zeros((LOG_ROWS, WIDE_LOG_COLUMNS))
+        wide[0, STAGES_ONLY] = 1.0 if record.tally[MODE] == NOTHING else 0.0
+        return wide
+    return np.zeros((LOG_ROWS if record.tally[MODE] != NOTHING else 0, LOG_COLUMNS))
 
 
 @compiled

@@ -17,6 +17,7 @@ from .outcome import Outcome
 from .parameters import Vector
 from .specimen import Specimen
 from .tally import TALLY_SIZE
+from .tangent import no_tangent
 from .trajectory import Impacts, Trajectory
 
 MAX_IMPACT_RATE_HZ = 20_000.0
@@ -178,6 +179,7 @@ def new_record(
         impact_times=np.zeros(math.ceil(impact_rate_hz * duration_s) + SPARE_IMPACTS),
         counts=np.zeros(2, np.int64),
         tally=np.zeros(TALLY_SIZE),
+        tangent=no_tangent(),
     )
 
 

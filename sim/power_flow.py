@@ -75,7 +75,8 @@ def power_rates(
     rates[4] = (pull + drive) / par.mass0
     rates[5] = (pressing - pull) / par.mass2
     rates[6] = 1.0
-    rates[7] = 0.0
+    # Nobody's rate: p itself, for who carries a small change along.
+    rates[7] = p
 
 
 @overload(motion_rates, jit_options={"forceinline": True})

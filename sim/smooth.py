@@ -18,12 +18,16 @@ from .contact import (
     LOG_AX,
     LOG_P,
     LOG_RATE,
+    LOG_STAGE_T,
+    LOG_STAGE_W,
+    LOG_STEP,
     LOG_TIME,
     LOG_VX,
     LOG_X,
     LOGGED,
     NOT_FINITE,
     STALLED,
+    WIDE_LOG_COLUMNS,
     step_factor,
 )
 from .contact_flow import (
@@ -184,6 +188,16 @@ def _log_point(log: Table, work: Table) -> None:
 
 
 @compiled
+def _log_stages(log: Table, work: Table, step: float) -> None:
+    """Add dt/ds = 1 and p at the stages of the step just taken, if the log is wide enough."""
+    if log.shape[1] == WIDE_LOG_COLUMNS:
+        row = log[int(log[0, LOGGED])]
+        row[LOG_STEP] = step
+        for stage in range(STAGES):
+            row[LOG_STAGE_T + stage], row[LOG_STAGE_W + stage] = 1.0, work[stage, WIDTH - 1]
+
+
+@compiled
 def _largest_push(force: Vector, half: float) -> float:
     """Bound of the base force on a stretch of twice ``half`` about its middle."""
     push, power = 0.0, 1.0
@@ -238,6 +252,7 @@ def advance_smooth(
             if at[T] + step == at[T]:
                 return NOT_FINITE, at[T]
             continue
+        _log_stages(log, work, taken)
         work[POINT] = work[TRIAL]
         if steps == 1:
             at[T] = limit
