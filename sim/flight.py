@@ -12,8 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .bound_modes import BoundTables, bound_tables, no_bound_tables
 from .clock import angle_at
 from .compiled import compiled
+from .contact_law import RigidStops
 from .detection import LARGEST_BOUND, LONGEST_TURN, NEVER, SERIES_TERMS, first_contact
 from .drive import Harmonic
 from .modes import Complex, harmonic_motion, modal_form
@@ -26,8 +28,8 @@ RUN_OF_STEPS = 512
 """Grid steps between two fresh exponentials: keeps the products' rounding below 1e-13."""
 
 
-CLEAR, TOUCHES, OUT_OF_RANGE = range(3)
-"""How a flight ends."""
+CLEAR, TOUCHES, OUT_OF_RANGE, DEPARTS = range(4)
+"""How a flight ends; the last: it has surely left the rigid stop on which m1 stood, and goes on."""
 
 
 class FlightTables(NamedTuple):
@@ -58,6 +60,8 @@ class FlightTables(NamedTuple):
     """Grid step [s]."""
     factors: Complex
     """exp(l_j grid), shape (n+1,)."""
+    bound: BoundTables
+    """Of m1 held by a rigid stop; without numbers for other laws."""
 
 
 def flight_tables(specimen: Specimen, drive: Harmonic) -> FlightTables:
@@ -68,6 +72,7 @@ def flight_tables(specimen: Specimen, drive: Harmonic) -> FlightTables:
     rates = np.append(modes.rates, 1j * omega)
     shapes = np.vstack([modes.shapes, motion])
     grid = GRID_TURN / float(np.max(np.abs(rates)))
+    is_rigid = isinstance(specimen.contact, RigidStops)
     return FlightTables(
         par=parameters(specimen),
         power=power_terms(specimen),
@@ -83,6 +88,7 @@ def flight_tables(specimen: Specimen, drive: Harmonic) -> FlightTables:
         rows=modes.rows,
         grid=grid,
         factors=np.exp(rates * grid),
+        bound=bound_tables(specimen, omega, drive.amplitude_m, GRID_TURN) if is_rigid else no_bound_tables(),
     )
 
 

@@ -20,11 +20,14 @@ from .contact import (
     STAGES_ONLY,
     WIDE_LOG_COLUMNS,
     contact_workspace,
+    gap_of,
 )
 from .contact_flow import FORCE_TERMS
+from .departure import departure
 from .detection import SERIES_TERMS
 from .flight import (
     CLEAR,
+    DEPARTS,
     OUT_OF_RANGE,
     FlightTables,
     drive_phasor,
@@ -35,9 +38,10 @@ from .flight import (
 )
 from .modes import Complex
 from .outcome import Outcome
-from .parameters import POWER, SIDE, Table, Vector, X, Y, Z
+from .parameters import POWER, RIGID, SIDE, Table, Vector, X, Y, Z
 from .smooth import smooth_turn
 from .smooth_tally import tally_smooth
+from .stick import held_tables, hold, place_held, tally_held
 from .tally import MODE, NOTHING, tally_contact, tally_flight
 from .tangent_contact import carry_through_steps
 from .tangent_flight import carry_through_flight
@@ -75,7 +79,7 @@ class Record(NamedTuple):
 
 
 @compiled
-def advance_harmonic(  # noqa: C901, PLR0912 - the two phases and their ends are one loop
+def advance_harmonic(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and their ends are one loop
     state: Vector, clock: Vector, until: float, tables: FlightTables, tolerance: float, record: Record
 ) -> int:
     """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code."""
@@ -95,7 +99,7 @@ def advance_harmonic(  # noqa: C901, PLR0912 - the two phases and their ends are
             return LOST
         if state[SIDE] == 0.0:
             take_off(phasors, state, clock, tables)
-            ends, length = fly(phasors, now, workspace, series, clock, longest, tables)
+            ends, length = _fly_on(phasors, now, workspace, series, clock, longest, tables)
             if ends == OUT_OF_RANGE:
                 return LOST
             tally_flight(record.tally, phasors, now, workspace, series, clock, length, tables)
@@ -108,11 +112,22 @@ def advance_harmonic(  # noqa: C901, PLR0912 - the two phases and their ends are
                 clock[0], clock[1] = until, 0.0
                 continue
             advance_clock(clock, length)
+            if ends == DEPARTS:
+                continue
             if counts[IMPACTS] == len(record.impact_times):
                 return TOO_MANY_IMPACTS
             record.impact_times[counts[IMPACTS]] = clock[0]
             counts[IMPACTS] += 1
             strike(state, tables.par, tolerance)
+        elif tables.par.law == RIGID:
+            ends, length = _stay_held(state, clock, longest, series, tables, record)
+            if ends == OUT_OF_RANGE:
+                return LOST
+            if ends == CLEAR:
+                clock[0], clock[1] = until, 0.0
+            else:
+                advance_clock(clock, length)
+                state[SIDE] = 0.0
         else:
             middle = min(0.5 * longest, 0.5 * turn / tables.omega)
             limit = min(longest, 2.0 * middle)
@@ -146,6 +161,47 @@ def _log_for(record: Record) -> Table:
         wide[0, STAGES_ONLY] = 1.0 if record.tally[MODE] == NOTHING else 0.0
         return wide
     return np.zeros((LOG_ROWS if record.tally[MODE] != NOTHING else 0, LOG_COLUMNS))
+
+
+@compiled
+def _fly_on(
+    phasors: Complex,
+    now: Complex,
+    terms: Complex,
+    series: Vector,
+    clock: Vector,
+    longest: float,
+    tables: FlightTables,
+) -> tuple[int, float]:
+    """Find how long a flight lasts, as `sim.flight.fly`; off a rigid stop it begins with a departure."""
+    if tables.par.law == RIGID:
+        leaves = departure(phasors, terms, series, tables)
+        if leaves > 0.0:
+            return (DEPARTS, leaves) if leaves < longest else (CLEAR, longest)
+    return fly(phasors, now, terms, series, clock, longest, tables)
+
+
+@compiled
+def _stay_held(
+    state: Vector, clock: Vector, longest: float, series: Vector, tables: FlightTables, record: Record
+) -> tuple[int, float]:
+    """Advance while a rigid stop holds m1, to where it lets go or by ``longest``."""
+    held = held_tables(tables)
+    terms, side, first = len(held.rates), state[SIDE], record.counts[NEXT_SAMPLE]
+    phasors, now = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
+    workspace = np.zeros(terms, np.complex128)
+    take_off(phasors, state, clock, held)
+    ends, length = hold(side, phasors, now, workspace, series, clock, longest, held)
+    if ends == OUT_OF_RANGE:
+        return ends, length
+    tally_flight(record.tally, phasors, now, workspace, series, clock, length, held)
+    tally_held(record.tally, side, clock, length, held)
+    _sample_flight(phasors, now, clock, length, held, record)
+    for row in range(first, record.counts[NEXT_SAMPLE]):
+        record.samples[row, Y] += side * gap_of(side, held.par)
+    turn_phasors(now, phasors, length, clock, held)
+    place_held(state, side, now, held)
+    return ends, length
 
 
 @compiled

@@ -25,6 +25,7 @@ from .detection import LONGEST_TURN
 from .modes import state_matrix
 from .parameters import (
     POWER,
+    RIGID,
     SIDE,
     STATE_SIZE,
     VX,
@@ -40,10 +41,13 @@ from .parameters import (
     power_terms,
 )
 from .piece import FAILED, IntervalTables, advance_part, carry_if_clear
+from .rigid_stop import place_between_rigid_stops
 from .smooth import begin_smooth
 from .specimen import Specimen
 
 CUBIC_TERMS = 4
+INSIDE = 1e-9
+"""A start this part of the displacements beyond a rigid stop is taken to be on it: their rounding."""
 
 
 def interval_tables(
@@ -104,12 +108,29 @@ def new_state(
 ) -> Vector:
     """Make a state, shape (STATE_SIZE,), from (x, y, z, vx, vy, vz) [m, m/s], absolute; at rest by default.
 
-    A motion with abs(y - z) beyond the gap starts in contact.
+    A motion with abs(y - z) beyond the gap starts in contact; one beyond a rigid stop is refused.
+
+    Raises ValueError when the motion is not possible.
     """
     state = np.zeros(STATE_SIZE)
     state[:6] = np.asarray(motion, dtype=np.float64)
-    place_on_its_side(state, parameters(specimen), accuracy.tolerance)
+    par = parameters(specimen)
+    if par.law == RIGID:
+        _refuse_inside_a_stop(state, specimen)
+    place_on_its_side(state, par, accuracy.tolerance)
     return state
+
+
+def _refuse_inside_a_stop(state: Vector, specimen: Specimen) -> None:
+    lower, upper = specimen.gaps_m
+    p = float(state[Y] - state[Z])
+    beyond = max(p - upper, -p - lower)
+    if beyond > INSIDE * (min(lower, upper) + float(np.abs(state[:3]).sum())):
+        msg = (
+            f"A start at y - z = {p} m is not allowed: rigid stops stand at {-lower} and {upper} m; "
+            "start between them."
+        )
+        raise ValueError(msg)
 
 
 @compiled
@@ -119,6 +140,8 @@ def place_on_its_side(state: Vector, par: Parameters, tolerance: float) -> None:
     state[SIDE] = 0.0
     if par.law == POWER:
         begin_smooth(state)
+    elif par.law == RIGID:
+        place_between_rigid_stops(state, par, tolerance)
     elif p > par.upper or p < -par.lower:
         begin_contact(state, math.copysign(1.0, p), par, tolerance)
 

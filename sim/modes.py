@@ -1,5 +1,6 @@
 """The specimen without contact, solved exactly: state matrix, modes, transmissibility. SI units."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -16,14 +17,20 @@ def state_matrix(specimen: Specimen) -> tuple[Table, Vector]:
 
     Returns A, shape (6, 6), and b, shape (6,).
     """
-    inverse = np.linalg.inv(specimen.mass_matrix)
-    system = np.zeros((6, 6))
-    system[:3, 3:] = np.eye(3)
-    system[3:, :3] = -inverse @ specimen.stiffness_matrix
-    system[3:, 3:] = -inverse @ specimen.damping_matrix
+    system = _first_order(specimen.mass_matrix, specimen.stiffness_matrix, specimen.damping_matrix)
     entry = np.zeros(6)
-    entry[VX] = inverse[0, 0]
+    entry[VX] = 1.0 / specimen.masses[0]
     return system, entry
+
+
+def _first_order(mass: Table, stiffness: Table, damping: Table) -> Table:
+    """Displacements above velocities: the matrix of their rates, shape (2n, 2n)."""
+    inverse, size = np.linalg.inv(mass), len(mass)
+    system = np.zeros((2 * size, 2 * size))
+    system[:size, size:] = np.eye(size)
+    system[size:, :size] = -inverse @ stiffness
+    system[size:, size:] = -inverse @ damping
+    return system
 
 
 def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Complex:
@@ -58,14 +65,14 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
 
 
 class ModalForm(NamedTuple):
-    """Free motion without contact as s(t) = Re sum_j (rows_j . s0) shapes_j exp(rates_j t)."""
+    """Free motion of d displacements as s(t) = Re sum_j (rows_j . s0) shapes_j exp(rates_j t)."""
 
     rates: Complex
-    """Shape (n,) [1/s]: one of each conjugate pair, and every real one; 3 <= n <= 6."""
+    """Shape (n,) [1/s]: one of each conjugate pair, and every real one; d <= n <= 2d."""
     shapes: Complex
-    """Shape (n, 6)."""
+    """Shape (n, 2d)."""
     rows: Complex
-    """Shape (n, 6): left eigenvectors, doubled for a pair."""
+    """Shape (n, 2d): left eigenvectors, doubled for a pair."""
 
 
 COINCIDENT = 1e7
@@ -73,14 +80,19 @@ COINCIDENT = 1e7
 
 
 def modal_form(specimen: Specimen) -> ModalForm:
-    """Diagonalise the state matrix, for any damping.
+    """Diagonalise the specimen without contact, for any damping.
 
     Raises ValueError when two modes coincide (critical damping): then no full set of modes exists.
     """
-    system, _ = state_matrix(specimen)
+    return diagonal_form(specimen.mass_matrix, specimen.stiffness_matrix, specimen.damping_matrix)
+
+
+def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
+    """Diagonalise M s'' + C s' + K s = 0 with a diagonal M; as `modal_form`."""
+    system = _first_order(mass, stiffness, damping)
     # Mass-normalised and in units of the fastest mode: a balanced matrix, so that every digit counts.
-    speed = 2.0 * np.pi * float(specimen.natural_frequencies_hz[-1])
-    root = np.sqrt(np.asarray(specimen.masses))
+    root = np.sqrt(np.diag(mass))
+    speed = math.sqrt(float(np.linalg.eigvalsh(stiffness / np.outer(root, root))[-1]))
     units = np.concatenate([1.0 / root, speed / root])
     values, vectors = np.linalg.eig(system / units[:, None] * units[None, :] / speed)
     if np.linalg.cond(vectors) > COINCIDENT:

@@ -19,7 +19,8 @@ Table = NDArray[np.float64]
 X, Y, Z, VX, VY, VZ = range(6)
 """Absolute displacements and velocities: always valid, in flight and in contact."""
 SIDE = 6
-"""0 in flight; +1 or -1 while m1 presses on the stop at positive or negative p; +1 under a power law."""
+"""0 in flight; +1 or -1 while m1 presses on the stop at positive or negative p, or is held by a rigid one; +1
+under a power law."""
 ROOT, RATE = 7, 8
 """In contact: w, the square root of the penetration [m^0.5], and its rate r = d|p|/dt [m/s]. Under a power
 law p and dp/dt themselves."""
@@ -97,9 +98,8 @@ def _stops(specimen: Specimen) -> Stops:
             return Stops(YIELDING, linear_stiffness=stiffness)
         case HuntCrossley(stiffness=stiffness, loss=loss):
             return Stops(YIELDING, contact_stiffness=stiffness, loss=loss)
-        case RigidStops():
-            msg = "Rigid stops cannot be followed in time yet: use Hertz or HuntCrossley."
-            raise ValueError(msg)
+        case RigidStops(restitution=restitution):
+            return Stops(RIGID, restitution=restitution)
         case PowerLaw():
             return Stops(POWER)
 

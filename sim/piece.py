@@ -9,13 +9,17 @@ from .base_force import Cubic, shifted
 from .compiled import compiled
 from .contact import HELD, LEFT, LOG_COLUMNS, contact_workspace
 from .contact_flow import FORCE_TERMS
+from .departure import time_to_depart
 from .detection import LARGEST_BOUND, NEVER, SERIES_TERMS, first_contact
+from .flight import CLEAR, DEPARTS, OUT_OF_RANGE, TOUCHES
 from .flight_series import fill_flight_series, place_on_series
-from .parameters import SIDE, VX, VY, VZ, Parameters, PowerTerms, Table, Vector, X, Y, Z
+from .parameters import RIGID, SIDE, VX, VY, VZ, Parameters, PowerTerms, Table, Vector, X, Y, Z
+from .stick import hold_on_series
 from .touch import advance_touching, strike
 
-MOST_IMPACTS_IN_A_PIECE = 1000
-"""Far beyond any motion of a specimen; a search that reaches it has lost its way."""
+MOST_PHASES_IN_A_PIECE = 100_000
+"""Flights and contacts: far beyond any motion of a specimen, chatter on rigid stops included. A search that
+reaches it has lost its way."""
 FAILED = -1
 """Returned instead of impacts when the state is not finite or a contact made no progress."""
 
@@ -89,33 +93,74 @@ def advance_part(state: Vector, force: Cubic, length: float, tables: IntervalTab
     Impact times (since the start of the piece) go to ``times`` while there is room. Returns the
     impacts, or FAILED.
     """
-    par = tables.par
-    work, no_log = contact_workspace(), np.zeros((0, LOG_COLUMNS))
-    series, path, pushing = np.empty((SERIES_TERMS, 6)), np.empty(SERIES_TERMS), np.zeros(FORCE_TERMS)
-    pushing[0], pushing[1], pushing[2], pushing[3] = force.f0, force.f1, force.f2, force.f3
+    work, series, path = contact_workspace(), np.empty((SERIES_TERMS, 6)), np.empty(SERIES_TERMS)
     tau, impacts = 0.0, 0
-    while impacts < MOST_IMPACTS_IN_A_PIECE:
+    for _ in range(MOST_PHASES_IN_A_PIECE):
         if state[SIDE] != 0.0:
-            code, tau = advance_touching(
-                state, tau, length, pushing, 0.0, par, tables.power, tables.tolerance, work, no_log
-            )
+            code, tau = _stay_on_stop(state, force, tau, length, tables, work, series, path)
             if code == HELD:
                 return impacts
             if code != LEFT:
                 return FAILED
-        rest = shifted(force, tau)
-        bound = acceleration_bound(state, rest, tables)
-        if not bound < LARGEST_BOUND:
-            return FAILED
-        fill_flight_series(series, path, state, rest, par)
-        touch = first_contact(path, length - tau, par.lower, par.upper, bound, abs(state[Y]) + abs(state[Z]))
-        if touch == NEVER:
-            place_on_series(state, series, length - tau)
+        ends, tau = _fly_part(state, force, tau, length, tables, series, path)
+        if ends == CLEAR:
             return impacts
-        place_on_series(state, series, touch)
-        tau += touch
-        if impacts < len(times):
-            times[impacts] = tau
-        impacts += 1
-        strike(state, par, tables.tolerance)
+        if ends == OUT_OF_RANGE:
+            return FAILED
+        if ends == TOUCHES:
+            if impacts < len(times):
+                times[impacts] = tau
+            impacts += 1
+            strike(state, tables.par, tables.tolerance)
     return FAILED
+
+
+@compiled
+def _stay_on_stop(
+    state: Vector,
+    force: Cubic,
+    tau: float,
+    length: float,
+    tables: IntervalTables,
+    work: Table,
+    series: Table,
+    path: Vector,
+) -> tuple[int, float]:
+    """Advance from ``tau`` while a stop pushes; the codes of `sim.contact`, and the time reached."""
+    if tables.par.law == RIGID:
+        lets_go = hold_on_series(series, path, state, shifted(force, tau), length - tau, tables.par)
+        if lets_go == NEVER:
+            return HELD, length
+        state[SIDE] = 0.0
+        return LEFT, tau + lets_go
+    pushing, no_log = np.zeros(FORCE_TERMS), np.zeros((0, LOG_COLUMNS))
+    pushing[0], pushing[1], pushing[2], pushing[3] = force.f0, force.f1, force.f2, force.f3
+    return advance_touching(
+        state, tau, length, pushing, 0.0, tables.par, tables.power, tables.tolerance, work, no_log
+    )
+
+
+@compiled
+def _fly_part(
+    state: Vector,
+    force: Cubic,
+    tau: float,
+    length: float,
+    tables: IntervalTables,
+    series: Table,
+    path: Vector,
+) -> tuple[int, float]:
+    """Advance a flight from ``tau`` to its first touch or to ``length``; the codes of `sim.flight.fly`."""
+    par, rest, left = tables.par, shifted(force, tau), length - tau
+    bound = acceleration_bound(state, rest, tables)
+    if not bound < LARGEST_BOUND:
+        return OUT_OF_RANGE, tau
+    fill_flight_series(series, path, state, rest, par)
+    scale = abs(state[Y]) + abs(state[Z])
+    leaves = time_to_depart(path, left, par.lower, par.upper, scale) if par.law == RIGID else 0.0
+    if leaves > 0.0:
+        place_on_series(state, series, leaves)
+        return (DEPARTS, tau + leaves) if leaves < left else (CLEAR, length)
+    touch = first_contact(path, left, par.lower, par.upper, bound, scale)
+    place_on_series(state, series, left if touch == NEVER else touch)
+    return (CLEAR, length) if touch == NEVER else (TOUCHES, tau + touch)

@@ -4,15 +4,20 @@ import math
 
 from .compiled import compiled
 from .contact import advance_contact, begin_contact
-from .parameters import POWER, VY, VZ, Parameters, PowerTerms, Table, Vector
+from .parameters import POWER, RIGID, VY, VZ, Parameters, PowerTerms, Table, Vector
 from .power_flow import PowerSystem
+from .rigid_stop import rebound
 from .smooth import advance_smooth
 
 
 @compiled
 def strike(state: Vector, par: Parameters, tolerance: float) -> None:
     """Touch the stop that m1 moves towards; the state is placed on it."""
-    begin_contact(state, math.copysign(1.0, state[VY] - state[VZ]), par, tolerance)
+    side = math.copysign(1.0, state[VY] - state[VZ])
+    if par.law == RIGID:
+        rebound(state, side, par, tolerance)
+    else:
+        begin_contact(state, side, par, tolerance)
 
 
 @compiled
@@ -28,7 +33,7 @@ def advance_touching(
     work: Table,
     log: Table,
 ) -> tuple[int, float]:
-    """Advance while the law's force acts, to its end or to ``limit``; see `sim.contact.advance_contact`."""
+    """Advance while a force acts that yields, to its end or ``limit``; see `sim.contact.advance_contact`."""
     if par.law == POWER:
         return advance_smooth(state, tau, limit, force, middle, PowerSystem(par, power), tolerance, work, log)
     return advance_contact(state, tau, limit, force, middle, par, tolerance, work, log)
