@@ -14,6 +14,7 @@ from acquisition.recording import Recording
 
 from .collision_region import Collisions, collisions
 from .dwell import DwellResponse, dwell_response
+from .dwell_motion import DwellMotion, dwell_motion
 from .envelope import Envelope, envelope
 from .errors import AnalysisError, NotEnoughData
 from .measurement_checks import Check, measurement_checks
@@ -66,6 +67,8 @@ class DwellAnalysis:
     """x over the dwell [m], without the ends that integration disturbs."""
     terminal: tuple[TerminalLevel, ...]
     """How much of the motion went to the bands of the bound modes."""
+    motion: DwellMotion
+    """How it repeats."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +113,8 @@ def _analysed(facts: RecordingFacts, channels: Channels) -> RecordingAnalysis:
             towards_hz = bound_frequencies_hz(facts)
             found = measured_dwell(channels, dwell, towards_hz)
             terminal = terminal_levels(found, towards_hz)
-            return DwellAnalysis(facts, checks, dwell, found, settled_envelope(found), terminal)
+            motion = dwell_motion(channels, found)
+            return DwellAnalysis(facts, checks, dwell, found, settled_envelope(found), terminal, motion)
         case SteppedSine() as stepped:
             return SteppedSineAnalysis(facts, checks, stepped, stepped_response(channels, stepped))
 

@@ -12,7 +12,7 @@ from .sine_fit import fitted_sine
 
 _LOWEST_ORDER = 0.1
 """Both signals are kept down to this part of the drive frequency."""
-_BAND_ABOVE = 0.25
+BAND_ABOVE = 0.25
 """... and up to this part of the sample rate, whose cosine edge ends within what interpolation trusts."""
 
 
@@ -64,7 +64,7 @@ def stroboscope(
     if drive.shape != response.shape:
         raise InvalidRequest(f"drive {drive.shape} and response {response.shape} must be equally long")
     sine = fitted_sine(drive, sample_rate_hz, near_hz)
-    band = {"low_hz": _LOWEST_ORDER * near_hz, "high_hz": _BAND_ABOVE * sample_rate_hz}
+    band = {"low_hz": _LOWEST_ORDER * near_hz, "high_hz": BAND_ABOVE * sample_rate_hz}
     displacement = converted_signal(
         response, sample_rate_hz, given=Quantity.VELOCITY, wanted=Quantity.DISPLACEMENT, **band
     )

@@ -14,6 +14,7 @@ from .campaign_results import (
     SteppedSineResult,
     SweepResult,
 )
+from .chaos.verdict import MotionVerdict
 from .collision_region import CollisionRegion, Collisions, Edge
 from .difference import Difference
 from .overlay import SimulatedRun
@@ -165,6 +166,26 @@ def _dwell(result: DwellResult) -> Json:
             for each in found.lines
         ],
         "terminal_bands": [_band(each) for each in result.analysis.terminal],
+        "motion": _motion(result.analysis.motion.verdict),
+    }
+
+
+def _motion(verdict: MotionVerdict) -> Json:
+    evidence = verdict.evidence
+    exponent, sd_exponent = evidence.exponent_per_s or (None, None)
+    return {
+        "kind": verdict.kind.value,
+        "why": verdict.why,
+        "period": verdict.period,
+        "periods_judged": evidence.periods,
+        "is_settled": evidence.is_settled,
+        "scatter_over_orbit": evidence.spread,
+        "noise_over_orbit": evidence.noise,
+        "zero_one_k": None if evidence.zero_one is None else evidence.zero_one.k,
+        "surrogates_p": None if evidence.surrogates is None else evidence.surrogates.p,
+        "turns_per_period": None if evidence.rotation is None else evidence.rotation.turns_per_period,
+        "lyapunov_per_s": exponent,
+        "sd_lyapunov_per_s": sd_exponent,
     }
 
 

@@ -39,10 +39,10 @@ class Points:
 def shortest_period(points: Points, longest: int = LONGEST_PERIOD) -> int | None:
     """Find the fewest drive periods after which all points repeat within noise; None if they do not.
 
-    Two draws of noise differ by sqrt(2) of its standard deviation; a steadiness of 0.2 % of the orbit is
-    granted to the drive.
+    Two draws differ by sqrt(2) of their standard deviation; a scatter of 0.2 % of the orbit is granted to
+    the drive.
     """
-    allowed = (_NOISE_MARGIN * np.sqrt(2.0) * points.noise) ** 2 + STEADY**2
+    allowed = 2 * ((_NOISE_MARGIN * points.noise) ** 2 + STEADY**2)
     for period in range(1, min(longest, len(points.value) // 4) + 1):
         change = points.value[period:] - points.value[:-period]
         if np.all(np.mean(change**2, axis=0) <= allowed):

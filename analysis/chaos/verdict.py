@@ -118,6 +118,9 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
     found = rotation(points.value)
     evidence = replace(so_far, rotation=found)
     if evidence.spread < ABOVE_NOISE * evidence.noise:
+        if evidence.spread <= SMALL:
+            why = f"the points stay within {evidence.spread:.1%} of the orbit, hardly above their noise"
+            return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)
         return _undecided(
             f"the points scatter by {evidence.spread / evidence.noise:.1f} times their noise, and below "
             f"{ABOVE_NOISE:g} times its shape says nothing; raise the level or use a finer vibrometer range",

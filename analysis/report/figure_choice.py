@@ -8,6 +8,7 @@ from ..figures.bench_levels import bench_levels_figure
 from ..figures.drawn import DrawnFigure
 from ..figures.dwells import dwells_figure
 from ..figures.excitation import excitation_figure
+from ..figures.portraits import portraits_figure
 from ..figures.stepped_sine import stepped_sine_figure
 from ..figures.sweep import sweep_figure
 from ..figures.transmission import transmission_figure
@@ -24,7 +25,9 @@ def result_figures(results: CampaignResults) -> Iterator[DrawnFigure]:
     for sweep in results.sweeps:
         yield sweep_figure(sweep.analysis, sweep.laid)
     for _, group in groupby(results.dwells, key=_dwell_frequency):
-        yield dwells_figure([(each.analysis, each.laid) for each in group])
+        dwells = tuple(group)
+        yield dwells_figure([(each.analysis, each.laid) for each in dwells])
+        yield portraits_figure([each.analysis for each in dwells])
     for stepped in results.stepped:
         yield stepped_sine_figure(stepped.analysis, stepped.laid)
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from ..campaign_results import CampaignResults, DwellResult, NoiseResult, SweepResult
+from ..figures.portraits import verdict_text
 from ..figures.sweep import regions_text
 
 
@@ -51,7 +52,7 @@ def _dwell(result: DwellResult) -> str:
     text = (
         f"Dwell at {plan.frequency_hz:g} Hz and {plan.amplitude_vpp:g} Vpp (A0 = "
         f"{1e6 * found.drive.amplitude_m:.3g} µm): Response I {found.response_i:.3g}, Response II "
-        f"{found.response_ii:.3g}"
+        f"{found.response_ii:.3g}, {verdict_text(result.analysis.motion.verdict)}"
     )
     if result.laid is None:
         return f"{text}."

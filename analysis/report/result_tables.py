@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from ..campaign_results import CampaignResults, DwellResult, NoiseResult, SweepResult
 from ..collision_region import Edge
+from ..figures.portraits import verdict_text
 from ..prediction import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
 from ..recording_facts import specimen_of
 from ..resonance import Resonance
@@ -142,6 +143,7 @@ def dwell_table(dwells: Sequence[DwellResult]) -> ReportTable:
             "Response I",
             "noise bias of I",
             "Response II",
+            "motion",
             "simulated I",
             "simulated II",
             "impacts per s (sim.)",
@@ -164,6 +166,7 @@ def _dwell_row(result: DwellResult) -> tuple[str, ...]:
         f"{found.response_i:.4g}",
         bias,
         f"{found.response_ii:.4g} ± {2 * found.sd_response_ii:.1g}",
+        verdict_text(result.analysis.motion.verdict),
         ABSENT if laid is None else f"{laid.response.response_i:.4g}",
         ABSENT
         if laid is None

@@ -1,0 +1,39 @@
+"""How recorded dwells of the simulated specimen repeat, and how that is shown."""
+
+import numpy as np
+import pytest
+
+from acquisition.recording import open_recording
+from analysis.chaos.verdict import MotionKind
+from analysis.figures.portraits import portraits_figure
+from analysis.measurement_analysis import analyse_recording
+
+
+@pytest.fixture(scope="module")
+def analyses(dwell_file):
+    return {level: analyse_recording(open_recording(dwell_file(level))) for level in ("weak", "strong")}
+
+
+def test_a_weak_dwell_is_periodic_with_the_drive_and_a_colliding_one_is_not(analyses):
+    weak, strong = analyses["weak"].motion.verdict, analyses["strong"].motion.verdict
+    assert (weak.kind, weak.period) == (MotionKind.PERIODIC, 1), weak.why
+    assert strong.kind in {MotionKind.CHAOTIC, MotionKind.UNDECIDED}
+    assert strong.evidence.spread > 50 * weak.evidence.spread
+
+
+def test_the_section_lies_on_the_orbit_once_a_drive_period(analyses):
+    section = analyses["weak"].motion.section
+    assert np.diff(section.time_s) == pytest.approx(1 / 260.0, rel=1e-4)
+    orbit = np.column_stack((section.orbit_displacement_m, section.orbit_velocity_m_per_s / 1634))
+    points = np.column_stack((section.displacement_m, section.velocity_m_per_s / 1634))
+    nearest = [np.min(np.linalg.norm(orbit - point, axis=1)) for point in points[::50]]
+    # Samples lie a thirtieth of a turn apart, so the nearest is within a sixtieth of one.
+    assert max(nearest) < 0.06 * np.max(np.abs(section.orbit_displacement_m))
+
+
+def test_the_portraits_say_the_verdict_and_hold_the_points(analyses):
+    drawn = portraits_figure(list(analyses.values()))
+    assert drawn.png.startswith(b"\x89PNG")
+    for analysis, each in zip(analyses.values(), drawn.tables, strict=True):
+        assert analysis.motion.verdict.why in drawn.caption
+        assert each.column("displacement_m") == pytest.approx(analysis.motion.section.displacement_m)
