@@ -43,8 +43,9 @@ from .smooth import smooth_turn
 from .smooth_tally import tally_smooth
 from .stick import held_tables, hold, place_held, tally_held
 from .tally import MODE, NOTHING, tally_contact, tally_flight
-from .tangent_contact import carry_through_steps
+from .tangent_contact import carry_through_steps, tangent_workspace
 from .tangent_flight import carry_through_flight
+from .tangent_impact import carry_through_impact
 from .touch import advance_touching, strike
 
 REACHED_END = int(Outcome.REACHED_END)
@@ -88,7 +89,7 @@ def advance_harmonic(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and 
     workspace = np.zeros(terms, np.complex128)
     series, force, work = np.zeros(SERIES_TERMS), np.zeros(FORCE_TERMS), contact_workspace()
     shadow = np.zeros(len(state))
-    log, has_tangent = _log_for(record), len(record.tangent) > 0
+    log, memory, has_tangent = _log_for(record), tangent_workspace(), len(record.tangent) > 0
     counts = record.counts
     turn = smooth_turn(tolerance) if tables.par.law == POWER else STRETCH_TURN
     while True:
@@ -118,7 +119,10 @@ def advance_harmonic(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and 
                 return TOO_MANY_IMPACTS
             record.impact_times[counts[IMPACTS]] = clock[0]
             counts[IMPACTS] += 1
+            shadow[:] = state
             strike(state, tables.par, tolerance)
+            if has_tangent and tables.par.law == RIGID:
+                carry_through_impact(record.tangent, shadow, state, tables.par)
         elif tables.par.law == RIGID:
             ends, length = _stay_held(state, clock, longest, series, tables, record)
             if ends == OUT_OF_RANGE:
@@ -145,7 +149,7 @@ def advance_harmonic(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and 
             elif record.tally[MODE] != NOTHING:
                 tally_contact(record.tally, log, clock, tables)
             if has_tangent:
-                carry_through_steps(record.tangent, log, tables.par, tables.power)
+                carry_through_steps(record.tangent, log, tables.par, tables.power, memory)
             _sample_contact(shadow, clock, length, force, middle, tables, tolerance, work, record)
             if length >= longest:
                 clock[0], clock[1] = until, 0.0
@@ -196,6 +200,8 @@ def _stay_held(
         return ends, length
     tally_flight(record.tally, phasors, now, workspace, series, clock, length, held)
     tally_held(record.tally, side, clock, length, held)
+    if len(record.tangent) > 0:
+        carry_through_flight(record.tangent, length, held)
     _sample_flight(phasors, now, clock, length, held, record)
     for row in range(first, record.counts[NEXT_SAMPLE]):
         record.samples[row, Y] += side * gap_of(side, held.par)

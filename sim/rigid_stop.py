@@ -87,6 +87,6 @@ def place_between_rigid_stops(state: Vector, par: Parameters, tolerance: float) 
     p = state[Y] - state[Z]
     side = math.copysign(1.0, p)
     short = gap_of(side, par) - side * p
-    if short <= closed_gap(side, state, par):
+    if short < math.inf and short <= closed_gap(side, state, par):
         place_on_stop(state, side, side * (state[VY] - state[VZ]), par)
         hold_if_pressed(state, side, par, tolerance)

@@ -16,7 +16,7 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from .compiled import compiled
+from .compiled import compiled, inlined
 from .contact import LOG_STAGE_T, LOG_STAGE_W, LOG_STEP, LOGGED
 from .contact_flow import FORCE_TERMS, POINT, STAGES, TRIAL, WIDTH, WORK_ROWS, motion_rates, trial_step
 from .contact_law import MOST_TERMS
@@ -24,40 +24,55 @@ from .parameters import POWER, VX, VY, VZ, Parameters, PowerTerms, Table, Vector
 from .power_flow import whole_power
 from .tangent import keep_in_range
 
-PACE, STIFFNESS, DAMPING = range(3)
+STEP_TIME, PRESS_P, PRESS_RATE = range(3)
 """Columns of a step's slopes, one row a stage: dt/ds, and the derivatives of what presses m1 and m2 together,
 k1 p + c1 dp/dt + F, by p [N/m] and by dp/dt [N s/m]."""
+
+
+class Links(NamedTuple):
+    """Springs and dampers over masses, for a kernel that must not divide."""
+
+    pull_spring: float
+    pull_damper: float
+    base_spring: float
+    base_damper: float
+    light0: float
+    """1 / m0 [1/kg]."""
+    light2: float
+    light_pair: float
+    """1/m1 + 1/m2 [1/kg]."""
 
 
 class TangentSystem(NamedTuple):
     """The linearised equations over one step."""
 
-    par: Parameters
+    links: Links
     slopes: Table
     """Shape (STAGES, 3)."""
     stage: NDArray[np.int64]
     """Shape (1,): the stage that comes next, counted by who writes the rates."""
 
 
-@compiled
+@inlined
 def tangent_rates(at: Vector, rates: Vector, system: TangentSystem) -> None:
     """Write d/ds of a change (p, dp/dt, x, z, vx, vz) at the coming stage."""
-    par, slopes = system.par, system.slopes[system.stage[0]]
-    system.stage[0] += 1
-    pace, p, rate, vx, vz = slopes[PACE], at[0], at[1], at[4], at[5]
-    pressing = slopes[STIFFNESS] * p + slopes[DAMPING] * rate
-    pull = par.k2 * (at[3] - at[2]) + par.c2 * (vz - vx)
-    rates[0] = pace * rate
-    rates[1] = pace * (pull / par.mass2 - pressing / par.reduced_mass)
-    rates[2] = pace * vx
-    rates[3] = pace * vz
-    rates[4] = pace * ((pull - par.k0 * at[2] - par.c0 * vx) / par.mass0)
-    rates[5] = pace * ((pressing - pull) / par.mass2)
+    links, stage = system.links, system.stage[0]
+    system.stage[0] = stage + 1
+    pace = system.slopes[stage, STEP_TIME]
+    rate, vx, vz = pace * at[1], pace * at[4], pace * at[5]
+    pressing = pace * system.slopes[stage, PRESS_P] * at[0] + system.slopes[stage, PRESS_RATE] * rate
+    pull = pace * links.pull_spring * (at[3] - at[2]) + links.pull_damper * (vz - vx)
+    rates[0] = rate
+    rates[1] = links.light2 * pull - links.light_pair * pressing
+    rates[2] = vx
+    rates[3] = vz
+    rates[4] = links.light0 * (pull - (pace * links.base_spring * at[2] + links.base_damper * vx))
+    rates[5] = links.light2 * (pressing - pull)
     rates[6] = 0.0
     rates[7] = 0.0
 
 
-@overload(motion_rates)
+@overload(motion_rates, jit_options={"forceinline": True})
 def _choose_tangent_rates(
     at: Vector, rates: Vector, side: float, force: Vector, middle: float, system: TangentSystem
 ) -> Callable[..., None] | None:
@@ -95,26 +110,35 @@ def _fill_slopes(slopes: Table, row: Vector, par: Parameters, power: PowerTerms)
     """Linearise the force at the stages that a row of a log holds."""
     for stage in range(STAGES):
         pace = row[LOG_STAGE_T + stage]
-        slopes[stage, PACE] = pace
+        slopes[stage, STEP_TIME] = pace
         if par.law == POWER:
-            slopes[stage, STIFFNESS] = par.k1 + power_stiffness(row[LOG_STAGE_W + stage], power)
-            slopes[stage, DAMPING] = par.c1
+            slopes[stage, PRESS_P] = par.k1 + power_stiffness(row[LOG_STAGE_W + stage], power)
+            slopes[stage, PRESS_RATE] = par.c1
         else:
             # dt/ds is w, dw/ds is r/2, and the force is w^2 (linear + contact w) (1 + loss r).
             w, r = pace, 2.0 * row[LOG_STAGE_W + stage]
             stiff = par.linear_stiffness + 1.5 * par.contact_stiffness * w
             lossy = w * w * (par.linear_stiffness + par.contact_stiffness * w) * par.loss
-            slopes[stage, STIFFNESS] = par.k1 + stiff * (1.0 + par.loss * r)
-            slopes[stage, DAMPING] = par.c1 + lossy
+            slopes[stage, PRESS_P] = par.k1 + stiff * (1.0 + par.loss * r)
+            slopes[stage, PRESS_RATE] = par.c1 + lossy
 
 
 @compiled
-def carry_through_steps(tangent: Table, log: Table, par: Parameters, power: PowerTerms) -> None:
+def tangent_workspace() -> Table:
+    """Memory that one run hands to every contact."""
+    return np.zeros((WORK_ROWS + STAGES, WIDTH))
+
+
+@compiled
+def carry_through_steps(
+    tangent: Table, log: Table, par: Parameters, power: PowerTerms, memory: Table
+) -> None:
     """Carry every change over the steps of a wide log."""
-    work, unforced = np.zeros((WORK_ROWS, WIDTH)), np.zeros(FORCE_TERMS)
-    slopes, stage = np.empty((STAGES, 3)), np.zeros(1, np.int64)
-    system = TangentSystem(par, slopes, stage)
-    at = work[POINT]
+    work, slopes, unforced = memory[:WORK_ROWS], memory[WORK_ROWS:], log[0, :FORCE_TERMS]
+    stage = np.zeros(1, np.int64)
+    links = Links(par.k2, par.c2, par.k0, par.c0, 1.0 / par.mass0, 1.0 / par.mass2, 1.0 / par.reduced_mass)
+    system = TangentSystem(links, slopes, stage)
+    at, end = work[POINT], work[TRIAL]
     for change in tangent:
         change[Y] -= change[Z]
         change[VY] -= change[VZ]
@@ -126,7 +150,6 @@ def carry_through_steps(tangent: Table, log: Table, par: Parameters, power: Powe
             stage[0] = 0
             tangent_rates(at, work[0], system)
             trial_step(work, log[logged, LOG_STEP], 1.0, unforced, 0.0, system)
-            end = work[TRIAL]
             change[Y], change[VY], change[X], change[Z] = end[0], end[1], end[2], end[3]
             change[VX], change[VZ] = end[4], end[5]
     for change in tangent:

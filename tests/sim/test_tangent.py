@@ -16,7 +16,7 @@ from sim.tangent import derivative_of, unit_tangent
 
 DRIVE = Harmonic(130.0, 20e-6)
 DURATION_S = 0.02
-ELASTIC = ["hertz", "linear_gap", "linear", "power:5", "power:3+5+7", "power:47"]
+ELASTIC = ["hertz", "linear_gap", "linear", "power:5", "power:3+5+7", "power:47", "rigid:1"]
 GAPS = [45e-6, (30e-6, 45e-6), (20e-6, np.inf)]
 SCALES = np.repeat([1e-4, 0.1], 3)
 
@@ -43,7 +43,7 @@ def by_differences(specimen, step, accuracy=Accuracy.REFERENCE):
 
 
 @pytest.mark.parametrize("gap_m", GAPS)
-@pytest.mark.parametrize("contact", [*ELASTIC, "hunt_crossley:0.5"])
+@pytest.mark.parametrize("contact", [*ELASTIC, "hunt_crossley:0.5", "rigid:0.8"])
 def test_differences_of_runs_approach_the_tangent_with_the_square_of_their_step(contact, gap_m):
     specimen = gong2025(contact=contact, gap_m=gap_m)
     tangent, _, impacts = run_with_tangent(specimen)
@@ -65,7 +65,7 @@ def test_volume_shrinks_by_the_damping_alone(contact):
     assert logarithm / DURATION_S == pytest.approx(rate, rel=1e-6)
 
 
-@pytest.mark.parametrize("contact", ["hertz", "linear_gap", "power:7"])
+@pytest.mark.parametrize("contact", ["hertz", "linear_gap", "power:7", "rigid:1"])
 def test_without_damping_the_tangent_is_symplectic(contact):
     # D' J D = J in displacements and momenta; here in displacements and velocities over their scales.
     specimen = gong2025(damping_time_s=0.0, contact=contact)
@@ -95,3 +95,22 @@ def test_each_level_of_accuracy_has_a_tangent_nearer_to_the_reference(contact):
     assert standard < 0.3 * quick
     assert standard < 1e-3
     assert quick < 0.1
+
+
+def test_an_impact_with_restitution_shrinks_volume_by_its_square():
+    specimen = gong2025(contact="rigid:0.8")
+    tangent, _, impacts = run_with_tangent(specimen)
+    rate = -np.trace(np.linalg.solve(specimen.mass_matrix, specimen.damping_matrix))
+    assert impacts > 2
+    expected = rate * DURATION_S + 2.0 * impacts * np.log(0.8)
+    assert np.linalg.slogdet(tangent)[1] == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_stop_that_holds_leaves_no_change_of_the_distance():
+    # No rebound: m1 stays on its stop, and two of the six directions are gone for good.
+    specimen = gong2025(contact="rigid:0")
+    tangent, _, impacts = run_with_tangent(specimen, duration_s=0.05)
+    values = np.linalg.svd(tangent, compute_uv=False)
+    assert impacts > 0
+    assert values[3] > 1e-6
+    assert values[4] < 1e-12 * values[0]
