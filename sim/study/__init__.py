@@ -1,0 +1,1 @@
+"""Studies: many scenes as one work queue, on threads or a cluster, kept in HDF5 and resumable."""

@@ -1,0 +1,36 @@
+"""A small study that has everything: chains, gaps, two amplitudes, impacts."""
+
+import numpy as np
+import pytest
+
+from sim.study.columns import SESSION, TAKEN
+from sim.study.study import Study
+
+OF_THE_OCCASION = (TAKEN, SESSION)
+"""What may differ between two computations of the same study."""
+
+
+@pytest.fixture
+def study():
+    return Study(
+        frequencies_hz={"start": 200.0, "stop": 280.0, "step": 20.0},
+        amplitudes_m=(1e-6, 20e-6),
+        gaps_m=(30e-6, 45e-6),
+        starts=("rest", "up", "down"),
+        duration_s=0.5,
+        window_s=0.2,
+    )
+
+
+@pytest.fixture
+def require_equal():
+    """Bit for bit, but for what belongs to the occasion."""
+
+    def require(one, other):
+        assert one.study == other.study
+        assert one.arrays.keys() == other.arrays.keys()
+        for name in one.arrays.keys() - set(OF_THE_OCCASION):
+            is_float = one.arrays[name].dtype.kind == "f"
+            assert np.array_equal(one.arrays[name], other.arrays[name], equal_nan=is_float), name
+
+    return require

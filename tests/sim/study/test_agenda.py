@@ -1,0 +1,95 @@
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sim.study.agenda import NOBODY, Agenda
+from sim.study.costs import Costs
+from sim.study.grid import Grid
+
+
+def agenda_of(planned_s, after=None, is_done=None):
+    points = len(planned_s)
+    costs = Costs(Grid((points,), (True,)), np.array(planned_s, dtype=float))
+    after = np.full(points, NOBODY) if after is None else np.array(after)
+    is_done = np.zeros(points, dtype=bool) if is_done is None else np.array(is_done)
+    return Agenda(after, is_done, costs)
+
+
+def test_the_longest_point_begins_first():
+    agenda = agenda_of([1.0, 5.0, 3.0])
+    assert [agenda.take(0.1, 1) for _ in range(4)] == [(1,), (2,), (0,), ()]
+
+
+def test_short_points_go_together_until_they_are_worth_the_trip():
+    assert agenda_of([1.0, 1.0, 1.0, 1.0]).take(2.5, 10) == (0, 1, 2)
+    assert agenda_of([1.0, 1.0, 1.0, 1.0]).take(2.5, 2) == (0, 1)
+
+
+def test_a_point_counts_with_all_that_wait_for_it():
+    # 0 <- 1 <- 2 take 6 s in a row; 3 alone takes 5 s.
+    agenda = agenda_of([1.0, 2.0, 3.0, 5.0], after=[NOBODY, 0, 1, NOBODY])
+    assert agenda.take(0.1, 1) == (0,)
+
+
+def test_a_follower_waits_until_its_predecessor_is_finished():
+    agenda = agenda_of([1.0, 2.0], after=[NOBODY, 0])
+    assert agenda.take(10.0, 10) == (0,)
+    assert agenda.take(10.0, 10) == ()
+    agenda.finish(0)
+    assert agenda.take(10.0, 10) == (1,)
+
+
+def test_a_follower_of_what_was_done_before_may_begin_at_once():
+    agenda = agenda_of([1.0, 2.0, 1.0], after=[NOBODY, 0, 1], is_done=[True, False, False])
+    assert agenda.take(10.0, 10) == (1,)
+
+
+def test_what_is_learnt_of_a_neighbour_changes_the_order():
+    agenda = agenda_of([1.0, 1.0, 1.0, 2.0])
+    assert agenda.take(0.1, 1) == (3,)
+    agenda.finish(3)
+    agenda.learn(3, 0.5)
+    assert agenda.take(0.1, 1) == (0,)
+    assert agenda.take(0.1, 1) == (1,)
+    assert agenda.take(0.1, 1) == (2,)
+
+
+def test_what_came_to_grief_among_others_is_handed_out_by_itself():
+    agenda = agenda_of([1.0, 1.0, 1.0])
+    assert agenda.take(10.0, 10) == (0, 1, 2)
+    agenda.put_back_alone(1)
+    agenda.put_back(2)
+    handed_out = [agenda.take(10.0, 10) for _ in range(3)]
+    assert sorted(handed_out) == [(), (1,), (2,)]
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.001, 10.0), st.booleans()), min_size=1, max_size=30),
+    st.randoms(use_true_random=False),
+)
+def test_every_point_is_handed_out_until_it_is_finished_and_never_after(points, random):
+    """Chains of any length, answers in any order, some handed back, some times learnt."""
+    planned_s, is_chained = zip(*points, strict=True)
+    after = [number - 1 if number and chained else NOBODY for number, chained in enumerate(is_chained)]
+    agenda = agenda_of(planned_s, after)
+    out, done = [], set()
+    while agenda.left:
+        taken = agenda.take(random.uniform(0.0, 5.0) + 1e-9, random.randint(1, 4))
+        for number in taken:
+            assert number not in done
+            assert number not in out
+            assert after[number] == NOBODY or after[number] in done
+        out.extend(taken)
+        assert out, "points are left, and none is under way or ready"
+        number = out.pop(random.randrange(len(out)))
+        match random.randrange(4):
+            case 0:
+                agenda.put_back(number)
+            case 1:
+                agenda.put_back_alone(number)
+            case _:
+                agenda.finish(number)
+                done.add(number)
+                if random.randrange(2):
+                    agenda.learn(number, random.uniform(1e-4, 10.0))
+    assert done == set(range(len(points)))

@@ -1,0 +1,35 @@
+import numpy as np
+import pytest
+
+from sim.study.costs import Costs
+from sim.study.grid import Grid
+
+
+def line_of(planned_s):
+    return Costs(Grid((len(planned_s),), (True,)), np.array(planned_s))
+
+
+def test_a_point_is_thought_to_take_what_its_neighbours_took():
+    costs = line_of([1.0] * 5)
+    assert list(costs.learn(0, 3.0)) == [1]
+    assert costs.estimate_s(1) == 3.0
+    assert set(costs.learn(2, 5.0)) == {1, 3}
+    assert costs.estimate_s(1) == 4.0
+    assert costs.estimate_s(3) == 5.0
+    assert costs.estimate_s(4) == 1.0
+
+
+def test_a_point_that_was_measured_is_not_estimated_again():
+    costs = line_of([1.0] * 3)
+    list(costs.learn(0, 3.0))
+    list(costs.learn(1, 7.0))
+    assert 0 not in list(costs.learn(1, 7.0))
+
+
+def test_plans_without_a_measured_neighbour_are_scaled_by_how_far_plans_were_off():
+    costs = line_of([1.0, 1.0, 1.0, 2.0])
+    is_missing = np.array([False, True, True, True])
+    assert costs.left_s(is_missing) == pytest.approx(4.0)
+    list(costs.learn(0, 10.0))
+    # Point 1 like its neighbour; points 2 and 3 as planned, times ten.
+    assert costs.left_s(is_missing) == pytest.approx(10.0 + 10.0 + 20.0)

@@ -1,0 +1,33 @@
+import math
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sim.study.grid import Grid
+
+axes = st.lists(st.tuples(st.integers(1, 5), st.booleans()), min_size=1, max_size=5)
+
+
+@given(axes)
+def test_a_place_is_numpys_unravelled_index(axes):
+    shape, ordered = zip(*axes, strict=True)
+    grid = Grid(shape, ordered)
+    assert grid.size == math.prod(shape)
+    for number in range(grid.size):
+        assert grid.place(number) == tuple(int(i) for i in np.unravel_index(number, shape))
+
+
+@given(axes)
+def test_neighbours_differ_by_one_step_along_one_ordered_axis_and_all_are_found(axes):
+    shape, ordered = zip(*axes, strict=True)
+    grid = Grid(shape, ordered)
+    for number in range(grid.size):
+        found = set(grid.neighbours(number))
+        here = np.array(grid.place(number))
+        expected = set()
+        for other in range(grid.size):
+            step = np.abs(np.array(grid.place(other)) - here)
+            if step.sum() == 1 and ordered[int(step.argmax())]:
+                expected.add(other)
+        assert found == expected
