@@ -1,0 +1,136 @@
+"""Lyapunov exponents of the specimen: closed forms, known states, and errors that mean what they say."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sim.accuracy import Accuracy
+from sim.contact_law import LinearGap
+from sim.drive import Harmonic
+from sim.lyapunov import FEWEST_INTERVALS, Precision, Source, Tendency, largest_exponent
+from sim.outcome import Outcome
+from sim.settling import FinalMotion
+from sim.specimen import Specimen, gong2025
+
+CHAOS = Harmonic(260.0, 5e-6)
+
+
+def slowest_decay(specimen):
+    """Real part of the slowest eigenvalue of the structure, by a polynomial eigenvalue problem of its own."""
+    inverse = np.linalg.inv(specimen.mass_matrix)
+    system = np.block(
+        [
+            [np.zeros((3, 3)), np.eye(3)],
+            [-inverse @ specimen.stiffness_matrix, -inverse @ specimen.damping_matrix],
+        ]
+    )
+    return np.linalg.eigvals(system).real.max()
+
+
+@pytest.mark.parametrize("contact", ["linear", "hertz", "linear_gap", "hunt_crossley:0.5", "rigid:0.8"])
+def test_without_impacts_the_exponent_is_the_decay_of_the_slowest_mode(contact):
+    specimen = gong2025(damping_time_s=3e-5, contact=contact)
+    found = largest_exponent(specimen, Harmonic(180.0, 1e-6), duration_s=5.0, settle_s=1.0)
+    assert found.source is Source.MODES
+    assert found.motion is FinalMotion.QUIET
+    assert found.tendency is Tendency.REGULAR
+    assert found.exponent_per_s == pytest.approx(slowest_decay(specimen), rel=1e-9)
+    # The reference's closed form, -time * omega1^2 / 2, and what the run itself measured.
+    omega = 2.0 * math.pi * specimen.natural_frequencies_hz[0]
+    assert found.exponent_per_s == pytest.approx(-3e-5 * omega**2 / 2.0, rel=1e-6)
+    assert found.local_exponents_per_s[50:].mean() == pytest.approx(found.exponent_per_s, abs=0.05)
+
+
+def test_a_weak_power_law_decays_as_the_linear_structure():
+    specimen = gong2025(contact="power:5")
+    found = largest_exponent(specimen, Harmonic(180.0, 1e-9), duration_s=5.0, settle_s=2.0)
+    assert found.source is Source.MULTIPLIERS
+    assert found.exponent_per_s == pytest.approx(slowest_decay(specimen), rel=1e-4)
+
+
+def test_the_papers_statements_on_chaos_hold():
+    # Its section 3.1 and Fig. 10: over 100 per second when colliding at 5 um; near zero or below at 1 um.
+    colliding = largest_exponent(gong2025(), CHAOS)
+    assert colliding.tendency is Tendency.CHAOTIC
+    assert colliding.exponent_per_s > 100.0
+    assert colliding.exponent_per_s - 3.0 * colliding.standard_error_per_s > 90.0
+    for frequency_hz in (94.4, 180.0, 260.0, 266.0, 500.0):
+        still = largest_exponent(gong2025(), Harmonic(frequency_hz, 1e-6))
+        assert still.exponent_per_s < 4.0
+
+
+@pytest.mark.parametrize("contact", ["hertz", "linear_gap", "power:5"])
+def test_two_halves_of_a_chaotic_run_agree_within_their_errors(contact):
+    specimen = gong2025(contact=contact)
+    first = largest_exponent(specimen, CHAOS, Accuracy.QUICK)
+    second = largest_exponent(specimen, CHAOS, Accuracy.STANDARD, initial_state=first.final_state)
+    assert first.tendency is second.tendency is Tendency.CHAOTIC
+    allowed = math.hypot(first.standard_error_per_s, second.standard_error_per_s)
+    assert abs(first.exponent_per_s - second.exponent_per_s) < 4.0 * allowed
+    assert allowed < 0.05 * first.exponent_per_s
+
+
+def test_a_periodic_motion_has_the_exponent_of_its_multipliers_and_of_its_average():
+    found = largest_exponent(gong2025(), Harmonic(130.0, 20e-6), duration_s=10.0)
+    assert found.source is Source.MULTIPLIERS
+    assert found.standard_error_per_s < 1e-3
+    assert found.exponent_per_s == pytest.approx(found.local_exponents_per_s[-300:].mean(), abs=0.3)
+
+
+def test_a_run_ends_as_soon_as_its_error_is_small_enough():
+    whole = largest_exponent(gong2025(), Harmonic(430.0, 50e-6), Accuracy.QUICK, duration_s=10.0)
+    short = largest_exponent(
+        gong2025(),
+        Harmonic(430.0, 50e-6),
+        Accuracy.QUICK,
+        10.0,
+        precision=Precision(0.0, 0.02),
+    )
+    assert short.end_time_s < 0.8 * whole.end_time_s
+    assert short.standard_error_per_s < 0.02 * short.exponent_per_s
+    assert abs(short.exponent_per_s - whole.exponent_per_s) < 4.0 * short.standard_error_per_s
+
+
+def test_a_lost_run_has_no_exponent_and_says_why():
+    found = largest_exponent(gong2025(), CHAOS, duration_s=5.0, max_impact_rate_hz=10.0)
+    assert found.outcome is Outcome.TOO_MANY_IMPACTS
+    assert found.tendency is Tendency.UNKNOWN
+    assert math.isnan(found.exponent_per_s)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"duration_s": 0.1}, f"ask for {FEWEST_INTERVALS} or more"),
+        ({"duration_s": -1.0}, "positive, and finite"),
+        ({"settle_s": math.inf}, "positive, and finite"),
+        ({"interval_s": 0.0}, "Interval 0.0 s is not allowed"),
+        ({"initial_state": np.zeros(5)}, "six finite numbers"),
+    ],
+)
+def test_what_makes_no_run_is_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        largest_exponent(gong2025(), CHAOS, **options)
+
+
+def heavy_base(restoring, gap, stiffness=1.0, damping=0.02):
+    """One oscillator of mass 1 on a base too heavy to feel it: m2 moves as the drive and its modes say."""
+    heavy = 1e9
+    fast, slow = 3.0, 2.0
+    return Specimen(
+        masses=(heavy, 1.0, heavy),
+        stiffnesses=(heavy * fast**2, stiffness, heavy * slow**2),
+        dampings=(heavy * fast, damping, heavy * slow),
+        gap_m=gap,
+        contact=restoring,
+        lower_gap_m=math.inf,
+    )
+
+
+def test_an_oscillator_that_never_reaches_its_stop_on_a_heavy_base_decays_by_itself():
+    specimen = heavy_base(LinearGap(29.0), 1.26)
+    found = largest_exponent(
+        specimen, Harmonic(0.8 / (2.0 * math.pi), 0.01), duration_s=2000.0, settle_s=500.0
+    )
+    assert found.exponent_per_s == pytest.approx(-0.01, rel=1e-4)
