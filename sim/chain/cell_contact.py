@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from ..compiled import compiled
+from ..compiled import compiled, inlined
 from ..contact import (
     APEX_SECANTS,
     DEEPEST,
@@ -28,26 +28,27 @@ from ..contact import (
 from ..contact_flow import R, W, step_error
 from ..detection import polynomial_at
 from ..parameters import POWER, Table, Vector
-from ..power_flow import power_force
-from ..smooth import MOST_SHORTENINGS, SHORTENING, WALL_TURN
 from .cell_flow import (
+    MEMORY,
     MOMENT,
     MOMENTS,
     POINT,
+    RATE,
+    RATE_SCALE,
+    ROOT,
+    ROOT_SCALE,
+    SIDE,
     SPARE,
+    STEP,
     TRIAL,
     WIDTH,
     WORK_ROWS,
     CellLaw,
     T,
-    acceleration_at,
-    cell_rates,
-    cell_step,
+    stop_rates,
+    stop_step,
 )
-
-SIDE, ROOT, RATE, STEP, ROOT_SCALE, RATE_SCALE, MEMORY = range(7)
-"""Places of a cell's row: as in `sim.parameters`; from MEMORY on I_1 ... since the window began."""
-CELL_SIZE = MEMORY + MOMENTS
+from .cell_power import power_cell_rates, power_cell_step, short_of_the_wall
 
 
 @compiled
@@ -103,6 +104,23 @@ def begin_pressing(
     cell[STEP] = tuned * min(4.8 * deepest / speed / 5.0, 0.7 / math.sqrt(0.5 * abs(acceleration) + 1e-300))
 
 
+@inlined
+def _begin_step(work: Table, side: float, curvature: Vector, markov: Vector, law: CellLaw) -> None:
+    """Write the rates at the accepted point."""
+    if law.kind == POWER:
+        power_cell_rates(work[POINT], work[0], curvature, markov, law.power)
+    else:
+        stop_rates(work[POINT], work[0], side, curvature, markov, law)
+
+
+@inlined
+def _try_step(work: Table, step: float, side: float, curvature: Vector, markov: Vector, law: CellLaw) -> None:
+    if law.kind == POWER:
+        power_cell_step(work, step, curvature, markov, law.power)
+    else:
+        stop_step(work, step, side, curvature, markov, law)
+
+
 @compiled
 def _land(
     work: Table,
@@ -111,7 +129,7 @@ def _land(
     goal: float,
     close: float,
     side: float,
-    series: Vector,
+    curvature: Vector,
     markov: Vector,
     law: CellLaw,
 ) -> float:
@@ -136,8 +154,15 @@ def _land(
             step = 0.5 * (low + high)
             if not low < step < high:
                 break
-        cell_step(work, step, side, series, markov, law)
+        _try_step(work, step, side, curvature, markov, law)
     return step
+
+
+@inlined
+def copy_row(to: Vector, source: Vector) -> None:
+    """Copy a point of the motion."""
+    for k in range(WIDTH):
+        to[k] = source[k]
 
 
 @compiled
@@ -145,7 +170,7 @@ def log_moment(log: Table, at: Vector) -> None:
     """Add a point of the motion as the log's next row, if there is room."""
     row = int(log[0, LOGGED]) + 1
     if row < len(log):
-        log[row] = at
+        copy_row(log[row], at)
         log[0, LOGGED] = row
 
 
@@ -157,31 +182,32 @@ def _far(w: float, side: float, law: CellLaw) -> float:
 
 @compiled
 def _log_apex(
-    log: Table, work: Table, step: float, side: float, series: Vector, markov: Vector, law: CellLaw
+    log: Table, work: Table, step: float, side: float, curvature: Vector, markov: Vector, law: CellLaw
 ) -> None:
     """Note the largest abs(p) of the step just taken; where r turns, step to r = 0 exactly."""
     log[0, DEEPEST] = max(log[0, DEEPEST], _far(work[TRIAL, W], side, law))
     before, after = work[POINT, R], work[TRIAL, R]
     if before * after >= 0.0:
         return
-    work[SPARE] = work[TRIAL]
+    copy_row(work[SPARE], work[TRIAL])
     low, high = 0.0, step
     for _ in range(APEX_SECANTS):
         part = low + (high - low) * before / (before - after)
-        cell_step(work, part, side, series, markov, law)
+        _try_step(work, part, side, curvature, markov, law)
         log[0, DEEPEST] = max(log[0, DEEPEST], _far(work[TRIAL, W], side, law))
         if work[TRIAL, R] * before > 0.0:
             low, before = part, work[TRIAL, R]
         else:
             high, after = part, work[TRIAL, R]
-    work[TRIAL] = work[SPARE]
+    copy_row(work[TRIAL], work[SPARE])
 
 
 @compiled
 def _gather(work: Table, cell: Vector, tau: float) -> None:
     at = work[POINT]
     at[W], at[R], at[T] = cell[ROOT], cell[RATE], tau
-    at[MOMENT:] = cell[MEMORY:]
+    for k in range(MOMENTS):
+        at[MOMENT + k] = cell[MEMORY + k]
 
 
 @compiled
@@ -192,7 +218,8 @@ def _scatter(work: Table, cell: Vector, series: Vector, markov: Vector, law: Cel
     """
     at, side = work[POINT], cell[SIDE]
     cell[ROOT], cell[RATE] = at[W], at[R]
-    cell[MEMORY:] = at[MOMENT:]
+    for k in range(MOMENTS):
+        cell[MEMORY + k] = at[MOMENT + k]
     if law.kind == POWER:
         return
     p, rate = motion_in_series(cell, series, markov, at[T])
@@ -202,40 +229,12 @@ def _scatter(work: Table, cell: Vector, series: Vector, markov: Vector, law: Cel
 
 
 @compiled
-def begin_power(cell: Vector, series: Vector, markov: Vector, law: CellLaw, length: float) -> None:
-    """Take p and dp/dt of a cell under a power law from the chain, and the sizes that errors are held to."""
-    p, rate = series[0], series[1]
-    secant = power_force(p, law.power) / p if p != 0.0 else 0.0
-    turn = math.sqrt(max(secant * markov[1], 1.0 / (length * length)))
-    cell[SIDE], cell[ROOT], cell[RATE] = 1.0, p, rate
-    cell[ROOT_SCALE] = max(abs(p) + abs(rate) / turn, 0.999 * cell[ROOT_SCALE])
-    cell[RATE_SCALE] = max(abs(rate) + abs(p) * turn, 0.999 * cell[RATE_SCALE])
-    if cell[STEP] == 0.0:
-        cell[STEP] = 0.05 * length
-
-
-@compiled
-def _short_of_the_wall(step: float, at: Vector, markov: Vector, law: CellLaw) -> float:
-    """Shorten a step until it turns the steepest spring on its way by little: see `sim.smooth`."""
-    exponent = 1
-    for half in law.power.halves:
-        exponent += 2 * half
-    outward = at[R] if at[W] >= 0.0 else -at[R]
-    for _ in range(MOST_SHORTENINGS):
-        reach = abs(at[W]) + max(outward, 0.0) * step
-        secant = power_force(reach, law.power) / reach if reach > 0.0 else 0.0
-        if step * math.sqrt(exponent * secant * markov[1]) <= WALL_TURN:
-            break
-        step *= SHORTENING
-    return step
-
-
-@compiled
 def press_cell(  # noqa: C901, PLR0912 - a step control and its three ends are one loop
     cell: Vector,
     tau: float,
     limit: float,
     series: Vector,
+    curvature: Vector,
     markov: Vector,
     law: CellLaw,
     tolerance: float,
@@ -252,6 +251,8 @@ def press_cell(  # noqa: C901, PLR0912 - a step control and its three ends are o
         Time now and time to stop at, since the window began [s].
     series
         p(t) without the force of this cell since the window began, shape (SERIES_TERMS,).
+    curvature
+        Its second derivative, shape (CURVATURE_TERMS,).
     markov
         g_k of p, shape (MARKOV_TERMS,).
     law, tolerance, work
@@ -271,12 +272,12 @@ def press_cell(  # noqa: C901, PLR0912 - a step control and its three ends are o
     _gather(work, cell, tau)
     point, trial = work[POINT], work[TRIAL]
     close = 4.0 * np.finfo(np.float64).eps * limit
-    cell_rates(point, work[0], side, series, markov, law)
+    _begin_step(work, side, curvature, markov, law)
     for _ in range(MOST_STEPS):
         wish = step
         if law.kind == POWER:
-            step = min(_short_of_the_wall(step, point, markov, law), limit - point[T])
-        cell_step(work, step, side, series, markov, law)
+            step = min(short_of_the_wall(step, point, markov, law), limit - point[T])
+        _try_step(work, step, side, curvature, markov, law)
         error = step_error(work, step, root_scale, rate_scale, tolerance)
         factor = step_factor(error)
         if not error <= 1.0:
@@ -286,10 +287,10 @@ def press_cell(  # noqa: C901, PLR0912 - a step control and its three ends are o
             continue
         taken, code = step, -1
         if law.kind != POWER and trial[W] <= 0.0:
-            taken = _land(work, step, W, 0.0, LANDING * root_scale, side, series, markov, law)
+            taken = _land(work, step, W, 0.0, LANDING * root_scale, side, curvature, markov, law)
             code = LEFT
         if trial[T] >= limit - close:
-            taken = _land(work, taken, T, limit, close, side, series, markov, law)
+            taken = _land(work, taken, T, limit, close, side, curvature, markov, law)
             trial[T] = limit
             code = HELD
         if trial[T] < point[T]:
@@ -297,8 +298,8 @@ def press_cell(  # noqa: C901, PLR0912 - a step control and its three ends are o
             step *= 0.5
             continue
         if len(log) > 0:
-            _log_apex(log, work, taken, side, series, markov, law)
-        work[POINT] = work[TRIAL]
+            _log_apex(log, work, taken, side, curvature, markov, law)
+        copy_row(point, trial)
         if code == LEFT:
             point[W] = 0.0
         if len(log) > 0:
@@ -309,17 +310,8 @@ def press_cell(  # noqa: C901, PLR0912 - a step control and its three ends are o
             if code == LEFT:
                 cell[SIDE] = 0.0
             return code, point[T]
-        cell_rates(point, work[0], side, series, markov, law)
+        _begin_step(work, side, curvature, markov, law)
         # A step that was cut by the limit says little about the next one's length.
         step = wish * factor if step == wish else max(wish, step * factor)
     _scatter(work, cell, series, markov, law)
     return STALLED, point[T]
-
-
-@compiled
-def press_acceleration(cell: Vector, series: Vector, markov: Vector, tau: float) -> float:
-    """d2p/dt2 without the force of this instant, but with all that it has done before."""
-    value = acceleration_at(series, tau)
-    for k in range(MOMENTS):
-        value -= markov[k + 2] * cell[MEMORY + k]
-    return value

@@ -3,22 +3,31 @@
 import math
 
 from ..compiled import compiled
-from ..contact import HELD, LEFT, LOGGED, NOT_FINITE
+from ..contact import DEEPEST, HELD, LEFT, LOGGED, NOT_FINITE
 from ..contact_flow import R, W
 from ..detection import NEVER, SERIES_TERMS, first_contact
 from ..outcome import Outcome
 from ..parameters import Table, Vector
 from .cell_contact import (
-    MEMORY,
-    RATE,
-    SIDE,
     begin_pressing,
     log_moment,
     motion_in_series,
-    press_acceleration,
     press_cell,
 )
-from .cell_flow import ARGUMENT, MOMENT, MOMENTS, CellLaw, T
+from .cell_flow import (
+    ARGUMENT,
+    CURVATURE,
+    MEMORY,
+    MOMENT,
+    MOMENTS,
+    RATE,
+    SIDE,
+    CellLaw,
+    T,
+    acceleration_at,
+    fill_curvature,
+    memory_force,
+)
 
 CROSSED = int(Outcome.REACHED_END)
 CHATTERS = int(Outcome.TOO_MANY_IMPACTS)
@@ -46,7 +55,8 @@ def age_moments(cell: Vector, by: float) -> None:
 @compiled
 def fill_later_series(later: Vector, series: Vector, cell: Vector, markov: Vector, tau: float) -> None:
     """Write p as a polynomial in the time since ``tau``, without a force from then on."""
-    later[:] = series
+    for k in range(SERIES_TERMS):
+        later[k] = series[k]
     if tau > 0.0:
         for low in range(SERIES_TERMS - 1):
             for k in range(SERIES_TERMS - 2, low - 1, -1):
@@ -76,7 +86,8 @@ def _log_now(log: Table, work: Table, cell: Vector, tau: float) -> None:
     if len(log) > 0:
         node = work[ARGUMENT]
         node[W], node[R], node[T] = 0.0, cell[RATE], tau
-        node[MOMENT:] = cell[MEMORY:]
+        for k in range(MOMENTS):
+            node[MOMENT + k] = cell[MEMORY + k]
         log_moment(log, node)
 
 
@@ -113,13 +124,14 @@ def cross_window(
         Filled with the instants between which the motion is smooth; no rows keep nothing.
 
     """
-    tau = start
+    tau, curvature = start, work[CURVATURE]
+    fill_curvature(curvature, series)
     if len(log) > 0:
-        log[0, :] = 0.0
+        log[0, LOGGED] = log[0, DEEPEST] = 0.0
         _log_now(log, work, cell, tau)
     while tau < until:
         if cell[SIDE] != 0.0:
-            code, tau = press_cell(cell, tau, until, series, markov, law, tolerance, work, log)
+            code, tau = press_cell(cell, tau, until, series, curvature, markov, law, tolerance, work, log)
             if code == NOT_FINITE:
                 return LOST
             if code not in (LEFT, HELD):
@@ -141,7 +153,7 @@ def cross_window(
         touches[int(touches[COUNT])] = tau
         p, rate = motion_in_series(cell, series, markov, tau)
         side = math.copysign(1.0, rate)
-        acceleration = press_acceleration(cell, series, markov, tau)
+        acceleration = acceleration_at(curvature, tau) - memory_force(markov, cell[MEMORY:])
         begin_pressing(cell, side, p, rate, acceleration, markov, law, tolerance)
         _log_now(log, work, cell, tau)
     return CROSSED if len(log) == 0 or log[0, LOGGED] + 1 < len(log) else STUCK

@@ -16,7 +16,7 @@ from ..outcome import Outcome
 from ..parameters import POWER, Table
 from ..trajectory import Floats
 from .cell_contact import begin_pressing
-from .cell_flow import acceleration_at
+from .cell_flow import CURVATURE_TERMS, fill_curvature
 from .chain import MASSES_PER_CELL, Chain
 from .run import IMPACTS, NEXT_SAMPLE, ChainRecord, advance_chain, chain_cells
 from .tables import OBSERVED, PATH, ChainTables, chain_tables
@@ -134,14 +134,16 @@ def start_chain(
     phasors = np.append(tables.rows @ (flat - (drive * tables.shapes[-1]).real), drive)
     cells = chain_cells(chain.size)
     terms, series = np.zeros_like(phasors), np.zeros((OBSERVED, SERIES_TERMS))
+    curvature = np.zeros(CURVATURE_TERMS)
     for place in range(chain.size):
         law, markov = law_of(tables.laws[place]), tables.markov[place, PATH]
         p = float(motion[place, 1] - motion[place, 2])
         rate = float(motion[place, 4] - motion[place, 5])
         if law.kind != POWER and not -law.lower < p < law.upper and p != 0.0:
             fill_observed(series, phasors, place, 1, terms, tables)
+            fill_curvature(curvature, series[PATH])
             begin_pressing(
-                cells[place], math.copysign(1.0, p), p, rate, acceleration_at(series[PATH], 0.0), markov, law,
+                cells[place], math.copysign(1.0, p), p, rate, float(curvature[0]), markov, law,
                 accuracy.tolerance,
             )  # fmt: skip
     return cells, phasors

@@ -35,6 +35,17 @@ def chain_state_matrix(chain: Chain) -> tuple[Table, Vector]:
     return system, entry
 
 
+def chain_impulses(chain: Chain) -> Table:
+    """State just after a unit impulse in each cell, shape (6 cells, cells): m1 and m2 part."""
+    entry = np.zeros((2 * MASSES_PER_CELL * chain.size, chain.size))
+    velocities = MASSES_PER_CELL * chain.size
+    for place, cell in enumerate(chain.cells):
+        first = velocities + MASSES_PER_CELL * place
+        _, m1, m2 = cell.masses
+        entry[first + 1, place], entry[first + 2, place] = 1.0 / m1, -1.0 / m2
+    return entry
+
+
 def chain_modal_form(chain: Chain) -> ModalForm:
     """Diagonalise the state matrix, for any damping.
 

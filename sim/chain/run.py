@@ -12,20 +12,23 @@ from numpy.typing import NDArray
 
 from ..clock import advance_clock, time_until
 from ..compiled import compiled
-from ..detection import LARGEST_BOUND
 from ..modes import Complex
 from ..outcome import Outcome
 from ..parameters import POWER, Table, Vector
-from .cell_contact import CELL_SIZE, MEMORY, SIDE, begin_power
+from .cell_flow import CELL_SIZE, MEMORY, SIDE
+from .cell_power import begin_power
 from .cell_window import COUNT, cross_window
 from .tables import KIND, LOWER, OBSERVED, PATH, UPPER, ChainTables
 from .tally import NOTHING, PEAKS_AND_LINES, ChainTally, tally_busy, tally_forces, tally_idle
 from .windows import (
     Space,
+    copy_motion,
+    copy_terms,
     deposit,
     drive_term,
     fill_observed,
     find_busy,
+    is_bounded,
     law_of,
     march,
     neighbours_clash,
@@ -41,8 +44,6 @@ REACHED_END = int(Outcome.REACHED_END)
 TOO_MANY_IMPACTS = int(Outcome.TOO_MANY_IMPACTS)
 LOST = int(Outcome.NOT_FINITE)
 
-RUN_OF_WINDOWS = 512
-"""Windows between two fresh values of the drive's term: keeps its rounding below 1e-13."""
 NEXT_SAMPLE, IMPACTS = 0, 1
 """Places of `ChainRecord.counts`."""
 
@@ -63,7 +64,7 @@ class ChainRecord(NamedTuple):
 
 
 @compiled
-def advance_chain(
+def advance_chain(  # noqa: C901 - the kinds of window and their ends are one loop
     cells: Table,
     phasors: Complex,
     clock: Vector,
@@ -86,31 +87,66 @@ def advance_chain(
             # A force has acted: what was known of the paths to come is void.
             place_observed(space.motion, phasors, observed, tables)
             weigh(space, phasors, observed, tables)
-            if not np.max(space.curvature[PATH]) < LARGEST_BOUND:
+            if is_bounded(space) == 0:
                 return LOST
-        is_watched = observed > 1 or record.counts[NEXT_SAMPLE] < len(record.samples)
-        if count == 0 and not is_watched and is_quiet(space, cells, tables) == 1:
-            turn_window(space, phasors, clock, longest, 0, tables)
-            phasors[:] = space.turned
-            clock[0], clock[1] = until, 0.0
-            return REACHED_END
+            if is_quiet(space, cells, tables) == 1:
+                _go_quietly(space, phasors, cells, clock, until, tables, tolerance, record, tally)
+                return REACHED_END
         if _march_on(space, phasors, cells, clock, longest, tally, record, observed, tables) > 0:
             count = 0
             continue
         length, count = _choose_window(space, cells, phasors, clock, longest, observed, tables)
-        space.before[:] = cells
         code = _cross(space, cells, phasors, count, length, clock, tables, tolerance, record, tally)
-        _sample(space, phasors, count, clock, length, tables, tolerance, record)
+        if record.counts[NEXT_SAMPLE] < len(record.samples):
+            _sample(space, phasors, count, clock, length, tables, tolerance, record)
         for k in range(count):
             deposit(space.turned, cells[space.busy[k]], space.busy[k], tables)
-        phasors[:] = space.turned
-        space.motion[:] = space.motion_end
+        copy_terms(phasors, space.turned)
+        copy_motion(space.motion, space.motion_end, observed)
         if length >= longest:
             clock[0], clock[1] = until, 0.0
         else:
             advance_clock(clock, length)
         if code != REACHED_END:
             return code
+
+
+@compiled
+def _go_quietly(
+    space: Space,
+    phasors: Complex,
+    cells: Table,
+    clock: Vector,
+    until: float,
+    tables: ChainTables,
+    tolerance: float,
+    record: ChainRecord,
+    tally: ChainTally,
+) -> None:
+    """Go to the end in one step when no cell can ever touch; who watches looks at every window."""
+    longest, drive = time_until(clock, until), len(phasors) - 1
+    copy_terms(space.start, phasors)
+    if record.counts[NEXT_SAMPLE] < len(record.samples):
+        _sample(space, phasors, 0, clock, longest, tables, tolerance, record)
+    if tally.mode != NOTHING:
+        then = np.zeros(2)
+        then[0], then[1] = clock[0], clock[1]
+        left = longest
+        while left > 0.0:
+            if _march_on(space, phasors, cells, then, left, tally, record, OBSERVED, tables) == 0:
+                length = min(left, tables.windows[0])
+                turn_window(space, phasors, then, length, 0, tables)
+                place_observed(space.motion_end, space.turned, OBSERVED, tables)
+                for i in range(len(cells)):
+                    tally_idle(tally, i, space, phasors, length, tables)
+                copy_terms(phasors, space.turned)
+                copy_motion(space.motion, space.motion_end, OBSERVED)
+                advance_clock(then, length)
+            left = time_until(then, until)
+    for j in range(drive):
+        phasors[j] = space.start[j] * np.exp(tables.rates[j] * longest)
+    clock[0], clock[1] = until, 0.0
+    phasors[drive] = drive_term(clock, 0.0, tables)
 
 
 @compiled
@@ -132,22 +168,16 @@ def _march_on(
     window, free = tables.windows[0], longest
     if record.counts[NEXT_SAMPLE] < len(record.samples):
         free = min(free, time_until(clock, record.start + record.counts[NEXT_SAMPLE] / record.sample_rate))
-    steps = min(RUN_OF_WINDOWS, int(free / window))
-    if steps == 0:
+    # One window less than fits: the last one before an instant is cut to end on it.
+    steps = int(free / window) - 1
+    if steps <= 0:
         return 0
     set_ceilings(space, tally.peaks, observed, window, tables)
     for what in range(observed):
         for i in range(len(cells)):
             if not space.floor[what, i] < space.motion[what, i] < space.ceiling[what, i]:
                 return 0
-    made = march(
-        phasors, space.turned, space.motion, space.motion_end, tables.factors[0], tables.real,
-        tables.imaginary, space.floor, space.ceiling, observed, steps,
-    )  # fmt: skip
-    if made > 0:
-        advance_clock(clock, made * window)
-        phasors[len(phasors) - 1] = drive_term(clock, 0.0, tables)
-    return made
+    return march(space, phasors, clock, observed, steps, tables)
 
 
 @compiled
@@ -211,10 +241,12 @@ def _cross(
         cell, series, markov = cells[i], space.series[i], tables.markov[i, PATH]
         law = law_of(tables.laws[i])
         fill_observed(series, phasors, i, observed, space.terms, tables)
-        cell[MEMORY:] = 0.0
+        for k in range(MEMORY, CELL_SIZE):
+            cell[k] = 0.0
         if law.kind == POWER:
             begin_power(cell, series[PATH], markov, law, length)
-        space.before[i] = cell
+        for k in range(CELL_SIZE):
+            space.before[i, k] = cell[k]
         space.touches[COUNT] = 0.0
         code = cross_window(
             cell, 0.0, length, series[PATH], markov, space.reach[PATH, i], law, tolerance,

@@ -15,7 +15,7 @@ from ..parameters import Table, Vector, parameters, power_terms
 from ..specimen import Specimen
 from .cell_flow import MARKOV_TERMS, WINDOW_TURN
 from .chain import MASSES_PER_CELL, Chain
-from .modes import chain_modal_form, chain_state_matrix, chain_transmissibility
+from .modes import chain_impulses, chain_modal_form, chain_state_matrix, chain_transmissibility
 
 PATH, ACROSS, INNER, MIDDLE = range(4)
 """What is observed of a cell: p, x, y, z."""
@@ -92,7 +92,7 @@ def chain_tables(chain: Chain, drive: Harmonic, accuracy: Accuracy) -> ChainTabl
         reaches=reaches,
         curvatures=reaches * (np.abs(rates) ** 2)[:, None, None],
         rows=modes.rows,
-        push=np.ascontiguousarray((modes.rows @ _impulses(chain)).T),
+        push=np.ascontiguousarray((modes.rows @ chain_impulses(chain)).T),
         markov=_own_markov(between),
         laws=np.vstack([_law_row(cell) for cell in chain.cells]),
         windows=windows,
@@ -101,24 +101,13 @@ def chain_tables(chain: Chain, drive: Harmonic, accuracy: Accuracy) -> ChainTabl
     )
 
 
-def _impulses(chain: Chain) -> Table:
-    """State just after a unit impulse in each cell, shape (6 cells, cells): m1 and m2 part."""
-    entry = np.zeros((2 * MASSES_PER_CELL * chain.size, chain.size))
-    velocities = MASSES_PER_CELL * chain.size
-    for place, cell in enumerate(chain.cells):
-        first = velocities + MASSES_PER_CELL * place
-        _, m1, m2 = cell.masses
-        entry[first + 1, place], entry[first + 2, place] = 1.0 / m1, -1.0 / m2
-    return entry
-
-
 def _markov_between(chain: Chain) -> Table:
     """Taylor coefficients of p, x, y, z of every cell after a unit impulse in every cell.
 
     Shape (MARKOV_TERMS, 4, answering cells, struck cells).
     """
     system, _ = chain_state_matrix(chain)
-    answer = _impulses(chain)
+    answer = chain_impulses(chain)
     between = np.zeros((MARKOV_TERMS, OBSERVED, chain.size, chain.size))
     for k in range(MARKOV_TERMS):
         moved = answer[: MASSES_PER_CELL * chain.size].reshape(chain.size, MASSES_PER_CELL, chain.size)

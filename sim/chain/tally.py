@@ -1,8 +1,8 @@
 """What is observed of a chain while it runs: the largest motions, and the forces' lines. SI units.
 
 The largest motions are extremes of the motion itself, not of samples. The lines of all displacements follow
-from those of the forces in the cells by the equations of motion (`sim.chain.response`), so that only the latter
-are summed.
+from those of the forces in the cells by the equations of motion (`sim.chain.response`), so that only the
+latter are summed.
 """
 
 from typing import NamedTuple
@@ -13,8 +13,7 @@ from ..detection import polynomial_at
 from ..modes import Complex
 from ..parameters import Table, Vector
 from ..tally import series_peak
-from .cell_contact import MEMORY
-from .cell_flow import MOMENT, MOMENTS, T
+from .cell_flow import MEMORY, MOMENT, MOMENTS, T
 from .tables import OBSERVED, PATH, ChainTables
 from .windows import Space, fill_observed
 

@@ -6,15 +6,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..clock import angle_at
-from ..compiled import compiled
+from ..clock import advance_clock, angle_at
+from ..compiled import compiled, inlined
 from ..contact_law import MOST_TERMS
-from ..detection import SERIES_TERMS
+from ..detection import LARGEST_BOUND, SERIES_TERMS
 from ..flight import fill_series
 from ..modes import Complex
 from ..parameters import POWER, PowerTerms, Table, Vector
-from .cell_contact import CELL_SIZE, MEMORY, SIDE, cell_workspace
-from .cell_flow import MOMENTS, WIDTH, CellLaw
+from .cell_contact import cell_workspace
+from .cell_flow import CELL_SIZE, MEMORY, MOMENTS, SIDE, WIDTH, CellLaw
 from .cell_window import LOG_ROWS, MOST_TOUCHES
 from .tables import (
     CONTACT,
@@ -34,6 +34,8 @@ from .tables import (
 class Space(NamedTuple):
     """Workspaces of one run."""
 
+    start: Complex
+    """Phasors at the beginning of what is watched, shape (n+1,)."""
     turned: Complex
     """Phasors at the window's end, shape (n+1,)."""
     terms: Complex
@@ -69,6 +71,7 @@ def space_for(tables: ChainTables) -> Space:
     return Space(
         np.zeros(terms, np.complex128),
         np.zeros(terms, np.complex128),
+        np.zeros(terms, np.complex128),
         np.zeros(terms),
         np.zeros((OBSERVED, cells)),
         np.zeros((OBSERVED, cells)),
@@ -87,7 +90,7 @@ def space_for(tables: ChainTables) -> Space:
     )
 
 
-@compiled
+@inlined
 def law_of(row: Vector) -> CellLaw:
     """Read a cell's law from its row of numbers."""
     h, f = HALVES, HALVES + MOST_TERMS
@@ -104,16 +107,18 @@ def law_of(row: Vector) -> CellLaw:
     return CellLaw(int(row[KIND]), row[LOWER], row[UPPER], row[LINEAR], row[CONTACT], row[LOSS], power)
 
 
-@compiled
+@inlined
 def drive_term(clock: Vector, later: float, tables: ChainTables) -> complex:
     """exp(i (omega t + phase)) at clock time plus ``later``."""
     return cmath.exp(complex(0.0, angle_at(clock, later, tables.frequency))) * tables.phase
 
 
-@compiled
+@inlined
 def place_observed(motion: Table, phasors: Complex, observed: int, tables: ChainTables) -> None:
     """Write the first ``observed`` of p, x, y, z of every cell."""
-    motion[:observed] = 0.0
+    for what in range(observed):
+        for i in range(motion.shape[1]):
+            motion[what, i] = 0.0
     for j in range(len(phasors)):
         real, imaginary = phasors[j].real, phasors[j].imag
         for what in range(observed):
@@ -121,11 +126,36 @@ def place_observed(motion: Table, phasors: Complex, observed: int, tables: Chain
                 motion[what, i] += real * tables.real[j, what, i] - imaginary * tables.imaginary[j, what, i]
 
 
-@compiled
+@inlined
+def copy_terms(to: Complex, source: Complex) -> None:
+    """Copy phasors; a loop, because a slice costs the compiler more than all the rest."""
+    for j in range(len(to)):
+        to[j] = source[j]
+
+
+@inlined
+def copy_motion(to: Table, source: Table, observed: int) -> None:
+    """Copy the first ``observed`` rows."""
+    for what in range(observed):
+        for i in range(to.shape[1]):
+            to[what, i] = source[what, i]
+
+
+@inlined
+def is_bounded(space: Space) -> int:
+    """Say (1 or 0) whether the motion is small enough for statements about touches."""
+    for i in range(space.curvature.shape[1]):
+        if not space.curvature[PATH, i] < LARGEST_BOUND:
+            return 0
+    return 1
+
+
+@inlined
 def weigh(space: Space, phasors: Complex, observed: int, tables: ChainTables) -> None:
     """Bound the motion and acceleration of the first ``observed`` of p, x, y, z, until a force acts."""
-    space.reach[:observed] = 0.0
-    space.curvature[:observed] = 0.0
+    for what in range(observed):
+        for i in range(space.reach.shape[1]):
+            space.reach[what, i] = space.curvature[what, i] = 0.0
     for j in range(len(phasors)):
         weight = abs(phasors[j])
         space.weights[j] = weight
@@ -135,7 +165,7 @@ def weigh(space: Space, phasors: Complex, observed: int, tables: ChainTables) ->
                 space.curvature[what, i] += weight * tables.curvatures[j, what, i]
 
 
-@compiled
+@inlined
 def turn_window(
     space: Space, phasors: Complex, clock: Vector, length: float, level: int, tables: ChainTables
 ) -> None:
@@ -150,7 +180,7 @@ def turn_window(
     space.turned[modes] = drive_term(clock, length, tables)
 
 
-@compiled
+@inlined
 def set_ceilings(space: Space, peaks: Table, observed: int, length: float, tables: ChainTables) -> None:
     """Work out between which values at the ends of windows of ``length`` nothing can happen within them.
 
@@ -169,38 +199,33 @@ def set_ceilings(space: Space, peaks: Table, observed: int, length: float, table
 
 @compiled
 def march(
-    phasors: Complex,
-    turned: Complex,
-    motion: Table,
-    motion_end: Table,
-    factors: Complex,
-    real: Table,
-    imaginary: Table,
-    floor: Table,
-    ceiling: Table,
-    observed: int,
-    steps: int,
+    space: Space, phasors: Complex, clock: Vector, observed: int, steps: int, tables: ChainTables
 ) -> int:
-    """Turn the phasors window by window while nothing can happen; gives the windows that were."""
-    cells = motion.shape[1]
+    """Advance over long windows in which nothing can happen, at most ``steps``; gives how many there were."""
+    window, factors, drive = tables.windows[0], tables.factors[0], len(phasors) - 1
+    real, imaginary, turned = tables.real, tables.imaginary, space.turned
+    motion, floor, ceiling = space.motion_end, space.floor, space.ceiling
     for made in range(steps):
-        motion_end[:observed] = 0.0
+        for what in range(observed):
+            for i in range(motion.shape[1]):
+                motion[what, i] = 0.0
         for j in range(len(phasors)):
-            term = phasors[j] * factors[j]
+            term = phasors[j] * factors[j] if j < drive else drive_term(clock, window, tables)
             turned[j] = term
             for what in range(observed):
-                for i in range(cells):
-                    motion_end[what, i] += term.real * real[j, what, i] - term.imag * imaginary[j, what, i]
+                for i in range(motion.shape[1]):
+                    motion[what, i] += term.real * real[j, what, i] - term.imag * imaginary[j, what, i]
         for what in range(observed):
-            for i in range(cells):
-                if not floor[what, i] < motion_end[what, i] < ceiling[what, i]:
+            for i in range(motion.shape[1]):
+                if not floor[what, i] < motion[what, i] < ceiling[what, i]:
                     return made
-        phasors[:] = turned
-        motion[:observed] = motion_end[:observed]
+        copy_terms(phasors, turned)
+        copy_motion(space.motion, motion, observed)
+        advance_clock(clock, window)
     return steps
 
 
-@compiled
+@inlined
 def find_busy(space: Space, cells: Table, length: float, tables: ChainTables) -> int:
     """List the cells that press, or whose touch within the window is not excluded; gives how many."""
     count = 0
@@ -215,7 +240,7 @@ def find_busy(space: Space, cells: Table, length: float, tables: ChainTables) ->
     return count
 
 
-@compiled
+@inlined
 def neighbours_clash(busy: NDArray[np.int64], count: int, distance: int) -> int:
     """Say (1 or 0) whether two busy cells are at most so far apart."""
     for k in range(1, count):
@@ -224,7 +249,7 @@ def neighbours_clash(busy: NDArray[np.int64], count: int, distance: int) -> int:
     return 0
 
 
-@compiled
+@inlined
 def fill_observed(
     series: Table, phasors: Complex, cell: int, observed: int, terms: Complex, tables: ChainTables
 ) -> None:
@@ -235,7 +260,7 @@ def fill_observed(
         fill_series(series[what], terms, tables.rates)
 
 
-@compiled
+@inlined
 def deposit(turned: Complex, cell: Vector, place: int, tables: ChainTables) -> None:
     """Add to the phasors at the window's end what the force of a cell did: its moments."""
     for j in range(len(turned) - 1):
@@ -248,7 +273,8 @@ def deposit(turned: Complex, cell: Vector, place: int, tables: ChainTables) -> N
 @compiled
 def place_motion(motion: Vector, phasors: Complex, tables: ChainTables) -> None:
     """Write displacements and velocities, shape (6 cells,)."""
-    motion[:] = 0.0
+    for i in range(len(motion)):
+        motion[i] = 0.0
     for j in range(len(phasors)):
         real, imaginary = phasors[j].real, phasors[j].imag
         for i in range(len(motion)):
