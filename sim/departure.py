@@ -11,7 +11,7 @@ a and j the first derivatives there and b a bound of the fourth derivative of p.
 import math
 
 from .compiled import compiled
-from .detection import ROUNDING, TOUCH
+from .detection import ROUNDING, TOUCH, derivative_bound
 from .flight import FlightTables, fill_series
 from .modes import Complex
 from .parameters import Vector
@@ -20,19 +20,6 @@ from .rigid_stop import RESOLVED
 SHORTEST_PART = 1e-3
 """A departure takes at least this part of a stretch: so little that m1 cannot get farther than rounding
 into the stop, so much that a run goes on."""
-
-
-@compiled
-def curvature_bound(series: Vector, length: float, derivative: int) -> float:
-    """Bound of a derivative of a polynomial on [0, length]; the coefficients ascend."""
-    bound, power = 0.0, 1.0
-    for k in range(derivative, len(series)):
-        factor = 1.0
-        for i in range(derivative):
-            factor *= k - i
-        bound += factor * abs(series[k]) * power
-        power *= length
-    return bound
 
 
 @compiled
@@ -50,7 +37,7 @@ def time_to_depart(series: Vector, length: float, lowest: float, highest: float,
     rate, bend, jerk = side * series[1], side * 2.0 * series[2], side * 6.0 * series[3]
     if side == 0.0 or rate * rate > 2.0 * abs(bend) * RESOLVED * touch:
         return 0.0
-    bound = curvature_bound(series, length, 4)
+    bound = derivative_bound(series, length, 4)
     under_root = jerk * jerk - 2.0 * bend * bound
     sure = 0.0
     if under_root > 0.0:

@@ -29,6 +29,8 @@ JUST_SHORT = 0.999
 """Part of the earliest possible return that is taken after leaving a stop."""
 SHORTEST_ADVANCE = 1e-15
 """An advance is at least this long [s], so that a search always ends."""
+TIGHTER_AFTER = 4
+"""Advances after which a tighter bound is worth its cost."""
 PATIENCE = 400
 """Advances after which the shortest one grows: a tangency followed for ever has no crossing."""
 IMPATIENT = 1e-4
@@ -43,6 +45,19 @@ def polynomial_at(series: Vector, tau: float) -> tuple[float, float]:
         slope = slope * tau + value
         value = value * tau + series[k]
     return value, slope
+
+
+@compiled
+def derivative_bound(series: Vector, length: float, derivative: int) -> float:
+    """Bound of a derivative of a polynomial on [0, length]; coefficients ascending."""
+    bound, power = 0.0, 1.0
+    for k in range(derivative, len(series)):
+        factor = 1.0
+        for i in range(derivative):
+            factor *= k - i
+        bound += factor * abs(series[k]) * power
+        power *= length
+    return bound
 
 
 @compiled
@@ -90,6 +105,9 @@ def first_contact(
         advance = min(_earliest(max(upper, 0.0), rate, positive), _earliest(max(lower, 0.0), -rate, positive))
         tau += max(advance, shortest)
         advances += 1
+        if advances == TIGHTER_AFTER:
+            # What bounds the terms of p knows nothing of how they cancel; the polynomial does.
+            positive = min(positive, derivative_bound(series, length, 2) + 1e-300)
         if advances == PATIENCE:
             shortest = IMPATIENT * length
     return NEVER

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .bound_modes import BoundTables, bound_tables, no_bound_tables
+from .bound_modes import bound_motion, no_bound_motion
 from .clock import angle_at
 from .compiled import compiled
 from .contact_law import RigidStops
@@ -60,8 +60,8 @@ class FlightTables(NamedTuple):
     """Grid step [s]."""
     factors: Complex
     """exp(l_j grid), shape (n+1,)."""
-    bound: BoundTables
-    """Of m1 held by a rigid stop; without numbers for other laws."""
+    bound: Complex
+    """The motion with m1 held by a rigid stop (`sim.bound_modes`); no rows for other laws."""
 
 
 def flight_tables(specimen: Specimen, drive: Harmonic) -> FlightTables:
@@ -88,7 +88,7 @@ def flight_tables(specimen: Specimen, drive: Harmonic) -> FlightTables:
         rows=modes.rows,
         grid=grid,
         factors=np.exp(rates * grid),
-        bound=bound_tables(specimen, omega, drive.amplitude_m, GRID_TURN) if is_rigid else no_bound_tables(),
+        bound=bound_motion(specimen, omega, drive.amplitude_m) if is_rigid else no_bound_motion(),
     )
 
 

@@ -19,10 +19,10 @@ RESOLVED = 4.0
 
 
 @compiled
-def closed_gap(side: float, state: Vector, par: Parameters) -> float:
+def closed_gap(state: Vector, par: Parameters) -> float:
     """How far from a stop m1 counts as touching it [m]: as in `sim.detection.first_contact`."""
     size = abs(state[X]) + abs(state[Y]) + abs(state[Z])
-    closed: float = TOUCH * gap_of(side, par) + ROUNDING * size
+    closed: float = TOUCH * min(par.lower, par.upper) + ROUNDING * size
     return closed
 
 
@@ -75,7 +75,7 @@ def hold_if_pressed(state: Vector, side: float, par: Parameters, tolerance: floa
     press = press_on(side, state, par)
     gap = gap_of(side, par)
     part = tolerance * (1.0 - par.restitution)
-    too_low = RESOLVED * closed_gap(side, state, par) + part * part * gap
+    too_low = RESOLVED * closed_gap(state, par) + part * part * gap
     if press >= 0.0 and rate * rate <= 2.0 * press * too_low:
         place_on_stop(state, side, 0.0, par)
         state[SIDE] = side
@@ -87,6 +87,6 @@ def place_between_rigid_stops(state: Vector, par: Parameters, tolerance: float) 
     p = state[Y] - state[Z]
     side = math.copysign(1.0, p)
     short = gap_of(side, par) - side * p
-    if short < math.inf and short <= closed_gap(side, state, par):
+    if short <= closed_gap(state, par):
         place_on_stop(state, side, side * (state[VY] - state[VZ]), par)
         hold_if_pressed(state, side, par, tolerance)

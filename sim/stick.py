@@ -6,13 +6,16 @@
 
 import math
 
+import numpy as np
+
 from .base_force import Cubic
+from .bound_modes import PULL, RATE, ROW, SHAPE
 from .compiled import compiled
 from .contact import gap_of
-from .departure import curvature_bound
-from .detection import LARGEST_BOUND, NEVER, SERIES_TERMS, first_contact, polynomial_at
+from .detection import LARGEST_BOUND, NEVER, SERIES_TERMS, derivative_bound, first_contact, polynomial_at
 from .flight import (
     CLEAR,
+    GRID_TURN,
     OUT_OF_RANGE,
     TOUCHES,
     FlightTables,
@@ -34,6 +37,8 @@ LETS_GO = TOUCHES
 def held_tables(tables: FlightTables) -> FlightTables:
     """Put the bound modes in the place of the free ones; p, being constant, is left out."""
     bound = tables.bound
+    rates = bound[:, RATE].copy()
+    grid = GRID_TURN / np.abs(rates).max()
     return FlightTables(
         par=tables.par,
         power=tables.power,
@@ -41,14 +46,14 @@ def held_tables(tables: FlightTables) -> FlightTables:
         omega=tables.omega,
         phase=tables.phase,
         force=tables.force,
-        rates=bound.rates,
-        squares=bound.squares,
-        shapes=bound.shapes,
-        path=bound.still,
-        across=bound.across,
-        rows=bound.rows,
-        grid=bound.grid,
-        factors=bound.factors,
+        rates=rates,
+        squares=np.abs(rates) ** 2,
+        shapes=bound[:, SHAPE].copy(),
+        path=np.zeros_like(rates),
+        across=bound[:, SHAPE][:, X].copy(),
+        rows=bound[:-1, ROW].copy(),
+        grid=grid,
+        factors=np.exp(rates * grid),
         bound=bound,
     )
 
@@ -71,7 +76,7 @@ def hold(
         turn_phasors(now, phasors, elapsed, clock, held)
         reach, bound = spring, 0.0
         for j in range(len(now)):
-            terms[j] = weight * now[j] * held.bound.pull[j]
+            terms[j] = weight * now[j] * held.bound[j, PULL]
             reach += abs(terms[j])
             bound += abs(terms[j]) * held.squares[j]
         if not bound < LARGEST_BOUND:
@@ -128,7 +133,7 @@ def hold_on_series(
     for k in range(2):
         reach += abs(path[k]) * length**k
     path[0] += spring
-    bound = curvature_bound(path, length, 2)
+    bound = derivative_bound(path, length, 2)
     free = first_contact(path, length, math.inf, 0.0, bound, reach)
     place_on_series(state, series, length if free == NEVER else free)
     state[Y] = state[Z] + side * gap_of(side, par)
