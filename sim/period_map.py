@@ -1,9 +1,11 @@
 """What a whole or half period makes of a state, exactly, and of a small change of it. SI units.
 
 A mirrored motion comes back with all signs changed after half a drive period, so that it is a fixed point
-of the half map: the flow over half a period, then the mirror. Derivatives are fourth-order central
-differences of the event-driven flow at reference accuracy, with steps far above its error (1e-10) and far
-below the gap: five to seven digits, enough for Newton's iteration and for multipliers.
+of the half map: the flow over half a period, then the mirror. The derivative by the state is exact: it is
+carried along with the motion, so that it holds up to a grazing contact (on a rigid stop it grows beyond all
+bounds there, as the map's own does). Those by frequency and amplitude are fourth-order central differences at
+reference accuracy, with steps far above its error (1e-10) and far below the gap: five to seven digits, and
+only Newton's iteration uses them.
 """
 
 import math
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 
 from .accuracy import Accuracy
 from .drive import Harmonic
+from .flow_derivative import flow_derivative
 from .integrate import integrate
 from .outcome import Outcome
 from .poincare import state_scales
@@ -25,7 +28,7 @@ Vector = NDArray[np.float64]
 Table = NDArray[np.float64]
 
 DIFFERENCE = 1e-5
-"""Step of a difference, over the state's or the parameter's scale."""
+"""Step of a difference, over the parameter."""
 OFFSETS, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)
 """Fourth-order central difference."""
 
@@ -76,13 +79,10 @@ class PeriodMap:
     def derivative(self, state: Vector, drive: Harmonic) -> Table:
         """D image / d state, both over their scales, shape (6, 6)."""
         scales = state_scales(self.specimen, drive)
-        columns = []
-        for axis in range(6):
-            push = np.zeros(6)
-            push[axis] = DIFFERENCE * scales[axis]
-            images = [self.image(state + offset * push, drive) for offset in OFFSETS]
-            columns.append(np.dot(WEIGHTS, images) / (DIFFERENCE * scales))
-        return np.array(columns).T
+        duration = self.turns / drive.frequency_hz
+        _, derivative = flow_derivative(self.specimen, drive, state, duration, Accuracy.REFERENCE)
+        scaled = derivative * scales / scales[:, None]
+        return -scaled if self.shape is OrbitShape.MIRRORED else scaled
 
     def frequency_slope(self, state: Vector, drive: Harmonic) -> Vector:
         """D image / d ln frequency, over the scales, shape (6,)."""
