@@ -22,6 +22,7 @@ class Agenda:
         self._after = after
         self._costs = costs
         self._is_done = is_done.copy()
+        self._left = int(np.count_nonzero(~is_done))
         self._is_out = np.zeros(len(after), dtype=np.bool_)
         self._is_alone = np.zeros(len(after), dtype=np.bool_)
         self._next = np.full(len(after), NOBODY, dtype=np.int64)
@@ -41,7 +42,7 @@ class Agenda:
     @property
     def left(self) -> int:
         """How many points have no answer."""
-        return int(np.count_nonzero(~self._is_done))
+        return self._left
 
     def take(self, worth_s: float, most: int) -> tuple[int, ...]:
         """Hand out the longest point that is ready, and short ones with it until they are ``worth_s``."""
@@ -70,6 +71,7 @@ class Agenda:
     def finish(self, number: int) -> None:
         """Take note of an answer, good or bad: who waited for it may begin."""
         self._is_done[number] = True
+        self._left -= 1
         self._is_out[number] = False
         follower = int(self._next[number])
         if follower != NOBODY and self._is_ready(follower):

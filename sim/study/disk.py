@@ -3,7 +3,7 @@
 import os
 import sys
 from pathlib import Path
-from typing import Self
+from typing import Protocol
 
 from .errors import StudyError
 
@@ -14,6 +14,19 @@ else:
 
 LOCK_BYTE = 2**62
 """Windows locks bytes, not files: one that lies beyond everything."""
+
+
+class Disk(Protocol):
+    """What a store needs of a file."""
+
+    def write(self, offset: int, data: bytes) -> None:
+        """Put ``data`` at ``offset``, in the system's cache at least."""
+
+    def sync(self) -> None:
+        """Return when everything written so far would survive a power cut."""
+
+    def close(self) -> None:
+        """Release the file."""
 
 
 class SoleWriter:
@@ -56,12 +69,6 @@ class SoleWriter:
     def close(self) -> None:
         """Release file and mark."""
         os.close(self._descriptor)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def sync_file(path: Path) -> None:

@@ -6,9 +6,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drive import Harmonic
 from ..outcome import Outcome
-from ..scene import AutomaticDuration, FixedDuration, Given, Rest, Scene, plan_scene
+from ..scene import Given, Rest, Scene, plan_scene
 from ..trajectory import Floats
 from .agenda import NOBODY
 from .answers import cells_of, cut_text
@@ -29,13 +28,6 @@ class Expansion:
     def __init__(self, study: Study) -> None:
         self._study = study
         self._grid = study.grid
-        self._duration = _duration(study)
-        self._specimens = {
-            (model, damping_time_s, gap_m): study.structure.specimen(model, damping_time_s, gap_m)
-            for model in study.models
-            for damping_time_s in study.damping_times_s
-            for gap_m in study.gaps_m
-        }
 
     @cached_property
     def after(self) -> NDArray[np.int64]:
@@ -77,7 +69,8 @@ class Expansion:
         state = tuple(float(value) for value in arrays[FINAL_STATE][before])
         x, y, z, vx, vy, vz = state
         name = continued_from(self._study.frequencies_hz[self._grid.place(before)[-1]])
-        return self._made(number, self._end_phase(before, arrays), Given((x, y, z, vx, vy, vz), name))
+        start = Given((x, y, z, vx, vy, vz), name)
+        return self._study.scene(self._grid.place(number), start, self._end_phase(before, arrays))
 
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
         """Say what is kept of a prediction."""
@@ -114,24 +107,13 @@ class Expansion:
 
     def _unchained(self, number: int) -> Scene:
         """Make the scene of a point that continues no other."""
-        start = self._study.starts[self._grid.place(number)[-2]]
+        place = self._grid.place(number)
+        start = self._study.starts[place[-2]]
         match start:
             case GivenStart():
-                return self._made(number, 0.0, Given(start.state, start.label))
+                return self._study.scene(place, Given(start.state, start.label))
             case _:
-                return self._made(number, 0.0, Rest())
-
-    def _made(self, number: int, phase_rad: float, start: Rest | Given) -> Scene:
-        model, damping, gap, amplitude, _, frequency = self._grid.place(number)
-        study = self._study
-        return Scene(
-            specimen=self._specimens[study.models[model], study.damping_times_s[damping], study.gaps_m[gap]],
-            drive=Harmonic(study.frequencies_hz[frequency], study.amplitudes_m[amplitude], phase_rad),
-            observe=study.observe,
-            accuracy=study.accuracy,
-            duration=self._duration,
-            start=start,
-        )
+                return self._study.scene(place, Rest())
 
     def _planned(self, number: int) -> float:
         """Planned time of a point; none when its scene is not allowed, which its answer will say."""
@@ -144,11 +126,3 @@ class Expansion:
 def continued_from(frequency_hz: float) -> str:
     """Name of a start that is the end of another point."""
     return f"end at {frequency_hz:g} Hz"
-
-
-def _duration(study: Study) -> FixedDuration | AutomaticDuration:
-    match study.duration_s:
-        case "auto":
-            return AutomaticDuration(window_s=study.window_s)
-        case float(duration_s):
-            return FixedDuration(duration_s, study.window_s)

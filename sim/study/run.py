@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .agenda import Agenda
 from .arrays import PointAnswer, states
@@ -57,7 +56,8 @@ def run_study(
 
     """
     session = _Session(study, executor, store)
-    store.begin(executor.description)
+    if session.is_unfinished:
+        store.begin(executor.description)
     while session.is_unfinished:
         session.feed()
         replies = executor.replies(LOOK_S)
@@ -83,7 +83,11 @@ class _Session:
             for _ in self._costs.learn(int(number), float(store.arrays[TAKEN][number])):
                 pass
         self._agenda = Agenda(self._expansion.after, is_done, self._costs)
+        self._points = study.grid.size
+        self._failed = int(np.count_nonzero(states(store.arrays) > PointState.DONE))
         self._out = 0
+        self._looked_s = -math.inf
+        self._work_left_s = 0.0
         self._began_s = time.monotonic()
         self._first_s = math.nan
         self._taken_s = 0.0
@@ -95,10 +99,11 @@ class _Session:
 
     def feed(self) -> None:
         """Hand bundles to the executor until every worker has enough."""
+        self._look()
         slots = self._executor.slots
         while self._out < slots * QUEUED_PER_SLOT:
-            share_s = self._costs.left_s(self._agenda.is_missing) / (slots * SHARE)
-            numbers = self._agenda.take(min(BUNDLE_S, share_s), MOST_IN_BUNDLE)
+            worth_s = min(BUNDLE_S, self._work_left_s / (slots * SHARE))
+            numbers = self._agenda.take(worth_s, MOST_IN_BUNDLE)
             if not numbers:
                 return
             scenes = tuple(self._expansion.scene(number, self._store.arrays) for number in numbers)
@@ -112,6 +117,7 @@ class _Session:
             self._store.keep(answers)
         for answer in answers:
             self._agenda.finish(answer.number)
+            self._failed += answer.state > PointState.DONE
         for number, taken_s in [
             (each.number, each.taken_s) for each in answers if math.isfinite(each.taken_s)
         ]:
@@ -123,21 +129,28 @@ class _Session:
 
     def progress(self) -> StudyProgress:
         """Where it stands."""
-        state = states(self._store.arrays)
-        is_missing = state == PointState.MISSING
         return StudyProgress(
-            points=len(state),
-            kept=len(state) - int(np.count_nonzero(is_missing)),
-            failed=int(np.count_nonzero(state > PointState.DONE)),
+            points=self._points,
+            kept=self._points - self._agenda.left,
+            failed=self._failed,
             elapsed_s=time.monotonic() - self._began_s,
-            left_s=self._left_s(is_missing),
+            left_s=self._left_s(),
         )
 
-    def _left_s(self, is_missing: NDArray[np.bool_]) -> float | None:
+    def _left_s(self) -> float | None:
         """Time that the rest takes, at the pace of the workers since the first answer."""
+        if not self.is_unfinished:
+            return 0.0
         if self._taken_s == 0.0:
             return None
-        return self._costs.left_s(is_missing) * (time.monotonic() - self._first_s) / self._taken_s
+        return self._work_left_s * (time.monotonic() - self._first_s) / self._taken_s
+
+    def _look(self) -> None:
+        """Add up the work that is left, now and then: there may be millions of points."""
+        now_s = time.monotonic()
+        if now_s - self._looked_s >= LOOK_S:
+            self._looked_s = now_s
+            self._work_left_s = self._costs.left_s(self._agenda.is_missing)
 
     def _answers(self, reply: Reply) -> Iterable[PointAnswer]:
         """Take a reply apart; what has no answer goes back to the agenda."""

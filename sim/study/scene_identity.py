@@ -1,4 +1,4 @@
-"""The identity of a scene: a digest of everything it says, the same on every machine and in every year."""
+"""The identity of a scene: a digest of everything it says, the same in every process on every machine."""
 
 import hashlib
 import json

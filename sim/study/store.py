@@ -4,7 +4,7 @@ Order of a commit: cells -> sync -> states -> sync. Whatever moment the process 
 whose state says that it is done has all its cells. States, like everything else, are written once.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
@@ -15,7 +15,7 @@ import numpy as np
 from . import layout
 from .arrays import Arrays, PointAnswer, empty_arrays, put
 from .columns import SESSION
-from .disk import SoleWriter
+from .disk import Disk, SoleWriter
 from .errors import StudyError
 from .file_making import make_file
 from .file_reading import places_of, read_arrays, read_study
@@ -69,9 +69,9 @@ class FileStore:
 
     """
 
-    def __init__(self, path: Path, study: Study) -> None:
+    def __init__(self, path: Path, study: Study, opened: Callable[[Path], Disk] = SoleWriter) -> None:
         self._path = path
-        self._disk = SoleWriter(path)
+        self._disk = opened(path)
         try:
             _require_same(path, read_study(path), study)
             self._places = places_of(path)
@@ -168,9 +168,26 @@ SHOWN = 60
 
 
 def _difference(name: str, kept: Study, asked: Study) -> str:
-    there, here = (str(study.model_dump(mode="json")[name]) for study in (kept, asked))
+    """Say how one field of two studies differs; of long lists, where they begin to."""
+    there, here = (study.model_dump(mode="json")[name] for study in (kept, asked))
+    match there, here:
+        case [*some], [*others]:
+            index = next(
+                (i for i, pair in enumerate(zip(some, others, strict=False)) if pair[0] != pair[1]),
+                min(len(some), len(others)),
+            )
+            there, here = (_item(values, index) for values in (some, others))
+        case _:
+            pass
     return f"{name} is {_short(there)} there and {_short(here)} here"
 
 
-def _short(text: str) -> str:
+def _item(values: list[object], index: int) -> str:
+    if len(values) == 1:
+        return str(values[0])
+    return f"{values[index]} at place {index + 1}" if index < len(values) else f"{len(values)} values"
+
+
+def _short(value: object) -> str:
+    text = str(value)
     return text if len(text) <= SHOWN else text[:SHOWN] + "…"

@@ -16,7 +16,8 @@ from pydantic import (
 )
 
 from ..accuracy import Accuracy
-from ..scene import Observable
+from ..drive import Harmonic
+from ..scene import AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
 from .axes import FREQUENCY, MODEL, START, Axis, grid_of
 from .frequency_range import listed
 from .grid import Grid
@@ -106,11 +107,11 @@ class Study(BaseModel):
         return self
 
     @model_validator(mode="after")
-    def _specimens_exist(self) -> Self:
-        """Refuse now, and not in each point, a model that nobody knows or that a gap does not allow."""
-        for model in self.models:
-            for gap_m in self.gaps_m:
-                self.structure.specimen(model, self.damping_times_s[0], gap_m)
+    def _scenes_are_allowed(self) -> Self:
+        """Refuse now, and not in each point, a model that nobody knows or a window that is too short."""
+        for model in range(len(self.models)):
+            for gap in range(len(self.gaps_m)):
+                self.scene((model, 0, gap, 0, 0, 0), Rest())
         return self
 
     @model_validator(mode="after")
@@ -142,12 +143,35 @@ class Study(BaseModel):
         """All points."""
         return grid_of(self.axes)
 
+    def scene(self, place: tuple[int, ...], start: Rest | Given, phase_rad: float = 0.0) -> Scene:
+        """Make the scene at a place of the grid.
+
+        Raises
+        ------
+        ValueError
+            When a scene of these numbers is not allowed.
+
+        """
+        model, damping, gap, amplitude, _, frequency = place
+        return Scene(
+            specimen=self.structure.specimen(
+                self.models[model], self.damping_times_s[damping], self.gaps_m[gap]
+            ),
+            drive=Harmonic(self.frequencies_hz[frequency], self.amplitudes_m[amplitude], phase_rad),
+            observe=self.observe,
+            accuracy=self.accuracy,
+            duration=self._duration(),
+            start=start,
+        )
+
+    def _duration(self) -> FixedDuration | AutomaticDuration:
+        match self.duration_s:
+            case "auto":
+                return AutomaticDuration(window_s=self.window_s)
+            case float(duration_s):
+                return FixedDuration(duration_s, self.window_s)
+
     def differences(self, other: Self) -> tuple[str, ...]:
         """Names of what differs between two studies."""
         mine, theirs = self.model_dump(mode="json"), other.model_dump(mode="json")
         return tuple(name for name in mine if mine[name] != theirs[name])
-
-
-def study_from_json(text: str) -> Study:
-    """Read a study back; raises pydantic's ValidationError when the text is none."""
-    return Study.model_validate_json(text)

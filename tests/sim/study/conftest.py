@@ -22,7 +22,7 @@ def study():
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def require_equal():
     """Bit for bit, but for what belongs to the occasion."""
 

@@ -1,0 +1,45 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sim.study.frequency_range import frequency_range, listed
+
+
+def test_a_range_includes_its_stop_when_it_is_hit():
+    assert frequency_range(10.0, 600.0, 1.0) == tuple(float(f) for f in range(10, 601))
+    assert frequency_range(1.0, 2.0, 0.1)[-1] == pytest.approx(2.0)
+    assert len(frequency_range(1.0, 2.0, 0.1)) == 11
+
+
+def test_a_range_ends_before_a_stop_that_it_misses():
+    assert frequency_range(1.0, 2.0, 0.4) == (1.0, 1.4, 1.8)
+
+
+@given(st.floats(0.1, 100.0), st.integers(0, 500), st.floats(1e-3, 10.0))
+def test_a_range_has_one_value_more_than_whole_steps_whatever_is_rounded(start, steps, step):
+    values = frequency_range(start, start + steps * step, step)
+    assert len(values) == steps + 1
+    assert np.allclose(np.diff(values), step)
+
+
+@pytest.mark.parametrize("numbers", [(2.0, 1.0, 0.1), (1.0, 2.0, 0.0), (1.0, 2.0, -1.0), (1.0, np.inf, 1.0)])
+def test_a_range_that_goes_nowhere_is_refused(numbers):
+    with pytest.raises(ValueError, match="start must not lie above stop, and the step must be positive"):
+        frequency_range(*numbers)
+
+
+def test_a_range_of_too_many_values_is_refused_before_it_is_made():
+    with pytest.raises(ValueError, match="too long"):
+        frequency_range(1.0, 2.0, 1e-12)
+
+
+def test_ranges_and_numbers_mix_and_overlaps_count_once():
+    given = [3, {"start": 1, "stop": 3, "step": 1}, {"start": 2.0, "stop": 2.5, "step": 0.25}]
+    assert listed(given) == [1.0, 2.0, 2.25, 2.5, 3]
+
+
+def test_what_is_no_range_is_left_to_its_validator():
+    assert listed("all") == "all"
+    assert listed({"start": 1, "stop": 2}) == {"start": 1, "stop": 2}
+    assert listed([1.0, "two"]) == [1.0, "two"]

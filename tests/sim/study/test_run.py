@@ -1,0 +1,239 @@
+"""The queue: same answers whoever computes, errors kept, cancelled at once."""
+
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sim.drive import Harmonic
+from sim.outcome import Outcome
+from sim.response import steady_response
+from sim.scene import solve_scene
+from sim.specimen import gong2025
+from sim.study.columns import CONTINUES, PHASE
+from sim.study.errors import InvalidStudy
+from sim.study.executor import Reply
+from sim.study.layout import PointState
+from sim.study.results import results_of
+from sim.study.run import StudyEnd, run_study
+from sim.study.solve import solve_study
+from sim.study.store import MemoryStore
+from sim.study.study import GivenStart, Study
+from sim.study.threads import ThreadExecutor
+from sim.study.timing import solve_timed
+
+
+class UnreliableExecutor:
+    """Computes in the calling thread; answers in any order, forgets bundles, and breaks some off."""
+
+    def __init__(self, seed, slots):
+        self.slots = slots
+        self.description = "unreliable"
+        self._luck = random.Random(seed)
+        self._waiting = []
+
+    def submit(self, bundle):
+        self._waiting.append(bundle)
+
+    def replies(self, timeout_s):
+        bundle = self._waiting.pop(self._luck.randrange(len(self._waiting)))
+        solved = tuple(solve_timed(scene, solve_scene) for scene in bundle.scenes)
+        match self._luck.randrange(4):
+            case 0:
+                return (Reply(bundle, solved[: self._luck.randrange(len(solved))]),)
+            case 1 if len(solved) > 1:
+                return (Reply(bundle, (), OSError("the worker died")),)
+            case _:
+                return (Reply(bundle, solved),)
+
+    def cancel(self):
+        self._waiting.clear()
+        return ()
+
+    def close(self):
+        pass
+
+
+@pytest.fixture(scope="module")
+def small():
+    return Study(
+        frequencies_hz=[200.0, 230.0, 260.0],
+        amplitudes_m=[5e-6, 20e-6],
+        starts=("rest", "up", "down"),
+        duration_s=0.2,
+        window_s=0.1,
+    )
+
+
+@pytest.fixture(scope="module")
+def truth(small):
+    return solve_study(small, workers=1)
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 2**32), st.integers(1, 9))
+def test_no_order_of_answers_and_no_lost_worker_changes_an_answer(small, truth, require_equal, seed, slots):
+    store = MemoryStore(small)
+    assert run_study(small, UnreliableExecutor(seed, slots), store) is StudyEnd.COMPLETE
+    require_equal(results_of(small, store.arrays), truth)
+
+
+@pytest.mark.parametrize("workers", [1, 2, 3, 7])
+def test_any_number_of_threads_gives_the_same_answers_bit_for_bit(small, truth, require_equal, workers):
+    require_equal(solve_study(small, workers=workers), truth)
+
+
+def test_a_point_says_what_one_response_alone_says(small, truth):
+    alone = steady_response(gong2025(), Harmonic(260.0, 20e-6), duration_s=0.2, window_s=0.1)
+    point = {"amplitude": 20e-6, "frequency": 260.0, "start": "rest"}
+    assert truth.values("response_i", **point).item() == alone.response_i
+    assert truth.values("relative_ii", **point).item() == alone.relative_ii
+    assert truth.values("impacts", **point).item() == alone.impacts
+    np.testing.assert_array_equal(truth.values("final_state", **point).ravel(), alone.final_state)
+
+
+def test_a_chain_goes_on_from_where_its_predecessor_ended(small, truth):
+    first = steady_response(gong2025(), Harmonic(200.0, 20e-6), duration_s=0.2, window_s=0.1)
+    # 200 Hz for 0.2 s are whole turns: the drive goes on at phase zero.
+    second = steady_response(
+        gong2025(), Harmonic(230.0, 20e-6), duration_s=0.2, window_s=0.1, initial_state=first.final_state
+    )
+    point = {"amplitude": 20e-6, "frequency": 230.0}
+    assert truth.values("response_i", start="up", **point).item() == second.response_i
+    assert truth.values("response_i", start="rest", **point).item() != second.response_i
+    states = [truth.values("final_state", start=start, **point).ravel() for start in ("up", "down")]
+    assert not np.array_equal(*states)
+
+
+def test_the_base_does_not_jump_where_a_chain_changes_frequency():
+    study = Study(
+        frequencies_hz=[201.3, 233.7, 260.1],
+        amplitudes_m=[5e-6],
+        starts=["down"],
+        duration_s=0.2,
+        window_s=0.1,
+    )
+    results = solve_study(study, workers=1)
+    phase = results.values(PHASE).ravel()
+    frequency = np.array(study.frequencies_hz)
+    assert phase[-1] == 0.0
+    base_before = np.sin(2.0 * np.pi * frequency[1:] * 0.2 + phase[1:])
+    assert np.allclose(np.sin(phase[:-1]), base_before, atol=1e-9)
+    assert list(results.values(CONTINUES).ravel()) != list(range(3))
+
+
+def test_predictions_say_where_they_began(truth):
+    starts = {(each.start, each.frequency_hz) for each in truth.predictions()}
+    assert {("rest", 200.0), ("end at 200 Hz", 230.0), ("end at 260 Hz", 230.0)} <= starts
+
+
+def test_a_given_start_is_the_start_of_every_point():
+    state = (0.0, 2e-5, 0.0, 0.0, 0.05, 0.0)
+    study = Study(
+        frequencies_hz=[100.0, 130.0],
+        amplitudes_m=[5e-6],
+        starts=[GivenStart(label="kick", state=state)],
+        duration_s=0.2,
+        window_s=0.1,
+    )
+    found = list(solve_study(study, workers=2).predictions())
+    alone = steady_response(
+        gong2025(), Harmonic(130.0, 5e-6), duration_s=0.2, window_s=0.1, initial_state=state
+    )
+    assert found[1].response_i == alone.response_i
+    assert found[1].start == "kick"
+
+
+class SolverWithACrack:
+    """Solves every scene but those near one frequency."""
+
+    def __init__(self, frequency_hz):
+        self._frequency_hz = frequency_hz
+
+    def __call__(self, scene):
+        if scene.drive.frequency_hz == self._frequency_hz:
+            raise ArithmeticError("a matrix is singular")
+        return solve_scene(scene)
+
+
+def test_an_error_in_one_scene_is_that_points_answer_and_loses_no_other(small, truth):
+    store = MemoryStore(small)
+    executor = ThreadExecutor(2, SolverWithACrack(200.0))
+    assert run_study(small, executor, store) is StudyEnd.COMPLETE
+    executor.close()
+    results = results_of(small, store.arrays)
+    state = results.state[0, 0, 0]
+    assert np.all(state[..., 0] == PointState.FAILED)
+    assert np.all(state[..., 1:] == PointState.DONE)
+    assert np.isnan(results.values("response_i", frequency=200.0)).all()
+    assert np.isfinite(results.values("response_i", frequency=260.0)).all()
+    failures = list(results.failures())
+    assert len(failures) == 6
+    assert all(where["frequency"] == 200.0 and "a matrix is singular" in why for where, why in failures)
+    # Whoever should have continued the failed point begins at rest instead, and says so.
+    restarted = {"start": "up", "frequency": 230.0}
+    assert np.isnan(results.values(CONTINUES, **restarted)).all()
+    rested = truth.values("response_i", start="rest", frequency=230.0)
+    np.testing.assert_array_equal(results.values("response_i", **restarted), rested)
+
+
+class SolverThatStops:
+    """Says of every scene that its run did not reach its end."""
+
+    def __call__(self, scene):
+        whole = solve_scene(scene)
+        return replace(
+            whole, outcome=Outcome.TOO_MANY_IMPACTS, response_i=None, ended=Outcome.TOO_MANY_IMPACTS.text
+        )
+
+
+def test_a_run_that_did_not_reach_its_end_is_told_apart(small):
+    store = MemoryStore(small)
+    executor = ThreadExecutor(1, SolverThatStops())
+    run_study(small, executor, store)
+    executor.close()
+    results = results_of(small, store.arrays)
+    assert np.all(results.state == PointState.STOPPED)
+    assert {each.outcome for each in results.predictions()} == {Outcome.TOO_MANY_IMPACTS}
+    assert {each.ended for each in results.predictions()} == {Outcome.TOO_MANY_IMPACTS.text}
+    assert {each.response_i for each in results.predictions()} == {None}
+
+
+def test_a_cancelled_study_stops_at_once_and_keeps_what_was_done(study, require_equal):
+    seen = []
+    begun = []
+
+    def solver(scene):
+        begun.append(scene)
+        return solve_scene(scene)
+
+    store = MemoryStore(study)
+    executor = ThreadExecutor(2, solver)
+    end = run_study(study, executor, store, seen.append, lambda: seen[-1].kept >= 10 if seen else False)
+    assert end is StudyEnd.CANCELLED
+    results = results_of(study, store.arrays)
+    kept = int(np.count_nonzero(results.state))
+    assert 10 <= kept < study.grid.size
+    # Whatever had begun came to its end and was kept; nothing began afterwards.
+    assert len(begun) == kept
+    whole = solve_study(study).values("response_i")
+    is_done = results.state == PointState.DONE
+    np.testing.assert_array_equal(results.values("response_i")[is_done], whole[is_done])
+
+
+def test_progress_counts_every_point_once_and_ends_with_nothing_left(study):
+    seen = []
+    solve_study(study, workers=2, watcher=seen.append)
+    counts = [each.kept for each in seen]
+    assert counts == sorted(set(counts))
+    assert counts[-1] == seen[-1].points == study.grid.size
+    assert seen[-1].left_s == 0.0
+    assert seen[-1].failed == 0
+
+
+def test_no_workers_are_refused():
+    with pytest.raises(InvalidStudy, match="0 workers are not allowed: give one or more"):
+        solve_study(Study(frequencies_hz=[100.0], amplitudes_m=[1e-6]), workers=0)

@@ -1,0 +1,303 @@
+"""The file: self-describing, committed in an order that cannot lie, resumed and never overwritten."""
+
+import itertools
+import json
+import random
+
+import h5py
+import numpy as np
+import pytest
+
+from sim.prediction import Prediction
+from sim.scene import Rest, solve_scene
+from sim.study.columns import COLUMNS, IDENTITY, NUMBERS, SESSION
+from sim.study.disk import SoleWriter
+from sim.study.errors import StudyError
+from sim.study.file_making import make_file
+from sim.study.layout import STATE, PointState
+from sim.study.results import open_study, results_of
+from sim.study.run import StudyEnd, run_study
+from sim.study.scene_identity import scene_identity
+from sim.study.solve import Existing, solve_study
+from sim.study.store import FileStore, MemoryStore
+from sim.study.study import Study
+from sim.study.threads import ThreadExecutor
+
+
+@pytest.fixture(scope="module")
+def small():
+    return Study(
+        frequencies_hz=[200.0, 260.0],
+        amplitudes_m=[5e-6, 20e-6],
+        models=("hertz", "linear"),
+        starts=("rest", "up"),
+        duration_s=0.2,
+        window_s=0.1,
+    )
+
+
+def computed_in(path, study, solver=solve_scene, cancelled=None):
+    """Run a study into its file, which is resumed; the scenes that were begun, and how it ended."""
+    begun = []
+
+    def noted(scene):
+        begun.append(scene)
+        return solver(scene)
+
+    executor = ThreadExecutor(2, noted)
+    with FileStore(path, study) as store:
+        end = run_study(study, executor, store, cancelled=cancelled)
+    executor.close()
+    return begun, end
+
+
+def test_every_field_of_a_prediction_is_kept_or_has_another_length_for_every_scene():
+    kept = set(NUMBERS) | {"motion", "method", "outcome", "ended", "final_state"}
+    of_the_study = {"frequency_hz", "amplitude_m", "accuracy", "start"}
+    of_any_length = {"section", "spectrum", "spectrum_hz"}
+    assert set(Prediction.__dataclass_fields__) == kept | of_the_study | of_any_length
+
+
+def test_what_comes_out_of_the_file_is_what_went_in(small, tmp_path, require_equal):
+    in_memory = solve_study(small)
+    in_file = solve_study(small, tmp_path / "a.h5")
+    require_equal(in_file, in_memory)
+    require_equal(open_study(tmp_path / "a.h5"), in_memory)
+    again = [each.to_dict() for each in in_file.predictions()]
+    assert again == [each.to_dict() for each in in_memory.predictions()]
+    assert json.loads(json.dumps(again, allow_nan=False)) == again
+
+
+def test_a_prediction_read_back_is_the_one_that_was_computed(small, tmp_path):
+    solve_study(small, tmp_path / "a.h5")
+    found = next(iter(open_study(tmp_path / "a.h5").predictions()))
+    made = solve_scene(small.scene((0,) * 6, REST))
+    assert found.to_dict() == made.to_dict()
+
+
+REST = Rest()
+
+
+def test_h5py_alone_finds_named_axes_units_and_missing_points(small, tmp_path):
+    path = tmp_path / "a.h5"
+    make_file(path, small)
+    with h5py.File(path) as file:
+        response = file["response_i"]
+        assert [dim.label or dim[0].name for dim in response.dims] == [
+            "/model", "/damping_time", "/gap", "/amplitude", "/start", "/frequency"
+        ]  # fmt: skip
+        assert response.attrs["units"] == b"1"
+        assert file["amplitude"].attrs["units"] == b"m"
+        assert list(file["frequency"][:]) == [200.0, 260.0]
+        assert list(file["model"][:]) == [b"hertz", b"linear"]
+        assert np.isnan(response[...]).all()
+        assert np.all(file["impacts"][...] == file["impacts"].attrs["_FillValue"])
+        assert np.all(file[STATE][...] == PointState.MISSING)
+        assert file[STATE].attrs["flag_meanings"] == b"missing done stopped failed"
+        assert json.loads(file["study_json"][()])["amplitudes_m"] == [5e-6, 20e-6]
+        assert file.attrs["Conventions"].startswith(b"CF-")
+
+
+def test_nothing_in_the_file_needs_a_new_reader(small, tmp_path):
+    path = tmp_path / "a.h5"
+    make_file(path, small)
+    with h5py.File(path) as file:
+        assert file.id.get_create_plist().get_version()[0] == 0
+
+        def require_plain(name, thing):
+            if isinstance(thing, h5py.Dataset):
+                assert thing.dtype.kind in "fiuS", name
+                assert thing.chunks is None, name
+
+        file.visititems(require_plain)
+
+
+def test_sessions_say_who_computed_which_point(small, tmp_path):
+    path = tmp_path / "a.h5"
+    make_file(path, small)
+    count = itertools.count()
+    _, end = computed_in(path, small, cancelled=lambda: next(count) >= 0)
+    assert end is StudyEnd.CANCELLED
+    first = open_study(path)
+    computed_in(path, small)
+    results = open_study(path)
+    assert len(results.sessions) == 2
+    assert "numba" in json.loads(results.sessions[0].software_json)
+    assert results.sessions[1].executor == "2 thread(s)"
+    was_done = first.state == PointState.DONE
+    np.testing.assert_array_equal(results.values(SESSION), np.where(was_done, 0.0, 1.0))
+
+
+def test_resuming_computes_what_is_missing_and_nothing_else(study, tmp_path, require_equal):
+    path = tmp_path / "a.h5"
+    make_file(path, study)
+    count = itertools.count()
+    begun, end = computed_in(path, study, cancelled=lambda: next(count) >= 3)
+    assert end is StudyEnd.CANCELLED
+    assert 0 < len(begun) < study.grid.size
+    more, end = computed_in(path, study)
+    assert end is StudyEnd.COMPLETE
+    assert len(begun) + len(more) == study.grid.size
+    require_equal(open_study(path), solve_study(study))
+
+
+def test_a_complete_study_is_not_touched_when_it_is_resumed(small, tmp_path):
+    path = tmp_path / "a.h5"
+    solve_study(small, path)
+    before = path.read_bytes()
+    assert solve_study(small, path, Existing.RESUME).is_complete
+    assert path.read_bytes() == before
+
+
+def test_identities_are_those_of_the_scenes(small, tmp_path):
+    results = solve_study(small, tmp_path / "a.h5")
+    kept = [bytes(each).decode() for each in results.arrays[IDENTITY]]
+    assert len(set(kept)) == small.grid.size - 4, "a chain's first point is the scene that starts at rest"
+    assert kept[0] == scene_identity(small.scene((0,) * 6, REST))
+
+
+def test_a_file_that_exists_is_refused_and_kept(small, tmp_path):
+    path = tmp_path / "a.h5"
+    path.write_text("mine")
+    with pytest.raises(StudyError, match="exists, and nothing is ever overwritten; resume it, or choose"):
+        solve_study(small, path)
+    assert path.read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"accuracy": "quick"}, "holds another study: accuracy is standard there and quick here"),
+        (
+            {"amplitudes_m": [5e-6, 21e-6]},
+            "amplitudes_m is 2e-05 at place 2 there and 2.1e-05 at place 2 here",
+        ),
+        ({"amplitudes_m": [5e-6]}, "amplitudes_m is 2e-05 at place 2 there and 5e-06 here"),
+        ({"duration_s": 0.3, "window_s": 0.2}, "duration_s is 0.2 there and 0.3 here, window_s is 0.1"),
+    ],
+)
+def test_another_study_is_refused_by_what_differs_and_changes_nothing(small, tmp_path, change, said):
+    path = tmp_path / "a.h5"
+    make_file(path, small)
+    before = path.read_bytes()
+    other = Study.model_validate({**small.model_dump(), **change})
+    with pytest.raises(StudyError, match=said):
+        solve_study(other, path, Existing.RESUME)
+    assert path.read_bytes() == before
+
+
+def test_two_runs_cannot_write_one_file_and_anybody_may_read_it_meanwhile(small, tmp_path):
+    path = tmp_path / "a.h5"
+    with FileStore.created(path, small):
+        with pytest.raises(StudyError, match="is being written by another run"):
+            FileStore(path, small)
+        with h5py.File(path, "r") as file:
+            assert file[STATE].shape == small.grid.shape
+        assert not open_study(path).is_complete
+    FileStore(path, small).close()
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [(None, "does not exist, or is no file"), (b"", "is no readable HDF5"), (b"text", "is no readable HDF5")],
+)
+def test_what_is_no_study_is_refused_in_one_sentence(tmp_path, content, said):
+    path = tmp_path / "a.h5"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(StudyError, match=said):
+        open_study(path)
+
+
+def test_another_kind_of_hdf5_file_and_a_newer_version_are_refused(small, tmp_path):
+    other, newer = tmp_path / "other.h5", tmp_path / "newer.h5"
+    with h5py.File(other, "w") as file:
+        file.attrs["format"] = b"vibench-recording"
+    with pytest.raises(StudyError, match="no study's file"):
+        open_study(other)
+    make_file(newer, small)
+    with h5py.File(newer, "r+") as file:
+        file.attrs["format_version"] = 99
+    with pytest.raises(StudyError, match="has format version 99"):
+        open_study(newer)
+
+
+def test_a_folder_that_does_not_exist_is_named(small, tmp_path):
+    with pytest.raises(StudyError, match=r"nowhere.*choose another folder"):
+        solve_study(small, tmp_path / "nowhere" / "a.h5")
+
+
+class LoggingDisk:
+    """Writes, and remembers what was written since the last sync, and before."""
+
+    def __init__(self, path):
+        self._inner = SoleWriter(path)
+        self.log = []
+
+    def write(self, offset, data):
+        self._inner.write(offset, data)
+        self.log.append((offset, data))
+
+    def sync(self):
+        self._inner.sync()
+        self.log.append(None)
+
+    def close(self):
+        self._inner.close()
+
+
+def images_after_power_cuts(empty, log, luck):
+    """Every state of the disk that a power cut may leave: what was synced, and any part of the rest."""
+    safe, loose = bytearray(empty), []
+    for entry in [*log, None]:
+        if entry is None:
+            for _ in range(4):
+                image = bytearray(safe)
+                for offset, data in loose:
+                    if luck.random() < 0.5:
+                        image[offset : offset + len(data)] = data
+                yield bytes(image)
+            for offset, data in loose:
+                safe[offset : offset + len(data)] = data
+            loose = []
+            yield bytes(safe)
+        else:
+            loose.append(entry)
+
+
+def test_whatever_moment_the_power_goes_a_point_that_counts_has_all_its_cells(small, tmp_path):
+
+    path, image_path = tmp_path / "a.h5", tmp_path / "image.h5"
+    make_file(path, small)
+    empty = path.read_bytes()
+    disks = []
+
+    def opened(of):
+        disks.append(LoggingDisk(of))
+        return disks[-1]
+
+    executor = ThreadExecutor(1)
+    with FileStore(path, small, opened) as store:
+        run_study(small, executor, store)
+    executor.close()
+    truth = open_study(path)
+    (disk,) = disks
+    seen = set()
+    for image in images_after_power_cuts(empty, disk.log, random.Random(1)):
+        image_path.write_bytes(image)
+        found = open_study(image_path)
+        is_done = found.arrays[STATE] != PointState.MISSING
+        seen.add(int(np.count_nonzero(is_done)))
+        for column in COLUMNS:
+            np.testing.assert_array_equal(
+                found.arrays[column.name][is_done], truth.arrays[column.name][is_done], column.name
+            )
+    assert {0, small.grid.size} < seen
+
+
+def test_a_memory_store_holds_what_a_file_would(small, tmp_path, require_equal):
+    store = MemoryStore(small)
+    executor = ThreadExecutor(3)
+    run_study(small, executor, store)
+    executor.close()
+    require_equal(results_of(small, store.arrays), solve_study(small, tmp_path / "a.h5"))

@@ -1,0 +1,75 @@
+import pytest
+from pydantic import ValidationError
+
+from sim.specimen import gong2025
+from sim.study.axes import FREQUENCY
+from sim.study.study import GivenStart, Start, Study
+
+LEAST = {"frequencies_hz": [100.0, 200.0], "amplitudes_m": [1e-6]}
+
+
+def test_a_study_comes_back_from_json_as_it_was():
+    study = Study(
+        **LEAST,
+        models=("hertz", "power:3@0.2+7@0.8"),
+        starts=("up", GivenStart(label="kick", state=(1e-7 / 3.0, 0, 0, 0, 0.1, 0))),
+        duration_s="auto",
+    )
+    assert Study.model_validate_json(study.model_dump_json()) == study
+
+
+def test_the_structure_is_the_papers_when_nothing_else_is_said():
+    study = Study(**LEAST)
+    assert study.structure.specimen("hertz", 2e-5, 45e-6) == gong2025()
+    assert study.structure.specimen("power:5", 0.0, 30e-6) == gong2025(0.0, 30e-6, "power:5")
+
+
+def test_the_grid_has_a_point_for_every_combination():
+    study = Study(
+        **LEAST,
+        models=("hertz", "linear"),
+        gaps_m=(1e-5, 2e-5, 3e-5),
+        starts=("rest", "up"),
+        observe=["response"],
+    )
+    assert study.grid.shape == (2, 1, 3, 1, 2, 2)
+    assert study.axes[-1].name == FREQUENCY
+    assert study.starts == (Start.REST, Start.UP)
+
+
+def test_differences_name_what_differs():
+    one, other = Study(**LEAST), Study(**{**LEAST, "amplitudes_m": [2e-6]}, accuracy="quick")
+    assert one.differences(one) == ()
+    assert one.differences(other) == ("amplitudes_m", "accuracy")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("amplitudes_m", [2e-6, 1e-6], "1e-06 comes after 2e-06; give every value once, ascending"),
+        ("amplitudes_m", [], "at least 1 item"),
+        ("amplitudes_m", [0.0], "greater than 0"),
+        ("frequencies_hz", [float("nan")], "finite|greater than 0"),
+        ("frequencies_hz", {"start": 10, "stop": 5, "step": 1}, "start must not lie above stop"),
+        ("models", ["herz"], "Contact 'herz' is not known: give one of hertz"),
+        ("models", ["hertz", "hertz"], "models names 'hertz' twice"),
+        ("starts", ["rest", "rest"], "starts names 'rest' twice"),
+        ("starts", [{"label": "kick", "state": [1, 2, 3]}], "state"),
+        ("damping_times_s", [-1e-5], "greater than or equal to 0"),
+        ("gaps_m", [0.0], "greater than 0"),
+        ("duration_s", "forever", "duration_s"),
+        ("observe", ["spectrum"], "response"),
+        ("window_s", 0.005, "it must hold one drive period, 0.01 s"),
+        ("window_s", 31.0, "within the run of 30.0 s"),
+        ("frequencys", [1.0], "frequencys"),
+    ],
+)
+def test_what_is_not_allowed_is_named(key, value, said):
+    with pytest.raises(ValidationError, match=said):
+        Study.model_validate({**LEAST, key: value})
+
+
+def test_more_points_than_a_file_should_hold_are_refused():
+    many = {"start": 1.0, "stop": 5000.0, "step": 0.001}
+    with pytest.raises(ValidationError, match="points are asked for; a study holds at most"):
+        Study(frequencies_hz=many, amplitudes_m=[1e-6, 2e-6, 3e-6])
