@@ -17,7 +17,7 @@ from .errors import ClusterLost
 from .executor import Bundle, Reply, Solved
 from .software import software
 from .threads import arrived_in
-from .timing import solve_timed
+from .timing import Solver, solve_timed
 
 CONNECT_PATIENCE_S = 30.0
 """How long the scheduler, and then its first worker, is waited for."""
@@ -30,9 +30,9 @@ Answer = tuple[str, tuple[Solved, ...]]
 """Software of the worker, and what it computed."""
 
 
-def solve_bundle(scenes: Sequence[Scene]) -> Answer:
+def solve_bundle(scenes: Sequence[Scene], solver: Solver) -> Answer:
     """Solve scenes one after the other; runs on a worker."""
-    return software(), tuple(solve_timed(scene, solve_scene) for scene in scenes)
+    return software(), tuple(solve_timed(scene, solver) for scene in scenes)
 
 
 class ClusterExecutor:
@@ -45,8 +45,11 @@ class ClusterExecutor:
 
     """
 
-    def __init__(self, address: str, patience_s: float = CONNECT_PATIENCE_S) -> None:
+    def __init__(
+        self, address: str, solver: Solver = solve_scene, patience_s: float = CONNECT_PATIENCE_S
+    ) -> None:
         self._address = address
+        self._solver = solver
         self._client = _connected(address, patience_s)
         try:
             _require_workers(self._client, address, patience_s)
@@ -81,7 +84,7 @@ class ClusterExecutor:
         """Hand a bundle to the scheduler."""
         self._submitted += 1
         key = f"{self._prefix}-{self._submitted}"
-        future = self._client.submit(solve_bundle, bundle.scenes, key=key, pure=False)
+        future = self._client.submit(solve_bundle, bundle.scenes, self._solver, key=key, pure=False)
         self._held[key] = future
         future.add_done_callback(partial(self._note, bundle))
 

@@ -1,0 +1,27 @@
+"""A process that runs a study into a file, says after every commit how much is kept, and may be killed."""
+
+import sys
+from pathlib import Path
+
+from sim.study.solve import Existing, solve_study
+from sim.study.study import Study
+
+STUDY = Study(
+    frequencies_hz={"start": 180.0, "stop": 300.0, "step": 2.0},
+    amplitudes_m=(2e-6, 5e-6, 10e-6),
+    starts=("rest", "up"),
+    duration_s=4.0,
+    window_s=1.0,
+)
+
+
+def main(path):
+    def tell(progress):
+        sys.stdout.write(f"{progress.kept}\n")
+        sys.stdout.flush()
+
+    solve_study(STUDY, Path(path), Existing.RESUME, workers=2, watcher=tell)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,172 @@
+"""A real Dask cluster of processes on this machine: workers die, schedulers die, strangers join."""
+
+import json
+import operator
+import os
+import shutil
+import subprocess
+import sys
+import time
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sim
+from sim.study.columns import SESSION
+from sim.study.errors import ClusterLost
+from sim.study.layout import STATE, PointState
+from sim.study.results import open_study, results_of
+from sim.study.run import StudyEnd, run_study
+from sim.study.solve import Existing, solve_study
+from sim.study.store import FileStore, MemoryStore
+from sim.study.study import Study
+
+pytest.importorskip("distributed", reason="a cluster needs the extra 'cluster'")
+
+from sim.study.cluster import ClusterExecutor
+
+START_PATIENCE_S = 60.0
+SHORT_S = 3.0
+
+
+@contextmanager
+def process(*arguments, folder, environment=None):
+    """A process that ends with the test; what it says goes to a file."""
+    with (folder / f"{arguments[0]}-{time.monotonic_ns()}.log").open("wb") as log:
+        command = [sys.executable, "-m", "dask", *map(str, arguments), "--no-dashboard"]
+        running = subprocess.Popen(command, stdout=log, stderr=log, cwd=folder, env=environment)
+        try:
+            yield running
+        finally:
+            running.kill()
+            running.wait()
+
+
+@contextmanager
+def scheduler(folder):
+    """A scheduler, and its address."""
+    told = folder / "scheduler.json"
+    with process(
+        "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", told, folder=folder
+    ) as running:
+        deadline_s = time.monotonic() + START_PATIENCE_S
+        while not (told.is_file() and told.read_text().endswith("}")):
+            assert running.poll() is None
+            assert time.monotonic() < deadline_s
+        yield running, json.loads(told.read_text())["address"]
+
+
+def worker(address, folder, environment=None):
+    return process("worker", address, "--nthreads", "1", "--no-nanny", folder=folder, environment=environment)
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """A scheduler and two workers; what is left of them is ended."""
+    with ExitStack() as stack:
+        running, address = stack.enter_context(scheduler(tmp_path))
+        workers = [stack.enter_context(worker(address, tmp_path)) for _ in range(2)]
+        yield running, address, workers
+
+
+@pytest.fixture(scope="module")
+def longer():
+    return Study(
+        frequencies_hz={"start": 180.0, "stop": 300.0, "step": 4.0},
+        amplitudes_m=(2e-6, 10e-6),
+        starts=("rest", "up"),
+        duration_s=4.0,
+        window_s=1.0,
+    )
+
+
+@pytest.fixture(scope="module")
+def truth(longer):
+    return solve_study(longer)
+
+
+def test_a_worker_killed_half_way_loses_no_point_and_changes_no_answer(
+    cluster, longer, truth, tmp_path, require_equal
+):
+    _, address, workers = cluster
+    kept_at_kill = []
+
+    def watch(progress):
+        if progress.kept >= progress.points // 3 and not kept_at_kill:
+            workers[0].kill()
+            kept_at_kill.append(progress.kept)
+
+    results = solve_study(longer, tmp_path / "a.h5", cluster=address, watcher=watch)
+    assert kept_at_kill[0] < longer.grid.size
+    assert np.all(results.state == PointState.DONE)
+    require_equal(results, truth)
+    assert results.sessions[0].executor.startswith(f"Dask cluster at {address}")
+
+
+@pytest.mark.slow
+def test_a_cluster_that_dies_is_told_and_what_was_kept_goes_on_elsewhere(
+    cluster, longer, truth, tmp_path, require_equal
+):
+    running, address, _ = cluster
+    path = tmp_path / "a.h5"
+
+    def watch(progress):
+        if progress.kept >= progress.points // 3:
+            running.kill()
+
+    executor = ClusterExecutor(address, patience_s=SHORT_S)
+    with FileStore.created(path, longer) as store, pytest.raises(ClusterLost, match=r"is gone.*resume"):
+        run_study(longer, executor, store, watch)
+    executor.close()
+    kept = np.count_nonzero(open_study(path).arrays[STATE])
+    assert longer.grid.size // 3 <= kept < longer.grid.size
+    results = solve_study(longer, path, Existing.RESUME, workers=2)
+    assert np.count_nonzero(results.values(SESSION) == 0.0) == kept
+    require_equal(results, truth)
+
+
+@pytest.mark.slow
+def test_errors_on_workers_and_cancelling_are_as_with_threads(cluster, longer):
+    _, address, _ = cluster
+    executor = ClusterExecutor(address, operator.neg)
+    store = MemoryStore(longer)
+    assert run_study(longer, executor, store) is StudyEnd.COMPLETE
+    executor.close()
+    failures = list(results_of(longer, store.arrays).failures())
+    assert len(failures) == longer.grid.size
+    assert all("TypeError: bad operand type for unary -: 'Scene'" in why for _, why in failures)
+
+    seen = []
+    executor = ClusterExecutor(address)
+    store = MemoryStore(longer)
+    began_s = time.monotonic()
+    end = run_study(longer, executor, store, seen.append, lambda: bool(seen))
+    executor.close()
+    assert end is StudyEnd.CANCELLED
+    assert 0 < np.count_nonzero(store.arrays[STATE]) < longer.grid.size
+    assert time.monotonic() - began_s < START_PATIENCE_S
+
+
+def test_a_worker_with_other_software_is_refused_before_it_computes(tmp_path):
+    package = tmp_path / "other" / "sim"
+    shutil.copytree(Path(sim.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+    with (package / "contact.py").open("a") as source:
+        source.write("\n# a better contact\n")
+    environment = {**os.environ, "PYTHONPATH": str(package.parent)}
+    with (
+        scheduler(tmp_path) as (_, address),
+        worker(address, tmp_path, environment),
+        pytest.raises(ClusterLost, match=r"has other software, whose answers may differ.*sim_sources"),
+    ):
+        ClusterExecutor(address)
+
+
+def test_an_address_where_nobody_answers_and_a_cluster_without_workers_are_one_sentence_each(tmp_path):
+    with pytest.raises(ClusterLost, match=r"No Dask scheduler answers at 'tcp://127.0.0.1:9'"):
+        ClusterExecutor("tcp://127.0.0.1:9", patience_s=0.5)
+    with pytest.raises(ClusterLost, match=r"No Dask scheduler answers at 'nonsense:what'"):
+        ClusterExecutor("nonsense:what", patience_s=0.5)
+    with scheduler(tmp_path) as (_, address), pytest.raises(ClusterLost, match=r"has no worker after 0.5 s"):
+        ClusterExecutor(address, patience_s=0.5)

@@ -1,0 +1,102 @@
+"""The promise: a study survives ``kill -9`` at any moment, and goes on with what is missing."""
+
+import importlib.util
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sim.scene import solve_scene
+from sim.study.columns import SESSION
+from sim.study.layout import STATE, PointState
+from sim.study.results import open_study
+from sim.study.run import StudyEnd, run_study
+from sim.study.solve import solve_study
+from sim.study.store import FileStore
+from sim.study.threads import ThreadExecutor
+
+CHILD = Path(__file__).with_name("study_child.py")
+SPEC = importlib.util.spec_from_file_location("study_child", CHILD)
+child = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(child)
+
+QUICK, MANY = 1, 12
+PATIENCE_S = 60.0
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return solve_study(child.STUDY)
+
+
+def killed(path, words, after_answers, delay_s):
+    """Run the study in another process and kill it; how many answers it had said were kept."""
+    with words.open("wb") as out:
+        process = subprocess.Popen([sys.executable, str(CHILD), str(path)], stdout=out)
+        deadline_s = time.monotonic() + PATIENCE_S
+        while said(words) < after_answers and process.poll() is None:
+            assert time.monotonic() < deadline_s
+        try:
+            process.wait(timeout=delay_s)
+        except subprocess.TimeoutExpired:
+            process.kill()
+        process.wait()
+    return said(words)
+
+
+def said(words):
+    """Last number of a text whose last line may be cut."""
+    numbers = words.read_text().split("\n")[:-1]
+    return int(numbers[-1]) if numbers else 0
+
+
+def resumed(path):
+    """Go on in this process; which scenes were begun."""
+    begun = []
+
+    def noted(scene):
+        begun.append(scene)
+        return solve_scene(scene)
+
+    executor = ThreadExecutor(2, noted)
+    with FileStore(path, child.STUDY) as store:
+        end = run_study(child.STUDY, executor, store)
+    executor.close()
+    assert end is StudyEnd.COMPLETE
+    return begun
+
+
+def check_killed_study(folder, truth, require_equal, kills, luck):
+    path = folder / "a.h5"
+    for session in range(kills):
+        promised = killed(path, folder / f"words-{session}", luck.randint(1, 40), luck.uniform(0.0, 0.4))
+        kept = open_study(path)
+        is_kept = kept.arrays[STATE] == PointState.DONE
+        assert np.count_nonzero(is_kept) >= promised
+        for name in ("response_i", "final_state", "scene"):
+            np.testing.assert_array_equal(kept.arrays[name][is_kept], truth.arrays[name][is_kept])
+    begun = resumed(path)
+    results = open_study(path)
+    # What was kept is as it was, and exactly what was missing was computed now.
+    assert len(begun) == np.count_nonzero(~is_kept)
+    np.testing.assert_array_equal(results.arrays[SESSION][is_kept], kept.arrays[SESSION][is_kept])
+    require_equal(results, truth)
+
+
+@pytest.mark.parametrize("seed", range(QUICK))
+def test_a_killed_study_goes_on_and_ends_like_one_that_was_never_interrupted(
+    tmp_path, truth, require_equal, seed
+):
+    check_killed_study(tmp_path, truth, require_equal, 1, random.Random(seed))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(100, 100 + MANY))
+def test_a_study_killed_three_times_ends_like_one_that_was_never_interrupted(
+    tmp_path, truth, require_equal, seed
+):
+    check_killed_study(tmp_path, truth, require_equal, 3, random.Random(seed))
