@@ -16,7 +16,7 @@ from ..outcome import Outcome
 from ..parameters import POWER, Table
 from ..trajectory import Floats
 from .cell_contact import begin_pressing
-from .cell_flow import CURVATURE_TERMS, fill_curvature
+from .cell_flow import CURVATURE_TERMS, SIDE, fill_curvature
 from .chain import MASSES_PER_CELL, Chain
 from .run import IMPACTS, NEXT_SAMPLE, ChainRecord, advance_chain, chain_cells
 from .tables import OBSERVED, PATH, ChainTables, chain_tables
@@ -139,7 +139,9 @@ def start_chain(
         law, markov = law_of(tables.laws[place]), tables.markov[place, PATH]
         p = float(motion[place, 1] - motion[place, 2])
         rate = float(motion[place, 4] - motion[place, 5])
-        if law.kind != POWER and not -law.lower < p < law.upper and p != 0.0:
+        if law.kind == POWER:
+            cells[place, SIDE] = 1.0
+        elif not -law.lower < p < law.upper:
             fill_observed(series, phasors, place, 1, terms, tables)
             fill_curvature(curvature, series[PATH])
             begin_pressing(

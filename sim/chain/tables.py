@@ -77,7 +77,7 @@ def chain_tables(chain: Chain, drive: Harmonic, accuracy: Accuracy) -> ChainTabl
     path = displacement[:, :, 1] - displacement[:, :, 2]
     observed = np.concatenate([path[:, :, None], displacement], axis=2)
     reaches = np.ascontiguousarray(np.abs(observed).transpose(0, 2, 1))
-    between = _markov_between(chain)
+    between = markov_between(chain)
     longest = WINDOW_TURN / float(np.max(np.abs(rates)))
     windows, clash = _windows(between, longest, CROSS_SHARE * accuracy.tolerance)
     return ChainTables(
@@ -101,7 +101,7 @@ def chain_tables(chain: Chain, drive: Harmonic, accuracy: Accuracy) -> ChainTabl
     )
 
 
-def _markov_between(chain: Chain) -> Table:
+def markov_between(chain: Chain) -> Table:
     """Taylor coefficients of p, x, y, z of every cell after a unit impulse in every cell.
 
     Shape (MARKOV_TERMS, 4, answering cells, struck cells).

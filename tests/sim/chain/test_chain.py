@@ -1,0 +1,53 @@
+"""A chain's matrices, and what it refuses."""
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from sim.chain.chain import Chain, chain_of
+from sim.contact_law import RigidStops
+from sim.specimen import Specimen, gong2025
+
+
+def test_a_chain_of_one_cell_has_the_matrices_of_the_specimen():
+    specimen = gong2025()
+    chain = chain_of(specimen, 1)
+    np.testing.assert_array_equal(chain.mass_matrix, specimen.mass_matrix)
+    np.testing.assert_array_equal(chain.stiffness_matrix, specimen.stiffness_matrix)
+    np.testing.assert_array_equal(chain.damping_matrix, specimen.damping_matrix)
+
+
+def test_only_the_link_to_the_base_resists_when_the_whole_chain_moves_as_one():
+    specimen = gong2025()
+    together = chain_of(specimen, 5).stiffness_matrix @ np.ones(15)
+    assert together[0] == pytest.approx(specimen.stiffnesses[0])
+    np.testing.assert_allclose(together[1:], 0.0, atol=1e-9)
+
+
+def test_a_link_pulls_on_the_outer_masses_of_its_own_cell_and_of_the_one_before():
+    specimen = gong2025()
+    stiffness = chain_of(specimen, 3).stiffness_matrix
+    assert stiffness[3, 0] == stiffness[6, 3] == -specimen.stiffnesses[0]
+    assert stiffness[6, 0] == 0.0
+    np.testing.assert_array_equal(stiffness, stiffness.T)
+
+
+def test_a_chain_survives_a_round_trip_through_its_serialised_form():
+    adapter = TypeAdapter(Chain)
+    chain = Chain((gong2025(), gong2025(contact="power:5", gap_m=30e-6)))
+    assert adapter.validate_json(adapter.dump_json(chain)) == chain
+    with pytest.raises(ValidationError):
+        adapter.validate_python({"cells": (), "links": 3})
+
+
+@pytest.mark.parametrize("cells", [0, -1, 10**6])
+def test_an_impossible_number_of_cells_is_refused_in_one_sentence(cells):
+    with pytest.raises(ValueError, match=rf"^A chain of {cells} cells is not allowed: give 1 to \d+\.$"):
+        chain_of(gong2025(), cells)
+
+
+def test_rigid_stops_are_refused_and_the_cell_is_named():
+    soft = gong2025()
+    rigid = Specimen(soft.masses, soft.stiffnesses, soft.dampings, soft.gap_m, RigidStops(0.8))
+    with pytest.raises(ValueError, match=r"^Cell 2 has rigid stops, .* use HuntCrossley\.$"):
+        Chain((soft, rigid))

@@ -1,0 +1,62 @@
+"""The bound on what one cell's force does to another's contact, which lets each keep its own time."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from sim.accuracy import Accuracy
+from sim.chain.chain import chain_of
+from sim.chain.modes import chain_impulses, chain_state_matrix
+from sim.chain.tables import CROSS_SHARE, chain_tables, cross_answers, markov_between
+from sim.drive import Harmonic
+from sim.specimen import gong2025
+
+DRIVE = Harmonic(220.0, 40e-6)
+
+
+def answer_to_an_impulse(chain, later):
+    """Velocity of every p after a unit impulse in every cell, by the matrix exponential."""
+    system, _ = chain_state_matrix(chain)
+    moved = expm(later * system) @ chain_impulses(chain)
+    velocities = moved[3 * chain.size :].reshape(chain.size, 3, -1)
+    return velocities[:, 1] - velocities[:, 2]
+
+
+@pytest.mark.parametrize("damping_time_s", [0.0, 2e-5, 1e-4])
+def test_no_answer_within_a_window_exceeds_its_bound(damping_time_s):
+    chain = chain_of(gong2025(damping_time_s=damping_time_s), 4)
+    window = 40e-6
+    bounds = cross_answers(markov_between(chain), window)
+    for part in (0.3, 0.7, 1.0):
+        answer = np.abs(answer_to_an_impulse(chain, part * window))
+        relative = answer / np.diagonal(answer_to_an_impulse(chain, 0.0))[:, None]
+        for i in range(4):
+            for j in range(4):
+                if i != j:
+                    assert relative[i, j] <= bounds[abs(i - j)] * (1.0 + 1e-6) + 1e-15
+
+
+def test_neighbours_answer_with_the_third_power_of_the_window_when_damped_and_the_sixth_when_not():
+    for damping_time_s, order in ((2e-5, 3.0), (0.0, 6.0)):
+        between = markov_between(chain_of(gong2025(damping_time_s=damping_time_s), 2))
+        coarse, fine = (cross_answers(between, window)[1] for window in (1e-6, 0.5e-6))
+        assert np.log2(coarse / fine) == pytest.approx(order, abs=0.1)
+
+
+@pytest.mark.parametrize("accuracy", list(Accuracy))
+def test_the_short_window_lets_even_neighbours_press_together_within_the_tolerance(accuracy):
+    chain = chain_of(gong2025(), 6)
+    tables = chain_tables(chain, DRIVE, accuracy)
+    long, short = tables.windows
+    allowed = CROSS_SHARE * accuracy.tolerance
+    between = markov_between(chain)
+    assert np.all(cross_answers(between, short)[1:] <= allowed)
+    distant = cross_answers(between, long)[1 + tables.clash[0] :]
+    assert np.all(distant <= allowed)
+    assert short <= long
+
+
+def test_the_paper_s_cells_never_wait_for_each_other_at_standard_accuracy():
+    tables = chain_tables(chain_of(gong2025(), 8), DRIVE, Accuracy.STANDARD)
+    assert tables.clash[0] == 0
+    assert chain_tables(chain_of(gong2025(), 8), DRIVE, Accuracy.REFERENCE).clash[0] > 0
