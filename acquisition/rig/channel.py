@@ -59,7 +59,7 @@ def _channel(rig: Rig, config: ChannelConfig) -> Channel:
 def _sensor(rig: Rig, role: Role) -> tuple[str, str, float, float, str, str, float, date | None]:
     match role:
         case Role.DRIVE_VOLTAGE:
-            wire = "generator output, by wire"
+            wire = "the amplifier's input, by wire"
             return "voltage", "V", 1.0, float("inf"), wire, "", 0.0, None
         case Role.AMPLIFIER_VOLTAGE:
             wire = "amplifier output, by wire"

@@ -20,8 +20,8 @@ class Drive(Protocol):
     """
 
     @property
-    def lead_s(self) -> float:
-        """How much silence stands between now and the first phase announced last [s]."""
+    def pause_s(self) -> float:
+        """Silence between saying what comes after all that was told, and hearing it [s]."""
 
     @property
     def setting_vpp(self) -> float:
@@ -35,7 +35,7 @@ class Drive(Protocol):
         """Get ready before the digitizer starts: the first of ``coming`` begins with its first sample."""
 
     def announce(self, coming: Iterable[Phase]) -> None:
-        """Say what comes after everything told before; it begins after `lead_s`."""
+        """Say what comes after everything told before; it begins after `pause_s`."""
 
     def perform(self, phase: Phase) -> Iterator[float]:
         """Play a phase; yields how long to read before the next command is due [s]."""

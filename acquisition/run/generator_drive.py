@@ -21,7 +21,7 @@ the smallest setting that the generator takes."""
 class GeneratorDrive:
     """A `Drive` whose commands take effect when they are given: each phase is commanded as it begins."""
 
-    lead_s = 0.0
+    pause_s = 0.0
     """A generator need not know what is coming."""
 
     def __init__(self, generator: FunctionGenerator, measurement: Measurement) -> None:

@@ -6,18 +6,17 @@ from ..recording.layout import Origin
 from ..rig.channel import Channel
 from ..rig.knobs import KnobSheet
 from .bench_protocol import RunBench
-from .schedule import CHECK_S, duration_s
 
 
-def run_header(bench: RunBench, measurement: Measurement) -> RecordingHeader:
-    """Describe the recording that a run of ``measurement`` on ``bench`` is going to make."""
+def run_header(bench: RunBench, measurement: Measurement, planned_s: float) -> RecordingHeader:
+    """Describe the recording of ``planned_s`` that a run of ``measurement`` on ``bench`` is going to make."""
     rig = bench.rig
     steps = bench.digitizer.volts_per_count
     sample_rate_hz = bench.digitizer.sample_rate_hz
     return RecordingHeader(
         channels=tuple(_channel(channel, step) for channel, step in zip(bench.channels, steps, strict=True)),
         sample_rate_hz=sample_rate_hz,
-        expected_samples=round((CHECK_S + duration_s(measurement)) * sample_rate_hz),
+        expected_samples=round(planned_s * sample_rate_hz),
         origin=Origin.REAL if rig.virtual is None else Origin.SIMULATED,
         plan_json=measurement.model_dump_json(),
         bench_json=rig.model_dump_json(),

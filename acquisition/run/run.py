@@ -72,7 +72,7 @@ class Run:
         self._create = create
         self._drive: Drive  # chosen when the plan is admitted; nothing plays before
         self._guard = Guard(bench.rig, bench.channels, measurement.limits)
-        self._total_s = (CHECK_S if bench_check is BenchCheck.AT_LOW_LEVEL else 0.0) + duration_s(measurement)
+        self._total_s = duration_s(measurement)
         self._state = RunState.IDLE
         self._cancelled: str | None = None
         self._ending = (RunState.FAILED, "the run ended without saying why")
@@ -145,7 +145,8 @@ class Run:
             require_checkable(self._bench.channels)
             require_within_limits(self._measurement, self._bench.rig)
             self._drive = drive_for(self._bench, self._measurement)
-            return self._create(self._path, run_header(self._bench, self._measurement))
+            self._total_s += self._before_s()
+            return self._create(self._path, run_header(self._bench, self._measurement, self._total_s))
         except AcquisitionError as error:
             self._ending = (RunState.FAILED, str(error))
             self._state = RunState.FAILED
@@ -157,13 +158,23 @@ class Run:
                 self._begin(check_phases(self._measurement))
                 yield from self._checked(tape)
                 self._drive.announce(phases(self._measurement))
+                pause_s = self._drive.pause_s
             case BenchCheck.RECENTLY_PASSED:
                 self._begin(phases(self._measurement))
                 tape.log("check", "left out: the bench was checked shortly before")
-        yield from self._perform(tape, Phase(RunState.ARMED, None, self._drive.lead_s))
+                pause_s = 0.0
+        yield from self._perform(tape, Phase(RunState.ARMED, None, pause_s))
         for phase in phases(self._measurement):
             yield from self._perform(tape, phase)
         tape.enter(None)
+
+    def _before_s(self) -> float:
+        """Time before the first ramp [s]: what comes is told when the check has passed, and not before."""
+        match self._bench_check:
+            case BenchCheck.AT_LOW_LEVEL:
+                return CHECK_S + self._drive.pause_s
+            case BenchCheck.RECENTLY_PASSED:
+                return 0.0
 
     def _begin(self, coming: Iterable[Phase]) -> None:
         """Start sampling, and with it what plays by the digitizer's trigger."""

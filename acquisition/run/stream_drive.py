@@ -43,9 +43,9 @@ class StreamDrive:
         self._heard_vpp = 0.0
 
     @property
-    def lead_s(self) -> float:
-        """Time from the last sample read to the first that is not written yet [s]."""
-        return self._written / self._output.sample_rate_hz - self._read_s
+    def pause_s(self) -> float:
+        """As long as it takes to play what is written ahead [s]."""
+        return self._output.ahead_samples / self._output.sample_rate_hz
 
     @property
     def setting_vpp(self) -> float:
@@ -76,9 +76,9 @@ class StreamDrive:
     def ramp_down(self) -> Iterator[float]:
         """Let what is written play out, then fade; yields as `perform` does."""
         fade_s = self._ramp_s if self._score.level > 0.0 else 0.0
-        lead_s = self.lead_s
+        written_s = self._written / self._output.sample_rate_hz - self._read_s
         self._score.fade(self._ramp_s)
-        yield from self._listened(lead_s, self._heard_vpp)
+        yield from self._listened(written_s, self._heard_vpp)
         yield from self._listened(fade_s, 0.0)
 
     def silence(self) -> None:
@@ -97,8 +97,8 @@ class StreamDrive:
 
     @property
     def _played(self) -> int:
-        """Samples that have been played for certain: as long ago as the last one read."""
-        return int(self._read_s * self._output.sample_rate_hz)
+        """Samples that have been played: as many as fit into the time read."""
+        return round(self._read_s * self._output.sample_rate_hz)
 
     def _full_vpp(self, phase: Phase) -> float:
         match phase.play:

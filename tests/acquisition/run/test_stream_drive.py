@@ -1,0 +1,251 @@
+"""The run as a state machine on an analogue output: what is heard, sample by sample, and every way out."""
+
+import numpy as np
+import pytest
+
+from acquisition.check.low_level import BenchCheck
+from acquisition.errors import DataLost, InstrumentLost, LimitExceeded, RecordingError
+from acquisition.excitation.streamed_noise import StreamedNoise
+from acquisition.instruments import Overload
+from acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
+from acquisition.recording.layout import RecordingState
+from acquisition.run.run import Run
+from acquisition.run.schedule import CHECK_S
+from acquisition.run.state import RunState
+
+RATE = 5120.0
+AHEAD = 2560
+RAMP = 1024
+NOISE = Measurement(
+    name="noise",
+    excitation=StreamedNoise(
+        amplitude_vpp=1.0, band_start_hz=50, band_stop_hz=600, settle_s=0.35, duration_s=1.0, seed=7
+    ),
+    ramp_s=RAMP / RATE,
+    ramp_step_s=0.02,
+)
+HEARD_STATES = [RunState.RAMPING_UP, RunState.SETTLING, RunState.RECORDING, RunState.RAMPING_DOWN]
+every_state = pytest.mark.parametrize("state", [RunState.CHECKING, *HEARD_STATES])
+heard_state = pytest.mark.parametrize("state", HEARD_STATES)
+
+
+def run_of(bench, tmp_path, measurement=NOISE, check=BenchCheck.AT_LOW_LEVEL):
+    return Run(bench, measurement, tmp_path / "run.h5", check, bench.recorder.create)
+
+
+def play(run):
+    return list(run)
+
+
+def upto(run, state):
+    return next(progress for progress in run if progress.state is state)
+
+
+def drive(bench):
+    return bench.recorder.channel(0) * bench.channels[0].units_per_volt
+
+
+def planned(bench, count):
+    """The source of the plan at full level [V], from the first sample of the ramp on."""
+    full_v = 0.5 * bench.rig.generator.terminal_factor()
+    return full_v * NOISE.excitation.source.samples(0, count, RATE)
+
+
+def ramp_first(bench):
+    return next(each["first"] for each in bench.recorder.segments if each["label"] == "ramp_up")
+
+
+def envelope(bench, first):
+    """Level of the noise at the samples that tell it, and where those lie; ``first`` begins the source."""
+    heard = drive(bench)[first:]
+    source = planned(bench, heard.size)
+    telling = np.flatnonzero(np.abs(source) > 0.05)
+    return telling, heard[telling] / source[telling]
+
+
+def half_cosine(samples):
+    return 0.5 * (1 - np.cos(np.pi * np.arange(samples) / samples))
+
+
+def assert_silent_and_finished(bench, state):
+    assert not bench.world.streams
+    assert not bench.world.is_sampling
+    assert bench.recorder.ending[0] is state
+    order = [name for name, _, _ in bench.world.calls]
+    assert order.index("output.stop") < order.index("recorder.finish")
+
+
+def assert_faded_without_a_step(bench):
+    """No level between two samples changes faster than on the half cosine of a ramp."""
+    at, level = envelope(bench, ramp_first(bench))
+    steepest = np.pi / 2 / RAMP
+    assert np.max(np.abs(np.diff(level)) / np.diff(at)) <= 1.01 * steepest
+    assert level[-1] < 0.01
+
+
+class TestThePlanIsCarriedOut:
+    @pytest.mark.parametrize("check", list(BenchCheck))
+    def test_the_drive_is_the_planned_noise_under_half_cosines_sample_by_sample(
+        self, streaming_bench, tmp_path, check
+    ):
+        play(run_of(streaming_bench, tmp_path, check=check))
+        begin = round(CHECK_S * RATE) + AHEAD if check is BenchCheck.AT_LOW_LEVEL else 0
+        hold = round(1.35 * RATE)
+        level = np.concatenate([half_cosine(RAMP), np.ones(hold), 1 - half_cosine(RAMP)])
+        np.testing.assert_allclose(
+            drive(streaming_bench)[begin:], level * planned(streaming_bench, level.size), atol=1e-12
+        )
+
+    @pytest.mark.parametrize("check", list(BenchCheck))
+    def test_every_stretch_lies_where_it_is_heard(self, streaming_bench, tmp_path, check):
+        play(run_of(streaming_bench, tmp_path, check=check))
+        begin = round(CHECK_S * RATE) + AHEAD if check is BenchCheck.AT_LOW_LEVEL else 0
+        found = {
+            each["label"]: (each["first"], each["last"] + 1) for each in streaming_bench.recorder.segments
+        }
+        found.pop("check", None)
+        noise = begin + RAMP + round(0.35 * RATE)
+        end = noise + round(RATE)
+        assert found == {
+            "ramp_up": (begin, begin + RAMP),
+            "noise": (noise, end),
+            "ramp_down": (end, end + RAMP),
+        }
+
+    @pytest.mark.parametrize("check", list(BenchCheck))
+    def test_the_length_is_known_beforehand(self, streaming_bench, tmp_path, check):
+        shown = play(run_of(streaming_bench, tmp_path, check=check))
+        assert shown[-1].elapsed_s == pytest.approx(shown[-1].total_s)
+        assert streaming_bench.recorder.header.expected_samples == streaming_bench.recorder.samples
+
+    def test_the_states_are_those_of_a_generators_run(self, streaming_bench, tmp_path):
+        run = run_of(streaming_bench, tmp_path)
+        seen = list(dict.fromkeys(progress.state for progress in run))
+        # With an output, to be armed takes the time of what is written ahead.
+        assert seen == [RunState.CHECKING, RunState.ARMED, *HEARD_STATES]
+        assert streaming_bench.recorder.states() == ["armed", *(state.value for state in HEARD_STATES)]
+        assert run.state is RunState.FINISHED
+        assert_silent_and_finished(streaming_bench, RecordingState.COMPLETE)
+
+    def test_nothing_louder_than_the_check_is_written_before_it_has_passed(self, streaming_bench, tmp_path):
+        run = run_of(streaming_bench, tmp_path)
+        upto(run, RunState.ARMED)
+        assert np.max(np.abs(streaming_bench.world.streamed)) <= 0.5 * 0.02
+        run.close()
+
+    def test_the_setting_shown_is_that_of_what_is_heard(self, streaming_bench, tmp_path):
+        shown = play(run_of(streaming_bench, tmp_path))
+        settings = {progress.state: progress.amplitude_vpp for progress in shown}
+        assert settings[RunState.CHECKING] == pytest.approx(0.02)
+        assert settings[RunState.RECORDING] == 1.0
+        assert settings[RunState.RAMPING_DOWN] == pytest.approx(0.0, abs=1e-12)
+
+    def test_an_output_that_was_never_armed_plays_nothing(self, streaming_bench, tmp_path):
+        streaming_bench.world.permanent["arm"] = lambda: InstrumentLost("no answer")
+        with pytest.raises(InstrumentLost, match="no answer"):
+            play(run_of(streaming_bench, tmp_path))
+        assert "digitizer.start" not in [name for name, _, _ in streaming_bench.world.calls]
+        assert_silent_and_finished(streaming_bench, RecordingState.FAILED)
+
+
+class TestEveryWayOut:
+    @every_state
+    def test_a_cancel_fades_after_what_is_written(self, streaming_bench, tmp_path, state):
+        run = run_of(streaming_bench, tmp_path)
+        shown = upto(run, state)
+        run.cancel("the operator pressed stop")
+        rest = play(run)
+        assert run.outcome.state is RunState.STOPPED
+        assert streaming_bench.recorder.ending == (RecordingState.STOPPED, "the operator pressed stop")
+        assert_silent_and_finished(streaming_bench, RecordingState.STOPPED)
+        took_s = rest[-1].elapsed_s - shown.elapsed_s if rest else 0.0
+        assert took_s <= (AHEAD + RAMP) / RATE + 0.1 + 1e-3
+        if state is not RunState.CHECKING:
+            assert_faded_without_a_step(streaming_bench)
+
+    @every_state
+    def test_an_abandoned_run_fades_as_well(self, streaming_bench, tmp_path, state):
+        with run_of(streaming_bench, tmp_path) as run:
+            upto(run, state)
+        assert run.state is RunState.STOPPED
+        assert_silent_and_finished(streaming_bench, RecordingState.STOPPED)
+        if state is not RunState.CHECKING:
+            assert_faded_without_a_step(streaming_bench)
+
+    @every_state
+    def test_an_exceeded_limit_fades_and_is_named(self, streaming_bench, tmp_path, state):
+        run = run_of(streaming_bench, tmp_path)
+        upto(run, state)
+        streaming_bench.world.base_factor, streaming_bench.world.background_m_per_s2 = 1.0, 1000.0
+        with pytest.raises(LimitExceeded, match=r"base acceleration reached 1.*736 m/s2 \(4809, bare table"):
+            play(run)
+        assert_silent_and_finished(streaming_bench, RecordingState.FAILED)
+        if state is not RunState.CHECKING:
+            assert_faded_without_a_step(streaming_bench)
+
+    def test_an_overload_fades_when_the_plan_says_so(self, streaming_bench, tmp_path):
+        strict = NOISE.model_copy(update={"limits": InRunLimits(on_overload=OnOverload.STOP)})
+        run = run_of(streaming_bench, tmp_path, strict)
+        upto(run, RunState.RECORDING)
+        streaming_bench.world.overloads = (Overload("m0_velocity", 3, 5),)
+        with pytest.raises(LimitExceeded, match="m0_velocity was overloaded at sample 3"):
+            play(run)
+        assert_faded_without_a_step(streaming_bench)
+
+    @heard_state
+    @pytest.mark.parametrize(
+        ("call", "fault"),
+        [
+            ("digitizer.read", DataLost),
+            ("recorder.append", RecordingError),
+            ("digitizer.read", KeyboardInterrupt),
+        ],
+    )
+    def test_when_nothing_can_be_read_a_short_fade_is_written_and_waited_for(
+        self, streaming_bench, tmp_path, state, call, fault
+    ):
+        world = streaming_bench.world
+        run = run_of(streaming_bench, tmp_path)
+        upto(run, state)
+        world.faults[call] = [lambda: fault("it broke")]
+        with pytest.raises(fault, match="it broke"):
+            play(run)
+        assert_silent_and_finished(
+            streaming_bench,
+            RecordingState.STOPPED if fault is KeyboardInterrupt else RecordingState.FAILED,
+        )
+        # The fade is 0.1 s long, and it had been played when the output was stopped.
+        begin = round(CHECK_S * RATE) + AHEAD
+        written = np.array(world.streamed)[begin:]
+        source = planned(streaming_bench, written.size)
+        telling = np.flatnonzero(np.abs(source) > 0.05)
+        level = written[telling] / source[telling]
+        assert np.max(np.abs(np.diff(level)) / np.diff(telling)) <= 1.01 * np.pi / 2 / (0.1 * RATE)
+        sounding = np.flatnonzero(world.streamed)
+        assert world.played > sounding[-1]
+
+    @heard_state
+    def test_an_output_that_takes_no_more_samples_is_stopped_at_once(self, streaming_bench, tmp_path, state):
+        world = streaming_bench.world
+        run = run_of(streaming_bench, tmp_path)
+        upto(run, state)
+        world.permanent["write"] = lambda: DataLost("the output ran out of samples")
+        with pytest.raises(DataLost, match="ran out"):
+            play(run)
+        assert_silent_and_finished(streaming_bench, RecordingState.FAILED)
+
+    @heard_state
+    def test_an_output_that_does_not_stop_is_shouted_out(self, streaming_bench, tmp_path, state):
+        run = run_of(streaming_bench, tmp_path)
+        upto(run, state)
+        streaming_bench.world.permanent["output.stop"] = lambda: InstrumentLost("MAY STILL BE PLAYING")
+        with pytest.raises(InstrumentLost, match="MAY STILL BE PLAYING"):
+            play(run)
+        assert run.state is RunState.FAILED
+        assert "MAY STILL BE PLAYING" in streaming_bench.recorder.ending[1]
+        assert not streaming_bench.world.is_sampling
+
+    def test_the_generator_is_left_alone(self, streaming_bench, tmp_path):
+        play(run_of(streaming_bench, tmp_path))
+        calls = {name for name, _, _ in streaming_bench.world.calls}
+        assert calls.isdisjoint({"load_sine", "load_waveform", "start", "set_amplitude"})
