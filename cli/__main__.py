@@ -7,6 +7,7 @@ from rich.console import Console
 
 from acquisition.errors import AcquisitionError
 from analysis.errors import AnalysisError
+from sim.study.errors import StudyError
 
 from .analyse import analyse
 from .bench import bench
@@ -14,6 +15,7 @@ from .demo import demo
 from .measure import measure
 from .recover import recover_recording
 from .serve_rig import serve_rig
+from .study import study
 
 app = typer.Typer(
     name="vibench",
@@ -25,6 +27,7 @@ app = typer.Typer(
 app.command()(demo)
 app.command()(measure)
 app.command()(analyse)
+app.command()(study)
 app.command(name="recover")(recover_recording)
 app.command(name="serve-rig")(serve_rig)
 app.add_typer(bench, name="bench")
@@ -34,7 +37,7 @@ def main() -> None:
     """Run the command line. An error that a user can mend is one sentence and a non-zero exit."""
     try:
         app()
-    except (AcquisitionError, AnalysisError) as error:
+    except (AcquisitionError, AnalysisError, StudyError) as error:
         complain(error)
         sys.exit(1)
 

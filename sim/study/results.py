@@ -51,6 +51,11 @@ class StudyResults:
         """Whether every point has an answer, good or bad."""
         return bool(np.all(states(self.arrays) != PointState.MISSING))
 
+    @property
+    def kept(self) -> int:
+        """How many points have an answer, good or bad."""
+        return int(np.count_nonzero(states(self.arrays) != PointState.MISSING))
+
     def values(self, name: str, **fixed: Value) -> Floats:
         """One quantity over the axes, NaN where it is not known.
 
