@@ -271,12 +271,19 @@ def _described(
     )
 
 
-def _tendency(taken: _Exponent) -> Tendency:
-    if not math.isfinite(taken.error) or (taken.blocks is not None and not taken.blocks.is_long_enough):
+def tendency_of(mean: float, error: float) -> Tendency:
+    """Say what an exponent means within its error."""
+    if not (math.isfinite(mean) and math.isfinite(error)):
         return Tendency.UNKNOWN
-    if abs(taken.mean) <= SURE * taken.error:
+    if abs(mean) <= SURE * error:
         return Tendency.NEUTRAL
-    return Tendency.CHAOTIC if taken.mean > 0.0 else Tendency.REGULAR
+    return Tendency.CHAOTIC if mean > 0.0 else Tendency.REGULAR
+
+
+def _tendency(taken: _Exponent) -> Tendency:
+    if taken.blocks is not None and not taken.blocks.is_long_enough:
+        return Tendency.UNKNOWN
+    return tendency_of(taken.mean, taken.error)
 
 
 def _transient(run: TangentRun, end: Settling) -> ChaoticTransient | None:

@@ -12,7 +12,7 @@ from .compiled import compiled
 from .parameters import Table, Vector
 
 PASSES = 2
-LOST = 1e-14
+LOST = 1e-11
 """A row of which no more than this part is left has no direction of its own any more."""
 
 
