@@ -23,7 +23,7 @@ from .contact import (
     gap_of,
 )
 from .contact_flow import FORCE_TERMS
-from .departure import departure
+from .departure import closed_for, departure
 from .detection import SERIES_TERMS
 from .flight import (
     CLEAR,
@@ -38,7 +38,7 @@ from .flight import (
 )
 from .modes import Complex
 from .outcome import Outcome
-from .parameters import POWER, RIGID, SIDE, Table, Vector, X, Y, Z
+from .parameters import CLOSED, POWER, RIGID, SIDE, Table, Vector, X, Y, Z
 from .smooth import smooth_turn
 from .smooth_tally import tally_smooth
 from .stick import held_tables, hold, place_held, tally_held
@@ -120,6 +120,8 @@ def advance_harmonic(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and 
             record.impact_times[counts[IMPACTS]] = clock[0]
             counts[IMPACTS] += 1
             shadow[:] = state
+            if tables.par.law == RIGID:
+                state[CLOSED] = closed_for(now, tables)
             strike(state, tables.par, tolerance)
             if has_tangent and tables.par.law == RIGID:
                 carry_through_impact(record.tangent, shadow, state, tables.par)

@@ -29,6 +29,8 @@ STEP = 9
 in time [s]."""
 ROOT_SCALE, RATE_SCALE = 10, 11
 """In contact: how large w and r will become, the measure of their errors."""
+CLOSED = 11
+"""Under rigid stops: how far from one m1 counts as touching it [m], from the rounding of the last flight."""
 SCALES = 12
 """Under a power law, the first of seven: how large p, dp/dt, x, z, vx, vz have lately been, and time as 1."""
 STATE_SIZE = 20

@@ -13,7 +13,8 @@ from .departure import time_to_depart
 from .detection import LARGEST_BOUND, NEVER, SERIES_TERMS, first_contact
 from .flight import CLEAR, DEPARTS, OUT_OF_RANGE, TOUCHES
 from .flight_series import fill_flight_series, place_on_series
-from .parameters import RIGID, SIDE, VX, VY, VZ, Parameters, PowerTerms, Table, Vector, X, Y, Z
+from .parameters import CLOSED, RIGID, SIDE, VX, VY, VZ, Parameters, PowerTerms, Table, Vector, X, Y, Z
+from .rigid_stop import closed_gap
 from .stick import hold_on_series
 from .touch import advance_touching, strike
 
@@ -157,10 +158,12 @@ def _fly_part(
         return OUT_OF_RANGE, tau
     fill_flight_series(series, path, state, rest, par)
     scale = abs(state[Y]) + abs(state[Z])
-    leaves = time_to_depart(path, left, par.lower, par.upper, scale) if par.law == RIGID else 0.0
-    if leaves > 0.0:
-        place_on_series(state, series, leaves)
-        return (DEPARTS, tau + leaves) if leaves < left else (CLEAR, length)
+    if par.law == RIGID:
+        state[CLOSED] = closed_gap(scale, par)
+        leaves = time_to_depart(path, left, state[CLOSED], par)
+        if leaves > 0.0:
+            place_on_series(state, series, leaves)
+            return (DEPARTS, tau + leaves) if leaves < left else (CLEAR, length)
     touch = first_contact(path, left, par.lower, par.upper, bound, scale)
     place_on_series(state, series, left if touch == NEVER else touch)
     return (CLEAR, length) if touch == NEVER else (TOUCHES, tau + touch)

@@ -12,17 +12,16 @@ import math
 from .compiled import compiled
 from .contact import gap_of
 from .detection import ROUNDING, TOUCH
-from .parameters import SIDE, VX, VY, VZ, Parameters, Vector, X, Y, Z
+from .parameters import CLOSED, SIDE, VX, VY, VZ, Parameters, Vector, X, Y, Z
 
 RESOLVED = 4.0
 """Hops lower than this many times the gap that counts as closed cannot be told from rest."""
 
 
 @compiled
-def closed_gap(state: Vector, par: Parameters) -> float:
-    """How far from a stop m1 counts as touching it [m]: as in `sim.detection.first_contact`."""
-    size = abs(state[X]) + abs(state[Y]) + abs(state[Z])
-    closed: float = TOUCH * min(par.lower, par.upper) + ROUNDING * size
+def closed_gap(scale: float, par: Parameters) -> float:
+    """How far from a stop m1 counts as touching it [m]; ``scale`` as in `sim.detection.first_contact`."""
+    closed: float = TOUCH * min(par.lower, par.upper) + ROUNDING * scale
     return closed
 
 
@@ -75,7 +74,7 @@ def hold_if_pressed(state: Vector, side: float, par: Parameters, tolerance: floa
     press = press_on(side, state, par)
     gap = gap_of(side, par)
     part = tolerance * (1.0 - par.restitution)
-    too_low = RESOLVED * closed_gap(state, par) + part * part * gap
+    too_low = RESOLVED * state[CLOSED] + part * part * gap
     if press >= 0.0 and rate * rate <= 2.0 * press * too_low:
         place_on_stop(state, side, 0.0, par)
         state[SIDE] = side
@@ -87,6 +86,7 @@ def place_between_rigid_stops(state: Vector, par: Parameters, tolerance: float) 
     p = state[Y] - state[Z]
     side = math.copysign(1.0, p)
     short = gap_of(side, par) - side * p
-    if short <= closed_gap(state, par):
+    state[CLOSED] = closed_gap(abs(state[X]) + abs(state[Y]) + abs(state[Z]), par)
+    if short <= state[CLOSED]:
         place_on_stop(state, side, side * (state[VY] - state[VZ]), par)
         hold_if_pressed(state, side, par, tolerance)

@@ -12,11 +12,12 @@ from .base_force import Cubic
 from .bound_modes import PULL, RATE, ROW, SHAPE
 from .compiled import compiled
 from .contact import gap_of
-from .detection import LARGEST_BOUND, NEVER, SERIES_TERMS, derivative_bound, first_contact, polynomial_at
+from .detection import LARGEST_BOUND, NEVER, SERIES_TERMS, derivative_bound, first_contact
 from .flight import (
     CLEAR,
     GRID_TURN,
     OUT_OF_RANGE,
+    RUN_OF_STEPS,
     TOUCHES,
     FlightTables,
     drive_phasor,
@@ -81,17 +82,38 @@ def hold(
             bound += abs(terms[j]) * held.squares[j]
         if not bound < LARGEST_BOUND:
             return OUT_OF_RANGE, elapsed
+        steps = min(RUN_OF_STEPS, int((longest - elapsed) / held.grid))
+        made = _march(terms, held.factors, steps, -spring - bound * held.grid**2 / 8.0)
+        if made > 0:
+            elapsed += made * held.grid
+            continue
+        for j in range(len(now)):
+            terms[j] = weight * now[j] * held.bound[j, PULL]
         length = min(held.grid, longest - elapsed)
         fill_series(series, terms, held.rates)
         series[0] += spring
-        margin = bound * length * length / 8.0
-        end, _ = polynomial_at(series, length)
-        if series[0] > -margin or end > -margin:
-            free = first_contact(series, length, math.inf, 0.0, bound, reach)
-            if free != NEVER:
-                return LETS_GO, elapsed + free
+        free = first_contact(series, length, math.inf, 0.0, bound, reach)
+        if free != NEVER:
+            return LETS_GO, elapsed + free
         elapsed = longest if length < held.grid else elapsed + length
     return CLEAR, longest
+
+
+@compiled
+def _march(terms: Complex, factors: Complex, steps: int, high: float) -> int:
+    """Turn the terms in place, step by step, while their sum is below ``high``; gives the steps that were."""
+    below = 0.0
+    for j in range(len(terms)):
+        below += terms[j].real
+    made = 0
+    while made < steps and below < high:
+        below = 0.0
+        for j in range(len(terms)):
+            terms[j] *= factors[j]
+            below += terms[j].real
+        if below < high:
+            made += 1
+    return made
 
 
 @compiled

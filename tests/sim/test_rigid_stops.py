@@ -453,3 +453,15 @@ def test_sampling_changes_no_bit_of_a_motion_that_sticks():
 def test_a_start_inside_a_rigid_stop_is_refused(p):
     with pytest.raises(ValueError, match=r"A start at y - z = .* is not allowed: rigid stops stand at"):
         integrate(rigid(0.5), STILL, 0.1, initial_state=[0.0, p, 0.0, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 0.95, 1.0])
+@pytest.mark.parametrize("gap_m", [1e-12, 1e-8, 45e-6])
+def test_m1_never_gets_beyond_a_rigid_stop(restitution, gap_m):
+    specimen = rigid(restitution, gap_m=gap_m)
+    for frequency_hz, amplitude_m in ((50.0, 50e-6), (200.0, 1e-3), (400.0, 1e-2)):
+        drive = Harmonic(frequency_hz, amplitude_m)
+        run = integrate(specimen, drive, 0.02, sample_rate_hz=1e6, max_impact_rate_hz=1e6)
+        p, _ = relative(run.states)
+        rounding = 1e-15 * np.abs(run.states[:, :3]).max()
+        assert np.abs(p).max() <= gap_m * (1.0 + 1e-9) + rounding
