@@ -28,7 +28,6 @@ from acquisition.run.run_measurement import run_measurement
 from acquisition.run.state import RunState
 from acquisition.virtual.generator.output_signal import Panel
 from acquisition.virtual.generator.scpi_command import Quirks
-from acquisition.virtual.rig import VirtualRig
 
 DWELL = Measurement(
     name="run",
@@ -39,29 +38,6 @@ DWELL = Measurement(
 SWEEP = DWELL.model_copy(
     update={"excitation": SineSweep(amplitude_vpp=1.5, start_hz=200, stop_hz=230, duration_s=3, settle_s=0.2)}
 )
-
-
-@pytest.fixture
-def laboratory(rig):
-    """Start a rig with faults on demand, and the bench on it as on any real one: by its addresses."""
-    opened = []
-
-    def start(**habits):
-        virtual = VirtualRig(rig, **habits)
-        virtual.__enter__()
-        opened.append(virtual)
-        connected = rig.model_copy(
-            update={
-                "virtual": None,
-                "daq": rig.daq.model_copy(update={"server": virtual.daq_address}),
-                "generator": rig.generator.model_copy(update={"resource": virtual.visa_resource}),
-            }
-        )
-        return virtual, connected
-
-    yield start
-    for virtual in opened:
-        virtual.__exit__(None, None, None)
 
 
 def bench_on(connected):

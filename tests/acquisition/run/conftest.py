@@ -1,0 +1,30 @@
+"""A laboratory whose instruments can be made to fail, found by their addresses like any others."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from acquisition.rig.configuration import Rig
+from acquisition.virtual.rig import VirtualRig
+
+Laboratory = Callable[..., tuple[VirtualRig, Rig]]
+
+
+@pytest.fixture
+def laboratory(rig: Rig) -> Iterator[Laboratory]:
+    """Start a rig with faults on demand, and the configuration of a bench on it."""
+    with ExitStack() as opened:
+
+        def start(**habits) -> tuple[VirtualRig, Rig]:
+            virtual = opened.enter_context(VirtualRig(rig, **habits))
+            connected = rig.model_copy(
+                update={
+                    "virtual": None,
+                    "daq": rig.daq.model_copy(update={"server": virtual.daq_address}),
+                    "generator": rig.generator.model_copy(update={"resource": virtual.visa_resource}),
+                }
+            )
+            return virtual, connected
+
+        yield start

@@ -1,0 +1,238 @@
+"""What goes wrong while an output streams: one clear error, silence, and a kept recording that says why.
+
+Silence is looked at behind the amplifier's input, in the simulated world, with the output's own task
+taken along through time: what a driver believes does not count.
+"""
+
+import re
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.bench import open_bench
+from acquisition.errors import DataLost, InstrumentError, InstrumentLost, LimitExceeded, RecordingError
+from acquisition.excitation.streamed_noise import StreamedNoise
+from acquisition.plan.measurement import InRunLimits, Measurement
+from acquisition.recording import RecordingState, create_recording, open_recording
+from acquisition.rig.calibration import CalibrationRule
+from acquisition.rig.configuration import load_rig
+from acquisition.rig.knobs import confirm_simulated
+from acquisition.run.run_measurement import run_measurement
+from acquisition.run.state import RunState
+from acquisition.virtual.analogue import Coupling, Input
+
+try:
+    import resource
+except ModuleNotFoundError:  # Windows has no limit on the size of files
+    resource = None
+
+FULL_BYTES = 1_000_000
+STREAMING = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig_streaming.toml"
+AMPLITUDE_VPP = 4.0
+PLAN = Measurement(
+    name="run",
+    excitation=StreamedNoise(
+        amplitude_vpp=AMPLITUDE_VPP, band_start_hz=50, band_stop_hz=600, settle_s=0.2, duration_s=3, seed=5
+    ),
+    ramp_s=0.3,
+    ramp_step_s=0.03,
+)
+RATE_HZ = 51_200.0
+SILENT_V = 1e-3
+"""Some fifty times the converter's noise, and a four-hundredth of the rms value played."""
+
+
+@pytest.fixture
+def rig():
+    return load_rig(STREAMING)
+
+
+def bench_on(connected):
+    return open_bench(connected, confirm=confirm_simulated, calibration=CalibrationRule.WAIVED)
+
+
+def passes(virtual, duration_s):
+    """Let rig time pass, with everything that still runs."""
+    rig = virtual._switched_on.daq._rig
+    with rig.changed:
+        rig.advance_to(rig.now_s + duration_s)
+
+
+def at_the_amplifier_v(virtual, duration_s=0.1):
+    """Largest voltage at the amplifier's input from now on, by a probe of its own."""
+    probe = virtual.world.sample((Input("Dev1/ai0", 10.0, Coupling.DC),), RATE_HZ)
+    passes(virtual, duration_s)
+    heard = probe.read(round(duration_s * RATE_HZ))
+    probe.close()
+    # The converter's filter looks back: its first samples show what was before.
+    return float(np.max(np.abs(heard[0, 100:])))
+
+
+def when_recording(act):
+    """Do ``act`` once, at the first block that belongs to the record."""
+    done = []
+
+    def watch(progress):
+        if progress.state is RunState.RECORDING and not done:
+            done.append(True)
+            act()
+
+    return watch
+
+
+def kept(path, state, reason):
+    with open_recording(path) as recording:
+        assert recording.state is state
+        assert re.search(reason, recording.reason), recording.reason
+        drive = recording.read("drive_voltage")
+    assert np.max(np.abs(drive)) > 0.1
+    return drive
+
+
+def one_sentence(failure):
+    """No more than a line: what happened, what was done, what to do."""
+    text = str(failure.value)
+    assert "\n" not in text
+    return text
+
+
+def test_a_limit_passed_while_streaming_fades_out_and_is_named(laboratory, tmp_path):
+    virtual, connected = laboratory()
+    # The noise itself reaches some 100 m/s2: allowed are 736.
+    tight = PLAN.model_copy(update={"limits": InRunLimits(base_acceleration=0.05)})
+    with bench_on(connected) as bench:
+        with pytest.raises(LimitExceeded) as failure:
+            run_measurement(bench, tight, tmp_path / "run.h5")
+        assert at_the_amplifier_v(virtual) < SILENT_V
+    assert re.search(r"base acceleration reached .* allowed is 36\.8 m/s2", one_sentence(failure))
+    drive = kept(tmp_path / "run.h5", RecordingState.FAILED, "base acceleration reached")
+    # What was written ahead was still heard, then a ramp to nothing.
+    assert np.max(np.abs(drive[-200:])) < 0.01
+
+
+@pytest.mark.parametrize("code", [-200290, -200018, -200621, -200016])
+def test_an_output_that_underflows_ends_the_run(laboratory, tmp_path, code):
+    virtual, connected = laboratory()
+    fail = when_recording(lambda: virtual.faults.fail_daq("WriteAnalogF64", code))
+    with bench_on(connected) as bench:
+        with pytest.raises(DataLost, match=r"ran out of samples.*To do: write further ahead") as failure:
+            run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=fail)
+        virtual.faults.heal_daq()
+        assert at_the_amplifier_v(virtual) < SILENT_V
+    one_sentence(failure)
+    kept(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
+
+
+def test_a_computer_that_pauses_for_too_long_underflows_and_ends_silent(laboratory, tmp_path):
+    virtual, connected = laboratory()
+    pause = when_recording(lambda: passes(virtual, 1.0))
+    with bench_on(connected) as bench:
+        with pytest.raises(DataLost, match="ran out of samples"):
+            run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=pause)
+        assert at_the_amplifier_v(virtual) < SILENT_V
+    kept(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
+
+
+def test_a_server_that_dies_leaves_at_most_what_was_written_and_says_so(laboratory, tmp_path):
+    virtual, connected = laboratory()
+    die = when_recording(virtual.faults.lose_daq_server)
+    with pytest.raises(InstrumentLost, match="MAY STILL BE PLAYING") as failure, bench_on(connected) as bench:
+        run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=die)
+    assert "at most 0.5 s" in one_sentence(failure)
+    assert "switch the amplifier off" in str(failure.value)
+    # The message is true: it plays on, and nobody is left who could stop it; then it runs dry.
+    assert at_the_amplifier_v(virtual) > 0.1
+    passes(virtual, 0.5)
+    assert at_the_amplifier_v(virtual) < SILENT_V
+    kept(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentLost.*MAY STILL BE PLAYING")
+
+
+@pytest.mark.parametrize(
+    ("code", "kind"), [(-200279, DataLost), (-200361, DataLost), (-200284, InstrumentError)]
+)
+def test_inputs_that_fail_let_the_output_fade(laboratory, tmp_path, code, kind):
+    virtual, connected = laboratory()
+    fail = when_recording(lambda: virtual.faults.fail_daq("ReadAnalogF64", code))
+    with bench_on(connected) as bench:
+        with pytest.raises(kind) as failure:
+            run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=fail)
+        virtual.faults.heal_daq()
+        assert at_the_amplifier_v(virtual) < SILENT_V
+    one_sentence(failure)
+    kept(tmp_path / "run.h5", RecordingState.FAILED, kind.__name__)
+
+
+def test_ctrl_c_fades_within_a_block_what_is_written_and_a_ramp(laboratory, tmp_path):
+    virtual, connected = laboratory()
+    elapsed_s = []
+
+    def watch(progress):
+        if progress.state is RunState.RECORDING and not elapsed_s:
+            elapsed_s.append(progress.elapsed_s)
+            signal.raise_signal(signal.SIGINT)
+
+    with bench_on(connected) as bench:
+        outcome = run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=watch)
+        assert at_the_amplifier_v(virtual) < SILENT_V
+    assert outcome.state is RunState.STOPPED
+    drive = kept(tmp_path / "run.h5", RecordingState.STOPPED, "^SIGINT: cancelled")
+    assert drive.size / RATE_HZ - elapsed_s[0] <= 0.5 + 0.3 + 0.1 + 1e-3
+    assert np.max(np.abs(drive[-200:])) < 0.01
+
+
+def test_a_second_ctrl_c_does_not_wait_for_the_ramp_and_ends_silent(laboratory, tmp_path):
+    virtual, connected = laboratory()
+    insist = when_recording(lambda: [signal.raise_signal(signal.SIGINT) for _ in range(2)])
+    with bench_on(connected) as bench:
+        with pytest.raises(KeyboardInterrupt):
+            run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=insist)
+        assert at_the_amplifier_v(virtual) < SILENT_V
+    kept(tmp_path / "run.h5", RecordingState.STOPPED, "left it|keyboard")
+
+
+class FillingDisk:
+    """A recording whose disk takes no more once something is safe, and has room again for the ending."""
+
+    def __init__(self, path, header):
+        self._writer = create_recording(path, header)
+        self._unlimited = resource.getrlimit(resource.RLIMIT_FSIZE)
+        self.log = self._writer.log
+        self.begin_segment = self._writer.begin_segment
+        self.end_segment = self._writer.end_segment
+
+    def append(self, block):
+        if self._writer.committed_samples > 0:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (FULL_BYTES, self._unlimited[1]))
+        self._writer.append(block)
+
+    def finish(self, state, reason=""):
+        resource.setrlimit(resource.RLIMIT_FSIZE, self._unlimited)
+        return self._writer.finish(state, reason)
+
+
+@pytest.mark.skipif(resource is None, reason="limits on file size exist on POSIX only")
+def test_a_full_disk_lets_the_output_fade_and_keeps_what_was_written(laboratory, tmp_path):
+    virtual, connected = laboratory()
+    long = PLAN.model_copy(update={"excitation": PLAN.excitation.model_copy(update={"duration_s": 120})})
+    with bench_on(connected) as bench:
+        with pytest.raises(RecordingError, match="The disk refused the recording") as failure:
+            run_measurement(bench, long, tmp_path / "run.h5", create=FillingDisk)
+        assert at_the_amplifier_v(virtual) < SILENT_V
+    one_sentence(failure)
+    with open_recording(tmp_path / "run.h5") as recording:
+        assert recording.state is RecordingState.FAILED
+        assert "disk refused" in recording.reason
+        assert recording.samples > 0
+
+
+def test_leaving_the_bench_silences_an_output_that_a_script_left_playing(laboratory):
+    virtual, connected = laboratory()
+    with bench_on(connected) as bench:
+        bench.output.write(np.full(25_600, 1.0))
+        bench.output.arm()
+        bench.digitizer.start()
+        bench.digitizer.read(5120)
+        assert at_the_amplifier_v(virtual) == pytest.approx(1.0, rel=0.01)
+    assert at_the_amplifier_v(virtual) < SILENT_V

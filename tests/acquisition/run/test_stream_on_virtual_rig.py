@@ -1,0 +1,173 @@
+"""Streamed noise on the whole path: plan, unmodified nidaqmx, a simulated USB-4431, the file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import welch
+
+from acquisition.bench import open_bench
+from acquisition.check.low_level import BenchCheck
+from acquisition.errors import CheckFailed
+from acquisition.excitation.streamed_noise import StreamedNoise
+from acquisition.plan.measurement import Measurement
+from acquisition.recording import RecordingState, open_recording
+from acquisition.rig.configuration import load_rig
+from acquisition.run.run_measurement import run_measurement
+from acquisition.run.state import RunState
+from acquisition.virtual.world.decimation import GROUP_DELAY_SAMPLES
+
+STREAMING = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig_streaming.toml"
+RIG = load_rig(STREAMING)
+RATE_HZ = RIG.daq.sample_rate_hz
+TERMINAL = RIG.generator.terminal_factor()
+DELAY = GROUP_DELAY_SAMPLES - 0.5
+"""Samples from the output to the recording: a sample is due at the end of its period, its filter is late
+by the group delay, and the hold of the output by half a sample."""
+NOISE_V = RIG.virtual.converter_noise_v
+PLAN = Measurement(
+    name="run",
+    excitation=StreamedNoise(
+        amplitude_vpp=2.0, band_start_hz=50, band_stop_hz=600, settle_s=0.2, duration_s=2.0, seed=11
+    ),
+    ramp_s=0.3,
+    ramp_step_s=0.03,
+)
+
+
+def paced(pace):
+    """The rig at a pace; on the wall clock it may fall a second behind before its output runs dry."""
+    output = RIG.daq.output.model_copy(update={"ahead_s": {"free": 0.5, "wall": 1.0}[pace]})
+    return RIG.model_copy(
+        update={
+            "virtual": RIG.virtual.model_copy(update={"pace": pace, "speed": 2.0}),
+            "daq": RIG.daq.model_copy(update={"output": output}),
+        }
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Streamed:
+    """What came back of the plan."""
+
+    drive_v: np.ndarray
+    segments: dict[str, slice]
+    state: RecordingState
+    log: str
+
+
+@pytest.fixture(scope="module", params=["free", "wall"])
+def streamed(request, tmp_path_factory):
+    path = tmp_path_factory.mktemp("streamed") / "run.h5"
+    with open_bench(paced(request.param)) as bench:
+        outcome = run_measurement(bench, PLAN, path)
+    assert outcome.state is RunState.FINISHED
+    with open_recording(path) as recording:
+        return Streamed(
+            recording.read("drive_voltage"),
+            {each.label: slice(each.start, each.stop) for each in recording.segments},
+            recording.state,
+            " ".join(event.text for event in recording.events),
+        )
+
+
+def delayed(volts, samples):
+    """The signal a fraction of a sample late, and as a hold of one sample shows it."""
+    cycles = np.fft.rfftfreq(volts.size)
+    shown = np.fft.rfft(volts) * np.exp(-2j * np.pi * cycles * samples) * np.sinc(cycles)
+    return np.fft.irfft(shown, volts.size)
+
+
+def played(streamed):
+    """What the plan previews from the first sample of the ramp on, under its envelope [V]."""
+    ramp, hold = round(PLAN.ramp_s * RATE_HZ), round(PLAN.excitation.playing_s * RATE_HZ)
+    rise = 0.5 * (1 - np.cos(np.pi * np.arange(ramp) / ramp))
+    envelope = np.concatenate([rise, np.ones(hold), 1 - rise])
+    length = PLAN.model_copy(
+        update={"excitation": PLAN.excitation.model_copy(update={"duration_s": envelope.size / RATE_HZ})}
+    )
+    preview = length.excitation.preview(RATE_HZ).volts
+    return TERMINAL * preview * envelope
+
+
+def test_what_is_recorded_is_what_the_plan_previews_to_the_converters_noise(streamed):
+    expected = played(streamed)
+    begin = streamed.segments["ramp_up"].start
+    assert streamed.segments["ramp_down"].stop - begin == expected.size
+    silence = np.zeros(1000)
+    whole = np.concatenate([silence, expected, silence])
+    heard = streamed.drive_v[begin - silence.size :]
+    # The recording ends with the ramp: what its own delay holds back is not in it.
+    left = (heard - delayed(whole, DELAY)[: heard.size])[: -GROUP_DELAY_SAMPLES - 1]
+    # The rest, 5e-5 of the signal, is the ripple of the converter's filter.
+    assert np.sqrt(np.mean(left**2)) < 1.25 * NOISE_V
+    assert np.max(np.abs(left)) < 10 * NOISE_V
+
+
+def test_the_first_sample_of_the_stream_is_at_the_first_sample_of_the_recording(streamed):
+    expected = played(streamed)
+    begin = streamed.segments["ramp_up"].start
+    heard = streamed.drive_v[begin : begin + expected.size]
+    cross = np.conj(np.fft.rfft(expected)) * np.fft.rfft(heard)
+    cycles = np.fft.rfftfreq(expected.size)
+    band = (cycles * RATE_HZ > 60) & (cycles * RATE_HZ < 590)
+    # The slope of the phase, each line weighted by its power.
+    phase = np.angle(cross[band] * np.exp(2j * np.pi * cycles[band] * DELAY))
+    weight = np.abs(cross[band])
+    slope = np.sum(weight * cycles[band] * phase) / np.sum(weight * cycles[band] ** 2)
+    assert -slope / (2 * np.pi) == pytest.approx(0.0, abs=0.01)
+
+
+def test_the_noise_has_its_rms_value_its_band_and_gaussian_moments(streamed):
+    noise = streamed.drive_v[streamed.segments["noise"]]
+    assert noise.size == round(2.0 * RATE_HZ)
+    # 2 s of 550 Hz are 2200 independent values: 1.5 % of scatter in the rms value, 0.1 in the kurtosis.
+    assert np.std(noise) == pytest.approx(2.0 * TERMINAL / 9, rel=0.05)
+    assert np.mean(noise**4) / np.mean(noise**2) ** 2 == pytest.approx(3.0, abs=0.4)
+    frequency_hz, density = welch(noise, RATE_HZ, nperseg=4096)
+    inside = np.median(density[(frequency_hz > 90) & (frequency_hz < 560)])
+    assert np.max(density[frequency_hz > 700]) < 1e-4 * inside
+
+
+def test_between_check_and_ramp_there_is_silence(streamed):
+    quiet = streamed.drive_v[streamed.segments["check"].stop + 4000 : streamed.segments["ramp_up"].start]
+    assert quiet.size > 0.2 * RATE_HZ
+    assert np.std(quiet) == pytest.approx(NOISE_V, rel=0.1)
+
+
+def test_the_check_at_low_level_plays_through_the_output(streamed):
+    assert "drive 0.01993 V (0.01993 V expected)" in streamed.log
+    check = streamed.drive_v[streamed.segments["check"]]
+    assert np.max(np.abs(check)) == pytest.approx(0.01 * 2.0 * TERMINAL, rel=0.02)
+    assert streamed.state is RecordingState.COMPLETE
+
+
+def test_two_runs_of_one_plan_play_the_same_and_another_seed_plays_another(tmp_path):
+    short = [
+        PLAN.model_copy(
+            update={"excitation": PLAN.excitation.model_copy(update={"seed": seed, "duration_s": 0.2})}
+        )
+        for seed in (11, 11, 12)
+    ]
+    drives = []
+    with open_bench(RIG) as bench:
+        for number, plan in enumerate(short):
+            path = tmp_path / f"{number}.h5"
+            run_measurement(bench, plan, path, BenchCheck.RECENTLY_PASSED)
+            with open_recording(path) as recording:
+                drives.append(recording.read("drive_voltage"))
+    first, again, another = drives
+    assert np.max(np.abs(first - again)) < 12 * NOISE_V
+    assert abs(np.corrcoef(first, another)[0, 1]) < 0.1
+
+
+def test_an_amplifier_turned_up_is_found_by_the_check_through_the_output(tmp_path):
+    turned = RIG.model_copy(update={"amplifier": RIG.amplifier.model_copy(update={"gain_db": 20.0})})
+    with open_bench(turned) as bench:
+        bench.rig = RIG
+        with pytest.raises(CheckFailed, match="check the amplifier's gain"):
+            run_measurement(bench, PLAN, tmp_path / "run.h5")
+    with open_recording(tmp_path / "run.h5") as recording:
+        assert recording.state is RecordingState.FAILED
+        assert np.max(np.abs(recording.read("drive_voltage"))) < 0.011 * 2.0
