@@ -8,7 +8,7 @@ from .arrays import Complexes, Reals
 from .drive_level import DriveLevel, drive_level
 from .errors import InvalidRequest, NotEnoughData
 from .noise_bias import noise_bias
-from .order_tracking import ORDERS, TrackedOrders, tracked_orders
+from .order_tracking import ALL_ORDERS, TrackedOrders, cycles_needed, order_label, tracked_orders
 from .peaks import peaks
 from .quantity import ConvertedSignal, Quantity, converted_signal
 from .sine_fit import steady_phase
@@ -79,7 +79,7 @@ def dwell_response(
     near_hz: float,
     window_s: float = 5.0,
     towards_hz: tuple[float, ...] = (),
-    orders: tuple[float, ...] = ORDERS,
+    orders: tuple[float, ...] = ALL_ORDERS,
     delay_s: float = 0.0,
 ) -> DwellResponse:
     """Analyse the last seconds of a dwell.
@@ -166,9 +166,14 @@ def _window(displacement: ConvertedSignal, window_s: float) -> slice:
 def _whole_and_parts(
     samples: Reals, phase: Reals, orders: tuple[float, ...]
 ) -> tuple[TrackedOrders, TrackedOrders]:
-    """Fit over the window, and over its tenths, whose scatter holds all that moves, chaos included."""
+    """Fit over the window, and over its tenths, whose scatter holds all that moves, chaos included.
+
+    A window that is too short for ten parts is cut into fewer.
+    """
+    cycles = float(phase[-1] - phase[0]) / (2 * np.pi)
+    blocks = max(2, min(_SCATTER_BLOCKS, int(cycles / (1.05 * cycles_needed(orders)))))
     whole = tracked_orders(samples, phase, interval_samples=samples.size, orders=orders)
-    parts = tracked_orders(samples, phase, interval_samples=samples.size // _SCATTER_BLOCKS, orders=orders)
+    parts = tracked_orders(samples, phase, interval_samples=samples.size // blocks, orders=orders)
     return whole, parts
 
 
@@ -203,9 +208,14 @@ def _order_lines(whole: TrackedOrders, parts: TrackedOrders, drive_hz: float) ->
         omega = 2 * np.pi * drive_hz * order
         size = float(whole.amplitude[index, 0])
         spread = float(np.std(parts.value[index], ddof=1)) / np.sqrt(2 * parts.residual_rms.size)
-        label = f"order {order:g}" if order == int(order) else f"order {round(2 * order)}/2"
         lines.append(
-            Line(label, drive_hz * order, size / omega, spread / omega, _decibel(size / order, reference))
+            Line(
+                order_label(order),
+                drive_hz * order,
+                size / omega,
+                spread / omega,
+                _decibel(size / order, reference),
+            )
         )
     return tuple(lines)
 

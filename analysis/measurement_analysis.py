@@ -17,10 +17,12 @@ from .dwell import DwellResponse, dwell_response
 from .dwell_motion import DwellMotion, dwell_motion
 from .envelope import Envelope, envelope
 from .errors import AnalysisError, NotEnoughData
+from .jumps import Jump, jumps
 from .measurement_checks import Check, measurement_checks
 from .noise_response import Noise, NoiseResponse, noise_response
 from .recorded_channels import Channels, RecordedChannels, only_stretch, read_whole
 from .recording_facts import RecordingFacts, recording_facts, specimen_of
+from .spectrogram import Spectrogram, SpectrogramSums
 from .stepped_response import SteppedResponse, stepped_response
 from .sweep import SweepResponse, SweepSums
 from .terminal_level import TerminalLevel, terminal_levels
@@ -31,6 +33,9 @@ _DWELL_EDGE_PERIODS = 121
 """Drive periods that integration disturbs, both ends together."""
 _SHORTEST_WINDOW_PERIODS = 50
 _BLOCK = 1 << 20
+_RESPONSE = 2
+_SPECTROGRAM_ORDER = 3.2
+"""A spectrogram shows the drive's third harmonic at the sweep's end."""
 _TIME_BINS = 1200
 
 
@@ -53,6 +58,10 @@ class SweepAnalysis:
     excitation: SineSweep
     response: SweepResponse
     collisions: Collisions
+    jumps: tuple[Jump, ...]
+    """Of Response II, between a smooth motion and another."""
+    spectrogram: Spectrogram
+    """Of the recorded velocity."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +116,11 @@ def _analysed(facts: RecordingFacts, channels: Channels) -> RecordingAnalysis:
         case MultisineNoise() | OddMultisine() | StreamedNoise() as noise:
             return NoiseAnalysis(facts, checks, noise, noise_response(channels, noise))
         case SineSweep() as sweep:
-            response = measured_sweep(channels, sweep)
-            return SweepAnalysis(facts, checks, sweep, response, collisions(response))
+            response, picture = measured_sweep(channels, sweep)
+            colliding = collisions(response)
+            return SweepAnalysis(
+                facts, checks, sweep, response, colliding, smooth_jumps(response, colliding), picture
+            )
         case Dwell() as dwell:
             towards_hz = bound_frequencies_hz(facts)
             found = measured_dwell(channels, dwell, towards_hz)
@@ -124,11 +136,19 @@ def bound_frequencies_hz(facts: RecordingFacts) -> tuple[float, ...]:
     return tuple(float(each) for each in specimen_of(facts.bench).bound_frequencies_hz)
 
 
-def measured_sweep(channels: Channels, sweep: SineSweep) -> SweepResponse:
-    """Analyse what there is of a sweep, whichever way it ran."""
+def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, ...]:
+    """Find the jumps of Response II that have a smooth motion on one side."""
+    return jumps(response.time_s, response.frequency_hz, response.response_ii, ~colliding.is_colliding)
+
+
+def measured_sweep(channels: Channels, sweep: SineSweep) -> tuple[SweepResponse, Spectrogram]:
+    """Analyse what there is of a sweep, whichever way it ran, and picture its velocity."""
     stretch = only_stretch(channels, "sweep")
     ends = sorted((sweep.start_hz, sweep.stop_hz))
-    sums = SweepSums(channels.sample_rate_hz, low_hz=ends[0], high_hz=ends[1])
+    rate = channels.sample_rate_hz
+    sums = SweepSums(rate, low_hz=ends[0], high_hz=ends[1])
+    highest_hz = min(_SPECTROGRAM_ORDER * ends[1], 0.5 * rate)
+    picture = SpectrogramSums(rate, stretch.samples, highest_hz=highest_hz)
     for first in range(stretch.start, stretch.stop, _BLOCK):
         last = min(first + _BLOCK, stretch.stop)
         block = channels.read(first, last)
@@ -139,7 +159,8 @@ def measured_sweep(channels: Channels, sweep: SineSweep) -> SweepResponse:
                 "across a hole; measure again"
             )
         sums.add(block)
-    return sums.response(delay_s=channels.response_delay_s)
+        picture.add(block[_RESPONSE])
+    return sums.response(delay_s=channels.response_delay_s), picture.spectrogram()
 
 
 def measured_dwell(channels: Channels, dwell: Dwell, towards_hz: tuple[float, ...]) -> DwellResponse:

@@ -1,6 +1,7 @@
 """Amplitude and phase of a signal at multiples of the drive frequency, interval by interval."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
@@ -9,8 +10,20 @@ from .errors import InvalidRequest, UnusableData
 
 ORDERS = (0.5, 1.0, 1.5, 2.0, 3.0)
 """Impacting systems answer at half orders as well as at whole ones."""
+ALL_ORDERS = (1 / 3, 0.5, 2 / 3, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0)
+"""With thirds and high harmonics: they need intervals of twelve drive cycles."""
 _BATCH_INTERVALS = 256
 """Intervals solved at once: some ten megabytes."""
+
+
+def order_label(order: float) -> str:
+    """Write an order as a reader says it: ``"order 1/3"``, ``"order 2"``."""
+    return f"order {Fraction(order).limit_denominator(12)}"
+
+
+def cycles_needed(orders: tuple[float, ...]) -> float:
+    """Drive cycles that an interval must hold to tell these orders apart."""
+    return 2 / float(min(np.diff((0.0, *sorted(orders)))))
 
 
 @dataclass(frozen=True)
@@ -62,11 +75,11 @@ def tracked_orders(
             f"the signal has {samples.size} samples, less than one interval of {interval_samples}"
         )
     turns = abs(float(phase_rad[count * interval_samples - 1] - phase_rad[0])) / (2 * np.pi) / count
-    spacing = min(np.diff((0.0, *sorted(orders))))
-    if turns * spacing < 2:
+    needed = cycles_needed(orders)
+    if turns < needed:
         raise InvalidRequest(
-            f"an interval of {interval_samples} samples holds {turns:.1f} drive cycles; orders {spacing:g} "
-            f"apart need at least {2 / spacing:g}: use longer intervals or fewer orders"
+            f"an interval of {interval_samples} samples holds {turns:.1f} drive cycles; orders "
+            f"{2 / needed:g} apart need at least {needed:g}: use longer intervals or fewer orders"
         )
     signal = samples[: count * interval_samples].reshape(count, interval_samples)
     phase = phase_rad[: count * interval_samples].reshape(count, interval_samples)

@@ -222,7 +222,7 @@ def equivalent_amplitude(analysis: NoiseAnalysis) -> tuple[float, str]:
 
 
 def _sweep(analysis: SweepAnalysis, channels: SimulatedChannels) -> SweepOverlay:
-    response = measured_sweep(channels, analysis.excitation)
+    response, _ = measured_sweep(channels, analysis.excitation)
     measured = analysis.response
     rising = np.argsort(measured.frequency_hz)
     low, high = sorted((float(measured.frequency_hz[0]), float(measured.frequency_hz[-1])))

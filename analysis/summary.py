@@ -115,6 +115,18 @@ def _sweep(result: SweepResult) -> Json:
         "largest_response_ii": float(found.response_ii[top]),
         "largest_response_ii_at_hz": float(found.frequency_hz[top]),
         "collision_regions": _regions(result.analysis.collisions),
+        "jumps": [
+            {
+                "frequency_hz": each.frequency_hz,
+                "lower_hz": each.lower_hz,
+                "upper_hz": each.upper_hz,
+                "time_s": each.time_s,
+                "before": each.before,
+                "after": each.after,
+                "decibel": each.decibel,
+            }
+            for each in result.analysis.jumps
+        ],
     }
 
 

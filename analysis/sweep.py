@@ -1,16 +1,17 @@
 """What a sine sweep shows: envelope, responses and phase against the frequency really played."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from math import ceil
 
 import numpy as np
 
 from .arrays import Reals
 from .decimation import Decimator, decimation_factor
-from .drive_phase import drive_phase
+from .drive_phase import DrivePhase, drive_phase
 from .errors import InvalidRequest, NotEnoughData
 from .noise_bias import noise_bias
-from .order_tracking import ORDERS, TrackedOrders, tracked_orders
+from .order_tracking import ALL_ORDERS, ORDERS, TrackedOrders, cycles_needed, tracked_orders
 from .quantity import Quantity, converted_signal
 
 _SAMPLES_PER_CYCLE = 24
@@ -19,6 +20,8 @@ _BAND_BELOW = 0.25
 """Displacement is kept down to this part of the lowest drive frequency: half orders pass, drift does not."""
 _BAND_ABOVE = 0.3
 """... and up to this part of the decimated rate, where the decimation is still flat at the band's edge."""
+_ROOM = 1.1
+"""Intervals are longer than orders need by this much: the first one may begin a little below the band."""
 _DRIVE, _BASE, _RESPONSE = range(3)
 _NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
 """Sixth difference, of unit gain for white noise: it removes what is smooth and leaves the noise."""
@@ -40,6 +43,10 @@ class SweepResponse:
     sd_drive_amplitude_m: Reals
     velocity: TrackedOrders
     """The response's velocity at orders of the drive [m/s]."""
+    harmonics: TrackedOrders
+    """Displacement at orders 1/3 to 5 [m], in longer intervals: `harmonics_hz` says where."""
+    harmonics_hz: Reals
+    """Drive frequency in the middle of each of these, shape (longer intervals,)."""
     peak_displacement_m: Reals
     """Largest |x| in the interval [m]."""
     response_i: Reals
@@ -134,13 +141,30 @@ class SweepSums:
             tracked_orders, phase_rad=phase.phase_rad, interval_samples=self._interval, orders=self._orders
         )
         velocity, base = track(data[_RESPONSE]), track(data[_BASE])
-        count = upper.size
-        used = slice(count * self._interval)
-        frequency_hz = phase.frequency_hz[used].reshape(count, self._interval).mean(axis=1)
+        frequency_hz = _means(phase.frequency_hz[: upper.size * self._interval], self._interval)
         noise_density = float(np.median(noise)) / np.sqrt(self._rate_hz * self._factor / 2)
         return self._scaled(
-            data[_RESPONSE], velocity, base, (upper, lower), frequency_hz, noise_density, delay_s
+            data[_RESPONSE],
+            velocity,
+            base,
+            (upper, lower),
+            frequency_hz,
+            self._harmonics(data[_RESPONSE], phase),
+            noise_density,
+            delay_s,
         )
+
+    def _harmonics(self, response: Reals, phase: DrivePhase) -> tuple[TrackedOrders, Reals]:
+        """Displacement at many orders, in intervals that are long enough to tell them apart."""
+        cycles = self._low_hz * self._interval / self._rate_hz
+        longer = self._interval * max(1, ceil(_ROOM * cycles_needed(ALL_ORDERS) / cycles))
+        longer = min(longer, response.size)
+        tracked = tracked_orders(response, phase.phase_rad, interval_samples=longer, orders=ALL_ORDERS)
+        count = tracked.residual_rms.size
+        frequency_hz = _means(phase.frequency_hz[: count * longer], longer)
+        omega = 2 * np.pi * frequency_hz * np.asarray(ALL_ORDERS)[:, np.newaxis]
+        scaled = replace(tracked, value=tracked.value / (1j * omega), sd=tracked.sd / omega)
+        return scaled, frequency_hz
 
     def _scaled(
         self,
@@ -149,6 +173,7 @@ class SweepSums:
         base: TrackedOrders,
         extremes: tuple[Reals, Reals],
         frequency_hz: Reals,
+        harmonics: tuple[TrackedOrders, Reals],
         noise_density: float,
         delay_s: float,
     ) -> SweepResponse:
@@ -183,6 +208,8 @@ class SweepSums:
             drive_amplitude_m=amplitude_m,
             sd_drive_amplitude_m=base.sd[fundamental] / omega**2,
             velocity=velocity,
+            harmonics=harmonics[0],
+            harmonics_hz=harmonics[1],
             peak_displacement_m=peak_m,
             response_i=peak_m / amplitude_m,
             noise_bias_i=bias_m / amplitude_m,
@@ -192,6 +219,10 @@ class SweepSums:
             noise_rms=noise_density * np.sqrt(self._rate_hz / 2),
             interval_s=self._interval / self._rate_hz,
         )
+
+
+def _means(values: Reals, length: int) -> Reals:
+    return np.asarray(values.reshape(-1, length).mean(axis=1))
 
 
 def sweep_response(

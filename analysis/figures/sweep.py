@@ -11,12 +11,14 @@ from ..overlay import SweepOverlay
 from ..sweep import SweepResponse
 from ..tables import Table, table
 from .drawn import DrawnFigure
+from .hysteresis import jumps_text
 from .style import (
     COLLIDING,
     LINEAR,
     MEASURED,
     PREDICTED,
     SIMULATED,
+    TERMINAL,
     legend_above,
     magnitude_axis,
     new_figure,
@@ -126,6 +128,9 @@ def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, w
             linewidth=0.7,
             linestyle=(0, (4, 2)),
         )
+    for number, jump in enumerate(analysis.jumps):
+        named = "jump" if number == 0 else None
+        axes.axvline(jump.frequency_hz, color=TERMINAL, linestyle=":", linewidth=1.0, label=named)
     ends = sorted((float(measured.frequency_hz[0]), float(measured.frequency_hz[-1])))
     axes.set_xlim(*ends)
     magnitude_axis(axes)
@@ -144,6 +149,7 @@ def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
             f"{amplitudes[0]:.3g} µm at the beginning and {amplitudes[-1]:.3g} µm at the end."
         ),
         f"Grey: {regions_text(analysis.collisions)}.",
+        f"Response II has {jumps_text(analysis.jumps)}.",
     ]
     if laid is not None:
         outside = ~analysis.collisions.is_colliding

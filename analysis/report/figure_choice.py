@@ -3,14 +3,16 @@
 from collections.abc import Iterator
 from itertools import groupby
 
-from ..campaign_results import CampaignResults, DwellResult, Result
+from ..campaign_results import CampaignResults, DwellResult, Result, SweepResult
 from ..figures.bench_levels import bench_levels_figure
 from ..figures.drawn import DrawnFigure
 from ..figures.dwells import dwells_figure
 from ..figures.excitation import excitation_figure
+from ..figures.hysteresis import hysteresis_figure
 from ..figures.portraits import portraits_figure
 from ..figures.stepped_sine import stepped_sine_figure
 from ..figures.sweep import sweep_figure
+from ..figures.sweep_orders import sweep_orders_figure
 from ..figures.transmission import transmission_figure
 from ..figures.transmission_levels import transmission_levels_figure
 
@@ -24,12 +26,28 @@ def result_figures(results: CampaignResults) -> Iterator[DrawnFigure]:
         yield transmission_figure(each.analysis, each.laid)
     for sweep in results.sweeps:
         yield sweep_figure(sweep.analysis, sweep.laid)
+        yield sweep_orders_figure(sweep.analysis)
+    for up, down in _there_and_back(results.sweeps):
+        yield hysteresis_figure(up.analysis, down.analysis)
     for _, group in groupby(results.dwells, key=_dwell_frequency):
         dwells = tuple(group)
         yield dwells_figure([(each.analysis, each.laid) for each in dwells])
         yield portraits_figure([each.analysis for each in dwells])
     for stepped in results.stepped:
         yield stepped_sine_figure(stepped.analysis, stepped.laid)
+
+
+def _there_and_back(sweeps: tuple[SweepResult, ...]) -> Iterator[tuple[SweepResult, SweepResult]]:
+    """Pair each sweep upwards with the first one downwards of the same level over some of its band."""
+    for up in sweeps:
+        plan = up.analysis.excitation
+        for down in sweeps:
+            other = down.analysis.excitation
+            is_back = plan.start_hz < plan.stop_hz and other.start_hz > other.stop_hz
+            overlaps = other.stop_hz < plan.stop_hz and other.start_hz > plan.start_hz
+            if is_back and overlaps and plan.amplitude_vpp == other.amplitude_vpp:
+                yield up, down
+                break
 
 
 def _dwell_frequency(result: DwellResult) -> float:

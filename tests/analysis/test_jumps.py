@@ -1,0 +1,100 @@
+"""Jumps of a swept response, put where they are known to be, and those of a hardening specimen."""
+
+import numpy as np
+import pytest
+
+from analysis.errors import InvalidRequest
+from analysis.hysteresis import hysteresis
+from analysis.jumps import jumps
+from analysis.sweep import sweep_response
+from sim.condensation import structure_of
+from sim.drive import LinearSweep
+from sim.first_order_balance import jump_frequencies
+from sim.integrate import integrate
+from sim.restoring_force import spring_of
+from sim.specimen import gong2025
+
+TIME_S = 0.1 * np.arange(2000)
+FREQUENCY_HZ = 150 + TIME_S
+BAND_HZ = (92.0, 108.0)
+
+
+def response(at_hz, decibel, noise, seed=0):
+    smooth = 2 + np.sin(TIME_S / 40)
+    stepped = smooth * np.where(at_hz <= FREQUENCY_HZ, 10 ** (decibel / 20), 1)
+    return stepped * np.exp(noise * np.random.default_rng(seed).standard_normal(TIME_S.size))
+
+
+@pytest.mark.parametrize("decibel", [-10.0, 3.0])
+@pytest.mark.parametrize("noise", [1e-3, 0.02])
+def test_the_bounds_hold_the_jump_and_nothing_else_is_found(decibel, noise):
+    for seed in range(10):
+        at_hz = np.random.default_rng(seed).uniform(180, 320)
+        found = jumps(TIME_S, FREQUENCY_HZ, response(at_hz, decibel, noise, seed))
+        assert len(found) == 1
+        assert found[0].lower_hz <= at_hz <= found[0].upper_hz
+        assert found[0].upper_hz - found[0].lower_hz < 1
+        assert found[0].decibel == pytest.approx(decibel, abs=0.7)
+
+
+def test_a_steep_resonance_and_noise_are_no_jumps():
+    resonance = 1 / np.abs(1 - (FREQUENCY_HZ / 266) ** 2 + 0.02j * FREQUENCY_HZ / 266)
+    noise = np.random.default_rng(1).standard_normal(TIME_S.size)
+    assert jumps(TIME_S, FREQUENCY_HZ, resonance * np.exp(0.01 * noise)) == ()
+    assert jumps(TIME_S, FREQUENCY_HZ, np.exp(0.3 * noise)) == ()
+
+
+def test_a_leap_between_two_rough_sides_is_not_a_jump():
+    rough = np.zeros(TIME_S.size, dtype=bool)
+    assert jumps(TIME_S, FREQUENCY_HZ, response(250.0, -10, 0.01), rough) == ()
+    half = FREQUENCY_HZ < 250
+    assert len(jumps(TIME_S, FREQUENCY_HZ, response(250.0, -10, 0.01), half)) == 1
+
+
+def test_rows_of_different_length_are_refused():
+    with pytest.raises(InvalidRequest, match="equally long"):
+        jumps(TIME_S, FREQUENCY_HZ[1:], TIME_S)
+
+
+@pytest.fixture(scope="module")
+def hardening():
+    """Sweeps up and down through the first resonance of the specimen whose stops are a cubic spring."""
+    specimen, amplitude_m, rate = gong2025(contact="power:3"), 2e-8, 4096.0
+    found = []
+    for start_hz, stop_hz in (BAND_HZ, BAND_HZ[::-1]):
+        drive = LinearSweep(start_hz, stop_hz, 40.0, amplitude_m)
+        run = integrate(specimen, drive, 40.0, sample_rate_hz=rate)
+        phase = 2 * np.pi * (start_hz * run.time_s + 0.5 * (stop_hz - start_hz) / 40.0 * run.time_s**2)
+        omega = 2 * np.pi * (start_hz + (stop_hz - start_hz) / 40.0 * run.time_s)
+        base = -amplitude_m * omega**2 * np.sin(phase)
+        low, high = BAND_HZ
+        found.append(
+            sweep_response(
+                np.sin(phase), base, run.states[:, 3], rate, low_hz=low, high_hz=high, interval_s=0.2
+            )
+        )
+    return specimen, amplitude_m, found
+
+
+def test_a_hardening_specimen_jumps_down_where_its_branch_folds_and_later_than_it_jumps_up(hardening):
+    specimen, amplitude_m, (up, down) = hardening
+    folds = jump_frequencies(structure_of(specimen), spring_of(specimen), amplitude_m, *BAND_HZ)
+    up_jumps = jumps(up.time_s, up.frequency_hz, up.response_ii)
+    down_jumps = jumps(down.time_s, down.frequency_hz, down.response_ii)
+    assert len(up_jumps) == len(down_jumps) == 1
+    # Up, the motion leaves the upper fold late: half a hertz per second against a slow escape.
+    assert up_jumps[0].frequency_hz == pytest.approx(folds[-1], rel=0.02)
+    assert up_jumps[0].decibel < 0 < down_jumps[0].decibel
+    found = hysteresis(up, down, up_jumps, down_jumps)
+    ((width, low, high),) = found.widths_hz
+    assert low <= width <= high
+    assert width == pytest.approx(folds[-1] - folds[0], abs=1.5)
+    between = (found.frequency_hz > folds[0] + 1) & (found.frequency_hz < folds[-1] - 1)
+    assert found.differs[between].all()
+    assert not found.differs[found.frequency_hz > folds[-1] + 3].any()
+
+
+def test_hysteresis_needs_both_directions(hardening):
+    _, _, (up, down) = hardening
+    with pytest.raises(InvalidRequest, match="in this order"):
+        hysteresis(down, up, (), ())
