@@ -56,8 +56,9 @@ class Bench:
 
     @property
     def identities(self) -> dict[str, Identity]:
-        """Who answered: ``"generator"`` and ``"digitizer"``."""
-        return {"generator": self.generator.identity, "digitizer": self.digitizer.identity}
+        """Who answered: ``"generator"``, ``"digitizer"``, and ``"output"`` where there is one."""
+        identities = {"generator": self.generator.identity, "digitizer": self.digitizer.identity}
+        return identities if self.output is None else {**identities, "output": self.output.identity}
 
     @property
     def reality(self) -> Reality:

@@ -116,6 +116,10 @@ class AnalogOutput(Protocol):
     """An output that streams samples written ahead of their time, from the digitizer's start on."""
 
     @property
+    def identity(self) -> Identity:
+        """Product, serial, driver version."""
+
+    @property
     def sample_rate_hz(self) -> float:
         """The rate that the hardware really runs at."""
 

@@ -13,6 +13,7 @@ from ..instruments import Block, Identity, Overload, Samples
 from ..rig.channel import Channel, channels_of
 from ..rig.configuration import DaqConfig, Rig
 from .daqmx_errors import NOT_OFFERED, daqmx_call
+from .daqmx_identity import daqmx_identity
 from .daqmx_inputs import InputScaling, add_input
 from .daqmx_session import DaqmxSession, daqmx_session
 from .overload_ranges import overload_ranges
@@ -185,23 +186,13 @@ class DaqmxDigitizer:
         self._reader = AnalogMultiChannelReader(task.in_stream)
 
     def _identify(self) -> Identity:
-        system = self._session.system()
-        device = system.devices[self._config.device]
-        product, serial = str(device.product_type), f"{device.serial_num:08X}"
-        if _plain(product) != _plain(self._config.product):
+        identity = daqmx_identity(self._session, self._config.device)
+        if _plain(identity.model) != _plain(self._config.product):
             raise ConfigurationError(
-                f"{self._config.device} on {self._session.place} is a {product}, and daq.product says "
+                f"{self._config.device} on {self._session.place} is a {identity.model}, and daq.product says "
                 f"{self._config.product!r}. Nothing was reserved; correct daq.device or daq.product"
             )
-        version = system.driver_version
-        driver = f"NI-DAQmx {version.major_version}.{version.minor_version}.{version.update_version}"
-        return Identity(
-            "National Instruments",
-            product,
-            serial,
-            driver,
-            f"{self._config.device}: {product}, {serial}, {driver}",
-        )
+        return identity
 
     def _open_task(self) -> Task:
         if self._task is None:

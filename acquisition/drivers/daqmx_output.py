@@ -1,6 +1,7 @@
 """An analogue output that streams samples ahead of time, never repeats old ones, and ends at zero."""
 
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
@@ -9,10 +10,11 @@ from nidaqmx.constants import AcquisitionType, RegenerationMode, TaskMode
 from nidaqmx.stream_writers import AnalogSingleChannelWriter
 
 from ..errors import DataLost, InstrumentError, InstrumentLost, LimitExceeded, SettingRefused
-from ..instruments import Samples
+from ..instruments import Identity, Samples
 from ..rig.configuration import OutputConfig
 from .daqmx import DaqmxDigitizer
 from .daqmx_errors import daqmx_call
+from .daqmx_identity import daqmx_identity
 
 _WRITE_TIMEOUT_S = 10.0
 # The last of them is what the output holds; some devices want more than one.
@@ -60,6 +62,14 @@ class DaqmxOutput:
         output._to_zero()
         output._reserve()
         return output
+
+    @property
+    def identity(self) -> Identity:
+        """Which module it belongs to, and which of its outputs it is."""
+        device, _, _ = self._physical.rpartition("/")
+        with daqmx_call(f"identifying {self._physical}"):
+            module = daqmx_identity(self._digitizer.session, device)
+        return replace(module, reply=f"{self._physical} of {module.reply}")
 
     @property
     def sample_rate_hz(self) -> float:

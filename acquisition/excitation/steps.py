@@ -58,15 +58,6 @@ class Stream:
 Play: TypeAlias = Tone | Waveform | Stream
 
 
-def is_stream(play: Play) -> bool:
-    """Whether only an analogue output can play it, since it never repeats."""
-    match play:
-        case Stream():
-            return True
-        case Tone() | Waveform():
-            return False
-
-
 @dataclass(frozen=True)
 class Segment:
     """A named stretch of the recording that belongs together in the analysis."""

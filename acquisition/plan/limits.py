@@ -7,12 +7,12 @@ from enum import StrEnum
 import numpy as np
 
 from ..errors import LimitExceeded
-from ..excitation.steps import is_stream
 from ..rig.channel import channels_of
 from ..rig.configuration import OutputConfig, Rig, Role
 from ..rig.model import Quantity, suspended_mass_kg
 from .loads import predicted_loads
 from .measurement import Measurement
+from .player import Player, player_of
 
 RAMP_PERIODS = 3.0
 """A ramp must take this many periods of the shaker's suspension, or it shakes like a step."""
@@ -127,7 +127,7 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
         f"{USABLE_BANDWIDTH:g} of the sample rate",
         "lower the frequency or raise sample_rate_hz",
     )
-    if rig.daq.output is not None and any(is_stream(step.play) for step in excitation.steps()):
+    if rig.daq.output is not None and player_of(measurement, rig) is Player.OUTPUT:
         yield from _streaming(measurement, rig, rig.daq.output)
     yield LimitCheck(
         "the ramp",

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Iterator
 from typing import Protocol
 
 from ..errors import ConfigurationError
-from ..excitation.steps import is_stream
 from ..plan.measurement import Measurement
+from ..plan.player import Player, player_of
 from .bench_protocol import RunBench
 from .generator_drive import GeneratorDrive
 from .schedule import Phase
@@ -18,6 +18,10 @@ class Drive(Protocol):
     A drive never waits: it says how long to read before it has something to do again, and samples
     read are the only clock. What comes next is told beforehand, since some drives write it ahead.
     """
+
+    @property
+    def player(self) -> Player:
+        """The instrument that is heard."""
 
     @property
     def pause_s(self) -> float:
@@ -56,12 +60,14 @@ def drive_for(bench: RunBench, measurement: Measurement) -> Drive:
         When it needs an analogue output and the bench has none.
 
     """
-    if not any(is_stream(step.play) for step in measurement.excitation.steps()):
-        return GeneratorDrive(bench.generator, measurement)
-    if bench.output is None:
-        raise ConfigurationError(
-            "streamed noise needs an analogue output, and this bench has none: its function generator "
-            "repeats one waveform. Nothing was played; add [daq.output] to the hardware configuration, or "
-            "use multisine_noise with more realisations"
-        )
-    return StreamDrive(bench.output, measurement, bench.rig.generator.terminal_factor())
+    match player_of(measurement, bench.rig), bench.output:
+        case Player.GENERATOR, _:
+            return GeneratorDrive(bench.generator, measurement)
+        case Player.OUTPUT, None:
+            raise ConfigurationError(
+                "streamed noise needs an analogue output, and this bench has none: its function generator "
+                "repeats one waveform. Nothing was played; add [daq.output] to the hardware configuration, "
+                "or use multisine_noise with more realisations"
+            )
+        case Player.OUTPUT, output:
+            return StreamDrive(output, measurement, bench.rig.generator.terminal_factor())

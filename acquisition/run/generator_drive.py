@@ -10,6 +10,7 @@ from ..excitation.plan import LOWEST_AMPLITUDE_VPP
 from ..excitation.steps import Play, Stream, Tone, Waveform
 from ..instruments import FunctionGenerator
 from ..plan.measurement import Measurement
+from ..plan.player import Player
 from .schedule import Phase, half_cosine, stairs
 from .state import RunState
 
@@ -21,6 +22,7 @@ the smallest setting that the generator takes."""
 class GeneratorDrive:
     """A `Drive` whose commands take effect when they are given: each phase is commanded as it begins."""
 
+    player = Player.GENERATOR
     pause_s = 0.0
     """A generator need not know what is coming."""
 

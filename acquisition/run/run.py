@@ -153,6 +153,7 @@ class Run:
             raise
 
     def _played(self, tape: Tape) -> Iterator[Progress]:
+        tape.log("player", self._drive.player.value)
         match self._bench_check:
             case BenchCheck.AT_LOW_LEVEL:
                 self._begin(check_phases(self._measurement))

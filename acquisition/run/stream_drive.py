@@ -10,6 +10,7 @@ from ..errors import AcquisitionError
 from ..excitation.steps import Tone
 from ..instruments import AnalogOutput
 from ..plan.measurement import Measurement
+from ..plan.player import Player
 from .schedule import Phase, half_cosine
 from .score import Score
 from .tape import BLOCK_S
@@ -27,6 +28,8 @@ class StreamDrive:
     in front of the output is known without asking the device. What was written cannot be taken back,
     so breaking off takes effect after at most that long.
     """
+
+    player = Player.OUTPUT
 
     def __init__(self, output: AnalogOutput, measurement: Measurement, terminal_factor: float) -> None:
         """``terminal_factor``: volts that the generator's terminal would show per volt of setting."""

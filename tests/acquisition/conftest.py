@@ -132,6 +132,7 @@ class LoopbackGenerator:
 class LoopbackOutput:
     """An AnalogOutput that keeps what it was given, with room for half a second, and fails when told to."""
 
+    identity = Identity("MAKER", "OUTPUT", "3", "1.0", "OUTPUT")
     sample_rate_hz = SAMPLE_RATE_HZ
     ahead_samples = 2560
 

@@ -9,6 +9,7 @@ import pytest
 from acquisition.drivers.daqmx import DaqmxDigitizer
 from acquisition.drivers.daqmx_output import DaqmxOutput
 from acquisition.errors import (
+    ConfigurationError,
     DataLost,
     InstrumentBusy,
     InstrumentError,
@@ -167,6 +168,24 @@ def test_a_rate_that_the_output_coerces_is_refused_and_nothing_stays_reserved(di
     DaqmxOutput.open("Dev2/ao0", CONFIG.model_copy(update={"sample_rate_hz": 12_500.0}), digitizer).close()
 
 
+@pytest.mark.parametrize(
+    ("physical", "changes", "kind", "said"),
+    [
+        ("Dev1/ao7", {}, ConfigurationError, r"Dev1/ao7 .*no such channel"),
+        ("Dev9/ao0", {}, ConfigurationError, r"Dev9/ao0 .*no device of that name"),
+        ("Dev1/ao0", {"limit_v": 5.0}, ConfigurationError, r"not support .*range.*-3\.5 to 3\.5 V"),
+        ("Dev1/ao0", {"sample_rate_hz": 2e5}, ConfigurationError, r"not support a rate.*1000 to 96000"),
+    ],
+)
+def test_an_output_that_the_device_does_not_have_is_refused_in_one_sentence(
+    digitizer, physical, changes, kind, said
+):
+    with pytest.raises(kind, match=said) as failure:
+        DaqmxOutput.open(physical, CONFIG.model_copy(update=changes), digitizer)
+    assert "\n" not in str(failure.value)
+    opened_output(digitizer).close()  # nothing stayed reserved
+
+
 def test_a_server_that_is_gone_leaves_an_output_that_may_still_play_and_says_so(digitizer, output, virtual):
     output.write(np.full(6400, 1.0))
     output.arm()
@@ -181,3 +200,5 @@ def test_a_server_that_is_gone_leaves_an_output_that_may_still_play_and_says_so(
 def test_the_driver_keeps_the_promises_of_an_analogue_output(output):
     promised: AnalogOutput = output
     assert (promised.sample_rate_hz, promised.ahead_samples) == (RATE_HZ, 6400)
+    assert promised.identity.model == "USB-4431"
+    assert promised.identity.reply.startswith("Dev1/ao0 of Dev1: USB-4431")

@@ -17,8 +17,8 @@ def test_every_configuration_that_we_ship_is_valid(path):
     assert load_rig(path).name
 
 
-def edited(tmp_path: Path, old: str, new: str) -> Path:
-    text = VIRTUAL.read_text(encoding="utf-8")
+def edited(tmp_path: Path, old: str, new: str, shipped: Path = VIRTUAL) -> Path:
+    text = shipped.read_text(encoding="utf-8")
     assert old in text
     path = tmp_path / "bench.toml"
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
@@ -50,6 +50,34 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
 def test_a_wrong_configuration_is_refused_with_its_key(tmp_path, old, new, said):
     with pytest.raises(ConfigurationError, match=said):
         load_rig(edited(tmp_path, old, new))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('physical = "ao0"', 'physical = "ai0"', r"daq\.output\.physical = 'ai0': .*match pattern"),
+        ("limit_v = 3.5\n", "", r"daq\.output\.limit_v is missing"),
+        ("limit_v = 3.5", "limit_v = 35.0", r"daq\.output\.limit_v = 35\.0: .*less than or equal to 10"),
+        ("limit_v = 3.5", "limit_v = -1.0", r"daq\.output\.limit_v = -1\.0: .*greater than 0"),
+        ("ahead_s = 0.5", "ahead_s = 0.05", r"daq\.output\.ahead_s = 0\.05: .*greater than or equal to 0\.3"),
+        ("ahead_s = 0.5", "ahead_s = 60", r"daq\.output\.ahead_s = 60: .*less than or equal to 5"),
+        ("ahead_s = 0.5", "ahead = 0.5", r"daq\.output\.ahead is not a known key"),
+        (
+            'plays = "tones_and_streams"',
+            'plays = "all"',
+            r"daq\.output\.plays = 'all': .*'streams' or 'tones_and_streams'",
+        ),
+        (
+            "sample_rate_hz = 51200\n# What",
+            "sample_rate_hz = 0\n# What",
+            r"output\.sample_rate_hz = 0: .*0",
+        ),
+    ],
+)
+def test_a_wrong_output_is_refused_with_its_key(tmp_path, old, new, said):
+    with pytest.raises(ConfigurationError, match=said) as failure:
+        load_rig(edited(tmp_path, old, new, CONFIGS / "virtual_rig_streaming.toml"))
+    assert "\n" not in str(failure.value)
 
 
 def test_a_missing_file_is_refused_with_its_path(tmp_path):

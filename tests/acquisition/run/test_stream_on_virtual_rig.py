@@ -10,10 +10,11 @@ from scipy.signal import welch
 from acquisition.bench import open_bench
 from acquisition.check.low_level import BenchCheck
 from acquisition.errors import CheckFailed
+from acquisition.excitation.sine_sweep import Hold, SineSweep
 from acquisition.excitation.streamed_noise import StreamedNoise
 from acquisition.plan.measurement import Measurement
 from acquisition.recording import RecordingState, open_recording
-from acquisition.rig.configuration import load_rig
+from acquisition.rig.configuration import OutputUse, load_rig
 from acquisition.run.run_measurement import run_measurement
 from acquisition.run.state import RunState
 from acquisition.virtual.world.decimation import GROUP_DELAY_SAMPLES
@@ -55,6 +56,7 @@ class Streamed:
     segments: dict[str, slice]
     state: RecordingState
     log: str
+    output: str
 
 
 @pytest.fixture(scope="module", params=["free", "wall"])
@@ -69,6 +71,7 @@ def streamed(request, tmp_path_factory):
             {each.label: slice(each.start, each.stop) for each in recording.segments},
             recording.state,
             " ".join(event.text for event in recording.events),
+            recording.instruments["output"].reply,
         )
 
 
@@ -143,6 +146,11 @@ def test_the_check_at_low_level_plays_through_the_output(streamed):
     assert streamed.state is RecordingState.COMPLETE
 
 
+def test_the_recording_says_what_played(streamed):
+    assert "analogue output" in streamed.log
+    assert streamed.output.startswith("Dev1/ao0 of Dev1: USB-4431")
+
+
 def test_two_runs_of_one_plan_play_the_same_and_another_seed_plays_another(tmp_path):
     short = [
         PLAN.model_copy(
@@ -160,6 +168,33 @@ def test_two_runs_of_one_plan_play_the_same_and_another_seed_plays_another(tmp_p
     first, again, another = drives
     assert np.max(np.abs(first - again)) < 12 * NOISE_V
     assert abs(np.corrcoef(first, another)[0, 1]) < 0.1
+
+
+def test_a_sweep_is_streamed_without_a_break_in_phase_or_amplitude(tmp_path):
+    sweep = SineSweep(
+        amplitude_vpp=1.0, start_hz=150, stop_hz=350, duration_s=1.0, step_s=0.0123, settle_s=0.2,
+        hold=Hold.DISPLACEMENT,
+    )  # fmt: skip
+    output = RIG.daq.output.model_copy(update={"plays": OutputUse.TONES_AND_STREAMS})
+    plan = PLAN.model_copy(update={"excitation": sweep})
+    with open_bench(RIG.model_copy(update={"daq": RIG.daq.model_copy(update={"output": output})})) as bench:
+        run_measurement(bench, plan, tmp_path / "run.h5", BenchCheck.RECENTLY_PASSED)
+    with open_recording(tmp_path / "run.h5") as recording:
+        drive = recording.read("drive_voltage")
+        (swept,) = [each for each in recording.segments if each.label == "sweep"]
+    # The phase is the sum of the frequencies, from the ramp on; every change lies on the nearest sample.
+    steps = list(sweep.steps())
+    ends = np.cumsum([plan.ramp_s + steps[0].duration_s, *(step.record_s for step in steps[1:])])
+    ends = np.round(ends * RATE_HZ).astype(int)
+    counts = np.diff(ends, prepend=0)
+    counts[-1] += round(plan.ramp_s * RATE_HZ)
+    cycles = np.cumsum(np.repeat([step.play.frequency_hz for step in steps], counts)) / RATE_HZ
+    level = np.repeat([step.play.level for step in steps], counts)
+    expected = 0.5 * TERMINAL * level * np.sin(2 * np.pi * np.concatenate([[0.0], cycles[:-1]]))
+    inside = slice(swept.start + 200, swept.stop - 200)
+    left = drive[inside] - delayed(expected, DELAY)[inside]
+    assert np.sqrt(np.mean(left**2)) < 2 * NOISE_V
+    assert np.max(np.abs(left)) < 1e-3
 
 
 def test_an_amplifier_turned_up_is_found_by_the_check_through_the_output(tmp_path):

@@ -1,0 +1,59 @@
+"""Sines are the generator's unless an output is plugged in for them; streams are always the output's."""
+
+import pytest
+
+from acquisition.excitation.dwell import Dwell
+from acquisition.excitation.multisine_noise import MultisineNoise
+from acquisition.excitation.sine_sweep import SineSweep
+from acquisition.excitation.stepped_sine import SteppedSine
+from acquisition.excitation.streamed_noise import StreamedNoise
+from acquisition.plan.limits import limit_checks
+from acquisition.plan.measurement import Measurement
+from acquisition.plan.player import Player, player_of
+from acquisition.rig.configuration import OutputConfig, OutputUse
+
+STREAM = StreamedNoise(amplitude_vpp=1, band_start_hz=50, band_stop_hz=600, duration_s=1)
+TONES = [
+    Dwell(amplitude_vpp=1, frequency_hz=260, duration_s=1),
+    SineSweep(amplitude_vpp=1, start_hz=150, stop_hz=350, duration_s=1),
+    SteppedSine(amplitude_vpp=1, frequencies_hz=(100, 200), record_s=1),
+]
+WAVEFORM = MultisineNoise(amplitude_vpp=1, band_start_hz=20, band_stop_hz=800, realisations=1, periods=1)
+
+
+def with_output(rig, plays):
+    output = OutputConfig(physical="ao0", limit_v=0.3, sample_rate_hz=51200, plays=plays, source="the test")
+    return rig.model_copy(update={"daq": rig.daq.model_copy(update={"output": output})})
+
+
+def player(excitation, rig):
+    return player_of(Measurement(name="m", excitation=excitation), rig)
+
+
+@pytest.mark.parametrize("tone", TONES, ids=lambda tone: tone.kind)
+def test_a_sine_is_played_by_the_output_only_where_it_is_plugged_in_for_sines(rig, tone):
+    assert player(tone, rig) is Player.GENERATOR
+    assert player(tone, with_output(rig, OutputUse.STREAMS)) is Player.GENERATOR
+    assert player(tone, with_output(rig, OutputUse.TONES_AND_STREAMS)) is Player.OUTPUT
+
+
+@pytest.mark.parametrize("plays", list(OutputUse))
+def test_a_stream_is_played_by_the_output_and_a_waveform_by_the_generator(rig, plays):
+    assert player(STREAM, with_output(rig, plays)) is Player.OUTPUT
+    assert player(WAVEFORM, with_output(rig, plays)) is Player.GENERATOR
+
+
+def test_a_stream_needs_an_output_also_on_a_rig_without_one(rig):
+    assert player(STREAM, rig) is Player.OUTPUT
+
+
+def test_the_outputs_limit_counts_for_what_it_plays_and_for_nothing_else(rig):
+    measurement = Measurement(name="m", excitation=TONES[0])
+    named = "the analogue output's voltage (peak)"
+    by_generator = limit_checks(measurement, with_output(rig, OutputUse.STREAMS))
+    assert named not in [check.what for check in by_generator]
+    by_output = limit_checks(measurement, with_output(rig, OutputUse.TONES_AND_STREAMS))
+    (check,) = [check for check in by_output if check.what == named]
+    assert not check.is_kept
+    assert check.value == pytest.approx(0.5 * rig.generator.terminal_factor())
+    assert check.limit == 0.3
