@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 from distributed import CancelledError, Client, Future
+from distributed.comm import get_address_host_port
 
 from ..scene import Scene, solve_scene
 from .errors import ClusterLost
@@ -151,6 +152,8 @@ class ClusterExecutor:
 
 def _connected(address: str, patience_s: float) -> Client:
     try:
+        # Asked first: a client that was begun with an address of another form cannot be closed again.
+        get_address_host_port(address)
         return Client(address, timeout=patience_s, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ClusterLost(

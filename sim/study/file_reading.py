@@ -93,7 +93,9 @@ def _opened(path: Path) -> Iterator[h5py.File]:
     if not path.is_file():
         raise StudyError(f"{path} does not exist, or is no file; give the path of a study's file.")
     try:
-        file = h5py.File(path, "r", locking=False)
+        # With HDF5's usual lock, which the writer's allows: a process that has the file open elsewhere, in
+        # xarray for example, cannot open it with another one.
+        file = h5py.File(path, "r")
     except OSError as error:
         raise StudyError(
             f"{path} is no readable HDF5 file ({error}); give the path of a study's file."

@@ -27,6 +27,10 @@ MOST_POINTS = 10_000_000
 """A file of 2 GB: a range that asks for more is a slip of the pen."""
 
 
+ANY_GAP_M = 1e-5
+"""For asking whether a model's name is known, which depends on no gap."""
+
+
 class Start(StrEnum):
     """The state from which a point begins."""
 
@@ -61,6 +65,13 @@ def _ascending(values: Numbers) -> Numbers:
     return values
 
 
+def _known(model: str) -> str:
+    """Refuse a name that no structure would understand, with its key."""
+    Structure().specimen(model, damping_time_s=0.0, gap_m=ANY_GAP_M)
+    return model
+
+
+Model = Annotated[str, AfterValidator(_known)]
 Positive = Annotated[tuple[PositiveFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
 NotNegative = Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
 Frequencies = Annotated[Positive, BeforeValidator(listed)]
@@ -79,7 +90,7 @@ class Study(BaseModel):
     """A list, or a table with start, stop and step, or several of these in a list."""
     amplitudes_m: Positive
     """Amplitudes of the base displacement."""
-    models: Annotated[tuple[str, ...], Field(min_length=1)] = ("hertz",)
+    models: Annotated[tuple[Model, ...], Field(min_length=1)] = ("hertz",)
     """Contact laws as `sim.model_name` spells them."""
     damping_times_s: NotNegative = (2e-5,)
     """c_i = damping time * k_i."""

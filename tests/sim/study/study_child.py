@@ -10,7 +10,7 @@ STUDY = Study(
     frequencies_hz={"start": 180.0, "stop": 300.0, "step": 2.0},
     amplitudes_m=(2e-6, 5e-6, 10e-6),
     starts=("rest", "up"),
-    duration_s=4.0,
+    duration_s=2.0,
     window_s=1.0,
 )
 

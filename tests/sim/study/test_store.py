@@ -193,7 +193,7 @@ def test_two_runs_cannot_write_one_file_and_anybody_may_read_it_meanwhile(small,
             FileStore(path, small)
         with h5py.File(path, "r") as file:
             assert file[STATE].shape == small.grid.shape
-        assert not open_study(path).is_complete
+            assert not open_study(path).is_complete
     FileStore(path, small).close()
 
 

@@ -1,0 +1,122 @@
+"""`vibench study` as a user meets it: a file of answers, one sentence for each error, Ctrl-C, resume."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sim.study.layout import PointState
+from sim.study.results import open_study
+from sim.study.study import Study
+
+ROOT = Path(__file__).resolve().parents[2]
+SMALL = """
+amplitudes_m = [1e-6, 20e-6]
+frequencies_hz = { start = 200, stop = 260, step = 30 }
+starts = ["rest", "up"]
+duration_s = 0.5
+window_s = 0.2
+"""
+LONG = """
+amplitudes_m = [20e-6]
+frequencies_hz = { start = 200, stop = 210, step = 0.01 }
+duration_s = 2.0
+window_s = 1.0
+"""
+LONG_POINTS = 1001
+
+
+def plan(folder, text=SMALL):
+    path = folder / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(vibench, tmp_path):
+    asked = plan(tmp_path)
+    first = vibench("study", asked, "--out", "a.h5", "--json", cwd=tmp_path)
+    assert first.returncode == 0, first.stderr
+    said = json.loads(first.stdout)
+    assert (said["points"], said["kept"], said["failures"]) == (12, 12, [])
+    results = open_study(tmp_path / "a.h5")
+    assert np.all(results.state == PointState.DONE)
+    assert results.values("response_i", amplitude=20e-6, frequency=230.0).shape == (1, 1, 1, 2)
+    before = (tmp_path / "a.h5").read_bytes()
+    second = vibench("study", asked, "--out", "a.h5", cwd=tmp_path)
+    assert second.returncode == 1
+    assert "a.h5 exists, and nothing is ever overwritten; resume it" in second.stderr
+    resumed = vibench("study", asked, "--out", "a.h5", "--resume", "--workers", "1", cwd=tmp_path)
+    assert resumed.returncode == 0, resumed.stderr
+    assert "12 of 12 points, 0 failed (complete)" in resumed.stdout
+    assert (tmp_path / "a.h5").read_bytes() == before
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C cannot be sent to one process there")
+def test_ctrl_c_keeps_what_is_computed_and_resume_goes_on(vibench, tmp_path):
+    asked = plan(tmp_path, LONG)
+    running = subprocess.Popen(
+        [sys.executable, "-m", "cli", "study", str(asked), "--out", "a.h5"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    try:
+        while running.poll() is None and not some_kept(tmp_path / "a.h5"):
+            pass
+        running.send_signal(signal.SIGINT)
+        out, _ = running.communicate(timeout=60)
+    finally:
+        running.kill()
+    assert running.returncode == 3
+    assert b"stopped: go on with --resume" in out
+    kept = open_study(tmp_path / "a.h5").kept
+    assert 0 < kept < LONG_POINTS
+    resumed = vibench("study", asked, "--out", "a.h5", "--resume", cwd=tmp_path)
+    assert resumed.returncode == 0, resumed.stderr
+    results = open_study(tmp_path / "a.h5")
+    assert results.is_complete
+    assert np.count_nonzero(results.values("session") == 0.0) == kept
+
+
+def some_kept(path):
+    """Whether a file that is being made holds an answer."""
+    return path.exists() and path.stat().st_size > 0 and open_study(path).kept > 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("window_s = 0.2", "windows_s = 0.2", "windows_s is not a known key"),
+        ("duration_s = 0.5", 'models = ["herz"]', "models.0 = 'herz': contact 'herz' is not known"),
+    ],
+)
+def test_a_wrong_study_is_one_sentence_and_makes_no_file(vibench, tmp_path, old, new, said):
+    assert old in SMALL
+    result = vibench("study", plan(tmp_path, SMALL.replace(old, new)), "--out", "a.h5", cwd=tmp_path)
+    assert result.returncode == 1
+    assert said in result.stderr
+    assert "Traceback" not in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "a.h5").exists()
+
+
+def test_a_cluster_that_does_not_answer_is_one_sentence_and_makes_no_file(vibench, tmp_path):
+    pytest.importorskip("distributed", reason="a cluster needs the extra 'cluster'")
+    result = vibench("study", plan(tmp_path), "--out", "a.h5", "--cluster", "nonsense:what", cwd=tmp_path)
+    assert result.returncode == 1
+    assert "No Dask scheduler answers at 'nonsense:what'" in result.stderr
+    assert "Traceback" not in result.stderr
+    assert not (tmp_path / "a.h5").exists()
+
+
+@pytest.mark.parametrize("shipped", sorted((ROOT / "studies").glob("*.toml")), ids=lambda path: path.name)
+def test_every_study_that_is_shipped_is_allowed(shipped):
+    asked = Study.model_validate(tomllib.loads(shipped.read_text(encoding="utf-8")))
+    assert asked.grid.size > 0
