@@ -19,7 +19,7 @@ from .store import Store
 from .study import Study
 
 BUNDLE_S = 0.05
-"""Worker time worth a trip to a worker and back, which costs about a millisecond on a cluster."""
+"""Worker time worth a trip to a worker and back, which costs a few milliseconds on a cluster."""
 MOST_IN_BUNDLE = 64
 """Answers that may be lost together with their worker."""
 SHARE = 8
