@@ -88,6 +88,7 @@ def _cluster_executor(address: str) -> Executor:
         from .cluster import ClusterExecutor  # noqa: PLC0415 - Dask is optional, and slow to import
     except ModuleNotFoundError as error:
         raise ClusterLost(
-            f"A cluster needs Dask, and {error.name} is not installed; install vibench with its extra 'cluster'."
+            f"A cluster needs Dask, and {error.name} is not installed;"
+            " install vibench with its extra 'cluster'."
         ) from error
     return ClusterExecutor(address)

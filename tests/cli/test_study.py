@@ -30,6 +30,8 @@ duration_s = 2.0
 window_s = 1.0
 """
 LONG_POINTS = 1001
+COMPILING_S = 300
+"""For whoever runs the first of these tests after a change of the simulation."""
 
 
 def plan(folder, text=SMALL):
@@ -38,9 +40,10 @@ def plan(folder, text=SMALL):
     return path
 
 
+@pytest.mark.timeout(COMPILING_S)
 def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(vibench, tmp_path):
     asked = plan(tmp_path)
-    first = vibench("study", asked, "--out", "a.h5", "--json", cwd=tmp_path)
+    first = vibench("study", asked, "--out", "a.h5", "--json", cwd=tmp_path, timeout_s=COMPILING_S)
     assert first.returncode == 0, first.stderr
     said = json.loads(first.stdout)
     assert (said["points"], said["kept"], said["failures"]) == (12, 12, [])
@@ -57,6 +60,7 @@ def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(vi
     assert (tmp_path / "a.h5").read_bytes() == before
 
 
+@pytest.mark.timeout(COMPILING_S)
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C cannot be sent to one process there")
 def test_ctrl_c_keeps_what_is_computed_and_resume_goes_on(vibench, tmp_path):
     asked = plan(tmp_path, LONG)
