@@ -92,13 +92,13 @@ def advance_chain(  # noqa: C901 - the kinds of window and their ends are one lo
             if is_quiet(space, cells, tables) == 1:
                 _go_quietly(space, phasors, cells, clock, until, tables, tolerance, record, tally)
                 return REACHED_END
-        if _march_on(space, phasors, cells, clock, longest, tally, record, observed, tables) > 0:
+        if _march_on(space, phasors, cells, clock, longest, tally, record, tables) > 0:
             count = 0
             continue
         length, count = _choose_window(space, cells, phasors, clock, longest, observed, tables)
         code = _cross(space, cells, phasors, count, length, clock, tables, tolerance, record, tally)
         if record.counts[NEXT_SAMPLE] < len(record.samples):
-            _sample(space, phasors, count, clock, length, tables, tolerance, record)
+            _sample(space, phasors, clock, length, tables, tolerance, record)
         for k in range(count):
             deposit(space.turned, cells[space.busy[k]], space.busy[k], tables)
         copy_terms(phasors, space.turned)
@@ -125,15 +125,16 @@ def _go_quietly(
 ) -> None:
     """Go to the end in one step when no cell can ever touch; who watches looks at every window."""
     longest, drive = time_until(clock, until), len(phasors) - 1
+    space.busy_count[0] = 0
     copy_terms(space.start, phasors)
     if record.counts[NEXT_SAMPLE] < len(record.samples):
-        _sample(space, phasors, 0, clock, longest, tables, tolerance, record)
+        _sample(space, phasors, clock, longest, tables, tolerance, record)
     if tally.mode != NOTHING:
         then = np.zeros(2)
         then[0], then[1] = clock[0], clock[1]
         left = longest
         while left > 0.0:
-            if _march_on(space, phasors, cells, then, left, tally, record, OBSERVED, tables) == 0:
+            if _march_on(space, phasors, cells, then, left, tally, record, tables) == 0:
                 length = min(left, tables.windows[0])
                 turn_window(space, phasors, then, length, 0, tables)
                 place_observed(space.motion_end, space.turned, OBSERVED, tables)
@@ -158,10 +159,10 @@ def _march_on(
     longest: float,
     tally: ChainTally,
     record: ChainRecord,
-    observed: int,
     tables: ChainTables,
 ) -> int:
     """Advance over whole windows in which nothing can happen; gives how many there were."""
+    observed = 1 if tally.mode == NOTHING else OBSERVED
     for i in range(len(cells)):
         if cells[i, SIDE] != 0.0:
             return 0
@@ -278,7 +279,6 @@ def _record_touches(touches: Vector, place: int, clock: Vector, record: ChainRec
 def _sample(
     space: Space,
     phasors: Complex,
-    count: int,
     clock: Vector,
     length: float,
     tables: ChainTables,
@@ -286,7 +286,7 @@ def _sample(
     record: ChainRecord,
 ) -> None:
     """Keep the samples that fall into a window, by a second run of the busy cells that lands on each."""
-    counts, reached = record.counts, 0.0
+    counts, reached, count = record.counts, 0.0, space.busy_count[0]
     drive = len(phasors) - 1
     while counts[NEXT_SAMPLE] < len(record.samples):
         later = time_until(clock, record.start + counts[NEXT_SAMPLE] / record.sample_rate)

@@ -50,6 +50,8 @@ class Space(NamedTuple):
     """The same of their accelerations."""
     busy: NDArray[np.int64]
     """Cells that press or may touch in this window, ascending; shape (cells,)."""
+    busy_count: NDArray[np.int64]
+    """How many they are, shape (1,)."""
     series: NDArray[np.float64]
     """p, x, y, z of the busy cells without forces in the window, shape (cells, 4, SERIES_TERMS)."""
     floor: Table
@@ -78,6 +80,7 @@ def space_for(tables: ChainTables) -> Space:
         np.zeros((OBSERVED, cells)),
         np.zeros((OBSERVED, cells)),
         np.zeros(cells, np.int64),
+        np.zeros(1, np.int64),
         np.zeros((cells, OBSERVED, SERIES_TERMS)),
         np.zeros((OBSERVED, cells)),
         np.zeros((OBSERVED, cells)),
@@ -237,6 +240,7 @@ def find_busy(space: Space, cells: Table, length: float, tables: ChainTables) ->
         if cells[i, SIDE] != 0.0 or law[KIND] == POWER or not is_clear:
             space.busy[count] = i
             count += 1
+    space.busy_count[0] = count
     return count
 
 

@@ -16,6 +16,9 @@ from sim.integrate import integrate
 from sim.outcome import Outcome
 from sim.specimen import gong2025
 
+pytestmark = pytest.mark.timeout(300)
+"""The first run compiles the kernels: half a minute of processor time, more on a busy machine."""
+
 PERIODIC = Harmonic(130.0, 20e-6)
 """One cell strikes about 260 times a second and settles on a stable period."""
 HARD = Harmonic(220.0, 40e-6)

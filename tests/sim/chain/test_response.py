@@ -14,6 +14,9 @@ from sim.outcome import Outcome
 from sim.response import steady_response
 from sim.specimen import gong2025
 
+pytestmark = pytest.mark.timeout(300)
+"""The first run compiles the kernels: half a minute of processor time, more on a busy machine."""
+
 PERIODIC = Harmonic(130.0, 20e-6)
 
 
