@@ -13,7 +13,7 @@ from .results import Transmission
 _REACH_BANDWIDTHS = 2.0
 """The fit uses lines within so many half-power bandwidths of the peak."""
 _LEAST_LINES = 8
-"""Two pole and six linear parameters need more reals than that: eight lines are sixteen."""
+"""Two pole and at most ten linear parameters need more reals than that: eight lines are sixteen."""
 _LEAST_RISE = 3.0
 """A peak stands above the valley beside it by at least so many standard deviations of the difference."""
 _SMALLEST_RELATIVE_SD = 1e-6
@@ -21,6 +21,12 @@ _SMALLEST_RELATIVE_SD = 1e-6
 _RESOLVED_LINES = 4.0
 """Noise bandwidths that a half-power bandwidth must hold, else the window smears the peak by over 2 %."""
 _LARGEST_DAMPING = 0.5
+_BACKGROUND_DEGREES = (1, 2, 3)
+"""Tried in turn: broad peaks see more of their neighbours than a straight line can follow."""
+_WELL_FITTED = 1.2
+"""Reduced chi-square at which the background is good enough: a higher degree would only widen the spreads."""
+_LARGEST_RELATIVE_SD_DAMPING = 0.5
+"""Past it the damping is not significantly above zero: a ripple of noisy lines, and no resonance."""
 
 
 @dataclass(frozen=True)
@@ -67,9 +73,10 @@ def resonances(transmission: Transmission, *, low_hz: float, high_hz: float) -> 
     """Find and fit the resonances of a transmission in a band, in the order of frequency.
 
     Each significant peak is fitted, weighted by the stated spreads, with
-    H(w) = R / (w0^2 - w^2 + 2 i zeta w0 w) + b0 + b1 (w - w0), complex R, b0, b1: one mode on what its
-    neighbours leave there. The pole is found by variable projection (Golub & Pereyra 1973, SIAM J.
-    Numer. Anal. 10, 413-432). A peak that noise explains is left out.
+    H(w) = R / (w0^2 - w^2 + 2 i zeta w0 w) + b0 + b1 (w - w0) + ..., complex R, b0, b1: one mode on what
+    its neighbours leave there, a straight line or, where that does not do, up to a cubic. The pole is
+    found by variable projection (Golub & Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432). A peak that
+    noise explains is left out.
 
     Raises
     ------
@@ -131,12 +138,27 @@ def _fitted(band: Transmission, line: int, half_width: int) -> Resonance | None:
         return None
     frequency_hz, value, spread = frequency_hz[usable], value[usable], spread[usable]
     centre_hz = float(band.frequency_hz[line])
+    data = (frequency_hz, value, spread, centre_hz)
+    found: Resonance | None = None
+    for degree in _BACKGROUND_DEGREES:
+        found = _fitted_on(band, data, half_width, degree) or found
+        if found is None or found.reduced_chi_square < _WELL_FITTED:
+            break
+    return found
+
+
+def _fitted_on(
+    band: Transmission, data: tuple[Reals, Complexes, Reals, float], half_width: int, degree: int
+) -> Resonance | None:
+    """Fit one mode on a background of one degree."""
+    frequency_hz, value, spread, centre_hz = data
     spacing_hz = float(np.median(np.diff(frequency_hz)))
     start = np.array([0.0, np.log(max(half_width, 0.5) * spacing_hz / centre_hz)])
     span = (frequency_hz[-1] - frequency_hz[0]) / centre_hz
 
     def misfit(pole: Reals) -> Reals:
-        basis = _basis(frequency_hz, centre_hz * np.exp(pole[0]), float(np.exp(pole[1]))) / spread[:, None]
+        natural_hz, damping = centre_hz * float(np.exp(pole[0])), float(np.exp(pole[1]))
+        basis = _basis(frequency_hz, natural_hz, damping, degree) / spread[:, None]
         target = value / spread
         coefficients = np.linalg.lstsq(basis, target, rcond=None)[0]
         left = target - basis @ coefficients
@@ -146,7 +168,7 @@ def _fitted(band: Transmission, line: int, half_width: int) -> Resonance | None:
     start = np.clip(start, np.asarray(bounds[0]) + 1e-9, np.asarray(bounds[1]) - 1e-9)
     result = least_squares(misfit, start, bounds=bounds, x_scale=[0.01, 1.0], xtol=1e-12, ftol=1e-12)
     jacobian = np.asarray(result.jac, dtype=np.float64)
-    return _resonance(band, result.x, jacobian, result.fun, (frequency_hz, value, spread, centre_hz))
+    return _resonance(band, result.x, jacobian, result.fun, data, degree)
 
 
 def _refitted(band: Transmission, first: Resonance | None) -> Resonance | None:
@@ -158,11 +180,12 @@ def _refitted(band: Transmission, first: Resonance | None) -> Resonance | None:
     return _fitted(band, line, round(0.5 * first.half_power_bandwidth_hz / spacing_hz)) or first
 
 
-def _basis(frequency_hz: Reals, natural_hz: float, damping: float) -> Complexes:
-    """One mode, a constant and a slope, each scaled to order one; shape (lines, 3)."""
+def _basis(frequency_hz: Reals, natural_hz: float, damping: float, degree: int) -> Complexes:
+    """One mode and the powers of a background, each scaled to order one; shape (lines, degree + 2)."""
     ratio = frequency_hz / natural_hz
     mode = 2 * damping / (1 - ratio**2 + 2j * damping * ratio)
-    return np.stack((mode, np.ones_like(mode), (ratio - 1).astype(np.complex128)), axis=1)
+    powers = [np.asarray((ratio - 1) ** power, dtype=np.complex128) for power in range(degree + 1)]
+    return np.stack((mode, *powers), axis=1)
 
 
 def _resonance(
@@ -171,6 +194,7 @@ def _resonance(
     jacobian: Reals,
     left: Reals,
     data: tuple[Reals, Complexes, Reals, float],
+    degree: int,
 ) -> Resonance | None:
     frequency_hz, value, spread, centre_hz = data
     natural_hz, damping = centre_hz * float(np.exp(pole[0])), float(np.exp(pole[1]))
@@ -178,14 +202,17 @@ def _resonance(
     curvature = jacobian.T @ jacobian
     if at_a_bound or np.linalg.cond(curvature) > 1e14:
         return None
-    freedom = max(1, left.size - 8)
+    # Two reals of the pole, and two for every complex coefficient.
+    freedom = max(1, left.size - 2 - 2 * (degree + 2))
     chi_square = float(left @ left) / freedom
     covariance = np.linalg.inv(curvature) * max(1.0, chi_square)
     sd_log_frequency, sd_log_damping = np.sqrt(np.diag(covariance))
-    basis = _basis(frequency_hz, natural_hz, damping)
+    if sd_log_damping > _LARGEST_RELATIVE_SD_DAMPING:
+        return None
+    basis = _basis(frequency_hz, natural_hz, damping, degree)
     coefficients = np.linalg.lstsq(basis / spread[:, None], value / spread, rcond=None)[0]
     fine_hz = np.linspace(frequency_hz[0], frequency_hz[-1], 2001)
-    curve = np.abs(_basis(fine_hz, natural_hz, damping) @ coefficients)
+    curve = np.abs(_basis(fine_hz, natural_hz, damping, degree) @ coefficients)
     top = int(np.argmax(curve))
     # The peak's height follows the residue: it is known as well as the damping, and as the lines at it.
     near = int(np.argmin(np.abs(frequency_hz - fine_hz[top])))
