@@ -12,6 +12,7 @@ from sim.study.errors import StudyError
 from .analyse import analyse
 from .bench import bench
 from .demo import demo
+from .figure import figure
 from .measure import measure
 from .recover import recover_recording
 from .serve_rig import serve_rig
@@ -28,6 +29,7 @@ app.command()(demo)
 app.command()(measure)
 app.command()(analyse)
 app.command()(study)
+app.command()(figure)
 app.command(name="recover")(recover_recording)
 app.command(name="serve-rig")(serve_rig)
 app.add_typer(bench, name="bench")

@@ -1,6 +1,8 @@
 """A figure with what belongs to it: a name, a caption that says what is seen, and the plotted numbers."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
@@ -11,7 +13,19 @@ from ..tables import Table, write_tables
 from .style import PNG_DPI, styled
 
 _NO_DATE = {"Date": None}
+_NO_PDF_DATE = {"CreationDate": None}
 """Two figures of the same data are the same file."""
+
+
+class ImageKind(StrEnum):
+    """Formats that a figure is written in; the value is the files' suffix."""
+
+    PNG = "png"
+    SVG = "svg"
+    PDF = "pdf"
+
+
+SCREEN = (ImageKind.PNG, ImageKind.SVG)
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,19 +49,32 @@ class DrawnFigure:
         """The figure as SVG, drawn once."""
         return self._drawn("svg")
 
+    @cached_property
+    def pdf(self) -> bytes:
+        """The figure as PDF, drawn once."""
+        return self._drawn("pdf")
+
     def _drawn(self, kind: str) -> bytes:
         target = BytesIO()
-        metadata = _NO_DATE if kind == "svg" else None
+        metadata = {"svg": _NO_DATE, "pdf": _NO_PDF_DATE}.get(kind)
         with styled():
             self.figure.savefig(target, format=kind, dpi=PNG_DPI, metadata=metadata)
         # The layout is found while drawing and costs as much: the next format takes it over.
         self.figure.set_layout_engine("none")
         return target.getvalue()
 
-    def save(self, folder: Path) -> tuple[Path, ...]:
-        """Write PNG, SVG and the plotted numbers as CSV; an older figure of that name is replaced."""
+    def save(self, folder: Path, kinds: Sequence[ImageKind] = SCREEN) -> tuple[Path, ...]:
+        """Write the images asked for and the numbers as CSV; an older figure of that name is replaced."""
         folder.mkdir(parents=True, exist_ok=True)
-        png, svg = folder / f"{self.name}.png", folder / f"{self.name}.svg"
-        png.write_bytes(self.png)
-        svg.write_bytes(self.svg)
-        return (png, svg, *write_tables(self.tables, folder))
+        drawn = []
+        for kind in kinds:
+            path = folder / f"{self.name}.{kind.value}"
+            match kind:
+                case ImageKind.PNG:
+                    path.write_bytes(self.png)
+                case ImageKind.SVG:
+                    path.write_bytes(self.svg)
+                case ImageKind.PDF:
+                    path.write_bytes(self.pdf)
+            drawn.append(path)
+        return (*drawn, *write_tables(self.tables, folder))

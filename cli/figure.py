@@ -1,0 +1,126 @@
+"""`vibench figure`: a figure of the paper, from our own studies or from recordings."""
+
+import hashlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from analysis.campaign_results import CampaignResults, analyse_files, recordings_in
+from analysis.errors import InvalidRequest
+from analysis.figures.drawn import DrawnFigure, ImageKind
+from analysis.figures.paper.catalogue import PAPER_FIGURES
+from analysis.figures.paper.options import FigureOptions, FrequencyGrid
+from analysis.report.figure_choice import recording_figures, result_figures
+from sim.accuracy import Accuracy
+from sim.study.results import StudyResults
+from sim.study.solve import Existing, solve_study
+from sim.study.study import Study
+
+from .analyse import complain_about
+from .interruption import told_to_stop
+from .output import console
+from .study import STOPPED_EXIT_CODE
+from .study_bar import study_bar
+
+ALL = "all"
+EXPERIMENT = (12, 13, 14)
+"""Figures of the experiment: they need recordings."""
+_DIGEST = 16
+
+
+def figure(
+    number: Annotated[str, typer.Argument(metavar="N", help="1 to 14, or all.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the figures.")],
+    recordings: Annotated[
+        Path | None,
+        typer.Option(
+            "--recordings", metavar="DIR", help="Recordings for figures 12 to 14; see vibench demo."
+        ),
+    ] = None,
+    damping_time: Annotated[
+        float, typer.Option("--damping-time", metavar="S", help="c_i = damping time * k_i.")
+    ] = FigureOptions.damping_time_s,
+    gap: Annotated[
+        float, typer.Option("--gap", metavar="M", help="Clearance at both stops.")
+    ] = FigureOptions.gap_m,
+    accuracy: Annotated[
+        Accuracy, typer.Option("--accuracy", help="Of every point.")
+    ] = FigureOptions.accuracy,
+    grid: Annotated[
+        FrequencyGrid, typer.Option("--grid", help="Every 5 Hz (coarse) or every 1 Hz (fine).")
+    ] = FigureOptions.grid,
+    workers: Annotated[
+        int | None, typer.Option("--workers", metavar="N", help="Threads; one for each processor if absent.")
+    ] = None,
+    kinds: Annotated[
+        list[ImageKind], typer.Option("--format", help="Image formats; give it several times for several.")
+    ] = [ImageKind.PNG, ImageKind.SVG],  # noqa: B006 - typer copies it
+) -> None:
+    """Draw a figure of the paper; studies are kept in DIR/studies and go on where they were stopped."""
+    options = FigureOptions(damping_time_s=damping_time, gap_m=gap, accuracy=accuracy, grid=grid)
+    numbers = _numbers(number)
+    experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])
+    for each in numbers:
+        drawn = experiment(each) if each in EXPERIMENT else _simulated(each, options, out, workers)
+        for one in drawn:
+            paths = one.save(out, kinds)
+            console.print(f"figure {each}: [bold]{paths[0]}[/] ({one.title})")
+
+
+def _numbers(asked: str) -> tuple[int, ...]:
+    known = (*PAPER_FIGURES, *EXPERIMENT)
+    if asked == ALL:
+        return tuple(PAPER_FIGURES)
+    if asked.isdigit() and int(asked) in known:
+        return (int(asked),)
+    raise InvalidRequest(f"figure {asked!r} was asked for; the paper has 1 to {known[-1]}, or say all")
+
+
+def _simulated(number: int, options: FigureOptions, out: Path, workers: int | None) -> Iterator[DrawnFigure]:
+    chosen = PAPER_FIGURES[number]
+    answers = tuple(_solved(each, out / "studies", workers) for each in chosen.studies(options))
+    yield chosen.draw(options, answers)
+
+
+def _solved(study: Study, folder: Path, workers: int | None) -> StudyResults:
+    """Solve a study, or what is missing of it: its file is named by everything that it asks."""
+    folder.mkdir(parents=True, exist_ok=True)
+    digest = hashlib.sha256(study.model_dump_json().encode()).hexdigest()[:_DIGEST]
+    with told_to_stop() as is_stopped, study_bar(study.grid.size) as watcher:
+        results = solve_study(
+            study, folder / f"{digest}.h5", Existing.RESUME, workers, watcher=watcher, cancelled=is_stopped
+        )
+    if not results.is_complete:
+        typer.echo(
+            f"stopped after {results.kept} of {study.grid.size} points; the same command goes on", err=True
+        )
+        raise typer.Exit(STOPPED_EXIT_CODE)
+    return results
+
+
+def _experiment(folder: Path | None, wanted: list[int]) -> Callable[[int], Iterator[DrawnFigure]]:
+    """Give what draws the figures of the experiment; the recordings are analysed once."""
+    if not wanted:
+        return lambda _: iter(())
+    if folder is None:
+        raise InvalidRequest(
+            f"figure {wanted[0]} shows the experiment; give its recordings with --recordings DIR, such as "
+            "vibench demo makes"
+        )
+    results = analyse_files(recordings_in(folder), folder.name)
+    complain_about(results)
+    return lambda number: _measured(number, results)
+
+
+def _measured(number: int, results: CampaignResults) -> Iterator[DrawnFigure]:
+    match number:
+        case 12:
+            for each in results.results[:1]:
+                yield from recording_figures(each)
+        case 13:
+            chosen = CampaignResults(results.name, (*results.noise, *results.sweeps), ())
+            yield from result_figures(chosen)
+        case _:
+            yield from result_figures(CampaignResults(results.name, results.dwells, ()))
