@@ -7,10 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from ..bench import Bench
+from ..excitation.dwell import Dwell
+from ..excitation.steps import Tone
 from ..instruments import Samples
+from ..plan.measurement import Measurement
+from ..plan.player import Player
 from ..rig.calibration import calibrations
 from ..rig.channel import Channel
-from ..run.schedule import CHECK_FREQUENCY_HZ
+from ..run.drive import Drive, drive_for
+from ..run.schedule import CHECK_FREQUENCY_HZ, Phase
+from ..run.state import RunState
 from .finding import BenchReport, Bounds, Finding, Verdict, judged
 from .loop import LoopCheck
 
@@ -36,8 +42,8 @@ ROOM_H = Bounds(-10.0, -1.0)
 def check_bench(bench: Bench, folder: Path) -> BenchReport:
     """Look at everything that can be known before a measurement; the generator is silent afterwards.
 
-    Listens in silence, plays two per cent of the amplitude limit at 160 Hz for some seconds, and
-    listens in silence again.
+    Listens in silence, plays two per cent of the amplitude limit at 160 Hz for some seconds by
+    whatever plays sines on this bench, and listens in silence again.
 
     Parameters
     ----------
@@ -54,16 +60,13 @@ def check_bench(bench: Bench, folder: Path) -> BenchReport:
     """
     findings = [*_identified(bench), *_calibrated(bench), _room(bench, folder)]
     amplitude_vpp = CHECK_SHARE * bench.rig.generator.amplitude_limit_vpp
+    drive = drive_for(bench, _small_sine(amplitude_vpp))
     bench.generator.stop()
     quiet = _listen(bench)
-    try:
-        bench.generator.load_sine(CHECK_FREQUENCY_HZ, amplitude_vpp)
-        findings.append(_latency(bench))
-        bench.generator.start()
-        heard = _listen(bench)
-    finally:
-        bench.generator.stop()
+    heard = _heard(bench, drive)
     after = _listen(bench)
+    if drive.player is Player.GENERATOR:
+        findings.append(_latency(bench))
     for channel, row in zip(bench.channels, quiet, strict=True):
         findings += [_noise(channel, row), _offset(channel, row)]
     findings += LoopCheck(bench, amplitude_vpp, heard, after).findings()
@@ -78,6 +81,38 @@ def _listen(bench: Bench) -> Samples:
         return bench.digitizer.read(round(_LISTEN_S * rate_hz)).volts
     finally:
         bench.digitizer.stop()
+
+
+def _small_sine(amplitude_vpp: float) -> Measurement:
+    sine = Dwell(
+        amplitude_vpp=amplitude_vpp,
+        frequency_hz=CHECK_FREQUENCY_HZ,
+        settle_s=_SETTLE_S,
+        duration_s=_LISTEN_S,
+    )
+    return Measurement(name="check", excitation=sine)
+
+
+def _heard(bench: Bench, drive: Drive) -> Samples:
+    """Play the sine without a ramp, as the check of a run does, and listen when all has settled."""
+    tone = Tone(CHECK_FREQUENCY_HZ)
+    settling = Phase(RunState.CHECKING, tone, _SETTLE_S)
+    listening = Phase(RunState.CHECKING, tone, _LISTEN_S)
+    try:
+        drive.arm((settling, listening))
+        bench.digitizer.start()
+        _read(bench, drive, settling)
+        return np.concatenate(_read(bench, drive, listening), axis=1)
+    finally:
+        try:
+            drive.silence()
+        finally:
+            bench.digitizer.stop()
+
+
+def _read(bench: Bench, drive: Drive, phase: Phase) -> list[Samples]:
+    rate_hz = bench.digitizer.sample_rate_hz
+    return [bench.digitizer.read(round(wait_s * rate_hz)).volts for wait_s in drive.perform(phase)]
 
 
 def _identified(bench: Bench) -> list[Finding]:

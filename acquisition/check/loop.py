@@ -67,7 +67,7 @@ class LoopCheck:
         advice = {
             Role.M0_VELOCITY: "see whether the laser is on, focused, and its beam free",
             Role.BASE_ACCELERATION: "see whether the accelerometer is plugged in and its current on",
-        }.get(role, "see whether the cable is open or shorted, and the amplifier on")
+        }.get(role, "see whether the cable is open or shorted, its source plugged in, and the amplifier on")
         return Finding(
             name=f"{role.value} hears the sine",
             value=f"{fit.amplitude:.3g} +- {fit.uncertainty:.1g} {self._channels[role].unit}",
@@ -98,7 +98,7 @@ class LoopCheck:
     def _silence(self) -> Finding:
         volts = self._after[Role.DRIVE_VOLTAGE] * self._channels[Role.DRIVE_VOLTAGE].units_per_volt
         left = fit_sine(volts, CHECK_FREQUENCY_HZ, self._rate_hz).amplitude / self._terminal_v
-        advice = "the output says off and plays on: switch the amplifier off, and have the generator repaired"
+        advice = "the output says off and plays on: switch the amplifier off, and have what plays repaired"
         return judged(
             "drive left after stop",
             left,
@@ -111,9 +111,9 @@ class LoopCheck:
     def _clocks(self) -> Finding:
         ratio = clock_ratio(self._rows[Role.DRIVE_VOLTAGE], CHECK_FREQUENCY_HZ, self._rate_hz)
         verdict = CLOCK_PPM.verdict(abs(ratio.ppm))
-        advice = "compare daq.sample_rate_hz and the generator's reference; phases over a minute need it"
+        advice = "compare daq.sample_rate_hz and the reference of what plays; phases over a minute need it"
         expected = f"0 ppm within {CLOCK_PPM.well:g} ppm"
-        return judged("generator's clock", ratio.ppm, "ppm", expected, verdict, advice, ratio.uncertainty_ppm)
+        return judged("drive's clock", ratio.ppm, "ppm", expected, verdict, advice, ratio.uncertainty_ppm)
 
     def _gain(self) -> Finding:
         drive, output = self._fit(Role.DRIVE_VOLTAGE), self._fit(Role.AMPLIFIER_VOLTAGE)

@@ -60,7 +60,7 @@ def failed(report):
 def test_a_healthy_bench_fails_nothing_and_its_figures_are_those_of_the_configuration(rig, tmp_path):
     report = checked(rig, tmp_path)
     assert failed(report) == set()
-    clock = report["generator's clock"]
+    clock = report["drive's clock"]
     told_ppm = rig.virtual.generator_clock_ppm - rig.virtual.converter_clock_ppm
     assert abs(clock.number - told_ppm) < 5 * clock.uncertainty + 0.01
     assert report["amplifier gain"].number == pytest.approx(rig.amplifier.gain_db, abs=0.05)
@@ -117,6 +117,17 @@ def test_the_report_reads_as_a_table_and_survives_json(rig, tmp_path):
     assert lines[at + 1].strip().startswith("-> set the gain")
     with pytest.raises(KeyError, match=r"amplifier gain"):
         report["nonsense"]
+
+
+def test_a_bench_whose_output_plays_sines_is_checked_by_its_output(tmp_path):
+    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig_streaming.toml")
+    with open_bench(rig) as bench:
+        report = check_bench(bench, tmp_path)
+    assert failed(report) == set()
+    assert report["drive over setting"].number == pytest.approx(1.0, abs=2e-3)
+    # One oscillator for both: the generator's would be 17 ppm off.
+    assert abs(report["drive's clock"].number) < 5 * report["drive's clock"].uncertainty + 0.01
+    assert "time of one setting" not in [finding.name for finding in report.findings]
 
 
 @pytest.mark.parametrize(
