@@ -76,7 +76,7 @@ def flight_tables(specimen: Specimen, drive: Harmonic) -> FlightTables:
     return FlightTables(
         par=parameters(specimen),
         power=power_terms(specimen),
-        frequency=drive.frequency_hz,
+        frequency=float(drive.frequency_hz),
         omega=omega,
         phase=cmath.exp(1j * drive.phase_rad),
         force=force,

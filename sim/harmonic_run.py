@@ -39,6 +39,7 @@ from .flight import (
 from .modes import Complex
 from .outcome import Outcome
 from .parameters import CLOSED, POWER, RIGID, SIDE, Table, Vector, X, Y, Z
+from .rigid_stop import is_resolved
 from .smooth import smooth_turn
 from .smooth_tally import tally_smooth
 from .stick import held_tables, hold, place_held, tally_held
@@ -181,6 +182,8 @@ def _fly_on(
 ) -> tuple[int, float]:
     """Find how long a flight lasts, as `sim.flight.fly`; off a rigid stop it begins with a departure."""
     if tables.par.law == RIGID:
+        if not is_resolved(closed_for(phasors, tables), tables.par):
+            return OUT_OF_RANGE, 0.0
         leaves = departure(phasors, terms, series, tables)
         if leaves > 0.0:
             return (DEPARTS, leaves) if leaves < longest else (CLEAR, longest)

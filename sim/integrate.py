@@ -25,6 +25,10 @@ MAX_IMPACT_RATE_HZ = 200_000.0
 stops, 23000 in the chatter on rigid ones of restitution 0.8; chatter of 0.95 may need more."""
 MOST_IMPACTS = 1 << 26
 """In one run: the memory of their times is half a gigabyte (none until they happen)."""
+LATEST_START_S = 1e8
+"""Three years: the end of a run is one number, whose last digit there is 1e-8 s."""
+MOST_SAMPLES = 1e9
+"""48 gigabytes."""
 SPARE_IMPACTS = 100
 """Allowed on top of the rate, for short runs."""
 BATCH = 1 << 16
@@ -75,8 +79,8 @@ def integrate(
     """
     _check_times(duration_s, start_time_s, sample_rate_hz, max_impact_rate_hz)
     state = new_state(specimen, start_motion(initial_state), accuracy)
-    clock = clock_at(start_time_s)
-    end = start_time_s + duration_s
+    clock = clock_at(float(start_time_s))
+    end = float(start_time_s + duration_s)
     record = new_record(start_time_s, duration_s, sample_rate_hz, max_impact_rate_hz)
     match drive:
         case Harmonic():
@@ -176,8 +180,8 @@ def new_record(
     """Make what a run fills: room for its samples and for the impacts that are allowed."""
     count = 0 if sample_rate_hz is None else math.floor(duration_s * sample_rate_hz * (1.0 + ROUNDING)) + 1
     return Record(
-        start=start_s,
-        sample_rate=1.0 if sample_rate_hz is None else sample_rate_hz,
+        start=float(start_s),
+        sample_rate=1.0 if sample_rate_hz is None else float(sample_rate_hz),
         samples=np.zeros((count, 6)),
         impact_times=np.zeros(min(math.ceil(impact_rate_hz * duration_s) + SPARE_IMPACTS, MOST_IMPACTS)),
         counts=np.zeros(2, np.int64),
@@ -213,11 +217,17 @@ def _check_times(
     if not 0.0 <= duration_s < math.inf:
         msg = f"Duration {duration_s} s is not allowed: it must be zero or positive, and finite."
         raise ValueError(msg)
-    if not 0.0 <= start_time_s < math.inf:
-        msg = f"Start time {start_time_s} s is not allowed: it must be zero or positive, and finite."
+    if not 0.0 <= start_time_s <= LATEST_START_S:
+        msg = f"Start time {start_time_s} s is not allowed: it must lie between 0 and {LATEST_START_S:g} s."
         raise ValueError(msg)
     if sample_rate_hz is not None and not 0.0 < sample_rate_hz < math.inf:
         msg = f"Sample rate {sample_rate_hz} Hz is not allowed: it must be positive and finite, or None."
+        raise ValueError(msg)
+    if sample_rate_hz is not None and duration_s * sample_rate_hz > MOST_SAMPLES:
+        msg = (
+            f"{duration_s * sample_rate_hz:.3g} samples are not allowed: {MOST_SAMPLES:.1g} at most; "
+            "lower the sample rate or cut the run."
+        )
         raise ValueError(msg)
     if not 0.0 <= max_impact_rate_hz < math.inf:
         msg = f"Impact rate {max_impact_rate_hz} Hz is not allowed: it must be zero or more, and finite."

@@ -5,7 +5,7 @@ from enum import IntEnum
 _TEXTS = (
     "reached the end time",
     "more impacts than allowed: raise max_impact_rate_hz, cut runs of over 6e7 impacts, or suspect chatter",
-    "the state is no longer finite: lower the drive, or check the specimen's numbers",
+    "the motion is beyond all numbers or their digits: lower the drive, or check the specimen's numbers",
     "a contact made no progress: ask for a less strict accuracy, or check the specimen's numbers",
 )
 

@@ -84,10 +84,12 @@ def parameters(specimen: Specimen) -> Parameters:
     lower, upper = specimen.gaps_m
     if isinstance(specimen.contact, NoContact):
         lower, upper = math.inf, math.inf
-    m0, m1, m2 = specimen.masses
-    k0, k1, k2 = specimen.stiffnesses
-    c0, c1, c2 = specimen.dampings
-    return Parameters(m0, m1, m2, k0, k1, k2, c0, c1, c2, lower, upper, m1 * m2 / (m1 + m2), *stops)
+    # A whole number is another type to a kernel, which would be compiled anew for it.
+    m0, m1, m2 = (float(mass) for mass in specimen.masses)
+    k0, k1, k2 = (float(stiffness) for stiffness in specimen.stiffnesses)
+    c0, c1, c2 = (float(damping) for damping in specimen.dampings)
+    pair = m1 * m2 / (m1 + m2)
+    return Parameters(m0, m1, m2, k0, k1, k2, c0, c1, c2, float(lower), float(upper), pair, *stops)
 
 
 def _stops(specimen: Specimen) -> Stops:
@@ -95,13 +97,13 @@ def _stops(specimen: Specimen) -> Stops:
         case NoContact():
             return Stops(YIELDING)
         case Hertz(stiffness=stiffness):
-            return Stops(YIELDING, contact_stiffness=stiffness)
+            return Stops(YIELDING, contact_stiffness=float(stiffness))
         case LinearGap(stiffness=stiffness):
-            return Stops(YIELDING, linear_stiffness=stiffness)
+            return Stops(YIELDING, linear_stiffness=float(stiffness))
         case HuntCrossley(stiffness=stiffness, loss=loss):
-            return Stops(YIELDING, contact_stiffness=stiffness, loss=loss)
+            return Stops(YIELDING, contact_stiffness=float(stiffness), loss=float(loss))
         case RigidStops(restitution=restitution):
-            return Stops(RIGID, restitution=restitution)
+            return Stops(RIGID, restitution=float(restitution))
         case PowerLaw():
             return Stops(POWER)
 
@@ -128,7 +130,7 @@ def power_terms(specimen: Specimen) -> PowerTerms:
     halves = [(after - before) // 2 for before, after in pairwise(exponents)]
     padding = MOST_TERMS - len(terms)
     return PowerTerms(
-        1.0 / reference,
+        1.0 / float(reference),
         (*halves, *[0] * padding),
         (*(float(force) for _, force in terms), *[0.0] * padding),
     )

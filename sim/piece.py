@@ -14,7 +14,7 @@ from .detection import LARGEST_BOUND, NEVER, SERIES_TERMS, first_contact
 from .flight import CLEAR, DEPARTS, OUT_OF_RANGE, TOUCHES
 from .flight_series import fill_flight_series, place_on_series
 from .parameters import CLOSED, RIGID, SIDE, VX, VY, VZ, Parameters, PowerTerms, Table, Vector, X, Y, Z
-from .rigid_stop import closed_gap
+from .rigid_stop import closed_gap, is_resolved
 from .stick import hold_on_series
 from .touch import advance_touching, strike
 
@@ -160,6 +160,8 @@ def _fly_part(
     scale = abs(state[Y]) + abs(state[Z])
     if par.law == RIGID:
         state[CLOSED] = closed_gap(scale, par)
+        if not is_resolved(state[CLOSED], par):
+            return OUT_OF_RANGE, tau
         leaves = time_to_depart(path, left, state[CLOSED], par)
         if leaves > 0.0:
             place_on_series(state, series, leaves)

@@ -95,9 +95,9 @@ def steady_response(
     tables = flight_tables(specimen, drive)
     record = new_record(0.0, duration_s, None, max_impact_rate_hz)
     line_s = periods / drive.frequency_hz
-    code = advance_harmonic(state, clock, duration_s - window_s, tables, accuracy.tolerance, record)
+    code = advance_harmonic(state, clock, float(duration_s - window_s), tables, accuracy.tolerance, record)
     before = int(record.counts[IMPACTS])
-    for mode, until in ((PEAKS, duration_s - line_s), (PEAKS_AND_LINES, duration_s)):
+    for mode, until in ((PEAKS, duration_s - line_s), (PEAKS_AND_LINES, float(duration_s))):
         if code == Outcome.REACHED_END:
             record.tally[MODE] = mode
             code = advance_harmonic(state, clock, until, tables, accuracy.tolerance, record)

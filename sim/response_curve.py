@@ -77,8 +77,8 @@ def response_curve(
 
     """
     frequencies = np.atleast_1d(np.asarray(frequencies_hz, dtype=np.float64))
-    if frequencies.ndim != 1:
-        msg = f"Frequencies of shape {frequencies.shape} are not allowed: give one row."
+    if frequencies.ndim != 1 or len(frequencies) == 0:
+        msg = f"Frequencies of shape {frequencies.shape} are not allowed: give one row of one or more."
         raise ValueError(msg)
     drives = [Harmonic(float(frequency), amplitude_m) for frequency in frequencies]
     threads = (os.cpu_count() or 1) if workers is None else workers

@@ -17,12 +17,21 @@ from .parameters import CLOSED, SIDE, VX, VY, VZ, Parameters, Vector, X, Y, Z
 RESOLVED = 4.0
 """Hops lower than this many times the gap that counts as closed cannot be told from rest."""
 
+LARGEST_PART = 1e-3
+"""... and of the room between the stops that gap may be this part."""
+
 
 @compiled
 def closed_gap(scale: float, par: Parameters) -> float:
     """How far from a stop m1 counts as touching it [m]; ``scale`` as in `sim.detection.first_contact`."""
     closed: float = TOUCH * min(par.lower, par.upper) + ROUNDING * scale
     return closed
+
+
+@compiled
+def is_resolved(closed: float, par: Parameters) -> bool:
+    """Whether m1 between its stops can be told from m1 on one of them: not where p is rounding."""
+    return closed < LARGEST_PART * (par.lower + par.upper)
 
 
 @compiled

@@ -1,0 +1,186 @@
+"""What must hold for every law and any numbers: symmetry, scales of length, time and mass, and how it was asked."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sim.accuracy import Accuracy
+from sim.contact_law import Hertz, HuntCrossley, LinearGap, PowerLaw
+from sim.drive import Harmonic, LinearSweep, Sampled
+from sim.integrate import integrate
+from sim.outcome import Outcome
+from sim.response_curve import response_curve
+from sim.specimen import gong2025
+
+LAWS = ["hertz", "linear_gap", "hunt_crossley:0.5", "power:5", "power:29", "rigid:0", "rigid:0.7", "rigid:1"]
+DRIVE = Harmonic(170.0, 20e-6)
+DURATION_S = 0.015
+"""Longer than the first impacts, shorter than chaos needs to make a rounding large."""
+LIMITS = 1e-6 * np.repeat([1e-4, 0.1], 3)
+"""A millionth of 100 um and of 0.1 m/s: how alike is alike at reference accuracy."""
+
+laws = st.sampled_from(LAWS)
+places = st.tuples(*[st.floats(-20e-6, 20e-6)] * 3)
+speeds = st.tuples(*[st.floats(-0.2, 0.2)] * 3)
+
+
+def paper(contact, **options):
+    return gong2025(**{"damping_time_s": 3e-5, "contact": contact, **options})
+
+
+def end(specimen, drive=DRIVE, duration_s=DURATION_S, start=None):
+    run = integrate(specimen, drive, duration_s, Accuracy.REFERENCE, start)
+    assert run.outcome is Outcome.REACHED_END
+    assert run.impacts.count > 5 or isinstance(specimen.contact, PowerLaw)
+    return run.final_state
+
+
+def noise(seed, rate=20_000.0, duration_s=0.03):
+    """Band-limited displacement of about 20 um."""
+    coarse = np.random.default_rng(seed).normal(0.0, 20e-6, round(duration_s * 1000) + 2)
+    time_s = np.arange(round(duration_s * rate))
+    return Sampled(np.interp(time_s, np.arange(len(coarse)) * rate / 1000.0, coarse), rate)
+
+
+@settings(max_examples=20, deadline=None)
+@given(contact=laws, place=places, speed=speeds, seed=st.integers(0, 1000))
+def test_a_mirrored_sampled_drive_and_start_give_the_mirrored_motion_to_the_bit(contact, place, speed, seed):
+    specimen, drive = paper(contact), noise(seed)
+    start = np.array([*place, *speed])
+    here = integrate(specimen, drive, 0.02, initial_state=start, sample_rate_hz=5e3)
+    mirrored = Sampled(-drive.displacement_m, drive.sample_rate_hz)
+    there = integrate(specimen, mirrored, 0.02, initial_state=-start, sample_rate_hz=5e3)
+    np.testing.assert_array_equal(here.states, -there.states)
+    np.testing.assert_array_equal(here.impacts.times_s, there.impacts.times_s)
+
+
+@settings(max_examples=20, deadline=None)
+@given(contact=laws, place=places, speed=speeds)
+def test_a_mirrored_start_gives_the_mirrored_free_motion_to_the_bit(contact, place, speed):
+    start, still = np.array([*place, *speed]), Harmonic(100.0, 0.0)
+    here = integrate(paper(contact), still, 0.05, initial_state=start)
+    there = integrate(paper(contact), still, 0.05, initial_state=-start)
+    np.testing.assert_array_equal(here.final_state, -there.final_state)
+    np.testing.assert_array_equal(here.impacts.times_s, there.impacts.times_s)
+
+
+def longer(specimen, scale):
+    """The specimen whose lengths are ``scale`` times as long under forces ``scale`` times as large."""
+    match specimen.contact:
+        case Hertz(stiffness=stiffness):
+            law = Hertz(stiffness / math.sqrt(scale))
+        case HuntCrossley(stiffness=stiffness, loss=loss):
+            law = HuntCrossley(stiffness / math.sqrt(scale), loss / scale)
+        case PowerLaw(reference=reference, terms=terms):
+            law = PowerLaw(scale * reference, tuple((n, scale * force) for n, force in terms))
+        case law:
+            pass
+    return replace(specimen, gap_m=scale * specimen.gap_m, contact=law)
+
+
+@settings(max_examples=25, deadline=None)
+@given(contact=laws, log_scale=st.floats(-4.0, 4.0))
+def test_a_longer_specimen_driven_farther_moves_alike(contact, log_scale):
+    scale, specimen = 10.0**log_scale, paper(contact)
+    long = end(longer(specimen, scale), Harmonic(170.0, 20e-6 * scale)) / scale
+    assert np.all(np.abs(long - end(specimen)) < LIMITS)
+
+
+def slower(specimen, scale):
+    """The specimen for which every time is ``scale`` times as long."""
+    match specimen.contact:
+        case Hertz(stiffness=stiffness):
+            law = Hertz(stiffness / scale**2)
+        case LinearGap(stiffness=stiffness):
+            law = LinearGap(stiffness / scale**2)
+        case HuntCrossley(stiffness=stiffness, loss=loss):
+            law = HuntCrossley(stiffness / scale**2, loss * scale)
+        case PowerLaw(reference=reference, terms=terms):
+            law = PowerLaw(reference, tuple((n, force / scale**2) for n, force in terms))
+        case law:
+            pass
+    return replace(
+        specimen,
+        stiffnesses=tuple(k / scale**2 for k in specimen.stiffnesses),
+        dampings=tuple(c / scale for c in specimen.dampings),
+        contact=law,
+    )
+
+
+@settings(max_examples=25, deadline=None)
+@given(contact=laws, log_scale=st.floats(-3.0, 3.0))
+def test_a_slower_specimen_driven_more_slowly_moves_alike(contact, log_scale):
+    scale, specimen = 10.0**log_scale, paper(contact)
+    slow = end(slower(specimen, scale), Harmonic(170.0 / scale, 20e-6), DURATION_S * scale)
+    slow[3:] *= scale
+    assert np.all(np.abs(slow - end(specimen)) < LIMITS)
+
+
+def heavier(specimen, scale):
+    """The specimen with all masses and all forces ``scale`` times as large."""
+    match specimen.contact:
+        case Hertz(stiffness=stiffness):
+            law = Hertz(stiffness * scale)
+        case LinearGap(stiffness=stiffness):
+            law = LinearGap(stiffness * scale)
+        case HuntCrossley(stiffness=stiffness, loss=loss):
+            law = HuntCrossley(stiffness * scale, loss)
+        case PowerLaw(reference=reference, terms=terms):
+            law = PowerLaw(reference, tuple((n, force * scale) for n, force in terms))
+        case law:
+            pass
+    return replace(
+        specimen,
+        masses=tuple(m * scale for m in specimen.masses),
+        stiffnesses=tuple(k * scale for k in specimen.stiffnesses),
+        dampings=tuple(c * scale for c in specimen.dampings),
+        contact=law,
+    )
+
+
+@settings(max_examples=25, deadline=None)
+@given(contact=laws, log_scale=st.floats(-6.0, 6.0))
+def test_a_heavier_and_stiffer_specimen_moves_alike(contact, log_scale):
+    specimen = paper(contact)
+    assert np.all(np.abs(end(heavier(specimen, 10.0**log_scale)) - end(specimen)) < LIMITS)
+
+
+@settings(max_examples=20, deadline=None)
+@given(contact=laws, rate=st.floats(10.0, 3e5))
+def test_no_sampling_rate_changes_a_bit_of_any_motion(contact, rate):
+    for drive in (DRIVE, LinearSweep(150.0, 250.0, 0.1, 30e-6)):
+        plain = integrate(paper(contact), drive, 0.1)
+        sampled = integrate(paper(contact), drive, 0.1, sample_rate_hz=rate)
+        np.testing.assert_array_equal(sampled.final_state, plain.final_state)
+        np.testing.assert_array_equal(sampled.impacts.times_s, plain.impacts.times_s)
+
+
+@settings(max_examples=20, deadline=None)
+@given(contact=laws, cuts=st.lists(st.floats(0.0, 0.1), min_size=1, max_size=6))
+def test_a_run_cut_anywhere_ends_where_the_whole_does(contact, cuts):
+    # Damped, and not driven into chaos: a run that is cut rounds anew at every cut.
+    specimen, drive = paper(contact, damping_time_s=1e-4), Harmonic(95.0, 8e-6)
+    whole, motion, now = integrate(specimen, drive, 0.1, Accuracy.REFERENCE), None, 0.0
+    for until in (*sorted(cuts), 0.1):
+        part = integrate(specimen, drive, until - now, Accuracy.REFERENCE, motion, start_time_s=now)
+        motion, now = part.final_state, until
+    assert np.all(np.abs(motion - whole.final_state) < LIMITS)
+
+
+@pytest.mark.parametrize("contact", ["hertz", "power:5", "rigid:0.7"])
+def test_any_number_of_workers_gives_the_same_curve_to_the_bit(contact):
+    frequencies = np.linspace(80.0, 480.0, 9)
+    curves = [
+        response_curve(paper(contact), 20e-6, frequencies, workers=workers, duration_s=0.5, window_s=0.2)
+        for workers in (1, 2, 7)
+    ]
+    for curve in curves[1:]:
+        for one, other in zip(curves[0].points, curve.points, strict=True):
+            np.testing.assert_array_equal(one.final_state, other.final_state)
+            assert one.largest_x_m == other.largest_x_m
+            assert one.line_x_m == other.line_x_m
+            assert one.impacts == other.impacts
