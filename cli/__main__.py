@@ -2,6 +2,9 @@
 
 import sys
 
+from . import blas_threads  # noqa: F401 - numpy reads its setting, so it comes first
+
+# isort: split
 import typer
 from rich.console import Console
 
