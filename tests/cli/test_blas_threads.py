@@ -1,4 +1,4 @@
-"""The command sets the threads of linear algebra before numpy reads them, and leaves a user's choice alone."""
+"""The command sets the threads of linear algebra before numpy reads them, and respects a user's choice."""
 
 import os
 import subprocess
