@@ -11,7 +11,7 @@ from nidaqmx.stream_writers import AnalogSingleChannelWriter
 
 from ..errors import DataLost, InstrumentError, InstrumentLost, LimitExceeded, SettingRefused
 from ..instruments import Identity, Samples
-from ..rig.configuration import OutputConfig
+from ..rig.output import OutputConfig
 from .daqmx import DaqmxDigitizer
 from .daqmx_errors import daqmx_call
 from .daqmx_identity import daqmx_identity

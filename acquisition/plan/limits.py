@@ -8,8 +8,9 @@ import numpy as np
 
 from ..errors import LimitExceeded
 from ..rig.channel import channels_of
-from ..rig.configuration import OutputConfig, Rig, Role
+from ..rig.configuration import Rig, Role
 from ..rig.model import Quantity, suspended_mass_kg
+from ..rig.output import OutputConfig
 from .loads import predicted_loads
 from .measurement import Measurement
 from .player import Player, player_of

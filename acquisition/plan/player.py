@@ -3,7 +3,8 @@
 from enum import StrEnum
 
 from ..excitation.steps import Play, Stream, Tone, Waveform
-from ..rig.configuration import OutputUse, Rig
+from ..rig.configuration import Rig
+from ..rig.output import OutputUse
 from .measurement import Measurement
 
 

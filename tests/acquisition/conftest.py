@@ -12,9 +12,10 @@ from acquisition.errors import DataLost
 from acquisition.instruments import Block, Identity, Samples
 from acquisition.recording.layout import RecordingState
 from acquisition.rig.channel import Channel, channels_of
-from acquisition.rig.configuration import OutputConfig, Rig, Role, load_rig
+from acquisition.rig.configuration import Rig, Role, load_rig
 from acquisition.rig.knobs import KnobSheet
 from acquisition.rig.model import Quantity, RigModel
+from acquisition.rig.output import OutputConfig
 
 ROOT = Path(__file__).parent.parent.parent
 SAMPLE_RATE_HZ = 5120.0

@@ -18,7 +18,8 @@ from acquisition.errors import (
     SettingRefused,
 )
 from acquisition.instruments import AnalogOutput
-from acquisition.rig.configuration import OutputConfig, load_rig
+from acquisition.rig.configuration import load_rig
+from acquisition.rig.output import OutputConfig
 from acquisition.virtual.rig import VirtualRig
 
 ROOT = Path(__file__).parents[3]

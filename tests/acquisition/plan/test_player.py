@@ -10,7 +10,7 @@ from acquisition.excitation.streamed_noise import StreamedNoise
 from acquisition.plan.limits import limit_checks
 from acquisition.plan.measurement import Measurement
 from acquisition.plan.player import Player, player_of
-from acquisition.rig.configuration import OutputConfig, OutputUse
+from acquisition.rig.output import OutputConfig, OutputUse
 
 STREAM = StreamedNoise(amplitude_vpp=1, band_start_hz=50, band_stop_hz=600, duration_s=1)
 TONES = [

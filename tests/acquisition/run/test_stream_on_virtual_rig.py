@@ -14,7 +14,8 @@ from acquisition.excitation.sine_sweep import Hold, SineSweep
 from acquisition.excitation.streamed_noise import StreamedNoise
 from acquisition.plan.measurement import Measurement
 from acquisition.recording import RecordingState, open_recording
-from acquisition.rig.configuration import OutputUse, load_rig
+from acquisition.rig.configuration import load_rig
+from acquisition.rig.output import OutputUse
 from acquisition.run.run_measurement import run_measurement
 from acquisition.run.state import RunState
 from acquisition.virtual.world.decimation import GROUP_DELAY_SAMPLES
