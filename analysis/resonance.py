@@ -20,6 +20,9 @@ _SMALLEST_RELATIVE_SD = 1e-6
 """Keeps the weights finite where a noise-free simulation states no spread at all."""
 _RESOLVED_LINES = 4.0
 """Noise bandwidths that a half-power bandwidth must hold, else the window smears the peak by over 2 %."""
+_LARGEST_SD_UNRESOLVED = 0.1
+"""A peak too narrow for the lines is believed only where they are known to a tenth: else it is one of the
+ripples on top of a broad hill."""
 _LARGEST_DAMPING = 0.5
 _BACKGROUND_DEGREES = (1, 2, 3)
 """Tried in turn: broad peaks see more of their neighbours than a straight line can follow."""
@@ -216,6 +219,9 @@ def _resonance(
     top = int(np.argmax(curve))
     # The peak's height follows the residue: it is known as well as the damping, and as the lines at it.
     near = int(np.argmin(np.abs(frequency_hz - fine_hz[top])))
+    is_resolved = 2 * damping * natural_hz > _RESOLVED_LINES * band.resolution_hz
+    if not is_resolved and spread[near] > _LARGEST_SD_UNRESOLVED * np.abs(value[near]):
+        return None
     lines_within = max(1.0, 2 * damping * natural_hz / float(np.median(np.diff(frequency_hz))))
     sd_peak = spread[near] * np.sqrt(max(1.0, chi_square) / lines_within)
     return Resonance(
@@ -228,7 +234,7 @@ def _resonance(
         sd_peak_magnitude=float(sd_peak),
         reduced_chi_square=chi_square,
         lines_used=frequency_hz.size,
-        is_resolved=2 * damping * natural_hz > _RESOLVED_LINES * band.resolution_hz,
+        is_resolved=is_resolved,
     )
 
 
