@@ -20,6 +20,7 @@ from .measure import measure
 from .recover import recover_recording
 from .serve_rig import serve_rig
 from .study import study
+from .tradeoff import tradeoff
 
 app = typer.Typer(
     name="vibench",
@@ -33,6 +34,7 @@ app.command()(measure)
 app.command()(analyse)
 app.command()(study)
 app.command()(figure)
+app.command()(tradeoff)
 app.command(name="recover")(recover_recording)
 app.command(name="serve-rig")(serve_rig)
 app.add_typer(bench, name="bench")

@@ -1,0 +1,91 @@
+"""What a measurement of the trade says: cost and error of each level, and of general solvers beside them."""
+
+from dataclasses import dataclass
+
+from ..accuracy import Accuracy
+from .regimes import Motion, Regime
+
+STATE_UNITS = (1e-4, 0.1)
+"""An error of a state is in units of 100 um and 0.1 m/s, whichever part is worst."""
+
+
+@dataclass(frozen=True)
+class LevelFigures:
+    """One level of accuracy on one motion."""
+
+    accuracy: Accuracy
+    cost: float
+    """Processor time over simulated time."""
+    state_error: float | None
+    """Of the state at the end of the span, against the independent solution; None in chaos."""
+    response_i_error: float | None
+    """Relative, against the reference level; None in chaos."""
+    response_ii_error: float | None
+    response_i: float
+    """Mean over all starts in chaos."""
+    response_i_scatter: float
+    """Relative standard deviation of Response I over starts; 0 where all agree."""
+    exponent_per_s: float
+    exponent_error_per_s: float
+    """Standard error of the exponent itself, whatever the accuracy."""
+
+
+@dataclass(frozen=True)
+class SolverFigures:
+    """A general solver on one motion."""
+
+    name: str
+    cost: float
+    """Processor time over simulated time."""
+    state_error: float | None
+    """Over its own, shorter span, against the independent solution."""
+
+
+@dataclass(frozen=True)
+class MotionTrade:
+    """The trade on one motion."""
+
+    motion: Motion
+    span_s: float
+    solver_span_s: float
+    levels: tuple[LevelFigures, ...]
+    solvers: tuple[SolverFigures, ...]
+
+    @property
+    def advice(self) -> str:
+        """Say in a sentence which level to take."""
+        quick, standard, reference = self.levels
+        match self.motion.regime:
+            case Regime.FREE:
+                return "Flight is exact: all levels are the same."
+            case Regime.PERIODIC:
+                return (
+                    f"Each level buys digits: {quick.state_error:.0e}, {standard.state_error:.0e} and "
+                    f"{reference.state_error:.0e} of the state; the last costs "
+                    f"{reference.cost / quick.cost:.1f} times the first."
+                )
+            case Regime.CHAOTIC:
+                return (
+                    "Quick is as good as any: with the start of the motion Response I scatters by "
+                    f"{quick.response_i_scatter:.1%}, which no accuracy lessens."
+                )
+
+
+@dataclass(frozen=True)
+class Trade:
+    """Everything that was measured in one run."""
+
+    motions: tuple[MotionTrade, ...]
+    machine: str
+    """Processor and cores."""
+    software: str
+
+    def solver_ratio(self, name: str, accuracy: Accuracy) -> dict[str, float]:
+        """Cost of a general solver over that of a level, by motion."""
+        return {
+            each.motion.name: solver.cost / level.cost
+            for each in self.motions
+            for solver in each.solvers
+            for level in each.levels
+            if solver.name == name and level.accuracy is accuracy
+        }

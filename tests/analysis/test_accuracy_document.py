@@ -1,0 +1,52 @@
+"""The page on accuracy is made from a measurement, and the page in docs was made by this code."""
+
+from pathlib import Path
+
+import pytest
+
+from analysis.accuracy_document import accuracy_document, worst_error
+from analysis.figures.tradeoff import tradeoff_figure
+from sim.accuracy import Accuracy
+from sim.trade.measuring import Thoroughness, measured_trade
+from sim.trade.regimes import MOTIONS
+
+PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
+
+
+@pytest.fixture(scope="module")
+def trade():
+    return measured_trade(Thoroughness(span_s=0.03, solver_span_s=0.01), motions=(MOTIONS[1], MOTIONS[-1]))
+
+
+def headings(text):
+    return [line for line in text.splitlines() if line.startswith(("#", "| level", "| motion"))]
+
+
+def test_the_page_holds_every_level_and_solver_of_every_motion(trade):
+    page = accuracy_document(trade, "images/tradeoff.png")
+    for each in trade.motions:
+        assert each.motion.name in page
+        assert each.advice in page
+    assert page.count("| **quick** |") == page.count("| scipy Radau |") == 2
+    assert page.count("](images/tradeoff.png)") == 1
+
+
+def test_the_page_says_when_a_promise_is_not_kept(trade):
+    assert worst_error(trade, Accuracy.QUICK) <= Accuracy.QUICK.promise
+    assert "**no**" not in accuracy_document(trade, "x.png")
+
+
+def test_the_page_in_docs_has_the_motions_and_columns_that_this_code_writes(trade):
+    kept = headings(PAGE.read_text(encoding="utf-8"))
+    made = headings(accuracy_document(trade, "x.png"))
+    assert set(made) <= set(kept)
+    assert [line for line in kept if line.startswith("## ") and ":" in line] == [
+        f"## {each.regime.value.capitalize()}: {each.name}" for each in MOTIONS
+    ]
+
+
+def test_the_figure_draws_every_motion_that_has_an_error(trade):
+    drawn = tradeoff_figure(trade)
+    labels = {line.get_label() for line in drawn.figure.axes[0].get_lines()}
+    assert trade.motions[0].motion.name in labels
+    assert trade.motions[1].motion.name not in labels
