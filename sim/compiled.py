@@ -13,7 +13,7 @@ Kernel = TypeVar("Kernel", bound=Callable[..., object])
 def _fingerprint_of_sources() -> str:
     """Digest of every source of this package."""
     digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
+    for source in sorted(Path(__file__).parent.rglob("*.py")):
         digest.update(source.name.encode())
         digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
