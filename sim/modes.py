@@ -60,7 +60,10 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
     )
     forcing = np.zeros((len(frequency), 3, 1), dtype=np.complex128)
     forcing[:, 0, 0] = specimen.stiffnesses[0] + 1j * omega[:, 0, 0] * specimen.dampings[0]
-    moved = np.linalg.solve(dynamic, forcing)[:, :, 0].astype(np.complex128)
+    # In mass-normalised coordinates: a light mass beside a heavy one keeps all its digits.
+    root = np.sqrt(np.asarray(specimen.masses))
+    scaled = np.linalg.solve(dynamic / np.outer(root, root), forcing / root[:, None])
+    moved = (scaled[:, :, 0] / root).astype(np.complex128)
     return np.column_stack([moved, moved[:, 1] - moved[:, 2]])
 
 

@@ -77,3 +77,16 @@ def test_modes_that_coincide_are_refused_with_a_remedy():
 def test_a_negative_frequency_is_refused():
     with pytest.raises(ValueError, match="zero or positive"):
         base_transmissibility(gong2025(), [-1.0])
+
+
+@pytest.mark.parametrize("heavier", [1e2, 1e6, 1e10])
+def test_a_light_mass_on_a_heavy_frame_moves_as_its_closed_form_says(heavier):
+    omega, damping = 0.8, 0.02
+    specimen = dataclasses.replace(
+        gong2025(),
+        masses=(heavier, 1.0, heavier),
+        stiffnesses=(9.0 * heavier, 1.0, 4.0 * heavier),
+        dampings=(3.0 * heavier, damping, 2.0 * heavier),
+    )
+    moved = base_transmissibility(specimen, omega / (2.0 * np.pi))[0]
+    assert moved[3] / moved[2] == pytest.approx(omega**2 / (1.0 - omega**2 + 1j * damping * omega), rel=1e-12)
