@@ -19,8 +19,8 @@ from .contact_flow import (
     R,
     T,
     W,
+    contact_error,
     contact_rates,
-    step_error,
     trial_step,
 )
 from .parameters import (
@@ -289,7 +289,7 @@ def advance_contact(  # noqa: C901, PLR0912 - a step control and its three ends 
     contact_rates(work[POINT], work[0], side, force, middle, par)
     for _ in range(MOST_STEPS):
         trial_step(work, step, side, force, middle, par)
-        error = step_error(work, step, root_scale, rate_scale, tolerance)
+        error = contact_error(work, step, root_scale, rate_scale, tolerance)
         factor = step_factor(error)
         if not error <= 1.0:
             step *= min(factor, 1.0)

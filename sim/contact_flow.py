@@ -18,7 +18,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 from scipy.integrate._ivp import dop853_coefficients as _dop
 
-from .compiled import compiled
+from .compiled import compiled, inlined
 from .parameters import Parameters, Table, Vector
 
 W, R, CX, CZ, CVX, CVZ, T = range(7)
@@ -170,22 +170,19 @@ def trial_step(  # noqa: C901 - the twelve stages of one formula, in order
         end[i] = y[i] + h * (early + B9 * k9[i] + B10 * k10[i] + B11 * k11[i] + B12 * k12[i])
 
 
-@compiled
-def step_error(work: Table, step: float, root_scale: float, rate_scale: float, tolerance: float) -> float:
-    """Error of the step just tried, over what is allowed: on w and r, the two fast unknowns.
-
-    Infinite when a stage ran away or overflowed.
-    """
-    fifth_w = fifth_r = third_w = third_r = 0.0
+@inlined
+def _errors(work: Table, column: int, allowed: float) -> tuple[float, float]:
+    """Squares of the fifth- and third-order errors of one unknown's step, over step and what is allowed."""
+    fifth, third = 0.0, 0.0
     for stage in range(STAGES):
-        fifth_w += ERROR_5[stage] * work[stage, W]
-        fifth_r += ERROR_5[stage] * work[stage, R]
-        third_w += ERROR_3[stage] * work[stage, W]
-        third_r += ERROR_3[stage] * work[stage, R]
-    allowed_w = tolerance * (root_scale + abs(work[POINT, W]))
-    allowed_r = tolerance * (rate_scale + abs(work[POINT, R]))
-    fifth: float = (fifth_w / allowed_w) ** 2 + (fifth_r / allowed_r) ** 2
-    third = (third_w / allowed_w) ** 2 + (third_r / allowed_r) ** 2
+        fifth += ERROR_5[stage] * work[stage, column]
+        third += ERROR_3[stage] * work[stage, column]
+    return (fifth / allowed) ** 2, (third / allowed) ** 2
+
+
+@inlined
+def _blended(fifth: float, third: float, step: float) -> float:
+    """DOP853's error from the sums of squares; infinite when a stage ran away or overflowed."""
     blended = fifth + BLEND * third
     if blended == 0.0:
         return 0.0
@@ -193,3 +190,24 @@ def step_error(work: Table, step: float, root_scale: float, rate_scale: float, t
         # A stage ran away: fifth over infinity would pass for no error at all.
         return math.inf
     return step * fifth / math.sqrt(2.0 * blended)
+
+
+@compiled
+def step_error(work: Table, step: float, root_scale: float, rate_scale: float, tolerance: float) -> float:
+    """Error of the step just tried, over what is allowed: on w and r, the two fast unknowns."""
+    fifth_w, third_w = _errors(work, W, tolerance * (root_scale + abs(work[POINT, W])))
+    fifth_r, third_r = _errors(work, R, tolerance * (rate_scale + abs(work[POINT, R])))
+    return _blended(fifth_w + fifth_r, third_w + third_r, step)
+
+
+@compiled
+def contact_error(work: Table, step: float, root_scale: float, rate_scale: float, tolerance: float) -> float:
+    """Error of a step in contact: on w, r and vx.
+
+    m0 feels no contact, but a light one is faster than the contact itself, and a step that it cannot bear
+    must be seen.
+    """
+    fifth_w, third_w = _errors(work, W, tolerance * (root_scale + abs(work[POINT, W])))
+    fifth_r, third_r = _errors(work, R, tolerance * (rate_scale + abs(work[POINT, R])))
+    fifth_x, third_x = _errors(work, CVX, tolerance * (rate_scale + abs(work[POINT, CVX])))
+    return _blended(fifth_w + fifth_r + fifth_x, third_w + third_r + third_x, step)

@@ -1,4 +1,4 @@
-"""What must hold for every law and any numbers: symmetry, scales of length, time and mass, and how it was asked."""
+"""What holds for every law and any numbers: symmetry, scales of length, time, mass, and how it is asked."""
 
 import math
 from dataclasses import replace

@@ -1,0 +1,332 @@
+"""The engine at its extremes: right, or refused in one sentence; never a hang, never a silent NaN."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from sim.accuracy import Accuracy
+from sim.contact import step_factor
+from sim.contact_flow import CVX, STAGES, WIDTH, WORK_ROWS, R, W, contact_error
+from sim.contact_law import Hertz, HuntCrossley, LinearGap, RigidStops
+from sim.drive import Harmonic, LinearSweep, Sampled
+from sim.integrate import integrate
+from sim.modes import base_transmissibility
+from sim.outcome import Outcome
+from sim.response import steady_response
+from sim.response_curve import response_curve
+from sim.restoring_force import spring_of
+from sim.smooth import MOTIONS, smooth_error
+from sim.specimen import gong2025
+
+pytestmark = pytest.mark.timeout(300)
+"""A hang is a failure: the first test compiles, the others take milliseconds."""
+
+STOPS = ["hertz", "linear_gap", "hunt_crossley:1", "rigid:0", "rigid:0.8", "rigid:1"]
+SPRINGY = ["hertz", "linear_gap", "hunt_crossley:1"]
+POWERS = ["power:3", "power:47", "power:201"]
+LAWS = [*STOPS, *POWERS]
+DRIVE = Harmonic(130.0, 20e-6)
+
+
+def paper(contact, **options):
+    return gong2025(**{"damping_time_s": 3e-5, "contact": contact, **options})
+
+
+def distance(first, second):
+    """Largest difference of two states in units of 100 um and 0.1 m/s."""
+    return np.max(np.abs(first - second) / np.repeat([1e-4, 0.1], 3))
+
+
+def as_written(specimen, drive, duration_s, longest_step_s, start=(0.0,) * 6):
+    """Final state by scipy, from the paper's equations and the force as harmonic balance knows it."""
+    (m0, m1, m2), (k0, k1, k2), (c0, c1, c2) = specimen.masses, specimen.stiffnesses, specimen.dampings
+    spring, omega = spring_of(specimen), 2.0 * math.pi * drive.frequency_hz
+
+    def rates(t, state):
+        x, y, z, vx, vy, vz = state
+        force = spring.force(np.array([y - z]), np.array([vy - vz]))[0]
+        upper, inner = k2 * (z - x) + c2 * (vz - vx), k1 * (y - z) + c1 * (vy - vz) + force
+        base = k0 * (drive.amplitude_m * math.sin(omega * t) - x)
+        base += c0 * (drive.amplitude_m * omega * math.cos(omega * t) - vx)
+        return [vx, vy, vz, (upper + base) / m0, -inner / m1, (inner - upper) / m2]
+
+    limits = {"rtol": 1e-11, "atol": 1e-15, "max_step": longest_step_s}
+    run = solve_ivp(rates, (0.0, duration_s), start, "DOP853", **limits)
+    return run.y[:, -1]
+
+
+def steady_start(specimen, drive):
+    """State at time zero of the steady motion without contact."""
+    moved = -1j * drive.amplitude_m * base_transmissibility(specimen, drive.frequency_hz)[0, :3]
+    return np.concatenate([moved, 2j * math.pi * drive.frequency_hz * moved]).real
+
+
+def motion(specimen, drive, duration_s):
+    run = integrate(specimen, drive, duration_s, sample_rate_hz=1000.0 / duration_s)
+    assert run.outcome is Outcome.REACHED_END
+    assert np.all(np.isfinite(run.states))
+    assert np.all(np.diff(run.impacts.times_s) >= 0.0)
+    return run
+
+
+@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize(
+    ("drive", "duration_s"),
+    [
+        (Harmonic(0.01, 1e-2), 100.0),
+        (Harmonic(50e3, 1e-2), 0.05),
+        (Harmonic(130.0, 1e-2), 0.1),
+        (Harmonic(1e9, 1e-3), 1e-6),
+        (Harmonic(1e-6, 1.0), 1.0),
+        (LinearSweep(0.01, 50e3, 0.05, 1e-5), 0.05),
+    ],
+)
+def test_any_drive_is_followed_to_its_end(contact, drive, duration_s):
+    run = motion(paper(contact), drive, duration_s)
+    p = np.abs(run.states[:, 1] - run.states[:, 2])
+    # Not even ten millimetres press a stop in by more than a hundred micrometres.
+    assert p.max() < 200e-6
+
+
+@pytest.mark.parametrize("contact", LAWS)
+@pytest.mark.parametrize("frequency_hz", [0.01, 130.0, 50e3])
+def test_a_drive_of_a_picometre_is_answered_by_the_transmissibility(contact, frequency_hz):
+    specimen, drive = paper(contact), Harmonic(frequency_hz, 1e-12)
+    window_s = max(0.1, 1.0 / frequency_hz)
+    start = steady_start(specimen, drive)
+    response = steady_response(specimen, drive, duration_s=window_s, window_s=window_s, initial_state=start)
+    expected = abs(base_transmissibility(specimen, frequency_hz)[0])
+    assert response.impacts == response.impacts_before == 0
+    assert response.response_ii == pytest.approx(expected[0], rel=1e-6)
+    # At 0.01 Hz p is a part in 10^8 of x, and a power law follows x with a millionth's accuracy.
+    assert response.relative_ii == pytest.approx(expected[3], rel=1e-5, abs=1e-11)
+
+
+@pytest.mark.parametrize("contact", STOPS)
+def test_a_gap_of_a_metre_is_no_stop_at_all(contact):
+    far, none = (integrate(one, DRIVE, 1.0) for one in (paper(contact, gap_m=1.0), paper("linear")))
+    assert far.impacts.count == 0
+    np.testing.assert_allclose(far.final_state, none.final_state, rtol=1e-12, atol=1e-18)
+
+
+@pytest.mark.parametrize("contact", SPRINGY)
+@pytest.mark.parametrize("gap_m", [1e-12, 1e-9])
+def test_the_smallest_gaps_agree_with_the_equations_as_written(contact, gap_m):
+    specimen = paper(contact, gap_m=gap_m)
+    ours = integrate(specimen, DRIVE, 0.003, Accuracy.REFERENCE)
+    assert ours.outcome is Outcome.REACHED_END
+    assert ours.impacts.count > 1
+    assert distance(ours.final_state, as_written(specimen, DRIVE, 0.003, 2e-6)) < 1e-6
+
+
+@pytest.mark.parametrize("contact", [*SPRINGY, *POWERS])
+@pytest.mark.parametrize("drive", [Harmonic(130.0, 1e-2), Harmonic(50e3, 1e-2)])
+def test_violent_drives_agree_with_the_equations_as_written(contact, drive):
+    specimen, duration_s = paper(contact), 0.0015
+    ours = integrate(specimen, drive, duration_s, Accuracy.REFERENCE)
+    theirs = as_written(specimen, drive, duration_s, 1e-6)
+    assert distance(ours.final_state, theirs) < 1e-6 * max(1.0, distance(theirs, 0.0))
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e-3, 1e3, 1e6])
+@pytest.mark.parametrize("contact", SPRINGY)
+def test_any_stiffness_keeps_to_its_accuracy(contact, factor):
+    law = paper(contact).contact
+    specimen = replace(paper(contact), contact=replace(law, stiffness=factor * law.stiffness))
+    finals = [integrate(specimen, DRIVE, 0.02, level).final_state for level in Accuracy]
+    assert distance(finals[0], finals[2]) < 1e-2
+    assert distance(finals[1], finals[2]) < 1e-4
+    if factor <= 1.0:
+        assert distance(finals[2], as_written(specimen, DRIVE, 0.02, 2e-5)) < 1e-6
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+@pytest.mark.parametrize(
+    "contact", ["hertz", *(pytest.param(law, marks=pytest.mark.slow) for law in SPRINGY[1:])]
+)
+def test_masses_in_a_ratio_of_a_million_agree_with_the_equations_as_written(contact, factor, place):
+    masses = list(paper(contact).masses)
+    masses[place] *= factor
+    specimen, start = (
+        replace(paper(contact, gap_m=1e-6), masses=tuple(masses)),
+        [0.0, 0.0, 0.0, 0.0, 0.1, 0.0],
+    )
+    if (factor, place) == (1e-6, 1):
+        # Too light to get anywhere against its damper: let it start on the stop.
+        start[1] = 1e-6
+    ours = integrate(specimen, DRIVE, 1e-4, Accuracy.REFERENCE, start)
+    assert ours.outcome is Outcome.REACHED_END
+    assert ours.impacts.count > 0
+    assert distance(ours.final_state, as_written(specimen, DRIVE, 1e-4, 1e-6, start)) < 1e-6
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+@pytest.mark.parametrize("contact", ["rigid:0", "rigid:0.8", "rigid:1", "power:47"])
+def test_masses_in_a_ratio_of_a_million_under_the_other_laws_agree_between_accuracies(contact, factor, place):
+    masses = list(paper(contact).masses)
+    masses[place] *= factor
+    specimen, drive = replace(paper(contact, gap_m=5e-6), masses=tuple(masses)), Harmonic(430.0, 50e-6)
+    finals = [
+        integrate(specimen, drive, 0.002, level, max_impact_rate_hz=1e7).final_state for level in Accuracy
+    ]
+    assert distance(finals[1], finals[2]) < 1e-4 * max(1.0, distance(finals[2], 0.0))
+
+
+@pytest.mark.parametrize("contact", ["hertz", "linear_gap", "hunt_crossley:1", "rigid:0.8", "rigid:1"])
+@pytest.mark.parametrize("frequency_hz", [60.0, 130.0, 300.0])
+def test_a_motion_that_grazes_within_a_hair_strikes_and_one_short_of_it_does_not(contact, frequency_hz):
+    specimen = paper(contact)
+    path = base_transmissibility(specimen, frequency_hz)[0, 3]
+    omega = 2.0 * math.pi * frequency_hz
+    # p = Re(-i A0 path exp(i omega t)) has its first extreme here.
+    peak = ((0.5 * math.pi - np.angle(path)) % math.pi) / omega
+    for margin, strikes in ((-1e-11, 0), (1e-11, 1)):
+        drive = Harmonic(frequency_hz, specimen.gap_m / abs(path) * (1.0 + margin))
+        start = steady_start(specimen, drive)
+        run = integrate(specimen, drive, peak + 0.1 / frequency_hz, initial_state=start)
+        assert run.impacts.count == strikes
+        # The stop is reached as long before the extreme as a parabola is off its top by the margin.
+        if strikes:
+            assert peak - run.impacts.times_s[0] == pytest.approx(math.sqrt(2.0 * margin) / omega, rel=0.1)
+
+
+def pulled_away(contact, acceleration):
+    """A specimen at rest in a frame that is pulled away evenly, m1 just touching its lower stop."""
+    specimen, rate = paper(contact, damping_time_s=2e-4), 10_000.0
+    time_s = np.arange(6001) / rate
+    base = Sampled(0.5 * acceleration * time_s**2, rate)
+    (m0, m1, m2), (k0, _, k2) = specimen.masses, specimen.stiffnesses
+    x = -(m0 + m1 + m2) * acceleration / k0
+    z = x - (m1 + m2) * acceleration / k2
+    return specimen, base, np.array([x, z - specimen.gap_m, z, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("contact", SPRINGY)
+def test_a_slow_pressed_contact_settles_where_its_springs_balance(contact):
+    acceleration = 20.0
+    specimen, base, start = pulled_away(contact, acceleration)
+    run = integrate(specimen, base, 0.6, Accuracy.REFERENCE, start)
+    left = specimen.masses[1] * acceleration - specimen.stiffnesses[1] * specimen.gap_m
+    exponent = 1.0 if contact == "linear_gap" else 1.5
+    pressed = (left / specimen.contact.stiffness) ** (1.0 / exponent)
+    p = run.final_state[1] - run.final_state[2]
+    assert run.outcome is Outcome.REACHED_END
+    assert -p - specimen.gap_m == pytest.approx(pressed, rel=2e-3)
+    assert abs(run.final_state[4] - run.final_state[5]) < 1e-6
+
+
+@pytest.mark.parametrize("contact", ["rigid:0", "rigid:0.5", "rigid:1"])
+@pytest.mark.parametrize(("acceleration", "stays"), [(20.0, True), (17.0, False)])
+def test_a_rigid_stop_holds_what_is_pressed_on_it_and_nothing_else(contact, acceleration, stays):
+    specimen, base, start = pulled_away(contact, acceleration)
+    # k1 gap / m1 = 17.8 m/s^2: below it the spring draws m1 off the stop.
+    threshold = specimen.stiffnesses[1] * specimen.gap_m / specimen.masses[1]
+    assert (acceleration > threshold) is stays
+    run = integrate(specimen, base, 0.05, Accuracy.REFERENCE, start, sample_rate_hz=1e4)
+    p, rate = run.states[:, 1] - run.states[:, 2], run.states[:, 4] - run.states[:, 5]
+    assert np.all(p >= -specimen.gap_m * (1.0 + 1e-9))
+    if stays:
+        assert np.all(rate == 0.0)
+        assert run.impacts.count == 0
+    else:
+        assert np.all(p[3:] > -specimen.gap_m)
+
+
+def stored_energy(specimen, states):
+    """Kinetic and elastic energy with the base at rest, between impacts [J]."""
+    x, y, z, vx, vy, vz = states.T
+    (m0, m1, m2), (k0, k1, k2) = specimen.masses, specimen.stiffnesses
+    elastic = k0 * x**2 + k1 * (y - z) ** 2 + k2 * (z - x) ** 2
+    return 0.5 * (m0 * vx**2 + m1 * vy**2 + m2 * vz**2 + elastic)
+
+
+@pytest.mark.parametrize("duration_s", [10.0, pytest.param(1000.0, marks=pytest.mark.slow)])
+def test_perfect_rigid_stops_lose_nothing_in_any_number_of_impacts(duration_s):
+    specimen = gong2025(damping_time_s=0.0, contact="rigid:1")
+    start = np.array([2e-5, 0.0, -4e-5, 0.5, 0.25, -0.9])
+    run = integrate(
+        specimen, Harmonic(100.0, 0.0), duration_s, initial_state=start, sample_rate_hz=1000.0 / duration_s
+    )
+    assert run.impacts.count > 1000 * duration_s
+    energy = stored_energy(specimen, run.states)
+    # A rounding an impact.
+    np.testing.assert_allclose(energy, energy[0], rtol=2e-15 * run.impacts.count)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    size=st.sampled_from([1e80, 1e120, 1e155, 1e200, 1e300, math.inf, math.nan]),
+    stage=st.integers(5, STAGES - 1),
+    place=st.sampled_from([W, R, CVX]),
+    sign=st.sampled_from([-1.0, 1.0]),
+    tolerance=st.sampled_from([level.tolerance for level in Accuracy]),
+)
+def test_a_stage_that_ran_away_is_never_an_accepted_step(size, stage, place, sign, tolerance):
+    work = np.zeros((WORK_ROWS, WIDTH))
+    work[stage, place] = sign * size
+    for step in (1e-12, 1e-6, 1e-3):
+        contact = contact_error(work, step, 1e-3, 0.1, tolerance)
+        smooth = smooth_error(work, step, np.full(MOTIONS, 1e-4), tolerance)
+        for error in (contact, smooth):
+            assert not error <= 1.0
+            assert step_factor(error) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("contact", "size"),
+    [*((contact, size) for contact in STOPS for size in (1e20, 1e100, 1e200, 1e300)), ("power:47", 1e200)],
+)
+def test_numbers_beyond_all_digits_end_with_an_outcome(contact, size):
+    samples = np.sin(np.arange(200) * 0.01) * size
+    runs = [
+        integrate(paper(contact), Harmonic(130.0, size), 0.001),
+        integrate(paper(contact), DRIVE, 0.001, initial_state=[0.0, 0.0, 0.0, size, size, 0.5 * size]),
+        integrate(paper(contact), Sampled(samples, 1e4), 0.001),
+    ]
+    for run in runs:
+        assert run.outcome is not Outcome.REACHED_END or np.all(np.isfinite(run.final_state))
+        assert run.outcome.text
+
+
+REFUSED = [
+    (lambda: gong2025(gap_m=0.0), "Gap 0.0 m is not allowed"),
+    (lambda: gong2025(gap_m=math.nan), "Gap nan m is not allowed"),
+    (lambda: gong2025(gap_m=(math.inf, math.inf)), "Gap .* is not allowed"),
+    (lambda: gong2025(damping_time_s=-1e-5), "Damping time -1e-05 s is not allowed"),
+    (lambda: replace(gong2025(), masses=(1.0, -1.0, 1.0)), "mass m1 = -1.0 kg is not allowed"),
+    (lambda: replace(gong2025(), masses=(1.0, 1.0, math.nan)), "mass m2 = nan kg is not allowed"),
+    (lambda: replace(gong2025(), stiffnesses=(math.inf, 1.0, 1.0)), "stiffness k0 = inf N/m is not allowed"),
+    (lambda: replace(gong2025(), dampings=(0.0, math.nan, 0.0)), "Damping c1 = nan N s/m is not allowed"),
+    (lambda: RigidStops(math.nan), "Restitution nan is not allowed"),
+    (lambda: RigidStops(1.0 + 1e-12), "Restitution 1.000000000001 is not allowed"),
+    (lambda: Hertz(0.0), "Contact stiffness 0.0 N/m.* is not allowed"),
+    (lambda: LinearGap(math.inf), "Stop stiffness inf N/m is not allowed"),
+    (lambda: HuntCrossley(1e9, -1.0), "Contact loss -1.0 s/m is not allowed"),
+    (lambda: Harmonic(0.0, 1e-6), "Drive frequency 0.0 Hz is not allowed"),
+    (lambda: Harmonic(100.0, math.nan), "nan m is not allowed"),
+    (lambda: Sampled(np.array([]), 1e3), r"shape \(0,\) is not allowed"),
+    (lambda: Sampled(np.array([0.0, math.inf, 0.0, 0.0]), 1e3), "Sample 1 of the drive is inf"),
+    (lambda: response_curve(gong2025(), 1e-6, []), r"Frequencies of shape \(0,\) are not allowed"),
+    (lambda: response_curve(gong2025(), 1e-6, [100.0, math.nan]), "Drive frequency nan Hz is not allowed"),
+    (lambda: steady_response(gong2025(), Harmonic(100.0, 0.0)), "A drive of amplitude 0 m has no response"),
+    (lambda: steady_response(gong2025(), DRIVE, duration_s=math.inf), "Duration inf s is not allowed"),
+    (lambda: steady_response(gong2025(), Harmonic(0.01, 1e-6)), "it must hold one drive period, 100.0 s"),
+    (lambda: integrate(gong2025(), DRIVE, math.nan), "Duration nan s is not allowed"),
+    (lambda: integrate(gong2025(), DRIVE, 1.0, start_time_s=1e300), r"Start time 1e\+300 s is not allowed"),
+    (lambda: integrate(gong2025(), DRIVE, 1.0, sample_rate_hz=1e300), r"1e\+300 samples are not allowed"),
+    (lambda: integrate(gong2025(), DRIVE, 1.0, max_impact_rate_hz=math.nan), "Impact rate nan Hz"),
+    (lambda: integrate(gong2025(), DRIVE, 1.0, initial_state=[math.nan] * 6), "give six finite numbers"),
+]
+
+
+@pytest.mark.parametrize(("ask", "sentence"), REFUSED)
+def test_what_has_no_answer_is_refused_in_one_sentence(ask, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        ask()
