@@ -17,6 +17,7 @@ from .bench import bench
 from .demo import demo
 from .figure import figure
 from .measure import measure
+from .predict import predict
 from .recover import recover_recording
 from .serve_rig import serve_rig
 from .study import study
@@ -32,6 +33,7 @@ app = typer.Typer(
 app.command()(demo)
 app.command()(measure)
 app.command()(analyse)
+app.command()(predict)
 app.command()(study)
 app.command()(figure)
 app.command()(tradeoff)

@@ -1,0 +1,199 @@
+"""`vibench predict`: Responses I and II, and exponents, over frequency."""
+
+import time
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from pydantic import ValidationError
+from rich.table import Table
+
+from analysis.errors import InvalidRequest
+from sim.accuracy import Accuracy
+from sim.scene import Observable, Rest, plan_scene
+from sim.study.results import StudyResults
+from sim.study.software import software
+from sim.study.solve import Existing, solve_study
+from sim.study.study import Start, Study
+
+from .interruption import told_to_stop
+from .output import console, print_json
+from .paths import AsJson
+from .study import STOPPED_EXIT_CODE, Cluster, Workers
+from .study_bar import study_bar
+
+AUTO: Literal["auto"] = "auto"
+_SHOWN = 24
+"""Rows of a table on the terminal; all of them are in the JSON and in the file."""
+_RANGE_PARTS = 3
+_OPTIONS = {
+    "models": "--model",
+    "amplitudes_m": "--amplitude",
+    "gaps_m": "--gap",
+    "damping_times_s": "--damping-time",
+    "frequencies_hz": "--frequency",
+    "duration_s": "--duration",
+    "window_s": "--window",
+}
+"""What the user typed, by the name that the study has for it."""
+
+
+def predict(
+    amplitude: Annotated[float, typer.Option("--amplitude", metavar="M", help="Of the base displacement.")],
+    frequency: Annotated[
+        str, typer.Option("--frequency", metavar="F|START:STOP:STEP", help="One frequency or a range [Hz].")
+    ],
+    model: Annotated[
+        str, typer.Option("--model", help="hertz, linear, linear_gap, rigid:0.8, power:5, power:3+5+7, ...")
+    ] = "hertz",
+    damping_time: Annotated[
+        float, typer.Option("--damping-time", metavar="S", help="c_i = damping time * k_i.")
+    ] = 2e-5,
+    gap: Annotated[float, typer.Option("--gap", metavar="M", help="Clearance at both stops.")] = 45e-6,
+    duration: Annotated[
+        str, typer.Option("--duration", metavar="S|auto", help="Length of each run, or until it settles.")
+    ] = "30",
+    window: Annotated[float, typer.Option("--window", metavar="S", help="Observed at its end.")] = 5.0,
+    accuracy: Annotated[
+        Accuracy, typer.Option("--accuracy", help="See docs/accuracy.md.")
+    ] = Accuracy.STANDARD,
+    observe: Annotated[
+        str, typer.Option("--observe", help="response, or response,lyapunov.")
+    ] = Observable.RESPONSE.value,
+    start: Annotated[
+        Start, typer.Option("--start", help="rest, or continued from the next lower (up) or higher (down).")
+    ] = Start.REST,
+    workers: Workers = None,
+    cluster: Cluster = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE.h5", help="Keep the answers in a file.")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with what FILE.h5 lacks.")] = False,
+    explain: Annotated[bool, typer.Option("--explain", help="Say what is computed and why.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Predict the responses of m0 and of p over frequency."""
+    asked = _study(
+        {
+            "models": (model,),
+            "amplitudes_m": (amplitude,),
+            "gaps_m": (gap,),
+            "damping_times_s": (damping_time,),
+            "frequencies_hz": _frequencies(frequency),
+            "observe": _observables(observe),
+            "starts": (start,),
+            "accuracy": accuracy,
+            "duration_s": _duration(duration),
+            "window_s": window,
+        }
+    )
+    began = time.monotonic()
+    existing = Existing.RESUME if resume else Existing.REFUSE
+    with told_to_stop() as is_stopped, study_bar(asked.grid.size) as watcher:
+        results = solve_study(asked, out, existing, workers, cluster, watcher, is_stopped)
+    if as_json:
+        print_json(document(results, time.monotonic() - began))
+    else:
+        _tell(results)
+    if explain:
+        typer.echo(explanation(results), err=as_json)
+    for where, why in results.failures():
+        typer.echo(f"error: {where['frequency']} Hz: {why}", err=True)
+    if not results.is_complete:
+        raise typer.Exit(STOPPED_EXIT_CODE)
+
+
+def _study(options: dict[str, object]) -> Study:
+    try:
+        return Study.model_validate(options)
+    except ValidationError as error:
+        first = error.errors()[0]
+        said = first["msg"].removeprefix("Value error, ")
+        place = str(first["loc"][0]) if first["loc"] else ""
+        given = f"{_OPTIONS.get(place, place)} was given as {first['input']!r}: " if place else ""
+        raise InvalidRequest(given + said) from error
+
+
+def _frequencies(text: str) -> object:
+    """Read ``260`` or ``10:600:1``; the study judges the numbers."""
+    parts = text.split(":")
+    try:
+        numbers = [float(part) for part in parts]
+    except ValueError as error:
+        raise InvalidRequest(
+            f"a frequency of {text!r} was given; give one number or START:STOP:STEP [Hz]"
+        ) from error
+    if len(numbers) == 1:
+        return numbers
+    if len(numbers) != _RANGE_PARTS:
+        raise InvalidRequest(f"a frequency range of {text!r} was given; give START:STOP:STEP [Hz]")
+    return dict(zip(("start", "stop", "step"), numbers, strict=True))
+
+
+def _observables(text: str) -> tuple[Observable, ...]:
+    names = [part.strip() for part in text.split(",")]
+    known = (Observable.RESPONSE, Observable.LYAPUNOV)
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise InvalidRequest(f"--observe was given as {text!r}; a point has response and lyapunov")
+    return tuple(Observable(name) for name in names)
+
+
+def _duration(text: str) -> float | str:
+    if text == AUTO:
+        return AUTO
+    try:
+        return float(text)
+    except ValueError as error:
+        raise InvalidRequest(f"a duration of {text!r} was given; give seconds, or auto") from error
+
+
+def document(results: StudyResults, elapsed_s: float) -> dict[str, object]:
+    """Say every point with its options, for other programs; what is not known is null."""
+    return {
+        "points": [each.to_dict() for each in results.predictions()],
+        "failures": [{**where, "message": why} for where, why in results.failures()],
+        "is_complete": results.is_complete,
+        "options": results.study.model_dump(mode="json"),
+        "software": software(),
+        "elapsed_s": elapsed_s,
+    }
+
+
+def explanation(results: StudyResults) -> str:
+    """Say how the points are answered: one passage for each different plan."""
+    study = results.study
+    passages: dict[str, list[float]] = {}
+    for index, frequency_hz in enumerate(study.frequencies_hz):
+        plan = plan_scene(study.scene((0, 0, 0, 0, 0, index), Rest()))
+        passages.setdefault(f"{plan.method.value}. " + " ".join(plan.sentences), []).append(frequency_hz)
+    return "\n".join(
+        f"{len(points)} points from {points[0]:g} to {points[-1]:g} Hz: {text}"
+        for text, points in passages.items()
+    )
+
+
+def _tell(results: StudyResults) -> None:
+    rows = Table()
+    headings = ("frequency [Hz]", "Response I", "Response II", "p: I", "p: II", "impacts", "exponent [1/s]")
+    for heading in headings:
+        rows.add_column(heading, justify="right")
+    points = list(results.predictions())
+    step = max(1, -(-len(points) // _SHOWN))
+    for each in points[::step]:
+        rows.add_row(
+            f"{each.frequency_hz:g}",
+            *(
+                _number(value)
+                for value in (each.response_i, each.response_ii, each.relative_i, each.relative_ii)
+            ),
+            str(each.impacts),
+            _number(each.lyapunov_per_s),
+        )
+    console.print(rows)
+    if step > 1:
+        console.print(f"every {step}th of {len(points)} points; --json or --out gives all")
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"

@@ -1,0 +1,86 @@
+"""`vibench predict` as a user meets it: JSON with every point, a table, one sentence for each error."""
+
+import json
+
+import pytest
+
+from sim.drive import Harmonic
+from sim.response import steady_response
+from sim.specimen import gong2025
+
+COMPILING_S = 300
+"""For whoever runs the first of these tests after a change of the simulation."""
+SHORT = ("--duration", 1, "--window", 0.5)
+
+
+@pytest.mark.timeout(COMPILING_S)
+def test_a_prediction_is_the_answer_of_the_engine_for_every_frequency(vibench, tmp_path):
+    ran = vibench(
+        "predict",
+        *("--amplitude", 5e-6, "--frequency", "240:280:20", "--json", *SHORT),
+        cwd=tmp_path,
+        timeout_s=COMPILING_S,
+    )
+    assert ran.returncode == 0, ran.stderr
+    said = json.loads(ran.stdout)
+    assert [point["frequency_hz"] for point in said["points"]] == [240, 260, 280]
+    for point in said["points"]:
+        drive = Harmonic(point["frequency_hz"], 5e-6)
+        known = steady_response(gong2025(), drive, duration_s=1.0, window_s=0.5)
+        assert point["response_i"] == pytest.approx(known.response_i, rel=1e-6)
+        assert point["relative_ii"] == pytest.approx(known.relative_ii, rel=1e-6)
+        assert point["impacts"] == known.impacts
+        assert point["lyapunov_per_s"] is None
+    assert said["is_complete"]
+    assert said["options"]["damping_times_s"] == [2e-5]
+
+
+@pytest.mark.timeout(COMPILING_S)
+def test_an_exponent_is_carried_where_it_is_asked_for(vibench, tmp_path):
+    ran = vibench(
+        "predict",
+        *("--amplitude", 5e-6, "--frequency", 260, "--observe", "response,lyapunov", "--json"),
+        *("--duration", 6, "--window", 1),
+        cwd=tmp_path,
+        timeout_s=COMPILING_S,
+    )
+    assert ran.returncode == 0, ran.stderr
+    (point,) = json.loads(ran.stdout)["points"]
+    assert point["lyapunov_per_s"] > 50
+    assert 0 < point["lyapunov_error_per_s"] < 30
+
+
+@pytest.mark.timeout(COMPILING_S)
+def test_a_reader_gets_a_table_and_the_reasons(vibench, tmp_path):
+    ran = vibench(
+        "predict",
+        *("--amplitude", 1e-6, "--frequency", 300, "--explain", *SHORT),
+        cwd=tmp_path,
+        timeout_s=COMPILING_S,
+    )
+    assert ran.returncode == 0, ran.stderr
+    assert "Response II" in ran.stdout
+    assert "300 to 300 Hz" in ran.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--amplitude", -1, "--frequency", 100), "--amplitude"),
+        (("--amplitude", 1e-6, "--frequency", "x"), "START:STOP:STEP"),
+        (("--amplitude", 1e-6, "--frequency", "1:2"), "START:STOP:STEP"),
+        (("--amplitude", 1e-6, "--frequency", "300:200:1"), "--frequency"),
+        (("--amplitude", 1e-6, "--frequency", 100, "--model", "jelly"), "jelly"),
+        (("--amplitude", 1e-6, "--frequency", 100, "--observe", "cats"), "cats"),
+        (("--amplitude", 1e-6, "--frequency", 100, "--window", 40), "Window 40"),
+        (("--amplitude", 1e-6, "--frequency", 100, "--duration", "soon"), "auto"),
+        (("--amplitude", "nan", "--frequency", 100), "--amplitude"),
+    ],
+)
+def test_what_cannot_be_predicted_is_said_in_one_sentence(vibench, tmp_path, arguments, said):
+    ran = vibench("predict", *arguments, "--json", cwd=tmp_path)
+    assert ran.returncode != 0
+    assert ran.stdout == ""
+    (line,) = [each for each in ran.stderr.splitlines() if each.startswith("error:")]
+    assert said in line
+    assert list(tmp_path.iterdir()) == []
