@@ -15,6 +15,7 @@ from sim.study.errors import StudyError
 from .analyse import analyse
 from .bench import bench
 from .demo import demo
+from .export import export
 from .figure import figure
 from .measure import measure
 from .predict import predict
@@ -37,6 +38,7 @@ app.command()(predict)
 app.command()(study)
 app.command()(figure)
 app.command()(tradeoff)
+app.command()(export)
 app.command(name="recover")(recover_recording)
 app.command(name="serve-rig")(serve_rig)
 app.add_typer(bench, name="bench")

@@ -1,0 +1,1 @@
+"""Recordings go out to other programs, and other programs' files come in."""

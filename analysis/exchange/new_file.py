@@ -1,0 +1,42 @@
+"""A file that appears whole, under a name that nobody had, or not at all."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..errors import InvalidRequest
+
+UNFINISHED = ".unfinished"
+
+
+def require_unused(path: Path) -> None:
+    """InvalidRequest when a file has that name, or its folder does not exist."""
+    if path.exists():
+        raise InvalidRequest(f"{path} exists, and nothing is ever overwritten; choose another name")
+    if not path.parent.is_dir():
+        raise InvalidRequest(f"{path.parent} is no folder; make it, or choose another place for {path.name}")
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[Path]:
+    """Give a name to write to; when all went well the file has ``path`` as its name, else it is gone.
+
+    Raises
+    ------
+    InvalidRequest
+        When ``path`` or its unfinished form exists, the folder does not, or the disk refuses.
+
+    """
+    unfinished = path.with_name(path.name + UNFINISHED)
+    for each in (path, unfinished):
+        require_unused(each)
+    try:
+        yield unfinished
+        require_unused(path)  # another program may have been as busy
+        unfinished.rename(path)
+    except OSError as error:
+        raise InvalidRequest(
+            f"{path} could not be written: {error}; nothing was kept of it, so make room and try again"
+        ) from error
+    finally:
+        unfinished.unlink(missing_ok=True)

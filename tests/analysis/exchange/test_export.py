@@ -1,0 +1,128 @@
+"""What other programs read from an exported recording is what was recorded."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+from acquisition.errors import RecordingError
+from analysis.errors import InvalidRequest
+from analysis.exchange.excerpt import excerpt
+from analysis.exchange.export import Format, export_samples
+
+RATE_HZ = 51_200.0
+ROLES = ("drive_voltage", "m0_velocity")
+
+
+def test_csv_reads_back_every_value_with_its_unit_and_time(known, known_values, tmp_path):
+    path, _ = export_samples(excerpt(known), Format.CSV, tmp_path / "a.csv")
+    with path.open(newline="", encoding="utf-8") as file:
+        assert next(csv.reader(file)) == ["time [s]", "drive_voltage [V]", "m0_velocity [m s-1]"]
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    np.testing.assert_allclose(table[:, 0], np.arange(known.samples) / RATE_HZ, atol=5e-10)
+    for column, role in enumerate(ROLES, start=1):
+        np.testing.assert_allclose(table[:, column], known_values[role], rtol=1e-9)
+
+
+def test_an_excerpt_keeps_the_times_of_the_recording(known, known_values, tmp_path):
+    chosen = excerpt(known, ("m0_velocity",), 1.0, 1.5)
+    path, facts = export_samples(chosen, Format.CSV, tmp_path / "part.csv")
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    assert table.shape == (25_600, 2)
+    assert table[0, 0] == 1.0
+    np.testing.assert_allclose(table[:, 1], known_values["m0_velocity"][51_200:76_800], rtol=1e-9)
+    assert json.loads(facts.read_text("utf-8"))["first_sample"] == 51_200
+
+
+def test_what_csv_cannot_hold_stands_beside_it(known, tmp_path):
+    _, facts = export_samples(excerpt(known), Format.CSV, tmp_path / "a.csv")
+    said = json.loads(facts.read_text("utf-8"))
+    assert facts.name == "a.facts.json"
+    assert said["recording_id"] == known.recording_id
+    assert said["segments"][0]["numbers"] == {"frequency_hz": 260.0}
+    assert said["gaps"] == [{"first_sample": 70_000, "last_sample": 70_009}]
+    assert said["events"][-1]["text"] == "gap 45 µm"
+    assert said["channels"][1]["scale_factor"] == known.channel("m0_velocity").scale_factor
+
+
+def test_pyuff_reads_every_value_of_a_universal_file(known, known_values, tmp_path):
+    pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
+    path, _ = export_samples(excerpt(known), Format.UFF, tmp_path / "a.uff")
+    file = pyuff.UFF(str(path))
+    assert file.get_set_types().tolist() == [164, 58, 58]
+    units, *sets = file.read_sets()
+    assert (units["units_code"], units["length"], units["force"]) == (1, 1.0, 1.0)
+    for role, unit, kind, each in zip(ROLES, ("V", "m s-1"), (0, 11), sets, strict=True):
+        assert (each["id1"], each["ordinate_axis_units_lab"]) == (role, unit)
+        assert (each["func_type"], each["ordinate_spec_data_type"]) == (1, kind)
+        assert each["abscissa_axis_units_lab"] == "s"
+        np.testing.assert_array_equal(each["data"], known_values[role])
+
+
+def test_a_universal_file_keeps_the_digits_of_the_rate_that_its_increment_loses(known, tmp_path):
+    pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
+    path, _ = export_samples(excerpt(known, from_s=1.0), Format.UFF, tmp_path / "a.uff")
+    first = pyuff.UFF(str(path)).read_sets(1)
+    assert first["abscissa_inc"] != 1 / RATE_HZ
+    assert first["id5"].split() == ["sample_rate_hz=51200.0", "first_sample=51200"]
+
+
+def test_a_matlab_file_holds_a_struct_for_each_channel(known, known_values, tmp_path):
+    export_samples(excerpt(known), Format.MAT, tmp_path / "a.mat")
+    found = loadmat(tmp_path / "a.mat", squeeze_me=True, simplify_cells=True)
+    np.testing.assert_array_equal(found["time_s"], known.time_s())
+    for role, unit in zip(ROLES, ("V", "m s-1"), strict=True):
+        np.testing.assert_array_equal(found[role]["values"], known_values[role])
+        assert found[role]["units"] == unit
+        assert found[role]["scale_factor"] == known.channel(role).scale_factor
+    assert found["recording"]["sample_rate_hz"] == RATE_HZ
+    assert json.loads(found["recording"]["plan_json"])["name"] == "known"
+
+
+def test_segments_in_a_matlab_file_are_indices_of_its_own_arrays(known, tmp_path):
+    export_samples(excerpt(known, from_s=1.0), Format.MAT, tmp_path / "a.mat")
+    found = loadmat(tmp_path / "a.mat", squeeze_me=True, simplify_cells=True)
+    segments = found["recording"]["segments"]
+    assert segments["label"].tolist() == ["dwell", "step"]
+    assert segments["first"].tolist() == [1, 70_000 - 51_200 + 1]
+    assert segments["last"].tolist() == [70_000 - 51_200, 120_000 - 51_200]
+
+
+@pytest.mark.parametrize("to", list(Format))
+def test_nothing_is_overwritten_and_nothing_is_left_of_a_refusal(known, tmp_path, to):
+    taken = tmp_path / f"a.{to.value}"
+    taken.write_text("mine")
+    with pytest.raises(InvalidRequest, match="nothing is ever overwritten"):
+        export_samples(excerpt(known), to, taken)
+    assert [each.read_text() for each in tmp_path.iterdir()] == ["mine"]
+
+
+def test_a_watcher_hears_of_every_value(known, tmp_path):
+    for to in Format:
+        heard = []
+        chosen = excerpt(known)
+        export_samples(chosen, to, tmp_path / f"watched_{to.value}.x", heard.append)
+        assert sum(heard) == chosen.values == 2 * known.samples
+        (tmp_path / f"watched_{to.value}.facts.json").unlink(missing_ok=True)
+
+
+def test_an_interrupted_export_leaves_no_file(known, tmp_path):
+    def interrupt(_):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        export_samples(excerpt(known), Format.CSV, tmp_path / "a.csv", interrupt)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("from_s", "to_s"), [(-1.0, None), (2.0, 1.0), (0.0, 100.0), (1.0, 1.0)])
+def test_a_stretch_outside_the_recording_is_refused_with_its_length(known, from_s, to_s):
+    with pytest.raises(InvalidRequest, match=r"goes from 0 to 2\.34375 s"):
+        excerpt(known, (), from_s, to_s)
+
+
+def test_a_channel_that_is_not_there_is_refused_with_those_that_are(known):
+    with pytest.raises(RecordingError, match="it has drive_voltage, m0_velocity"):
+        excerpt(known, ("velocity",))
