@@ -17,6 +17,7 @@ from .bench import bench
 from .demo import demo
 from .export import export
 from .figure import figure
+from .import_recording import import_file
 from .measure import measure
 from .predict import predict
 from .recover import recover_recording
@@ -39,6 +40,7 @@ app.command()(study)
 app.command()(figure)
 app.command()(tradeoff)
 app.command()(export)
+app.command(name="import")(import_file)
 app.command(name="recover")(recover_recording)
 app.command(name="serve-rig")(serve_rig)
 app.add_typer(bench, name="bench")

@@ -25,7 +25,7 @@ class Format(StrEnum):
 def export_samples(
     excerpt: Excerpt, to: Format, path: Path, watcher: Watcher = unwatched
 ) -> tuple[Path, ...]:
-    """Write the excerpt as ``path``, and what its format has no place for as ``NAME.facts.json`` beside it.
+    """Write the excerpt as ``path``, and what its format has no place for as ``PATH.facts.json`` beside it.
 
     Gives the files that were written. Nothing is ever overwritten.
 

@@ -11,8 +11,8 @@ SUFFIX = ".facts.json"
 
 
 def facts_path(path: Path) -> Path:
-    """``NAME.facts.json`` beside ``NAME.csv``."""
-    return path.with_name(path.name.removesuffix(path.suffix) + SUFFIX)
+    """``NAME.csv.facts.json`` beside ``NAME.csv``."""
+    return path.with_name(path.name + SUFFIX)
 
 
 def facts_document(excerpt: Excerpt) -> dict[str, Any]:

@@ -39,7 +39,7 @@ def test_an_excerpt_keeps_the_times_of_the_recording(known, known_values, tmp_pa
 def test_what_csv_cannot_hold_stands_beside_it(known, tmp_path):
     _, facts = export_samples(excerpt(known), Format.CSV, tmp_path / "a.csv")
     said = json.loads(facts.read_text("utf-8"))
-    assert facts.name == "a.facts.json"
+    assert facts.name == "a.csv.facts.json"
     assert said["recording_id"] == known.recording_id
     assert said["segments"][0]["numbers"] == {"frequency_hz": 260.0}
     assert said["gaps"] == [{"first_sample": 70_000, "last_sample": 70_009}]
@@ -103,9 +103,8 @@ def test_a_watcher_hears_of_every_value(known, tmp_path):
     for to in Format:
         heard = []
         chosen = excerpt(known)
-        export_samples(chosen, to, tmp_path / f"watched_{to.value}.x", heard.append)
+        export_samples(chosen, to, tmp_path / f"a.{to.value}", heard.append)
         assert sum(heard) == chosen.values == 2 * known.samples
-        (tmp_path / f"watched_{to.value}.facts.json").unlink(missing_ok=True)
 
 
 def test_an_interrupted_export_leaves_no_file(known, tmp_path):

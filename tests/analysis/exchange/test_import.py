@@ -1,0 +1,365 @@
+"""Other people's files become recordings that say and give what the files did."""
+
+import hashlib
+import json
+import wave
+
+import h5py
+import numpy as np
+import pytest
+from scipy.io import wavfile
+
+from acquisition.errors import ConfigurationError, RecordingError
+from acquisition.recording import RecordingState, open_recording
+from acquisition.toml_file import load_toml
+from analysis.errors import InvalidRequest, UnusableData
+from analysis.exchange.excerpt import excerpt
+from analysis.exchange.export import Format, export_samples
+from analysis.exchange.import_recording import import_recording
+from analysis.exchange.mapping import ImportMapping
+from analysis.exchange.source import opened_source
+from analysis.measurement_analysis import analyse_recording
+
+RATE_HZ = 8000.0
+SAMPLES = 60_000
+ROUNDING = 2.0**-30
+"""Of a channel's range: the finest step of a stored channel."""
+DWELL = """
+started_utc = 2026-03-01T12:00:00Z
+sample_rate_hz = 8000.0
+[measurement]
+name = "dwell-260"
+excitation = { kind = "dwell", amplitude_vpp = 1.0, frequency_hz = 260, settle_s = 1, duration_s = 5 }
+"""
+CHANNEL = '[[channels]]\nsource = "{}"\nrole = "{}"\n{}\n'
+
+
+def mapping(tmp_path, *channels, head=DWELL):
+    path = tmp_path / "map.toml"
+    path.write_text(head + "".join(CHANNEL.format(*each) for each in channels), encoding="utf-8")
+    return load_toml(path, ImportMapping)
+
+
+def signals():
+    noise = np.random.default_rng(5).standard_normal((2, SAMPLES))
+    return noise * np.array([[0.3], [2e-3]])
+
+
+def imported(path, meaning, out=None):
+    with open_recording(import_recording(path, meaning, out or path.parent / "made.h5")) as recording:
+        values = [recording.read(role) for role in recording.roles]
+        return recording, np.stack(values)
+
+
+def assert_same(found, wanted):
+    for row, expected in zip(found, wanted, strict=True):
+        np.testing.assert_allclose(row, expected, rtol=0, atol=2 * np.nanmax(np.abs(expected)) * ROUNDING)
+
+
+def test_columns_of_a_table_in_hdf5_become_channels(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["run/data"] = signals().T
+    meaning = mapping(tmp_path, ("/run/data#1", "drive_voltage", ""), ("/run/data#2", "m0_velocity", ""))
+    recording, values = imported(tmp_path / "a.h5", meaning)
+    assert_same(values, signals())
+    assert recording.state is RecordingState.COMPLETE
+    assert recording.sample_rate_hz == RATE_HZ
+    assert recording.channel("m0_velocity").unit == "m s-1"
+    assert recording.started_utc.startswith("2026-03-01T12:00:00")
+
+
+def test_rows_of_a_matlab_matrix_become_channels(tmp_path):
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        file["v"] = signals()[:1]
+    _, values = imported(tmp_path / "a.mat", mapping(tmp_path, ("v", "m0_velocity", "")))
+    assert_same(values, signals()[:1])
+
+
+def test_scales_of_file_and_mapping_multiply_and_integers_stay_exact(tmp_path):
+    counts = np.random.default_rng(1).integers(-(2**23), 2**23, SAMPLES, dtype=np.int32)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["acc"] = counts
+        file["acc"].attrs["scale_factor"] = 1e-6
+    meaning = mapping(tmp_path, ("acc", "base_acceleration", "scale = 9.80665"))
+    recording, values = imported(tmp_path / "a.h5", meaning)
+    np.testing.assert_allclose(values[0], counts * 1e-6 * 9.80665, rtol=1e-12)
+    with open_recording(recording.path) as again:
+        np.testing.assert_array_equal(again.read_counts("base_acceleration"), counts)
+
+
+def test_values_that_are_no_numbers_are_lost_samples(tmp_path):
+    wanted = signals()
+    wanted[0, 55_000:55_003] = np.nan
+    wanted[1, 10] = np.inf
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["a"], file["b"] = wanted
+    meaning = mapping(tmp_path, ("a", "drive_voltage", ""), ("b", "m0_velocity", ""))
+    recording, values = imported(tmp_path / "a.h5", meaning)
+    assert [(each.first_sample, each.last_sample) for each in recording.gaps] == [(10, 10), (55_000, 55_002)]
+    expected = np.where(np.isfinite(wanted).all(axis=0), wanted, np.nan)
+    assert_same(values, expected)
+
+
+def test_a_tdms_file_brings_its_rate_and_its_values(tmp_path):
+    nptdms = pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
+    about = {"wf_increment": 1 / RATE_HZ, "unit_string": "m/s"}
+    with nptdms.TdmsWriter(tmp_path / "a.tdms") as writer:
+        for piece in np.split(signals(), 3, axis=1):
+            writer.write_segment(
+                [
+                    nptdms.ChannelObject("Measured", "Base", piece[0], about),
+                    nptdms.ChannelObject("Measured", "Laser", piece[1], about),
+                ]
+            )
+    with opened_source(tmp_path / "a.tdms") as source:
+        assert [(each.name, each.unit) for each in source.channels] == [
+            ("Measured/Base", "m/s"),
+            ("Measured/Laser", "m/s"),
+        ]
+    head = DWELL.replace("sample_rate_hz = 8000.0\n", "")
+    meaning = mapping(
+        tmp_path, ("Base", "drive_voltage", ""), ("Measured/Laser", "m0_velocity", ""), head=head
+    )
+    recording, values = imported(tmp_path / "a.tdms", meaning)
+    assert recording.sample_rate_hz == pytest.approx(RATE_HZ, rel=1e-12)
+    assert_same(values, signals())
+
+
+@pytest.mark.parametrize(("dtype", "full"), [(np.int16, 2**15), (np.int32, 2**31), (np.float32, 1)])
+def test_wav_samples_are_fractions_of_full_scale(tmp_path, dtype, full):
+    fractions = np.clip(signals()[0], -0.9, 0.9)
+    stored = (fractions * full).astype(dtype)
+    wavfile.write(tmp_path / "a.wav", int(RATE_HZ), np.stack((stored, -stored), axis=1))
+    meaning = mapping(tmp_path, ("1", "drive_voltage", "scale = 10.0"), ("2", "m0_velocity", ""))
+    _, values = imported(tmp_path / "a.wav", meaning)
+    exact = stored.astype(float) / full
+    np.testing.assert_allclose(values, np.stack((10 * exact, -exact)), rtol=0, atol=1e-8)
+
+
+def test_wav_of_24_bits_keeps_every_bit(tmp_path):
+    counts = np.random.default_rng(2).integers(-(2**22), 2**22, SAMPLES, dtype=np.int32)
+    with wave.open(str(tmp_path / "a.wav"), "wb") as file:
+        file.setparams((1, 3, int(RATE_HZ), 0, "NONE", ""))
+        file.writeframes(counts.astype("<i4").view(np.uint8).reshape(-1, 4)[:, :3].tobytes())
+    _, values = imported(tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", "")))
+    np.testing.assert_array_equal(values[0], counts / 2.0**23)
+
+
+def test_samples_near_a_stated_full_scale_are_overloads(tmp_path):
+    wanted = 0.1 * signals()[:1]
+    wanted[0, 100:103] = 0.96
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["a"] = wanted[0]
+    meaning = mapping(tmp_path, ("a", "m0_velocity", "full_scale = 1.0"))
+    recording, _ = imported(tmp_path / "a.h5", meaning)
+    assert [(each.first_sample, each.last_sample) for each in recording.overloads] == [(100, 102)]
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # pyuff leaves a file open
+@pytest.mark.parametrize(("binary", "single"), [(0, False), (0, True), (1, False)])
+def test_universal_files_of_pyuff_read_as_pyuff_wrote_them(tmp_path, binary, single):
+    pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
+    file = pyuff.UFF(str(tmp_path / "a.uff"))
+    wanted = signals()[:, :4001]
+    if single:
+        wanted = wanted.astype(np.float32).astype(float)
+    for number, row in enumerate(wanted, start=1):
+        each = pyuff.prepare_58(
+            binary=binary,
+            func_type=1,
+            rsp_node=number,
+            rsp_dir=3,
+            ref_node=0,
+            ref_dir=0,
+            data=row,
+            x=np.arange(row.size) / RATE_HZ,
+            id1=f"point {number}",
+            ord_data_type=2,
+            abscissa_spacing=1,
+            abscissa_spec_data_type=17,
+            ordinate_spec_data_type=11,
+            orddenom_spec_data_type=0,
+        )
+        file.write_sets([each], "add", force_double=not single)
+    head = DWELL.replace("settle_s = 1,", "settle_s = 0,")
+    meaning = mapping(tmp_path, ("point 1", "drive_voltage", ""), ("2", "m0_velocity", ""), head=head)
+    _, values = imported(tmp_path / "a.uff", meaning)
+    digits = 1e-5 if single else 1e-10
+    np.testing.assert_allclose(values, wanted, rtol=digits, atol=2 * np.abs(wanted).max() * ROUNDING)
+
+
+def test_binary_samples_of_single_precision_and_the_other_byte_order_are_read(known, known_values, tmp_path):
+    path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
+    lines = path.read_bytes().split(b"\n", 19)
+    kind, numbers = lines[7], lines[14]
+    lines[7] = kind.replace(b"58b     1", b"58b     2").replace(
+        b"%12d" % (8 * 51_200), b"%12d" % (4 * 51_200)
+    )
+    lines[14] = b"         2" + numbers[10:]
+    lines[19] = known_values["m0_velocity"][:51_200].astype(">f4").tobytes() + b"\n    -1\n"
+    path.write_bytes(b"\n".join(lines))
+    with opened_source(path) as source:
+        read = source.read(source.channels[0], 3, 51_200)
+    np.testing.assert_array_equal(read, known_values["m0_velocity"][3:51_200].astype(np.float32))
+
+
+@pytest.mark.parametrize("ending", ["    -1\n", "\n    -1\n", "\r\n    -1\r\n"])
+def test_what_a_maker_puts_behind_binary_samples_does_not_matter(known, known_values, tmp_path, ending):
+    path, _ = export_samples(excerpt(known, to_s=1.0), Format.UFF, tmp_path / "a.uff")
+    head, *bodies = path.read_bytes().split(b"    -1\n    58b")
+    kept = [body.removesuffix(b"    -1\n") for body in bodies]
+    path.write_bytes(head + b"".join(b"    -1\n    58b" + each + ending.encode() for each in kept))
+    head = DWELL.replace("8000.0", "51200.0").replace("settle_s = 1,", "settle_s = 0,")
+    meaning = mapping(tmp_path, ("m0_velocity", "m0_velocity", ""), head=head)
+    _, values = imported(path, meaning)
+    assert_same(values, [known_values["m0_velocity"][:51_200]])
+
+
+def test_samples_that_look_like_a_delimiter_are_samples(known, tmp_path):
+    path, _ = export_samples(excerpt(known, ("drive_voltage",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
+    raw = path.read_bytes()
+    at = raw.rindex(b"    -1\n") - 8 * 100
+    path.write_bytes(raw[:at] + b"\n    -1\n" + raw[at + 8 :])
+    with opened_source(path) as source:
+        (only,) = source.channels
+        read = source.read(only, 51_099, 51_102)
+    assert read[1] == np.frombuffer(b"\n    -1\n", "<f8")[0]
+    assert (read[0], read[2]) == (
+        known.read("drive_voltage", 51_099)[0],
+        known.read("drive_voltage", 51_101)[0],
+    )
+
+
+def test_an_imported_dwell_is_analysed_like_the_recording_it_came_from(dwell_file, tmp_path):
+    with open_recording(dwell_file()) as recording:
+        original = analyse_recording(recording)
+        path, _ = export_samples(excerpt(recording), Format.UFF, tmp_path / "dwell.uff")
+        delay_s = recording.channel("m0_velocity").delay_s
+        start_s = recording.segments[0].start / recording.sample_rate_hz
+        plan = original.excitation
+    head = (
+        f"started_utc = 2026-03-01T12:00:00Z\nbegins_s = {start_s - plan.settle_s!r}\n"
+        '[measurement]\nname = "weak"\nexcitation = { kind = "dwell", frequency_hz = 260.0, '
+        f"amplitude_vpp = {plan.amplitude_vpp!r}, settle_s = {plan.settle_s!r}, "
+        f"duration_s = {plan.duration_s!r} }}\n"
+    )
+    channels = [
+        ("drive_voltage", "drive_voltage", ""),
+        ("base_acceleration", "base_acceleration", ""),
+        ("m0_velocity", "m0_velocity", f"delay_s = {delay_s!r}"),
+    ]
+    made = import_recording(path, mapping(tmp_path, *channels, head=head), tmp_path / "made.h5")
+    with open_recording(made) as recording:
+        found = analyse_recording(recording)
+    assert found.response.response_i == pytest.approx(original.response.response_i, rel=1e-6)
+    assert found.response.response_ii == pytest.approx(original.response.response_ii, rel=1e-6)
+    assert found.facts.whole_stretches == found.facts.planned_stretches == 1
+
+
+def test_a_recording_says_where_it_came_from(tmp_path):
+    wavfile.write(tmp_path / "a.wav", int(RATE_HZ), signals()[0].astype(np.float32))
+    recording, _ = imported(tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", 'serial = "V-7"')))
+    said = recording.bench["imported"]
+    digest = hashlib.sha256((tmp_path / "a.wav").read_bytes()).hexdigest()
+    assert (said["file"], said["sha256"]) == ("a.wav", digest)
+    assert said["mapping"]["channels"][0]["serial"] == "V-7"
+    assert recording.reason == "imported from a.wav"
+    assert json.loads(json.dumps(recording.plan))["excitation"]["frequency_hz"] == 260
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("started_utc = 2026-03-01T12:00:00Z", "", "started_utc is missing"),
+        ("2026-03-01T12:00:00Z", "2026-03-01T12:00:00", "timezone"),
+        ("frequency_hz = 260", "frequency = 260", "frequency is not a known key"),
+        ('role = "m0_velocity"', 'role = "m0_velocity"\nunit = "mm s-1"', "convert it by scale"),
+        ('role = "m0_velocity"', 'role = "other"', "needs a quantity and a unit"),
+        ('role = "m0_velocity"', 'role = "m0_velocity"\nscale = 0', "leaves nothing"),
+    ],
+)
+def test_a_wrong_mapping_names_its_key(tmp_path, old, new, said):
+    text = DWELL + CHANNEL.format("1", "m0_velocity", "")
+    (tmp_path / "map.toml").write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(ConfigurationError, match=said):
+        load_toml(tmp_path / "map.toml", ImportMapping)
+
+
+def test_a_mapping_that_does_not_fit_the_file_is_refused_and_leaves_nothing(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["x/v"], file["y/v"], file["short"] = (*signals(), np.ones(5))
+    one = ("x/v", "m0_velocity", "")
+    refusals = [
+        ([("w", "m0_velocity", "")], DWELL, r"no channel 'w'; it has '/short' \(short\), '/x/v' \(v\)"),
+        ([("v", "m0_velocity", "")], DWELL, "several channels 'v'"),
+        ([("/x/v", *one[1:]), ("/short", "drive_voltage", "")], DWELL, "differ in their numbers of samples"),
+        ([("/x/v", *one[1:])], DWELL.replace("sample_rate_hz = 8000.0\n", ""), "give sample_rate_hz"),
+        ([("/x/v", *one[1:])], "begins_s = 7.0\n" + DWELL, "no part of the plan begins within the 7.5 s"),
+    ]
+    for channels, head, said in refusals:
+        with pytest.raises(InvalidRequest, match=said):
+            import_recording(tmp_path / "a.h5", mapping(tmp_path, *channels, head=head), tmp_path / "made.h5")
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["a.h5", "map.toml"]
+
+
+def test_a_rate_far_from_the_files_own_is_refused(tmp_path):
+    wavfile.write(tmp_path / "a.wav", 44_100, signals()[0].astype(np.float32))
+    with pytest.raises(InvalidRequest, match="says 44100 samples/s, and the mapping 8000"):
+        import_recording(tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", "")), tmp_path / "b.h5")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("a.pkl", b"\x80\x04", "cannot be imported"),
+        ("a.npy", b"\x93NUMPY", "cannot be imported"),
+        ("a.h5", b"text", "is no HDF5 file"),
+        ("a.mat", b"MATLAB 5.0 MAT-file", "saved with -v7.3"),
+        ("a.wav", b"RIFF\x00\x00", "cannot be read as WAV"),
+        ("a.uff", b"    -1\n    58b     1     2\n", "no universal file that can be read"),
+        ("a.unv", b"    -1\n   164\n    -1\n", "holds no time samples"),
+    ],
+)
+def test_a_file_that_is_not_what_its_suffix_says_is_one_sentence(tmp_path, name, content, said):
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises((InvalidRequest, UnusableData), match=said), opened_source(tmp_path / name):
+        pass
+
+
+def test_a_tdms_file_that_is_none_is_one_sentence(tmp_path):
+    pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
+    (tmp_path / "a.tdms").write_bytes(b"nothing of the kind")
+    with pytest.raises(UnusableData, match="is no TDMS file"), opened_source(tmp_path / "a.tdms"):
+        pass
+
+
+def test_objects_inside_hdf5_are_never_offered(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["v"] = signals()[0]
+        file.create_dataset("pickled", data=np.void(b"\x80\x04K\x01."))
+        file.create_dataset("text", data=["a", "b"], dtype=h5py.string_dtype())
+        file.create_dataset("complex", data=np.ones(9, dtype=complex))
+        file["elsewhere"] = h5py.ExternalLink("b.h5", "/v")
+    with opened_source(tmp_path / "a.h5") as source:
+        assert [each.name for each in source.channels] == ["/v"]
+
+
+def test_nothing_is_overwritten_by_an_import(tmp_path):
+    wavfile.write(tmp_path / "a.wav", int(RATE_HZ), signals()[0].astype(np.float32))
+    (tmp_path / "made.h5").write_text("mine")
+    with pytest.raises(RecordingError, match="nothing is ever overwritten"):
+        import_recording(
+            tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", "")), tmp_path / "made.h5"
+        )
+    assert (tmp_path / "made.h5").read_text() == "mine"
+
+
+def test_an_interrupted_import_leaves_nothing(tmp_path):
+    def interrupt(_):
+        raise KeyboardInterrupt
+
+    wavfile.write(tmp_path / "a.wav", int(RATE_HZ), signals()[0].astype(np.float32))
+    meaning = mapping(tmp_path, ("1", "m0_velocity", ""))
+    with pytest.raises(KeyboardInterrupt):
+        import_recording(tmp_path / "a.wav", meaning, tmp_path / "made.h5", interrupt)
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["a.wav", "map.toml"]

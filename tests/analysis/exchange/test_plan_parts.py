@@ -1,0 +1,78 @@
+"""Where a plan's parts lie in a file."""
+
+import pytest
+
+from acquisition.toml_file import validated
+from analysis.errors import InvalidRequest
+from analysis.exchange.mapping import ImportMapping
+from analysis.exchange.plan_parts import laid_parts
+
+NOISE = {
+    "kind": "multisine_noise",
+    "amplitude_vpp": 1.0,
+    "band_start_hz": 60.0,
+    "band_stop_hz": 560.0,
+    "repetition_hz": 4.0,
+    "periods": 2,
+    "realisations": 3,
+    "settle_s": 1.0,
+}
+SWEEP = {
+    "kind": "sine_sweep",
+    "amplitude_vpp": 1.0,
+    "start_hz": 150.0,
+    "stop_hz": 350.0,
+    "duration_s": 20.0,
+    "settle_s": 2.0,
+}
+
+
+def mapped(excitation, **more):
+    content = {
+        "started_utc": "2026-03-01T12:00:00Z",
+        "measurement": {"name": "m", "excitation": excitation},
+        "channels": [{"source": "1", "role": "m0_velocity"}],
+        **more,
+    }
+    return validated(content, ImportMapping, "test")
+
+
+def ranges(parts):
+    return [(each.start, each.stop) for each in parts]
+
+
+def test_realisations_follow_each_other_with_their_settling_between_them():
+    parts = laid_parts(mapped(NOISE, begins_s=0.5), 1000.0, 10_000)
+    assert ranges(parts) == [(1500, 2000), (3000, 3500), (4500, 5000)]
+    assert [each.segment.numbers["realisation"] for each in parts] == [0, 1, 2]
+
+
+def test_the_steps_of_a_sweep_are_one_part():
+    (part,) = laid_parts(mapped(SWEEP), 1000.0, 30_000)
+    assert (part.start, part.stop) == (2000, 22_000)
+    assert part.segment.label == "sweep"
+
+
+def test_told_parts_take_the_plans_labels_in_order():
+    told = [{"start_s": 1.0, "stop_s": 1.5}, {"start_s": 4.0, "stop_s": 4.5}]
+    parts = laid_parts(mapped(NOISE, parts=told), 1000.0, 10_000)
+    assert ranges(parts) == [(1000, 1500), (4000, 4500)]
+    assert [each.segment.numbers["realisation"] for each in parts] == [0, 1]
+
+
+def test_parts_behind_the_end_of_the_file_are_left_out():
+    assert len(laid_parts(mapped(NOISE), 1000.0, 3000)) == 2
+
+
+@pytest.mark.parametrize(
+    ("told", "said"),
+    [
+        ([(1, 2), (3, 4), (5, 6), (7, 8)], "4 parts are given, and the plan of m has 3"),
+        ([(1, 3), (2, 4)], "in the order of time"),
+        ([(11, 12)], "no part of the plan begins within the 10 s"),
+    ],
+)
+def test_parts_that_cannot_be_are_refused(told, said):
+    parts = [{"start_s": start_s, "stop_s": stop_s} for start_s, stop_s in told]
+    with pytest.raises(InvalidRequest, match=said):
+        laid_parts(mapped(NOISE, parts=parts), 1000.0, 10_000)
