@@ -1,6 +1,8 @@
 """`vibench predict`: Responses I and II, and exponents, over frequency."""
 
 import time
+from collections.abc import Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,7 +12,8 @@ from rich.table import Table
 
 from analysis.errors import InvalidRequest
 from sim.accuracy import Accuracy
-from sim.scene import Observable, Rest, plan_scene
+from sim.answer.plan import ScenePlan, plan_scene
+from sim.scene import Observable, Rest
 from sim.study.results import StudyResults
 from sim.study.software import software
 from sim.study.solve import Existing, solve_study
@@ -58,7 +61,7 @@ def predict(
         Accuracy, typer.Option("--accuracy", help="See docs/accuracy.md.")
     ] = Accuracy.STANDARD,
     observe: Annotated[
-        str, typer.Option("--observe", help="response, or response,lyapunov.")
+        str, typer.Option("--observe", help="response; with it lyapunov, scatter.")
     ] = Observable.RESPONSE.value,
     start: Annotated[
         Start, typer.Option("--start", help="rest, or continued from the next lower (up) or higher (down).")
@@ -132,10 +135,10 @@ def _frequencies(text: str) -> object:
 
 def _observables(text: str) -> tuple[Observable, ...]:
     names = [part.strip() for part in text.split(",")]
-    known = (Observable.RESPONSE, Observable.LYAPUNOV)
+    known = (Observable.RESPONSE, Observable.LYAPUNOV, Observable.SCATTER)
     unknown = [name for name in names if name not in known]
     if unknown:
-        raise InvalidRequest(f"--observe was given as {text!r}; a point has response and lyapunov")
+        raise InvalidRequest(f"--observe was given as {text!r}; a point has response, lyapunov and scatter")
     return tuple(Observable(name) for name in names)
 
 
@@ -161,22 +164,33 @@ def document(results: StudyResults, elapsed_s: float) -> dict[str, object]:
 
 
 def explanation(results: StudyResults) -> str:
-    """Say how the points are answered: one passage for each different plan."""
+    """Say how the points are answered: one passage for each run of points that are answered alike."""
     study = results.study
-    passages: dict[str, list[float]] = {}
-    for index, frequency_hz in enumerate(study.frequencies_hz):
-        plan = plan_scene(study.scene((0, 0, 0, 0, 0, index), Rest()))
-        passages.setdefault(f"{plan.method.value}. " + " ".join(plan.sentences), []).append(frequency_hz)
-    return "\n".join(
-        f"{len(points)} points from {points[0]:g} to {points[-1]:g} Hz: {text}"
-        for text, points in passages.items()
+    plans = [
+        (frequency_hz, plan_scene(study.scene((0, 0, 0, 0, 0, index), Rest())))
+        for index, frequency_hz in enumerate(study.frequencies_hz)
+    ]
+    return "\n".join(_passage(list(run)) for _, run in groupby(plans, lambda each: each[1].alike))
+
+
+def _passage(plans: Sequence[tuple[float, ScenePlan]]) -> str:
+    """Explain points that follow one another and are answered alike, by the one nearest to its stops."""
+    first_hz, last_hz = plans[0][0], plans[-1][0]
+    worst_hz, worst = max(plans, key=lambda each: each[1].largest_p_m)
+    said = " ".join(worst.sentences)
+    if len(plans) == 1:
+        return f"{first_hz:g} Hz: {worst.method.value}. {said}"
+    return (
+        f"{len(plans)} points, {first_hz:g} to {last_hz:g} Hz: {worst.method.value}. "
+        f"At {worst_hz:g} Hz: {said}"
     )
 
 
 def _tell(results: StudyResults) -> None:
-    rows = Table()
-    headings = ("frequency [Hz]", "Response I", "Response II", "p: I", "p: II", "impacts", "exponent [1/s]")
-    for heading in headings:
+    rows = Table(title="Responses I and II of m0 and of p = y - z, over the base amplitude")
+    has_exponents = Observable.LYAPUNOV in results.study.observe
+    headings = ["f [Hz]", "I", "II", "p: I", "p: II", "impacts", "motion", "error"]
+    for heading in headings + ["exponent [1/s]"] * has_exponents:
         rows.add_column(heading, justify="right")
     points = list(results.predictions())
     step = max(1, -(-len(points) // _SHOWN))
@@ -188,7 +202,9 @@ def _tell(results: StudyResults) -> None:
                 for value in (each.response_i, each.response_ii, each.relative_i, each.relative_ii)
             ),
             str(each.impacts),
-            _number(each.lyapunov_per_s),
+            str(each.motion),
+            "" if each.error_estimate is None else f"{each.error_estimate:.1g}",
+            *([_number(each.lyapunov_per_s)] if has_exponents else []),
         )
     console.print(rows)
     if step > 1:

@@ -38,7 +38,11 @@ def time_to_depart(series: Vector, length: float, closed: float, par: Parameters
     elif par.lower + series[0] <= closed:
         side = -1.0
     rate, bend, jerk = side * series[1], side * 2.0 * series[2], side * 6.0 * series[3]
-    if side == 0.0 or rate * rate > 2.0 * abs(bend) * RESOLVED * closed:
+    # A speed that cannot carry m1 out of what counts as closed, against the bend or against the jerk alone
+    # (r^2 / 2b and, with the bend gone to nothing at a release, 2 r sqrt(2 r / j) / 3), is none.
+    by_bend = rate * rate <= 2.0 * abs(bend) * RESOLVED * closed
+    by_jerk = 8.0 * abs(rate) ** 3 <= 9.0 * abs(jerk) * (RESOLVED * closed) ** 2
+    if side == 0.0 or not (by_bend or by_jerk):
         return 0.0
     if bend > 0.0 and not (jerk < 0.0 and 2.0 * bend**3 <= 3.0 * closed * jerk * jerk):
         # Still pressed on the stop, and by more than rounding: so far would it go before it turns.

@@ -111,3 +111,20 @@ def first_contact(
         if advances == PATIENCE:
             shortest = IMPATIENT * length
     return NEVER
+
+
+@compiled
+def touched_side(p: float, rate: float, lowest: float, highest: float) -> float:
+    """Side of the stop that is touched at p: the nearer one, not the one moved towards.
+
+    At a grazing touch the speed is rounding and its sign says nothing. Where there is no room between the
+    stops, p is rounding in its turn, and the speed tells.
+    """
+    if highest == math.inf:
+        return -1.0
+    if lowest == math.inf:
+        return 1.0
+    above, below = highest - p, lowest + p
+    if abs(above - below) <= 0.5 * (highest + lowest):
+        return math.copysign(1.0, rate)
+    return 1.0 if above < below else -1.0

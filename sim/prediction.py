@@ -69,7 +69,7 @@ class Prediction:
     ended: str
     """Why it was followed no longer."""
     error_estimate: float | None
-    """Relative; see `sim.scene.solve_scene`."""
+    """Relative; see `sim.answer.solve.solve_scene`."""
     integration_error: float | None
     """The part of it that a stricter accuracy would lessen."""
     scatter: float | None

@@ -1,10 +1,9 @@
 """Where a law acts: what a touch does to the motion, and how it goes on while the force lasts. SI units."""
 
-import math
-
 from .compiled import compiled
 from .contact import advance_contact, begin_contact
-from .parameters import POWER, RIGID, VY, VZ, Parameters, PowerTerms, Table, Vector
+from .detection import touched_side
+from .parameters import POWER, RIGID, VY, VZ, Parameters, PowerTerms, Table, Vector, Y, Z
 from .power_flow import PowerSystem
 from .rigid_stop import rebound
 from .smooth import advance_smooth
@@ -12,8 +11,8 @@ from .smooth import advance_smooth
 
 @compiled
 def strike(state: Vector, par: Parameters, tolerance: float) -> None:
-    """Touch the stop that m1 moves towards; the state is placed on it."""
-    side = math.copysign(1.0, state[VY] - state[VZ])
+    """Touch the stop that m1 has come to; the state is placed on it."""
+    side = touched_side(state[Y] - state[Z], state[VY] - state[VZ], par.lower, par.upper)
     if par.law == RIGID:
         rebound(state, side, par, tolerance)
     else:

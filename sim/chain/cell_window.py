@@ -1,11 +1,9 @@
 """One cell through one window: flight, contact, flight, ... and nothing else of the chain. SI units."""
 
-import math
-
 from ..compiled import compiled
 from ..contact import DEEPEST, HELD, LEFT, LOGGED, NOT_FINITE
 from ..contact_flow import R, W
-from ..detection import NEVER, SERIES_TERMS, first_contact
+from ..detection import NEVER, SERIES_TERMS, first_contact, touched_side
 from ..outcome import Outcome
 from ..parameters import Table, Vector
 from .cell_contact import (
@@ -152,7 +150,7 @@ def cross_window(
         touches[COUNT] += 1.0
         touches[int(touches[COUNT])] = tau
         p, rate = motion_in_series(cell, series, markov, tau)
-        side = math.copysign(1.0, rate)
+        side = touched_side(p, rate, law.lower, law.upper)
         acceleration = acceleration_at(curvature, tau) - memory_force(markov, cell[MEMORY:])
         begin_pressing(cell, side, p, rate, acceleration, markov, law, tolerance)
         _log_now(log, work, cell, tau)

@@ -13,7 +13,8 @@ from functools import partial
 from distributed import CancelledError, Client, Future
 from distributed.comm import get_address_host_port
 
-from ..scene import Scene, solve_scene
+from ..answer.solve import solve_scene
+from ..scene import Scene
 from .errors import ClusterLost
 from .executor import Bundle, Reply, Solved
 from .software import software

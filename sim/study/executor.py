@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..scene import Prediction, Scene
+from ..prediction import Prediction
+from ..scene import Scene
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..answer.plan import plan_scene
 from ..outcome import Outcome
-from ..scene import Given, Rest, Scene, plan_scene
+from ..scene import Given, Rest, Scene
 from ..trajectory import Floats
 from .agenda import NOBODY
 from .answers import cells_of, cut_text

@@ -77,7 +77,7 @@ NotNegative = Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), After
 Frequencies = Annotated[Positive, BeforeValidator(listed)]
 
 
-Kept = Literal[Observable.RESPONSE, Observable.LYAPUNOV]
+Kept = Literal[Observable.RESPONSE, Observable.LYAPUNOV, Observable.SCATTER]
 """What has one number a point."""
 
 

@@ -8,7 +8,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import TypeVar
 
-from ..scene import Scene, solve_scene
+from ..answer.solve import solve_scene
+from ..scene import Scene
 from .errors import InvalidStudy
 from .executor import Bundle, Reply, Solved
 from .timing import Solver, solve_timed

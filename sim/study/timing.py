@@ -4,7 +4,8 @@ import math
 import time
 from collections.abc import Callable
 
-from ..scene import Prediction, Scene
+from ..prediction import Prediction
+from ..scene import Scene
 from .executor import Solved
 
 Solver = Callable[[Scene], Prediction]

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
@@ -416,6 +416,9 @@ def test_a_sweep_that_chatters_and_sticks_is_its_own_samples():
 
 @settings(max_examples=15, deadline=None)
 @given(first_s=st.floats(0.0, 0.03), restitution=st.sampled_from([0.0, 0.6, 0.8]))
+@example(first_s=0.020404096147730984, restitution=0.6).via(
+    "a release whose speed is rounding of either sign"
+)
 def test_a_run_in_two_parts_ends_where_the_whole_does_even_cut_while_held(first_s, restitution):
     specimen = rigid(restitution)
     for drive in (STICKING, LinearSweep(180.0, 220.0, 0.03, 50e-6)):

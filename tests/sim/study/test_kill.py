@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.scene import solve_scene
+from sim.answer.solve import solve_scene
 from sim.study.columns import SESSION
 from sim.study.layout import STATE, PointState
 from sim.study.results import open_study

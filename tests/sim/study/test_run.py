@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sim.answer.solve import solve_scene
 from sim.drive import Harmonic
 from sim.outcome import Outcome
-from sim.response import steady_response
-from sim.scene import solve_scene
+from sim.scene import FixedDuration, Given, Rest, Scene
 from sim.specimen import gong2025
 from sim.study.columns import CONTINUES, PHASE
 from sim.study.errors import InvalidStudy
@@ -86,21 +86,26 @@ def test_any_number_of_threads_gives_the_same_answers_bit_for_bit(small, truth, 
     require_equal(solve_study(small, workers=workers), truth)
 
 
-def test_a_point_says_what_one_response_alone_says(small, truth):
-    alone = steady_response(gong2025(), Harmonic(260.0, 20e-6), duration_s=0.2, window_s=0.1)
+def alone(frequency_hz, amplitude_m, start):
+    """One scene, solved by itself."""
+    return solve_scene(
+        Scene(gong2025(), Harmonic(frequency_hz, amplitude_m), duration=FixedDuration(0.2, 0.1), start=start)
+    )
+
+
+def test_a_point_says_what_one_scene_alone_says(small, truth):
+    one = alone(260.0, 20e-6, Rest())
     point = {"amplitude": 20e-6, "frequency": 260.0, "start": "rest"}
-    assert truth.values("response_i", **point).item() == alone.response_i
-    assert truth.values("relative_ii", **point).item() == alone.relative_ii
-    assert truth.values("impacts", **point).item() == alone.impacts
-    np.testing.assert_array_equal(truth.values("final_state", **point).ravel(), alone.final_state)
+    assert truth.values("response_i", **point).item() == one.response_i
+    assert truth.values("relative_ii", **point).item() == one.relative_ii
+    assert truth.values("impacts", **point).item() == one.impacts
+    np.testing.assert_array_equal(truth.values("final_state", **point).ravel(), one.final_state)
 
 
 def test_a_chain_goes_on_from_where_its_predecessor_ended(small, truth):
-    first = steady_response(gong2025(), Harmonic(200.0, 20e-6), duration_s=0.2, window_s=0.1)
+    first = alone(200.0, 20e-6, Rest())
     # 200 Hz for 0.2 s are whole turns: the drive goes on at phase zero.
-    second = steady_response(
-        gong2025(), Harmonic(230.0, 20e-6), duration_s=0.2, window_s=0.1, initial_state=first.final_state
-    )
+    second = alone(230.0, 20e-6, Given(first.final_state))
     point = {"amplitude": 20e-6, "frequency": 230.0}
     assert truth.values("response_i", start="up", **point).item() == second.response_i
     assert truth.values("response_i", start="rest", **point).item() != second.response_i
@@ -140,10 +145,7 @@ def test_a_given_start_is_the_start_of_every_point():
         window_s=0.1,
     )
     found = list(solve_study(study, workers=2).predictions())
-    alone = steady_response(
-        gong2025(), Harmonic(130.0, 5e-6), duration_s=0.2, window_s=0.1, initial_state=state
-    )
-    assert found[1].response_i == alone.response_i
+    assert found[1].response_i == alone(130.0, 5e-6, Given(state)).response_i
     assert found[1].start == "kick"
 
 

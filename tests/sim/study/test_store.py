@@ -8,8 +8,9 @@ import h5py
 import numpy as np
 import pytest
 
+from sim.answer.solve import solve_scene
 from sim.prediction import Prediction
-from sim.scene import Rest, solve_scene
+from sim.scene import Rest
 from sim.study.columns import COLUMNS, IDENTITY, NUMBERS, SESSION
 from sim.study.disk import SoleWriter
 from sim.study.errors import StudyError

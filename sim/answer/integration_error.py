@@ -1,0 +1,80 @@
+"""How far the steps of contacts have moved the responses: measured against stricter steps. SI units.
+
+A motion is followed twice from the state in which a run ended, as before and with a far smaller tolerance.
+One that repeats is followed until both have forgotten where they began: their responses then differ by the
+error itself. One that never repeats forgets nothing but itself; what counts is what each drive period adds.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..accuracy import Accuracy
+from ..drive import Harmonic
+from ..outcome import Outcome
+from ..specimen import Specimen
+from ..trajectory import Floats
+from .followed_run import FollowedRun, Watch
+
+STRICTER = 1e-2
+"""Tolerance of the comparison over that of the run."""
+STRICTEST = 1e-12
+"""Smaller tolerances are rounding."""
+FORGETTING = 4.0
+"""Forgetting times that a motion which repeats is followed before it is compared."""
+LOOKS = 8
+"""Periods of it, or drive periods of a motion that does not repeat, that are compared."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunEnd:
+    """Where a run ended, and how it may go on."""
+
+    specimen: Specimen
+    drive: Harmonic
+    accuracy: Accuracy
+    state: Floats
+    """Shape (6,)."""
+    time_s: float
+
+    def go_on(self, tolerance: float, state: Floats, time_s: float) -> FollowedRun:
+        """Follow the motion from a state at an instant."""
+        return FollowedRun(self.specimen, self.drive, tolerance, state, time_s)
+
+
+def error_of_repeating(end: RunEnd, period: int, forgetting_s: float) -> float:
+    """Relative error of the responses of a motion that repeats, the largest of the four; NaN if lost."""
+    cycle_s = period / end.drive.frequency_hz
+    wait_s = cycle_s * np.ceil(FORGETTING * forgetting_s / cycle_s)
+    found = []
+    for tolerance in _tolerances(end.accuracy):
+        run = end.go_on(tolerance, end.state, end.time_s)
+        run.follow(end.time_s + wait_s)
+        found.append(_responses(run, LOOKS * cycle_s))
+    return float(np.max(np.abs(found[0] - found[1]) / np.abs(found[1])))
+
+
+def error_per_period(end: RunEnd) -> float:
+    """Relative error that a drive period adds to a motion's responses, the largest seen; NaN if lost."""
+    loose, strict = _tolerances(end.accuracy)
+    cycle_s = 1.0 / end.drive.frequency_hz
+    run = end.go_on(loose, end.state, end.time_s)
+    seen, missed = [], []
+    for _ in range(LOOKS):
+        twin = end.go_on(strict, run.state, run.time_s)
+        seen.append(_responses(run, cycle_s))
+        missed.append(np.abs(seen[-1] - _responses(twin, cycle_s)))
+    return float(np.max(np.max(missed, axis=0) / np.max(np.abs(seen), axis=0)))
+
+
+def _tolerances(accuracy: Accuracy) -> tuple[float, float]:
+    return accuracy.tolerance, max(STRICTER * accuracy.tolerance, STRICTEST)
+
+
+def _responses(run: FollowedRun, length_s: float) -> Floats:
+    """Largest x and p and both lines over a stretch, shape (4,); NaN if the run was lost."""
+    seen = run.follow(run.time_s + length_s, Watch.PEAKS_AND_LINES)
+    if run.outcome is not Outcome.REACHED_END:
+        return np.full(4, np.nan)
+    scale = 2.0 / length_s
+    return np.array([seen.peak_x_m, seen.peak_p_m, scale * abs(seen.area_x), scale * abs(seen.area_p)])

@@ -1,0 +1,81 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sim.accuracy import Accuracy
+from sim.answer.linear_motion import linear_motion, never_touches
+from sim.drive import Harmonic
+from sim.integrate import integrate
+from sim.modes import base_transmissibility
+from sim.specimen import gong2025
+
+DRIVE = Harmonic(137.0, 3e-6, phase_rad=0.7)
+START = (2e-6, -1e-6, 3e-6, 1e-3, -2e-3, 5e-4)
+
+
+def test_it_is_the_motion_that_the_integration_finds_from_any_start():
+    motion = linear_motion(gong2025(contact="linear"), DRIVE, START)
+    run = integrate(gong2025(contact="linear"), DRIVE, 0.3, Accuracy.REFERENCE, START, sample_rate_hz=1000.0)
+    for time_s, state in zip(run.time_s[::30], run.states[::30], strict=True):
+        np.testing.assert_allclose(motion.state(time_s), state, rtol=1e-9, atol=1e-15)
+
+
+def test_its_steady_part_is_the_transmissibility():
+    motion = linear_motion(gong2025(), DRIVE, START)
+    x, _, _, p = base_transmissibility(gong2025(), DRIVE.frequency_hz)[0]
+    assert abs(motion.steady_x) == pytest.approx(abs(x) * DRIVE.amplitude_m, rel=1e-12)
+    assert abs(motion.steady_p) == pytest.approx(abs(p) * DRIVE.amplitude_m, rel=1e-12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    frequency_hz=st.floats(1.0, 2000.0),
+    phase_rad=st.floats(0.0, 6.0),
+    start=st.tuples(*[st.floats(-1e-5, 1e-5)] * 3, *[st.floats(-1e-2, 1e-2)] * 3),
+)
+def test_p_never_leaves_its_bound(frequency_hz, phase_rad, start):
+    motion = linear_motion(gong2025(), Harmonic(frequency_hz, 2e-6, phase_rad), start)
+    times = np.linspace(0.0, 0.2, 400)
+    p = np.array([motion.state(time_s)[1] - motion.state(time_s)[2] for time_s in times])
+    assert np.abs(p).max() <= motion.largest_p_m * (1.0 + 1e-12)
+
+
+def test_the_bound_is_met_where_all_parts_come_together():
+    """At rest with no drive to speak of, a push in one mode alone reaches its own bound at once."""
+    free = linear_motion(gong2025(damping_time_s=0.0, contact="linear"), Harmonic(1.0, 1e-30), (0.0,) * 6)
+    assert free.largest_p_m < 1e-25
+    pushed = linear_motion(gong2025(damping_time_s=0.0, contact="linear"), DRIVE, START)
+    times = np.linspace(0.0, 40.0, 40001)
+    turn = np.exp(2j * np.pi * DRIVE.frequency_hz * times + 1j * DRIVE.phase_rad) * pushed.steady_p
+    free_p = np.exp(np.outer(times, pushed.rates)) @ (pushed.modes[:, 1] - pushed.modes[:, 2])
+    assert 0.97 * pushed.largest_p_m < np.abs((turn + free_p).real).max() <= pushed.largest_p_m
+
+
+def test_the_start_is_forgotten_when_it_says_so():
+    motion = linear_motion(gong2025(), DRIVE, START)
+    when_s = motion.died_away_s(1e-6)
+    later = np.linspace(when_s, when_s + 0.05, 500)
+    steady = motion.steady[0] * np.exp(2j * np.pi * DRIVE.frequency_hz * later + 1j * DRIVE.phase_rad)
+    left = np.array([motion.state(time_s)[0] for time_s in later]) - steady.real
+    assert np.abs(left).max() < 1e-6 * abs(motion.steady_x)
+    assert motion.share_left(when_s) <= 1e-6 * (1.0 + 1e-9)
+    assert motion.share_left(0.5 * when_s) > 1e-5
+
+
+def test_without_damping_the_start_is_never_forgotten():
+    motion = linear_motion(gong2025(damping_time_s=0.0), DRIVE, START)
+    assert motion.died_away_s(1e-3) == math.inf
+
+
+def test_a_stop_counts_as_untouched_only_by_proof():
+    quiet, loud = Harmonic(200.0, 1e-6), Harmonic(200.0, 1e-4)
+    for contact in ("hertz", "linear_gap", "rigid:0.8"):
+        specimen = gong2025(contact=contact)
+        assert never_touches(specimen, linear_motion(specimen, quiet, (0.0,) * 6))
+        assert not never_touches(specimen, linear_motion(specimen, loud, (0.0,) * 6))
+    soft, none = gong2025(contact="power:3"), gong2025(contact="linear")
+    assert not never_touches(soft, linear_motion(soft, quiet, (0.0,) * 6))
+    assert never_touches(none, linear_motion(none, loud, (0.0,) * 6))

@@ -1,0 +1,61 @@
+import pytest
+
+from sim.answer.plan import plan_scene
+from sim.drive import Harmonic
+from sim.prediction import Method
+from sim.scene import AutomaticDuration, FixedDuration, Given, Observable, Scene
+from sim.specimen import gong2025
+
+QUIET, LOUD = Harmonic(200.0, 1e-6), Harmonic(260.0, 5e-6)
+
+
+@pytest.mark.parametrize("contact", ["hertz", "linear_gap", "rigid:0.8", "linear"])
+@pytest.mark.parametrize("duration", [FixedDuration(), AutomaticDuration()], ids=["fixed", "automatic"])
+def test_what_provably_never_touches_is_answered_in_closed_form(contact, duration):
+    plan = plan_scene(Scene(gong2025(contact=contact), QUIET, duration=duration))
+    assert plan.method is Method.CLOSED_FORM
+    assert "closed form" in plan.explain()
+
+
+def test_a_gap_that_may_be_crossed_by_the_transient_alone_is_followed():
+    specimen = gong2025()
+    begins_fast = Given((0.0, 0.0, 0.0, 0.0, 0.5, 0.0))
+    plan = plan_scene(Scene(specimen, QUIET, start=begins_fast))
+    assert plan.method is Method.EVENT_DRIVEN
+    assert "A stop may be touched" in plan.explain()
+
+
+def test_a_start_that_is_not_forgotten_before_the_window_is_followed():
+    short = plan_scene(Scene(gong2025(), QUIET, duration=FixedDuration(0.2, 0.1)))
+    undamped = plan_scene(Scene(gong2025(damping_time_s=0.0), QUIET))
+    for plan in (short, undamped):
+        assert plan.method is Method.EVENT_DRIVEN
+        assert "not forgotten" in plan.explain()
+
+
+def test_a_force_at_every_p_is_followed_throughout():
+    assert plan_scene(Scene(gong2025(contact="power:7"), QUIET)).method is Method.POLYNOMIAL
+
+
+@pytest.mark.parametrize(
+    ("observable", "said"),
+    [
+        (Observable.LYAPUNOV, "A tangent vector is carried for the exponent."),
+        (Observable.SPECTRUM, "Samples are kept over the window"),
+        (Observable.SCATTER, "more times"),
+    ],
+)
+def test_only_what_is_observed_is_carried_along(observable, said):
+    plain = plan_scene(Scene(gong2025(), LOUD))
+    asked = plan_scene(Scene(gong2025(), LOUD, observe=(Observable.RESPONSE, observable)))
+    assert said not in plain.explain()
+    assert said in asked.explain()
+    assert asked.cost_s >= plain.cost_s
+
+
+def test_contacts_and_long_runs_cost_more():
+    def cost(amplitude_m, duration_s):
+        drive = Harmonic(260.0, amplitude_m)
+        return plan_scene(Scene(gong2025(), drive, duration=FixedDuration(duration_s, 5.0))).cost_s
+
+    assert cost(1e-9, 30.0) < cost(5e-6, 30.0) < cost(50e-6, 30.0) < cost(50e-6, 300.0)

@@ -1,0 +1,56 @@
+import numpy as np
+import pytest
+
+from sim.answer.scatter import bootstrap_of_largest, response_ensemble, window_scatter
+from sim.drive import Harmonic
+from sim.specimen import gong2025
+
+
+def test_it_is_the_bootstrap_of_the_largest_in_closed_form():
+    random = np.random.default_rng(3)
+    peaks, blocks = random.gumbel(5.0, 0.3, 40), 5
+    drawn = random.choice(peaks, (200_000, blocks)).max(axis=1)
+    mean, deviation = bootstrap_of_largest(np.sort(peaks), blocks)
+    assert mean == pytest.approx(drawn.mean(), rel=0.001)
+    assert deviation == pytest.approx(drawn.std(), rel=0.01)
+
+
+def test_it_finds_the_known_scatter_of_a_gumbel_extreme():
+    """The largest of n Gumbel values is Gumbel of the same width, ln n widths further out."""
+    random = np.random.default_rng(4)
+    width, blocks, many = 0.2, 5, 4000
+    truth = width * np.pi / np.sqrt(6.0) / (5.0 + width * (np.log(blocks) + np.euler_gamma))
+    found = window_scatter(random.gumbel(5.0, width, many), blocks)
+    assert found.relative == pytest.approx(truth, rel=0.05)
+
+
+def test_few_blocks_say_nothing():
+    assert window_scatter(np.random.default_rng(5).uniform(1.0, 2.0, 3), 3) is None
+
+
+@pytest.mark.parametrize("blocks", [1, 5, 10])
+def test_two_windows_differ_by_no_more_than_is_said_in_19_cases_of_20(blocks):
+    """Normal extremes, where one block is a window; with more, what is said errs on the large side."""
+    random = np.random.default_rng(6)
+    inside = 0
+    for _ in range(2000):
+        peaks = random.normal(5.0, 0.2, 20)
+        one, another = peaks[-blocks:].max(), random.normal(5.0, 0.2, blocks).max()
+        inside += abs(another / one - 1.0) < window_scatter(peaks, blocks).between_runs
+    assert 0.93 < inside / 2000 < (0.965 if blocks == 1 else 1.0)
+
+
+def test_starts_a_millionth_of_the_gap_apart_scatter_in_chaos_and_nowhere_else():
+    chaos = response_ensemble(
+        gong2025(), Harmonic(260.0, 5e-6), duration_s=4.0, window_s=2.0, members=6
+    ).scatter_i
+    periodic = response_ensemble(
+        gong2025(), Harmonic(130.0, 20e-6), duration_s=4.0, window_s=2.0, members=6
+    ).scatter_i
+    assert 0.003 < chaos < 0.2
+    assert periodic < 1e-5
+
+
+def test_an_ensemble_of_one_is_refused():
+    with pytest.raises(ValueError, match="1 members is not allowed"):
+        response_ensemble(gong2025(), Harmonic(260.0, 5e-6), members=1)
