@@ -7,7 +7,7 @@ import typer
 
 from acquisition.recording import open_recording
 from analysis.exchange.excerpt import excerpt
-from analysis.exchange.export import Format, export_samples
+from analysis.exchange.export import Format, Results, export_samples
 
 from .output import console
 from .transfer_bar import transfer_bar
@@ -30,12 +30,16 @@ def export(
     to_s: Annotated[
         float | None, typer.Option("--until", metavar="S", help="Seconds since the first sample.")
     ] = None,
+    results: Annotated[
+        bool, typer.Option("--results", help="Results that were saved in the recording, too.")
+    ] = False,
 ) -> None:
     """Write a recording's samples, with units and times, as CSV, UFF 58 or MATLAB."""
     with open_recording(recording) as opened:
         chosen = excerpt(opened, tuple(channels.split(",")) if channels else (), from_s, to_s)
         path = recording.with_name(f"{chosen.name}.{to.value}") if out is None else out
+        included = Results.INCLUDED if results else Results.LEFT_OUT
         with transfer_bar(f"export as {to.value}", chosen.values) as watcher:
-            written = export_samples(chosen, to, path, watcher)
+            written = export_samples(chosen, to, path, included, watcher)
     for each in written:
         console.print(f"wrote {each}")

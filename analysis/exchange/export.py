@@ -1,6 +1,6 @@
 """An excerpt of a recording becomes a file that other programs read."""
 
-from enum import StrEnum
+from enum import Enum, StrEnum, auto
 from pathlib import Path
 
 from .csv_export import write_csv_samples
@@ -8,6 +8,7 @@ from .excerpt import Excerpt, Watcher, unwatched
 from .facts_document import facts_path, write_facts
 from .mat_export import require_small, write_mat
 from .new_file import new_file, require_unused
+from .result_export import matlab_results, result_paths, write_result_tables
 from .uff_export import write_uff
 
 
@@ -22,26 +23,45 @@ class Format(StrEnum):
     """MATLAB 5: a struct for each channel."""
 
 
+class Results(Enum):
+    """Whether saved results go out with the samples."""
+
+    LEFT_OUT = auto()
+    INCLUDED = auto()
+
+
 def export_samples(
-    excerpt: Excerpt, to: Format, path: Path, watcher: Watcher = unwatched
+    excerpt: Excerpt,
+    to: Format,
+    path: Path,
+    results: Results = Results.LEFT_OUT,
+    watcher: Watcher = unwatched,
 ) -> tuple[Path, ...]:
     """Write the excerpt as ``path``, and what its format has no place for as ``PATH.facts.json`` beside it.
 
-    Gives the files that were written. Nothing is ever overwritten.
+    Results become structs in a MATLAB file, and beside the others ``NAME.RESULT.AXIS.csv``. Gives the
+    files that were written. Nothing is ever overwritten.
 
     Raises
     ------
     InvalidRequest
         When a name is taken, the disk refuses, or the format cannot hold so much; nothing is left of it.
+    NotEnoughData
+        When results are asked for and none is saved.
 
     """
+    recording = excerpt.recording
+    are_included = results is Results.INCLUDED
     if to is Format.MAT:
         require_small(excerpt)
+        structs = matlab_results(recording) if are_included else {}
         with new_file(path) as unfinished:
-            write_mat(excerpt, unfinished, watcher)
+            write_mat(excerpt, unfinished, structs, watcher)
         return (path,)
     facts = facts_path(path)
     require_unused(facts)
+    if are_included:
+        result_paths(recording, path)
     with new_file(path) as unfinished:
         match to:
             case Format.CSV:
@@ -50,4 +70,5 @@ def export_samples(
                 write_uff(excerpt, unfinished, watcher)
     with new_file(facts) as unfinished:
         write_facts(excerpt, unfinished)
-    return path, facts
+    tables = write_result_tables(recording, path) if are_included else ()
+    return path, facts, *tables

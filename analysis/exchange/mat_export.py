@@ -1,6 +1,7 @@
 """Samples and what is known of them as a MATLAB 5 file: a struct for each channel, and one of facts."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -35,7 +36,7 @@ def require_small(excerpt: Excerpt) -> None:
         )
 
 
-def write_mat(excerpt: Excerpt, path: Path, watcher: Watcher = unwatched) -> None:
+def write_mat(excerpt: Excerpt, path: Path, results: Mapping[str, Any], watcher: Watcher = unwatched) -> None:
     """Write one variable after the other, so that one channel at a time is in memory.
 
     Raises
@@ -47,6 +48,8 @@ def write_mat(excerpt: Excerpt, path: Path, watcher: Watcher = unwatched) -> Non
     require_small(excerpt)
     with path.open("xb") as file:
         _save(file, {"recording": _facts(excerpt)})
+        if results:
+            _save(file, {"results": results})
         _save(file, {"time_s": excerpt.recording.time_s(excerpt.start, excerpt.stop)[:, np.newaxis]})
         for channel in excerpt.channels:
             values = _whole(excerpt, channel.role, watcher)

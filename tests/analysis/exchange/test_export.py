@@ -2,15 +2,17 @@
 
 import csv
 import json
+import shutil
 
 import numpy as np
 import pytest
 from scipy.io import loadmat
 
 from acquisition.errors import RecordingError
-from analysis.errors import InvalidRequest
+from acquisition.recording import ResultArray, open_recording
+from analysis.errors import InvalidRequest, NotEnoughData
 from analysis.exchange.excerpt import excerpt
-from analysis.exchange.export import Format, export_samples
+from analysis.exchange.export import Format, Results, export_samples
 
 RATE_HZ = 51_200.0
 ROLES = ("drive_voltage", "m0_velocity")
@@ -103,7 +105,7 @@ def test_a_watcher_hears_of_every_value(known, tmp_path):
     for to in Format:
         heard = []
         chosen = excerpt(known)
-        export_samples(chosen, to, tmp_path / f"a.{to.value}", heard.append)
+        export_samples(chosen, to, tmp_path / f"a.{to.value}", watcher=heard.append)
         assert sum(heard) == chosen.values == 2 * known.samples
 
 
@@ -112,7 +114,7 @@ def test_an_interrupted_export_leaves_no_file(known, tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        export_samples(excerpt(known), Format.CSV, tmp_path / "a.csv", interrupt)
+        export_samples(excerpt(known), Format.CSV, tmp_path / "a.csv", watcher=interrupt)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -125,3 +127,47 @@ def test_a_stretch_outside_the_recording_is_refused_with_its_length(known, from_
 def test_a_channel_that_is_not_there_is_refused_with_those_that_are(known):
     with pytest.raises(RecordingError, match="it has drive_voltage, m0_velocity"):
         excerpt(known, ("velocity",))
+
+
+@pytest.fixture
+def with_results(known_file, tmp_path):
+    shutil.copyfile(known_file, tmp_path / "known.h5")
+    arrays = {
+        "frequency": ResultArray(np.array([1.0, 2.0, 3.0]), "Hz"),
+        "time": ResultArray(np.array([0.0, 0.5]), "s"),
+        "transmission": ResultArray(np.array([1 + 2j, 3 - 4j, 0.5j]), "1", ("frequency",)),
+        "picture": ResultArray(np.arange(6.0).reshape(2, 3), "m s-1", ("time", "frequency")),
+    }
+    with open_recording(tmp_path / "known.h5") as recording:
+        recording.save_results("noise-2", arrays, {"estimator": "h1"})
+        yield recording
+
+
+def test_saved_results_become_tables_of_their_axes(with_results, tmp_path):
+    chosen = excerpt(with_results)
+    *_, picture, lines = export_samples(chosen, Format.CSV, tmp_path / "a.csv", Results.INCLUDED)
+    assert (lines.name, picture.name) == ("a.noise-2.frequency.csv", "a.noise-2.time.frequency.csv")
+    assert lines.read_text().splitlines() == [
+        "frequency [Hz],transmission_real [1],transmission_imag [1]",
+        "1,1,2",
+        "2,3,-4",
+        "3,0,0.5",
+    ]
+    rows = np.loadtxt(picture, delimiter=",", skiprows=1)
+    assert rows[4].tolist() == [0.5, 2.0, 4.0]
+
+
+def test_saved_results_become_structs_in_matlab(with_results, tmp_path):
+    export_samples(excerpt(with_results), Format.MAT, tmp_path / "a.mat", Results.INCLUDED)
+    found = loadmat(tmp_path / "a.mat", squeeze_me=True, simplify_cells=True)["results"]["noise_2"]
+    assert found["transmission"]["values"].tolist() == [1 + 2j, 3 - 4j, 0.5j]
+    assert found["picture"]["units"] == "m s-1"
+    assert found["picture"]["axes"].tolist() == ["time", "frequency"]
+    assert json.loads(found["settings_json"]) == {"estimator": "h1"}
+
+
+@pytest.mark.parametrize("to", list(Format))
+def test_results_that_are_not_there_are_refused_before_anything_is_written(known, tmp_path, to):
+    with pytest.raises(NotEnoughData, match=r"no analysis has saved a result in known\.h5"):
+        export_samples(excerpt(known), to, tmp_path / "a", Results.INCLUDED)
+    assert list(tmp_path.iterdir()) == []

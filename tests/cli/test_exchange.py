@@ -1,0 +1,74 @@
+"""`vibench export` and `vibench import` as a user meets them."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from acquisition.instruments import Block
+from acquisition.recording import ChannelHeader, Origin, RecordingHeader, create_recording, open_recording
+from cli.__main__ import app
+
+MAPPING = """
+started_utc = 2026-03-01T12:00:00Z
+[measurement]
+name = "dwell"
+excitation = { kind = "dwell", amplitude_vpp = 1, frequency_hz = 20, duration_s = 1, settle_s = 0 }
+[[channels]]
+source = "m0_velocity"
+role = "m0_velocity"
+"""
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    channel = ChannelHeader("m0_velocity", "dev/ai0", "velocity", "m s-1", 0.125, range_v=5.0)
+    header = RecordingHeader((channel,), 1000.0, 2000, Origin.SIMULATED)
+    with create_recording(tmp_path / "run.h5", header) as writer:
+        writer.append(Block(0, np.random.default_rng(3).uniform(-4.0, 4.0, (1, 2000))))
+    return writer.path
+
+
+@pytest.fixture
+def run(recorded, monkeypatch):
+    """Run a command in the recording's folder, in this process: starting one takes seconds."""
+    monkeypatch.chdir(recorded.parent)
+    return lambda *arguments: CliRunner().invoke(app, arguments)
+
+
+def test_a_recording_goes_out_and_comes_back(run, recorded):
+    out = run("export", "run.h5", "--to", "uff", "--until", "1.5")
+    assert out.stdout.splitlines() == ["wrote run.uff", "wrote run.uff.facts.json"]
+    (channel,) = json.loads(run("import", "run.uff", "--json").stdout)["channels"]
+    assert (channel["name"], channel["label"], channel["samples"]) == ("1", "m0_velocity", 1500)
+    recorded.with_name("map.toml").write_text(MAPPING)
+    back = run("import", "run.uff", "--mapping", "map.toml", "--out", "back.h5", "--json")
+    assert json.loads(back.stdout) == {"recording": "back.h5"}
+    with open_recording(recorded) as first, open_recording(recorded.with_name("back.h5")) as second:
+        wanted = first.read("m0_velocity", 0, 1500)
+        np.testing.assert_allclose(second.read("m0_velocity"), wanted, rtol=0, atol=1e-8)
+        assert [each.label for each in second.segments] == ["dwell"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("export", "run.h5", "--to", "csv", "--channels", "x"), "has no channel 'x'; it has m0_velocity"),
+        (("export", "run.h5", "--to", "mat", "--results"), "no analysis has saved a result"),
+        (("export", "run.h5", "--to", "csv", "--from", "3"), "goes from 0 to 2 s"),
+        (("import", "run.h5", "--out", "a.h5"), "give --mapping"),
+        (("import", "run.h5", "--mapping", "map.toml"), "run.h5 exists, and nothing is ever overwritten"),
+    ],
+)
+def test_what_cannot_be_is_refused_and_leaves_nothing(run, recorded, arguments, said):
+    recorded.with_name("map.toml").write_text("sample_rate_hz = 1000.0\n" + MAPPING)
+    assert said in str(run(*arguments).exception)
+    assert sorted(each.name for each in recorded.parent.iterdir()) == ["map.toml", "run.h5"]
+
+
+def test_a_refusal_is_one_sentence_on_standard_error(vibench, recorded, tmp_path):
+    result = vibench("export", "run.h5", "--to", "csv", "--out", "run.h5", cwd=tmp_path)
+    assert (result.returncode, result.stdout) == (1, "")
+    assert "error: run.h5 exists, and nothing is ever overwritten; choose another name" in result.stderr
+    assert "Traceback" not in result.stderr
