@@ -3,6 +3,7 @@
 import hashlib
 import json
 import wave
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -363,3 +364,17 @@ def test_an_interrupted_import_leaves_nothing(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         import_recording(tmp_path / "a.wav", meaning, tmp_path / "made.h5", interrupt)
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a.wav", "map.toml"]
+
+
+def test_the_mapping_in_the_manual_is_one(tmp_path):
+    manual = (Path(__file__).parents[3] / "docs" / "exchange.md").read_text(encoding="utf-8")
+    (tmp_path / "map.toml").write_text(manual.split("```toml\n")[1].split("```")[0], encoding="utf-8")
+    meaning = load_toml(tmp_path / "map.toml", ImportMapping)
+    assert [each.kind[1] for each in meaning.channels] == ["V", "m s-2", "m s-1", "N"]
+
+
+def test_one_channel_of_a_file_may_stand_for_two(tmp_path):
+    wavfile.write(tmp_path / "a.wav", int(RATE_HZ), signals()[0].astype(np.float32))
+    meaning = mapping(tmp_path, ("1", "drive_voltage", "scale = 2.0"), ("1", "base_acceleration", ""))
+    _, values = imported(tmp_path / "a.wav", meaning)
+    np.testing.assert_array_equal(values[0], 2.0 * values[1])
