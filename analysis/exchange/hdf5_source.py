@@ -44,21 +44,16 @@ class Hdf5Source:
         return tuple(self.places)
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Read a stretch; UnusableData when the file is damaged there."""
+        """Read a stretch."""
         place = self.places[channel]
         dataset = self.file[place.path]
-        try:
-            match place:
-                case _Place(row=None):
-                    raw = dataset[start:stop]
-                case _Place(row=row, has_time_first=True):
-                    raw = dataset[start:stop, row]
-                case _Place(row=row):
-                    raw = dataset[row, start:stop]
-        except (OSError, RuntimeError) as error:
-            raise UnusableData(
-                f"{channel.name} cannot be read from sample {start} to {stop}: {error}; copy the file again"
-            ) from error
+        match place:
+            case _Place(row=None):
+                raw = dataset[start:stop]
+            case _Place(row=row, has_time_first=True):
+                raw = dataset[start:stop, row]
+            case _Place(row=row):
+                raw = dataset[row, start:stop]
         values = np.asarray(raw, dtype=np.float64) * _number(dataset, "scale_factor", 1.0)
         values += _number(dataset, "add_offset", 0.0)
         if "_FillValue" in dataset.attrs:

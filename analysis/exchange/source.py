@@ -1,9 +1,13 @@
 """What an import asks of a file, whoever wrote it: its channels, and their numbers in any stretch."""
 
+import struct
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
+
+import numpy as np
 
 from ..arrays import Reals
 from ..errors import InvalidRequest, UnusableData
@@ -37,6 +41,22 @@ _READERS: dict[str, Callable[[Path], AbstractContextManager[Source]]] = {
 }
 
 
+DAMAGE = (
+    OSError,
+    EOFError,
+    RuntimeError,
+    KeyError,
+    IndexError,
+    ValueError,
+    TypeError,
+    ArithmeticError,
+    MemoryError,
+    UnboundLocalError,
+    struct.error,
+)
+"""What h5py, npTDMS and scipy raise when the inside of a file is not what its outside promised."""
+
+
 @contextmanager
 def opened_source(path: Path) -> Iterator[Source]:
     """Open a file by its suffix. Nothing in it is ever run: no pickles, no macros.
@@ -57,12 +77,49 @@ def opened_source(path: Path) -> Iterator[Source]:
             f"{path.name} cannot be imported: {path.suffix or 'a name without suffix'} is none of "
             f"{', '.join(_READERS)}; export it as one of these, and import that"
         )
-    with reader(path) as source:
-        if not source.channels:
+    with ExitStack() as stack:
+        with _readable(path):
+            source = stack.enter_context(reader(path))
+            if not source.channels:
+                raise UnusableData(
+                    f"{path.name} holds no time samples of real numbers; spectra and pictures cannot be read"
+                )
+        yield _CheckedSource(path, source)
+
+
+@dataclass(frozen=True)
+class _CheckedSource:
+    """A source whose every failure is a sentence."""
+
+    path: Path
+    source: Source
+
+    @property
+    def channels(self) -> tuple[SourceChannel, ...]:
+        return self.source.channels
+
+    def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
+        # Converting a signalling NaN is no error: it is a lost sample like any other NaN.
+        with _readable(self.path), np.errstate(invalid="ignore"):
+            values = self.source.read(channel, start, stop)
+        if values.shape != (stop - start,):
             raise UnusableData(
-                f"{path.name} holds no time samples of real numbers; spectra and pictures cannot be imported"
+                f"{self.path.name} gives {values.size} of the {stop - start} numbers of {channel.name} from "
+                f"sample {start} on; copy or export it again"
             )
-        yield source
+        return values
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (InvalidRequest, UnusableData):
+        raise
+    except DAMAGE as error:
+        raise UnusableData(
+            f"{path.name} is damaged, or not what its suffix says ({error}); copy or export it again"
+        ) from error
 
 
 def find_channel(source: Source, wanted: str, path: Path) -> SourceChannel:

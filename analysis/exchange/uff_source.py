@@ -81,12 +81,9 @@ class UffSource:
 
 @contextmanager
 def opened_uff(path: Path) -> Iterator[UffSource]:
-    """Find the time responses of a file; UnusableData when a dataset 58 is damaged."""
-    try:
-        with path.open("rb") as file:
-            bodies = dict(_bodies(file))
-    except (ValueError, KeyError, OSError) as error:
-        raise UnusableData(f"{path.name} is no universal file that can be read: {error}") from error
+    """Find the time responses of a file; ValueError when a dataset 58 is damaged."""
+    with path.open("rb") as file:
+        bodies = dict(_bodies(file))
     yield UffSource(path, bodies)
 
 
@@ -109,6 +106,8 @@ def _bodies(file: BinaryIO) -> Iterator[tuple[SourceChannel, _Body]]:
 def _body(file: BinaryIO, kind: str, header: list[str]) -> _Body | None:
     """Find the numbers and go past them; None when they are no samples over time."""
     ordinate, count, spacing = (int(header[6][at : at + 10]) for at in (0, 10, 20))
+    if count < 0:
+        raise ValueError(f"a dataset of {count} numbers")
     offset = file.tell()
     is_binary = kind[6:7].lower() == "b"
     if is_binary:

@@ -1,6 +1,5 @@
 """WAV as a source: integers are fractions of full scale, -1 to 1, as every sound program takes them."""
 
-import struct
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,7 +12,6 @@ from numpy.typing import NDArray
 from scipy.io import wavfile
 
 from ..arrays import Reals
-from ..errors import UnusableData
 from .source_channel import SourceChannel
 
 OFFSETS = {"u": 128.0}
@@ -36,11 +34,8 @@ class WavSource:
 
 @contextmanager
 def opened_wav(path: Path) -> Iterator[WavSource]:
-    """Open a file; UnusableData when it is no WAV, or compressed."""
-    try:
-        rate, data = _read(path)
-    except (ValueError, OSError, EOFError, struct.error) as error:
-        raise UnusableData(f"{path.name} cannot be read as WAV: {error}; save it as PCM or float") from error
+    """Open a file; ValueError when it is no WAV, or compressed."""
+    rate, data = _read(path)
     table = data.reshape(len(data), -1)
     is_integer = table.dtype.kind in "iu"
     yield WavSource(

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import random
 import wave
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from scipy.io import wavfile
 from acquisition.errors import ConfigurationError, RecordingError
 from acquisition.recording import RecordingState, open_recording
 from acquisition.toml_file import load_toml
-from analysis.errors import InvalidRequest, UnusableData
+from analysis.errors import AnalysisError, InvalidRequest, UnusableData
 from analysis.exchange.excerpt import excerpt
 from analysis.exchange.export import Format, export_samples
 from analysis.exchange.import_recording import import_recording
@@ -316,8 +317,8 @@ def test_a_rate_far_from_the_files_own_is_refused(tmp_path):
         ("a.npy", b"\x93NUMPY", "cannot be imported"),
         ("a.h5", b"text", "is no HDF5 file"),
         ("a.mat", b"MATLAB 5.0 MAT-file", "saved with -v7.3"),
-        ("a.wav", b"RIFF\x00\x00", "cannot be read as WAV"),
-        ("a.uff", b"    -1\n    58b     1     2\n", "no universal file that can be read"),
+        ("a.wav", b"RIFF\x00\x00", "is damaged, or not what its suffix says"),
+        ("a.uff", b"    -1\n    58b     1     2\n", "is damaged, or not what its suffix says"),
         ("a.unv", b"    -1\n   164\n    -1\n", "holds no time samples"),
     ],
 )
@@ -378,3 +379,43 @@ def test_one_channel_of_a_file_may_stand_for_two(tmp_path):
     meaning = mapping(tmp_path, ("1", "drive_voltage", "scale = 2.0"), ("1", "base_acceleration", ""))
     _, values = imported(tmp_path / "a.wav", meaning)
     np.testing.assert_array_equal(values[0], 2.0 * values[1])
+
+
+def spoiled(raw, dice):
+    """Change a few bytes, mostly of the head, and sometimes lose the end."""
+    found = bytearray(raw[: dice.randrange(len(raw))] if dice.random() < 0.3 else raw)
+    for _ in range(dice.randrange(1, 6)):
+        if found:
+            at = dice.randrange(len(found) if dice.random() < 0.3 else min(len(found), 1200))
+            found[at] = dice.choice([dice.randrange(256), *b" -09\xff\x00"])
+    return bytes(found)
+
+
+@pytest.mark.parametrize("suffix", ["uff", "h5", "wav", "tdms"])
+def test_a_spoiled_file_is_read_or_refused_but_never_crashes(known, tmp_path, suffix):
+    path = tmp_path / f"a.{suffix}"
+    data = signals()[:, :500]
+    match suffix:
+        case "uff":
+            export_samples(excerpt(known, to_s=0.01), Format.UFF, path)
+        case "h5":
+            with h5py.File(path, "w") as file:
+                file["table"] = data
+                file.create_dataset("packed", data=data[0], chunks=(100,), compression="gzip")
+        case "wav":
+            wavfile.write(path, int(RATE_HZ), data.T.astype(np.float32))
+        case "tdms":
+            nptdms = pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
+            with nptdms.TdmsWriter(path) as writer:
+                writer.write_segment([nptdms.ChannelObject("g", "c", data[0], {"wf_increment": 1e-3})])
+    raw, dice = path.read_bytes(), random.Random(7)
+    refused = 0
+    for _ in range(80):
+        path.write_bytes(spoiled(raw, dice))
+        try:
+            with opened_source(path) as source:
+                for channel in source.channels:
+                    assert source.read(channel, 0, channel.samples).shape == (channel.samples,)
+        except AnalysisError:
+            refused += 1
+    assert 0 < refused < 80
