@@ -19,7 +19,7 @@ from .transfer_bar import transfer_bar
 
 
 def import_file(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="UFF, HDF5, MATLAB 7.3, TDMS or WAV.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="UFF, HDF5, MATLAB, TDMS, WAV or CSV.")],
     mapping: Annotated[
         Path | None,
         typer.Option("--mapping", metavar="MAP.toml", help="What its channels are; lists them if absent."),

@@ -67,9 +67,7 @@ def opened_hdf5(path: Path) -> Iterator[Hdf5Source]:
     try:
         file = h5py.File(path, "r", locking=False)
     except OSError as error:
-        raise UnusableData(
-            f"{path.name} is no HDF5 file ({error}); a MATLAB file must be saved with -v7.3 to be one"
-        ) from error
+        raise UnusableData(f"{path.name} is no HDF5 file ({error}); copy or export it again") from error
     with file:
         yield Hdf5Source(file, dict(_places(file)))
 

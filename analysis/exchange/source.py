@@ -11,7 +11,9 @@ import numpy as np
 
 from ..arrays import Reals
 from ..errors import InvalidRequest, UnusableData
+from .csv_source import opened_csv
 from .hdf5_source import opened_hdf5
+from .mat_source import opened_mat
 from .source_channel import SourceChannel
 from .tdms_source import opened_tdms
 from .uff_source import opened_uff
@@ -34,10 +36,12 @@ _READERS: dict[str, Callable[[Path], AbstractContextManager[Source]]] = {
     ".unv": opened_uff,
     ".h5": opened_hdf5,
     ".hdf5": opened_hdf5,
-    ".mat": opened_hdf5,
+    ".mat": opened_mat,
     ".nc": opened_hdf5,
     ".tdms": opened_tdms,
     ".wav": opened_wav,
+    ".csv": opened_csv,
+    ".txt": opened_csv,
 }
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from scipy.io import wavfile
+from scipy.io import savemat, wavfile
 
 from acquisition.errors import ConfigurationError, RecordingError
 from acquisition.recording import RecordingState, open_recording
@@ -316,7 +316,8 @@ def test_a_rate_far_from_the_files_own_is_refused(tmp_path):
         ("a.pkl", b"\x80\x04", "cannot be imported"),
         ("a.npy", b"\x93NUMPY", "cannot be imported"),
         ("a.h5", b"text", "is no HDF5 file"),
-        ("a.mat", b"MATLAB 5.0 MAT-file", "saved with -v7.3"),
+        ("a.mat", b"MATLAB 5.0 MAT-file", "is damaged, or not what its suffix says"),
+        ("a.csv", b"a,b\nc,d\n", "no line of numbers"),
         ("a.wav", b"RIFF\x00\x00", "is damaged, or not what its suffix says"),
         ("a.uff", b"    -1\n    58b     1     2\n", "is damaged, or not what its suffix says"),
         ("a.unv", b"    -1\n   164\n    -1\n", "holds no time samples"),
@@ -381,6 +382,53 @@ def test_one_channel_of_a_file_may_stand_for_two(tmp_path):
     np.testing.assert_array_equal(values[0], 2.0 * values[1])
 
 
+@pytest.mark.parametrize("to", [Format.MAT, Format.CSV])
+def test_what_was_exported_as_matlab_or_text_comes_back(known, known_values, tmp_path, to):
+    path, *_ = export_samples(excerpt(known, to_s=1.0), to, tmp_path / f"a.{to.value}")
+    head = DWELL.replace("8000.0", "51200.0").replace("settle_s = 1,", "settle_s = 0,")
+    channels = (
+        [(role, role, "") for role in known.roles]
+        if to is Format.CSV
+        else [(f"{role}.values", role, "") for role in known.roles]
+    )
+    _, values = imported(path, mapping(tmp_path, *channels, head=head))
+    wanted = np.stack([known_values[role][:51_200] for role in known.roles])
+    np.testing.assert_allclose(values, wanted, rtol=1e-9, atol=1e-8)
+
+
+def test_matrices_and_fields_of_matlab_5_become_channels(tmp_path):
+    field = {"data": signals()[0], "units": "m/s"}
+    savemat(tmp_path / "a.mat", {"run": {"vib": field}, "table": signals().T, "name": "text", "n": 3.0})
+    with opened_source(tmp_path / "a.mat") as source:
+        assert {each.name: each.unit for each in source.channels} == {
+            "run.vib.data": "m/s",
+            "table#1": "",
+            "table#2": "",
+        }
+    meaning = mapping(tmp_path, ("data", "drive_voltage", ""), ("table#2", "m0_velocity", ""))
+    _, values = imported(tmp_path / "a.mat", meaning)
+    assert_same(values, signals())
+
+
+@pytest.mark.parametrize(
+    ("text", "label", "rate_hz"),
+    [
+        ("Time (s),Vib (m/s)\n0,1.5\n0.001,-2\n0.002,1e-3\n", "Vib", 1000.0),
+        ('"time";"Vib (m/s)"\n0;1,5\n0,001;-2\n0,002;1e-3\n', "Vib", 1000.0),
+        ("recorded by X\n\nno\tVib (m/s)\n0\t1.5\n1\t-2\n2\t1e-3\n", "Vib", None),
+        ("0 1.5\n1 -2\n2 1e-3\n", "", None),
+        ("time,Vib (m/s)\n0,1.5\n0.001,-2\n0.004,1e-3\n", "Vib", None),
+    ],
+)
+def test_columns_of_text_are_read_however_they_are_written(tmp_path, text, label, rate_hz):
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    with opened_source(tmp_path / "a.csv") as source:
+        _, column = source.channels
+        assert source.read(column, 0, 3).tolist() == [1.5, -2.0, 1e-3]
+    assert (column.label, column.unit) == (label, "m/s" if label else "")
+    assert column.sample_rate_hz == (None if rate_hz is None else pytest.approx(rate_hz))
+
+
 def spoiled(raw, dice):
     """Change a few bytes, mostly of the head, and sometimes lose the end."""
     found = bytearray(raw[: dice.randrange(len(raw))] if dice.random() < 0.3 else raw)
@@ -391,7 +439,7 @@ def spoiled(raw, dice):
     return bytes(found)
 
 
-@pytest.mark.parametrize("suffix", ["uff", "h5", "wav", "tdms"])
+@pytest.mark.parametrize("suffix", ["uff", "h5", "wav", "tdms", "mat", "csv"])
 def test_a_spoiled_file_is_read_or_refused_but_never_crashes(known, tmp_path, suffix):
     path = tmp_path / f"a.{suffix}"
     data = signals()[:, :500]
@@ -404,6 +452,10 @@ def test_a_spoiled_file_is_read_or_refused_but_never_crashes(known, tmp_path, su
                 file.create_dataset("packed", data=data[0], chunks=(100,), compression="gzip")
         case "wav":
             wavfile.write(path, int(RATE_HZ), data.T.astype(np.float32))
+        case "mat":
+            savemat(path, {"table": data})
+        case "csv":
+            np.savetxt(path, data.T, delimiter=",", header="a,b", comments="")
         case "tdms":
             nptdms = pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
             with nptdms.TdmsWriter(path) as writer:
