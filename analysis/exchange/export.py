@@ -10,6 +10,7 @@ from .mat_export import require_small, write_mat
 from .new_file import new_file, require_unused
 from .result_export import matlab_results, result_paths, write_result_tables
 from .uff_export import write_uff
+from .wav_export import require_sound, write_wav
 
 
 class Format(StrEnum):
@@ -21,6 +22,8 @@ class Format(StrEnum):
     """Universal file, dataset 58, binary."""
     MAT = "mat"
     """MATLAB 5: a struct for each channel."""
+    WAV = "wav"
+    """Sound: 32 bits, full scale is 1."""
 
 
 class Results(Enum):
@@ -60,6 +63,8 @@ def export_samples(
         return (path,)
     facts = facts_path(path)
     require_unused(facts)
+    if to is Format.WAV:
+        require_sound(excerpt)
     if are_included:
         result_paths(recording, path)
     with new_file(path) as unfinished:
@@ -68,6 +73,8 @@ def export_samples(
                 write_csv_samples(excerpt, unfinished, watcher)
             case Format.UFF:
                 write_uff(excerpt, unfinished, watcher)
+            case Format.WAV:
+                write_wav(excerpt, unfinished, watcher)
     with new_file(facts) as unfinished:
         write_facts(excerpt, unfinished)
     tables = write_result_tables(recording, path) if are_included else ()

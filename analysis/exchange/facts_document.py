@@ -29,7 +29,12 @@ def facts_document(excerpt: Excerpt) -> dict[str, Any]:
         "first_sample": excerpt.start,
         "last_sample": excerpt.stop - 1,
         "channels": [
-            {**asdict(each), "scale_factor": each.scale_factor, "add_offset": each.add_offset}
+            {
+                **asdict(each),
+                "scale_factor": each.scale_factor,
+                "add_offset": each.add_offset,
+                "full_scale": abs(each.physical_per_volt) * each.range_v,
+            }
             for each in excerpt.channels
         ],
         "segments": [asdict(each) for each in recording.segments],

@@ -3,10 +3,11 @@
 import csv
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.io import loadmat
+from scipy.io import loadmat, wavfile
 
 from acquisition.errors import RecordingError
 from acquisition.recording import ResultArray, open_recording
@@ -90,6 +91,33 @@ def test_segments_in_a_matlab_file_are_indices_of_its_own_arrays(known, tmp_path
     assert segments["label"].tolist() == ["dwell", "step"]
     assert segments["first"].tolist() == [1, 70_000 - 51_200 + 1]
     assert segments["last"].tolist() == [70_000 - 51_200, 120_000 - 51_200]
+
+
+def test_wav_keeps_the_counts_of_the_converter_behind_full_scale(known, known_values, tmp_path):
+    path, facts = export_samples(excerpt(known), Format.WAV, tmp_path / "a.wav")
+    rate, data = wavfile.read(path)
+    assert (rate, data.dtype) == (RATE_HZ, np.int32)
+    full_scales = [each["full_scale"] for each in json.loads(facts.read_text("utf-8"))["channels"]]
+    assert full_scales == [5.0, 0.625]
+    for role, full_scale, column in zip(ROLES, full_scales, data.T, strict=True):
+        np.testing.assert_array_equal(column / 2.0**31 * full_scale, np.nan_to_num(known_values[role]))
+
+
+def test_a_rate_that_wav_cannot_say_is_refused(known, tmp_path):
+    odd = replace(known, sample_rate_hz=51_199.7)
+    with pytest.raises(
+        InvalidRequest, match=r"51199\.7 samples/s, and a WAV file can only say whole numbers"
+    ):
+        export_samples(excerpt(odd), Format.WAV, tmp_path / "a.wav")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("to", "hours", "said"), [(Format.MAT, 1, "2 GiB"), (Format.WAV, 6, "4 GiB")])
+def test_more_than_the_format_holds_is_refused_before_anything_is_written(known, tmp_path, to, hours, said):
+    samples = round(hours * 3600 * RATE_HZ)
+    with pytest.raises(InvalidRequest, match=said):
+        export_samples(excerpt(replace(known, samples=samples)), to, tmp_path / "a")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("to", list(Format))

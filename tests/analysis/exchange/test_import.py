@@ -3,6 +3,7 @@
 import hashlib
 import json
 import random
+import tracemalloc
 import wave
 from pathlib import Path
 
@@ -256,6 +257,46 @@ def test_an_imported_dwell_is_analysed_like_the_recording_it_came_from(dwell_fil
     assert found.response.response_i == pytest.approx(original.response.response_i, rel=1e-6)
     assert found.response.response_ii == pytest.approx(original.response.response_ii, rel=1e-6)
     assert found.facts.whole_stretches == found.facts.planned_stretches == 1
+
+
+def test_imported_noise_gives_the_transmission_of_the_recording_it_came_from(noise_file, tmp_path):
+    with open_recording(noise_file()) as recording:
+        original = analyse_recording(recording)
+        path, *_ = export_samples(excerpt(recording), Format.MAT, tmp_path / "noise.mat")
+        rate = recording.sample_rate_hz
+        parts = [(each.start / rate, each.stop / rate) for each in recording.segments]
+        roles = recording.roles
+    plan = original.excitation.model_dump()
+    head = (
+        f"started_utc = 2026-03-01T12:00:00Z\nsample_rate_hz = {rate!r}\n"
+        f"parts = [{', '.join(f'{{ start_s = {a!r}, stop_s = {b!r} }}' for a, b in parts)}]\n"
+        '[measurement]\nname = "noise"\nexcitation = { '
+        + ", ".join(f"{key} = {json.dumps(value)}" for key, value in plan.items())
+        + " }\n"
+    )
+    channels = [(f"{role}.values", role, "") for role in roles]
+    made = import_recording(path, mapping(tmp_path, *channels, head=head), tmp_path / "made.h5")
+    with open_recording(made) as recording:
+        found = analyse_recording(recording)
+    wanted = original.response.transmission
+    np.testing.assert_array_equal(found.response.transmission.frequency_hz, wanted.frequency_hz)
+    np.testing.assert_allclose(found.response.transmission.value, wanted.value, rtol=1e-4)
+
+
+def test_neither_export_nor_import_holds_a_long_file_in_memory(tmp_path):
+    samples = 2_000_000
+    with h5py.File(tmp_path / "long.h5", "w") as file:
+        file["v"] = np.random.default_rng(0).standard_normal(samples)
+    meaning = mapping(tmp_path, ("v", "m0_velocity", ""))
+    tracemalloc.start()
+    try:
+        import_recording(tmp_path / "long.h5", meaning, tmp_path / "made.h5")
+        with open_recording(tmp_path / "made.h5") as recording:
+            export_samples(excerpt(recording), Format.UFF, tmp_path / "long.uff")
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 0.4 * samples * 8
 
 
 def test_a_recording_says_where_it_came_from(tmp_path):
