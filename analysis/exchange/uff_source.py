@@ -92,12 +92,12 @@ def _bodies(file: BinaryIO) -> Iterator[tuple[SourceChannel, _Body]]:
     while line := file.readline():
         if line.strip() != DELIMITER.strip().encode():
             continue
-        kind = file.readline().decode("ascii", "replace")
+        kind = _line(file)
         if kind[:6].strip() != "58":
             _skip_text(file)
             continue
         number += 1
-        header = [file.readline().decode("ascii", "replace") for _ in range(HEADER_LINES)]
+        header = [_line(file) for _ in range(HEADER_LINES)]
         body = _body(file, kind, header)
         if body is not None:
             yield _channel(number, header), body
@@ -123,6 +123,15 @@ def _body(file: BinaryIO, kind: str, header: list[str]) -> _Body | None:
     if not is_time or ordinate not in SIZES or spacing != EVENLY_SPACED or count < 2:
         return None
     return _Body(offset, file.tell(), count, ordinate, BYTE_ORDERS[order] if is_binary else "")
+
+
+def _line(file: BinaryIO) -> str:
+    """Read a line of a header; makers write ``m/s²`` in one of two encodings, and say in neither which."""
+    raw = file.readline()
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
 
 
 def _skip_text(file: BinaryIO) -> None:

@@ -218,6 +218,14 @@ def test_what_a_maker_puts_behind_binary_samples_does_not_matter(known, known_va
     assert_same(values, [known_values["m0_velocity"][:51_200]])
 
 
+@pytest.mark.parametrize("unit", [b"m/s\xb2 ", b"m/s\xc2\xb2"])
+def test_a_unit_may_have_a_sign_that_ascii_has_not(known, tmp_path, unit):
+    path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=0.1), Format.UFF, tmp_path / "a.uff")
+    path.write_bytes(path.read_bytes().replace(b"m s-1", unit))
+    with opened_source(path) as source:
+        assert source.channels[0].unit == "m/s²"
+
+
 def test_samples_that_look_like_a_delimiter_are_samples(known, tmp_path):
     path, _ = export_samples(excerpt(known, ("drive_voltage",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
     raw = path.read_bytes()
