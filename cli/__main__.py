@@ -21,6 +21,7 @@ from .import_recording import import_file
 from .measure import measure
 from .predict import predict
 from .recover import recover_recording
+from .reproduce import reproduce
 from .serve_rig import serve_rig
 from .study import study
 from .tradeoff import tradeoff
@@ -38,6 +39,7 @@ app.command()(analyse)
 app.command()(predict)
 app.command()(study)
 app.command()(figure)
+app.command()(reproduce)
 app.command()(tradeoff)
 app.command()(export)
 app.command(name="import")(import_file)

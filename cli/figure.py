@@ -1,6 +1,5 @@
 """`vibench figure`: a figure of the paper, from our own studies or from recordings."""
 
-import hashlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated
@@ -14,20 +13,14 @@ from analysis.figures.paper.catalogue import PAPER_FIGURES
 from analysis.figures.paper.options import FigureOptions, FrequencyGrid
 from analysis.report.figure_choice import recording_figures, result_figures
 from sim.accuracy import Accuracy
-from sim.study.results import StudyResults
-from sim.study.solve import Existing, solve_study
-from sim.study.study import Study
 
 from .analyse import complain_about
-from .interruption import told_to_stop
+from .kept_study import kept_study
 from .output import console
-from .study import STOPPED_EXIT_CODE
-from .study_bar import study_bar
 
 ALL = "all"
 EXPERIMENT = (12, 13, 14)
 """Figures of the experiment: they need recordings."""
-_DIGEST = 16
 
 
 def figure(
@@ -80,24 +73,8 @@ def _numbers(asked: str) -> tuple[int, ...]:
 
 def _simulated(number: int, options: FigureOptions, out: Path, workers: int | None) -> Iterator[DrawnFigure]:
     chosen = PAPER_FIGURES[number]
-    answers = tuple(_solved(each, out / "studies", workers) for each in chosen.studies(options))
+    answers = tuple(kept_study(each, out / "studies", workers) for each in chosen.studies(options))
     yield chosen.draw(options, answers)
-
-
-def _solved(study: Study, folder: Path, workers: int | None) -> StudyResults:
-    """Solve a study, or what is missing of it: its file is named by everything that it asks."""
-    folder.mkdir(parents=True, exist_ok=True)
-    digest = hashlib.sha256(study.model_dump_json().encode()).hexdigest()[:_DIGEST]
-    with told_to_stop() as is_stopped, study_bar(study.grid.size) as watcher:
-        results = solve_study(
-            study, folder / f"{digest}.h5", Existing.RESUME, workers, watcher=watcher, cancelled=is_stopped
-        )
-    if not results.is_complete:
-        typer.echo(
-            f"stopped after {results.kept} of {study.grid.size} points; the same command goes on", err=True
-        )
-        raise typer.Exit(STOPPED_EXIT_CODE)
-    return results
 
 
 def _experiment(folder: Path | None, wanted: list[int]) -> Callable[[int], Iterator[DrawnFigure]]:

@@ -1,0 +1,53 @@
+"""Judge all claims and say what they were judged on."""
+
+import json
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from sim.study.software import PACKAGES, software
+
+from ..figures.paper.options import FigureOptions
+from .case import AS_CHOSEN, Case
+from .claim import Claim, judged
+from .document import Reproduction
+from .evidence import Evidence
+
+_MINUTE_S = 60.0
+Told = Callable[[str], None]
+"""Told the key of the claim that comes next."""
+
+
+def ignore_claims(key: str) -> None:
+    """Watch nothing."""
+
+
+def reproduction(
+    sections: Mapping[str, tuple[Claim, ...]],
+    evidence: Evidence,
+    options: FigureOptions,
+    on_claim: Told = ignore_claims,
+) -> Reproduction:
+    """Judge every claim under the options given, and where it fails under its alternatives."""
+    case = Case(AS_CHOSEN, options)
+    judgements = {}
+    for heading, claims in sections.items():
+        found = []
+        for claim in claims:
+            on_claim(claim.key)
+            found.append(judged(claim, evidence, case))
+        judgements[heading] = tuple(found)
+    return Reproduction(judgements, options.sentence.replace("Options:", "Defaults:"), _made_with(evidence))
+
+
+def _made_with(evidence: Evidence) -> str:
+    """Say how much was computed, by what; taken from the studies, however often they were gone on with."""
+    studies = evidence.studies
+    points = sum(each.study.grid.size for each in studies)
+    taken_s = sum(float(np.nansum(each.values("taken"))) for each in studies)
+    versions = json.loads(software())
+    named = ", ".join(f"{name} {versions[name]}" for name in PACKAGES)
+    return (
+        f"Computed from {points} simulated points in {len(studies)} studies, "
+        f"{taken_s / _MINUTE_S:.0f} minutes of one core, with {named}."
+    )

@@ -1,0 +1,57 @@
+"""`vibench reproduce`: every claim of the paper that can be measured, with a verdict."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from analysis.figures.paper.options import FigureOptions, FrequencyGrid
+from analysis.reproduction.catalogue import SECTIONS
+from analysis.reproduction.document import Reproduction, reproduction_document, verdict_text
+from analysis.reproduction.evidence import Evidence
+from analysis.reproduction.reproduce import reproduction
+from sim.accuracy import Accuracy
+
+from .kept_study import kept_study
+from .output import console
+from .study import Workers
+
+PAGE = "reproduction.md"
+
+
+def reproduce(
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder for the page and the studies it rests on.")
+    ],
+    markdown: Annotated[
+        Path | None,
+        typer.Option("--markdown", metavar="FILE.md", help="Write the page here; in DIR if absent."),
+    ] = None,
+    damping_time: Annotated[
+        float, typer.Option("--damping-time", metavar="S", help="c_i = damping time * k_i.")
+    ] = FigureOptions.damping_time_s,
+    accuracy: Annotated[Accuracy, typer.Option("--accuracy", help="Of every point.")] = Accuracy.QUICK,
+    grid: Annotated[
+        FrequencyGrid, typer.Option("--grid", help="Every 5 Hz (coarse) or every 1 Hz (fine).")
+    ] = FigureOptions.grid,
+    workers: Workers = None,
+) -> None:
+    """Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped."""
+    options = FigureOptions(damping_time_s=damping_time, accuracy=accuracy, grid=grid)
+    evidence = Evidence(lambda study: kept_study(study, out / "studies", workers))
+    found = reproduction(SECTIONS, evidence, options)
+    page = out / PAGE if markdown is None else markdown
+    page.parent.mkdir(parents=True, exist_ok=True)
+    page.write_text(reproduction_document(found), encoding="utf-8")
+    _tell(found)
+    console.print(f"The page: [bold]{page.resolve()}[/]")
+
+
+def _tell(found: Reproduction) -> None:
+    rows = Table(title="What of the paper holds", title_justify="left")
+    rows.add_column("claim")
+    rows.add_column("verdict")
+    for each in found.judgements:
+        rows.add_row(each.claim.says, verdict_text(each).strip("*"))
+    console.print(rows)
