@@ -10,7 +10,15 @@ import pytest
 from scipy.io import loadmat, wavfile
 
 from acquisition.errors import RecordingError
-from acquisition.recording import ResultArray, open_recording
+from acquisition.instruments import Block
+from acquisition.recording import (
+    ChannelHeader,
+    Origin,
+    RecordingHeader,
+    ResultArray,
+    create_recording,
+    open_recording,
+)
 from analysis.errors import InvalidRequest, NotEnoughData
 from analysis.exchange.excerpt import excerpt
 from analysis.exchange.export import Format, Results, export_samples
@@ -199,3 +207,16 @@ def test_results_that_are_not_there_are_refused_before_anything_is_written(known
     with pytest.raises(NotEnoughData, match=r"no analysis has saved a result in known\.h5"):
         export_samples(excerpt(known), to, tmp_path / "a", Results.INCLUDED)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_that_still_grows_is_exported_as_far_as_it_is_safe(tmp_path):
+    channel = ChannelHeader("m0_velocity", "dev/ai0", "velocity", "m s-1", 0.125, range_v=5.0)
+    header = RecordingHeader((channel,), 1000.0, 5000, Origin.SIMULATED)
+    with create_recording(tmp_path / "grows.h5", header) as writer:
+        writer.append(Block(0, np.linspace(-1.0, 1.0, 2000)[np.newaxis]))
+        while writer.committed_samples < 2000:
+            pass  # half a second at most
+        with open_recording(tmp_path / "grows.h5.part") as recording:
+            path, _ = export_samples(excerpt(recording), Format.CSV, tmp_path / "a.csv")
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    np.testing.assert_allclose(table[:, 1], 0.125 * np.linspace(-1.0, 1.0, 2000), atol=1e-8)
