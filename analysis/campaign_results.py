@@ -1,6 +1,6 @@
 """All recordings of a campaign, analysed; one that cannot be analysed says why and stops no other."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
@@ -10,6 +10,7 @@ from acquisition.recording import Recording, open_recording
 
 from .errors import AnalysisError, NotEnoughData
 from .measurement_analysis import (
+    UNWATCHED,
     DwellAnalysis,
     NoiseAnalysis,
     RecordingAnalysis,
@@ -17,11 +18,11 @@ from .measurement_analysis import (
     SweepAnalysis,
     analyse_recording,
 )
+from .noise_request import NoiseRequest
+from .noise_response import DEFAULT_REQUEST
 from .overlay import DwellOverlay, NoiseOverlay, Overlay, SteppedSineOverlay, SweepOverlay, overlay
 from .recording_facts import RecordingFacts
-
-Stage = Callable[[str, str], None]
-"""Told (recording, what is being computed)."""
+from .watcher import Watcher
 
 
 class Simulation(Enum):
@@ -117,17 +118,14 @@ class CampaignResults:
         return tuple(each for each in self.results if isinstance(each, SteppedSineResult))
 
 
-def ignore_stages(recording: str, stage: str) -> None:
-    """Watch nothing."""
-
-
 def analyse_files(
     paths: Sequence[Path],
     name: str,
     simulation: Simulation = Simulation.LAID_OVER,
-    on_stage: Stage = ignore_stages,
+    request: NoiseRequest = DEFAULT_REQUEST,
+    watcher: Watcher = UNWATCHED,
 ) -> CampaignResults:
-    """Analyse recordings one after the other, each with the model laid over it.
+    """Analyse recordings one after the other, each with the model laid over it, as `analyse_recording` does.
 
     Raises
     ------
@@ -142,7 +140,7 @@ def analyse_files(
     for path in paths:
         try:
             with open_recording(path) as recording:
-                result, failed = result_of(recording, simulation, on_stage)
+                result, failed = result_of(recording, simulation, request, watcher)
         except (AnalysisError, RecordingError) as error:
             failures.append(Failure(path.name, "analysis", str(error)))
             continue
@@ -163,7 +161,8 @@ def assembled(name: str, parts: Sequence[CampaignResults]) -> CampaignResults:
 def result_of(
     recording: Recording,
     simulation: Simulation = Simulation.LAID_OVER,
-    on_stage: Stage = ignore_stages,
+    request: NoiseRequest = DEFAULT_REQUEST,
+    watcher: Watcher = UNWATCHED,
 ) -> tuple[Result, tuple[Failure, ...]]:
     """Analyse one recording; a simulation that fails leaves the measured result standing.
 
@@ -174,12 +173,11 @@ def result_of(
 
     """
     name = recording.path.name
-    on_stage(name, "analysing")
-    analysis = analyse_recording(recording)
+    analysis = analyse_recording(recording, request, watcher)
     if simulation is Simulation.LEFT_OUT:
         return _paired(analysis, None), ()
     try:
-        laid = overlay(recording, analysis, stage=lambda stage: on_stage(name, stage))
+        laid = overlay(recording, analysis, stage=lambda stage: watcher.begin(name, stage))
     except AnalysisError as error:
         return _paired(analysis, None), (Failure(name, "simulation", str(error)),)
     return _paired(analysis, laid), ()

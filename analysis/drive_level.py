@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Flags, Reals
+from .arrays import Reals
 from .order_tracking import tracked_orders
 from .quantity import Quantity, derivative_factor
 from .sine_fit import fitted_sine, steady_phase
-from .spectra import spectral_density
+from .spectra import SpectralDensity
 
 _SCATTER_BLOCKS = 10
 """Parts of the window whose scatter gives the uncertainty: it holds whatever moves, not only noise."""
@@ -63,24 +63,25 @@ def drive_level(drive: Reals, base: Reals, sample_rate_hz: float, *, near_hz: fl
     )
 
 
-def noise_drive_level(
-    base: Reals,
-    sample_rate_hz: float,
-    *,
-    low_hz: float,
-    high_hz: float,
-    segment_samples: int,
-    valid: Flags | None = None,
-) -> NoiseDriveLevel:
-    """Measure how hard noise drove the base: rms of acceleration and displacement in a band."""
-    density = spectral_density(base, sample_rate_hz, segment_samples=segment_samples, valid=valid)
+def noise_drive_level(density: SpectralDensity, *, low_hz: float, high_hz: float) -> NoiseDriveLevel:
+    """Measure how hard noise drove the base: rms of acceleration and displacement in a band.
+
+    Parameters
+    ----------
+    density
+        Of the base acceleration [(m/s2)^2 / Hz].
+    low_hz, high_hz
+        The band.
+
+    """
     kept = (density.frequency_hz >= low_hz) & (density.frequency_hz <= high_hz) & (density.frequency_hz > 0)
     factor = np.abs(
         derivative_factor(density.frequency_hz[kept], Quantity.ACCELERATION, Quantity.DISPLACEMENT)
     )
-    power = density.density[kept] * sample_rate_hz / segment_samples
+    spacing_hz = density.sample_rate_hz / density.segment_samples
+    power = density.density[kept] * spacing_hz
     # Lines within one noise bandwidth say the same; the rms has half the relative spread of the power.
-    lines = np.count_nonzero(kept) / (density.noise_bandwidth_hz * segment_samples / sample_rate_hz)
+    lines = np.count_nonzero(kept) / (density.noise_bandwidth_hz / spacing_hz)
     return NoiseDriveLevel(
         low_hz=low_hz,
         high_hz=high_hz,

@@ -60,6 +60,30 @@ def hv(s_xx: Reals, s_yy: Reals, s_xy: Complexes, noise_ratio: float) -> Complex
     return _ratio(numerator.astype(np.complex128), 2 * np.conj(s_xy))
 
 
+def least_squares(
+    estimator: Estimator, s_xx: Reals, s_yy: Reals, s_xy: Complexes, noise_ratio: float | None
+) -> Complexes:
+    """h1, h2 or hv by its name.
+
+    Raises
+    ------
+    InvalidRequest
+        For the drive-referenced estimator, which needs a third channel, and for hv without its ratio.
+
+    """
+    match estimator, noise_ratio:
+        case Estimator.H1, _:
+            return h1(s_xx, s_xy)
+        case Estimator.H2, _:
+            return h2(s_yy, s_xy)
+        case Estimator.HV, float(ratio):
+            return hv(s_xx, s_yy, s_xy, ratio)
+        case _:
+            raise InvalidRequest(
+                f"{estimator.value} is not made of two channels alone; use h1, h2, or hv with a noise ratio"
+            )
+
+
 def drive_referenced(s_rx: Complexes, s_ry: Complexes) -> Complexes:
     """S_ry / S_rx: the reference acts as an instrument, noise on x and y averages out."""
     return _ratio(s_ry, s_rx)

@@ -12,6 +12,7 @@ from acquisition.excitation.stepped_sine import SteppedSine
 from acquisition.excitation.streamed_noise import StreamedNoise
 from acquisition.recording import Recording
 
+from .channel_faults import require_moving_channels
 from .collision_region import Collisions, collisions
 from .dwell import DwellResponse, dwell_response
 from .dwell_motion import DwellMotion, dwell_motion
@@ -19,13 +20,15 @@ from .envelope import Envelope, envelope
 from .errors import AnalysisError, NotEnoughData
 from .jumps import Jump, jumps
 from .measurement_checks import Check, measurement_checks
-from .noise_response import Noise, NoiseResponse, noise_response
+from .noise_request import NoiseRequest
+from .noise_response import DEFAULT_REQUEST, Noise, NoiseResponse, noise_response
 from .recorded_channels import Channels, RecordedChannels, only_stretch, read_whole
 from .recording_facts import RecordingFacts, recording_facts, specimen_of
 from .spectrogram import Spectrogram, SpectrogramSums
 from .stepped_response import SteppedResponse, stepped_response
 from .sweep import SweepResponse, SweepSums
 from .terminal_level import TerminalLevel, terminal_levels
+from .watcher import Unwatched, WatchedChannels, Watcher
 
 WINDOW_S = 5.0
 """The paper's window: the last 5 s of a dwell."""
@@ -37,6 +40,7 @@ _RESPONSE = 2
 _SPECTROGRAM_ORDER = 3.2
 """A spectrogram shows the drive's third harmonic at the sweep's end."""
 _TIME_BINS = 1200
+UNWATCHED = Unwatched()
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +51,8 @@ class NoiseAnalysis:
     checks: tuple[Check, ...]
     excitation: Noise
     response: NoiseResponse
+    request: NoiseRequest
+    """What was asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +99,19 @@ class SteppedSineAnalysis:
 RecordingAnalysis = NoiseAnalysis | SweepAnalysis | DwellAnalysis | SteppedSineAnalysis
 
 
-def analyse_recording(recording: Recording) -> RecordingAnalysis:
+def analyse_recording(
+    recording: Recording, request: NoiseRequest = DEFAULT_REQUEST, watcher: Watcher = UNWATCHED
+) -> RecordingAnalysis:
     """Analyse a recording, complete or not, by the excitation that its plan names.
+
+    Parameters
+    ----------
+    recording
+        Finished, interrupted or still growing: what it held when it was opened is analysed.
+    request
+        How the transmission of noise is estimated; other excitations take no notice.
+    watcher
+        Told how far it is.
 
     Raises
     ------
@@ -102,19 +119,23 @@ def analyse_recording(recording: Recording) -> RecordingAnalysis:
         With one sentence that names the file, when nothing in it is usable.
 
     """
-    facts = recording_facts(recording)
+    name = recording.path.name
+    watcher.begin(name, "looking at every channel")
+    facts = recording_facts(recording, watcher.read)
+    watcher.begin(name, "analysing")
     try:
-        return _analysed(facts, RecordedChannels(recording))
+        return _analysed(facts, WatchedChannels(RecordedChannels(recording), watcher), request)
     except AnalysisError as error:
         ended = f"{facts.state.value}" + (f": {facts.reason}" if facts.reason else "")
         raise type(error)(f"{recording.path.name} ({ended}): {error}") from error
 
 
-def _analysed(facts: RecordingFacts, channels: Channels) -> RecordingAnalysis:
+def _analysed(facts: RecordingFacts, channels: Channels, request: NoiseRequest) -> RecordingAnalysis:
     checks = measurement_checks(facts)
+    require_moving_channels(facts.channels)
     match facts.measurement.excitation:
         case MultisineNoise() | OddMultisine() | StreamedNoise() as noise:
-            return NoiseAnalysis(facts, checks, noise, noise_response(channels, noise))
+            return NoiseAnalysis(facts, checks, noise, noise_response(channels, noise, request), request)
         case SineSweep() as sweep:
             response, picture = measured_sweep(channels, sweep)
             colliding = collisions(response)

@@ -184,7 +184,7 @@ def _run(channels: SimulatedChannels, label: str) -> SimulatedRun:
 
 def _noise(analysis: NoiseAnalysis, channels: SimulatedChannels) -> NoiseOverlay:
     noise = analysis.excitation
-    response = noise_response(channels, noise)
+    response = noise_response(channels, noise, analysis.request)
     measured, simulated = analysis.response.transmission, response.transmission
     amplitude_m, basis = equivalent_amplitude(analysis)
     stop_hz = min(noise.band_stop_hz, _HIGHEST_PREDICTED_HZ)

@@ -7,7 +7,7 @@ import numpy as np
 
 from acquisition.recording import Recording
 
-from .arrays import Reals
+from .arrays import Flags, Reals
 from .errors import NotEnoughData, UnusableData
 
 DRIVE, BASE, RESPONSE = "drive_voltage", "base_acceleration", "m0_velocity"
@@ -51,6 +51,9 @@ class Channels(Protocol):
     def read(self, start: int, stop: int) -> Reals:
         """Give drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
 
+    def overloaded(self, start: int, stop: int) -> Flags:
+        """Say at which samples one of the channels was near its full scale, shape (samples,)."""
+
 
 @dataclass(frozen=True, eq=False)
 class RecordedChannels:
@@ -62,8 +65,8 @@ class RecordedChannels:
         missing = [role for role in (DRIVE, BASE, RESPONSE) if role not in self.recording.roles]
         if missing:
             raise UnusableData(
-                f"{self.recording.path.name} has no channel {', '.join(missing)}; it has "
-                f"{', '.join(self.recording.roles)}, and an analysis needs drive, base and response"
+                f"there is no channel {', '.join(missing)}; the recording has "
+                f"{', '.join(self.recording.roles)}, and an analysis needs {DRIVE}, {BASE} and {RESPONSE}"
             )
 
     @property
@@ -92,6 +95,14 @@ class RecordedChannels:
     def read(self, start: int, stop: int) -> Reals:
         """Give drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
         return np.stack([self.recording.read(role, start, stop) for role in (DRIVE, BASE, RESPONSE)])
+
+    def overloaded(self, start: int, stop: int) -> Flags:
+        """Say at which samples one of the channels was near its full scale, shape (samples,)."""
+        marks = np.zeros(stop - start, dtype=np.bool_)
+        for each in self.recording.overloads:
+            if each.channel in (DRIVE, BASE, RESPONSE):
+                marks[max(0, each.first_sample - start) : max(0, each.last_sample + 1 - start)] = True
+        return marks
 
 
 def only_stretch(channels: Channels, label: str) -> Stretch:

@@ -12,7 +12,7 @@ from acquisition.plan.measurement import Measurement
 from acquisition.recording import Origin, Recording, RecordingState
 from sim.specimen import Specimen, gong2025
 
-from .channel_levels import ChannelLevel, channel_levels
+from .channel_levels import ChannelLevel, OnRead, channel_levels, ignore_reading
 from .errors import UnusableData
 
 
@@ -55,8 +55,8 @@ class RecordingFacts:
         return next(each for each in self.channels if each.header.role == role)
 
 
-def recording_facts(recording: Recording) -> RecordingFacts:
-    """Collect what a recording says about itself.
+def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> RecordingFacts:
+    """Collect what a recording says about itself; ``on_read`` is told how far its samples are read.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def recording_facts(recording: Recording) -> RecordingFacts:
         instruments=recording.instruments,
         confirmations=recording.confirmations,
         provenance=recording.provenance,
-        channels=channel_levels(recording),
+        channels=channel_levels(recording, on_read),
         overload_s=overload_s,
         lost_samples=sum(each.last_sample - each.first_sample + 1 for each in recording.gaps),
         planned_stretches=len(steps),

@@ -11,7 +11,7 @@ from sim.drive import Sampled
 from sim.sample_by_sample import follow_samples
 from sim.specimen import Specimen
 
-from .arrays import Integers, Reals
+from .arrays import Flags, Integers, Reals
 from .base_motion import RecordedBaseMotion, recorded_base_motion
 from .errors import UnusableData
 from .recorded_channels import BASE, Channels, RecordedChannels, Stretch
@@ -118,6 +118,10 @@ class SimulatedChannels:
         data = self.recorded.read(start, stop)
         data[2] = self.simulated.velocity[start:stop]
         return data
+
+    def overloaded(self, start: int, stop: int) -> Flags:
+        """Where the recording was overloaded: what is compared must rest on the same samples."""
+        return self.recorded.overloaded(start, stop)
 
 
 def played_impacts(channels: Channels, simulated: SimulatedSpecimen, label: str) -> tuple[int, float]:

@@ -17,6 +17,7 @@ from .campaign_results import (
 from .chaos.verdict import MotionVerdict
 from .collision_region import CollisionRegion, Collisions, Edge
 from .difference import Difference
+from .measurement_analysis import NoiseAnalysis
 from .overlay import SimulatedRun
 from .recording_facts import RecordingFacts
 from .resonance import Resonance
@@ -79,13 +80,45 @@ def _noise(result: NoiseResult) -> Json:
     found = result.analysis.response
     return {
         "resonances": [_resonance(each) for each in found.resonances],
+        "transmission": _transmission(result.analysis),
         "independent_averages": found.transmission.n_eff,
         "used_s": found.used_s,
         "left_out": found.left_out,
+        "lost_samples": found.lost_samples,
+        "overloaded_samples": found.overloaded_samples,
         "median_coherence": float(np.median(found.transmission.coherence)),
         "base_rms_acceleration_m_per_s2": found.base_level.rms_acceleration,
         "base_rms_displacement_m": found.base_level.rms_displacement_m,
         "relative_sd_base_rms": found.base_level.relative_sd,
+    }
+
+
+def _transmission(analysis: NoiseAnalysis) -> Json:
+    view = analysis.request.view
+    found = view.shown(analysis.response.transmission)
+    how = found.settings
+    return {
+        "quantity": view.name,
+        "unit": view.unit,
+        "estimator": how.estimator.value,
+        "noise_ratio": how.noise_ratio,
+        "window": how.window,
+        "segment_s": how.segment_samples / how.sample_rate_hz,
+        "overlap": how.overlap,
+        "resolution_hz": found.resolution_hz,
+        "segments_used": found.segments_used,
+        "segments_excluded": found.segments_excluded,
+        "delay_removed_s": how.delay_s,
+        "confidence": how.confidence,
+        "coherence_significance": found.coherence_significance,
+        "frequency_hz": found.frequency_hz,
+        "magnitude": found.magnitude,
+        "magnitude_lower": found.magnitude_lower,
+        "magnitude_upper": found.magnitude_upper,
+        "phase_rad": found.phase_rad,
+        "phase_lower_rad": found.phase_lower,
+        "phase_upper_rad": found.phase_upper,
+        "coherence": found.coherence,
     }
 
 

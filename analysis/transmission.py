@@ -1,11 +1,19 @@
 """Transmission from noise records: response over drive by averaged spectra, with bounds."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from .arrays import Complexes, Flags, Reals
 from .confidence import DEFAULT_CONFIDENCE, coherence_significance, relative_sd, student_half_width
 from .errors import InvalidRequest, NotEnoughData
-from .estimators import coherence, drive_referenced, drive_referenced_relative_sd, h1, h2, hv, named_estimator
+from .estimators import (
+    coherence,
+    drive_referenced,
+    drive_referenced_relative_sd,
+    least_squares,
+    named_estimator,
+)
 from .results import Estimator, Transmission, TransmissionSettings
 from .segment_spectra import SegmentSpectra, SpectralAverages, pieces
 from .window import Window
@@ -40,7 +48,7 @@ class TransmissionSums:
             window=str(window),
             overlap=overlap,
             confidence=confidence,
-            noise_ratio=noise_ratio,
+            noise_ratio=None if noise_ratio is None else float(noise_ratio),
         )
         _check(self._settings)
         self._channels = 3 if self._settings.estimator is Estimator.DRIVE else 2
@@ -64,6 +72,14 @@ class TransmissionSums:
             When fewer than two valid segments were found: their coherence would be 1 whatever they hold.
 
         """
+        return self.by(self._settings.estimator, self._settings.noise_ratio)
+
+    def by(self, estimator: Estimator, noise_ratio: float | None = None) -> Transmission:
+        """Give what another estimator makes of the same averages; errors as `transmission` has them."""
+        settings = replace(self._settings, estimator=estimator, noise_ratio=noise_ratio)
+        _check(settings)
+        if estimator is Estimator.DRIVE and self._channels < len(_ROWS):
+            raise InvalidRequest("drive was asked for of sums without a reference; begin them for drive")
         averages = self._spectra.averages()
         if averages.segments_used < _LEAST_SEGMENTS:
             raise NotEnoughData(
@@ -71,7 +87,7 @@ class TransmissionSums:
                 f"{averages.segments_excluded} touched invalid samples; a coherence needs at least "
                 f"{_LEAST_SEGMENTS}: use shorter segments or a longer record"
             )
-        return _result(averages, self._settings)
+        return _result(averages, settings)
 
 
 def transmission(
@@ -187,15 +203,7 @@ def _result(averages: SpectralAverages, settings: TransmissionSettings) -> Trans
 
 
 def _value(products: Complexes, settings: TransmissionSettings) -> Complexes:
+    if settings.estimator is Estimator.DRIVE:
+        return drive_referenced(products[_REFERENCE, _DRIVE], products[_REFERENCE, _RESPONSE])
     s_xx, s_yy = products[_DRIVE, _DRIVE].real, products[_RESPONSE, _RESPONSE].real
-    s_xy = products[_DRIVE, _RESPONSE]
-    match settings.estimator:
-        case Estimator.H1:
-            return h1(s_xx, s_xy)
-        case Estimator.H2:
-            return h2(s_yy, s_xy)
-        case Estimator.HV:
-            assert settings.noise_ratio is not None
-            return hv(s_xx, s_yy, s_xy, settings.noise_ratio)
-        case Estimator.DRIVE:
-            return drive_referenced(products[_REFERENCE, _DRIVE], products[_REFERENCE, _RESPONSE])
+    return least_squares(settings.estimator, s_xx, s_yy, products[_DRIVE, _RESPONSE], settings.noise_ratio)

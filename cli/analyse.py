@@ -5,12 +5,20 @@ from typing import Annotated
 
 import typer
 
-from analysis.campaign_results import CampaignResults, Simulation, analyse_files, recordings_in
+from analysis.campaign_results import CampaignResults, Failure, Simulation, analyse_files, recordings_in
+from analysis.noise_request import NoiseRequest
 from analysis.report.report import write_report
+from analysis.results import Estimator
 from analysis.summary import campaign_summary
+from analysis.transmission_view import MagnitudeScale, quantities_named
+from analysis.window import Window
 
 from .output import console, print_json
 from .paths import AsJson, unused
+from .reading_bar import reading_bar
+
+NOISE = "Transmission of noise"
+"""Heading of the options that no other excitation takes notice of."""
 
 
 def analyse(
@@ -24,15 +32,83 @@ def analyse(
     simulate: Annotated[
         bool, typer.Option(help="Lay the simulation over the measurement; takes some seconds more.")
     ] = True,
+    estimator: Annotated[
+        Estimator,
+        typer.Option(
+            help="drive: referenced to the drive voltage, free of any channel's noise.", rich_help_panel=NOISE
+        ),
+    ] = NoiseRequest.estimator,
+    noise_ratio: Annotated[
+        float | None,
+        typer.Option(
+            metavar="R",
+            help="For hv: noise density of m0's velocity over that of the base's acceleration [s2].",
+            rich_help_panel=NOISE,
+        ),
+    ] = None,
+    quantity: Annotated[
+        str,
+        typer.Option(
+            metavar="Q[/Q]",
+            help="Motion of m0 over motion of the base, such as velocity/acceleration; one word for both.",
+            rich_help_panel=NOISE,
+        ),
+    ] = "displacement",
+    scale: Annotated[
+        MagnitudeScale, typer.Option(help="Of the magnitudes in figures.", rich_help_panel=NOISE)
+    ] = MagnitudeScale.LOG,
+    resolution: Annotated[
+        float | None,
+        typer.Option(
+            metavar="HZ",
+            help="Width of a line; streamed noise only, like the next four.",
+            rich_help_panel=NOISE,
+        ),
+    ] = None,
+    segment: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S", help="Length of a segment, instead of a resolution.", rich_help_panel=NOISE
+        ),
+    ] = None,
+    averages: Annotated[
+        float | None,
+        typer.Option(
+            metavar="N", help="Independent averages, instead of a resolution.", rich_help_panel=NOISE
+        ),
+    ] = None,
+    window: Annotated[
+        Window, typer.Option(help="Taper of a segment.", rich_help_panel=NOISE)
+    ] = NoiseRequest.window,
+    overlap: Annotated[
+        float, typer.Option(metavar="SHARE", help="Of neighbouring segments, 0 to 1.", rich_help_panel=NOISE)
+    ] = NoiseRequest.overlap,
+    confidence: Annotated[
+        float,
+        typer.Option(metavar="P", help="That the bounds of a line hold the truth.", rich_help_panel=NOISE),
+    ] = NoiseRequest.confidence,
     as_json: AsJson = False,
 ) -> None:
     """Analyse recordings, complete, interrupted or still growing, and write one HTML report."""
+    request = NoiseRequest(
+        estimator=estimator,
+        noise_ratio=noise_ratio,
+        resolution_hz=resolution,
+        segment_s=segment,
+        averages=averages,
+        window=window,
+        overlap=overlap,
+        confidence=confidence,
+        view=quantities_named(quantity, scale),
+    )
     paths = recordings_in(recording) if recording.is_dir() else (recording,)
     name = recording.name.removesuffix(".part").removesuffix(".h5")
-    results = analyse_files(paths, name, Simulation.LAID_OVER if simulate else Simulation.LEFT_OUT)
+    with reading_bar() as watcher:
+        simulation = Simulation.LAID_OVER if simulate else Simulation.LEFT_OUT
+        results = analyse_files(paths, name, simulation, request, watcher)
     if as_json:
         print_json(campaign_summary(results))
-    if out is not None or not as_json:
+    if results.results and (out is not None or not as_json):
         folder = unused(recording.parent / f"{name}_analysis") if out is None else out
         report = write_report(results, unused(folder / "report.html"), folder / "figures")
         if not as_json:
@@ -43,6 +119,11 @@ def analyse(
 def complain_about(results: CampaignResults) -> None:
     """End with a sentence for each recording without a result."""
     for failure in results.failures:
-        typer.echo(f"error: {failure.sentence}", err=True)
+        typer.echo(f"error: {_named(failure)}", err=True)
     if any(failure.what == "analysis" for failure in results.failures):
         raise typer.Exit(1)
+
+
+def _named(failure: Failure) -> str:
+    """Give the sentence, with the recording's name where it does not say it itself."""
+    return failure.sentence if failure.name in failure.sentence else f"{failure.name}: {failure.sentence}"

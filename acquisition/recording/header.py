@@ -15,6 +15,8 @@ from .provenance import Provenance, collect_provenance
 
 ROLE_PATTERN = re.compile(r"[a-z][a-z0-9_]*")
 COUPLINGS = ("AC", "DC")
+OPTIONAL = ("sensitivity", "volts_per_count")
+"""Numbers that may be unknown: NaN in the file, None here."""
 UNPLANNED = -1
 """``expected_samples`` in the file when the recording lasts until somebody stops it."""
 
@@ -105,7 +107,7 @@ class ChannelHeader:
         own = {each.name: getattr(self, each.name) for each in fields(self)}
         del own["role"], own["unit"]
         own["long_name"] = self.long_name or self.role.replace("_", " ")
-        absent = {name: math.nan for name in ("sensitivity", "volts_per_count") if own[name] is None}
+        absent = {name: math.nan for name in OPTIONAL if own[name] is None}
         return {
             "units": self.unit,
             "scale_factor": self.scale_factor,
@@ -119,7 +121,8 @@ class ChannelHeader:
     def from_attributes(cls, role: str, attributes: Mapping[str, Attribute]) -> "ChannelHeader":
         """Read back what :meth:`attributes` wrote."""
         given = {each.name: attributes[each.name] for each in fields(cls) if each.name in attributes}
-        absent = {name: None for name, value in given.items() if value != value}  # noqa: PLR0124 - NaN
+        # NaN alone differs from itself.
+        absent = {name: None for name in OPTIONAL if given.get(name) != given.get(name)}
         return cls(**{**given, **absent, "role": role, "unit": attributes["units"]})  # type: ignore[arg-type]
 
 

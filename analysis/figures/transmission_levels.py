@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from ..measurement_analysis import NoiseAnalysis
 from ..recording_facts import specimen_of
 from ..tables import table
+from ..transmission_view import MagnitudeScale
 from .drawn import DrawnFigure
 from .marked_resonances import label_resonances, mark_resonances, model_resonances
 from .style import LEVEL_STYLES, LEVELS, frequency_axis, legend_above, magnitude_axis, new_figure, styled
@@ -15,24 +16,26 @@ _HEIGHT_IN = 4.0
 def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> DrawnFigure:
     """Draw the transmissions of several noise levels, weak to strong; at least one is needed."""
     rising = sorted(analyses, key=lambda each: each.excitation.amplitude_vpp)
+    view = rising[0].request.view
     at = model_resonances(specimen_of(rising[0].facts.bench))
     with styled():
         figure = new_figure(_HEIGHT_IN)
         axes = figure.subplots()
         mark_resonances(axes, at)
         for number, each in enumerate(rising):
-            found = each.response.transmission
+            found = view.shown(each.response.transmission)
             level = each.response.base_level.rms_acceleration
             axes.plot(
                 found.frequency_hz,
-                found.magnitude,
+                view.drawn(found.magnitude),
                 color=LEVELS[number % len(LEVELS)],
                 linestyle=LEVEL_STYLES[number % len(LEVEL_STYLES)],
                 linewidth=1.0,
                 label=f"{each.excitation.amplitude_vpp:g} Vpp ({level:.2g} m/s² rms)",
             )
-        magnitude_axis(axes)
-        axes.set_ylabel("|x / U|  (m0 over base)")
+        if view.scale is MagnitudeScale.LOG:
+            magnitude_axis(axes)
+        axes.set_ylabel(view.label)
         axes.set_xlabel("frequency [Hz]")
         lows = [float(each.response.transmission.frequency_hz[0]) for each in rising]
         highs = [float(each.response.transmission.frequency_hz[-1]) for each in rising]
@@ -42,7 +45,7 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> DrawnFigure
     columns = {}
     for each in rising:
         columns[f"frequency_hz_{each.facts.name}"] = each.response.transmission.frequency_hz
-        columns[f"magnitude_{each.facts.name}"] = each.response.transmission.magnitude
+        columns[f"magnitude_{each.facts.name}"] = view.shown(each.response.transmission).magnitude
     return DrawnFigure(
         name="transmission_levels",
         title="Transmission at all noise levels",

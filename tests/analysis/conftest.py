@@ -11,6 +11,7 @@ from acquisition.excitation.dwell import Dwell
 from acquisition.excitation.multisine_noise import MultisineNoise
 from acquisition.excitation.sine_sweep import SineSweep
 from acquisition.excitation.stepped_sine import SteppedSine
+from acquisition.excitation.streamed_noise import StreamedNoise
 
 
 def _load(name):
@@ -131,3 +132,27 @@ def stepped_file(tmp_path_factory):
     plan = SteppedSine(amplitude_vpp=0.05, frequencies_hz=frequencies, settle_s=2.5, record_s=1.0)
     folder = tmp_path_factory.mktemp("stepped")
     return synthetic.write_recording(folder, plan, base, velocity, parts, name="stepped")
+
+
+STREAMED = {"band_start_hz": 40.0, "band_stop_hz": 600.0, "duration_s": 20.0}
+
+
+@pytest.fixture(scope="session")
+def streamed_noise():
+    """20 s of streamed noise whose transmission is 2 at every frequency: plan, base, velocity, parts."""
+    base, velocity = synthetic.streamed(STREAMED["duration_s"], 20.0, 700.0, 1e-6, 5)
+    plan = StreamedNoise(amplitude_vpp=0.1, settle_s=0.0, seed=1, **STREAMED)
+    return plan, base, velocity, [synthetic.Part("noise", 0.0, STREAMED["duration_s"], {})]
+
+
+@pytest.fixture(scope="session")
+def streamed_file(streamed_noise, tmp_path_factory):
+    """Write streamed noise, whole or not, in a folder of its own."""
+
+    def write(**how):
+        folder = tmp_path_factory.mktemp("streamed")
+        plan, base, velocity, parts = streamed_noise
+        velocity = how.pop("velocity", velocity)
+        return synthetic.write_recording(folder, plan, base, velocity, parts, **{"name": "streamed", **how})
+
+    return write

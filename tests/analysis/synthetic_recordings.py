@@ -91,6 +91,18 @@ def multisine(duration_s, lines_hz, amplitude_m, seed):
     return Motion(sum(each.displacement_m for each in parts), sum(each.acceleration for each in parts))
 
 
+def streamed(duration_s, low_hz, high_hz, rms_m, seed):
+    """Gaussian base motion in a band, and the velocity of a mass that moves exactly twice as far."""
+    count = round(duration_s * RATE)
+    omega = 2 * np.pi * np.fft.rfftfreq(count, 1 / RATE)
+    inside = (omega >= 2 * np.pi * low_hz) & (omega <= 2 * np.pi * high_hz)
+    rng = np.random.default_rng(seed)
+    spectrum = np.where(inside, rng.standard_normal(omega.size) + 1j * rng.standard_normal(omega.size), 0)
+    spectrum *= rms_m / np.std(np.fft.irfft(spectrum, count))
+    base = Motion(np.fft.irfft(spectrum, count), np.fft.irfft(-(omega**2) * spectrum, count))
+    return base, np.fft.irfft(2j * omega * spectrum, count)
+
+
 def response_of(motion, delay_samples=0):
     """Velocity of m0 under a base motion; a delay shows it late."""
     drive = Sampled(np.append(motion.displacement_m, motion.displacement_m[-1]), RATE)
@@ -145,8 +157,40 @@ def write_recording(
     samples=None,
     delay_s=0.0,
     started_utc=PROVENANCE.started_utc,
+    overloads=(),
 ):
     """Write a recording; ``hole`` is a range of samples that were lost, ``samples`` cuts the end off."""
+    writer = begun_recording(
+        folder,
+        excitation,
+        motion,
+        velocity,
+        parts,
+        name=name,
+        hole=hole,
+        samples=samples,
+        delay_s=delay_s,
+        started_utc=started_utc,
+        overloads=overloads,
+    )
+    return writer.finish(state, reason)
+
+
+def begun_recording(
+    folder: Path,
+    excitation,
+    motion,
+    velocity,
+    parts,
+    *,
+    name="run",
+    hole=None,
+    samples=None,
+    delay_s=0.0,
+    started_utc=PROVENANCE.started_utc,
+    overloads=(),
+):
+    """Begin a recording and hand over its samples; it can still grow."""
     planned = velocity.size
     kept = planned if samples is None else samples
     measurement = Measurement(name=name, excitation=excitation)
@@ -169,5 +213,6 @@ def write_recording(
         if hole is not None and hole[0] <= begin < hole[1]:
             continue
         if end > begin:
-            writer.append(Block(begin, volts[:, begin:end]))
-    return writer.finish(state, reason)
+            inside = tuple(each for each in overloads if begin <= each.first_sample < end)
+            writer.append(Block(begin, volts[:, begin:end], inside))
+    return writer

@@ -8,6 +8,7 @@ import pytest
 from analysis.drive_level import drive_level, noise_drive_level
 from analysis.dwell import dwell_response
 from analysis.errors import InvalidRequest, NotEnoughData, UnusableData
+from analysis.spectra import spectral_density
 from analysis.stroboscope import stroboscope
 from sim.drive import Harmonic
 from sim.integrate import integrate
@@ -133,7 +134,7 @@ def test_a_periodic_motion_is_one_point_and_a_half_order_two():
 def test_the_noise_drive_level_is_the_rms_in_the_band():
     rng = np.random.default_rng(3)
     base = 2.0 * rng.standard_normal(200_000)
-    level = noise_drive_level(base, RATE, low_hz=100, high_hz=1000, segment_samples=4096)
+    level = noise_drive_level(spectral_density(base, RATE, segment_samples=4096), low_hz=100, high_hz=1000)
     density = 2 * 4.0 / RATE
     assert level.rms_acceleration == pytest.approx(np.sqrt(900 * density), rel=4 * level.relative_sd + 0.002)
     integral = (100.0**-3 - 1000.0**-3) / 3 / (2 * np.pi) ** 4

@@ -44,7 +44,7 @@ def numbers(path):
 def test_a_transmission_figure_draws_the_measured_magnitude_under_its_simulation(noise_file):
     found = result(noise_file())
     drawn = transmission_figure(found.analysis, found.laid)
-    top, strip, difference = drawn.figure.axes
+    top, phase, strip, difference = drawn.figure.axes
     measured = line(top, "measured")
     np.testing.assert_array_equal(measured.get_ydata(), found.analysis.response.transmission.magnitude)
     np.testing.assert_array_equal(measured.get_xdata(), found.analysis.response.transmission.frequency_hz)
@@ -52,7 +52,10 @@ def test_a_transmission_figure_draws_the_measured_magnitude_under_its_simulation
     np.testing.assert_array_equal(simulated.get_ydata(), found.laid.response.transmission.magnitude)
     assert measured.get_color() != simulated.get_color() == SIMULATED
     assert difference.get_xlabel() == "frequency [Hz]"
+    assert phase.get_ylabel() == "phase [°]"
     assert strip.get_ylabel() == "coherence"
+    level = [each.get_ydata()[0] for each in strip.get_lines() if each.get_linestyle() == "-."]
+    assert level == [found.analysis.response.transmission.coherence_significance]
     assert top.get_legend() is None  # it stands outside, where it covers no data
     assert len(drawn.figure.legends) == 1
 

@@ -1,0 +1,143 @@
+"""What an analyst asks of noise: the lines, averages, estimator and quantity that come out of it."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.instruments import Overload
+from acquisition.recording import open_recording
+from analysis.errors import InvalidRequest, NotEnoughData
+from analysis.measurement_analysis import analyse_recording
+from analysis.noise_request import NoiseRequest, longest_segment
+from analysis.results import Estimator
+from analysis.transmission_view import MagnitudeScale, quantities_named
+from analysis.window import Window, effective_averages, hop_samples, taper
+
+RATE = 6400.0
+
+
+def response(path, **asked):
+    with open_recording(path) as recording:
+        return analyse_recording(recording, NoiseRequest(**asked)).response
+
+
+def test_streamed_noise_gives_the_exact_ratio_by_every_estimator(streamed_file):
+    found = response(streamed_file())
+    # Velocity over acceleration bends by 1 % over a line at 40 Hz: leakage leaves some of that.
+    for each in (found.transmission, found.h1, found.h2):
+        np.testing.assert_allclose(each.value, 2, rtol=6e-3)
+    hv = response(streamed_file(), estimator=Estimator.HV, noise_ratio=1e-6)
+    np.testing.assert_allclose(hv.transmission.value, 2, rtol=6e-3)
+    assert hv.transmission.settings.estimator is Estimator.HV
+    assert found.transmission.settings.estimator is Estimator.DRIVE
+
+
+def test_a_noisy_vibrometer_biases_h2_and_not_the_estimate_referenced_to_the_drive(
+    streamed_file, streamed_noise
+):
+    velocity = streamed_noise[2]
+    extra = np.random.default_rng(3).standard_normal(velocity.size) * 2e-4
+    path = streamed_file(velocity=velocity + extra)
+    referenced, h2 = response(path), response(path, estimator=Estimator.H2)
+    band = referenced.transmission.frequency_hz < 100
+    assert np.median(h2.transmission.magnitude[band]) > 2.01
+    assert np.median(referenced.transmission.magnitude[band]) == pytest.approx(2, abs=0.005)
+
+
+@pytest.mark.parametrize("window", list(Window))
+def test_the_resolution_asked_for_is_the_noise_bandwidth_of_a_line(streamed_file, window):
+    found = response(streamed_file(), resolution_hz=3.0, window=window).transmission
+    assert found.resolution_hz == pytest.approx(3.0, rel=1e-3)
+    assert found.settings.window == window.value
+
+
+@pytest.mark.parametrize("averages", [4.0, 25.0])
+def test_the_averages_asked_for_are_reached_and_hardly_passed(streamed_file, averages):
+    found = response(streamed_file(), averages=averages).transmission
+    assert averages <= found.n_eff < 1.25 * averages
+
+
+@given(
+    samples=st.integers(2_000, 20_000),
+    averages=st.floats(2, 40),
+    window=st.sampled_from(Window),
+    overlap=st.floats(0, 0.8),
+)
+def test_the_longest_segment_leaves_the_averages_asked_for(samples, averages, window, overlap):
+    segment = longest_segment(samples, averages, window, overlap)
+    if segment < 32:
+        return
+    hop = hop_samples(segment, overlap)
+    used = np.ones((samples - segment) // hop + 1, dtype=bool)
+    # A hop is a whole number of samples, so that a segment may be missing at the end.
+    assert effective_averages(taper(window, segment), hop, used) > 0.93 * averages * (1 - 1 / used.size)
+
+
+def test_segments_that_touch_lost_or_overloaded_samples_are_left_out_and_counted(streamed_file):
+    hole = (round(3 * RATE), round(3 * RATE) + 50)
+    overload = Overload("m0_velocity", round(9 * RATE), round(9 * RATE) + 19)
+    elsewhere = Overload("m0_velocity", round(9.5 * RATE), round(9.5 * RATE) + 4)
+    found = response(streamed_file(hole=hole, overloads=(overload, elsewhere)), segment_s=0.5, overlap=0.0)
+    assert (found.lost_samples, found.overloaded_samples) == (50, 25)
+    assert found.left_out == found.transmission.segments_excluded == 3
+    assert found.transmission.segments_used == 37
+    np.testing.assert_allclose(found.transmission.value, 2, rtol=1.5e-2)
+
+
+def test_an_overloaded_realisation_is_left_out(noise_file):
+    overload = Overload("base_acceleration", round(3.2 * RATE), round(3.2 * RATE) + 4)
+    found = response(noise_file(overloads=(overload,)))
+    assert found.left_out == 1
+    assert found.overloaded_samples == 5
+    both = (overload, Overload("m0_velocity", round(7.2 * RATE), round(7.2 * RATE)))
+    with pytest.raises(NotEnoughData, match="6 samples near full scale"):
+        response(noise_file(overloads=both))
+
+
+def test_noise_that_repeats_takes_an_estimator_and_refuses_segments(noise_file):
+    found = response(noise_file(), estimator=Estimator.HV, noise_ratio=1e-6, confidence=0.8)
+    assert found.transmission.settings.estimator is Estimator.HV
+    assert found.transmission.settings.confidence == 0.8
+    with pytest.raises(InvalidRequest, match=r"repeats every 0\.25 s.*line every 4 Hz.*streamed noise only"):
+        response(noise_file(), resolution_hz=1.0)
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (
+            {"resolution_hz": 1.0, "averages": 9.0},
+            "a resolution and a number of averages were given; give one",
+        ),
+        ({"resolution_hz": 0.0}, "must be more than 0"),
+        ({"averages": 1.0}, "needs more than 1"),
+        ({"estimator": Estimator.HV}, "without a noise ratio"),
+        ({"noise_ratio": 1.0}, "only hv"),
+        ({"overlap": 1.0}, "below 1"),
+        ({"confidence": 95.0}, "between 0 and 1"),
+    ],
+)
+def test_a_request_without_meaning_says_what_is_allowed(asked, said):
+    with pytest.raises(InvalidRequest, match=said):
+        NoiseRequest(**asked)
+
+
+def test_a_resolution_that_the_record_cannot_give_is_refused_with_its_length(streamed_file):
+    with pytest.raises(
+        NotEnoughData, match="20 s of noise were recorded, less than two segments of the 30 s"
+    ):
+        response(streamed_file(), resolution_hz=0.05)
+
+
+def test_a_view_turns_displacements_into_what_was_recorded(streamed_file):
+    found = response(streamed_file()).transmission
+    view = quantities_named("velocity/acceleration", MagnitudeScale.DECIBEL)
+    shown = view.shown(found)
+    np.testing.assert_allclose(shown.value, found.value / (2j * np.pi * found.frequency_hz), rtol=1e-12)
+    np.testing.assert_allclose(shown.magnitude, found.magnitude * view.factor(found.frequency_hz), rtol=1e-12)
+    np.testing.assert_allclose(view.drawn(shown.magnitude), shown.decibel)
+    assert view.unit == "s"
+    np.testing.assert_allclose(quantities_named("velocity").shown(found).value, found.value)
+    with pytest.raises(InvalidRequest, match="such as velocity/acceleration"):
+        quantities_named("speed")

@@ -1,0 +1,185 @@
+"""`vibench analyse` on good, growing and bad recordings: a report and numbers, or one sentence."""
+
+import importlib.util
+import json
+import shutil
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from acquisition.excitation.dwell import Dwell
+from acquisition.excitation.streamed_noise import StreamedNoise
+from acquisition.recording import RecordingState
+from analysis.campaign_results import Simulation, analyse_files
+
+PLACE = Path(__file__).parents[1] / "analysis" / "synthetic_recordings.py"
+SECONDS = 8.0
+PATIENCE_S = 60.0
+
+
+def _synthetic():
+    """The tests are no package: a module of another folder is loaded by its path."""
+    spec = importlib.util.spec_from_file_location("synthetic_recordings", PLACE)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules.setdefault(spec.name, module)
+    spec.loader.exec_module(module)
+    return module
+
+
+synthetic = _synthetic()
+
+
+@pytest.fixture(scope="module")
+def noise():
+    """Streamed noise whose transmission is 2 at every frequency: plan, base, velocity, parts."""
+    plan = StreamedNoise(
+        amplitude_vpp=0.1, band_start_hz=50, band_stop_hz=600, settle_s=0, duration_s=SECONDS, seed=1
+    )
+    base, velocity = synthetic.streamed(SECONDS, 20.0, 700.0, 1e-6, 5)
+    return plan, base, velocity, [synthetic.Part("noise", 0.0, SECONDS, {})]
+
+
+@pytest.fixture(scope="module")
+def good(noise, tmp_path_factory):
+    return synthetic.write_recording(tmp_path_factory.mktemp("good"), *noise, name="good")
+
+
+def changed(good, folder, change):
+    """Copy a recording and change something inside."""
+    path = folder / "changed.h5"
+    shutil.copy(good, path)
+    with h5py.File(path, "r+") as file:
+        change(file)
+    return path
+
+
+def test_options_choose_estimator_quantity_and_resolution_and_are_named_in_the_answer(
+    vibench, good, tmp_path
+):
+    asked = ("--estimator", "h1", "--quantity", "velocity/acceleration", "--resolution", "5", "--scale", "db")
+    done = vibench(
+        "analyse", good, "--no-simulate", "--json", "--out", tmp_path / "out", *asked, cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)["results"][0]["measured"]["transmission"]
+    assert (found["estimator"], found["quantity"], found["unit"]) == ("h1", "velocity/acceleration", "s")
+    assert found["resolution_hz"] == pytest.approx(5.0, rel=1e-3)
+    frequency = np.array(found["frequency_hz"])
+    np.testing.assert_allclose(found["magnitude"], 2 / (2 * np.pi * frequency), rtol=0.01)
+    table = (tmp_path / "out" / "figures" / "transmission_good.csv").read_text(encoding="utf-8").splitlines()
+    assert len(table) == 1 + frequency.size
+    assert "phase_lower_rad" in table[0]
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Estimator h1; hann segments of 0.3 s overlapping by 50 %, lines 5 Hz wide." in page
+
+
+def test_a_growing_recording_is_analysed_as_far_as_it_is_written(vibench, noise, tmp_path):
+    plan, base, velocity, parts = noise
+    half = round(SECONDS * synthetic.RATE / 2)
+    with synthetic.begun_recording(
+        tmp_path, plan, base, velocity, parts, name="growing", samples=half
+    ) as writer:
+        deadline_s = time.monotonic() + PATIENCE_S
+        while writer.committed_samples < half:
+            assert time.monotonic() < deadline_s
+        done = vibench("analyse", "growing.h5.part", "--no-simulate", "--json", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        answer = json.loads(done.stdout)["results"][0]
+        assert answer["recording"]["state"] == "recording"
+        assert answer["measured"]["used_s"] == pytest.approx(SECONDS / 2)
+        np.testing.assert_allclose(answer["measured"]["transmission"]["magnitude"], 2, rtol=0.01)
+        writer.finish(RecordingState.STOPPED, "enough")
+
+
+def test_a_bad_recording_in_a_folder_is_one_sentence_and_the_others_are_analysed(vibench, good, tmp_path):
+    shutil.copy(good, tmp_path / "good.h5")
+    (tmp_path / "cut.h5").write_bytes(good.read_bytes()[:5000])
+    done = vibench("analyse", ".", "--no-simulate", "--out", tmp_path / "out", cwd=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.strip().count("\n") == 0
+    assert "cut.h5 is no readable HDF5 file" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert (tmp_path / "out" / "report.html").exists()
+
+
+def test_a_single_bad_recording_leaves_no_report_behind(vibench, tmp_path):
+    (tmp_path / "nothing.h5").touch()
+    done = vibench("analyse", "nothing.h5", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "nothing.h5 is empty (0 bytes)" in done.stderr
+    assert [each.name for each in tmp_path.iterdir()] == ["nothing.h5"]
+
+
+def test_options_that_contradict_each_other_are_one_sentence(vibench, good, tmp_path):
+    done = vibench("analyse", good, "--resolution", "1", "--averages", "9", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "a resolution and a number of averages were given; give one" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def sentence(path):
+    """What the analysis says of a recording that it refuses."""
+    (failure,) = analyse_files([path], "one", Simulation.LEFT_OUT).failures
+    assert failure.what == "analysis"
+    return failure.sentence
+
+
+def newer(file):
+    file.attrs["format_version"] = 99
+
+
+def renamed(file):
+    file.move("m0_velocity", "laser")
+    file.attrs["roles"] = "drive_voltage base_acceleration laser"
+
+
+def without_scale(file):
+    file["m0_velocity"].attrs["physical_per_volt"] = np.nan
+
+
+def without_plan(file):
+    del file["configuration/plan_json"]
+    file["configuration/plan_json"] = "{}"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (newer, "format version 99; this vibench reads version 1. Update"),
+        (renamed, "no channel m0_velocity; the recording has drive_voltage, base_acceleration, laser"),
+        (without_scale, "physical_per_volt of 'm0_velocity' is nan"),
+        (without_plan, "the plan in changed.h5 is not one this version of vibench can read"),
+    ],
+)
+def test_a_recording_that_cannot_be_understood_says_what_is_wrong_with_it(good, tmp_path, change, said):
+    assert said in sentence(changed(good, tmp_path, change))
+
+
+def test_channels_that_hold_nothing_are_named(noise, tmp_path):
+    plan, base, velocity, parts = noise
+    dead = synthetic.write_recording(tmp_path, plan, base, 0 * velocity, parts, name="dead")
+    assert "m0_velocity holds the same value throughout" in sentence(dead)
+    still = synthetic.Motion(base.displacement_m, 0 * base.acceleration)
+    deaf = synthetic.write_recording(tmp_path, plan, still, velocity, parts, name="deaf")
+    assert "base_acceleration holds the same value throughout" in sentence(deaf)
+    clipped = np.clip(1e4 * velocity, -1.0, 1.0)
+    cut = synthetic.write_recording(tmp_path, plan, base, clipped, parts, name="clipped")
+    assert "m0_velocity lay at its full scale of 1 m s-1 for" in sentence(cut)
+    lost = synthetic.write_recording(
+        tmp_path, plan, base, velocity, parts, name="lost", hole=(0, velocity.size)
+    )
+    assert "holds no samples" in sentence(lost)
+
+
+def test_a_sine_that_just_fills_its_range_is_analysed(tmp_path):
+    base = synthetic.sine(4.0, 260.0, 5e-7)
+    time_s = synthetic.times(4.0)
+    plan = Dwell(amplitude_vpp=0.01, frequency_hz=260.0, settle_s=2.0, duration_s=2.0)
+    part = synthetic.Part("dwell", 2.0, 4.0, {"frequency_hz": 260.0})
+    velocity = 0.9999 * np.sin(2 * np.pi * 260.0 * time_s)
+    path = synthetic.write_recording(tmp_path, plan, base, velocity, [part], name="full")
+    assert not analyse_files([path], "full", Simulation.LEFT_OUT).failures
