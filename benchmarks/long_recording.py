@@ -1,0 +1,172 @@
+"""Speed and memory of the analysis of a long recording, against scipy on the whole arrays.
+
+Run as ``python benchmarks/long_recording.py [MINUTES]``. The recording has 4 channels at 51.2 kS/s and is
+written by the program's own writer: streamed noise through a resonator, with converter noise on every
+channel. Each contestant runs in a process of its own, so that its peak memory is its own.
+"""
+
+import json
+import multiprocessing
+import resource
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from scipy import signal
+
+from acquisition.excitation.streamed_noise import StreamedNoise
+from acquisition.instruments import Block
+from acquisition.plan.measurement import Measurement
+from acquisition.recording import (
+    ChannelHeader,
+    Origin,
+    RecordingHeader,
+    RecordingState,
+    create_recording,
+    open_recording,
+)
+from analysis.measurement_analysis import analyse_recording
+from analysis.recorded_channels import BASE, DRIVE, RESPONSE
+
+RATE_HZ = 51_200
+BLOCK = 1 << 19
+SEGMENT_S = 4.0
+RESONANCE_HZ, DAMPING = 266.0, 0.01
+CONVERTER_NOISE = 1e-4
+RANGE_V = 10.0
+STEP_V = 2 * RANGE_V / 2**24
+"""Of a 24-bit converter."""
+PER_VOLT = {DRIVE: 1.0, BASE: 10.0, RESPONSE: 0.1, "table_acceleration": 10.0}
+UNITS = {
+    DRIVE: ("voltage", "V"),
+    BASE: ("acceleration", "m s-2"),
+    RESPONSE: ("velocity", "m s-1"),
+    "table_acceleration": ("acceleration", "m s-2"),
+}
+BYTES_PER_MEGABYTE = 1 << 20
+KILOBYTES = 1 << 10
+
+
+def header(plan, samples):
+    """Describe four channels of a 24-bit converter."""
+    return RecordingHeader(
+        channels=tuple(
+            ChannelHeader(
+                role=role,
+                physical_channel=f"dev/{role}",
+                quantity=UNITS[role][0],
+                unit=UNITS[role][1],
+                physical_per_volt=per_volt,
+                range_v=RANGE_V,
+                volts_per_count=STEP_V,
+            )
+            for role, per_volt in PER_VOLT.items()
+        ),
+        sample_rate_hz=float(RATE_HZ),
+        expected_samples=samples,
+        origin=Origin.SIMULATED,
+        plan_json=Measurement(name="long", excitation=plan).model_dump_json(),
+        bench_json=json.dumps({"name": "benchmark"}),
+    )
+
+
+def write_recording(path, duration_s):
+    """Record noise of a resonator: the base follows the drive, the response is the filtered base."""
+    plan = StreamedNoise(
+        amplitude_vpp=10.0, band_start_hz=20, band_stop_hz=2000, settle_s=0.0, duration_s=duration_s, seed=1
+    )
+    samples = round(duration_s * RATE_HZ)
+    rng = np.random.default_rng(1)
+    omega = 2 * np.pi * RESONANCE_HZ
+    section = signal.bilinear([omega, 0.0], [1.0, 2 * DAMPING * omega, omega**2], fs=RATE_HZ)
+    state = np.zeros(2)
+    with create_recording(path, header(plan, samples)) as writer:
+        writer.begin_segment("noise")
+        for first in range(0, samples, BLOCK):
+            drive = rng.standard_normal(min(BLOCK, samples - first))
+            response, state = signal.lfilter(*section, drive, zi=state)
+            volts = np.stack((drive, drive, response, drive))
+            volts += CONVERTER_NOISE * rng.standard_normal(volts.shape)
+            writer.append(Block(first, STEP_V * np.round(volts / STEP_V)))
+        writer.end_segment()
+        writer.finish(RecordingState.COMPLETE, "the plan was carried out")
+
+
+def ours(path):
+    """Analyse the recording as the command does: levels, checks, three estimates with bounds, resonances."""
+    with open_recording(path) as recording:
+        found = analyse_recording(recording).response.h1
+    return found.frequency_hz, found.magnitude
+
+
+def theirs(path):
+    """Form the six spectra that the same estimates need by scipy, from whole channels; nothing else."""
+    with open_recording(path) as recording:
+        drive, base, response = (recording.read(role) for role in (DRIVE, BASE, RESPONSE))
+    how = {"fs": RATE_HZ, "nperseg": round(SEGMENT_S * RATE_HZ), "detrend": False}
+    frequency_hz, s_xx = signal.welch(base, **how)
+    signal.welch(response, **how)
+    signal.welch(drive, **how)
+    _, s_xy = signal.csd(base, response, **how)
+    signal.csd(drive, base, **how)
+    signal.csd(drive, response, **how)
+    # Velocity over acceleration becomes displacement over displacement.
+    return frequency_hz, np.abs(s_xy / s_xx) * 2 * np.pi * frequency_hz
+
+
+def measured(contestant, path, pipe):
+    """Run one contestant and send its time, its peak memory and its result."""
+    idle = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    begin_s, begin_cpu_s = time.perf_counter(), time.process_time()
+    result = contestant(path)
+    wall_s, cpu_s = time.perf_counter() - begin_s, time.process_time() - begin_cpu_s
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    scale = KILOBYTES / BYTES_PER_MEGABYTE
+    pipe.send((wall_s, cpu_s, peak * scale, idle * scale, result))
+
+
+def run(contestant, path):
+    """Give a contestant a process of its own."""
+    context = multiprocessing.get_context("spawn")
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=measured, args=(contestant, path, sender))
+    process.start()
+    answer = receiver.recv()
+    process.join()
+    return answer
+
+
+def compare(path):
+    """Run both on one recording and print time, memory and agreement."""
+    answers = {"vibench": run(ours, path), "scipy": run(theirs, path)}
+    for name, (wall_s, cpu_s, peak_mb, idle_mb, _) in answers.items():
+        print(
+            f"{name + ':':9} {wall_s:6.2f} s, {cpu_s:6.2f} s of processor time, peak {peak_mb:.0f} MB "
+            f"({idle_mb:.0f} MB before it began)"
+        )
+    frequency_hz, magnitude = answers["vibench"][-1]
+    their_hz, theirs_magnitude = answers["scipy"][-1]
+    lines = np.searchsorted(their_hz, frequency_hz - 1e-9)
+    difference = np.max(np.abs(magnitude / theirs_magnitude[lines] - 1))
+    ratio = answers["scipy"][1] / answers["vibench"][1]
+    print(f"scipy takes {ratio:.2f} times the processor time; h1 differs by {difference:.1e} at most")
+
+
+def main():
+    """Write a recording, compare, and throw it away."""
+    minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "long.h5"
+        write_recording(path, 60.0 * minutes)
+        counts = 4 * len(PER_VOLT) * minutes * 60 * RATE_HZ / BYTES_PER_MEGABYTE
+        size = path.stat().st_size / BYTES_PER_MEGABYTE
+        print(
+            f"{minutes:g} minutes, {len(PER_VOLT)} channels: {counts:.0f} MB of counts, {size:.0f} MB on disk"
+        )
+        compare(path)
+
+
+if __name__ == "__main__":
+    main()
