@@ -1,0 +1,77 @@
+"""Errors that no averaging removes are as large as theory says: short segments, holes filled with zeros."""
+
+import numpy as np
+import pytest
+from scipy import fft, signal
+
+from analysis.spectra import spectral_density
+from analysis.transmission import transmission
+
+RATE = 1024.0
+SEGMENT = 256
+
+
+def lagged_share(lag):
+    """Correlation of the Hann window with itself, ``lag`` samples later."""
+    taper = signal.get_window("hann", SEGMENT)
+    return float(taper[:-lag] @ taper[lag:] / (taper @ taper))
+
+
+@pytest.mark.parametrize("lag", [3, 40, 90])
+def test_a_delay_costs_the_share_of_the_segment_that_it_moves_out_of(lag):
+    """E[h1] = rho(lag) exp(-i omega lag): what of a segment's response belongs to its own drive."""
+    record = np.random.default_rng(41).standard_normal(600_000)
+    found = transmission(record[lag:], record[:-lag], RATE, segment_samples=SEGMENT)
+    inner = slice(3, -3)
+    straight = found.without_delay(lag / RATE).value[inner]
+    own_error = np.sqrt(np.mean(found.relative_sd_magnitude[inner] ** 2) / straight.size) * lagged_share(lag)
+    assert np.mean(straight.real) == pytest.approx(lagged_share(lag), abs=6 * own_error + 1e-4)
+    assert np.mean(straight.imag) == pytest.approx(0, abs=6 * own_error + 1e-4)
+
+
+def test_a_peak_narrower_than_the_resolution_is_the_peak_seen_through_the_windows_spectrum():
+    """E[h1] = sum H |W|^2 / sum |W|^2 for a white drive: a half-power width of 8 Hz, lines 6 Hz wide."""
+    omega, damping = 2 * np.pi * 260, 0.02
+    section = signal.bilinear([2 * damping * omega, omega**2], [1, 2 * damping * omega, omega**2], fs=RATE)
+    drive = np.random.default_rng(42).standard_normal(1_500_000)
+    found = transmission(drive, signal.lfilter(*section, drive), RATE, segment_samples=SEGMENT)
+    finer = 64
+    fine_hz = fft.fftfreq(finer * SEGMENT, 1 / RATE)
+    _, true = signal.freqz(*section, worN=2 * np.pi * fine_hz / RATE)
+    seen = np.abs(fft.fft(signal.get_window("hann", SEGMENT), finer * SEGMENT)) ** 2
+    smeared = fft.ifft(fft.fft(true) * fft.fft(seen)) / seen.sum()
+    line = int(np.argmax(np.abs(true[: finer * SEGMENT // 2 : finer])))
+    expected = smeared[finer * line]
+    loss = abs(expected) / abs(true[finer * line]) - 1
+    assert loss < -0.1
+    assert abs(found.value[line] / expected - 1) < 4 * np.sqrt(2) * found.relative_sd_magnitude[line]
+    assert abs(found.value[line] / expected - 1) < -loss / 5
+
+
+def test_filling_holes_with_zeros_would_lower_the_coherence_that_leaving_them_out_keeps():
+    drive = np.random.default_rng(43).standard_normal(400_000)
+    response = signal.lfilter([1.0, 0.5], [1.0], drive)
+    valid = np.ones(drive.size, dtype=bool)
+    for start in range(2_000, 390_000, 6_500):
+        valid[start : start + 100] = False
+    holed = np.where(valid, response, 0.0)
+    kept = transmission(drive, np.where(valid, response, np.nan), RATE, segment_samples=1024, valid=valid)
+    filled = transmission(drive, holed, RATE, segment_samples=1024)
+    assert np.min(kept.coherence) > 0.9999
+    # 100 of 6500 samples are missing, and the others cannot know it: 1.5 % of the power no longer belongs.
+    assert np.median(filled.coherence) == pytest.approx(1 - 100 / 6500, abs=0.004)
+    assert kept.segments_excluded > 0 == filled.segments_excluded
+
+
+@pytest.mark.parametrize(("overlap", "n_eff"), [(0.0, 64.0), (0.5, 120.4), (0.75, 131.7)])
+def test_the_effective_averages_are_those_that_the_spread_of_a_density_shows(overlap, n_eff):
+    rng = np.random.default_rng(44)
+    segment = 128
+    densities = [
+        spectral_density(rng.standard_normal(64 * segment), RATE, segment_samples=segment, overlap=overlap)
+        for _ in range(500)
+    ]
+    assert densities[0].n_eff == pytest.approx(n_eff, rel=0.005)
+    levels = np.array([each.density[3:-3] for each in densities])
+    shown = np.mean(levels.mean(axis=0) ** 2 / levels.var(axis=0, ddof=1))
+    assert shown == pytest.approx(n_eff, rel=0.04)

@@ -1,0 +1,77 @@
+"""Bounds of overlapping, tapered segments hold the truth as often as they say, whatever the estimator."""
+
+import numpy as np
+import pytest
+
+from analysis.results import Estimator
+from analysis.transmission import transmission
+
+RATE = 1024.0
+SEGMENT = 64
+NOISE = 0.5
+EVERY_THIRD = slice(3, -3, 3)
+"""Hann lines three apart share no noise."""
+SECOND_ORDER = 0.004
+"""The logarithmic bounds are exact to second order in the error; this is what is left at ten averages."""
+
+
+def coverage(estimator, overlap, averages, repeats, seed):
+    """Shares of (magnitude, phase) bounds that hold the truth H = 1, and the shares' own standard error."""
+    rng = np.random.default_rng(seed)
+    held_magnitude = held_phase = trials = 0
+    for _ in range(repeats):
+        clean = rng.standard_normal(averages * SEGMENT)
+        on_drive, on_response = NOISE * rng.standard_normal((2, clean.size))
+        drive = clean if estimator is Estimator.H1 else clean + on_drive
+        response = clean if estimator is Estimator.H2 else clean + on_response
+        how = {
+            Estimator.HV: {"noise_ratio": 1.0},
+            Estimator.DRIVE: {"reference": clean},
+        }.get(estimator, {})
+        found = transmission(
+            drive, response, RATE, segment_samples=SEGMENT, overlap=overlap, estimator=estimator, **how
+        )
+        low, high = found.magnitude_lower[EVERY_THIRD], found.magnitude_upper[EVERY_THIRD]
+        held_magnitude += np.count_nonzero((low <= 1) & (high >= 1))
+        held_phase += np.count_nonzero(
+            (found.phase_lower[EVERY_THIRD] <= 0) & (found.phase_upper[EVERY_THIRD] >= 0)
+        )
+        trials += low.size
+    return held_magnitude / trials, held_phase / trials, np.sqrt(0.95 * 0.05 / trials)
+
+
+def require_coverage(estimator, overlap, averages, repeats):
+    seed = [list(Estimator).index(estimator), round(100 * overlap), averages]
+    magnitude, phase, own_error = coverage(estimator, overlap, averages, repeats, seed)
+    assert magnitude == pytest.approx(0.95, abs=3 * own_error + SECOND_ORDER)
+    assert phase == pytest.approx(0.95, abs=3 * own_error + SECOND_ORDER)
+
+
+@pytest.mark.parametrize("estimator", list(Estimator))
+@pytest.mark.parametrize("overlap", [0.5, 0.75])
+def test_bounds_of_overlapping_hann_segments_hold_the_truth_95_times_in_100(estimator, overlap):
+    require_coverage(estimator, overlap, averages=12, repeats=400)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("estimator", list(Estimator))
+@pytest.mark.parametrize("overlap", [0.0, 0.5, 0.75])
+@pytest.mark.parametrize("averages", [12, 48])
+def test_many_more_repeats_find_the_bounds_no_wider_and_no_narrower(estimator, overlap, averages):
+    require_coverage(estimator, overlap, averages, repeats=8000)
+
+
+def test_segments_counted_as_independent_would_promise_too_much():
+    """Without the correction for overlap the bounds at 75 % would be those of too many averages."""
+    rng = np.random.default_rng(8)
+    outside = trials = 0
+    for _ in range(200):
+        drive = rng.standard_normal(12 * SEGMENT)
+        response = drive + NOISE * rng.standard_normal(drive.size)
+        found = transmission(drive, response, RATE, segment_samples=SEGMENT, overlap=0.75)
+        naive = found.half_width * np.sqrt(found.n_eff / found.segments_used)
+        error = np.abs(np.log(found.magnitude))
+        outside += np.count_nonzero(error[EVERY_THIRD] > naive[EVERY_THIRD])
+        trials += error[EVERY_THIRD].size
+    assert outside / trials > 0.12

@@ -1,0 +1,76 @@
+"""Transmission against programs of other makers on the same samples: scipy, and pyFRF if installed."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from analysis.results import Estimator
+from analysis.transmission import transmission
+
+RATE = 2048
+SEGMENT = 512
+
+
+@pytest.fixture(scope="module")
+def noisy_pair():
+    """A resonance at 260 Hz under noise, with noise on the drive and on the response."""
+    rng = np.random.default_rng(31)
+    omega, damping = 2 * np.pi * 260, 0.02
+    section = signal.bilinear([2 * damping * omega, omega**2], [1, 2 * damping * omega, omega**2], fs=RATE)
+    clean = rng.standard_normal(40_000)
+    drive = clean + 0.2 * rng.standard_normal(clean.size)
+    return drive, signal.lfilter(*section, clean) + 0.3 * rng.standard_normal(clean.size)
+
+
+@pytest.mark.parametrize("window", ["hann", "boxcar"])
+@pytest.mark.parametrize("overlap", [0.0, 0.5, 0.75])
+def test_coherence_is_that_of_scipy(noisy_pair, window, overlap):
+    ours = transmission(*noisy_pair, RATE, segment_samples=SEGMENT, window=window, overlap=overlap)
+    how = {"window": window, "nperseg": SEGMENT, "noverlap": int(overlap * SEGMENT), "detrend": False}
+    frequency_hz, theirs = signal.coherence(*noisy_pair, RATE, **how)
+    np.testing.assert_allclose(ours.frequency_hz, frequency_hz, rtol=1e-14)
+    np.testing.assert_allclose(ours.coherence, theirs, rtol=1e-10)
+
+
+WITHOUT_MEAN = slice(1, None)
+"""pyFRF takes the mean off every segment, which changes the line at 0 Hz."""
+
+
+@pytest.fixture(scope="module", params=["boxcar", "hann"])
+def pyfrf_answer(noisy_pair, request):
+    """What pyFRF averages over half-overlapping segments; its Hann is the symmetric one, so it gets ours."""
+    pyfrf = pytest.importorskip("pyFRF")
+    taper = signal.get_window(request.param, SEGMENT)
+    drive, response = (
+        np.lib.stride_tricks.sliding_window_view(each, SEGMENT)[:: SEGMENT // 2, np.newaxis] * taper
+        for each in noisy_pair
+    )
+    found = pyfrf.FRF(RATE, exc_type="f", resp_type="d", window="none", fft_len=SEGMENT, nperseg=SEGMENT)
+    found.add_data(drive, response)
+    return request.param, found
+
+
+@pytest.mark.parametrize(
+    ("estimator", "method", "how"),
+    [
+        (Estimator.H1, "get_H1", {}),
+        (Estimator.H2, "get_H2", {}),
+        # pyFRF takes both noises for equally strong, whatever the channels' units are.
+        (Estimator.HV, "get_Hv", {"noise_ratio": 1.0}),
+    ],
+)
+def test_h1_h2_and_hv_are_those_of_pyfrf(noisy_pair, pyfrf_answer, estimator, method, how):
+    window, theirs = pyfrf_answer
+    ours = transmission(*noisy_pair, RATE, segment_samples=SEGMENT, window=window, estimator=estimator, **how)
+    np.testing.assert_allclose(ours.frequency_hz, theirs.get_f_axis(), rtol=1e-14)
+    np.testing.assert_allclose(
+        ours.value[WITHOUT_MEAN], getattr(theirs, method)()[0, 0][WITHOUT_MEAN], rtol=1e-10
+    )
+
+
+def test_coherence_is_that_of_pyfrf(noisy_pair, pyfrf_answer):
+    window, theirs = pyfrf_answer
+    ours = transmission(*noisy_pair, RATE, segment_samples=SEGMENT, window=window)
+    np.testing.assert_allclose(
+        ours.coherence[WITHOUT_MEAN], theirs.get_coherence()[0][WITHOUT_MEAN], rtol=1e-10
+    )
