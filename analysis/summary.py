@@ -17,8 +17,10 @@ from .campaign_results import (
 from .chaos.verdict import MotionVerdict
 from .collision_region import CollisionRegion, Collisions, Edge
 from .difference import Difference
+from .distortion import distortion
 from .measurement_analysis import NoiseAnalysis
 from .overlay import SimulatedRun
+from .periodic_transmission import PeriodicTransmission
 from .recording_facts import RecordingFacts
 from .resonance import Resonance
 from .terminal_level import TerminalLevel
@@ -81,6 +83,7 @@ def _noise(result: NoiseResult) -> Json:
     return {
         "resonances": [_resonance(each) for each in found.resonances],
         "transmission": _transmission(result.analysis),
+        "distortion": None if found.periodic is None else _distortion(found.periodic),
         "independent_averages": found.transmission.n_eff,
         "used_s": found.used_s,
         "left_out": found.left_out,
@@ -119,6 +122,18 @@ def _transmission(analysis: NoiseAnalysis) -> Json:
         "phase_lower_rad": found.phase_lower,
         "phase_upper_rad": found.phase_upper,
         "coherence": found.coherence,
+    }
+
+
+def _distortion(periodic: PeriodicTransmission) -> Json:
+    found = distortion(periodic)
+    return {
+        "realisations": periodic.realisations,
+        "median_noise_over_magnitude": found.noise_share,
+        "median_distortion_over_magnitude": found.distortion_share,
+        "odd_detection_lines_m_per_s": found.odd_m_per_s,
+        "even_detection_lines_m_per_s": found.even_m_per_s,
+        "noise_on_detection_lines_m_per_s": found.detection_noise_m_per_s,
     }
 
 

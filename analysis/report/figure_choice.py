@@ -5,6 +5,7 @@ from itertools import groupby
 
 from ..campaign_results import CampaignResults, DwellResult, Result, SweepResult
 from ..figures.bench_levels import bench_levels_figure
+from ..figures.distortion import distortion_figure
 from ..figures.drawn import DrawnFigure
 from ..figures.dwells import dwells_figure
 from ..figures.excitation import excitation_figure
@@ -24,6 +25,8 @@ def result_figures(results: CampaignResults) -> Iterator[DrawnFigure]:
         yield transmission_levels_figure([each.analysis for each in noise])
     for each in noise:
         yield transmission_figure(each.analysis, each.laid)
+        if each.analysis.response.periodic is not None:
+            yield distortion_figure(each.analysis, each.analysis.response.periodic)
     for sweep in results.sweeps:
         yield sweep_figure(sweep.analysis, sweep.laid)
         yield sweep_orders_figure(sweep.analysis)

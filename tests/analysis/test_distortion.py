@@ -1,0 +1,104 @@
+"""An odd multisine in a recording tells even from odd distortion, and both from noise."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.excitation.odd_multisine import OddMultisine
+from acquisition.recording import open_recording
+from analysis.distortion import distortion
+from analysis.figures.distortion import distortion_caption, distortion_figure
+from analysis.measurement_analysis import analyse_recording
+
+REPETITION_HZ, PERIODS, REALISATIONS, SETTLE_S = 4.0, 4, 4, 0.5
+NOISE_M_PER_S = 2e-5
+
+
+@pytest.fixture(scope="module")
+def synthetic():
+    """The tests are no package: a module beside this file is loaded by its path."""
+    place = Path(__file__).with_name("synthetic_recordings.py")
+    spec = importlib.util.spec_from_file_location("synthetic_recordings", place)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules.setdefault(spec.name, module)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def analysed(synthetic, tmp_path_factory):
+    """Analyse a mass that moves twice as far as its base, plus a distortion of its velocity."""
+
+    def analyse(distorted, realisations=REALISATIONS):
+        plan = OddMultisine(
+            amplitude_vpp=0.2,
+            band_start_hz=60.0,
+            band_stop_hz=400.0,
+            repetition_hz=REPETITION_HZ,
+            realisations=realisations,
+            periods=PERIODS,
+            settle_s=SETTLE_S,
+        )
+        rng = np.random.default_rng(51)
+        played_s = PERIODS / REPETITION_HZ
+        time_s = np.arange(round((SETTLE_S + played_s) * synthetic.RATE)) / synthetic.RATE
+        omega = 2 * np.pi * REPETITION_HZ * np.array(plan.excited_lines)
+        motions, velocities, parts = [], [], []
+        for number in range(realisations):
+            angles = np.outer(omega, time_s) + rng.uniform(0, 2 * np.pi, (omega.size, 1))
+            velocity = 2e-6 * omega @ np.cos(angles)
+            velocity += distorted(velocity / 0.01) * 0.01 + NOISE_M_PER_S * rng.standard_normal(time_s.size)
+            motions.append((1e-6 * np.sin(angles).sum(axis=0), -1e-6 * omega**2 @ np.sin(angles)))
+            velocities.append(velocity)
+            start_s = number * time_s.size / synthetic.RATE + SETTLE_S
+            parts.append(synthetic.Part("realisation", start_s, start_s + played_s, {"realisation": number}))
+        base = synthetic.Motion(*np.concatenate(motions, axis=1))
+        folder = tmp_path_factory.mktemp("odd")
+        path = synthetic.write_recording(folder, plan, base, np.concatenate(velocities), parts, name="odd")
+        with open_recording(path) as recording:
+            return analyse_recording(recording)
+
+    return analyse
+
+
+def test_a_square_shows_on_even_lines_and_a_cube_on_odd_ones(analysed):
+    square = distortion(analysed(lambda velocity: 0.05 * velocity**2).response.periodic)
+    cube = distortion(analysed(lambda velocity: 0.02 * velocity**3).response.periodic)
+    noise = square.detection_noise_m_per_s
+    assert square.even_m_per_s > 20 * noise > 20 * square.odd_m_per_s / 3
+    assert cube.odd_m_per_s > 20 * noise > 20 * cube.even_m_per_s / 3
+    # A cube scatters realisations; noise is what it was.
+    assert cube.distortion_share > 10 * cube.noise_share
+    assert cube.noise_share == pytest.approx(square.noise_share, rel=0.2)
+
+
+def test_without_distortion_only_noise_is_left_and_it_is_the_noise_that_was_put_in(analysed, synthetic):
+    found = distortion(analysed(np.zeros_like).response.periodic)
+    # White noise of variance s^2 puts 4 s^2 over the averaged samples on the square of an amplitude.
+    expected = NOISE_M_PER_S * np.sqrt(4 * REPETITION_HZ / (synthetic.RATE * PERIODS))
+    assert found.detection_noise_m_per_s == pytest.approx(expected, rel=0.1)
+    assert found.odd_m_per_s < expected > found.even_m_per_s
+    assert found.distortion_share < 2 * found.noise_share
+
+
+def test_the_figure_holds_the_lines_and_its_caption_the_levels(analysed):
+    analysis = analysed(lambda velocity: 0.05 * velocity**2)
+    periodic = analysis.response.periodic
+    drawn = distortion_figure(analysis, periodic)
+    shares, quiet = drawn.figure.axes
+    shown = {each.get_label(): each.get_ydata() for each in (*shares.get_lines(), *quiet.get_lines())}
+    even = periodic.detection.order % 2 == 0
+    np.testing.assert_array_equal(
+        shown["even lines, not driven"], periodic.detection.response_amplitude[even]
+    )
+    assert shown["nonlinear distortion"].size == periodic.transmission.frequency_hz.size
+    assert f"{1e6 * distortion(periodic).even_m_per_s:.3g} µm/s on even lines" in drawn.caption
+
+
+def test_one_realisation_says_that_it_cannot_show_distortion(analysed):
+    periodic = analysed(np.zeros_like, realisations=1).response.periodic
+    assert distortion(periodic).distortion_share is None
+    assert "one realisation cannot show distortion" in distortion_caption(periodic)
