@@ -1,0 +1,81 @@
+"""Long records are analysed block by block: memory does not grow with them, and a watcher sees them pass."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from acquisition.excitation.streamed_noise import StreamedNoise
+from acquisition.recording import open_recording
+from analysis.measurement_analysis import analyse_recording
+from analysis.noise_request import NoiseRequest
+from analysis.noise_response import noise_response
+from analysis.recorded_channels import Stretch
+
+RATE = 51_200.0
+
+
+class Endless:
+    """Noise made when it is read; nothing of it is kept."""
+
+    sample_rate_hz = RATE
+    response_delay_s = 0.0
+
+    def __init__(self, duration_s):
+        self.samples = round(duration_s * RATE)
+        self.longest_read = 0
+
+    def stretches(self, label):
+        return (Stretch(0, self.samples, {}, True),)
+
+    def read(self, start, stop):
+        self.longest_read = max(self.longest_read, stop - start)
+        drive = np.random.default_rng(start).standard_normal(stop - start)
+        return np.stack((drive, drive, np.cumsum(drive) / RATE))
+
+    def overloaded(self, start, stop):
+        return np.zeros(stop - start, dtype=bool)
+
+
+def peak_bytes(duration_s):
+    plan = StreamedNoise(
+        amplitude_vpp=1.0, band_start_hz=50, band_stop_hz=600, settle_s=0, duration_s=duration_s, seed=1
+    )
+    channels = Endless(duration_s)
+    tracemalloc.start()
+    noise_response(channels, plan, NoiseRequest(segment_s=1.0))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak, channels
+
+
+def test_four_times_the_record_needs_no_more_memory():
+    short, _ = peak_bytes(25.0)
+    long, channels = peak_bytes(100.0)
+    assert long < 1.1 * short
+    assert channels.longest_read < channels.samples / 5
+
+
+class Notes:
+    """Keeps what a watcher is told."""
+
+    def __init__(self):
+        self.stages = []
+        self.reads = []
+
+    def begin(self, recording, stage):
+        self.stages.append((recording, stage))
+        self.reads.append([])
+
+    def read(self, samples, of):
+        self.reads[-1].append(samples / of)
+
+
+def test_a_watcher_hears_every_stage_and_how_far_it_is_read(streamed_file):
+    notes = Notes()
+    with open_recording(streamed_file()) as recording:
+        analyse_recording(recording, watcher=notes)
+    assert notes.stages == [("streamed.h5", "looking at every channel"), ("streamed.h5", "analysing")]
+    for shares in notes.reads:
+        assert shares == sorted(shares)
+        assert shares[-1] == pytest.approx(1.0)
