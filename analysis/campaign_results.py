@@ -7,6 +7,7 @@ from pathlib import Path
 
 from acquisition.errors import RecordingError
 from acquisition.recording import Recording, open_recording
+from sim.specimen import Specimen
 
 from .errors import AnalysisError, NotEnoughData
 from .measurement_analysis import (
@@ -84,6 +85,8 @@ class CampaignResults:
     name: str
     results: tuple[Result, ...]
     failures: tuple[Failure, ...]
+    model_said: tuple[str, ...] = ()
+    """What is to be known of the model that was laid over: a sentence for each fitted value."""
 
     @property
     def facts(self) -> tuple[RecordingFacts, ...]:
@@ -124,8 +127,11 @@ def analyse_files(
     simulation: Simulation = Simulation.LAID_OVER,
     request: NoiseRequest = DEFAULT_REQUEST,
     watcher: Watcher = UNWATCHED,
+    specimen: Specimen | None = None,
 ) -> CampaignResults:
     """Analyse recordings one after the other, each with the model laid over it, as `analyse_recording` does.
+
+    The model is the ``specimen`` given; by default what each recording's bench configuration says.
 
     Raises
     ------
@@ -140,7 +146,7 @@ def analyse_files(
     for path in paths:
         try:
             with open_recording(path) as recording:
-                result, failed = result_of(recording, simulation, request, watcher)
+                result, failed = result_of(recording, simulation, request, watcher, specimen)
         except (AnalysisError, RecordingError) as error:
             failures.append(Failure(path.name, "analysis", str(error)))
             continue
@@ -163,6 +169,7 @@ def result_of(
     simulation: Simulation = Simulation.LAID_OVER,
     request: NoiseRequest = DEFAULT_REQUEST,
     watcher: Watcher = UNWATCHED,
+    specimen: Specimen | None = None,
 ) -> tuple[Result, tuple[Failure, ...]]:
     """Analyse one recording; a simulation that fails leaves the measured result standing.
 
@@ -177,7 +184,7 @@ def result_of(
     if simulation is Simulation.LEFT_OUT:
         return _paired(analysis, None), ()
     try:
-        laid = overlay(recording, analysis, stage=lambda stage: watcher.begin(name, stage))
+        laid = overlay(recording, analysis, specimen=specimen, stage=lambda stage: watcher.begin(name, stage))
     except AnalysisError as error:
         return _paired(analysis, None), (Failure(name, "simulation", str(error)),)
     return _paired(analysis, laid), ()

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Reals
+from .arrays import Flags, Reals
 
 _PER_NEPER_DB = 20 / np.log(10)
 
@@ -17,6 +17,10 @@ class Difference:
     decibel: Reals
     standard_errors: Reals
     """ln(measured / simulated) over the standard deviation of both; infinite where neither has any."""
+
+    def where(self, kept: Flags) -> "Difference":
+        """Keep some of the points."""
+        return Difference(self.frequency_hz[kept], self.decibel[kept], self.standard_errors[kept])
 
     @property
     def median_abs_db(self) -> float:

@@ -1,5 +1,7 @@
 """`vibench analyse`: a recording, or a folder of them, becomes figures, tables and a report."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -9,8 +11,10 @@ from analysis.campaign_results import CampaignResults, Failure, Simulation, anal
 from analysis.noise_request import NoiseRequest
 from analysis.report.report import write_report
 from analysis.results import Estimator
+from analysis.shaken_specimen import ShakenSpecimen, shaken_specimen
 from analysis.summary import campaign_summary
 from analysis.transmission_view import MagnitudeScale, quantities_named
+from analysis.watcher import Watcher
 from analysis.window import Window
 
 from .output import console, print_json
@@ -32,6 +36,13 @@ def analyse(
     simulate: Annotated[
         bool, typer.Option(help="Lay the simulation over the measurement; takes some seconds more.")
     ] = True,
+    fit: Annotated[
+        bool,
+        typer.Option(
+            "--fit",
+            help="Fit damping, frequencies and gap to the recordings first, and lay that specimen over them.",
+        ),
+    ] = False,
     estimator: Annotated[
         Estimator,
         typer.Option(
@@ -105,15 +116,27 @@ def analyse(
     name = recording.name.removesuffix(".part").removesuffix(".h5")
     with reading_bar() as watcher:
         simulation = Simulation.LAID_OVER if simulate else Simulation.LEFT_OUT
-        results = analyse_files(paths, name, simulation, request, watcher)
+        shaken = fitted_to(paths, name, watcher) if fit else None
+        specimen = None if shaken is None else shaken.specimen
+        results = analyse_files(paths, name, simulation, request, watcher, specimen)
+    if shaken is not None:
+        results = replace(results, model_said=shaken.sentences)
     if as_json:
-        print_json(campaign_summary(results))
+        fitted = {} if shaken is None else {"specimen_fit": shaken.to_dict()}
+        print_json({**campaign_summary(results), **fitted})
+    for sentence in () if as_json else results.model_said:
+        console.print(sentence)
     if results.results and (out is not None or not as_json):
         folder = unused(recording.parent / f"{name}_analysis") if out is None else out
         report = write_report(results, unused(folder / "report.html"), folder / "figures")
         if not as_json:
             console.print(f"The report: [bold]{report.resolve()}[/]")
     complain_about(results)
+
+
+def fitted_to(paths: Sequence[Path], name: str, watcher: Watcher) -> ShakenSpecimen:
+    """Fit the specimen to recordings, whatever the report is to show of them."""
+    return shaken_specimen(analyse_files(paths, name, Simulation.LEFT_OUT, watcher=watcher))
 
 
 def complain_about(results: CampaignResults) -> None:

@@ -106,5 +106,6 @@ def stepped_sine_caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay
         return text
     return (
         f"{text} Simulated under the recorded base motion: median difference "
-        f"{laid.difference.median_abs_db:.2g} dB, {laid.run.impacts} impacts within the steps."
+        f"{laid.difference.median_abs_db:.2g} dB, {laid.difference.share_within_two:.0%} of the steps "
+        f"within two standard errors, {laid.run.impacts} impacts within the steps."
     )

@@ -153,8 +153,13 @@ def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
     ]
     if laid is not None:
         outside = ~analysis.collisions.is_colliding
-        apart = np.abs(laid.difference.decibel[outside])
-        smooth = f", {np.median(apart):.2g} dB median difference outside of it" if apart.size else ""
+        apart = laid.difference.where(outside)
+        smooth = (
+            f"; outside of it {apart.median_abs_db:.2g} dB median difference, "
+            f"{apart.share_within_two:.0%} of the intervals within two standard errors"
+            if outside.any()
+            else ""
+        )
         said.append(
             f"Simulated under the recorded base motion: {regions_text(laid.collisions)}, "
             f"{laid.run.impacts} impacts{smooth}. Blue dots: steady sines from rest, which know "

@@ -9,6 +9,7 @@ from ..figures.sweep import regions_text
 
 def findings(results: CampaignResults) -> Iterator[str]:
     """Say what each measurement found, weak to strong, and how far the simulation lies from it."""
+    yield from results.model_said
     for noise in results.noise:
         yield _noise(noise)
     for sweep in results.sweeps:

@@ -103,10 +103,12 @@ def streamed(duration_s, low_hz, high_hz, rms_m, seed):
     return base, np.fft.irfft(2j * omega * spectrum, count)
 
 
-def response_of(motion, delay_samples=0):
-    """Velocity of m0 under a base motion; a delay shows it late."""
+def response_of(motion, delay_samples=0, specimen=None):
+    """Velocity of m0 under a base motion, and when it struck; a delay shows it late."""
     drive = Sampled(np.append(motion.displacement_m, motion.displacement_m[-1]), RATE)
-    path = integrate(gong2025(), drive, (motion.displacement_m.size - 1) / RATE, sample_rate_hz=RATE)
+    path = integrate(
+        specimen or gong2025(), drive, (motion.displacement_m.size - 1) / RATE, sample_rate_hz=RATE
+    )
     return np.roll(path.states[:, 3], delay_samples), path.impacts.times_s
 
 

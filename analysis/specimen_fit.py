@@ -1,0 +1,216 @@
+"""The specimen that is really on the shaker: damping and frequencies fitted to a measured transmission."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import assert_never
+
+import numpy as np
+from scipy.optimize import OptimizeResult, least_squares
+from scipy.stats import t as student
+
+from sim.modes import base_transmissibility
+from sim.specimen import Specimen
+
+from .arrays import Reals
+from .confidence import DEFAULT_CONFIDENCE
+from .errors import InvalidRequest, NotEnoughData
+from .results import Transmission
+
+LEAST_RELATIVE_SD = 1e-4
+"""No line counts for more than this scatter says: calibrations and clocks are no better."""
+POOR = 3.0
+"""A reduced chi square above which other beginnings are tried."""
+SCALES = (0.9, 0.95, 1.05, 1.1)
+"""Of all frequencies."""
+_STEP = 1e-6
+"""Of a logarithm, for a central difference: far above rounding, and far less than a resonance is wide."""
+
+
+class Parameter(StrEnum):
+    """What of a specimen is fitted."""
+
+    DAMPING_TIME = "damping_time_s"
+    """c_i / k_i, one for all links."""
+    F0 = "f0_hz"
+    F1 = "f1_hz"
+    F2 = "f2_hz"
+    """Frequencies of the single oscillators, f_i = sqrt(k_i / m_i) / 2 pi."""
+    GAP = "gap_m"
+
+
+LINEAR = (Parameter.DAMPING_TIME, Parameter.F0, Parameter.F1, Parameter.F2)
+"""What a transmission without collisions tells."""
+
+
+@dataclass(frozen=True)
+class FittedValue:
+    """A parameter with its interval."""
+
+    parameter: Parameter
+    value: float
+    low: float
+    high: float
+    """Both with the confidence of the fit."""
+    sd: float
+    """Standard deviation; NaN where the interval is one of bounds."""
+    nominal: float
+    """What the bench configuration says."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpecimenFit:
+    """A fitted specimen, and how well it fits."""
+
+    specimen: Specimen
+    values: tuple[FittedValue, ...]
+    covariance: Reals
+    """Of the logarithms of the fitted linear parameters, shape (n, n), in the order of ``values``."""
+    lines: int
+    """Lines of the transmission that were used."""
+    reduced_chi_square: float
+    """Squared residual over what the measured scatter explains: 1 for a model that leaves nothing."""
+    confidence: float
+
+    def value(self, parameter: Parameter) -> FittedValue:
+        """Give one fitted value; InvalidRequest when it was not fitted."""
+        for each in self.values:
+            if each.parameter is parameter:
+                return each
+        names = ", ".join(each.parameter for each in self.values)
+        raise InvalidRequest(f"{parameter.value} was not fitted; there are {names}")
+
+
+def parameter_value(specimen: Specimen, parameter: Parameter) -> float:
+    """Read one parameter of a specimen; the damping time of a specimen with several is that of link 0."""
+    masses, stiffnesses = specimen.masses, specimen.stiffnesses
+    match parameter:
+        case Parameter.DAMPING_TIME:
+            return specimen.dampings[0] / stiffnesses[0]
+        case Parameter.F0 | Parameter.F1 | Parameter.F2:
+            link = LINEAR.index(parameter) - 1
+            return float(np.sqrt(stiffnesses[link] / masses[link]) / (2.0 * np.pi))
+        case Parameter.GAP:
+            return specimen.gap_m
+        case _:
+            assert_never(parameter)
+
+
+def with_values(specimen: Specimen, values: Mapping[Parameter, float]) -> Specimen:
+    """Give a specimen other parameters; the masses stay, and dampings follow their stiffnesses."""
+    beta = values.get(Parameter.DAMPING_TIME, parameter_value(specimen, Parameter.DAMPING_TIME))
+    stiffnesses = tuple(
+        mass * (2.0 * np.pi * values.get(name, parameter_value(specimen, name))) ** 2
+        for mass, name in zip(specimen.masses, LINEAR[1:], strict=True)
+    )
+    k0, k1, k2 = (float(each) for each in stiffnesses)
+    gap_m = values.get(Parameter.GAP, specimen.gap_m)
+    return replace(
+        specimen,
+        stiffnesses=(k0, k1, k2),
+        dampings=(beta * k0, beta * k1, beta * k2),
+        gap_m=gap_m,
+    )
+
+
+def fit_specimen(
+    transmission: Transmission,
+    nominal: Specimen,
+    free: Sequence[Parameter] = LINEAR,
+    confidence: float = DEFAULT_CONFIDENCE,
+) -> SpecimenFit:
+    """Fit the linear specimen to a transmission of base to m0 that was measured without collisions.
+
+    Least squares of ln(measured / model), magnitude and phase, each over its measured standard deviation,
+    in the logarithms of the parameters. The covariance is Gauss-Newton's, made larger by the reduced chi
+    square where the model leaves more than the scatter explains.
+
+    Parameters
+    ----------
+    transmission
+        Displacement over displacement, delays removed.
+    nominal
+        Where the search begins, and what stays of the parameters that are not free; contact and gap too.
+    free
+        What is fitted.
+    confidence
+        Of the intervals.
+
+    Raises
+    ------
+    InvalidRequest
+        When nothing is free, or the gap is, which no linear transmission tells.
+    NotEnoughData
+        When fewer significant lines than twice the parameters are left.
+
+    """
+    free = tuple(free)
+    if not free or Parameter.GAP in free:
+        raise InvalidRequest(
+            f"{', '.join(free) or 'nothing'} was to be fitted to a transmission; it tells any of "
+            f"{', '.join(LINEAR)}"
+        )
+    used = transmission.is_significant & np.isfinite(transmission.relative_sd_magnitude)
+    count = int(np.count_nonzero(used))
+    if count < 2 * len(free):
+        raise NotEnoughData(
+            f"{count} lines of the transmission stand above their uncertainty, and {len(free)} parameters "
+            f"need {2 * len(free)}; measure longer or with more drive"
+        )
+    frequency_hz, measured = transmission.frequency_hz[used], transmission.value[used]
+    weights = 1.0 / np.concatenate(
+        [
+            np.maximum(transmission.relative_sd_magnitude[used], LEAST_RELATIVE_SD),
+            np.maximum(transmission.sd_phase_rad[used], LEAST_RELATIVE_SD),
+        ]
+    )
+    start = np.log([parameter_value(nominal, each) for each in free])
+
+    def specimen_at(logarithms: Reals) -> Specimen:
+        return with_values(nominal, dict(zip(free, np.exp(logarithms).tolist(), strict=True)))
+
+    def residuals(logarithms: Reals) -> Reals:
+        model = base_transmissibility(specimen_at(logarithms), frequency_hz)[:, 0]
+        apart = np.log(measured / model)
+        return np.asarray(weights * np.concatenate([apart.real, apart.imag]))
+
+    freedom = 2 * count - len(free)
+    found = _descended(residuals, start)
+    if 2.0 * found.cost > POOR * freedom:
+        # A phase may lie on another branch: begin again from specimens that are stiffer or softer.
+        scaled = [start + np.log(scale) * np.array([each in LINEAR[1:] for each in free]) for scale in SCALES]
+        found = min([found, *(_descended(residuals, each) for each in scaled)], key=lambda each: each.cost)
+    chi_square = float(2.0 * found.cost / freedom)
+    slopes = np.asarray(found.jac, dtype=np.float64)
+    covariance = np.asarray(np.linalg.inv(slopes.T @ slopes) * max(1.0, chi_square))
+    return SpecimenFit(
+        specimen=specimen_at(found.x),
+        values=_values(
+            free, nominal, found.x, covariance, float(student.ppf(0.5 + 0.5 * confidence, freedom))
+        ),
+        covariance=covariance,
+        lines=count,
+        reduced_chi_square=chi_square,
+        confidence=confidence,
+    )
+
+
+def _descended(residuals: Callable[[Reals], Reals], start: Reals) -> OptimizeResult:
+    return least_squares(residuals, start, jac="3-point", diff_step=[_STEP], x_scale="jac")
+
+
+def _values(
+    free: tuple[Parameter, ...], nominal: Specimen, found: Reals, covariance: Reals, reach: float
+) -> tuple[FittedValue, ...]:
+    spreads = np.sqrt(np.diag(covariance))
+    return tuple(
+        FittedValue(
+            parameter=name,
+            value=float(np.exp(middle)),
+            low=float(np.exp(middle - reach * sd)),
+            high=float(np.exp(middle + reach * sd)),
+            sd=float(np.exp(middle) * sd),
+            nominal=parameter_value(nominal, name),
+        )
+        for name, middle, sd in zip(free, found, spreads, strict=True)
+    )

@@ -1,0 +1,121 @@
+"""A fit finds the specimen that was measured, and its intervals hold it as often as they say."""
+
+import math
+
+import numpy as np
+import pytest
+
+from analysis.confidence import student_half_width
+from analysis.errors import InvalidRequest, NotEnoughData
+from analysis.results import Estimator, Transmission, TransmissionSettings
+from analysis.specimen_fit import LINEAR, Parameter, fit_specimen, parameter_value, with_values
+from sim.modes import base_transmissibility
+from sim.specimen import gong2025
+
+NOMINAL = gong2025()
+TRUE = {
+    Parameter.DAMPING_TIME: 3.1e-5,
+    Parameter.F0: 318.0,
+    Parameter.F1: 103.0,
+    Parameter.F2: 395.0,
+}
+LINES_HZ = np.arange(60.0, 560.0, 4.0)
+SD = 0.02
+
+
+def measured(specimen, rng, sd=SD, lines_hz=LINES_HZ, gain=1.0):
+    """A transmission whose lines scatter by ``sd`` in ln(magnitude) and in phase, as it says."""
+    scatter = sd * (rng.standard_normal(lines_hz.size) + 1j * rng.standard_normal(lines_hz.size))
+    value = gain * base_transmissibility(specimen, lines_hz)[:, 0] * np.exp(scatter)
+    spread = np.full(lines_hz.size, sd)
+    return Transmission(
+        frequency_hz=lines_hz,
+        value=value,
+        coherence=np.full(lines_hz.size, 0.99),
+        n_eff=20.0,
+        relative_sd_magnitude=spread,
+        sd_phase_rad=spread,
+        half_width=student_half_width(spread, 20.0, 0.95),
+        coherence_significance=0.3,
+        resolution_hz=0.0,
+        segments_used=20,
+        segments_excluded=0,
+        settings=TransmissionSettings(Estimator.DRIVE, 6400.0, 1600, "rectangular", 0.0, 0.95),
+    )
+
+
+@pytest.fixture(scope="module")
+def true():
+    return with_values(NOMINAL, TRUE)
+
+
+def test_parameters_are_read_back_as_they_were_given(true):
+    for name, value in TRUE.items():
+        assert parameter_value(true, name) == pytest.approx(value, rel=1e-12)
+    assert true.masses == NOMINAL.masses
+    assert true.gap_m == NOMINAL.gap_m
+    assert with_values(true, {Parameter.GAP: 50e-6}).gap_m == 50e-6
+
+
+def test_a_transmission_without_noise_gives_the_specimen_back(true):
+    clean = measured(true, np.random.default_rng(0), sd=1e-9)
+    fit = fit_specimen(clean, NOMINAL)
+    for name, value in TRUE.items():
+        assert fit.value(name).value == pytest.approx(value, rel=1e-6)
+
+
+def test_the_intervals_hold_the_truth_as_often_as_they_say_and_are_no_wider_than_they_must(true):
+    rng = np.random.default_rng(20250101)
+    draws = 120
+    fits = [fit_specimen(measured(true, rng), NOMINAL) for _ in range(draws)]
+    # 95 % of 120 is 114; three standard deviations of that binomial are 7.2.
+    slack = 3 * math.sqrt(draws * 0.95 * 0.05)
+    for name, value in TRUE.items():
+        found = [fit.value(name) for fit in fits]
+        held = sum(each.low <= value <= each.high for each in found)
+        assert abs(held - 0.95 * draws) <= slack, name
+        scatter = np.std([each.value for each in found], ddof=1)
+        assert np.mean([each.sd for each in found]) == pytest.approx(scatter, rel=0.3)
+        # The mean of the fits is the truth, within its own standard error: no bias.
+        assert np.mean([each.value for each in found]) == pytest.approx(
+            value, abs=4 * scatter / math.sqrt(draws)
+        )
+    assert np.mean([fit.reduced_chi_square for fit in fits]) == pytest.approx(1.0, abs=0.1)
+
+
+def test_what_is_not_free_stays_as_the_bench_says(true):
+    fit = fit_specimen(measured(true, np.random.default_rng(1)), true, (Parameter.DAMPING_TIME,))
+    assert [each.parameter for each in fit.values] == [Parameter.DAMPING_TIME]
+    assert fit.specimen.stiffnesses == pytest.approx(true.stiffnesses, rel=1e-12)
+    with pytest.raises(InvalidRequest, match="f0_hz was not fitted"):
+        fit.value(Parameter.F0)
+
+
+def test_a_model_that_cannot_follow_the_data_says_so_and_widens_its_intervals(true):
+    rng = np.random.default_rng(2)
+    right = fit_specimen(measured(true, rng), NOMINAL)
+    wrong = fit_specimen(measured(true, rng, gain=1.2), NOMINAL)
+    assert wrong.reduced_chi_square > 10
+    assert wrong.value(Parameter.F1).sd > 3 * right.value(Parameter.F1).sd
+
+
+def test_it_finds_a_specimen_that_is_far_from_what_the_bench_says():
+    far = with_values(NOMINAL, {name: value * 1.07 for name, value in TRUE.items()})
+    fit = fit_specimen(measured(far, np.random.default_rng(3)), NOMINAL)
+    for name in LINEAR:
+        assert fit.value(name).value == pytest.approx(parameter_value(far, name), abs=4 * fit.value(name).sd)
+    assert fit.reduced_chi_square < 1.5
+
+
+def test_the_gap_cannot_be_told_from_a_transmission(true):
+    clean = measured(true, np.random.default_rng(4))
+    with pytest.raises(InvalidRequest, match="tells any of"):
+        fit_specimen(clean, NOMINAL, (Parameter.GAP,))
+    with pytest.raises(InvalidRequest, match="nothing was to be fitted"):
+        fit_specimen(clean, NOMINAL, ())
+
+
+def test_too_few_lines_are_refused(true):
+    few = measured(true, np.random.default_rng(5), lines_hz=LINES_HZ[:6])
+    with pytest.raises(NotEnoughData, match="6 lines"):
+        fit_specimen(few, NOMINAL)

@@ -1,0 +1,69 @@
+"""`vibench analyse --fit`: the specimen that was measured, with intervals, as JSON and in words."""
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.excitation.multisine_noise import MultisineNoise
+from sim.specimen import gong2025
+
+PLACE = Path(__file__).parents[1] / "analysis" / "synthetic_recordings.py"
+DAMPING_S = 3.3e-5
+NOISE = {"band_start_hz": 60.0, "band_stop_hz": 560.0, "repetition_hz": 4.0, "periods": 2}
+
+
+def _synthetic():
+    """The tests are no package: a module of another folder is loaded by its path."""
+    spec = importlib.util.spec_from_file_location("synthetic_recordings", PLACE)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules.setdefault(spec.name, module)
+    spec.loader.exec_module(module)
+    return module
+
+
+synthetic = _synthetic()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """One recording of weak noise, of a specimen with more damping than the bench says."""
+    place, rng = tmp_path_factory.mktemp("fit"), np.random.default_rng(4)
+    lines = np.arange(NOISE["band_start_hz"], NOISE["band_stop_hz"] + 1, NOISE["repetition_hz"])
+    motions = [synthetic.multisine(2.5, lines, 1e-9, number) for number in range(2)]
+    velocities = [synthetic.response_of(each, specimen=gong2025(DAMPING_S))[0] for each in motions]
+    base = synthetic.Motion(
+        np.concatenate([each.displacement_m for each in motions]),
+        np.concatenate([each.acceleration for each in motions]),
+    )
+    velocity = np.concatenate(velocities)
+    parts = [
+        synthetic.Part("realisation", 3.0 * number + 2.0, 3.0 * number + 2.5, {"realisation": number})
+        for number in range(2)
+    ]
+    plan = MultisineNoise(amplitude_vpp=0.05, realisations=2, settle_s=2.0, **NOISE)
+    noisy = velocity + 2e-7 * rng.standard_normal(velocity.size)
+    synthetic.write_recording(place, plan, base, noisy, parts, name="noise")
+    return place
+
+
+def test_the_fit_stands_in_the_json_with_its_interval_and_what_it_could_not_tell(vibench, folder):
+    result = vibench("analyse", folder, "--fit", "--no-simulate", "--json", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    fit = json.loads(result.stdout)["specimen_fit"]
+    damping = fit["values"]["damping_time_s"]
+    assert damping["value"] == pytest.approx(DAMPING_S, rel=0.03)
+    assert damping["low"] < damping["value"] < damping["high"] < 2 * damping["bench"]
+    assert damping["bench"] == pytest.approx(2e-5)
+    assert "gap_m" not in fit["values"]
+    assert any("gap stays as the bench says" in each for each in fit["not_told"])
+
+
+def test_the_fit_is_said_in_words(vibench, folder, tmp_path):
+    result = vibench("analyse", folder, "--fit", "--no-simulate", "--out", tmp_path / "report", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    assert "Fitted c / k = 3" in result.stdout
+    assert "the bench says 20 µs" in result.stdout
