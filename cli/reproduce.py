@@ -1,16 +1,23 @@
 """`vibench reproduce`: every claim of the paper that can be measured, with a verdict."""
 
+import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.table import Table
 
+from analysis.figures.damping_score import damping_score_figure
+from analysis.figures.drawn import ImageKind
+from analysis.figures.paper.fig03_levels import levels_figure
 from analysis.figures.paper.options import FigureOptions, FrequencyGrid
+from analysis.reproduction.case import AS_CHOSEN, Case
 from analysis.reproduction.catalogue import SECTIONS
-from analysis.reproduction.document import Reproduction, reproduction_document, verdict_text
+from analysis.reproduction.document import Picture, Reproduction, reproduction_document, verdict_text
 from analysis.reproduction.evidence import Evidence
 from analysis.reproduction.reproduce import reproduction
+from analysis.reproduction.studies import levels_asked
 from sim.accuracy import Accuracy
 
 from .kept_study import kept_study
@@ -18,6 +25,7 @@ from .output import console
 from .study import Workers
 
 PAGE = "reproduction.md"
+IMAGES = "images"
 
 
 def reproduce(
@@ -40,12 +48,23 @@ def reproduce(
     """Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped."""
     options = FigureOptions(damping_time_s=damping_time, accuracy=accuracy, grid=grid)
     evidence = Evidence(lambda study: kept_study(study, out / "studies", workers))
-    found = reproduction(SECTIONS, evidence, options)
+    found = reproduction(SECTIONS, evidence, options, lambda step: console.print(f"measuring {step}"))
     page = out / PAGE if markdown is None else markdown
     page.parent.mkdir(parents=True, exist_ok=True)
-    page.write_text(reproduction_document(found), encoding="utf-8")
+    pictures = tuple(_pictures(found, evidence, options, page))
+    page.write_text(reproduction_document(found, pictures), encoding="utf-8")
     _tell(found)
     console.print(f"The page: [bold]{page.resolve()}[/]")
+
+
+def _pictures(
+    found: Reproduction, evidence: Evidence, options: FigureOptions, page: Path
+) -> Iterator[Picture]:
+    """Draw what the page shows into a folder beside it."""
+    curves = evidence.study(levels_asked(Case(AS_CHOSEN, options)))
+    for drawn in (damping_score_figure(found.scores), levels_figure(options, curves)):
+        image = drawn.save(page.parent / IMAGES, (ImageKind.PNG,))[0]
+        yield Picture(drawn.title, Path(os.path.relpath(image, page.parent)).as_posix())
 
 
 def _tell(found: Reproduction) -> None:

@@ -12,13 +12,16 @@ from ..prediction import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
 from .case import Case
 from .claim import Claim
 from .curve_peaks import curve_peaks, nearest, two_highest
+from .dampings import DAMPINGS
 from .evidence import Evidence
 from .expectation import about, at_least, at_most
 from .studies import CONTINUOUS, STRONG_M, WEAK_M, level
 
 AGREES = 0.1
 """Relative: the paper's own measure of similar (its eq. 6) is looser."""
-_MOST = 0.8
+_MOST, _MAJORITY = 0.8, 0.5
+_SMOOTH_PROMINENCE = 1.1
+"""Of a peak of a curve without chaos."""
 _GRID_HZ, _ROUGH_HZ = 5.0, 10.0
 
 
@@ -49,12 +52,16 @@ def _lowest(solutions: tuple[Reals, ...]) -> Reals:
     return np.array([float(np.min(each)) if each.size else np.nan for each in solutions])
 
 
-def _weak(evidence: Evidence, case: Case) -> tuple[float, ...]:
+def _weak_balance(evidence: Evidence, case: Case) -> tuple[float, ...]:
     frequency_hz = np.asarray(case.options.frequencies_hz)
-    by_balance = curve_peaks(frequency_hz, _lowest(balanced(evidence, case, WEAK_M)))
-    integrated = level(evidence, case, WEAK_M, CONTINUOUS).response_i
-    both = (by_balance, curve_peaks(frequency_hz, integrated))
-    return tuple(each for found in both for each in nearest(found, PAPER_RESONANCES_HZ))
+    lowest = _lowest(balanced(evidence, case, WEAK_M))
+    return nearest(curve_peaks(frequency_hz, lowest, _SMOOTH_PROMINENCE), PAPER_RESONANCES_HZ)
+
+
+def _weak_response(evidence: Evidence, case: Case) -> tuple[float, ...]:
+    curve = level(evidence, case, WEAK_M, CONTINUOUS)
+    found = curve_peaks(curve.frequency_hz, curve.response_i, _SMOOTH_PROMINENCE)
+    return nearest(found, PAPER_RESONANCES_HZ)
 
 
 def _strong(evidence: Evidence, case: Case) -> tuple[float, ...]:
@@ -80,21 +87,31 @@ def _is_near(solutions: Reals, response: float) -> bool:
     return bool(np.any(np.abs(solutions / response - 1.0) <= AGREES))
 
 
+_AT_RESONANCES = tuple(about(f"peak at {each:g} Hz", "Hz", each, _GRID_HZ) for each in PAPER_RESONANCES_HZ)
+_BENT = "The force of n = 5 acts at every p, so that a resonance at which p nears the gap is bent upwards."
 _NO_THIRD = at_most("next peak over the second", "", 0.5)
 
 
 BALANCE_CLAIMS = (
     Claim(
-        key="continuous-weak",
+        key="continuous-weak-balance",
         place="section 3.2, Fig. 6(a)",
-        says="At 1 µm both the analytical response of n = 5 and its Response I have the three resonances.",
-        measured_by="Peaks of the lowest stable first-order solution and of Response I on the grid.",
-        wanted=tuple(
-            about(f"{what} at {each:g} Hz", "Hz", each, _GRID_HZ)
-            for what in ("balance", "Response I")
-            for each in PAPER_RESONANCES_HZ
-        ),
-        measure=_weak,
+        says="At 1 µm the analytical response of n = 5 has the three resonances, 95, 266 and 500 Hz.",
+        measured_by="Peaks of the lowest stable first-order solution on the grid, nearest to each.",
+        wanted=_AT_RESONANCES,
+        measure=_weak_balance,
+        alternatives=DAMPINGS,
+        remark=_BENT,
+        is_scored=False,
+    ),
+    Claim(
+        key="continuous-weak-i",
+        place="section 3.2, Fig. 6(a)",
+        says="So has its Response I.",
+        measured_by="Peaks of Response I of n = 5 at 1 µm on the grid, nearest to each.",
+        wanted=_AT_RESONANCES,
+        measure=_weak_response,
+        remark=_BENT,
         is_scored=False,
     ),
     Claim(
@@ -126,8 +143,8 @@ BALANCE_CLAIMS = (
         key="balance-strong",
         place="section 3.2, Fig. 6(d)",
         says="At 50 µm the analytical solution predicts Response I's major behaviour.",
-        measured_by="Share of the frequencies at which a stable solution lies within 10 %.",
-        wanted=(at_least("Response I", "%", _MOST), at_least("Response II", "%", _MOST)),
+        measured_by="Share of the frequencies at which a stable solution lies within 10 %: most of them.",
+        wanted=(at_least("Response I", "%", _MAJORITY), at_least("Response II", "%", _MAJORITY)),
         measure=lambda evidence, case: _agreeing(evidence, case, STRONG_M),
         is_scored=False,
     ),

@@ -8,6 +8,7 @@ from ..similarity import LogarithmOf
 
 SWEEP_AMPLITUDE_M = 5e-6
 """Base amplitude of the sweep of Fig. 13(d): the one that the paper sets beside 1.5 V."""
+EQUAL_PARTS = "power:3+5+7"
 AS_CHOSEN = "the defaults"
 
 
@@ -18,6 +19,8 @@ class Case:
     name: str
     options: FigureOptions
     sweep_amplitude_m: float = SWEEP_AMPLITUDE_M
+    sum_model: str = EQUAL_PARTS
+    """The model n = 3+5+7, and how its terms share the force."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,13 @@ def damping(damping_time_s: float) -> Alternative:
     return Alternative(
         f"c = {damping_time_s:.3g} s · k",
         lambda case: replace(case, options=replace(case.options, damping_time_s=damping_time_s)),
+    )
+
+
+def gapped(gap_m: float) -> Alternative:
+    """Change the clearance; the paper's has a tolerance of 15 um."""
+    return Alternative(
+        f"gap {1e6 * gap_m:g} µm", lambda case: replace(case, options=replace(case.options, gap_m=gap_m))
     )
 
 
@@ -61,3 +71,8 @@ def swept_at(amplitude_m: float) -> Alternative:
     return Alternative(
         f"sweep of {1e6 * amplitude_m:g} µm", lambda case: replace(case, sweep_amplitude_m=amplitude_m)
     )
+
+
+def summed(model: str) -> Alternative:
+    """Change how the three terms of the sum share the force."""
+    return Alternative(f"the sum as {model}", lambda case: replace(case, sum_model=model))

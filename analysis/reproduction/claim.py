@@ -40,6 +40,8 @@ class Claim:
     measure: Measure
     alternatives: tuple[Alternative, ...] = ()
     """Options tried where the defaults do not uphold it, in this order."""
+    remark: str = ""
+    """What a reader should know where it does not hold; without numbers, which the page measures."""
     is_scored: bool = True
     """Whether it is measured again at every damping of the score; not where that would take too long."""
 

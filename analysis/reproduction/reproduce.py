@@ -1,4 +1,4 @@
-"""Judge all claims and say what they were judged on."""
+"""Judge all claims, at the defaults and over the dampings, and say what they were judged on."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -12,13 +12,15 @@ from .case import AS_CHOSEN, Case
 from .claim import Claim, judged
 from .document import Reproduction
 from .evidence import Evidence
+from .page_tables import rates_table, regions_table
+from .score import scores
 
 _MINUTE_S = 60.0
 Told = Callable[[str], None]
-"""Told the key of the claim that comes next."""
+"""Told what is measured next."""
 
 
-def ignore_claims(key: str) -> None:
+def ignore_steps(step: str) -> None:
     """Watch nothing."""
 
 
@@ -26,18 +28,26 @@ def reproduction(
     sections: Mapping[str, tuple[Claim, ...]],
     evidence: Evidence,
     options: FigureOptions,
-    on_claim: Told = ignore_claims,
+    on_step: Told = ignore_steps,
 ) -> Reproduction:
-    """Judge every claim under the options given, and where it fails under its alternatives."""
+    """Judge every claim under the options given, under its alternatives where it fails, and by damping."""
     case = Case(AS_CHOSEN, options)
     judgements = {}
     for heading, claims in sections.items():
         found = []
         for claim in claims:
-            on_claim(claim.key)
+            on_step(claim.key)
             found.append(judged(claim, evidence, case))
         judgements[heading] = tuple(found)
-    return Reproduction(judgements, options.sentence.replace("Options:", "Defaults:"), _made_with(evidence))
+    on_step("score by damping")
+    by_damping = scores([claim for claims in sections.values() for claim in claims], evidence, case)
+    return Reproduction(
+        sections=judgements,
+        scores=by_damping,
+        tables=(regions_table(evidence, case), rates_table(evidence, case)),
+        options=options.sentence.replace("Options:", "Defaults:"),
+        made_with=_made_with(evidence),
+    )
 
 
 def _made_with(evidence: Evidence) -> str:

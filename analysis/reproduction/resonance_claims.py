@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from sim.scene import Observable
+
 from ..figures.paper.fig11_clearance import GAPS_M, clearance_studies
 from ..figures.paper.responses import responses
 from ..prediction import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
@@ -11,8 +13,9 @@ from .curve_peaks import bound_peaks, curve_peaks, linear_peaks, nearest, two_hi
 from .dampings import DAMPINGS
 from .evidence import Evidence
 from .expectation import Expectation, about, at_most
-from .studies import STRONG_M, WEAK_M, level, specimen_under
+from .studies import PIECE_WISE, STRONG_M, WEAK_M, level, model_study, specimen_under
 
+_STRONGER_M = 100e-6
 _WHOLE_HZ = 1.0
 """The paper gives whole hertz."""
 
@@ -45,6 +48,11 @@ def _weak_apart(evidence: Evidence, case: Case) -> tuple[float, ...]:
 def _strong(evidence: Evidence, case: Case, what: str) -> tuple[float, ...]:
     curve = level(evidence, case, STRONG_M)
     return two_highest(curve.frequency_hz, getattr(curve, what))
+
+
+def _stronger_still(evidence: Evidence, case: Case) -> tuple[float, ...]:
+    curve = responses(evidence.study(model_study(case, PIECE_WISE, (_STRONGER_M,), (Observable.RESPONSE,))))
+    return two_highest(curve.frequency_hz, curve.response_ii)
 
 
 def _suppressed(evidence: Evidence, case: Case) -> tuple[float, ...]:
@@ -135,6 +143,15 @@ RESONANCE_CLAIMS = (
         wanted=(*_within_a_step(_GRID_HZ, PAPER_TERMINAL_RESONANCES_HZ, "peak"), _NO_THIRD),
         measure=lambda evidence, case: _strong(evidence, case, "response_ii"),
         alternatives=DAMPINGS,
+    ),
+    Claim(
+        key="terminal-stay",
+        place="section 3.1",
+        says="At larger amplitudes these two resonances stay where they are.",
+        measured_by="The two highest peaks of Response II at 100 µm, and how high the next one is.",
+        wanted=(*_within_a_step(_GRID_HZ, PAPER_TERMINAL_RESONANCES_HZ, "peak"), _NO_THIRD),
+        measure=_stronger_still,
+        is_scored=False,
     ),
     Claim(
         key="any-gap-i",

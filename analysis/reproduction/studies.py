@@ -24,8 +24,12 @@ def specimen_under(case: Case) -> Specimen:
 
 def level(evidence: Evidence, case: Case, amplitude_m: float, model: str = PIECE_WISE) -> Responses:
     """Give the curves of a model at one of the paper's amplitudes."""
-    asked = model_study(case, model, AMPLITUDES_M, with_exponents(model))
-    return responses(evidence.study(asked), amplitude=amplitude_m)
+    return responses(evidence.study(levels_asked(case, model)), amplitude=amplitude_m)
+
+
+def levels_asked(case: Case, model: str = PIECE_WISE) -> Study:
+    """Give the study of a model at all four amplitudes."""
+    return model_study(case, model, AMPLITUDES_M, with_exponents(model))
 
 
 def with_exponents(model: str) -> tuple[Kept, ...]:
