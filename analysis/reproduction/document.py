@@ -11,7 +11,7 @@ HEAD = "| claim | where | measured | wanted | verdict |"
 _RULE = "|---|---|---|---|---|"
 _PIPE = "&#124;"
 """A bar inside of a cell."""
-COMMAND = "vibench reproduce --markdown docs/reproduction.md"
+COMMAND = "vibench reproduce --out DIR --markdown docs/reproduction.md"
 
 
 @dataclass(frozen=True)

@@ -90,8 +90,8 @@ def score_table(scores: Sequence[DampingScore]) -> PageTable:
     best = ", ".join(f"{each.damping_time_s:.3g} s" for each in scores if len(each.held) == most)
     return PageTable(
         "Score by damping",
-        f"The paper's c = 0.01 k, read in SI units, would make the damping ratios {_listed(ratios)}: no "
-        "resonance at 266 or 500 Hz were left. Read in mm, g and ms it is 1e-05 s. Of the claims that are "
+        f"The paper's c = 0.01 k, read in SI units, would make the damping ratios {_listed(ratios)}; "
+        "above 1 a mode does not oscillate. Read in mm, g and ms it is 1e-05 s. Of the claims that are "
         f"measured at every damping, most hold at {best}.",
         ("c / k", "hold", "largest exponent at 1 µm [1/s]", "at 5 µm [1/s]", "do not hold"),
         tuple(

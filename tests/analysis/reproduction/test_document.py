@@ -9,9 +9,12 @@ from analysis.figures.paper.options import FigureOptions
 from analysis.reproduction.case import AS_CHOSEN, Case, damping
 from analysis.reproduction.catalogue import CLAIMS, SECTIONS
 from analysis.reproduction.claim import Claim, Verdict, judged
-from analysis.reproduction.document import HEAD, Reproduction, reproduction_document, wanted_text
+from analysis.reproduction.dampings import SCORED_S
+from analysis.reproduction.document import HEAD, Picture, Reproduction, reproduction_document, wanted_text
 from analysis.reproduction.evidence import Evidence
 from analysis.reproduction.expectation import at_least
+from analysis.reproduction.page_tables import PageTable
+from analysis.reproduction.score import DampingScore
 
 PAGE = Path(__file__).parents[3] / "docs" / "reproduction.md"
 CASE = Case(AS_CHOSEN, FigureOptions())
@@ -37,7 +40,16 @@ def found():
         judgement("second", {2e-5: 50.0, 3e-5: 130.0}),
         judgement("third", {2e-5: 50.0, 3e-5: 60.0}),
     )
-    return Reproduction({"Synthetic": judgements}, "Defaults: these.", "Computed by nobody.")
+    return Reproduction(
+        sections={"Synthetic": judgements},
+        scores=(
+            DampingScore(2e-5, ("first",), ("second", "third"), -1.5, 120.0),
+            DampingScore(3e-5, ("first", "second"), ("third",), -2.5, 90.0),
+        ),
+        tables=(PageTable("Regions", "Frequencies.", ("A0", "colliding"), (("1 µm", "nowhere"),)),),
+        options="Defaults: these.",
+        made_with="Computed by nobody.",
+    )
 
 
 def rows(page):
@@ -63,6 +75,24 @@ def test_what_was_tried_is_written_with_its_numbers(found):
     assert "- c = 3e-05 s · k: exponent: 130 1/s (holds)" in page
 
 
+def test_what_differs_from_the_paper_is_said_first_with_the_option_that_would_make_us_meet(found):
+    summary = reproduction_document(found).split("## ")[0]
+    assert "**first**" not in summary
+    assert (
+        "- **second**: It is so with second. We find exponent: 50 1/s; wanted ≥ 100 1/s. We meet" in summary
+    )
+    assert "under c = 3e-05 s · k: exponent: 130 1/s." in summary
+    assert "None of 1 options tried would make us meet." in summary
+
+
+def test_the_score_names_the_damping_at_which_most_claims_hold_and_what_does_not(found):
+    page = reproduction_document(found, (Picture("A figure", "images/it.png"),))
+    assert "most hold at 3e-05 s." in page
+    assert "| 2e-05 s | 1 of 3 | -1.5 | 120 | second, third |" in page
+    assert "| A0 | colliding |\n|---|---|\n| 1 µm | nowhere |" in page
+    assert page.endswith("![A figure](images/it.png)\n")
+
+
 def test_every_claim_has_a_key_of_its_own():
     assert len({claim.key for claim in CLAIMS}) == len(CLAIMS)
 
@@ -78,3 +108,18 @@ def test_the_page_in_docs_has_the_claims_columns_and_bounds_of_this_code():
         assert f"| {wanted_text(claim)} |" in row
         assert all(f"{each.name}: ".replace("|", "&#124;") in row for each in claim.wanted)
         assert f"- **{claim.key}**: {claim.measured_by}" in page
+
+
+def test_the_page_in_docs_scores_the_dampings_of_this_code_and_shows_its_figures():
+    page = PAGE.read_text(encoding="utf-8")
+    scored = [float(each) for each in re.findall(r"^\| (\S+) s \| \d+ of \d+ \|", page, re.MULTILINE)]
+    assert scored == list(SCORED_S)
+    asked = sum(claim.is_scored for claim in CLAIMS)
+    assert page.count(f" of {asked} |") == len(SCORED_S)
+    pictures = re.findall(r"^!\[.*\]\((.*)\)$", page, re.MULTILINE)
+    assert pictures
+    assert all((PAGE.parent / each).is_file() for each in pictures)
+    counts = [
+        int(each) for each in re.findall(r"^(?:Of \d+ claims )?(\d+) (?:hold )?under", page, re.MULTILINE)
+    ]
+    assert sum(counts) == len(CLAIMS)
