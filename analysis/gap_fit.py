@@ -15,6 +15,7 @@ from .confidence import DEFAULT_CONFIDENCE
 from .errors import NotEnoughData
 from .measurement_analysis import SweepAnalysis
 from .specimen_fit import FittedValue, Parameter, SpecimenFit, parameter_value, with_values
+from .sweep import SweepResponse
 
 _RELATIVE = 3
 """Column of p in `base_transmissibility`."""
@@ -23,6 +24,9 @@ _STEP_HZ = 0.02
 _STEP = 1e-4
 """Of a logarithm, for how the relative motion depends on the linear parameters."""
 _EDGE_POINTS = 41
+_APPROACH_S = 1.0
+_LEAST_INTERVALS = 3
+"""For a line through A0 with something left to judge it by."""
 
 
 @dataclass(frozen=True)
@@ -88,31 +92,50 @@ def onsets(
 ) -> Iterator[Onset]:
     """Give every onset of a sweep with the gap that it implies."""
     reach = float(norm.ppf(0.5 + 0.5 * confidence))
+    rate = sweep.response.sweep_rate_hz_per_s
     for region in sweep.collisions.regions:
         if region.reaches_start:
             continue
         edge = region.start
+        drive = _approach(sweep.response, edge)
         near = np.linspace(edge.lower_hz, edge.upper_hz, _EDGE_POINTS)
-        filled = _relative_amplitude(sweep, linear, near)
+        filled = drive.at(near) * np.abs(swept_relative(linear, near, rate))
         at_edge = np.array([edge.frequency_hz])
-        spread = reach * np.hypot(_drive_spread(sweep, edge), _linear_spread(sweep, linear, fit, at_edge))
+        spread = reach * np.hypot(drive.relative_sd, _linear_spread(linear, fit, at_edge, rate))
         yield Onset(
             recording=sweep.facts.name,
             frequency_hz=edge.frequency_hz,
-            gap_m=float(_relative_amplitude(sweep, linear, at_edge)[0]),
+            gap_m=float(drive.at(at_edge)[0] * np.abs(swept_relative(linear, at_edge, rate))[0]),
             low_m=float(np.min(filled) * np.exp(-spread)),
             high_m=float(np.max(filled) * np.exp(spread)),
         )
 
 
-def _relative_amplitude(sweep: SweepAnalysis, linear: Specimen, frequency_hz: Reals) -> Reals:
-    """Amplitude of p without contact at frequencies of a sweep [m]."""
-    measured = sweep.response
-    rising = np.argsort(measured.frequency_hz)
-    amplitude_m = np.interp(frequency_hz, measured.frequency_hz[rising], measured.drive_amplitude_m[rising])
-    return np.asarray(
-        amplitude_m * np.abs(swept_relative(linear, frequency_hz, measured.sweep_rate_hz_per_s))
-    )
+@dataclass(frozen=True)
+class _Approach:
+    """A0 on the way to an onset, as a line over frequency: what collides pushes the base off its course."""
+
+    slope: float
+    offset_m: float
+    relative_sd: float
+
+    def at(self, frequency_hz: Reals) -> Reals:
+        return np.asarray(self.offset_m + self.slope * frequency_hz)
+
+
+def _approach(measured: SweepResponse, edge: Edge) -> _Approach:
+    """Take A0 from the last intervals before an onset, the very last one left out."""
+    last = int(np.argmin(np.abs(measured.time_s - edge.time_s))) - 1
+    first = max(0, last - round(_APPROACH_S / measured.interval_s))
+    if last - first < _LEAST_INTERVALS:
+        raise NotEnoughData(
+            f"the sweep begins {max(last, 0)} intervals before it collides, and A0 there needs "
+            f"{_LEAST_INTERVALS}; begin the sweep further away"
+        )
+    before = slice(first, last)
+    slope, offset = np.polyfit(measured.frequency_hz[before], measured.drive_amplitude_m[before], 1)
+    typical = float(np.median(measured.sd_drive_amplitude_m[before] / measured.drive_amplitude_m[before]))
+    return _Approach(float(slope), float(offset), typical)
 
 
 def swept_relative(specimen: Specimen, frequency_hz: Reals, rate_hz_per_s: float) -> Complexes:
@@ -129,13 +152,7 @@ def swept_relative(specimen: Specimen, frequency_hz: Reals, rate_hz_per_s: float
     return np.asarray(at(0.0) - 1j / (4.0 * np.pi) * rate_hz_per_s * curvature)
 
 
-def _drive_spread(sweep: SweepAnalysis, edge: Edge) -> float:
-    """Relative standard deviation of A0 at an edge."""
-    place = int(np.argmin(np.abs(sweep.response.frequency_hz - edge.frequency_hz)))
-    return float(sweep.response.sd_drive_amplitude_m[place] / sweep.response.drive_amplitude_m[place])
-
-
-def _linear_spread(sweep: SweepAnalysis, linear: Specimen, fit: SpecimenFit | None, at_hz: Reals) -> float:
+def _linear_spread(linear: Specimen, fit: SpecimenFit | None, at_hz: Reals, rate_hz_per_s: float) -> float:
     """Relative standard deviation of the relative amplitude that the linear fit's covariance leaves."""
     if fit is None:
         return 0.0
@@ -143,9 +160,13 @@ def _linear_spread(sweep: SweepAnalysis, linear: Specimen, fit: SpecimenFit | No
     for each in fit.values:
         value = parameter_value(linear, each.parameter)
         shifted = [
-            _relative_amplitude(sweep, with_values(linear, {each.parameter: value * np.exp(step)}), at_hz)[0]
+            abs(
+                swept_relative(
+                    with_values(linear, {each.parameter: value * np.exp(step)}), at_hz, rate_hz_per_s
+                )
+            )
             for step in (_STEP, -_STEP)
         ]
-        slopes.append(np.log(shifted[0] / shifted[1]) / (2.0 * _STEP))
+        slopes.append(float(np.log(shifted[0] / shifted[1])[0]) / (2.0 * _STEP))
     gradient = np.array(slopes)
     return float(np.sqrt(gradient @ fit.covariance @ gradient))

@@ -1,5 +1,6 @@
 """The specimen that is really on the shaker, from the recordings of one campaign."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -71,10 +72,12 @@ class ShakenSpecimen:
 
 def _said(found: FittedValue) -> str:
     name, scale, unit = _SHOWN[found.parameter]
-    return (
-        f"Fitted {name} = {scale * found.value:.4g} {unit} ({scale * found.low:.4g} to "
-        f"{scale * found.high:.4g} {unit}, 95 %); the bench says {scale * found.nominal:.4g} {unit}."
+    # Two digits of the interval, so that it is an interval on paper too.
+    digits = max(0, 1 - math.floor(math.log10(scale * (found.high - found.low))))
+    value, low, high, nominal = (
+        f"{scale * each:.{digits}f}" for each in (found.value, found.low, found.high, found.nominal)
     )
+    return f"Fitted {name} = {value} {unit} ({low} to {high} {unit}, 95 %); the bench says {nominal} {unit}."
 
 
 def shaken_specimen(results: CampaignResults) -> ShakenSpecimen:

@@ -19,6 +19,9 @@ from .results import Transmission
 
 LEAST_RELATIVE_SD = 1e-4
 """No line counts for more than this scatter says: calibrations and clocks are no better."""
+CHANNEL_PHASES = 2
+PHASE_AT_HZ = 100.0
+"""Where the phases of the channels are named."""
 POOR = 3.0
 """A reduced chi square above which other beginnings are tried."""
 SCALES = (0.9, 0.95, 1.05, 1.1)
@@ -71,6 +74,8 @@ class SpecimenFit:
     reduced_chi_square: float
     """Squared residual over what the measured scatter explains: 1 for a model that leaves nothing."""
     confidence: float
+    phase_rad: tuple[float, float]
+    """What the channels add to the phase at 100 Hz: a high pass (falling as 1 / f), and a delay (as f)."""
 
     def value(self, parameter: Parameter) -> FittedValue:
         """Give one fitted value; InvalidRequest when it was not fitted."""
@@ -122,8 +127,10 @@ def fit_specimen(
     """Fit the linear specimen to a transmission of base to m0 that was measured without collisions.
 
     Least squares of ln(measured / model), magnitude and phase, each over its measured standard deviation,
-    in the logarithms of the parameters. The covariance is Gauss-Newton's, made larger by the reduced chi
-    square where the model leaves more than the scatter explains.
+    in the logarithms of the parameters. The phase may also differ by a high pass of one channel and a delay
+    (a / f and b f), which a calibration of magnitudes does not see; they are fitted beside.
+    The covariance is Gauss-Newton's, made larger by the reduced chi square where the model leaves more than
+    the scatter explains.
 
     Parameters
     ----------
@@ -141,7 +148,7 @@ def fit_specimen(
     InvalidRequest
         When nothing is free, or the gap is, which no linear transmission tells.
     NotEnoughData
-        When fewer significant lines than twice the parameters are left.
+        When fewer significant lines than twice what is fitted are left.
 
     """
     free = tuple(free)
@@ -152,10 +159,10 @@ def fit_specimen(
         )
     used = transmission.is_significant & np.isfinite(transmission.relative_sd_magnitude)
     count = int(np.count_nonzero(used))
-    if count < 2 * len(free):
+    if count < 2 * (len(free) + CHANNEL_PHASES):
         raise NotEnoughData(
             f"{count} lines of the transmission stand above their uncertainty, and {len(free)} parameters "
-            f"need {2 * len(free)}; measure longer or with more drive"
+            f"need {2 * (len(free) + CHANNEL_PHASES)}; measure longer or with more drive"
         )
     frequency_hz, measured = transmission.frequency_hz[used], transmission.value[used]
     weights = 1.0 / np.concatenate(
@@ -164,34 +171,44 @@ def fit_specimen(
             np.maximum(transmission.sd_phase_rad[used], LEAST_RELATIVE_SD),
         ]
     )
-    start = np.log([parameter_value(nominal, each) for each in free])
+    phases = np.stack([PHASE_AT_HZ / frequency_hz, frequency_hz / PHASE_AT_HZ])
+    start = np.concatenate(
+        [np.log([parameter_value(nominal, each) for each in free]), np.zeros(CHANNEL_PHASES)]
+    )
 
     def specimen_at(logarithms: Reals) -> Specimen:
         return with_values(nominal, dict(zip(free, np.exp(logarithms).tolist(), strict=True)))
 
     def residuals(logarithms: Reals) -> Reals:
-        model = base_transmissibility(specimen_at(logarithms), frequency_hz)[:, 0]
+        model = base_transmissibility(specimen_at(logarithms[: len(free)]), frequency_hz)[:, 0]
         apart = np.log(measured / model)
-        return np.asarray(weights * np.concatenate([apart.real, apart.imag]))
+        channels = logarithms[len(free) :] @ phases
+        return np.asarray(weights * np.concatenate([apart.real, apart.imag - channels]))
 
-    freedom = 2 * count - len(free)
+    freedom = 2 * count - start.size
     found = _descended(residuals, start)
     if 2.0 * found.cost > POOR * freedom:
         # A phase may lie on another branch: begin again from specimens that are stiffer or softer.
-        scaled = [start + np.log(scale) * np.array([each in LINEAR[1:] for each in free]) for scale in SCALES]
+        is_frequency = np.array([*(each in LINEAR[1:] for each in free), *np.zeros(CHANNEL_PHASES, bool)])
+        scaled = [start + np.log(scale) * is_frequency for scale in SCALES]
         found = min([found, *(_descended(residuals, each) for each in scaled)], key=lambda each: each.cost)
     chi_square = float(2.0 * found.cost / freedom)
     slopes = np.asarray(found.jac, dtype=np.float64)
-    covariance = np.asarray(np.linalg.inv(slopes.T @ slopes) * max(1.0, chi_square))
+    covariance = np.asarray(np.linalg.inv(slopes.T @ slopes) * max(1.0, chi_square))[: len(free), : len(free)]
     return SpecimenFit(
-        specimen=specimen_at(found.x),
+        specimen=specimen_at(found.x[: len(free)]),
         values=_values(
-            free, nominal, found.x, covariance, float(student.ppf(0.5 + 0.5 * confidence, freedom))
+            free,
+            nominal,
+            found.x[: len(free)],
+            covariance,
+            float(student.ppf(0.5 + 0.5 * confidence, freedom)),
         ),
         covariance=covariance,
         lines=count,
         reduced_chi_square=chi_square,
         confidence=confidence,
+        phase_rad=(float(found.x[-2]), float(found.x[-1])),
     )
 
 

@@ -1,6 +1,7 @@
 """A fit finds the specimen that was measured, and its intervals hold it as often as they say."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -81,6 +82,16 @@ def test_the_intervals_hold_the_truth_as_often_as_they_say_and_are_no_wider_than
             value, abs=4 * scatter / math.sqrt(draws)
         )
     assert np.mean([fit.reduced_chi_square for fit in fits]) == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_high_pass_and_a_delay_of_a_channel_move_nothing(true):
+    clean = measured(true, np.random.default_rng(6), sd=1e-3)
+    turned = 0.5 / LINES_HZ + 2 * np.pi * LINES_HZ * 20e-6
+    fit = fit_specimen(replace(clean, value=clean.value * np.exp(1j * turned)), NOMINAL)
+    for name, value in TRUE.items():
+        assert fit.value(name).value == pytest.approx(value, abs=4 * fit.value(name).sd)
+    assert fit.phase_rad == pytest.approx((0.5 / 100.0, 2 * np.pi * 100.0 * 20e-6), abs=3e-4)
+    assert fit.reduced_chi_square < 1.5
 
 
 def test_what_is_not_free_stays_as_the_bench_says(true):
