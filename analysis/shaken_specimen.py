@@ -1,6 +1,7 @@
 """The specimen that is really on the shaker, from the recordings of one campaign."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 from sim.specimen import Specimen
 
 from .campaign_results import CampaignResults
+from .dwell_bracket import bracketed_gap
 from .errors import AnalysisError, NotEnoughData
 from .gap_fit import fit_gap
 from .recording_facts import specimen_of
@@ -81,7 +83,7 @@ def _said(found: FittedValue) -> str:
 
 
 def shaken_specimen(results: CampaignResults) -> ShakenSpecimen:
-    """Fit damping and frequencies to the weakest noise, and the gap to where a sweep begins to collide.
+    """Fit damping and frequencies to the weakest noise, and the gap to where sweeps or dwells collide.
 
     Parameters
     ----------
@@ -92,7 +94,7 @@ def shaken_specimen(results: CampaignResults) -> ShakenSpecimen:
     Raises
     ------
     NotEnoughData
-        When neither could be fitted: no noise, and no sweep that enters a colliding region.
+        When neither could be fitted: no noise, and no sweep or pair of dwells that tells the gap.
 
     """
     if not results.results:
@@ -134,8 +136,20 @@ def _linear(
 def _gap(
     results: CampaignResults, model: Specimen, linear: SpecimenFit | None, not_told: list[str]
 ) -> FittedValue | None:
-    try:
-        return fit_gap([each.analysis for each in results.sweeps], model, linear)
-    except AnalysisError as error:
-        not_told.append(f"The gap stays as the bench says: {error}.")
+    """Give the narrower of what sweeps and dwells tell."""
+    sweeps, dwells = [each.analysis for each in results.sweeps], [each.analysis for each in results.dwells]
+    ways: tuple[Callable[[], FittedValue], ...] = (
+        lambda: fit_gap(sweeps, model, linear),
+        lambda: bracketed_gap(dwells, model),
+    )
+    found: list[FittedValue] = []
+    why: list[str] = []
+    for tell in ways:
+        try:
+            found.append(tell())
+        except NotEnoughData as error:
+            why.append(str(error))
+    if not found:
+        not_told.append(f"The gap stays as the bench says: {'; '.join(why)}.")
         return None
+    return min(found, key=lambda each: each.high / each.low)

@@ -1,6 +1,7 @@
 """Another specimen than the bench says is found again from its recordings, and then lies on them."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import synthetic_recordings as synthetic
 from acquisition.excitation.multisine_noise import MultisineNoise
 from acquisition.excitation.sine_sweep import SineSweep
 from analysis.campaign_results import CampaignResults, Simulation, analyse_files
+from analysis.dwell_bracket import bracketed_gap, brackets
 from analysis.errors import NotEnoughData
 from analysis.gap_fit import fit_gap, onsets, swept_relative
 from analysis.shaken_specimen import shaken_specimen
@@ -123,6 +125,32 @@ def test_the_onset_is_where_the_first_impact_was(recorded, measured):
     (onset,) = onsets(measured.sweeps[0].analysis, TRUE)
     assert onset.frequency_hz == pytest.approx(recorded[2], abs=0.6)
     assert onset.low_m <= TRUE.gap_m <= onset.high_m
+
+
+def test_a_base_that_collisions_push_off_its_course_moves_no_gap(measured):
+    sweep = measured.sweeps[0].analysis
+    (before,) = onsets(sweep, TRUE)
+    pushed = np.where(
+        sweep.collisions.is_colliding,
+        1.3 * sweep.response.drive_amplitude_m,
+        sweep.response.drive_amplitude_m,
+    )
+    (after,) = onsets(replace(sweep, response=replace(sweep.response, drive_amplitude_m=pushed)), TRUE)
+    assert (after.low_m, after.gap_m, after.high_m) == (before.low_m, before.gap_m, before.high_m)
+
+
+def test_dwells_below_and_above_the_onset_bracket_the_gap(dwell_file):
+    results = analyse_files([dwell_file("weak"), dwell_file("strong")], "dwells", Simulation.LEFT_OUT)
+    dwells = [each.analysis for each in results.dwells]
+    (bracket,) = brackets(dwells, gong2025())
+    assert bracket.low_m < 45e-6 < bracket.high_m
+    assert bracket.high_m / bracket.low_m == pytest.approx(10.0, rel=1e-6)
+    found = shaken_specimen(results)
+    assert [(each.parameter, each.low, each.high) for each in found.values] == [
+        (Parameter.GAP, bracket.low_m, bracket.high_m)
+    ]
+    with pytest.raises(NotEnoughData, match="one below and one above"):
+        bracketed_gap(dwells[:1], gong2025())
 
 
 def test_a_swept_response_lags_by_what_its_rate_says():
