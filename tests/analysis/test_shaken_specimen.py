@@ -13,6 +13,7 @@ from analysis.campaign_results import CampaignResults, Simulation, analyse_files
 from analysis.dwell_bracket import bracketed_gap, brackets
 from analysis.errors import NotEnoughData
 from analysis.gap_fit import fit_gap, onsets, swept_relative
+from analysis.report.findings import findings
 from analysis.shaken_specimen import shaken_specimen
 from analysis.specimen_fit import LINEAR, Parameter, parameter_value, with_values
 from sim.drive import Sampled
@@ -96,6 +97,12 @@ def test_every_parameter_lies_within_its_interval_and_the_bench_does_not(shaken)
         assert not each.low <= each.nominal <= each.high, each
     assert shaken.not_told == ()
     assert 0.3 < shaken.reduced_chi_square < 3
+
+
+def test_the_report_says_what_was_fitted_and_what_the_bench_says(measured, shaken):
+    said = list(findings(replace(measured, model_said=shaken.sentences)))
+    assert said[: len(shaken.sentences)] == list(shaken.sentences)
+    assert [each for each in said if each.startswith("Fitted gap = 5") and "the bench says 45" in each]
 
 
 def test_the_intervals_are_useful(shaken):
