@@ -10,7 +10,8 @@ from sim.specimen import Specimen
 
 from .errors import NotEnoughData
 from .measurement_analysis import DwellAnalysis
-from .specimen_fit import FittedValue, Parameter
+from .specimen_fit import FittedValue
+from .specimen_parameters import Parameter
 
 CALM, COLLIDING = 1.01, 1.05
 """Response I over Response II: 1 for a sine; between the two nothing is said."""

@@ -14,7 +14,8 @@ from .collision_region import Edge
 from .confidence import DEFAULT_CONFIDENCE
 from .errors import NotEnoughData
 from .measurement_analysis import SweepAnalysis
-from .specimen_fit import FittedValue, Parameter, SpecimenFit, parameter_value, with_values
+from .specimen_fit import FittedValue, SpecimenFit
+from .specimen_parameters import Parameter, parameter_value, with_values
 from .sweep import SweepResponse
 
 _RELATIVE = 3

@@ -14,7 +14,8 @@ from .dwell_bracket import bracketed_gap
 from .errors import AnalysisError, NotEnoughData
 from .gap_fit import fit_gap
 from .recording_facts import specimen_of
-from .specimen_fit import FittedValue, Parameter, SpecimenFit, fit_specimen, with_values
+from .specimen_fit import FittedValue, SpecimenFit, fit_specimen
+from .specimen_parameters import Parameter, with_values
 
 _SHOWN = {
     Parameter.DAMPING_TIME: ("c / k", 1e6, "µs"),

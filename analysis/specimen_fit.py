@@ -1,9 +1,7 @@
 """The specimen that is really on the shaker: damping and frequencies fitted to a measured transmission."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from enum import StrEnum
-from typing import assert_never
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
@@ -12,10 +10,11 @@ from scipy.stats import t as student
 from sim.modes import base_transmissibility
 from sim.specimen import Specimen
 
-from .arrays import Reals
+from .arrays import Complexes, Reals
 from .confidence import DEFAULT_CONFIDENCE
 from .errors import InvalidRequest, NotEnoughData
 from .results import Transmission
+from .specimen_parameters import LINEAR, Parameter, parameter_value, with_values
 
 LEAST_RELATIVE_SD = 1e-4
 """No line counts for more than this scatter says: calibrations and clocks are no better."""
@@ -28,22 +27,6 @@ SCALES = (0.9, 0.95, 1.05, 1.1)
 """Of all frequencies."""
 _STEP = 1e-6
 """Of a logarithm, for a central difference: far above rounding, and far less than a resonance is wide."""
-
-
-class Parameter(StrEnum):
-    """What of a specimen is fitted."""
-
-    DAMPING_TIME = "damping_time_s"
-    """c_i / k_i, one for all links."""
-    F0 = "f0_hz"
-    F1 = "f1_hz"
-    F2 = "f2_hz"
-    """Frequencies of the single oscillators, f_i = sqrt(k_i / m_i) / 2 pi."""
-    GAP = "gap_m"
-
-
-LINEAR = (Parameter.DAMPING_TIME, Parameter.F0, Parameter.F1, Parameter.F2)
-"""What a transmission without collisions tells."""
 
 
 @dataclass(frozen=True)
@@ -86,38 +69,6 @@ class SpecimenFit:
         raise InvalidRequest(f"{parameter.value} was not fitted; there are {names}")
 
 
-def parameter_value(specimen: Specimen, parameter: Parameter) -> float:
-    """Read one parameter of a specimen; the damping time of a specimen with several is that of link 0."""
-    masses, stiffnesses = specimen.masses, specimen.stiffnesses
-    match parameter:
-        case Parameter.DAMPING_TIME:
-            return specimen.dampings[0] / stiffnesses[0]
-        case Parameter.F0 | Parameter.F1 | Parameter.F2:
-            link = LINEAR.index(parameter) - 1
-            return float(np.sqrt(stiffnesses[link] / masses[link]) / (2.0 * np.pi))
-        case Parameter.GAP:
-            return specimen.gap_m
-        case _:
-            assert_never(parameter)
-
-
-def with_values(specimen: Specimen, values: Mapping[Parameter, float]) -> Specimen:
-    """Give a specimen other parameters; the masses stay, and dampings follow their stiffnesses."""
-    beta = values.get(Parameter.DAMPING_TIME, parameter_value(specimen, Parameter.DAMPING_TIME))
-    stiffnesses = tuple(
-        mass * (2.0 * np.pi * values.get(name, parameter_value(specimen, name))) ** 2
-        for mass, name in zip(specimen.masses, LINEAR[1:], strict=True)
-    )
-    k0, k1, k2 = (float(each) for each in stiffnesses)
-    gap_m = values.get(Parameter.GAP, specimen.gap_m)
-    return replace(
-        specimen,
-        stiffnesses=(k0, k1, k2),
-        dampings=(beta * k0, beta * k1, beta * k2),
-        gap_m=gap_m,
-    )
-
-
 def fit_specimen(
     transmission: Transmission,
     nominal: Specimen,
@@ -157,58 +108,80 @@ def fit_specimen(
             f"{', '.join(free) or 'nothing'} was to be fitted to a transmission; it tells any of "
             f"{', '.join(LINEAR)}"
         )
-    used = transmission.is_significant & np.isfinite(transmission.relative_sd_magnitude)
-    count = int(np.count_nonzero(used))
-    if count < 2 * (len(free) + CHANNEL_PHASES):
-        raise NotEnoughData(
-            f"{count} lines of the transmission stand above their uncertainty, and {len(free)} parameters "
-            f"need {2 * (len(free) + CHANNEL_PHASES)}; measure longer or with more drive"
-        )
-    frequency_hz, measured = transmission.frequency_hz[used], transmission.value[used]
-    weights = 1.0 / np.concatenate(
-        [
-            np.maximum(transmission.relative_sd_magnitude[used], LEAST_RELATIVE_SD),
-            np.maximum(transmission.sd_phase_rad[used], LEAST_RELATIVE_SD),
-        ]
-    )
-    phases = np.stack([PHASE_AT_HZ / frequency_hz, frequency_hz / PHASE_AT_HZ])
-    start = np.concatenate(
-        [np.log([parameter_value(nominal, each) for each in free]), np.zeros(CHANNEL_PHASES)]
-    )
-
-    def specimen_at(logarithms: Reals) -> Specimen:
-        return with_values(nominal, dict(zip(free, np.exp(logarithms).tolist(), strict=True)))
-
-    def residuals(logarithms: Reals) -> Reals:
-        model = base_transmissibility(specimen_at(logarithms[: len(free)]), frequency_hz)[:, 0]
-        apart = np.log(measured / model)
-        channels = logarithms[len(free) :] @ phases
-        return np.asarray(weights * np.concatenate([apart.real, apart.imag - channels]))
-
-    freedom = 2 * count - start.size
-    found = _descended(residuals, start)
+    lines = _lines(transmission, nominal, free)
+    freedom = 2 * lines.frequency_hz.size - lines.start.size
+    found = _descended(lines.residuals, lines.start)
     if 2.0 * found.cost > POOR * freedom:
         # A phase may lie on another branch: begin again from specimens that are stiffer or softer.
-        is_frequency = np.array([*(each in LINEAR[1:] for each in free), *np.zeros(CHANNEL_PHASES, bool)])
-        scaled = [start + np.log(scale) * is_frequency for scale in SCALES]
-        found = min([found, *(_descended(residuals, each) for each in scaled)], key=lambda each: each.cost)
+        others = [_descended(lines.residuals, lines.start + lines.scaled_by(scale)) for scale in SCALES]
+        found = min([found, *others], key=lambda each: each.cost)
     chi_square = float(2.0 * found.cost / freedom)
     slopes = np.asarray(found.jac, dtype=np.float64)
-    covariance = np.asarray(np.linalg.inv(slopes.T @ slopes) * max(1.0, chi_square))[: len(free), : len(free)]
+    whole = np.asarray(np.linalg.inv(slopes.T @ slopes) * max(1.0, chi_square))
+    logarithms, covariance = found.x[: len(free)], whole[: len(free), : len(free)]
+    reach = float(student.ppf(0.5 + 0.5 * confidence, freedom))
     return SpecimenFit(
-        specimen=specimen_at(found.x[: len(free)]),
-        values=_values(
-            free,
-            nominal,
-            found.x[: len(free)],
-            covariance,
-            float(student.ppf(0.5 + 0.5 * confidence, freedom)),
-        ),
+        specimen=lines.specimen(logarithms),
+        values=_values(free, nominal, logarithms, covariance, reach),
         covariance=covariance,
-        lines=count,
+        lines=lines.frequency_hz.size,
         reduced_chi_square=chi_square,
         confidence=confidence,
         phase_rad=(float(found.x[-2]), float(found.x[-1])),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """The lines that are fitted, and what they are fitted by: logarithms of parameters, then two phases."""
+
+    frequency_hz: Reals
+    measured: Complexes
+    weights: Reals
+    """Of the magnitudes, then of the phases."""
+    nominal: Specimen
+    free: tuple[Parameter, ...]
+
+    @property
+    def start(self) -> Reals:
+        """Where the search begins."""
+        named = np.log([parameter_value(self.nominal, each) for each in self.free])
+        return np.concatenate([named, np.zeros(CHANNEL_PHASES)])
+
+    def scaled_by(self, scale: float) -> Reals:
+        """Give the step that scales all frequencies."""
+        steps = [np.log(scale) if each in LINEAR[1:] else 0.0 for each in self.free]
+        return np.array([*steps, *np.zeros(CHANNEL_PHASES)])
+
+    def specimen(self, logarithms: Reals) -> Specimen:
+        """Give the specimen of these parameters."""
+        return with_values(self.nominal, dict(zip(self.free, np.exp(logarithms).tolist(), strict=True)))
+
+    def residuals(self, at: Reals) -> Reals:
+        """Measured less model in standard deviations, magnitudes and then phases."""
+        model = base_transmissibility(self.specimen(at[: len(self.free)]), self.frequency_hz)[:, 0]
+        apart = np.log(self.measured / model)
+        high_pass, delay = at[len(self.free) :]
+        channels = high_pass * PHASE_AT_HZ / self.frequency_hz + delay * self.frequency_hz / PHASE_AT_HZ
+        return np.asarray(self.weights * np.concatenate([apart.real, apart.imag - channels]))
+
+
+def _lines(transmission: Transmission, nominal: Specimen, free: tuple[Parameter, ...]) -> _Lines:
+    """Take the lines that stand above their uncertainty; NotEnoughData where they are too few."""
+    used = transmission.is_significant & np.isfinite(transmission.relative_sd_magnitude)
+    count, needed = int(np.count_nonzero(used)), 2 * (len(free) + CHANNEL_PHASES)
+    if count < needed:
+        raise NotEnoughData(
+            f"{count} lines of the transmission stand above their uncertainty, and {len(free)} parameters "
+            f"need {needed}; measure longer or with more drive"
+        )
+    spreads = np.concatenate([transmission.relative_sd_magnitude[used], transmission.sd_phase_rad[used]])
+    return _Lines(
+        frequency_hz=transmission.frequency_hz[used],
+        measured=transmission.value[used],
+        weights=1.0 / np.maximum(spreads, LEAST_RELATIVE_SD),
+        nominal=nominal,
+        free=free,
     )
 
 

@@ -15,7 +15,7 @@ from analysis.errors import NotEnoughData
 from analysis.gap_fit import fit_gap, onsets, swept_relative
 from analysis.report.findings import findings
 from analysis.shaken_specimen import shaken_specimen
-from analysis.specimen_fit import LINEAR, Parameter, parameter_value, with_values
+from analysis.specimen_parameters import LINEAR, Parameter, parameter_value, with_values
 from sim.drive import Sampled
 from sim.integrate import integrate
 from sim.modes import base_transmissibility

@@ -9,7 +9,8 @@ import pytest
 from analysis.confidence import student_half_width
 from analysis.errors import InvalidRequest, NotEnoughData
 from analysis.results import Estimator, Transmission, TransmissionSettings
-from analysis.specimen_fit import LINEAR, Parameter, fit_specimen, parameter_value, with_values
+from analysis.specimen_fit import fit_specimen
+from analysis.specimen_parameters import LINEAR, Parameter, parameter_value, with_values
 from sim.modes import base_transmissibility
 from sim.specimen import gong2025
 
