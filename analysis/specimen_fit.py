@@ -18,6 +18,8 @@ from .specimen_parameters import LINEAR, Parameter, parameter_value, with_values
 
 LEAST_RELATIVE_SD = 1e-4
 """No line counts for more than this scatter says: calibrations and clocks are no better."""
+CLOCK_RELATIVE_SD = 25e-6
+"""Converters promise 50 parts in a million or better, which no recording of its own can tell."""
 CHANNEL_PHASES = 2
 PHASE_AT_HZ = 100.0
 """Where the phases of the channels are named."""
@@ -81,7 +83,7 @@ def fit_specimen(
     in the logarithms of the parameters. The phase may also differ by a high pass of one channel and a delay
     (a / f and b f), which a calibration of magnitudes does not see; they are fitted beside.
     The covariance is Gauss-Newton's, made larger by the reduced chi square where the model leaves more than
-    the scatter explains.
+    the scatter explains, and by what the converter's clock may be wrong by.
 
     Parameters
     ----------
@@ -118,7 +120,8 @@ def fit_specimen(
     chi_square = float(2.0 * found.cost / freedom)
     slopes = np.asarray(found.jac, dtype=np.float64)
     whole = np.asarray(np.linalg.inv(slopes.T @ slopes) * max(1.0, chi_square))
-    logarithms, covariance = found.x[: len(free)], whole[: len(free), : len(free)]
+    logarithms = found.x[: len(free)]
+    covariance = whole[: len(free), : len(free)] + _of_the_clock(free)
     reach = float(student.ppf(0.5 + 0.5 * confidence, freedom))
     return SpecimenFit(
         specimen=lines.specimen(logarithms),
@@ -183,6 +186,12 @@ def _lines(transmission: Transmission, nominal: Specimen, free: tuple[Parameter,
         nominal=nominal,
         free=free,
     )
+
+
+def _of_the_clock(free: tuple[Parameter, ...]) -> Reals:
+    """Covariance that a wrong clock makes: it scales all frequencies, and times inversely."""
+    direction = np.array([-1.0 if each is Parameter.DAMPING_TIME else 1.0 for each in free])
+    return CLOCK_RELATIVE_SD**2 * np.outer(direction, direction)
 
 
 def _descended(residuals: Callable[[Reals], Reals], start: Reals) -> OptimizeResult:

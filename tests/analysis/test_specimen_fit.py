@@ -95,6 +95,16 @@ def test_a_high_pass_and_a_delay_of_a_channel_move_nothing(true):
     assert fit.reduced_chi_square < 1.5
 
 
+def test_no_frequency_is_claimed_better_than_the_converters_clock(true):
+    """A clock that runs 40 ppm fast shows all frequencies low by that, and no scatter tells it."""
+    slow = measured(true, np.random.default_rng(7), sd=1e-6)
+    fit = fit_specimen(replace(slow, frequency_hz=LINES_HZ * (1 - 40e-6)), NOMINAL)
+    for name, value in TRUE.items():
+        found = fit.value(name)
+        assert abs(found.value / value - 1) == pytest.approx(40e-6, rel=0.05), name
+        assert found.low <= value <= found.high, name
+
+
 def test_what_is_not_free_stays_as_the_bench_says(true):
     fit = fit_specimen(measured(true, np.random.default_rng(1)), true, (Parameter.DAMPING_TIME,))
     assert [each.parameter for each in fit.values] == [Parameter.DAMPING_TIME]
