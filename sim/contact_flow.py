@@ -53,7 +53,7 @@ LARGEST_SQUARE = 1e300
 """A squared error beyond this is one that no step may have."""
 
 
-@compiled
+@inlined
 def base_force_at(force: Vector, since_middle: float) -> float:
     """Polynomial of degree 7, summed in pairs: the shortest chain of dependent multiplications."""
     u = since_middle
@@ -63,7 +63,7 @@ def base_force_at(force: Vector, since_middle: float) -> float:
     return low + u2 * u2 * high
 
 
-@compiled
+@inlined
 def contact_rates(
     at: Vector, rates: Vector, side: float, force: Vector, middle: float, par: Parameters
 ) -> None:
@@ -80,11 +80,11 @@ def contact_rates(
     pull = par.k2 * (at[3] - at[2]) + par.c2 * (vz - vx)
     drive = base_force_at(force, at[6] - middle) - par.k0 * at[2] - par.c0 * vx
     rates[0] = 0.5 * r
-    rates[1] = w * (side * pull / par.mass2 - pressing / par.reduced_mass)
+    rates[1] = w * (side * pull * par.inverse2 - pressing * par.inverse_pair)
     rates[2] = w * vx
     rates[3] = w * vz
-    rates[4] = w * ((pull + drive) / par.mass0)
-    rates[5] = w * ((side * pressing - pull) / par.mass2)
+    rates[4] = w * ((pull + drive) * par.inverse0)
+    rates[5] = w * ((side * pressing - pull) * par.inverse2)
     rates[6] = w
     rates[7] = 0.0
 
@@ -102,7 +102,7 @@ def motion_rates(
     raise NotImplementedError
 
 
-@overload(motion_rates)
+@overload(motion_rates, jit_options={"forceinline": True})
 def _choose_contact_rates(
     at: Vector, rates: Vector, side: float, force: Vector, middle: float, system: Parameters
 ) -> Callable[..., None] | None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .clock import advance_clock, time_until
-from .compiled import compiled
+from .compiled import compiled, inlined
 from .contact import (
     HELD,
     LEFT,
@@ -104,10 +104,12 @@ def advance_harmonic(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and 
             ends, length = _fly_on(phasors, now, workspace, series, clock, longest, tables)
             if ends == OUT_OF_RANGE:
                 return LOST
-            tally_flight(record.tally, phasors, now, workspace, series, clock, length, tables)
+            if record.tally[MODE] != NOTHING:
+                tally_flight(record.tally, phasors, now, workspace, series, clock, length, tables)
             if has_tangent:
                 carry_through_flight(record.tangent, length, tables)
-            _sample_flight(phasors, now, clock, length, tables, record)
+            if counts[NEXT_SAMPLE] < len(record.samples):
+                _sample_flight(phasors, now, clock, length, tables, record)
             turn_phasors(now, phasors, length, clock, tables)
             place_on_phasors(state, now, tables)
             if ends == CLEAR:
@@ -153,7 +155,8 @@ def advance_harmonic(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and 
                 tally_contact(record.tally, log, clock, tables)
             if has_tangent:
                 carry_through_steps(record.tangent, log, tables.par, tables.power, memory)
-            _sample_contact(shadow, clock, length, force, middle, tables, tolerance, work, record)
+            if counts[NEXT_SAMPLE] < len(record.samples):
+                _sample_contact(shadow, clock, length, force, middle, tables, tolerance, work, record)
             if length >= longest:
                 clock[0], clock[1] = until, 0.0
             else:
@@ -170,7 +173,7 @@ def _log_for(record: Record) -> Table:
     return np.zeros((LOG_ROWS if record.tally[MODE] != NOTHING else 0, LOG_COLUMNS))
 
 
-@compiled
+@inlined
 def _fly_on(
     phasors: Complex,
     now: Complex,
@@ -215,7 +218,7 @@ def _stay_held(
     return ends, length
 
 
-@compiled
+@inlined
 def _fill_base_force(force: Vector, clock: Vector, middle: float, tables: FlightTables) -> None:
     """Taylor coefficients of the base force about clock time plus ``middle``."""
     term = tables.force * drive_phasor(clock, middle, tables)

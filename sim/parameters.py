@@ -29,6 +29,8 @@ STEP = 9
 in time [s]."""
 ROOT_SCALE, RATE_SCALE = 10, 11
 """In contact: how large w and r will become, the measure of their errors."""
+PACE = 12
+"""In contact: w over r, as large as they will become: the time scale of the collision, in s [s/m^0.5]."""
 CLOSED = 11
 """Under rigid stops: how far from one m1 counts as touching it [m], from the rounding of the last flight."""
 SCALES = 12
@@ -60,6 +62,12 @@ class Parameters(NamedTuple):
     """The same at positive p."""
     reduced_mass: float
     """m1 m2 / (m1 + m2): the mass that a collision of the two feels."""
+    inverse0: float
+    """1 / m0; a division keeps a contact waiting longer than all its other sums."""
+    inverse2: float
+    """1 / m2."""
+    inverse_pair: float
+    """1 / reduced mass."""
     law: int
     """YIELDING, RIGID or POWER."""
     linear_stiffness: float
@@ -89,7 +97,10 @@ def parameters(specimen: Specimen) -> Parameters:
     k0, k1, k2 = (float(stiffness) for stiffness in specimen.stiffnesses)
     c0, c1, c2 = (float(damping) for damping in specimen.dampings)
     pair = m1 * m2 / (m1 + m2)
-    return Parameters(m0, m1, m2, k0, k1, k2, c0, c1, c2, float(lower), float(upper), pair, *stops)
+    in0, in2, in_pair = 1.0 / m0, 1.0 / m2, 1.0 / pair
+    return Parameters(
+        m0, m1, m2, k0, k1, k2, c0, c1, c2, float(lower), float(upper), pair, in0, in2, in_pair, *stops
+    )
 
 
 def _stops(specimen: Specimen) -> Stops:

@@ -69,11 +69,11 @@ def power_rates(
     pull = par.k2 * (at[3] - at[2]) + par.c2 * (vz - vx)
     drive = base_force_at(force, at[6] - middle) - par.k0 * at[2] - par.c0 * vx
     rates[0] = rate
-    rates[1] = pull / par.mass2 - pressing / par.reduced_mass
+    rates[1] = pull * par.inverse2 - pressing * par.inverse_pair
     rates[2] = vx
     rates[3] = vz
-    rates[4] = (pull + drive) / par.mass0
-    rates[5] = (pressing - pull) / par.mass2
+    rates[4] = (pull + drive) * par.inverse0
+    rates[5] = (pressing - pull) * par.inverse2
     rates[6] = 1.0
     # Nobody's rate: p itself, for who carries a small change along.
     rates[7] = p

@@ -1,8 +1,8 @@
 """A motion followed for a given time and observed at its end, or until it has settled. SI units.
 
 It is looked at once a drive period. Where it has not begun to repeat by the time that it should have
-forgotten its start, a small change is carried along from then on and extremes are kept block by block: a
-motion that never repeats is known only by its growth and its statistics.
+forgotten its start, a small change is carried along and extremes are kept block by block: a motion that
+never repeats is known only by its growth and its statistics.
 """
 
 from collections.abc import Sequence
@@ -16,8 +16,8 @@ from ..outcome import Outcome
 from ..prediction import MotionKind
 from ..specimen import Specimen
 from ..trajectory import Floats
-from .followed_run import FollowedRun, Stretch, Watch
-from .observed_window import BLOCKS, ObservedWindow, follow_strobed, states_of, watch_window
+from .followed_run import FollowedRun, Stretch
+from .observed_window import ObservedWindow, follow_strobed, states_of, watch_window
 from .repetition import Growth, Repetition, Sharpness, kind_of, repetition, section_needed
 
 FORGETTING = 8.0
@@ -97,16 +97,11 @@ class SceneRun:
 
 def run_for(run: FollowedRun, duration_s: float, window_s: float, pace: Pace) -> SceneRun:
     """Follow a motion that is at time zero for a while, and observe the last ``window_s`` of it."""
-    early_s = duration_s - window_s
-    last = _last_section(run, min(early_s, pace.attractor_s), pace)
-    blocks: list[Stretch] = []
+    last = _last_section(run, duration_s - window_s, pace)
     if pace.repeats([last]) is None:
         run.carry_tangent()
-        blocks = _follow_blocks(run, early_s, window_s / BLOCKS)
-    else:
-        last = _last_section(run, early_s, pace)
     window = watch_window(run, window_s)
-    return judged(run, window, [last, *blocks], pace, f"the {duration_s:g} s asked for are over")
+    return judged(run, window, [last], pace, f"the {duration_s:g} s asked for are over")
 
 
 def judged(
@@ -143,11 +138,3 @@ def _last_section(run: FollowedRun, until_s: float, pace: Pace) -> Stretch:
     """Advance to an instant; the states of the last periods are kept."""
     run.follow(max(run.time_s, until_s - pace.section_s))
     return follow_strobed(run, until_s)
-
-
-def _follow_blocks(run: FollowedRun, until_s: float, block_s: float) -> list[Stretch]:
-    """Advance to an instant in whole blocks that end there, after what is left over."""
-    count = int((until_s - run.time_s) / block_s)
-    rest = follow_strobed(run, until_s - count * block_s)
-    edges = (until_s - k * block_s for k in range(count - 1, -1, -1))
-    return [rest, *(follow_strobed(run, edge, Watch.PEAKS) for edge in edges)]

@@ -1,7 +1,7 @@
 """A motion under a harmonic drive, followed stretch by stretch, each watched in its own way. SI units."""
 
 import math
-from copy import deepcopy
+from copy import copy
 from dataclasses import dataclass
 from enum import Enum
 from typing import Self
@@ -110,9 +110,16 @@ class FollowedRun:
         """X, y, z, vx, vy, vz now, shape (6,)."""
         return self._state[: len(self._scales)].copy()
 
-    def copy(self) -> Self:
-        """Give the same motion, to be followed apart from this one."""
-        return deepcopy(self)
+    def apart(self, tolerance: float | None = None) -> Self:
+        """Give the same motion, to be followed apart from this one, at a tolerance of its own if need be."""
+        twin = copy(self)
+        twin.__dict__.update(
+            _state=self._state.copy(),
+            _clock=self._clock.copy(),
+            _tangent=no_tangent() if tolerance is not None else self._tangent.copy(),
+            _tolerance=self._tolerance if tolerance is None else tolerance,
+        )
+        return twin
 
     def carry_tangent(self) -> None:
         """Carry a small change along from now on, in no special direction."""

@@ -5,14 +5,10 @@ One that repeats is followed until both have forgotten where they began: their r
 error itself. One that never repeats forgets nothing but itself; what counts is what each drive period adds.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..accuracy import Accuracy
-from ..drive import Harmonic
 from ..outcome import Outcome
-from ..specimen import Specimen
 from ..trajectory import Floats
 from .followed_run import FollowedRun, Watch
 
@@ -26,43 +22,27 @@ LOOKS = 8
 """Periods of it, or drive periods of a motion that does not repeat, that are compared."""
 
 
-@dataclass(frozen=True, eq=False)
-class RunEnd:
-    """Where a run ended, and how it may go on."""
-
-    specimen: Specimen
-    drive: Harmonic
-    accuracy: Accuracy
-    state: Floats
-    """Shape (6,)."""
-    time_s: float
-
-    def go_on(self, tolerance: float, state: Floats, time_s: float) -> FollowedRun:
-        """Follow the motion from a state at an instant."""
-        return FollowedRun(self.specimen, self.drive, tolerance, state, time_s)
-
-
-def error_of_repeating(end: RunEnd, period: int, forgetting_s: float) -> float:
+def error_of_repeating(run: FollowedRun, accuracy: Accuracy, period: int, forgetting_s: float) -> float:
     """Relative error of the responses of a motion that repeats, the largest of the four; NaN if lost."""
-    cycle_s = period / end.drive.frequency_hz
+    cycle_s = period / run.drive.frequency_hz
     wait_s = cycle_s * np.ceil(FORGETTING * forgetting_s / cycle_s)
     found = []
-    for tolerance in _tolerances(end.accuracy):
-        run = end.go_on(tolerance, end.state, end.time_s)
-        run.follow(end.time_s + wait_s)
-        found.append(_responses(run, LOOKS * cycle_s))
+    for tolerance in _tolerances(accuracy):
+        twin = run.apart(tolerance)
+        twin.follow(run.time_s + wait_s)
+        found.append(_responses(twin, LOOKS * cycle_s))
     return float(np.max(np.abs(found[0] - found[1]) / np.abs(found[1])))
 
 
-def error_per_period(end: RunEnd) -> float:
+def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
     """Relative error that a drive period adds to a motion's responses, the largest seen; NaN if lost."""
-    loose, strict = _tolerances(end.accuracy)
-    cycle_s = 1.0 / end.drive.frequency_hz
-    run = end.go_on(loose, end.state, end.time_s)
+    loose, strict = _tolerances(accuracy)
+    cycle_s = 1.0 / run.drive.frequency_hz
+    on = run.apart(loose)
     seen, missed = [], []
     for _ in range(LOOKS):
-        twin = end.go_on(strict, run.state, run.time_s)
-        seen.append(_responses(run, cycle_s))
+        twin = on.apart(strict)
+        seen.append(_responses(on, cycle_s))
         missed.append(np.abs(seen[-1] - _responses(twin, cycle_s)))
     return float(np.max(np.max(missed, axis=0) / np.max(np.abs(seen), axis=0)))
 

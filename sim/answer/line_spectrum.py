@@ -29,7 +29,7 @@ def spectrum_of(window: ObservedWindow) -> LineSpectrum:
 
     Samples change nothing: it is the same motion to the last digit, even in chaos.
     """
-    run, periods = window.begins.copy(), window.line_periods
+    run, periods = window.begins.apart(), window.line_periods
     frequency = run.drive.frequency_hz
     per_period = math.ceil(LEAST_RATE_HZ / frequency)
     rate, count = per_period * frequency, per_period * periods

@@ -9,7 +9,7 @@ import numpy as np
 from ..trajectory import Floats
 from .followed_run import FollowedRun, Samples, Stretch, Watch
 
-BLOCKS = 5
+BLOCKS = 10
 """Parts of a window whose extremes are kept apart: what the scatter of the whole is found from."""
 WHOLE = 1e-9
 """A time this close to a whole number of periods is taken for it."""
@@ -71,7 +71,7 @@ def follow_strobed(run: FollowedRun, until_s: float, watch: Watch = Watch.NOTHIN
 
 def watch_window(run: FollowedRun, window_s: float) -> ObservedWindow:
     """Follow a motion through a window that begins now and holds a drive period or more, and observe it."""
-    begins, start_s, frequency = run.copy(), run.time_s, run.drive.frequency_hz
+    begins, start_s, frequency = run.apart(), run.time_s, run.drive.frequency_hz
     end_s = start_s + window_s
     line_s = max(end_s - whole_periods(window_s, frequency) / frequency, start_s)
     edges = [start_s + window_s * k / BLOCKS for k in range(1, BLOCKS)] + [end_s]

@@ -43,7 +43,7 @@ class WindowScatter:
     def between_runs(self) -> float:
         """Two runs differ by less in 19 cases of 20, if the extremes were normal: sqrt(2) deviations of
         Student's t for so many blocks. Measured in seven chaotic regimes of five laws at three durations, 40
-        runs each: 89 to 99.7 % of the pairs.
+        runs each: 85 to 99.7 % of the pairs.
         """
         return math.sqrt(2.0) * float(stdtrit(self.blocks - 1, COVERED)) * self.relative
 

@@ -60,7 +60,7 @@ def run_until_settled(run: FollowedRun, window_s: float, longest_s: float, pace:
             continue
         if not late:
             run.carry_tangent()
-        starts.append(run.copy())
+        starts.append(run.apart())
         late.append(follow_strobed(run, end_s, Watch.PEAKS_AND_LINES))
     before = late or early
     return _observed(run, before, starts, in_window, pace, f"it has not settled within {longest_s:g} s")
@@ -75,7 +75,7 @@ def _slices(window_s: float, frequency_hz: float) -> tuple[int, int]:
 
 def _observe_period(run: FollowedRun, repeats: Repetition, pace: Pace) -> SceneRun:
     """Observe one period of a motion that repeats."""
-    settled_s, begins = run.time_s, run.copy()
+    settled_s, begins = run.time_s, run.apart()
     end_s = settled_s + repeats.period / pace.frequency_hz
     one = follow_strobed(run, end_s, Watch.PEAKS_AND_LINES)
     window = window_of(begins, [one], [one.peak_x_m])

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..accuracy import Accuracy
 from ..lyapunov import LyapunovEstimate, Precision, largest_exponent
 from ..outcome import Outcome
 from ..prediction import Method, MotionKind, Prediction, State
@@ -12,7 +13,7 @@ from ..scene import AutomaticDuration, FixedDuration, Observable, Scene
 from ..trajectory import Floats
 from .fixed_run import Pace, SceneRun, pace_of, run_for
 from .followed_run import FollowedRun
-from .integration_error import RunEnd, error_of_repeating, error_per_period
+from .integration_error import error_of_repeating, error_per_period
 from .line_spectrum import spectrum_of
 from .linear_motion import LinearMotion, linear_motion
 from .observed_window import states_of, whole_periods
@@ -104,12 +105,11 @@ def _followed(scene: Scene, method: Method, motion: LinearMotion) -> Prediction:
     tolerance = scene.accuracy.tolerance
     run = FollowedRun(scene.specimen, scene.drive, tolerance, scene.start.state)
     seen, pace = _seen(scene, run, motion)
-    end = RunEnd(scene.specimen, scene.drive, scene.accuracy, run.state, run.time_s)
     window, amplitude = seen.window, scene.drive.amplitude_m
     is_whole = run.outcome is Outcome.REACHED_END
-    error = _integration_error(seen, end, pace) if is_whole else None
+    error = _integration_error(scene.accuracy, seen, run, pace) if is_whole else None
     drawn = _between_windows(seen) if is_whole else None
-    exponent = _exponent(scene, end) if is_whole and Observable.LYAPUNOV in scene.observe else None
+    exponent = _exponent(scene, run) if is_whole and Observable.LYAPUNOV in scene.observe else None
     found = Prediction(
         frequency_hz=scene.drive.frequency_hz,
         amplitude_m=amplitude,
@@ -155,11 +155,11 @@ def _seen(scene: Scene, run: FollowedRun, motion: LinearMotion) -> tuple[SceneRu
             return run_until_settled(run, window_s, longest_s, pace), pace
 
 
-def _integration_error(seen: SceneRun, end: RunEnd, pace: Pace) -> float | None:
+def _integration_error(accuracy: Accuracy, seen: SceneRun, run: FollowedRun, pace: Pace) -> float | None:
     """Measure the error of the steps; None where the comparison was lost."""
     if seen.repeats is None:
-        return _known(error_per_period(end))
-    return _known(error_of_repeating(end, seen.repeats.period, pace.forgetting_s))
+        return _known(error_per_period(run, accuracy))
+    return _known(error_of_repeating(run, accuracy, seen.repeats.period, pace.forgetting_s))
 
 
 def _between_windows(seen: SceneRun) -> WindowScatter | None:
@@ -192,11 +192,11 @@ def _error_estimate(seen: SceneRun, error: float | None, drawn: WindowScatter | 
     return None if drawn is None else drawn.between_runs + SAFETY * error
 
 
-def _exponent(scene: Scene, end: RunEnd) -> LyapunovEstimate:
+def _exponent(scene: Scene, run: FollowedRun) -> LyapunovEstimate:
     """Find the largest exponent of the motion that a run has come to."""
     drive = scene.drive
     phase = math.fmod(
-        2.0 * math.pi * math.fmod(drive.frequency_hz * end.time_s, 1.0) + drive.phase_rad, 2.0 * math.pi
+        2.0 * math.pi * math.fmod(drive.frequency_hz * run.time_s, 1.0) + drive.phase_rad, 2.0 * math.pi
     )
     return largest_exponent(
         scene.specimen,
@@ -204,7 +204,7 @@ def _exponent(scene: Scene, end: RunEnd) -> LyapunovEstimate:
         scene.accuracy,
         EXPONENT_S,
         0.0,
-        end.state,
+        run.state,
         precision=EXPONENT_PRECISION,
     )
 

@@ -22,7 +22,6 @@ from ..contact import (
     ROOT_FLOOR,
     SLOWEST_TOUCH,
     STALLED,
-    STANDARD_TOLERANCE,
     step_factor,
 )
 from ..contact_flow import R, W, step_error
@@ -49,6 +48,9 @@ from .cell_flow import (
     stop_step,
 )
 from .cell_power import power_cell_rates, power_cell_step, short_of_the_wall
+
+FIRST_STEP_TOLERANCE = 1e-6
+"""The tolerance for which a contact's first step is tuned; it scales with the eighth root."""
 
 
 @compiled
@@ -98,7 +100,7 @@ def begin_pressing(
     linear = law.linear_stiffness * markov[1]
     speed = math.sqrt(rate * rate + hertz * root**5 + linear * root**4)
     deepest = min((speed * speed / hertz) ** 0.2, math.sqrt(speed / math.sqrt(linear)))
-    tuned = min(1.0, (tolerance / STANDARD_TOLERANCE) ** 0.125)
+    tuned = min(1.0, (tolerance / FIRST_STEP_TOLERANCE) ** 0.125)
     cell[SIDE], cell[ROOT], cell[RATE] = side, root, rate
     cell[ROOT_SCALE], cell[RATE_SCALE] = deepest + ROOT_FLOOR, speed + RATE_FLOOR
     cell[STEP] = tuned * min(4.8 * deepest / speed / 5.0, 0.7 / math.sqrt(0.5 * abs(acceleration) + 1e-300))

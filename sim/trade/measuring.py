@@ -13,14 +13,15 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from ..accuracy import Accuracy
+from ..independent_solution import independent_state, state_error
 from ..integrate import integrate
 from ..lyapunov import largest_exponent
+from ..plain_equations import Place, law_of, numbers_of, rates_at
 from ..poincare import smallest_period, state_scales, stroboscopic_section
 from ..response import steady_response
 from ..study.software import software
 from ..trajectory import Floats
-from .figures import STATE_UNITS, LevelFigures, MotionTrade, SolverFigures, Trade
-from .independent import independent_state, plain_rates
+from .figures import LevelFigures, MotionTrade, SolverFigures, Trade
 from .regimes import MOTIONS, Motion, Regime
 
 LEVELS = tuple(Accuracy)
@@ -31,7 +32,7 @@ SETTLE_S = 8.0
 """Thirty times the slowest decay of the specimen without contact."""
 PERIODS_SEEN = 100
 REPEATS = 3
-TIMED_S = 2.0
+TIMED_S = 10.0
 RESPONSE_S, WINDOW_S = 3.0, 2.0
 STARTS = 8
 EXPONENT_S = 10.0
@@ -95,11 +96,6 @@ def settled_state(motion: Motion) -> Floats:
     if (period is None) != (motion.regime is Regime.CHAOTIC):
         raise ArithmeticError(f"{motion.name} is called {motion.regime.value}, but its period is {period}")
     return np.asarray(section[-1])
-
-
-def state_error(state: Floats, truth: Floats) -> float:
-    """Largest difference of two states in units of 100 um and 0.1 m/s."""
-    return float(np.max(np.abs(state - truth) / np.repeat(STATE_UNITS, 3)))
 
 
 def _whole(span_s: float, motion: Motion) -> float:
@@ -174,7 +170,8 @@ def _level(
 def _solver(
     name: Solver, motion: Motion, start: Floats, span_s: float, truth: Floats | None
 ) -> SolverFigures:
-    rates = plain_rates(motion.specimen, motion.drive)
+    rates = rates_at(Place.ANYWHERE, law_of(motion.specimen), numbers_of(motion.specimen, motion.drive))
+    rates(0.0, start)
     ends: list[Floats] = []
 
     def run() -> None:

@@ -17,7 +17,7 @@ RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
 PERIODIC = [
     ("hertz", 130.0, 20e-6),
     ("hertz", 94.0, 5e-6),
-    ("hertz", 238.0, 5e-6),
+    ("hertz", 225.0, 5e-6),
     ("linear_gap", 130.0, 20e-6),
     ("rigid:0.8", 130.0, 20e-6),
     ("power:3", 200.0, 5e-6),

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from sim.accuracy import Accuracy
+from sim.independent_solution import independent_state
 from sim.integrate import integrate
 from sim.modes import modal_form
-from sim.trade.independent import independent_state
 from sim.trade.measuring import SOLVERS, Thoroughness, measured_motion, settled_state, state_error
 from sim.trade.regimes import MOTIONS, Motion, Regime
 

@@ -1,0 +1,356 @@
+"""Work against precision: this engine and general solvers on the same motions, in one run.
+
+``python benchmarks/work_precision.py --markdown docs/speed.md``; peers: ``pip install -e '.[peers]'``
+(numbalsoda is built from source and wants a Fortran compiler). A peer that is not installed is left out,
+and the page says so.
+
+Every solver begins in the same settled state and runs for the same time; its error is the distance of its
+end from the independent solution's. Costs are processor time over simulated time, least of several, with
+everything made beforehand that depends on the specimen alone. Peers are given the plain equations: scipy
+with a compiled right-hand side; numbalsoda's LSODA and DOP853 wholly compiled; heyoka's Taylor method with
+terminal events at the stops, because its series must not meet a kink.
+"""
+
+import argparse
+import importlib.util
+import math
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from sim.accuracy import Accuracy
+from sim.answer.followed_run import FollowedRun
+from sim.contact_law import PowerLaw
+from sim.independent_solution import independent_state, state_error
+from sim.plain_equations import Place, law_of, numbers_of, rates_at
+from sim.study.software import software
+from sim.trade.measuring import settled_state
+from sim.trade.regimes import MOTIONS, Regime
+
+PERIODIC_S, CHAOTIC_S = 0.2, 0.03
+"""Chaos of 112 per second makes e^3 of an error in 0.03 s: still the error of the solver."""
+REPEATS = 5
+TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
+LOWEST_M = 1e-13
+"""Absolute tolerance over the relative one, for solvers that want one."""
+HAIR_M = 1e-11
+"""heyoka's series of depth^1.5 has no radius at depth zero: stops begin this much deeper for it."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """One solver at one tolerance."""
+
+    solver: str
+    tolerance: float
+    cost: float
+    """Processor time over simulated time."""
+    error: float
+    """Of the state, in units of 100 um and 0.1 m/s."""
+
+
+def main():
+    """Measure, print, and write the page where it is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--markdown", type=Path, help="write the tables to this page, the figure beside it")
+    arguments = parser.parse_args()
+    parts, curves = [], {}
+    for motion in MOTIONS:
+        if motion.regime is Regime.FREE:
+            continue
+        works = measured(motion)
+        curves[motion.name] = works
+        parts.append(table_of(motion, works))
+        print(parts[-1], flush=True)
+    if arguments.markdown:
+        write_page(arguments.markdown, parts, curves)
+
+
+def measured(motion):
+    """Run every solver on a motion at every tolerance."""
+    span_s = CHAOTIC_S if motion.regime is Regime.CHAOTIC else PERIODIC_S
+    span_s = round(span_s * motion.frequency_hz) / motion.frequency_hz
+    start = settled_state(motion)
+    truth = independent_state(motion.specimen, motion.drive, span_s, start)
+    works = []
+    for name, prepare in solvers_of(motion):
+        for tolerance in [level.tolerance for level in Accuracy] if name == OURS else TOLERANCES:
+            found = timed(prepare, tolerance, start, span_s)
+            if found is not None:
+                cost, state = found
+                works.append(Work(name, tolerance, cost / span_s, state_error(state, truth)))
+    return works
+
+
+def timed(prepare, tolerance, start, span_s):
+    """Least processor time of a run, and its end; None where the solver gave up."""
+    best, end = math.inf, None
+    spent = 0.0
+    for _ in range(REPEATS):
+        job = prepare(tolerance, start, span_s)
+        before = time.thread_time()
+        end = job()
+        taken = time.thread_time() - before
+        best, spent = min(best, taken), spent + taken
+        if end is None or not np.all(np.isfinite(end)):
+            return None
+        if spent > 2.0:
+            break
+    return best, np.asarray(end)
+
+
+OURS = "vibench"
+
+
+def solvers_of(motion):
+    """Give every solver's name, and what prepares a run of it."""
+    yield OURS, lambda tolerance, start, span_s: ours(motion, tolerance, start, span_s)
+    for method in ("DOP853", "LSODA"):
+        yield f"scipy {method}", lambda *run, m=method: with_scipy(motion, m, *run)
+    if importlib.util.find_spec("numbalsoda"):
+        for method in ("lsoda", "dop853"):
+            yield f"numbalsoda {method}", lambda *run, m=method: with_numbalsoda(motion, m, *run)
+    if importlib.util.find_spec("heyoka"):
+        yield "heyoka", lambda *run: with_heyoka(motion, *run)
+
+
+def ours(motion, tolerance, start, span_s):
+    """Run the engine."""
+    run = FollowedRun(motion.specimen, motion.drive, tolerance, start)
+
+    def job():
+        run.follow(span_s)
+        return run.state
+
+    return job
+
+
+def with_scipy(motion, method, tolerance, start, span_s):
+    """Run solve_ivp of scipy."""
+    rates = rates_at(Place.ANYWHERE, law_of(motion.specimen), numbers_of(motion.specimen, motion.drive))
+    rates(0.0, start)
+
+    def job():
+        found = solve_ivp(
+            rates,
+            (0.0, span_s),
+            start,
+            method=method,
+            rtol=tolerance,
+            atol=tolerance * LOWEST_M,
+            t_eval=[span_s],
+        )
+        return found.y[:, -1] if found.success else None
+
+    return job
+
+
+_numbalsoda_address = []
+
+
+def plain_function():
+    """Give the address of the plain equations as numbalsoda calls them; compiled once."""
+    if not _numbalsoda_address:
+        from numba import cfunc  # noqa: PLC0415 - only where the peer is there
+        from numbalsoda import lsoda_sig  # noqa: PLC0415
+
+        @cfunc(lsoda_sig)
+        def rates(t, u, du, q):
+            """Masses, stiffnesses, dampings; amplitude, omega; gap, stiffness, exponent; n, force, p_ref."""
+            x, y, z, vx, vy, vz = u[0], u[1], u[2], u[3], u[4], u[5]
+            base, base_rate = q[9] * np.sin(q[10] * t), q[9] * q[10] * np.cos(q[10] * t)
+            p = y - z
+            push = 0.0
+            if q[12] > 0.0 and abs(p) > q[11]:
+                push = math.copysign(q[12] * (abs(p) - q[11]) ** q[13], p)
+            if q[15] > 0.0:
+                push += q[15] * (p / q[16]) ** int(q[14])
+            inner = q[4] * p + q[7] * (vy - vz) + push
+            outer = q[5] * (z - x) + q[8] * (vz - vx)
+            du[0], du[1], du[2] = vx, vy, vz
+            du[3] = (outer + q[3] * (base - x) + q[6] * (base_rate - vx)) / q[0]
+            du[4] = -inner / q[1]
+            du[5] = (inner - outer) / q[2]
+
+        _numbalsoda_address.append(rates)
+    return _numbalsoda_address[0].address
+
+
+def constants_of(motion):
+    """All numbers of the plain equations in the order of `plain_function`."""
+    specimen, drive, law = motion.specimen, motion.drive, law_of(motion.specimen)
+    power, force, reference = 0.0, 0.0, 1.0
+    if isinstance(specimen.contact, PowerLaw):
+        ((power, force),) = specimen.contact.terms
+        reference = specimen.contact.reference
+    linear = [*specimen.masses, *specimen.stiffnesses, *specimen.dampings]
+    driven = [drive.amplitude_m, 2.0 * math.pi * drive.frequency_hz]
+    return np.array(
+        [*linear, *driven, min(specimen.gaps_m), law.stiffness, law.exponent, power, force, reference]
+    )
+
+
+def with_numbalsoda(motion, method, tolerance, start, span_s):
+    """Run LSODA in C++, or DOP853 in Fortran, by numbalsoda."""
+    import numbalsoda  # noqa: PLC0415 - only where the peer is there
+
+    solve, address, constants = getattr(numbalsoda, method), plain_function(), constants_of(motion)
+    times = np.array([0.0, span_s])
+    options = {"rtol": tolerance, "atol": tolerance * LOWEST_M}
+    if method == "lsoda":
+        options["mxstep"] = 10_000_000
+
+    def job():
+        found, success = solve(address, start, times, constants, **options)
+        return found[-1] if success else None
+
+    return job
+
+
+def with_heyoka(motion, tolerance, start, span_s):
+    """Run the Taylor method of heyoka; par[0] is the side whose stop acts."""
+    import heyoka as hy  # noqa: PLC0415 - only where the peer is there
+
+    q = constants_of(motion)
+    (m0, m1, m2), (k0, k1, k2), (c0, c1, c2) = q[0:3], q[3:6], q[6:9]
+    amplitude, omega, gap, stiffness, exponent, power, force, reference = q[9:17]
+    x, y, z, vx, vy, vz = hy.make_vars("x", "y", "z", "vx", "vy", "vz")
+    p, side = y - z, hy.par[0]
+    if force > 0.0:
+        push = force * (p / reference) ** power
+    elif exponent == 1.0:
+        push = stiffness * side * (side * p - gap)
+    else:
+        # Zero to the power of a half has no series: away from the stop the depth is replaced by one.
+        depth = side * side * (side * p - gap) + (1.0 - side * side)
+        push = stiffness * side * depth**exponent
+    inner = k1 * p + c1 * (vy - vz) + push
+    outer = k2 * (z - x) + c2 * (vz - vx)
+    base, base_rate = amplitude * hy.sin(omega * hy.time), amplitude * omega * hy.cos(omega * hy.time)
+    system = [
+        (x, vx),
+        (y, vy),
+        (z, vz),
+        (vx, (outer + k0 * (base - x) + c0 * (base_rate - vx)) / m0),
+        (vy, -inner / m1),
+        (vz, (inner - outer) / m2),
+    ]
+    events = [] if force > 0.0 else heyoka_events(hy, p, gap + (HAIR_M if exponent != 1.0 else 0.0))
+    solver = hy.taylor_adaptive(
+        system, list(start), tol=tolerance, t_events=events, **{} if force > 0.0 else {"pars": [0.0]}
+    )
+    if events and abs(start[1] - start[2]) > gap:
+        solver.pars[0] = math.copysign(1.0, start[1] - start[2])
+
+    def job():
+        outcome = solver.propagate_until(span_s)[0]
+        return solver.state.copy() if outcome == hy.taylor_outcome.time_limit else None
+
+    return job
+
+
+def heyoka_events(hy, p, gap):
+    """One event for each stop and direction, which switches its force on or off and goes on."""
+
+    def switch(side):
+        def callback(solver, _):
+            solver.pars[0] = side
+            return True
+
+        return callback
+
+    direction = hy.event_direction
+    return [
+        hy.t_event(p - gap, callback=switch(1.0), direction=direction.positive),
+        hy.t_event(p - gap, callback=switch(0.0), direction=direction.negative),
+        hy.t_event(p + gap, callback=switch(-1.0), direction=direction.negative),
+        hy.t_event(p + gap, callback=switch(0.0), direction=direction.positive),
+    ]
+
+
+def cost_at(works, error):
+    """Cost of a solver at an error, between its measured points in logarithms; None beyond them."""
+    front, best = [], math.inf
+    for work in sorted(works, key=lambda each: each.error):
+        if work.cost < best:
+            front.append(work)
+            best = work.cost
+    if not front or error < front[0].error:
+        return None
+    errors, costs = ([math.log(getattr(work, name)) for work in front] for name in ("error", "cost"))
+    return math.exp(np.interp(math.log(error), errors, costs))
+
+
+def table_of(motion, works):
+    """Say what every solver costs at the error of our standard level."""
+    standard = next(w for w in works if w.solver == OURS and w.tolerance == Accuracy.STANDARD.tolerance)
+    lines = [
+        f"## {motion.regime.value.capitalize()}: {motion.name}",
+        "",
+        (
+            f"At {Accuracy.STANDARD} accuracy vibench simulates {1.0 / standard.cost:.0f} s per second, "
+            f"with an error of {standard.error:.1e}."
+        ),
+        "",
+        "| solver | time for the same error | at its tolerance of 1e-6: time | error |",
+        "|---|---|---|---|",
+    ]
+    for name in dict.fromkeys(work.solver for work in works if work.solver != OURS):
+        its = [work for work in works if work.solver == name]
+        equal = cost_at(its, standard.error)
+        usual = next((work for work in its if work.tolerance == 1e-6), None)
+        lines.append(
+            f"| {name} | {'never as exact' if equal is None else f'{equal / standard.cost:.3g} times'} | "
+            + (
+                "gave up | – |"
+                if usual is None
+                else f"{usual.cost / standard.cost:.3g} times | {usual.error:.1e} |"
+            )
+        )
+    return "\n".join(lines) + "\n"
+
+
+def write_page(page, parts, curves):
+    """Write the tables and draw the curves."""
+    missing = [name for name in ("numbalsoda", "heyoka") if not importlib.util.find_spec(name)]
+    absent = f" Not installed: {', '.join(missing)}." if missing else ""
+    page.write_text(
+        "# Work and precision, beside other solvers\n\n"
+        f"Made by `python benchmarks/work_precision.py --markdown {page}`; not edited by hand.\n"
+        f"{software()}.{absent}\n\n"
+        + " ".join(__doc__.split("\n\n", 2)[2].split())
+        + "\n\n![Error over cost](images/work_precision.png)\n\n"
+        + "\n".join(parts),
+        encoding="utf-8",
+    )
+    draw(page.parent / "images" / "work_precision.png", curves)
+
+
+def draw(path, curves):
+    """Error over cost, one panel for each motion."""
+    import matplotlib as mpl  # noqa: PLC0415 - slow to load, and needed only here
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt  # noqa: PLC0415
+
+    figure, panels = plt.subplots(2, 3, figsize=(12, 7), layout="constrained", sharex=True, sharey=True)
+    for panel, (name, works) in zip(panels.flat, curves.items(), strict=True):
+        for solver in dict.fromkeys(work.solver for work in works):
+            its = [work for work in works if work.solver == solver]
+            thick = 2.5 if solver == OURS else 1.0
+            panel.loglog([w.cost for w in its], [w.error for w in its], "o-", label=solver, lw=thick, ms=3)
+        panel.set_title(name, fontsize=9)
+        panel.grid(visible=True, which="major", alpha=0.3)
+    for panel in panels[-1]:
+        panel.set_xlabel("processor time per simulated time")
+    for panel in panels[:, 0]:
+        panel.set_ylabel("error of the state")
+    panels.flat[0].legend(fontsize=8)
+    figure.savefig(path, dpi=130)
+
+
+if __name__ == "__main__":
+    main()
