@@ -8,7 +8,7 @@ from acquisition.plan.measurement import Measurement
 from acquisition.recording import Recording
 from sim.accuracy import Accuracy
 from sim.drive import Sampled
-from sim.sample_by_sample import follow_samples
+from sim.engine.sample_by_sample import follow_samples
 from sim.specimen import Specimen
 
 from .arrays import Flags, Integers, Reals

@@ -7,8 +7,8 @@ import numpy as np
 from sim.accuracy import Accuracy
 from sim.compiled import compiled
 from sim.drive import Harmonic, LinearSweep, Sampled
+from sim.engine.interval import advance_interval, interval_tables, new_state
 from sim.integrate import integrate
-from sim.interval import advance_interval, interval_tables, new_state
 from sim.specimen import gong2025
 
 REPEATS = 3

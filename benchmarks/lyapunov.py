@@ -14,15 +14,15 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from sim.accuracy import Accuracy
-from sim.clock import clock_at
 from sim.drive import Harmonic
-from sim.flight import flight_tables
-from sim.harmonic_run import advance_harmonic
+from sim.engine.clock import clock_at
+from sim.engine.flight import flight_tables
+from sim.engine.harmonic_run import advance_harmonic
+from sim.engine.interval import new_state
+from sim.growth.tangent import unit_tangent
 from sim.integrate import new_record
-from sim.interval import new_state
 from sim.lyapunov import Precision, largest_exponent
 from sim.specimen import gong2025
-from sim.tangent import unit_tangent
 
 REPEATS = 5
 COST_S = 10.0

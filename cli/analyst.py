@@ -12,8 +12,8 @@ import numpy as np
 from analysis.campaign_results import CampaignResults, analyse_files, assembled
 from sim.accuracy import Accuracy
 from sim.drive import Harmonic, Sampled
+from sim.engine.sample_by_sample import follow_samples
 from sim.response import steady_response
-from sim.sample_by_sample import follow_samples
 from sim.specimen import gong2025
 
 

@@ -7,17 +7,17 @@ from numpy.typing import ArrayLike
 
 from .accuracy import Accuracy
 from .base_motion import BaseMotion, sampled_motion, sweep_interval_s, sweep_motion
-from .clock import clock_at
 from .drive import Drive, Harmonic, LinearSweep, LogarithmicSweep, Sampled, Sweep
-from .flight import flight_tables
-from .harmonic_run import IMPACTS, NEXT_SAMPLE, Record, advance_harmonic
-from .interval import interval_tables, new_state
-from .interval_run import advance_intervals
+from .engine.clock import clock_at
+from .engine.flight import flight_tables
+from .engine.harmonic_run import IMPACTS, NEXT_SAMPLE, Record, advance_harmonic
+from .engine.interval import interval_tables, new_state
+from .engine.interval_run import advance_intervals
+from .engine.parameters import Vector
+from .engine.tally import TALLY_SIZE
+from .growth.tangent import no_tangent
 from .outcome import Outcome
-from .parameters import Vector
 from .specimen import Specimen
-from .tally import TALLY_SIZE
-from .tangent import no_tangent
 from .trajectory import Impacts, Trajectory
 
 MAX_IMPACT_RATE_HZ = 200_000.0

@@ -14,17 +14,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .accuracy import Accuracy
-from .blocking import BlockedMean, blocked_mean
 from .drive import Harmonic
-from .floquet import multipliers
-from .flow_derivative import flow_derivative
+from .growth.blocking import BlockedMean, blocked_mean
+from .growth.settling import ALIGNING, SURE, FinalMotion, Settling, settling
+from .growth.tangent_run import ALMOST, Interval, TangentRun, interval_for, run_with_tangent
 from .integrate import MAX_IMPACT_RATE_HZ
 from .modes import modal_form
 from .outcome import Outcome
-from .poincare import state_scales
-from .settling import ALIGNING, SURE, FinalMotion, Settling, settling
+from .periodic.floquet import multipliers
+from .periodic.flow_derivative import flow_derivative
+from .periodic.poincare import state_scales
 from .specimen import Specimen
-from .tangent_run import ALMOST, Interval, TangentRun, interval_for, run_with_tangent
 from .trajectory import Floats
 
 FEWEST_INTERVALS = 32

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .parameters import VX, Table, Vector
+from .engine.parameters import VX, Table, Vector
 from .specimen import Specimen
 
 Complex = NDArray[np.complex128]

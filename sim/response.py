@@ -7,15 +7,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .accuracy import Accuracy
-from .clock import clock_at
 from .drive import Harmonic
-from .flight import flight_tables
-from .harmonic_run import IMPACTS, advance_harmonic
+from .engine.clock import clock_at
+from .engine.flight import flight_tables
+from .engine.harmonic_run import IMPACTS, advance_harmonic
+from .engine.interval import new_state
+from .engine.tally import (
+    LINE_P_IM,
+    LINE_P_RE,
+    LINE_X_IM,
+    LINE_X_RE,
+    MODE,
+    PEAK_P,
+    PEAK_X,
+    PEAKS,
+    PEAKS_AND_LINES,
+)
 from .integrate import MAX_IMPACT_RATE_HZ, new_record, start_motion
-from .interval import new_state
 from .outcome import Outcome
 from .specimen import Specimen
-from .tally import LINE_P_IM, LINE_P_RE, LINE_X_IM, LINE_X_RE, MODE, PEAK_P, PEAK_X, PEAKS, PEAKS_AND_LINES
 from .trajectory import Floats
 
 WHOLE = 1e-9

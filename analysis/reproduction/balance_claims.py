@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from sim.condensation import structure_of
-from sim.first_order_balance import first_order_states
-from sim.restoring_force import PowerSpring, spring_of
+from sim.periodic.condensation import structure_of
+from sim.periodic.first_order_balance import first_order_states
+from sim.periodic.restoring_force import PowerSpring, spring_of
 from sim.specimen import gong2025
 
 from ..arrays import Reals

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.signal import find_peaks
 
-from sim.bound_modes import JOIN
+from sim.engine.bound_modes import JOIN
 from sim.specimen import Specimen
 
 from ..arrays import Reals

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sim.restoring_force import spring_of
+from sim.periodic.restoring_force import spring_of
 from sim.specimen import gong2025
 
 from ..arrays import Reals

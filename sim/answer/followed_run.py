@@ -10,16 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..accuracy import Accuracy
-from ..clock import clock_at
 from ..drive import Harmonic
-from ..flight import flight_tables
-from ..harmonic_run import IMPACTS, NEXT_SAMPLE, advance_harmonic
-from ..integrate import MAX_IMPACT_RATE_HZ, new_record, start_motion
-from ..interval import new_state
-from ..outcome import Outcome
-from ..poincare import state_scales
-from ..specimen import Specimen
-from ..tally import (
+from ..engine.clock import clock_at
+from ..engine.flight import flight_tables
+from ..engine.harmonic_run import IMPACTS, NEXT_SAMPLE, advance_harmonic
+from ..engine.interval import new_state
+from ..engine.tally import (
     LINE_P_IM,
     LINE_P_RE,
     LINE_X_IM,
@@ -31,7 +27,11 @@ from ..tally import (
     PEAKS,
     PEAKS_AND_LINES,
 )
-from ..tangent import GROWTH, TANGENT_SIZE, no_tangent
+from ..growth.tangent import GROWTH, TANGENT_SIZE, no_tangent
+from ..integrate import MAX_IMPACT_RATE_HZ, new_record, start_motion
+from ..outcome import Outcome
+from ..periodic.poincare import state_scales
+from ..specimen import Specimen
 from ..trajectory import Floats
 
 

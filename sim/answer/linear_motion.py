@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..clock import angle_at, clock_at
 from ..contact_law import NoContact, PowerLaw
 from ..drive import Harmonic
+from ..engine.clock import angle_at, clock_at
+from ..engine.parameters import X, Y, Z
 from ..modes import Complex, harmonic_motion, modal_form
-from ..parameters import X, Y, Z
 from ..specimen import Specimen
 from ..trajectory import Floats
 

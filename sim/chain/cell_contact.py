@@ -1,6 +1,6 @@
 """A cell while its force acts: from touching a stop to leaving it, with controlled error. SI units.
 
-The same step control, landings and ends as `sim.contact`, for the unknowns of `sim.chain.cell_flow`.
+The same step control, landings and ends as `sim.engine.contact`, for the unknowns of `sim.chain.cell_flow`.
 """
 
 import math
@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from ..compiled import compiled, inlined
-from ..contact import (
+from ..engine.contact import (
     APEX_SECANTS,
     DEEPEST,
     HELD,
@@ -24,9 +24,9 @@ from ..contact import (
     STALLED,
     step_factor,
 )
-from ..contact_flow import R, W, step_error
-from ..detection import polynomial_at
-from ..parameters import POWER, Table, Vector
+from ..engine.contact_flow import R, W, step_error
+from ..engine.detection import polynomial_at
+from ..engine.parameters import POWER, Table, Vector
 from .cell_flow import (
     MEMORY,
     MOMENT,
@@ -90,7 +90,7 @@ def begin_pressing(
     """Enter contact at any penetration; ``acceleration`` is that of p without the stop, times side.
 
     The first step resolves the elastic collision or a slow pressing, whichever is faster: see
-    `sim.contact.begin_contact`.
+    `sim.engine.contact.begin_contact`.
     """
     root = math.sqrt(max(side * p - gap_on(side, law), 0.0))
     rate *= side

@@ -6,13 +6,13 @@ Within a window the chain is linear but for the force F in the cell, so that (Du
 
 with g_k the Taylor coefficients (Markov parameters) of the chain's answer in p to a unit impulse in the cell.
 Nothing of the chain but these few numbers enters, however long it is. With |p| = gap + w^2 and dt = w ds
-every rate is a polynomial, and one step is Dormand and Prince's 8(5,3), both as in `sim.contact_flow`.
+every rate is a polynomial, and one step is Dormand and Prince's 8(5,3), both as in `sim.engine.contact_flow`.
 """
 
 from typing import NamedTuple
 
 from ..compiled import compiled, inlined
-from ..contact_flow import (
+from ..engine.contact_flow import (
     A21,
     A31,
     A32,
@@ -75,8 +75,8 @@ from ..contact_flow import (
     R,
     W,
 )
-from ..detection import SERIES_TERMS
-from ..parameters import PowerTerms, Table, Vector
+from ..engine.detection import SERIES_TERMS
+from ..engine.parameters import PowerTerms, Table, Vector
 
 T = 2
 MOMENT = 3
@@ -87,18 +87,18 @@ WIDTH = MOMENT + MOMENTS
 WINDOW_TURN = 0.2
 """Longest window, as the fastest rate of chain and drive times its length [rad]."""
 SIDE, ROOT, RATE, STEP, ROOT_SCALE, RATE_SCALE, MEMORY = range(7)
-"""Places of a cell's row: as in `sim.parameters`; from MEMORY on I_1 ... since the window began."""
+"""Places of a cell's row: as in `sim.engine.parameters`; from MEMORY on I_1 ... since the window began."""
 CELL_SIZE = MEMORY + MOMENTS
 MARKOV_TERMS = MOMENTS + 2
 """g_0 ... g_10."""
 
 WORK_ROWS = STAGES + 5
 ARGUMENT, POINT, TRIAL, SPARE, CURVATURE = range(STAGES, WORK_ROWS)
-"""Rows of a workspace after the stages, as in `sim.contact_flow`; the last is as long as a curvature."""
+"""Rows of a workspace after the stages, as in `sim.engine.contact_flow`; the last is a curvature long."""
 
 
 class CellLaw(NamedTuple):
-    """The stops of one cell as numbers; see `sim.parameters.Parameters`."""
+    """The stops of one cell as numbers; see `sim.engine.parameters.Parameters`."""
 
     kind: int
     """YIELDING or POWER."""

@@ -10,10 +10,10 @@ import numpy as np
 from scipy.integrate._ivp import dop853_coefficients as _dop
 
 from ..compiled import compiled
-from ..contact_flow import STAGES, R, W
-from ..parameters import PowerTerms, Table, Vector
-from ..power_flow import power_force
-from ..smooth import MOST_SHORTENINGS, SHORTENING, WALL_TURN
+from ..engine.contact_flow import STAGES, R, W
+from ..engine.parameters import PowerTerms, Table, Vector
+from ..engine.power_flow import power_force
+from ..engine.smooth import MOST_SHORTENINGS, SHORTENING, WALL_TURN
 from .cell_flow import (
     ARGUMENT,
     MOMENT,
@@ -94,7 +94,7 @@ def begin_power(cell: Vector, series: Vector, markov: Vector, law: CellLaw, leng
 
 @compiled
 def short_of_the_wall(step: float, at: Vector, markov: Vector, law: CellLaw) -> float:
-    """Shorten a step until it turns the steepest spring on its way by little: see `sim.smooth`."""
+    """Shorten a step until it turns the steepest spring on its way by little: see `sim.engine.smooth`."""
     exponent = 1
     for half in law.power.halves:
         exponent += 2 * half

@@ -1,11 +1,11 @@
 """One cell through one window: flight, contact, flight, ... and nothing else of the chain. SI units."""
 
 from ..compiled import compiled
-from ..contact import DEEPEST, HELD, LEFT, LOGGED, NOT_FINITE
-from ..contact_flow import R, W
-from ..detection import NEVER, SERIES_TERMS, first_contact, touched_side
+from ..engine.contact import DEEPEST, HELD, LEFT, LOGGED, NOT_FINITE
+from ..engine.contact_flow import R, W
+from ..engine.detection import NEVER, SERIES_TERMS, first_contact, touched_side
+from ..engine.parameters import Table, Vector
 from ..outcome import Outcome
-from ..parameters import Table, Vector
 from .cell_contact import (
     begin_pressing,
     log_moment,

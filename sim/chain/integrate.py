@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..accuracy import Accuracy
-from ..clock import clock_at
-from ..detection import SERIES_TERMS
 from ..drive import Harmonic
+from ..engine.clock import clock_at
+from ..engine.detection import SERIES_TERMS
+from ..engine.parameters import POWER, Table
 from ..integrate import MAX_IMPACT_RATE_HZ, ROUNDING, SPARE_IMPACTS
 from ..modes import Complex
 from ..outcome import Outcome
-from ..parameters import POWER, Table
 from ..trajectory import Floats
 from .cell_contact import begin_pressing
 from .cell_flow import CURVATURE_TERMS, SIDE, fill_curvature

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..accuracy import Accuracy
-from ..blocking import BlockedMean, blocked_mean
-from ..clock import clock_at
 from ..drive import Harmonic
+from ..engine.clock import clock_at
+from ..engine.parameters import Table
+from ..growth.blocking import BlockedMean, blocked_mean
 from ..integrate import MAX_IMPACT_RATE_HZ
 from ..outcome import Outcome
-from ..parameters import Table
 from ..trajectory import Floats
 from .chain import MASSES_PER_CELL, Chain
 from .integrate import integrate_chain, new_chain_record, new_tally, start_chain, state_of_phasors

@@ -9,8 +9,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..engine.parameters import Table, Vector
 from ..modes import COINCIDENT, Complex, ModalForm
-from ..parameters import Table, Vector
 from .chain import MASSES_PER_CELL, Chain
 
 PROPORTIONAL = 1e-12

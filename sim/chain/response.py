@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..accuracy import Accuracy
-from ..clock import clock_at
 from ..drive import Harmonic
+from ..engine.clock import clock_at
 from ..integrate import MAX_IMPACT_RATE_HZ
 from ..modes import Complex
 from ..outcome import Outcome

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..clock import advance_clock, time_until
 from ..compiled import compiled
+from ..engine.clock import advance_clock, time_until
+from ..engine.parameters import POWER, Table, Vector
 from ..modes import Complex
 from ..outcome import Outcome
-from ..parameters import POWER, Table, Vector
 from .cell_flow import CELL_SIZE, MEMORY, SIDE
 from .cell_power import begin_power
 from .cell_window import COUNT, cross_window

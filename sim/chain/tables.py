@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ..accuracy import Accuracy
 from ..contact_law import MOST_TERMS
 from ..drive import Harmonic
+from ..engine.parameters import Table, Vector, parameters, power_terms
 from ..modes import Complex
-from ..parameters import Table, Vector, parameters, power_terms
 from ..specimen import Specimen
 from .cell_flow import MARKOV_TERMS, WINDOW_TURN
 from .chain import MASSES_PER_CELL, Chain

@@ -8,11 +8,11 @@ latter are summed.
 from typing import NamedTuple
 
 from ..compiled import compiled
-from ..contact import DEEPEST, LOGGED
-from ..detection import polynomial_at
+from ..engine.contact import DEEPEST, LOGGED
+from ..engine.detection import polynomial_at
+from ..engine.parameters import Table, Vector
+from ..engine.tally import series_peak
 from ..modes import Complex
-from ..parameters import Table, Vector
-from ..tally import series_peak
 from .cell_flow import MEMORY, MOMENT, MOMENTS, T
 from .tables import OBSERVED, PATH, ChainTables
 from .windows import Space, fill_observed

@@ -6,13 +6,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..clock import advance_clock, angle_at
 from ..compiled import compiled, inlined
 from ..contact_law import MOST_TERMS
-from ..detection import LARGEST_BOUND, SERIES_TERMS
-from ..flight import fill_series
+from ..engine.clock import advance_clock, angle_at
+from ..engine.detection import LARGEST_BOUND, SERIES_TERMS
+from ..engine.flight import fill_series
+from ..engine.parameters import POWER, PowerTerms, Table, Vector
 from ..modes import Complex
-from ..parameters import POWER, PowerTerms, Table, Vector
 from .cell_contact import cell_workspace
 from .cell_flow import CELL_SIZE, MEMORY, MOMENTS, SIDE, WIDTH, CellLaw
 from .cell_window import LOG_ROWS, MOST_TOUCHES

@@ -16,8 +16,8 @@ from ..accuracy import Accuracy
 from ..independent_solution import independent_state, state_error
 from ..integrate import integrate
 from ..lyapunov import largest_exponent
+from ..periodic.poincare import smallest_period, state_scales, stroboscopic_section
 from ..plain_equations import Place, law_of, numbers_of, rates_at
-from ..poincare import smallest_period, state_scales, stroboscopic_section
 from ..response import steady_response
 from ..study.software import software
 from ..trajectory import Floats

@@ -7,11 +7,11 @@ from analysis.errors import InvalidRequest
 from analysis.hysteresis import hysteresis
 from analysis.jumps import jumps
 from analysis.sweep import sweep_response
-from sim.condensation import structure_of
 from sim.drive import LinearSweep
-from sim.first_order_balance import jump_frequencies
 from sim.integrate import integrate
-from sim.restoring_force import spring_of
+from sim.periodic.condensation import structure_of
+from sim.periodic.first_order_balance import jump_frequencies
+from sim.periodic.restoring_force import spring_of
 from sim.specimen import gong2025
 
 TIME_S = 0.1 * np.arange(2000)

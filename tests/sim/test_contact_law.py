@@ -19,10 +19,10 @@ from sim.contact_law import (
     fitted_linear_gap,
     fitted_power_law,
 )
+from sim.engine.parameters import power_terms
+from sim.engine.power_flow import power_force
 from sim.model_name import model_named
-from sim.parameters import power_terms
-from sim.power_flow import power_force
-from sim.restoring_force import spring_of
+from sim.periodic.restoring_force import spring_of
 from sim.specimen import gong2025
 
 HERTZ = Hertz(4.9e9)

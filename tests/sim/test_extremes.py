@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from sim.accuracy import Accuracy
-from sim.contact import step_factor
-from sim.contact_flow import CVX, STAGES, WIDTH, WORK_ROWS, R, W, contact_error
 from sim.contact_law import Hertz, HuntCrossley, LinearGap, RigidStops
 from sim.drive import Harmonic, LinearSweep, Sampled
+from sim.engine.contact import step_factor
+from sim.engine.contact_flow import CVX, STAGES, WIDTH, WORK_ROWS, R, W, contact_error
+from sim.engine.smooth import MOTIONS, smooth_error
 from sim.integrate import integrate
 from sim.modes import base_transmissibility
 from sim.outcome import Outcome
+from sim.periodic.restoring_force import spring_of
 from sim.response import steady_response
 from sim.response_curve import response_curve
-from sim.restoring_force import spring_of
-from sim.smooth import MOTIONS, smooth_error
 from sim.specimen import gong2025
 
 pytestmark = pytest.mark.timeout(300)

@@ -13,12 +13,12 @@ from numba import njit
 
 from sim.contact_law import LinearGap, RigidStops
 from sim.drive import Harmonic
-from sim.dynamical_exponents import map_exponents
+from sim.growth.dynamical_exponents import map_exponents
+from sim.growth.lyapunov_spectrum import lyapunov_spectrum
+from sim.growth.settling import FinalMotion
 from sim.integrate import integrate
 from sim.lyapunov import Source, Tendency, largest_exponent
-from sim.lyapunov_spectrum import lyapunov_spectrum
 from sim.modes import base_transmissibility
-from sim.settling import FinalMotion
 from sim.specimen import Specimen
 
 HEAVY, FAST, SLOW = 1e10, 3.0, 2.0

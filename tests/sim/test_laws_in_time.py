@@ -14,8 +14,8 @@ from sim.contact_law import HuntCrossley, LinearGap, PowerLaw
 from sim.drive import Harmonic, LinearSweep, Sampled
 from sim.integrate import integrate
 from sim.outcome import Outcome
+from sim.periodic.restoring_force import spring_of
 from sim.response import steady_response
-from sim.restoring_force import spring_of
 from sim.specimen import Specimen, gong2025
 
 DRIVE = Harmonic(130.0, 20e-6)

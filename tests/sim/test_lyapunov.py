@@ -8,9 +8,9 @@ import pytest
 from sim.accuracy import Accuracy
 from sim.contact_law import LinearGap
 from sim.drive import Harmonic
+from sim.growth.settling import FinalMotion
 from sim.lyapunov import FEWEST_INTERVALS, Precision, Source, Tendency, largest_exponent
 from sim.outcome import Outcome
-from sim.settling import FinalMotion
 from sim.specimen import Specimen, gong2025
 
 CHAOS = Harmonic(260.0, 5e-6)

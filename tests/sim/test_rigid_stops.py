@@ -13,12 +13,12 @@ from scipy.linalg import expm
 from sim.accuracy import Accuracy
 from sim.contact_law import Hertz, HuntCrossley, RigidStops
 from sim.drive import Harmonic, LinearSweep, Sampled
+from sim.engine.interval import new_state
+from sim.engine.parameters import parameters
+from sim.engine.rigid_stop import rebound
 from sim.integrate import integrate
-from sim.interval import new_state
 from sim.outcome import Outcome
-from sim.parameters import parameters
 from sim.response import steady_response
-from sim.rigid_stop import rebound
 from sim.specimen import Specimen, gong2025
 
 STILL = Harmonic(100.0, 0.0)

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from sim.compiled import compiled
-from sim.interval import advance_interval, base_reaction, interval_tables, new_state
-from sim.piece import IntervalTables
+from sim.engine.interval import advance_interval, base_reaction, interval_tables, new_state
+from sim.engine.piece import IntervalTables
 from sim.specimen import Specimen
 
 from ...errors import AcquisitionError

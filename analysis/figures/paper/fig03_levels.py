@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.axes import Axes
 
-from sim.condensation import structure_of
-from sim.first_order_balance import first_order_states, jump_frequencies
-from sim.restoring_force import PowerSpring, spring_of
+from sim.periodic.condensation import structure_of
+from sim.periodic.first_order_balance import first_order_states, jump_frequencies
+from sim.periodic.restoring_force import PowerSpring, spring_of
 from sim.specimen import Specimen
 from sim.study.results import StudyResults
 from sim.study.study import Study

@@ -6,7 +6,7 @@ import pytest
 from analysis.chaos.period import Points, shortest_period
 from analysis.chaos.verdict import MotionKind, motion_verdict
 from sim.drive import Harmonic
-from sim.poincare import stroboscopic_section
+from sim.periodic.poincare import stroboscopic_section
 from sim.specimen import gong2025
 
 DRIVE_HZ = 260.0

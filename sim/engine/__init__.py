@@ -1,0 +1,1 @@
+"""The engine: flight in closed form, contacts in controlled steps, and what is observed on the way."""

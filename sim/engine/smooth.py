@@ -1,0 +1,272 @@
+"""Motion under a power law, whose force acts at every p: no flight, no stops, one adaptive method. SI units.
+
+The unknowns are (p, dp/dt, x, z, vx, vz, t) in the places of a contact's; the step is the same Dormand and
+Prince 8(5,3) in time itself. Every unknown is held to the tolerance of its own recent size, because any one
+of them may be the small one (a light mass, a stiff link, a still start).
+
+An overflowing stage, usual for p^29 and beyond when a step is tried too far, makes the error NaN, and the
+step shrinks.
+"""
+
+import math
+
+from ..compiled import compiled
+from .contact import (
+    DEEPEST,
+    HELD,
+    LOG_AP,
+    LOG_AX,
+    LOG_P,
+    LOG_RATE,
+    LOG_STAGE_T,
+    LOG_STAGE_W,
+    LOG_STEP,
+    LOG_TIME,
+    LOG_VX,
+    LOG_X,
+    LOGGED,
+    NOT_FINITE,
+    STALLED,
+    WIDE_LOG_COLUMNS,
+    step_factor,
+)
+from .contact_flow import (
+    BLEND,
+    CVX,
+    CVZ,
+    CX,
+    CZ,
+    ERROR_3,
+    ERROR_5,
+    LARGEST_SQUARE,
+    POINT,
+    STAGES,
+    TRIAL,
+    WIDTH,
+    R,
+    T,
+    W,
+    trial_step,
+)
+from .parameters import (
+    RATE,
+    ROOT,
+    SCALES,
+    SIDE,
+    STEP,
+    VX,
+    VY,
+    VZ,
+    Parameters,
+    PowerTerms,
+    Table,
+    Vector,
+    X,
+    Y,
+    Z,
+)
+from .power_flow import PowerSystem, power_rates, stiffest_rate
+
+MOTIONS = 6
+"""The unknowns whose errors count; time has none."""
+FORGETTING = 0.02
+"""How fast a past size fades, over the lowest rate of the whole body on its spring."""
+SMALLEST_PART = 1e-3
+"""A displacement (velocity) counts as at least this part of the largest one."""
+NOTHING_MOVES = 1e-150
+"""Size of a motion that has none, so that an error over it is zero."""
+FIRST_TURN = 0.01
+"""First step, in radians of the fastest link without the power law."""
+MOST_STEPS = 1_000_000
+"""Steps in one call, which is a fraction of a period."""
+FORCE_SHARE = 1e-3
+"""Part of the tolerance that the polynomial of the base force may use."""
+LARGEST_TURN = 1.0
+WALL_TURN = 1.5
+"""See `_short_of_the_wall`: for p^47 the errors are ten times smaller than without, at no cost, for steps
+that would fail are not tried [rad]."""
+SHORTENING, MOST_SHORTENINGS = 0.75, 40
+FACTORIAL_8 = 40320.0
+
+
+@compiled
+def smooth_turn(tolerance: float) -> float:
+    """Longest stretch, as drive phase, on which a sine is its Taylor polynomial of degree 7 [rad]."""
+    turn: float = min(LARGEST_TURN, 2.0 * (FACTORIAL_8 * FORCE_SHARE * tolerance) ** 0.125)
+    return turn
+
+
+@compiled
+def begin_smooth(state: Vector) -> None:
+    """Set up from the displacements and velocities of ``state``."""
+    state[SIDE] = 1.0
+    state[ROOT], state[RATE] = state[Y] - state[Z], state[VY] - state[VZ]
+    state[STEP] = 0.0
+    sizes = state[SCALES : SCALES + MOTIONS]
+    sizes[W], sizes[R], sizes[CX] = abs(state[ROOT]), abs(state[RATE]), abs(state[X])
+    sizes[CZ], sizes[CVX], sizes[CVZ] = abs(state[Z]), abs(state[VX]), abs(state[VZ])
+
+
+@compiled
+def _gather(work: Table, state: Vector, tau: float) -> None:
+    at = work[POINT]
+    at[W], at[R], at[CX], at[CZ] = state[ROOT], state[RATE], state[X], state[Z]
+    at[CVX], at[CVZ], at[T], at[WIDTH - 1] = state[VX], state[VZ], tau, 0.0
+
+
+@compiled
+def _scatter(work: Table, state: Vector) -> None:
+    at = work[POINT]
+    state[ROOT], state[RATE] = at[W], at[R]
+    state[X], state[Z], state[VX], state[VZ] = at[CX], at[CZ], at[CVX], at[CVZ]
+    state[Y], state[VY] = at[CZ] + at[W], at[CVZ] + at[R]
+
+
+@compiled
+def _widen_sizes(sizes: Vector, at: Vector, fading: float, push: float, par: Parameters) -> None:
+    """Bring the recent sizes up to date with the point reached."""
+    for i in range(MOTIONS):
+        sizes[i] = max(abs(at[i]), fading * sizes[i])
+    sizes[CX] = max(sizes[CX], push / par.k0)
+    sizes[CVX] = max(sizes[CVX], push / math.sqrt(par.k0 * par.mass0))
+    far = SMALLEST_PART * max(sizes[W], sizes[CX], sizes[CZ]) + NOTHING_MOVES
+    fast = SMALLEST_PART * max(sizes[R], sizes[CVX], sizes[CVZ]) + NOTHING_MOVES
+    sizes[W], sizes[CX], sizes[CZ] = max(sizes[W], far), max(sizes[CX], far), max(sizes[CZ], far)
+    sizes[R], sizes[CVX], sizes[CVZ] = max(sizes[R], fast), max(sizes[CVX], fast), max(sizes[CVZ], fast)
+
+
+@compiled
+def smooth_error(work: Table, step: float, sizes: Vector, tolerance: float) -> float:
+    """Error of the step just tried, over what is allowed: root mean square of all six motions.
+
+    Infinite when a stage ran away or overflowed.
+    """
+    fifth, third = 0.0, 0.0
+    for i in range(MOTIONS):
+        sum_5, sum_3 = 0.0, 0.0
+        for stage in range(STAGES):
+            sum_5 += ERROR_5[stage] * work[stage, i]
+            sum_3 += ERROR_3[stage] * work[stage, i]
+        allowed = tolerance * sizes[i]
+        fifth += (sum_5 / allowed) ** 2
+        third += (sum_3 / allowed) ** 2
+    blended = fifth + BLEND * third
+    if blended == 0.0:
+        return 0.0
+    if not blended < LARGEST_SQUARE:
+        # A stage ran away: fifth over infinity would pass for no error at all.
+        return math.inf
+    error: float = abs(step) * fifth / math.sqrt(MOTIONS * blended)
+    return error
+
+
+@compiled
+def _short_of_the_wall(step: float, at: Vector, par: Parameters, power: PowerTerms) -> float:
+    """Shorten a step until it would turn the stiffest spring on its way by `WALL_TURN` at most.
+
+    In free motion the error sees nothing of a steep wall ahead, and a stage that meets it late in the step is
+    too little for the estimate.
+    """
+    outward = at[R] if at[W] >= 0.0 else -at[R]
+    for _ in range(MOST_SHORTENINGS):
+        reach = abs(at[W]) + max(outward, 0.0) * step
+        if step * stiffest_rate(reach, par, power) <= WALL_TURN:
+            break
+        step *= SHORTENING
+    return step
+
+
+@compiled
+def _log_point(log: Table, work: Table) -> None:
+    """Add the accepted point, whose rates are in ``work[0]``, as the log's next row."""
+    at, rates = work[POINT], work[0]
+    log[0, LOGGED] += 1.0
+    row = int(log[0, LOGGED])
+    log[row, LOG_TIME], log[row, LOG_X], log[row, LOG_VX] = at[T], at[CX], at[CVX]
+    log[row, LOG_P], log[row, LOG_RATE] = at[W], at[R]
+    log[row, LOG_AX], log[row, LOG_AP] = rates[CVX], rates[R]
+
+
+@compiled
+def _log_stages(log: Table, work: Table, step: float) -> None:
+    """Add dt/ds = 1 and p at the stages of the step just taken, if the log is wide enough."""
+    if log.shape[1] == WIDE_LOG_COLUMNS:
+        row = log[int(log[0, LOGGED])]
+        row[LOG_STEP] = step
+        for stage in range(STAGES):
+            row[LOG_STAGE_T + stage], row[LOG_STAGE_W + stage] = 1.0, work[stage, WIDTH - 1]
+
+
+@compiled
+def _largest_push(force: Vector, half: float) -> float:
+    """Bound of the base force on a stretch of twice ``half`` about its middle."""
+    push, power = 0.0, 1.0
+    for k in range(len(force)):
+        push += abs(force[k]) * power
+        power *= half
+    return push
+
+
+@compiled
+def advance_smooth(
+    state: Vector,
+    tau: float,
+    limit: float,
+    force: Vector,
+    middle: float,
+    system: PowerSystem,
+    tolerance: float,
+    work: Table,
+    log: Table,
+) -> tuple[int, float]:
+    """Advance to the time ``limit``; arguments and codes as in `sim.engine.contact.advance_contact`.
+
+    Steps divide the time that is left evenly when it is short, so that none is cut to a stub.
+    """
+    par, power = system.par, system.power
+    sizes, step = state[SCALES : SCALES + MOTIONS], state[STEP]
+    _gather(work, state, tau)
+    if tau >= limit:
+        return HELD, tau
+    at = work[POINT]
+    push = _largest_push(force, max(abs(limit - middle), abs(tau - middle)))
+    lowest = FORGETTING * math.sqrt(par.k0 / (par.mass0 + par.mass1 + par.mass2))
+    if step == 0.0:
+        step = FIRST_TURN / math.sqrt((par.k0 + par.k2) / par.mass0 + (par.k1 + par.k2) / par.reduced_mass)
+    _widen_sizes(sizes, at, 1.0, push, par)
+    power_rates(at, work[0], force, middle, par, power)
+    if len(log) > 0:
+        log[0, LOGGED] = log[0, DEEPEST] = 0.0
+        _log_point(log, work)
+    code = STALLED
+    for _ in range(MOST_STEPS):
+        step = _short_of_the_wall(step, at, par, power)
+        left = limit - at[T]
+        steps = math.ceil(left / step)
+        taken = left / steps if steps <= 2 else step
+        trial_step(work, taken, 1.0, force, middle, system)
+        error = smooth_error(work, taken, sizes, tolerance)
+        factor = step_factor(error)
+        if not error <= 1.0:
+            step = taken * min(factor, 1.0)
+            if at[T] + step == at[T]:
+                return NOT_FINITE, at[T]
+            continue
+        _log_stages(log, work, taken)
+        work[POINT] = work[TRIAL]
+        if steps == 1:
+            at[T] = limit
+        # A step that was cut by the limit says little about the next one's length.
+        step = max(step, taken * factor) if taken < step and factor > 1.0 else taken * factor
+        _widen_sizes(sizes, at, 1.0 / (1.0 + lowest * taken), push, par)
+        power_rates(at, work[0], force, middle, par, power)
+        is_full = False
+        if len(log) > 0:
+            _log_point(log, work)
+            is_full = log[0, LOGGED] + 1 == len(log)
+        if at[T] >= limit or is_full:
+            code = HELD
+            break
+    state[STEP] = step
+    _scatter(work, state)
+    return code, at[T]

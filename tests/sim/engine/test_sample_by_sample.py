@@ -1,0 +1,57 @@
+"""Following a base sample by sample is the same motion as integrating it."""
+
+import numpy as np
+import pytest
+
+from sim.accuracy import Accuracy
+from sim.drive import Sampled
+from sim.engine.sample_by_sample import follow_samples
+from sim.integrate import integrate
+from sim.specimen import gong2025
+
+RATE_HZ = 51_200.0
+
+
+def shaken_base(amplitude_m, seconds=0.3, frequency_hz=260.0):
+    time_s = np.arange(round(seconds * RATE_HZ) + 1) / RATE_HZ
+    ramp = np.clip(time_s / 0.02, 0.0, 1.0)
+    return Sampled(amplitude_m * ramp**3 * np.sin(2 * np.pi * frequency_hz * time_s), RATE_HZ)
+
+
+@pytest.mark.parametrize("amplitude_m", [0.0, 1e-7, 2e-6, 2e-5])
+def test_it_is_the_motion_that_integration_gives(amplitude_m):
+    drive = shaken_base(amplitude_m)
+    followed = follow_samples(gong2025(), drive, Accuracy.REFERENCE)
+    duration_s = (len(drive.displacement_m) - 1) / RATE_HZ
+    whole = integrate(gong2025(), drive, duration_s, Accuracy.REFERENCE, sample_rate_hz=RATE_HZ)
+    assert followed.states.shape == (followed.asked, 6)
+    assert np.sum(followed.impacts) == whole.impacts.count
+    # Both cut intervals alike but join the pieces in another order; chaos magnifies the rounding.
+    near = slice(0, 4000)
+    scale = np.array([1e-4, 1e-4, 1e-4, 0.1, 0.1, 0.1])
+    np.testing.assert_allclose(followed.states[near] / scale, whole.states[near] / scale, atol=1e-9)
+
+
+def test_impacts_are_counted_in_the_interval_they_begin_in():
+    drive = shaken_base(2e-6)
+    followed = follow_samples(gong2025(), drive)
+    whole = integrate(gong2025(), drive, (len(drive.displacement_m) - 1) / RATE_HZ)
+    first = np.floor(whole.impacts.times_s[:10] * RATE_HZ).astype(int)
+    assert np.flatnonzero(followed.impacts)[:10].tolist() == first.tolist()
+
+
+def test_going_on_from_a_state_is_the_same_as_not_stopping():
+    drive = shaken_base(2e-6, seconds=0.05)
+    rest = Sampled(np.zeros(100), RATE_HZ)
+    begun = follow_samples(gong2025(), drive)
+    decayed = follow_samples(gong2025(), rest, initial_state=begun.states[-1])
+    free = integrate(gong2025(), rest, 99 / RATE_HZ, initial_state=begun.states[-1], sample_rate_hz=RATE_HZ)
+    np.testing.assert_allclose(decayed.states, free.states, rtol=0, atol=1e-12)
+
+
+def test_a_motion_that_leaves_the_numbers_stops_where_it_did():
+    samples = np.zeros(1000)
+    samples[500:] = 1e280
+    followed = follow_samples(gong2025(), Sampled(samples, RATE_HZ))
+    assert len(followed.states) < followed.asked
+    assert np.all(np.isfinite(followed.states[:400]))

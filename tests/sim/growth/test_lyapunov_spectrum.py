@@ -1,0 +1,117 @@
+"""All six exponents: sums that mechanics fixes, pairs, and agreement with the largest alone."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sim.accuracy import Accuracy
+from sim.drive import Harmonic
+from sim.growth.lyapunov_spectrum import kaplan_yorke, lyapunov_spectrum
+from sim.growth.tangent_run import interval_for, run_with_tangent
+from sim.lyapunov import Source, Tendency, largest_exponent
+from sim.modes import state_matrix
+from sim.outcome import Outcome
+from sim.specimen import gong2025
+
+CHAOS = Harmonic(260.0, 5e-6)
+LARGE = Harmonic(430.0, 50e-6)
+
+
+def shrinking(specimen):
+    """-tr(M^-1 C)."""
+    return -float(np.trace(np.linalg.solve(specimen.mass_matrix, specimen.damping_matrix)))
+
+
+@pytest.mark.parametrize("drive", [CHAOS, LARGE, Harmonic(130.0, 20e-6), Harmonic(260.0, 1e-6)])
+@pytest.mark.parametrize("contact", ["hertz", "linear_gap", "power:5", "power:47", "linear", "rigid:1"])
+def test_the_exponents_add_up_to_what_the_dampers_take(contact, drive):
+    specimen = gong2025(damping_time_s=3e-5, contact=contact)
+    found = lyapunov_spectrum(specimen, drive, Accuracy.REFERENCE, duration_s=1.0, settle_s=0.2)
+    assert shrinking(specimen) == pytest.approx(-390.081, abs=1e-3)
+    assert found.sum_per_s == pytest.approx(shrinking(specimen), rel=1e-6)
+    assert np.all(np.diff(found.exponents_per_s) <= 0.0)
+
+
+@pytest.mark.parametrize(("accuracy", "allowed"), [(Accuracy.QUICK, 1e-2), (Accuracy.STANDARD, 1e-4)])
+def test_each_level_of_accuracy_keeps_its_part_of_the_sum(accuracy, allowed):
+    found = lyapunov_spectrum(gong2025(), LARGE, accuracy, duration_s=2.0, settle_s=0.2)
+    assert found.sum_per_s == pytest.approx(shrinking(gong2025()), rel=allowed)
+
+
+def test_a_lossy_contact_takes_more_than_the_dampers():
+    lossy = lyapunov_spectrum(gong2025(contact="hunt_crossley:0.5"), CHAOS, duration_s=4.0)
+    assert lossy.sum_per_s < shrinking(gong2025()) - 5.0
+
+
+def test_free_impacts_with_restitution_add_twice_its_logarithm_each():
+    # Over an interval in which nothing sticks.
+    specimen = gong2025(contact="rigid:0.8")
+    interval = interval_for(specimen, Harmonic(130.0, 20e-6), 0.02)
+    run = run_with_tangent(specimen, Harmonic(130.0, 20e-6), 6, 2.0, interval, Accuracy.REFERENCE)
+    free = np.all(np.isfinite(run.growth), axis=1) & (run.impacts > 0)
+    assert np.count_nonzero(free) > 3
+    expected = shrinking(specimen) * interval.length_s + 2.0 * math.log(0.8) * run.impacts[free]
+    assert run.growth[free].sum(axis=1) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("contact", ["hertz", "power:5", "rigid:1"])
+def test_without_damping_the_exponents_come_in_pairs_of_opposite_sign(contact):
+    specimen = gong2025(damping_time_s=0.0, contact=contact)
+    found = lyapunov_spectrum(specimen, CHAOS, duration_s=8.0, settle_s=2.0)
+    exponents = found.exponents_per_s
+    assert abs(found.sum_per_s) < 0.05
+    assert exponents[0] > 5.0
+    paired = np.abs(exponents + exponents[::-1])
+    assert np.all(
+        paired < 4.0 * np.hypot(found.standard_errors_per_s, found.standard_errors_per_s[::-1]) + 1.0
+    )
+
+
+def test_the_first_of_six_is_the_largest_alone():
+    six = lyapunov_spectrum(gong2025(), CHAOS)
+    one = largest_exponent(gong2025(), CHAOS)
+    allowed = math.hypot(six.standard_errors_per_s[0], one.standard_error_per_s)
+    assert abs(six.exponents_per_s[0] - one.exponent_per_s) < 4.0 * allowed
+    assert six.tendency is one.tendency is Tendency.CHAOTIC
+    assert 4.0 < six.dimension < 5.0
+
+
+def test_without_impacts_the_exponents_are_the_decays_of_the_modes():
+    found = lyapunov_spectrum(gong2025(), Harmonic(180.0, 1e-6), duration_s=4.0, settle_s=1.0)
+    system, _ = state_matrix(gong2025())
+    assert found.source is Source.MODES
+    assert found.exponents_per_s == pytest.approx(np.sort(np.linalg.eigvals(system).real)[::-1])
+    assert found.dimension == 0.0
+
+
+@pytest.mark.parametrize(("drive", "left"), [(Harmonic(130.0, 20e-6), 4), (CHAOS, 5)])
+def test_a_stop_without_rebound_takes_two_directions_where_it_holds_m1_and_one_where_it_does_not(drive, left):
+    found = lyapunov_spectrum(gong2025(contact="rigid:0"), drive, duration_s=4.0, settle_s=1.0)
+    assert found.outcome is Outcome.REACHED_END
+    assert np.count_nonzero(np.isfinite(found.exponents_per_s)) == left
+    assert np.all(found.exponents_per_s[left:] == -np.inf)
+
+
+@pytest.mark.parametrize(
+    ("exponents", "dimension"),
+    [
+        ([0.9056, 0.0, -14.572], 2.06215),
+        ([-1.0, -2.0], 0.0),
+        ([1.0, 0.5], 2.0),
+        ([0.41922, -1.62319], 1.25827),
+        ([2.0, -math.inf], 1.0),
+    ],
+)
+def test_the_dimension_is_kaplan_and_yorkes(exponents, dimension):
+    assert kaplan_yorke(np.array(exponents)) == pytest.approx(dimension, abs=1e-4)
+
+
+@given(st.lists(st.floats(-10.0, 10.0), min_size=1, max_size=6))
+def test_the_dimension_lies_between_the_exponents_that_sum_to_growth(exponents):
+    ordered = np.sort(np.array(exponents))[::-1]
+    found = kaplan_yorke(ordered)
+    assert 0.0 <= found <= len(ordered)
+    assert found >= np.count_nonzero(ordered > 0.0)

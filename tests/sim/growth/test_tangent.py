@@ -1,0 +1,116 @@
+"""The derivative of the flow, carried along with a run: against differences of runs, and mechanics."""
+
+import numpy as np
+import pytest
+
+from sim.accuracy import Accuracy
+from sim.drive import Harmonic
+from sim.engine.clock import clock_at
+from sim.engine.flight import flight_tables
+from sim.engine.harmonic_run import advance_harmonic
+from sim.engine.interval import new_state
+from sim.growth.tangent import derivative_of, unit_tangent
+from sim.integrate import integrate, new_record
+from sim.outcome import Outcome
+from sim.specimen import gong2025
+
+DRIVE = Harmonic(130.0, 20e-6)
+DURATION_S = 0.02
+ELASTIC = ["hertz", "linear_gap", "linear", "power:5", "power:3+5+7", "power:47", "rigid:1"]
+GAPS = [45e-6, (30e-6, 45e-6), (20e-6, np.inf)]
+SCALES = np.repeat([1e-4, 0.1], 3)
+
+
+def run_with_tangent(specimen, accuracy=Accuracy.REFERENCE, duration_s=DURATION_S, drive=DRIVE):
+    """Derivative of the flow from rest, scaled, with the state and the impacts."""
+    state = new_state(specimen, np.zeros(6), accuracy)
+    record = new_record(0.0, duration_s, None, 1e4)._replace(tangent=unit_tangent())
+    tables = flight_tables(specimen, drive)
+    code = advance_harmonic(state, clock_at(0.0), duration_s, tables, accuracy.tolerance, record)
+    assert code == Outcome.REACHED_END
+    return derivative_of(record.tangent) * SCALES / SCALES[:, None], state[:6], int(record.counts[1])
+
+
+def by_differences(specimen, step, accuracy=Accuracy.REFERENCE):
+    """The same by central differences of whole runs."""
+    columns = []
+    for push in np.diag(step * SCALES):
+        ends = [
+            integrate(specimen, DRIVE, DURATION_S, accuracy, sign * push).final_state for sign in (1.0, -1.0)
+        ]
+        columns.append((ends[0] - ends[1]) / (2.0 * step * SCALES))
+    return np.array(columns).T
+
+
+@pytest.mark.parametrize("gap_m", GAPS)
+@pytest.mark.parametrize("contact", [*ELASTIC, "hunt_crossley:0.5", "rigid:0.8"])
+def test_differences_of_runs_approach_the_tangent_with_the_square_of_their_step(contact, gap_m):
+    specimen = gong2025(contact=contact, gap_m=gap_m)
+    tangent, _, impacts = run_with_tangent(specimen)
+    assert impacts > 2 or not specimen.contact.kind.startswith(("hertz", "hunt"))
+    size = np.abs(tangent).max()
+    far, near = (np.abs(by_differences(specimen, step) - tangent).max() / size for step in (1e-5, 2.5e-6))
+    assert near < 1e-5
+    assert near < 0.15 * far or near < 5e-6
+
+
+@pytest.mark.parametrize("contact", ELASTIC)
+def test_volume_shrinks_by_the_damping_alone(contact):
+    # Liouville: an elastic force, however stiff, has no part in the divergence of the flow.
+    specimen = gong2025(contact=contact)
+    tangent, _, _ = run_with_tangent(specimen)
+    rate = -np.trace(np.linalg.solve(specimen.mass_matrix, specimen.damping_matrix))
+    sign, logarithm = np.linalg.slogdet(tangent)
+    assert sign == 1.0
+    assert logarithm / DURATION_S == pytest.approx(rate, rel=1e-6)
+
+
+@pytest.mark.parametrize("contact", ["hertz", "linear_gap", "power:7", "rigid:1"])
+def test_without_damping_the_tangent_is_symplectic(contact):
+    # D' J D = J in displacements and momenta; here in displacements and velocities over their scales.
+    specimen = gong2025(damping_time_s=0.0, contact=contact)
+    tangent, _, _ = run_with_tangent(specimen)
+    masses = np.diag(specimen.masses) / max(specimen.masses)
+    form = np.block([[np.zeros((3, 3)), masses], [-masses, np.zeros((3, 3))]])
+    np.testing.assert_allclose(tangent.T @ form @ tangent, form, atol=1e-8 * np.abs(tangent).max() ** 2)
+
+
+@pytest.mark.parametrize("contact", ["hertz", "power:29"])
+def test_a_tangent_changes_no_step(contact):
+    specimen = gong2025(contact=contact)
+    _, carried, _ = run_with_tangent(specimen, Accuracy.STANDARD, 0.3)
+    plain = integrate(specimen, DRIVE, 0.3, Accuracy.STANDARD)
+    np.testing.assert_array_equal(carried, plain.final_state)
+
+
+@pytest.mark.parametrize("contact", ["hertz", "power:7"])
+def test_each_level_of_accuracy_has_a_tangent_nearer_to_the_reference(contact):
+    specimen = gong2025(contact=contact)
+    found = {level: run_with_tangent(specimen, level, 0.2)[0] for level in Accuracy}
+    size = np.abs(found[Accuracy.REFERENCE]).max()
+    quick, standard = (
+        np.abs(found[level] - found[Accuracy.REFERENCE]).max() / size
+        for level in (Accuracy.QUICK, Accuracy.STANDARD)
+    )
+    assert standard < 0.2 * quick
+    assert standard < 1e-2
+    assert quick < 0.1
+
+
+def test_an_impact_with_restitution_shrinks_volume_by_its_square():
+    specimen = gong2025(contact="rigid:0.8")
+    tangent, _, impacts = run_with_tangent(specimen)
+    rate = -np.trace(np.linalg.solve(specimen.mass_matrix, specimen.damping_matrix))
+    assert impacts > 2
+    expected = rate * DURATION_S + 2.0 * impacts * np.log(0.8)
+    assert np.linalg.slogdet(tangent)[1] == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_stop_that_holds_leaves_no_change_of_the_distance():
+    # No rebound: m1 stays on its stop, and two of the six directions are gone for good.
+    specimen = gong2025(contact="rigid:0")
+    tangent, _, impacts = run_with_tangent(specimen, duration_s=0.05)
+    values = np.linalg.svd(tangent, compute_uv=False)
+    assert impacts > 0
+    assert values[3] > 1e-6
+    assert values[4] < 1e-12 * values[0]

@@ -1,0 +1,77 @@
+import math
+
+import numpy as np
+import pytest
+
+from sim.periodic.continuation import ArcEnd, ArcSteps, trace
+
+
+class Circle:
+    """u^2 + lambda^2 = 1."""
+
+    def linearised(self, point):
+        u, parameter = point
+        return np.array([u**2 + parameter**2 - 1.0]), np.array([[2.0 * u, 2.0 * parameter]])
+
+
+class Snap:
+    """lambda = u^3 - u: folds at u = -+1/sqrt(3), lambda = +-2/(3 sqrt(3))."""
+
+    def linearised(self, point):
+        u, parameter = point
+        return np.array([parameter - u**3 + u]), np.array([[1.0 - 3.0 * u**2, 1.0]])
+
+
+class Kink:
+    """lambda = -|u|: turns back at u = 0 in no distance at all."""
+
+    def linearised(self, point):
+        u, parameter = point
+        return np.array([parameter + abs(u)]), np.array([[1.0 if u >= 0.0 else -1.0, 1.0]])
+
+
+class Edge:
+    """lambda = u, defined up to u = 1/2 only."""
+
+    def linearised(self, point):
+        u, parameter = point
+        return np.array([parameter - u if u < 0.5 else math.nan]), np.array([[-1.0, 1.0]])
+
+
+def test_a_circle_is_followed_round_with_its_folds_at_plus_and_minus_one():
+    steps = ArcSteps(first=0.05, longest=0.1, most_points=100)
+    points = list(trace(Circle(), np.array([-1.0, 0.0]), 1.0, (-2.0, 2.0), steps))
+    assert points[-1].end is ArcEnd.TOO_MANY_POINTS
+    assert all(p.point @ p.point == pytest.approx(1.0, abs=1e-9) for p in points)
+    folds = [p.point[-1] for p in points if p.is_fold]
+    assert folds[:3] == pytest.approx([1.0, -1.0, 1.0], abs=1e-9)
+
+
+def test_both_folds_of_a_snap_are_located_and_the_end_lies_on_the_bound():
+    points = list(trace(Snap(), np.array([-1.5, -1.875]), 1.0, (-1.875, 1.0), ArcSteps()))
+    folds = [p.point for p in points if p.is_fold]
+    peak = 2.0 / (3.0 * math.sqrt(3.0))
+    assert [f[-1] for f in folds] == pytest.approx([peak, -peak], abs=1e-9)
+    assert [f[0] for f in folds] == pytest.approx([-1 / math.sqrt(3), 1 / math.sqrt(3)], abs=1e-6)
+    assert points[-1].end is ArcEnd.REACHED_BOUND
+    assert points[-1].point[-1] == 1.0
+
+
+def test_a_branch_that_turns_back_in_a_kink_is_followed_across_it():
+    points = list(trace(Kink(), np.array([-1.0, -1.0]), 1.0, (-1.0, 1.0), ArcSteps()))
+    assert points[-1].end is ArcEnd.REACHED_BOUND
+    assert points[-1].point == pytest.approx([1.0, -1.0], abs=1e-12)
+    (fold,) = (p for p in points if p.is_fold)
+    assert fold.point[-1] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_equations_that_cease_to_exist_end_the_branch_with_a_reason():
+    last = list(trace(Edge(), np.array([0.0, 0.0]), 1.0, (-1.0, 1.0), ArcSteps()))[-1]
+    assert last.end is ArcEnd.STEP_TOO_SHORT
+    assert last.point[-1] == pytest.approx(0.5, abs=1e-5)
+
+
+@pytest.mark.parametrize("direction", [-1.0, 1.0])
+def test_the_first_step_goes_where_it_is_told(direction):
+    points = list(trace(Snap(), np.array([0.0, 0.0]), direction, (-0.1, 0.1), ArcSteps()))
+    assert points[-1].point[-1] == pytest.approx(0.1 * direction)

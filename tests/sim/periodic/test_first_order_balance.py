@@ -1,0 +1,135 @@
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from sim.modes import base_transmissibility
+from sim.periodic.condensation import Structure, condense, structure_of
+from sim.periodic.first_order_balance import (
+    first_order_states,
+    fold_amplitudes,
+    fundamental_share,
+    jump_frequencies,
+)
+from sim.periodic.restoring_force import PowerSpring
+from sim.specimen import gong2025
+
+FIT_LENGTH, FIT_FORCE = 46e-6, 4.891e9 * 1e-6**1.5
+
+
+def duffing(damping_ratio):
+    """x'' + 2 zeta x' + x = U - F, one mass."""
+    one = np.array([[1.0]])
+    return Structure(one, 2.0 * damping_ratio * one, one, np.ones(1), np.ones(1), np.zeros(1))
+
+
+@pytest.mark.parametrize("exponent", [1, 3, 5, 7, 29, 47, 201])
+def test_the_fundamental_of_a_power_of_a_cosine_is_its_fourier_integral(exponent):
+    integral, _ = quad(lambda a: math.cos(a) ** (exponent + 1), 0.0, 2.0 * math.pi, epsabs=1e-13)
+    assert fundamental_share(exponent) == pytest.approx(integral / math.pi, rel=1e-11)
+
+
+def test_an_even_power_is_refused():
+    with pytest.raises(ValueError, match="Exponent 4 is not allowed"):
+        fundamental_share(4)
+
+
+@pytest.mark.parametrize("frequency_hz", [80.0, 180.0, 199.0, 260.0, 420.0, 550.0])
+@pytest.mark.parametrize("amplitude_m", [1e-6, 5e-6, 50e-6])
+def test_every_state_satisfies_the_papers_fifth_order_equations(frequency_hz, amplitude_m):
+    specimen, omega = gong2025(), 2.0 * math.pi * frequency_hz
+    # The paper's equation 5 in its coordinates (x, p, z), with displacements A cos + B sin.
+    m0, m1, m2 = specimen.masses
+    k0, k1, k2 = specimen.stiffnesses
+    c0, c1, c2 = specimen.dampings
+    mass = np.array([[m0, 0, 0], [0, m1, m1], [0, 0, m2]])
+    stiff = np.array([[k0 + k2, 0, -k2], [0, k1, 0], [-k2, -k1, k2]])
+    damp = np.array([[c0 + c2, 0, -c2], [0, c1, 0], [-c2, -c1, c2]])
+    spring = PowerSpring(FIT_LENGTH, ((5, FIT_FORCE),))
+    states = first_order_states(structure_of(specimen), spring, frequency_hz, amplitude_m)
+    assert len(states) in (1, 3)
+    for state in states:
+        x, y, z = state.displacements
+        assert y - z == pytest.approx(state.relative, rel=1e-9)
+        phasor = np.array([x, y - z, z])
+        a, b = phasor.real, -phasor.imag
+        cubed = 5.0 / 8.0 * FIT_FORCE / FIT_LENGTH**5 * (a[1] ** 2 + b[1] ** 2) ** 2
+        pull_cos, pull_sin = cubed * a[1] * np.array([0, 1, -1]), cubed * b[1] * np.array([0, 1, -1])
+        drive_cos, drive_sin = [c0 * omega * amplitude_m, 0, 0], [k0 * amplitude_m, 0, 0]
+        dynamic = stiff - omega**2 * mass
+        size = np.abs(dynamic @ a).max() + np.abs(dynamic @ b).max()
+        np.testing.assert_allclose(dynamic @ a + omega * damp @ b + pull_cos, drive_cos, atol=1e-10 * size)
+        np.testing.assert_allclose(dynamic @ b - omega * damp @ a + pull_sin, drive_sin, atol=1e-10 * size)
+
+
+@pytest.mark.parametrize("exponent", [3, 47, 201])
+def test_a_weak_drive_leaves_the_linear_response(exponent):
+    specimen, spring = gong2025(), PowerSpring(FIT_LENGTH, ((exponent, FIT_FORCE),))
+    (state,) = first_order_states(structure_of(specimen), spring, 130.0, 1e-12)
+    linear = base_transmissibility(specimen, 130.0)[0]
+    assert state.displacements == pytest.approx(-1e-12j * linear[:3], rel=1e-9)
+
+
+@pytest.mark.parametrize("exponent", [3, 5, 29, 201])
+def test_a_huge_drive_binds_the_two_masses(exponent):
+    # p grows only as the n-th root of the force, so x approaches that of the two-mass specimen.
+    specimen, spring = gong2025(), PowerSpring(FIT_LENGTH, ((exponent, FIT_FORCE),))
+    states = first_order_states(structure_of(specimen), spring, 300.0, 10.0)
+    join = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
+    omega = 2.0 * math.pi * 300.0
+    dynamic = (
+        specimen.stiffness_matrix + 1j * omega * specimen.damping_matrix - omega**2 * specimen.mass_matrix
+    )
+    entry = specimen.stiffnesses[0] + 1j * omega * specimen.dampings[0]
+    bound = np.linalg.solve(join.T @ dynamic @ join, np.array([entry, 0.0]))
+    assert abs(states[0].displacements[0]) / 10.0 == pytest.approx(abs(bound[0]), rel=1e-3)
+
+
+def test_the_folds_of_the_duffing_oscillator_satisfy_their_closed_form():
+    zeta, alpha, force = 0.02, 0.5, 0.1
+    structure, spring = duffing(zeta), PowerSpring(1.0, ((3, alpha),))
+    jumps = jump_frequencies(structure, spring, force, 0.8 / (2 * math.pi), 3.0 / (2 * math.pi), 401)
+    assert len(jumps) == 2
+    for frequency in jumps:
+        omega = 2.0 * math.pi * frequency
+        # d/d(a^2) of a^2 ((1 - W^2 + 3/4 alpha a^2)^2 + (2 zeta W)^2) = 0, quadratic in a^2.
+        detuning = 1.0 - omega**2
+        squares = np.roots(
+            [27.0 / 16.0 * alpha**2, 3.0 * alpha * detuning, detuning**2 + (2 * zeta * omega) ** 2]
+        ).real
+        forces = np.sqrt(squares * ((detuning + 0.75 * alpha * squares) ** 2 + (2 * zeta * omega) ** 2))
+        assert np.min(np.abs(forces - force)) < 1e-9
+    low, high = jumps
+    inside = first_order_states(structure, spring, 0.5 * (low + high), force)
+    assert [state.is_stable_to_amplitude for state in inside] == [True, False, True]
+    assert len(first_order_states(structure, spring, low * 0.999, force)) == 1
+    assert len(first_order_states(structure, spring, high * 1.001, force)) == 1
+
+
+def test_the_duffing_resonance_lies_on_its_backbone():
+    # On the backbone W^2 = 1 + 3/4 alpha a^2 the phase lags by a quarter turn and a = force / (2 zeta W).
+    zeta, alpha, amplitude = 0.02, 0.5, 0.8
+    omega = math.sqrt(1.0 + 0.75 * alpha * amplitude**2)
+    states = first_order_states(
+        duffing(zeta), PowerSpring(1.0, ((3, alpha),)), omega / (2 * math.pi), 2 * zeta * omega * amplitude
+    )
+    assert states[-1].relative == pytest.approx(-amplitude, rel=1e-12)  # sin drive, then a quarter turn
+
+
+def test_between_its_fold_amplitudes_the_specimen_has_three_states():
+    structure = structure_of(gong2025())
+    for terms in [((5, FIT_FORCE),), ((201, FIT_FORCE),), tuple((n, FIT_FORCE / 3) for n in (3, 5, 7))]:
+        spring = PowerSpring(FIT_LENGTH, terms)
+        upper, lower = fold_amplitudes(structure, spring, 300.0)
+        assert len(first_order_states(structure, spring, 300.0, math.sqrt(upper * lower))) == 3
+        assert len(first_order_states(structure, spring, 300.0, 1.01 * upper)) == 1
+        assert len(first_order_states(structure, spring, 300.0, 0.99 * lower)) == 1
+
+
+def test_condensed_slopes_are_the_derivatives_by_frequency():
+    structure, harmonics, omega, step = structure_of(gong2025()), np.array([0, 1, 2, 7]), 1500.0, 0.01
+    before, here, after = (condense(structure, omega + d, harmonics) for d in (-step, 0.0, step))
+    slope = (after.compliance - before.compliance) / (2.0 * step)
+    np.testing.assert_allclose(here.compliance_slope, slope, rtol=1e-6, atol=1e-9 * np.abs(slope).max())
+    assert here.linear_slope == pytest.approx((after.linear - before.linear) / (2.0 * step), rel=1e-6)

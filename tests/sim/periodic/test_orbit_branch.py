@@ -1,0 +1,76 @@
+import numpy as np
+import pytest
+
+from sim.accuracy import Accuracy
+from sim.drive import Harmonic
+from sim.integrate import integrate
+from sim.modes import base_transmissibility
+from sim.periodic.branch import Happening, Parameter
+from sim.periodic.continuation import ArcEnd, ArcSteps
+from sim.periodic.orbit_branch import orbit_branch
+from sim.periodic.period_map import OrbitShape
+from sim.periodic.poincare import state_scales
+from sim.periodic.shooting import periodic_orbit
+from sim.specimen import gong2025
+
+SPECIMEN = gong2025(damping_time_s=3e-5)
+STEPS = ArcSteps(first=0.02, longest=0.3, shortest=1e-7, tolerance=1e-9, most_points=60)
+
+
+@pytest.fixture(scope="module")
+def upward():
+    """The mirrored motion at 100 Hz and 5 um, followed up to 112 Hz."""
+    orbit = periodic_orbit(SPECIMEN, Harmonic(100.0, 5e-6), OrbitShape.MIRRORED)
+    return orbit_branch(orbit, Parameter.FREQUENCY, 112.0, STEPS)
+
+
+def test_a_branch_ends_where_it_is_asked_to(upward):
+    assert upward.end is ArcEnd.REACHED_BOUND
+    assert upward.frequencies_hz[[0, -1]] == pytest.approx([100.0, 112.0])
+    assert upward.response_ii.shape == (len(upward.frequencies_hz), 4)
+
+
+def test_at_a_neimark_sacker_point_a_complex_pair_lies_on_the_unit_circle(upward):
+    points = [event for event in upward.events if event.kind is Happening.NEIMARK_SACKER]
+    assert points
+    for event in points:
+        orbit = periodic_orbit(SPECIMEN, Harmonic(event.frequency_hz, 5e-6), start=event.state)
+        on_circle = np.abs(np.abs(orbit.floquet_multipliers) - 1.0) < 1e-5
+        assert np.count_nonzero(on_circle) == 2
+        assert np.abs(orbit.floquet_multipliers[on_circle].imag).min() > 0.1
+
+
+def test_a_small_push_dies_on_a_stable_point_and_grows_on_an_unstable_one(upward):
+    for is_stable in (True, False):
+        place = int(np.flatnonzero(upward.is_stable == is_stable)[-1])
+        drive = Harmonic(float(upward.frequencies_hz[place]), 5e-6)
+        start, scales = upward.states[place], state_scales(SPECIMEN, drive)
+        push = 1e-7 * scales
+        periods = 60 / drive.frequency_hz
+        ends = [
+            integrate(SPECIMEN, drive, periods, Accuracy.REFERENCE, s).final_state
+            for s in (start, start + push)
+        ]
+        growth = np.abs((ends[1] - ends[0]) / scales).max() / 1e-7
+        expected = abs(upward.multipliers[place, 0]) ** 60
+        assert (growth < 1.0) == is_stable
+        assert 0.01 * expected < growth < 100.0 * expected
+
+
+def test_a_branch_that_leaves_the_stops_does_so_at_the_grazing_of_the_linear_response():
+    # Under a weak drive at 60 Hz, raised until p meets the gap.
+    gap_amplitude = SPECIMEN.gap_m / abs(base_transmissibility(SPECIMEN, 60.0)[0, 3])
+    orbit = periodic_orbit(SPECIMEN, Harmonic(60.0, 0.9 * gap_amplitude), OrbitShape.MIRRORED)
+    branch = orbit_branch(
+        orbit, Parameter.AMPLITUDE, 1.1 * gap_amplitude, ArcSteps(tolerance=1e-9, longest=0.5, most_points=60)
+    )
+    assert branch.events[0].kind is Happening.GRAZING
+    assert branch.events[0].amplitude_m == pytest.approx(gap_amplitude, rel=1e-6)
+    linear = base_transmissibility(SPECIMEN, 60.0)[0]
+    assert branch.response_ii[0] == pytest.approx(np.abs(linear), rel=1e-8)
+
+
+def test_a_branch_to_where_it_is_goes_nowhere():
+    orbit = periodic_orbit(SPECIMEN, Harmonic(130.0, 20e-6))
+    with pytest.raises(ValueError, match="two different ends"):
+        orbit_branch(orbit, Parameter.FREQUENCY, 130.0)

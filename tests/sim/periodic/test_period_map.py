@@ -1,0 +1,64 @@
+"""The period map's derivative: exact, against differences of the map, up to a grazing contact."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sim.drive import Harmonic
+from sim.integrate import integrate
+from sim.modes import base_transmissibility
+from sim.periodic.period_map import OrbitShape, PeriodMap
+from sim.periodic.poincare import state_scales
+from sim.specimen import gong2025
+
+DRIVE = Harmonic(130.0, 20e-6)
+OFFSETS, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)
+
+
+def by_differences(mapping, state, drive, step=1e-5):
+    """Fourth-order central differences of the map, over the state's scales."""
+    scales = state_scales(mapping.specimen, drive)
+    columns = []
+    for push in np.diag(step * scales):
+        images = [mapping.image(state + offset * push, drive) for offset in OFFSETS]
+        columns.append(np.dot(WEIGHTS, images) / (step * scales))
+    return np.array(columns).T
+
+
+@pytest.mark.parametrize("shape", list(OrbitShape))
+@pytest.mark.parametrize("contact", ["hertz", "linear_gap", "hunt_crossley:0.5", "rigid:0.8", "power:7"])
+def test_the_derivative_is_that_of_differences_of_the_map(contact, shape):
+    specimen = gong2025(contact=contact)
+    state = integrate(specimen, DRIVE, 20 / DRIVE.frequency_hz).final_state
+    mapping = PeriodMap(specimen, shape)
+    exact = mapping.derivative(state, DRIVE)
+    assert np.abs(by_differences(mapping, state, DRIVE) - exact).max() < 1e-6 * np.abs(exact).max()
+
+
+def test_two_periods_have_the_product_of_the_derivatives_of_each():
+    mapping = PeriodMap(gong2025())
+    state = integrate(gong2025(), DRIVE, 20 / DRIVE.frequency_hz).final_state
+    between = mapping.image(state, DRIVE)
+    product = mapping.derivative(between, DRIVE) @ mapping.derivative(state, DRIVE)
+    twice = PeriodMap(gong2025(), OrbitShape.REPEATED, 2).derivative(state, DRIVE)
+    np.testing.assert_allclose(twice, product, atol=1e-7 * np.abs(product).max())
+
+
+@pytest.mark.parametrize(("contact", "power"), [("hertz", 1.0), ("linear_gap", 0.5)])
+def test_past_grazing_the_derivative_leaves_the_free_one_with_the_power_of_the_law(contact, power):
+    # The contact lasts as the square root of its depth d; its stiffness is d^0.5 (Hertz) or constant.
+    specimen = gong2025(contact=contact)
+    motion = base_transmissibility(specimen, DRIVE.frequency_hz)[0]
+    grazing = specimen.gap_m / abs(motion[3])
+    half = OrbitShape.MIRRORED
+    free = PeriodMap(gong2025(contact="linear"), half).derivative(np.zeros(6), DRIVE)
+    omega = 2.0 * math.pi * DRIVE.frequency_hz
+    departures = []
+    for excess in (-1e-9, 1e-10, 1e-9, 1e-8):
+        drive = Harmonic(DRIVE.frequency_hz, grazing * (1.0 + excess))
+        state = drive.amplitude_m * np.concatenate([motion[:3].imag, omega * motion[:3].real])
+        departures.append(np.abs(PeriodMap(specimen, half).derivative(state, drive) - free).max())
+    assert departures[0] < 1e-9
+    slopes = np.diff(np.log10(departures[1:]))
+    assert slopes == pytest.approx(power, abs=0.1)

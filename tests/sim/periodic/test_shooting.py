@@ -1,0 +1,102 @@
+import math
+
+import numpy as np
+import pytest
+
+from sim.accuracy import Accuracy
+from sim.drive import Harmonic
+from sim.integrate import integrate
+from sim.modes import base_transmissibility
+from sim.periodic.period_map import OrbitShape, PeriodMap
+from sim.periodic.poincare import smallest_period, state_scales, stroboscopic_section
+from sim.periodic.shooting import ShootingEnd, periodic_orbit
+from sim.specimen import gong2025
+
+SPECIMEN = gong2025(damping_time_s=3e-5)
+TRACE = 390.081
+"""tr(M^-1 C) of the specimen [1/s]."""
+
+
+@pytest.mark.parametrize("shape", list(OrbitShape))
+def test_the_known_periodic_state_is_found(shape):
+    orbit = periodic_orbit(SPECIMEN, Harmonic(130.0, 20e-6), shape)
+    assert orbit.outcome is ShootingEnd.CONVERGED
+    assert orbit.is_stable
+    assert orbit.impacts == 2
+    assert orbit.response_i[0] * 20e-6 == pytest.approx(29.397e-6, abs=1e-9)
+    assert orbit.response_ii[0] * 20e-6 == pytest.approx(31.4079e-6, abs=2e-10)
+
+
+@pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(100.0, 5e-6), (130.0, 20e-6)])
+def test_the_multipliers_of_an_orbit_multiply_to_what_damping_leaves(frequency_hz, amplitude_m):
+    # Liouville's theorem: the contact, which has no loss, cannot change the volume.
+    orbit = periodic_orbit(SPECIMEN, Harmonic(frequency_hz, amplitude_m), OrbitShape.MIRRORED)
+    product = np.prod(orbit.floquet_multipliers)
+    assert np.log(product).real == pytest.approx(-TRACE / frequency_hz, rel=1e-6)
+    whole = periodic_orbit(SPECIMEN, Harmonic(frequency_hz, amplitude_m))
+    for value in whole.floquet_multipliers:
+        assert np.abs(orbit.floquet_multipliers - value).min() < 1e-7
+
+
+def test_without_contact_the_orbit_is_the_linear_response():
+    specimen, drive = gong2025(contact="linear"), Harmonic(266.0, 5e-6)
+    orbit = periodic_orbit(specimen, drive, start=np.zeros(6))
+    linear = np.abs(base_transmissibility(specimen, 266.0)[0])
+    assert orbit.impacts == 0
+    assert orbit.response_ii == pytest.approx(linear, rel=1e-9)
+    assert orbit.response_i == pytest.approx(linear, rel=1e-5)
+
+
+def test_an_orbit_is_found_from_a_state_far_from_it():
+    drive = Harmonic(130.0, 20e-6)
+    known = periodic_orbit(SPECIMEN, drive)
+    pushed = known.state + 1e-3 * state_scales(SPECIMEN, drive)
+    again = periodic_orbit(SPECIMEN, drive, start=pushed)
+    np.testing.assert_allclose(again.state / known.state, 1.0, atol=1e-6)
+
+
+def test_the_map_slopes_are_those_of_a_linear_flow():
+    specimen, drive = gong2025(contact="linear"), Harmonic(130.0, 20e-6)
+    mapping = PeriodMap(specimen)
+    scales = state_scales(specimen, drive)
+    origin = mapping.image(np.zeros(6), drive)
+    columns = [
+        (mapping.image(s * e, drive) - origin) / scales for s, e in zip(scales, np.eye(6), strict=True)
+    ]
+    derivative = mapping.derivative(np.zeros(6), drive)
+    np.testing.assert_allclose(derivative, np.array(columns).T, atol=1e-9)
+    # From rest the response is proportional to the drive: d image / d ln A0 is the image itself.
+    slope = mapping.amplitude_slope(np.zeros(6), drive)
+    np.testing.assert_allclose(slope, origin / scales, atol=1e-9 * np.abs(origin / scales).max())
+
+
+def test_chaos_has_no_period_and_a_settled_orbit_has_one():
+    drive = Harmonic(130.0, 20e-6)
+    section = stroboscopic_section(SPECIMEN, drive, 300)
+    assert smallest_period(section, state_scales(SPECIMEN, drive)) == 1
+    wild = Harmonic(260.0, 5e-6)
+    section = stroboscopic_section(SPECIMEN, wild, 600)
+    assert smallest_period(section, state_scales(SPECIMEN, wild)) is None
+
+
+def test_a_section_of_a_known_sequence_has_its_period():
+    points = np.tile(np.arange(3.0), 8)[:, None] * np.ones(6)
+    assert smallest_period(points, np.ones(6)) == 3
+    assert smallest_period(points + np.arange(24.0)[:, None], np.ones(6)) is None
+
+
+def test_chaos_is_refused_or_an_unstable_orbit_is_found_in_it():
+    orbit = periodic_orbit(SPECIMEN, Harmonic(260.0, 5e-6))
+    if orbit.outcome is ShootingEnd.CONVERGED:
+        assert not orbit.is_stable
+        run = integrate(SPECIMEN, orbit.drive, 1.0 / 260.0, Accuracy.REFERENCE, orbit.state)
+        assert np.abs((run.final_state - orbit.state) / state_scales(SPECIMEN, orbit.drive)).max() < 1e-8
+    else:
+        assert orbit.defect > 1e-9 or math.isinf(orbit.defect)
+
+
+def test_a_drive_of_nothing_and_a_mirrored_double_period_are_refused():
+    with pytest.raises(ValueError, match="positive amplitude"):
+        periodic_orbit(SPECIMEN, Harmonic(100.0, 0.0))
+    with pytest.raises(ValueError, match="mirrored motion of 2 periods"):
+        periodic_orbit(SPECIMEN, Harmonic(100.0, 1e-6), OrbitShape.MIRRORED, 2)
