@@ -10,11 +10,10 @@ from pydantic import ConfigDict
 from .accuracy import Accuracy
 from .drive import Harmonic
 from .prediction import State
+from .response import WHOLE
 from .specimen import Specimen
 
 _STRICT = ConfigDict(extra="forbid")
-WHOLE = 1e-9
-"""A window this close to a whole number of periods is taken for it."""
 PAPER_DURATION_S, PAPER_WINDOW_S = 30.0, 5.0
 """Gong et al. 2025, section 2: 30 s from rest, the last 5 s observed."""
 

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..response import WHOLE
 from ..trajectory import Floats
 from .followed_run import FollowedRun, Samples, Stretch, Watch
 
 BLOCKS = 10
 """Parts of a window whose extremes are kept apart: what the scatter of the whole is found from."""
-WHOLE = 1e-9
-"""A time this close to a whole number of periods is taken for it."""
 
 
 @dataclass(frozen=True, eq=False)

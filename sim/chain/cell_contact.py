@@ -15,7 +15,6 @@ from ..engine.contact import (
     LANDING,
     LEFT,
     LOGGED,
-    MOST_CORRECTIONS,
     MOST_STEPS,
     NOT_FINITE,
     RATE_FLOOR,
@@ -24,6 +23,7 @@ from ..engine.contact import (
     STALLED,
     step_factor,
 )
+from ..engine.contact_end import MOST_CORRECTIONS
 from ..engine.contact_flow import R, W, step_error
 from ..engine.detection import polynomial_at
 from ..engine.parameters import POWER, Table, Vector

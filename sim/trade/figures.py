@@ -5,9 +5,6 @@ from dataclasses import dataclass
 from ..accuracy import Accuracy
 from .regimes import Motion, Regime
 
-STATE_UNITS = (1e-4, 0.1)
-"""An error of a state is in units of 100 um and 0.1 m/s, whichever part is worst."""
-
 
 @dataclass(frozen=True)
 class LevelFigures:
@@ -17,7 +14,7 @@ class LevelFigures:
     cost: float
     """Processor time over simulated time."""
     state_error: float | None
-    """Of the state at the end of the span, against the independent solution; None in chaos."""
+    """Of the state at the end of the span, as `sim.independent_solution.state_error`; None in chaos."""
     response_i_error: float | None
     """Relative, against the reference level; None in chaos."""
     response_ii_error: float | None

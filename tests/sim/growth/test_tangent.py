@@ -97,6 +97,14 @@ def test_each_level_of_accuracy_has_a_tangent_nearer_to_the_reference(contact):
     assert quick < 0.1
 
 
+@pytest.mark.parametrize("contact", ["hertz", "power:7"])
+def test_after_a_few_impacts_a_tangent_has_three_digits_at_standard_accuracy(contact):
+    specimen = gong2025(contact=contact)
+    truth = run_with_tangent(specimen)[0]
+    off = np.abs(run_with_tangent(specimen, Accuracy.STANDARD)[0] - truth).max()
+    assert off < 1e-3 * np.abs(truth).max()
+
+
 def test_an_impact_with_restitution_shrinks_volume_by_its_square():
     specimen = gong2025(contact="rigid:0.8")
     tangent, _, impacts = run_with_tangent(specimen)
