@@ -44,8 +44,15 @@ class Drive(Protocol):
     def perform(self, phase: Phase) -> Iterator[float]:
         """Play a phase; yields how long to read before the next command is due [s]."""
 
-    def ramp_down(self) -> Iterator[float]:
-        """Break off what was announced, and ramp down; yields as `perform` does."""
+    @property
+    def can_hold(self) -> bool:
+        """Whether what is played goes on by itself while nobody tells more."""
+
+    def ramp_down(self, ramp_s: float) -> Iterator[float]:
+        """Break off what was announced, and ramp down within ``ramp_s`` [s]; yields as `perform` does."""
+
+    def cut(self) -> None:
+        """Switch off at once, with a step. Legal at any time."""
 
     def silence(self) -> None:
         """Be silent as soon as it goes without a step, and at once when that fails. Legal at any time."""

@@ -25,11 +25,11 @@ class GeneratorDrive:
     player = Player.GENERATOR
     pause_s = 0.0
     """A generator need not know what is coming."""
+    can_hold = True
 
     def __init__(self, generator: FunctionGenerator, measurement: Measurement) -> None:
         self._generator = generator
         self._amplitude_vpp = measurement.excitation.amplitude_vpp
-        self._ramp_s = measurement.ramp_s
         self._stairs = stairs(measurement)
         self._play: Play | None = None
         self._level = 0.0
@@ -60,16 +60,20 @@ class GeneratorDrive:
                 yield phase.duration_s
             case RunState.RAMPING_UP:
                 self._begin(phase.play)
-                yield from self._ramp(phase.end_level)
+                yield from self._ramp(phase.end_level, phase.duration_s)
             case RunState.RAMPING_DOWN:
-                yield from self._ramp(phase.end_level)
+                yield from self._ramp(phase.end_level, phase.duration_s)
             case _:
                 self._begin(phase.play)
                 yield phase.duration_s
 
-    def ramp_down(self) -> Iterator[float]:
-        """Ramp down from the level of now; yields how long to read on every stair [s]."""
-        yield from self._ramp(0.0)
+    def ramp_down(self, ramp_s: float) -> Iterator[float]:
+        """Ramp down from the level of now, in as many stairs as any; yields how long to read on each [s]."""
+        yield from self._ramp(0.0, ramp_s)
+
+    def cut(self) -> None:
+        """Turn the output off, loud as it is."""
+        self._stop()
 
     def silence(self) -> None:
         """Ramp down as fast as the generator takes commands, then turn the output off, whatever happens.
@@ -129,11 +133,11 @@ class GeneratorDrive:
         if level > level_before:
             self._generator.set_amplitude(self._due_vpp)
 
-    def _ramp(self, target: float) -> Iterator[float]:
+    def _ramp(self, target: float, ramp_s: float) -> Iterator[float]:
         begin = self._level
         for stair in range(1, self._stairs + 1):
             self._set_level(begin + (target - begin) * half_cosine(stair / self._stairs))
-            yield self._ramp_s / self._stairs
+            yield ramp_s / self._stairs
 
     def _start(self) -> None:
         # Before the command: should it fail half-way, the output counts as on.

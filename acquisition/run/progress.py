@@ -6,6 +6,7 @@ from pathlib import Path
 from ..excitation.steps import Segment
 from ..instruments import Block
 from .state import RunState
+from .stop import Cause
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,3 +33,5 @@ class Outcome:
     reason: str
     path: Path
     """The recording."""
+    cause: Cause | None = None
+    """What ended it before its plan did; None for a plan carried out."""

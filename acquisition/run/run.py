@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -12,13 +11,14 @@ import numpy as np
 from ..check.low_level import BenchCheck, judged, require_checkable
 from ..errors import AcquisitionError, LimitExceeded
 from ..instruments import Block, Samples
-from ..plan.limits import require_within_limits
+from ..plan.limits import require_within_limits, shortest_ramp_s
 from ..plan.measurement import Measurement
 from ..recording.header import RecordingHeader
-from ..recording.layout import RecordingState
+from ..recording.preallocate import MARGIN_S
 from ..recording.writer import create_recording
 from .bench_protocol import RunBench
 from .drive import Drive, drive_for
+from .ending import Ending
 from .guard import Guard
 from .header import run_header
 from .progress import Outcome, Progress
@@ -31,13 +31,21 @@ from .schedule import (
     phases,
 )
 from .state import RunState
-from .tape import Recorder, Tape
+from .stop import LEVELS, Cause, StopLevel, StopRequest, StopSwitch
+from .tape import BLOCK_S, Recorder, Tape
 
 CreateRecording = Callable[[Path, RecordingHeader], Recorder]
 
+HOLD_LONGEST_S = 0.8 * MARGIN_S
+"""How long a run may be held in all [s]: its recording has room for that and for the ramp after it."""
 
-class _Cancelled(Exception):
-    """Somebody asked the run to end; the text says why."""
+
+class _Stopped(Exception):
+    """Somebody asked the run to end."""
+
+    def __init__(self, request: StopRequest) -> None:
+        super().__init__(request.reason)
+        self.request = request
 
 
 class Run:
@@ -64,7 +72,10 @@ class Run:
         path: Path,
         bench_check: BenchCheck = BenchCheck.AT_LOW_LEVEL,
         create: CreateRecording = create_recording,
+        switch: StopSwitch | None = None,
     ) -> None:
+        """``switch``: what others hold or end the run by; one of its own if absent."""
+        self._switch = StopSwitch() if switch is None else switch
         self._bench = bench
         self._measurement = measurement
         self._path = path
@@ -74,9 +85,9 @@ class Run:
         self._guard = Guard(bench.rig, bench.channels, measurement.limits)
         self._total_s = duration_s(measurement)
         self._state = RunState.IDLE
-        self._cancelled: str | None = None
-        self._ending = (RunState.FAILED, "the run ended without saying why")
+        self._ending = Ending()
         self._look: Callable[[Block], None] = self._go_on
+        self._held_s = 0.0
         self._blocks = self._carry_out()
 
     @property
@@ -87,15 +98,19 @@ class Run:
     @property
     def outcome(self) -> Outcome:
         """How the run ended, once its state is one of ``ENDED``."""
-        return Outcome(*self._ending, self._path)
+        return self._ending.outcome(self._path)
+
+    @property
+    def switch(self) -> StopSwitch:
+        """What holds or ends the run, within a block; from any thread, and from a signal handler."""
+        return self._switch
 
     def cancel(self, reason: str = "cancelled") -> None:
-        """Ask the run to ramp down and end, within a block. From any thread, and from a signal handler.
+        """Ask the run to ramp down and end, as the operator would.
 
-        Without effect on a run that is ramping down for the last time, or has ended.
+        Without effect on a run that has ended, or is ramping down for the last time.
         """
-        # One assignment, which needs no lock: a signal handler must not wait for one.
-        self._cancelled = reason
+        self._switch.ask(StopRequest.by(Cause.OPERATOR, reason))
 
     def close(self) -> None:
         """End the run if it has not ended: ramp down, silence, finish the recording."""
@@ -117,26 +132,29 @@ class Run:
         tape = Tape(self._bench.digitizer, recorder)
         try:
             yield from self._played(tape)
-            self._ending = (RunState.FINISHED, "the plan was carried out")
-        except _Cancelled as request:
-            self._ending = (RunState.STOPPED, str(request))
-            yield from self._ramped_down_early(tape)
+            self._ending.is_finished()
+        except _Stopped as stop:
+            self._ending.is_stopped(str(stop), stop.request.cause)
+            yield from self._ramped_down_early(tape, stop.request.level)
         except LimitExceeded as error:
-            self._ending = (RunState.FAILED, str(error))
-            yield from self._ramped_down_early(tape)
+            self._ending.is_failed(error, str(error))
+            yield from self._ramped_down_early(tape, LEVELS[Cause.LIMIT])
             raise
         except GeneratorExit:
-            self._ending = (RunState.STOPPED, "the program that carried it out left it")
-            deque(self._ramped_down_early(tape), maxlen=0)
+            self._ending.is_stopped("the program that carried it out left it", Cause.PROGRAM)
+            deque(self._ramped_down_early(tape, LEVELS[Cause.PROGRAM]), maxlen=0)
             raise
         except KeyboardInterrupt:
-            self._ending = (RunState.STOPPED, "interrupted from the keyboard")
+            self._ending.is_stopped("interrupted from the keyboard", Cause.KEYBOARD)
             raise
         except Exception as error:
-            self._ending = (RunState.FAILED, f"{type(error).__name__}: {error}")
+            self._ending.is_failed(error, f"{type(error).__name__}: {error}")
             raise
         finally:
-            self._leave(recorder)
+            try:
+                self._ending.leave(self._drive, self._bench.digitizer, recorder)
+            finally:
+                self._state = self._ending.state
 
     def _admitted(self) -> Recorder:
         """Refuse what can be refused before anything moves; then begin the recording."""
@@ -148,7 +166,7 @@ class Run:
             self._total_s += self._before_s()
             return self._create(self._path, run_header(self._bench, self._measurement, self._total_s))
         except AcquisitionError as error:
-            self._ending = (RunState.FAILED, str(error))
+            self._ending.is_failed(error, str(error))
             self._state = RunState.FAILED
             raise
 
@@ -205,79 +223,78 @@ class Run:
         for wait_s in self._drive.perform(phase):
             yield from self._read(tape, wait_s, into)
 
-    def _ramped_down_early(self, tape: Tape) -> Iterator[Progress]:
-        """Ramp down from wherever the run is, unwatched; a segment that is open stays incomplete."""
+    def _ramped_down_early(self, tape: Tape, level: StopLevel) -> Iterator[Progress]:
+        """Ramp down from wherever the run is, unwatched; a segment that is open stays incomplete.
+
+        A harder stop that is asked for on the way takes over.
+        """
         self._look = _look_away
-        tape.log("end", self._ending[1])
+        tape.log("end", self._ending.reason)
         tape.cut()
+        since_s = tape.elapsed_s
         if self._drive.is_heard:
             self._enter(tape, RunState.RAMPING_DOWN)
-            for wait_s in self._drive.ramp_down():
+        while level is not StopLevel.OFF and self._drive.is_heard:
+            for wait_s in self._drive.ramp_down(self._ramp_s(level)):
                 yield from self._read(tape, wait_s)
+                if (harder := self._switch.harder_than(level)) is not None:
+                    level = harder.level
+                    tape.log("end", harder.reason)
+                    break
+        if level is StopLevel.OFF:
+            self._drive.cut()
+        tape.log("silence", f"{level.value}: {tape.elapsed_s - since_s:.3f} s after the stop was seen")
+
+    def _ramp_s(self, level: StopLevel) -> float:
+        """How long the ramp of a stop takes [s]."""
+        planned_s = self._measurement.ramp_s
+        return planned_s if level is StopLevel.RAMP else min(planned_s, shortest_ramp_s(self._bench.rig))
 
     def _read(self, tape: Tape, duration_s: float, into: list[Samples] | None = None) -> Iterator[Progress]:
         for block in tape.read_for(duration_s):
             if into is not None:
                 into.append(block.volts)
-            yield Progress(
-                self._state, tape.segment, block, tape.elapsed_s, self._total_s, self._drive.setting_vpp
-            )
+            yield self._progress(tape, block)
             self._look(block)
+            if self._switch.is_holding and self._look == self._go_on:
+                yield from self._held(tape)
+
+    def _held(self, tape: Tape) -> Iterator[Progress]:
+        """Stay where the run is, watched and recorded, until it is resumed or stopped.
+
+        What must be fed cannot stay, and the recording has room for `HOLD_LONGEST_S` in all: then it is
+        ramped down.
+        """
+        if not self._drive.can_hold:
+            reason = f"a stream from the {self._drive.player.value} cannot be held: it was ramped down"
+            raise _Stopped(StopRequest.by(Cause.OPERATOR, reason))
+        before = self._state
+        self._enter(tape, RunState.HELD)
+        while self._switch.is_holding:
+            self._held_s += BLOCK_S
+            if self._held_s > HOLD_LONGEST_S:
+                reason = f"held for {HOLD_LONGEST_S:g} s, the longest that its recording has room for"
+                raise _Stopped(StopRequest.by(Cause.OPERATOR, reason))
+            block = tape.linger(BLOCK_S)
+            yield self._progress(tape, block)
+            self._look(block)
+        self._enter(tape, before)
 
     def _go_on(self, block: Block) -> None:
         """Raise what ends the run early: a limit, or somebody's wish."""
         self._guard.require_safe(block)
-        if self._cancelled is not None:
-            raise _Cancelled(self._cancelled)
+        if (request := self._switch.request) is not None:
+            raise _Stopped(request)
+
+    def _progress(self, tape: Tape, block: Block) -> Progress:
+        level_vpp = self._drive.setting_vpp
+        return Progress(self._state, tape.segment, block, tape.elapsed_s, self._total_s, level_vpp)
 
     def _enter(self, tape: Tape, state: RunState) -> None:
         if state is not self._state:
             self._state = state
             tape.log("state", state.value)
 
-    def _leave(self, recorder: Recorder) -> None:
-        """Silence the generator, end sampling, finish the recording: each of them, whatever the others do."""
-        with ExitStack() as leaving:
-            leaving.callback(self._finish, recorder)
-            leaving.callback(self._stop_listening)
-            leaving.callback(self._silence)
-
-    def _silence(self) -> None:
-        try:
-            self._drive.silence()
-        except AcquisitionError as failure:
-            self._add_failure(failure)
-            raise
-
-    def _stop_listening(self) -> None:
-        has_failed_already = self._ending[0] is RunState.FAILED
-        try:
-            self._bench.digitizer.stop()
-        except AcquisitionError as failure:
-            self._add_failure(failure)
-            if not has_failed_already:  # else the first failure is the cause, and must stay in front
-                raise
-
-    def _add_failure(self, failure: AcquisitionError) -> None:
-        self._ending = (RunState.FAILED, f"{self._ending[1]}; then: {failure}")
-
-    def _finish(self, recorder: Recorder) -> None:
-        state, reason = self._ending
-        try:
-            recorder.finish(_RECORDED_AS[state], reason)
-        except AcquisitionError as failure:
-            self._add_failure(failure)
-            raise
-        finally:
-            self._state = self._ending[0]
-
 
 def _look_away(block: Block) -> None:
     """Let a block pass: the run is ending already."""
-
-
-_RECORDED_AS = {
-    RunState.FINISHED: RecordingState.COMPLETE,
-    RunState.STOPPED: RecordingState.STOPPED,
-    RunState.FAILED: RecordingState.FAILED,
-}

@@ -7,9 +7,10 @@ from ..check.low_level import BenchCheck
 from ..plan.measurement import Measurement
 from ..recording.writer import create_recording
 from .bench_protocol import RunBench
-from .cancel_on_signal import cancel_on_signal
 from .progress import Outcome, Progress
 from .run import CreateRecording, Run
+from .stop import StopSwitch
+from .stop_on_signal import stop_on_signal
 
 
 def ignore_progress(progress: Progress) -> None:
@@ -23,11 +24,12 @@ def run_measurement(
     bench_check: BenchCheck = BenchCheck.AT_LOW_LEVEL,
     on_progress: Callable[[Progress], None] = ignore_progress,
     create: CreateRecording = create_recording,
+    switch: StopSwitch | None = None,
 ) -> Outcome:
     """Carry out ``measurement`` on an open bench and record it at ``path`` (``NAME.h5``).
 
-    ``on_progress`` is called after every block. Ctrl-C ramps down and returns an outcome whose
-    state is ``stopped``; a second Ctrl-C raises KeyboardInterrupt.
+    ``on_progress`` is called after every block; ``switch`` lets others hold or end the run. Ctrl-C
+    ramps down and returns an outcome whose state is ``stopped``; a second one raises KeyboardInterrupt.
 
     Raises
     ------
@@ -36,9 +38,9 @@ def run_measurement(
         finished as failed.
 
     """
-    run = Run(bench, measurement, path, bench_check, create)
+    run = Run(bench, measurement, path, bench_check, create, switch)
     # The signals stay caught until the run has been left: impatience must not interrupt the silencing.
-    with cancel_on_signal(run), run:
+    with stop_on_signal(run.switch), run:
         for progress in run:
             on_progress(progress)
     return run.outcome

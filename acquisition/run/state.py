@@ -11,7 +11,8 @@ class RunState(StrEnum):
         idle -> checking -> armed -> ramping_up -> settling -> recording -> ramping_down -> finished
                     |          |          ^            (next waveform)           |
                     |          |          +--------------------------------------+
-                    |          +-> ramping_down -> stopped    (cancelled)
+                    |          |     (held: any of these stays as it is for a while)
+                    |          +-> ramping_down -> stopped    (asked to stop)
                     +-> failed <- from every state            (limit, check, driver, disk)
 
     From ``armed`` to ``ramping_down`` the generator's output may be on; in every other state it is off,
@@ -24,6 +25,7 @@ class RunState(StrEnum):
     RAMPING_UP = "ramping_up"
     SETTLING = "settling"
     RECORDING = "recording"
+    HELD = "held"
     RAMPING_DOWN = "ramping_down"
     FINISHED = "finished"
     STOPPED = "stopped"

@@ -30,13 +30,13 @@ class StreamDrive:
     """
 
     player = Player.OUTPUT
+    can_hold = False
 
     def __init__(self, output: AnalogOutput, measurement: Measurement, terminal_factor: float) -> None:
         """``terminal_factor``: volts that the generator's terminal would show per volt of setting."""
         self._output = output
         self._amplitude_vpp = measurement.excitation.amplitude_vpp
         self._full_v = 0.5 * self._amplitude_vpp * terminal_factor
-        self._ramp_s = measurement.ramp_s
         self._score = Score(output.sample_rate_hz)
         self._read_s = 0.0
         self._written = 0
@@ -76,13 +76,19 @@ class StreamDrive:
         self._is_playing = True
         yield from self._listened(phase.duration_s, self._full_vpp(phase) * phase.end_level)
 
-    def ramp_down(self) -> Iterator[float]:
+    def ramp_down(self, ramp_s: float) -> Iterator[float]:
         """Let what is written play out, then fade; yields as `perform` does."""
-        fade_s = self._ramp_s if self._score.level > 0.0 else 0.0
+        fade_s = ramp_s if self._score.level > 0.0 else 0.0
         written_s = self._written / self._output.sample_rate_hz - self._read_s
-        self._score.fade(self._ramp_s)
+        self._score.fade(ramp_s)
         yield from self._listened(written_s, self._heard_vpp)
         yield from self._listened(fade_s, 0.0)
+
+    def cut(self) -> None:
+        """Go to zero volts at once, whatever was written."""
+        self._is_playing = False
+        self._heard_vpp = 0.0
+        self._output.stop()
 
     def silence(self) -> None:
         """Fade within the shortest time, wait by writing until that has been played, then stop.
@@ -94,9 +100,7 @@ class StreamDrive:
             with suppress(AcquisitionError):  # what fails here leaves it to stop()
                 self._fade_blindly()
         finally:
-            self._is_playing = False
-            self._heard_vpp = 0.0
-            self._output.stop()
+            self.cut()
 
     @property
     def _played(self) -> int:

@@ -59,13 +59,21 @@ class Tape:
         """
         rate_hz = self._digitizer.sample_rate_hz
         self._due_s += duration_s
-        goal = round(self._due_s * rate_hz)
         longest = max(1, round(BLOCK_S * rate_hz))
-        while self._samples < goal:
-            block = self._digitizer.read(min(longest, goal - self._samples))
-            self._recorder.append(block)
-            self._samples = block.first_sample + block.volts.shape[1]
-            yield block
+        # The goal moves when whoever takes the blocks lingers.
+        while self._samples < (goal := round(self._due_s * rate_hz)):
+            yield self._next(min(longest, goal - self._samples))
+
+    def linger(self, duration_s: float) -> Block:
+        """Read and keep one block more than was asked for; everything after it comes that much later."""
+        self._due_s += duration_s
+        return self._next(round(duration_s * self._digitizer.sample_rate_hz))
+
+    def _next(self, samples: int) -> Block:
+        block = self._digitizer.read(samples)
+        self._recorder.append(block)
+        self._samples = block.first_sample + block.volts.shape[1]
+        return block
 
     def cut(self) -> None:
         """Let the next stretch begin now, however much of the last one is missing."""

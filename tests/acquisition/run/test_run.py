@@ -22,11 +22,13 @@ from acquisition.excitation.sine_sweep import SineSweep
 from acquisition.excitation.stepped_sine import SteppedSine
 from acquisition.excitation.streamed_noise import StreamedNoise
 from acquisition.instruments import Overload
+from acquisition.plan.limits import shortest_ramp_s
 from acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
 from acquisition.recording.layout import RecordingState
-from acquisition.run.run import Run
+from acquisition.run.run import HOLD_LONGEST_S, Run
 from acquisition.run.schedule import CHECK_S
 from acquisition.run.state import RunState
+from acquisition.run.stop import Cause, StopLevel, StopRequest, StopSwitch
 
 RATE = 5120.0
 AMPLITUDE_VPP = 1.0
@@ -36,6 +38,7 @@ DWELL = Measurement(
     ramp_s=0.2,
     ramp_step_s=0.02,
 )
+SLOW = DWELL.model_copy(update={"ramp_s": 1.0})
 RECORDED_STATES = [
     RunState.CHECKING,
     RunState.RAMPING_UP,
@@ -381,6 +384,100 @@ class TestEveryWayOut:
         play(run)
         assert run.state is RunState.STOPPED
         assert_ended_without_a_jump(bench)
+
+
+class TestStopLevels:
+    def ended(self, bench, tmp_path, *levels):
+        """Stop a recording at each level, a block after the other; the blocks after the first wish."""
+        run = run_of(bench, tmp_path, SLOW)
+        upto(run, RunState.RECORDING)
+        shown = []
+        for level in levels:
+            run.switch.ask(StopRequest(Cause.OPERATOR, level, f"{level} pressed"))
+            shown += [progress for progress in [next(iter(run), None)] if progress is not None]
+        return run, [*shown, *play(run)]
+
+    def test_a_ramp_takes_as_long_as_planned(self, bench, tmp_path):
+        run, shown = self.ended(bench, tmp_path, StopLevel.RAMP)
+        assert shown[-1].elapsed_s - shown[0].elapsed_s == pytest.approx(SLOW.ramp_s * 49 / 50, abs=1e-3)
+        assert run.outcome.cause is Cause.OPERATOR
+        assert_ended_without_a_jump(bench)
+
+    def test_an_abort_takes_three_periods_of_the_suspension(self, bench, tmp_path):
+        _, shown = self.ended(bench, tmp_path, StopLevel.ABORT)
+        ramp_s = shortest_ramp_s(bench.rig)
+        assert shown[-1].elapsed_s - shown[0].elapsed_s == pytest.approx(ramp_s * 49 / 50, abs=1e-3)
+        assert_ended_without_a_jump(bench)
+
+    def test_off_switches_off_before_another_sample_is_read(self, bench, tmp_path):
+        run = run_of(bench, tmp_path)
+        upto(run, RunState.RECORDING)
+        run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off"))
+        reads = [name for name, _, _ in bench.world.calls].count("digitizer.read")
+        assert play(run) == []
+        assert [name for name, _, _ in bench.world.calls].count("digitizer.read") == reads
+        assert_silent_and_finished(bench, RecordingState.STOPPED)
+
+    def test_a_harder_stop_takes_over_from_a_slow_ramp(self, bench, tmp_path):
+        _, shown = self.ended(bench, tmp_path, StopLevel.RAMP, StopLevel.ABORT)
+        assert shown[-1].elapsed_s - shown[0].elapsed_s < shortest_ramp_s(bench.rig) + 2 * SLOW.ramp_s / 50
+        assert_ended_without_a_jump(bench)
+        assert [event[2] for event in bench.recorder.events if event[1] == "end"] == [
+            "ramp pressed", "abort pressed"
+        ]  # fmt: skip
+
+    def test_a_gentler_wish_does_not_soften_a_hard_one(self):
+        switch = StopSwitch()
+        switch.ask(StopRequest(Cause.EMERGENCY, StopLevel.ABORT, "first"))
+        switch.ask(StopRequest(Cause.OPERATOR, StopLevel.RAMP, "second"))
+        assert switch.request.reason == "first"
+
+    def test_the_time_to_silence_stands_in_the_recording(self, bench, tmp_path):
+        self.ended(bench, tmp_path, StopLevel.ABORT)
+        said = next(event[2] for event in bench.recorder.events if event[1] == "silence")
+        assert said == f"abort: {shortest_ramp_s(bench.rig):.3f} s after the stop was seen"
+
+    @pytest.mark.parametrize("state", [RunState.RAMPING_UP, RunState.SETTLING, RunState.RECORDING])
+    def test_a_held_run_stays_as_it_is_and_goes_on_where_it_was(self, bench, tmp_path, state):
+        run = run_of(bench, tmp_path)
+        before = upto(run, state)
+        run.switch.hold()
+        held = [next(iter(run)) for _ in range(3)]
+        assert {progress.state for progress in held} == {RunState.HELD}
+        assert {progress.amplitude_vpp for progress in held} == {before.amplitude_vpp}
+        run.switch.resume()
+        after = play(run)
+        assert after[0].state is state
+        assert run.state is RunState.FINISHED
+        assert bench.recorder.samples == round((CHECK_S + 0.2 + 0.35 + 0.5 + 0.2 + 0.3) * RATE)
+
+    def test_a_held_run_is_still_watched(self, bench, tmp_path):
+        run = run_of(bench, tmp_path)
+        upto(run, RunState.RECORDING)
+        run.switch.hold()
+        next(iter(run))
+        bench.world.base_factor, bench.world.background_m_per_s2 = 1.0, 1000.0
+        with pytest.raises(LimitExceeded):
+            play(run)
+        assert_silent_and_finished(bench, RecordingState.FAILED)
+
+    def test_a_hold_ends_by_a_stop(self, bench, tmp_path):
+        run = run_of(bench, tmp_path)
+        upto(run, RunState.RECORDING)
+        run.switch.hold()
+        next(iter(run))
+        run.cancel("enough")
+        play(run)
+        assert bench.recorder.ending == (RecordingState.STOPPED, "enough")
+        assert_ended_without_a_jump(bench)
+
+    def test_nobody_holds_longer_than_the_recording_has_room(self, bench, tmp_path):
+        run = run_of(bench, tmp_path)
+        upto(run, RunState.RECORDING)
+        run.switch.hold()
+        play(run)
+        assert run.outcome.state is RunState.STOPPED
+        assert f"held for {HOLD_LONGEST_S:g} s" in run.outcome.reason
 
 
 class TestRefusals:

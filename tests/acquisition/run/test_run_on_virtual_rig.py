@@ -140,7 +140,7 @@ def test_a_cancelled_run_ends_with_a_ramp_to_silence(virtual_bench, tmp_path):
     with open_recording(tmp_path / "run.h5") as recording:
         assert (recording.state, recording.reason) == (RecordingState.STOPPED, "enough")
         assert recording.duration_s < 10
-        last = recording.read("drive_voltage", recording.samples - 512)
+        last = recording.read("drive_voltage", recording.samples - 64)
         dwell = recording.segments[-1]
         assert (dwell.label, dwell.is_complete) == ("dwell", False)
     assert np.max(np.abs(last)) < 5e-3
@@ -188,4 +188,4 @@ def test_a_signal_from_outside_ends_a_run_softly(tmp_path, number):
     with open_recording(path) as recording:
         assert recording.state is RecordingState.STOPPED
         assert recording.reason.startswith(number.name)
-        assert np.max(np.abs(recording.read("drive_voltage", recording.samples - 512))) < 5e-3
+        assert np.max(np.abs(recording.read("drive_voltage", recording.samples - 64))) < 5e-3

@@ -7,11 +7,13 @@ from acquisition.check.low_level import BenchCheck
 from acquisition.errors import DataLost, InstrumentLost, LimitExceeded, RecordingError
 from acquisition.excitation.streamed_noise import StreamedNoise
 from acquisition.instruments import Overload
+from acquisition.plan.limits import shortest_ramp_s
 from acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
 from acquisition.recording.layout import RecordingState
 from acquisition.run.run import Run
 from acquisition.run.schedule import CHECK_S
 from acquisition.run.state import RunState
+from acquisition.run.stop import Cause, StopLevel, StopRequest
 
 RATE = 5120.0
 AHEAD = 2560
@@ -63,6 +65,10 @@ def envelope(bench, first):
     return telling, heard[telling] / source[telling]
 
 
+def shortest_ramp(bench):
+    return shortest_ramp_s(bench.rig) * RATE
+
+
 def half_cosine(samples):
     return 0.5 * (1 - np.cos(np.pi * np.arange(samples) / samples))
 
@@ -75,10 +81,10 @@ def assert_silent_and_finished(bench, state):
     assert order.index("output.stop") < order.index("recorder.finish")
 
 
-def assert_faded_without_a_step(bench):
-    """No level between two samples changes faster than on the half cosine of a ramp."""
+def assert_faded_without_a_step(bench, ramp=RAMP):
+    """No level between two samples changes faster than on the half cosine of a ramp of that many samples."""
     at, level = envelope(bench, ramp_first(bench))
-    steepest = np.pi / 2 / RAMP
+    steepest = np.pi / 2 / ramp
     assert np.max(np.abs(np.diff(level)) / np.diff(at)) <= 1.01 * steepest
     assert level[-1] < 0.01
 
@@ -170,7 +176,7 @@ class TestEveryWayOut:
         assert run.state is RunState.STOPPED
         assert_silent_and_finished(streaming_bench, RecordingState.STOPPED)
         if state is not RunState.CHECKING:
-            assert_faded_without_a_step(streaming_bench)
+            assert_faded_without_a_step(streaming_bench, shortest_ramp(streaming_bench))
 
     @every_state
     def test_an_exceeded_limit_fades_and_is_named(self, streaming_bench, tmp_path, state):
@@ -181,7 +187,24 @@ class TestEveryWayOut:
             play(run)
         assert_silent_and_finished(streaming_bench, RecordingState.FAILED)
         if state is not RunState.CHECKING:
-            assert_faded_without_a_step(streaming_bench)
+            assert_faded_without_a_step(streaming_bench, shortest_ramp(streaming_bench))
+
+    def test_a_stream_that_is_asked_to_hold_is_ramped_down_and_says_why(self, streaming_bench, tmp_path):
+        run = run_of(streaming_bench, tmp_path)
+        upto(run, RunState.RECORDING)
+        run.switch.hold()
+        play(run)
+        assert run.outcome.state is RunState.STOPPED
+        assert "cannot be held" in run.outcome.reason
+        assert_faded_without_a_step(streaming_bench)
+
+    @heard_state
+    def test_off_cuts_what_was_written(self, streaming_bench, tmp_path, state):
+        run = run_of(streaming_bench, tmp_path)
+        upto(run, state)
+        run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off"))
+        assert play(run) == []
+        assert_silent_and_finished(streaming_bench, RecordingState.STOPPED)
 
     def test_an_overload_fades_when_the_plan_says_so(self, streaming_bench, tmp_path):
         strict = NOISE.model_copy(update={"limits": InRunLimits(on_overload=OnOverload.STOP)})
@@ -190,7 +213,7 @@ class TestEveryWayOut:
         streaming_bench.world.overloads = (Overload("m0_velocity", 3, 5),)
         with pytest.raises(LimitExceeded, match="m0_velocity was overloaded at sample 3"):
             play(run)
-        assert_faded_without_a_step(streaming_bench)
+        assert_faded_without_a_step(streaming_bench, shortest_ramp(streaming_bench))
 
     @heard_state
     @pytest.mark.parametrize(

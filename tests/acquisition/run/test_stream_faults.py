@@ -177,7 +177,7 @@ def test_ctrl_c_fades_within_a_block_what_is_written_and_a_ramp(laboratory, tmp_
         outcome = run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=watch)
         assert at_the_amplifier_v(virtual) < SILENT_V
     assert outcome.state is RunState.STOPPED
-    drive = kept(tmp_path / "run.h5", RecordingState.STOPPED, "^SIGINT: cancelled")
+    drive = kept(tmp_path / "run.h5", RecordingState.STOPPED, "^SIGINT: stopped")
     assert drive.size / RATE_HZ - elapsed_s[0] <= 0.5 + 0.3 + 0.1 + 1e-3
     assert np.max(np.abs(drive[-200:])) < 0.01
 

@@ -1,0 +1,125 @@
+"""How a run is told to end: what may cause it, how hard each cause stops, and the switch in between."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class StopLevel(StrEnum):
+    """How hard a run is stopped, from the gentlest to the hardest."""
+
+    HOLD = "hold"
+    """Stay as it is, drive included, until resumed or stopped."""
+    RAMP = "ramp"
+    """The half-cosine ramp that the plan ends with."""
+    ABORT = "abort"
+    """The shortest ramp that is no blow: three periods of the loaded shaker on its suspension."""
+    OFF = "off"
+    """The output is switched off at once, whatever the step does to the specimen."""
+
+    def is_harder_than(self, other: "StopLevel") -> bool:
+        """Whether this one ends sooner."""
+        return _HARDNESS[self] > _HARDNESS[other]
+
+
+_HARDNESS = {level: number for number, level in enumerate(StopLevel)}
+
+
+class Cause(StrEnum):
+    """What made a run end before its plan did."""
+
+    OPERATOR = "operator"
+    """Somebody pressed stop."""
+    EMERGENCY = "emergency key"
+    """Esc, or the large button."""
+    KEYBOARD = "ctrl-c"
+    TERMINATED = "terminated"
+    """The system asked the process to end."""
+    VIEWER_GONE = "viewer gone"
+    """Attended, and nobody has looked for too long: the window froze, was closed or was killed."""
+    PARENT_GONE = "parent gone"
+    """The program that started the engine has ended."""
+    PROGRAM = "program left"
+    """The program that carried the run out went away from it."""
+    LIMIT = "limit"
+    INSTRUMENT = "instrument"
+    DISK = "disk"
+    FAULT = "fault"
+    """Anything else that went wrong."""
+
+
+LEVELS: Mapping[Cause, StopLevel] = {
+    Cause.OPERATOR: StopLevel.RAMP,
+    Cause.EMERGENCY: StopLevel.ABORT,
+    Cause.KEYBOARD: StopLevel.RAMP,
+    Cause.TERMINATED: StopLevel.ABORT,
+    Cause.VIEWER_GONE: StopLevel.ABORT,
+    Cause.PARENT_GONE: StopLevel.ABORT,
+    Cause.PROGRAM: StopLevel.ABORT,
+    Cause.LIMIT: StopLevel.ABORT,
+    Cause.INSTRUMENT: StopLevel.OFF,
+    Cause.DISK: StopLevel.OFF,
+    Cause.FAULT: StopLevel.OFF,
+}
+"""How hard each cause stops. Where nothing can be read any more (instrument, disk, fault), what still answers
+is lowered as fast as it takes commands before its output goes off."""
+
+
+@dataclass(frozen=True)
+class StopRequest:
+    """A wish to end, and who has it."""
+
+    cause: Cause
+    level: StopLevel
+    reason: str
+
+    @classmethod
+    def by(cls, cause: Cause, reason: str) -> "StopRequest":
+        """Stop as hard as the cause asks for."""
+        return cls(cause, LEVELS[cause], reason)
+
+
+class StopSwitch:
+    """What anybody may use to hold or to end a run, or a campaign: any thread, and signal handlers.
+
+    It takes no lock, so that a signal handler cannot wait for one. A stop cannot be taken back, only
+    be made harder.
+    """
+
+    def __init__(self) -> None:
+        self._asked: dict[StopLevel, StopRequest] = {}
+        self._holding = False
+
+    @property
+    def request(self) -> StopRequest | None:
+        """The hardest stop asked for so far; None while nobody has asked."""
+        # One slot a level: two threads that ask at once cannot lose the harder wish.
+        for level in reversed(StopLevel):
+            if level in self._asked:
+                return self._asked[level]
+        return None
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether the run should stay where it is; a stop ends a hold."""
+        return self._holding and not self._asked
+
+    def ask(self, request: StopRequest) -> None:
+        """Ask for a stop; the first of each level is the one that counts."""
+        if request.level is StopLevel.HOLD:
+            self.hold()
+        else:
+            self._asked.setdefault(request.level, request)
+
+    def hold(self) -> None:
+        """Stay as it is."""
+        self._holding = True
+
+    def resume(self) -> None:
+        """Go on after a hold."""
+        self._holding = False
+
+    def harder_than(self, level: StopLevel) -> StopRequest | None:
+        """Give a request that is harder than ``level``, if there is one."""
+        request = self.request
+        return request if request is not None and request.level.is_harder_than(level) else None
