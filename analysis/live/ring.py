@@ -1,0 +1,91 @@
+"""The newest samples of a run, as they come in from whoever records."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidRequest
+
+Values = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """Consecutive samples up to the newest."""
+
+    first_sample: int
+    """Since the run began."""
+    values: Values
+    """Shape (channels, samples), a view that the next samples will overwrite; lost samples are NaN."""
+
+    @property
+    def stop_sample(self) -> int:
+        """One past the newest."""
+        return self.first_sample + int(self.values.shape[1])
+
+
+class Ring:
+    """Holds the newest samples of one run; never copies them to hand them out.
+
+    Every sample is written twice, a capacity apart: any stretch of the newest samples then lies in
+    one piece.
+    """
+
+    def __init__(self, channels: int, capacity: int) -> None:
+        if channels < 1 or capacity < 1:
+            raise InvalidRequest(
+                f"a ring of {channels} channels and {capacity} samples was asked for; both are 1 or more"
+            )
+        self._capacity = capacity
+        self._values: Values = np.full((channels, 2 * capacity), np.nan, dtype=np.float32)
+        self._begun: int | None = None
+        self._next = 0
+
+    @property
+    def next_sample(self) -> int:
+        """Number of the sample that has not come yet."""
+        return self._next
+
+    @property
+    def held(self) -> int:
+        """How many samples can be handed out."""
+        return 0 if self._begun is None else min(self._next - self._begun, self._capacity)
+
+    def add(self, first_sample: int, values: Values) -> None:
+        """Take samples, shape (channels, samples); what lies between these and the last is NaN.
+
+        Samples that are already there are passed over; those of another run belong in another ring.
+        """
+        if self._begun is None:
+            self._begun = self._next = first_sample
+        late = self._next - first_sample
+        if late > 0:
+            values, first_sample = values[:, late:], self._next
+        if values.shape[1] == 0:
+            return
+        lost = min(first_sample - self._next, self._capacity)
+        if lost:
+            self._put(first_sample - lost, np.full((values.shape[0], lost), np.nan, dtype=np.float32))
+        newest = values[:, -self._capacity :]
+        self._put(first_sample + values.shape[1] - newest.shape[1], newest)
+        self._next = first_sample + values.shape[1]
+
+    def newest(self, samples: int) -> Window:
+        """Give so many of the newest samples, fewer when there are not so many."""
+        count = min(max(samples, 0), self.held)
+        end = self._next % self._capacity + self._capacity
+        return Window(self._next - count, self._values[:, end - count : end])
+
+    def since(self, sample: int) -> Window:
+        """Give what came from a sample on, as far as it is still held."""
+        return self.newest(self._next - sample)
+
+    def _put(self, first_sample: int, values: Values) -> None:
+        begin, count = first_sample % self._capacity, values.shape[1]
+        for place in (begin, begin + self._capacity):
+            end = min(place + count, 2 * self._capacity)
+            self._values[:, place:end] = values[:, : end - place]
+        overflow = begin + count - self._capacity
+        if overflow > 0:
+            self._values[:, :overflow] = values[:, count - overflow :]

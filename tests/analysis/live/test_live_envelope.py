@@ -1,0 +1,57 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from analysis.errors import InvalidRequest
+from analysis.live.envelope import column_starts, envelope, zigzag
+
+
+@pytest.mark.parametrize("place", [0, 1, 51_199, 77_777, 102_397])
+def test_an_impact_of_three_samples_is_seen_wherever_it_falls(place):
+    samples = np.zeros((2, 102_400), dtype=np.float32)
+    samples[1, place : place + 3] = (5.0, -7.0, 6.0)
+    low, high = envelope(samples, 1000)
+    assert low.shape == high.shape == (2, 1000)
+    assert low[1].min() == -7.0
+    assert high[1].max() == 6.0
+    assert not low[0].any()
+    assert not high[0].any()
+
+
+def test_columns_are_the_extremes_of_their_own_samples_and_of_no_others():
+    samples = np.random.default_rng(3).standard_normal(10_007)
+    low, high = envelope(samples, 333)
+    edges = [*column_starts(10_007, 333), 10_007]
+    for column, (begin, end) in enumerate(pairwise(edges)):
+        assert low[column] == samples[begin:end].min()
+        assert high[column] == samples[begin:end].max()
+
+
+def test_lost_samples_hide_no_others_and_a_lost_column_stays_empty():
+    samples = np.arange(40.0)
+    samples[5] = np.nan
+    samples[10:20] = np.nan
+    low, high = envelope(samples, 4)
+    assert low[0] == 0.0
+    assert high[0] == 9.0
+    assert np.isnan(low[1])
+    assert np.isnan(high[1])
+    assert (low[2], high[3]) == (20.0, 39.0)
+
+
+def test_fewer_samples_than_columns_are_drawn_as_they_are():
+    samples = np.array([3.0, 1.0, 2.0])
+    low, high = envelope(samples, 10)
+    assert np.array_equal(low, samples)
+    assert np.array_equal(high, samples)
+    assert np.array_equal(column_starts(3, 10), [0, 1, 2])
+
+
+def test_a_picture_without_columns_is_refused():
+    with pytest.raises(InvalidRequest, match="0 columns"):
+        envelope(np.zeros(5), 0)
+
+
+def test_both_edges_make_one_line():
+    assert np.array_equal(zigzag(np.array([[0.0, 1.0]]), np.array([[2.0, 3.0]])), [[0, 2, 1, 3]])

@@ -1,0 +1,59 @@
+import numpy as np
+import pytest
+
+from analysis.errors import InvalidRequest
+from analysis.live.ring import Ring
+
+
+def numbered(first, count):
+    return np.stack([np.arange(first, first + count), -np.arange(first, first + count)]).astype(np.float32)
+
+
+@pytest.mark.parametrize("length", [1, 7, 99, 100, 101, 250])
+def test_the_newest_samples_lie_in_one_piece_whatever_the_blocks(length):
+    ring = Ring(2, 100)
+    for first in range(40, 1000, length):
+        ring.add(first, numbered(first, length))
+        window = ring.newest(100)
+        assert window.stop_sample == first + length == ring.next_sample
+        expected = numbered(window.first_sample, window.values.shape[1])
+        assert np.array_equal(window.values, expected)
+
+
+def test_a_ring_hands_out_no_more_than_has_come():
+    ring = Ring(1, 100)
+    assert ring.newest(10).values.shape == (1, 0)
+    ring.add(5, np.ones((1, 3), dtype=np.float32))
+    assert ring.newest(10).values.shape == (1, 3)
+    assert ring.newest(10).first_sample == 5
+
+
+def test_samples_that_come_twice_are_kept_once():
+    ring = Ring(2, 50)
+    ring.add(0, numbered(0, 20))
+    ring.add(10, numbered(10, 20))
+    ring.add(0, numbered(0, 30))
+    assert np.array_equal(ring.newest(50).values, numbered(0, 30))
+
+
+def test_lost_samples_are_not_a_number_and_what_is_older_stays():
+    ring = Ring(2, 50)
+    ring.add(0, numbered(0, 20))
+    ring.add(30, numbered(30, 5))
+    values = ring.newest(50).values
+    assert values.shape == (2, 35)
+    assert np.isnan(values[:, 20:30]).all()
+    assert np.array_equal(values[:, :20], numbered(0, 20))
+    assert np.array_equal(values[:, 30:], numbered(30, 5))
+
+
+def test_since_gives_what_is_new():
+    ring = Ring(2, 50)
+    ring.add(0, numbered(0, 45))
+    assert np.array_equal(ring.since(40).values, numbered(40, 5))
+    assert ring.since(45).values.shape == (2, 0)
+
+
+def test_a_ring_of_nothing_is_refused():
+    with pytest.raises(InvalidRequest, match="0 channels"):
+        Ring(0, 10)
