@@ -23,6 +23,8 @@ class Progress:
     """Planned, from the first sample to the last [s]."""
     amplitude_vpp: float
     """Setting of the generator, peak to peak [V]; 0 while its output is off."""
+    frequency_hz: float | None = None
+    """Of the sine that is played; None for anything else."""
 
 
 @dataclass(frozen=True)

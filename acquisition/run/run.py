@@ -10,6 +10,7 @@ import numpy as np
 
 from ..check.low_level import BenchCheck, judged, require_checkable
 from ..errors import AcquisitionError, LimitExceeded
+from ..excitation.steps import Play, Tone
 from ..instruments import Block, Samples
 from ..plan.limits import require_within_limits, shortest_ramp_s
 from ..plan.measurement import Measurement
@@ -88,6 +89,7 @@ class Run:
         self._ending = Ending()
         self._look: Callable[[Block], None] = self._go_on
         self._held_s = 0.0
+        self._play: Play | None = None
         self._blocks = self._carry_out()
 
     @property
@@ -220,6 +222,7 @@ class Run:
     def _perform(self, tape: Tape, phase: Phase, into: list[Samples] | None = None) -> Iterator[Progress]:
         self._enter(tape, phase.state)
         tape.enter(phase.segment)
+        self._play = phase.play
         for wait_s in self._drive.perform(phase):
             yield from self._read(tape, wait_s, into)
 
@@ -288,7 +291,10 @@ class Run:
 
     def _progress(self, tape: Tape, block: Block) -> Progress:
         level_vpp = self._drive.setting_vpp
-        return Progress(self._state, tape.segment, block, tape.elapsed_s, self._total_s, level_vpp)
+        frequency_hz = self._play.frequency_hz if isinstance(self._play, Tone) else None
+        return Progress(
+            self._state, tape.segment, block, tape.elapsed_s, self._total_s, level_vpp, frequency_hz
+        )
 
     def _enter(self, tape: Tape, state: RunState) -> None:
         if state is not self._state:

@@ -17,6 +17,7 @@ from .drive import drive_for
 from .progress import Progress
 from .run_measurement import run_measurement
 from .state import RunState
+from .stop import StopSwitch
 
 
 class Existing(StrEnum):
@@ -95,12 +96,14 @@ def run_campaign(
     after_failure: AfterFailure = AfterFailure.STOP,
     on_progress: Callable[[CampaignProgress], None] = ignore_campaign_progress,
     on_item: Callable[[CampaignItem], None] = ignore_item,
+    switch: StopSwitch | None = None,
 ) -> tuple[CampaignItem, ...]:
     """Make every recording of ``campaign`` in ``folder``, in order, on an open bench.
 
     All measurements are held against the limits of the rig before the first one begins. Ctrl-C
     ends the running measurement softly, and the campaign with it. ``on_progress`` is called after every
-    block, ``on_item`` after every recording.
+    block, ``on_item`` after every recording. ``switch`` lets others hold the running measurement, or end
+    the campaign.
 
     Returns
     -------
@@ -121,12 +124,13 @@ def run_campaign(
     _make(folder)
     plan = planned_recordings(campaign, folder, existing)
     items: list[CampaignItem] = []
+    stop = StopSwitch() if switch is None else switch
     for number, planned in enumerate(plan, start=1):
 
         def tell(progress: Progress, number: int = number, planned: PlannedRecording = planned) -> None:
             on_progress(CampaignProgress(planned.name, number, len(plan), progress))
 
-        item = _carried_out(bench, planned, after_failure, tell)
+        item = _carried_out(bench, planned, after_failure, tell, stop)
         items.append(item)
         on_item(item)
         if item.result is Item.STOPPED:
@@ -195,12 +199,16 @@ def _resumed(
 
 
 def _carried_out(
-    bench: RunBench, planned: PlannedRecording, after_failure: AfterFailure, tell: Callable[[Progress], None]
+    bench: RunBench,
+    planned: PlannedRecording,
+    after_failure: AfterFailure,
+    tell: Callable[[Progress], None],
+    switch: StopSwitch,
 ) -> CampaignItem:
     if planned.is_complete:
         return CampaignItem(planned.name, Item.KEPT, planned.path, "complete before")
     try:
-        outcome = run_measurement(bench, planned.measurement, planned.path, on_progress=tell)
+        outcome = run_measurement(bench, planned.measurement, planned.path, on_progress=tell, switch=switch)
     except InstrumentLost:
         raise
     except AcquisitionError as error:

@@ -9,13 +9,17 @@ from types import FrameType
 from .stop import Cause, StopRequest, StopSwitch
 
 CAUSES = {signal.SIGINT: Cause.KEYBOARD, signal.SIGTERM: Cause.TERMINATED}
+if hasattr(signal, "SIGHUP"):  # Windows has none
+    CAUSES[signal.SIGHUP] = Cause.TERMINATED
 
 
 @contextmanager
 def stop_on_signal(switch: StopSwitch) -> Iterator[None]:
-    """While inside, SIGINT and SIGTERM ask ``switch`` for a stop.
+    """While inside, SIGINT, SIGTERM and SIGHUP (the terminal was closed) ask ``switch`` for a stop.
 
-    The first ramps down and ends the run as stopped: Ctrl-C as the plan ends, SIGTERM faster. A second
+    SIGHUP stays ignored where it was ignored before (nohup): such a run is meant to go on.
+
+    The first ramps down and ends the run as stopped: Ctrl-C as the plan ends, the others faster. A second
     raises KeyboardInterrupt, which silences the generator without the measured ramp. Later ones are
     ignored, so that impatience cannot interrupt the silencing. Outside the main thread, where Python
     delivers no signals, nothing is changed.
@@ -35,7 +39,8 @@ def stop_on_signal(switch: StopSwitch) -> Iterator[None]:
             case 2:
                 raise KeyboardInterrupt
 
-    before = {number: signal.signal(number, on_signal) for number in CAUSES}
+    heeded = [number for number in CAUSES if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, on_signal) for number in heeded}
     try:
         yield
     finally:
