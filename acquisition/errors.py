@@ -1,5 +1,7 @@
 """The errors of a measurement: each says what happened, what was done about it, and what to do next."""
 
+from dataclasses import dataclass
+
 
 class AcquisitionError(Exception):
     """Base of everything that can go wrong between a plan and its recording.
@@ -36,11 +38,34 @@ class DataLost(AcquisitionError):
     """Samples were overwritten before they were read: the record has a hole and ends here."""
 
 
+@dataclass(frozen=True)
+class Trip:
+    """The numbers of a limit that the running measurement has passed."""
+
+    channel: str
+    """Role of the channel that showed it: ``"base_acceleration"``."""
+    quantity: str
+    """What passed its limit: ``"stroke"``."""
+    value: float
+    """Largest magnitude of the block, in ``unit``."""
+    limit: float
+    unit: str
+    sample: int
+    """The first sample past the limit, counted from the first of the run."""
+    time_s: float
+    """The same, in seconds of the converter's clock."""
+
+
 class LimitExceeded(AcquisitionError):
     """A plan, or the running measurement, goes past a limit of shaker, amplifier or specimen.
 
-    The text names the quantity, its value, the limit, and where the limit comes from.
+    The text names the quantity, its value, the limit, and where the limit comes from. ``trip`` holds
+    the numbers when a running measurement was stopped; it is None for a plan that was refused.
     """
+
+    def __init__(self, text: str, trip: Trip | None = None) -> None:
+        super().__init__(text)
+        self.trip = trip
 
 
 class CheckFailed(AcquisitionError):

@@ -28,11 +28,19 @@ class InRunLimits(FrozenModel):
 
     base_acceleration: Fraction = 1.0
     """Of the shaker's acceleration limit, measured at the base."""
+    base_velocity: Fraction = 1.0
+    """Of the shaker's velocity limit, integrated from the acceleration at the base."""
+    stroke: Fraction = 1.0
+    """Of the shaker's stroke limit, integrated twice."""
+    force: Fraction = 1.0
+    """Of the shaker's force limit: the coil's, from its current, and the one that moves the table."""
     amplifier_voltage: Fraction = 1.0
     """Of the amplifier's clipping voltage, measured at its output."""
     current: Fraction = 1.0
-    """Of the coil's current limit; the current is the amplifier voltage over the coil's resistance,
-    which is the most it can be."""
+    """Of the coil's peak current and of the amplifier's limiter (rms); the current is the amplifier voltage,
+    less what the moving coil induces, over the coil's resistance."""
+    specimen_amplitude: Fraction = 1.0
+    """Of the specimen's amplitude limit: the main mass against the base, from the vibrometer."""
     on_overload: OnOverload = OnOverload.FLAG
 
 

@@ -83,7 +83,7 @@ class Run:
         self._bench_check = bench_check
         self._create = create
         self._drive: Drive  # chosen when the plan is admitted; nothing plays before
-        self._guard = Guard(bench.rig, bench.channels, measurement.limits)
+        self._guard = Guard(bench.rig, bench.channels, measurement.limits, bench.digitizer.sample_rate_hz)
         self._total_s = duration_s(measurement)
         self._state = RunState.IDLE
         self._ending = Ending()
@@ -140,6 +140,7 @@ class Run:
             yield from self._ramped_down_early(tape, stop.request.level)
         except LimitExceeded as error:
             self._ending.is_failed(error, str(error))
+            tape.log_trip(error)
             yield from self._ramped_down_early(tape, LEVELS[Cause.LIMIT])
             raise
         except GeneratorExit:

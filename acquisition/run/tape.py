@@ -1,15 +1,21 @@
 """From converter to recording without a gap: reads blocks, watches them, keeps them, counts the samples."""
 
+import json
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Protocol
 
+from ..errors import LimitExceeded
 from ..excitation.steps import Segment
 from ..instruments import Block, Digitizer
 from ..recording.layout import RecordingState
 
 BLOCK_S = 0.1
 """Longest time between two looks at the limits and at a cancel [s]; ten reads a second suit NI-DAQmx."""
+
+LIMIT_KIND = "limit"
+"""Kind of the event that holds the numbers of a limit that was passed, as a JSON object."""
 
 
 class Recorder(Protocol):
@@ -92,3 +98,8 @@ class Tape:
     def log(self, kind: str, text: str) -> None:
         """Note an event at the next sample."""
         self._recorder.log(kind, text, self._samples)
+
+    def log_trip(self, error: LimitExceeded) -> None:
+        """Note the numbers of a limit that was passed, at the sample where it was."""
+        if error.trip is not None:
+            self._recorder.log(LIMIT_KIND, json.dumps(asdict(error.trip)), error.trip.sample)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from acquisition.errors import DataLost
 from acquisition.instruments import Block, Identity, Samples
@@ -164,7 +165,7 @@ class LoopbackOutput:
 
 
 class LoopbackDigitizer:
-    """A Digitizer on the loop: drive, amplifier and base follow the generator, the specimen does not move."""
+    """A Digitizer on the loop: all follow the generator, and the specimen sits on the base."""
 
     identity = Identity("MAKER", "DIGITIZER", "2", "1.0", "DIGITIZER")
     sample_rate_hz = SAMPLE_RATE_HZ
@@ -173,6 +174,7 @@ class LoopbackDigitizer:
         self._world = world
         self._channels = channels
         self._first = 0
+        self._velocity = np.zeros(1)
         self._accelerance = abs(complex(RigModel(world.rig).transfer(Quantity.ACCELERATION, 160.0)))
 
     @property
@@ -200,12 +202,18 @@ class LoopbackDigitizer:
             Role.DRIVE_VOLTAGE: drive * world.drive_factor,
             Role.AMPLIFIER_VOLTAGE: drive * world.rig.amplifier.gain,
             Role.BASE_ACCELERATION: base,
-            Role.M0_VELOCITY: np.zeros(samples),
+            Role.M0_VELOCITY: self._integrated(base),
         }
         volts = np.stack([physical[channel.role] / channel.units_per_volt for channel in self._channels])
         block = Block(world.samples, volts, world.overloads)
         world.samples += samples
         return block
+
+    def _integrated(self, acceleration: Samples) -> Samples:
+        """Velocity of what moves with that acceleration; what lies seconds back is forgotten."""
+        leak = 1 - 2 * np.pi * 0.1 / SAMPLE_RATE_HZ
+        velocity, self._velocity = lfilter([1 / SAMPLE_RATE_HZ], [1, -leak], acceleration, zi=self._velocity)
+        return velocity
 
     def stop(self) -> None:
         self._world.call("digitizer.stop")

@@ -1,0 +1,63 @@
+"""The motion behind the limits: sines come out with the right amplitude, in whatever blocks they arrive."""
+
+import numpy as np
+import pytest
+
+from acquisition.run.motion import HIGH_PASS_HZ, BaseTracker, SpecimenTracker
+
+RATE_HZ = 51_200.0
+TIME_S = np.arange(round(3 * RATE_HZ)) / RATE_HZ
+
+
+def amplitude(values):
+    """Peak of the last second, when what the start has left is gone."""
+    return np.max(np.abs(values[-round(RATE_HZ) :]))
+
+
+@pytest.mark.parametrize("frequency_hz", [10.0, 44.0, 160.0, 1000.0])
+def test_velocity_and_stroke_of_a_sine_are_its_integrals(frequency_hz):
+    turn = 2 * np.pi * frequency_hz
+    motion = BaseTracker(RATE_HZ).follow(7.0 * np.sin(turn * TIME_S))
+    # What the high pass takes: its own gain for a velocity, twice for a displacement.
+    gain = 1 / np.sqrt(1 + (HIGH_PASS_HZ / frequency_hz) ** 4)
+    assert amplitude(motion.velocity) == pytest.approx(gain * 7.0 / turn, rel=3e-3)
+    assert amplitude(motion.displacement) == pytest.approx(gain**2 * 7.0 / turn**2, rel=6e-3)
+
+
+def test_blocks_of_any_size_give_the_motion_of_the_whole():
+    rng = np.random.default_rng(5)
+    acceleration = rng.standard_normal(TIME_S.size)
+    whole = BaseTracker(RATE_HZ).follow(acceleration)
+    tracker = BaseTracker(RATE_HZ)
+    edges = np.unique(rng.integers(1, TIME_S.size, 40))
+    pieces = [tracker.follow(piece) for piece in np.split(acceleration, edges)]
+    np.testing.assert_allclose(
+        np.concatenate([each.displacement for each in pieces]), whole.displacement, atol=1e-15
+    )
+
+
+def test_a_constant_offset_moves_nothing():
+    motion = BaseTracker(RATE_HZ).follow(np.full(TIME_S.size, 9.81))
+    assert np.max(np.abs(motion.displacement)) < 1e-12
+
+
+def test_a_mass_that_moves_with_the_base_stretches_no_spring():
+    turn = 2 * np.pi * 10.0
+    motion = BaseTracker(RATE_HZ).follow(15.0 * np.sin(turn * TIME_S))
+    seen = np.zeros(TIME_S.size, dtype=np.bool_)
+    together = SpecimenTracker(RATE_HZ).follow(-15.0 / turn * np.cos(turn * TIME_S), motion.velocity, seen)
+    assert amplitude(motion.displacement) > 3.7e-3
+    assert amplitude(together) < 1e-5
+
+
+def test_a_mass_on_a_still_base_stretches_its_springs_by_its_own_displacement():
+    turn = 2 * np.pi * 95.0
+    still, seen = np.zeros(TIME_S.size), np.zeros(TIME_S.size, dtype=np.bool_)
+    stretched = SpecimenTracker(RATE_HZ).follow(1e-3 * turn * np.cos(turn * TIME_S), still, seen)
+    assert amplitude(stretched) == pytest.approx(1e-3, rel=2e-3)
+
+
+def test_a_vibrometer_past_its_range_is_taken_for_blind_and_not_for_moving():
+    still, is_blind = np.zeros(TIME_S.size), np.ones(TIME_S.size, dtype=np.bool_)
+    stuck = SpecimenTracker(RATE_HZ).follow(np.full(TIME_S.size, 1.0), still, is_blind)
+    assert np.max(np.abs(stuck)) == 0.0
