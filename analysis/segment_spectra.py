@@ -35,8 +35,8 @@ class SpectralAverages:
     window_energy: float
 
     def frequency_hz(self, sample_rate_hz: float) -> Reals:
-        """Frequencies of the lines [Hz]."""
-        return np.asarray(fft.rfftfreq(self.segment_samples, 1 / sample_rate_hz))
+        """Frequencies of the lines that there are, from 0 Hz on [Hz]."""
+        return np.asarray(fft.rfftfreq(self.segment_samples, 1 / sample_rate_hz)[: self.products.shape[-1]])
 
     def density(self, first: int, second: int, sample_rate_hz: float) -> Complexes:
         """One-sided (cross-)spectral density of two channels [product of their units per Hz]."""

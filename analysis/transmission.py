@@ -87,7 +87,7 @@ class TransmissionSums:
                 f"{averages.segments_excluded} touched invalid samples; a coherence needs at least "
                 f"{_LEAST_SEGMENTS}: use shorter segments or a longer record"
             )
-        return _result(averages, settings)
+        return transmission_of(averages, settings)
 
 
 def transmission(
@@ -169,7 +169,8 @@ def _check(settings: TransmissionSettings) -> None:
         raise InvalidRequest(f"sample_rate_hz is {settings.sample_rate_hz:g}; it is more than 0")
 
 
-def _result(averages: SpectralAverages, settings: TransmissionSettings) -> Transmission:
+def transmission_of(averages: SpectralAverages, settings: TransmissionSettings) -> Transmission:
+    """Form the transmission of averaged products, rows drive, response and perhaps reference, with bounds."""
     products = averages.products
     s_xx, s_yy = products[_DRIVE, _DRIVE].real, products[_RESPONSE, _RESPONSE].real
     s_xy = products[_DRIVE, _RESPONSE]

@@ -1,0 +1,83 @@
+import numpy as np
+import pytest
+from scipy.signal import welch
+
+from analysis.errors import InvalidRequest
+from analysis.live.spectra import LiveSpectra, SpectrumSettings
+
+RATE = 10_000.0
+SETTINGS = SpectrumSettings(segment_samples=1000, averages=40)
+
+
+def fed(samples, block, settings=SETTINGS):
+    spectra = LiveSpectra(samples.shape[0], RATE, settings)
+    for first in range(0, samples.shape[1], block):
+        spectra.add(samples[:, first : first + block].astype(np.float32))
+    return spectra
+
+
+@pytest.mark.parametrize("block", [17, 500, 5000])
+def test_the_spectrum_is_welchs_whatever_the_blocks(block):
+    samples = np.random.default_rng(1).standard_normal((2, 20_500))
+    found = fed(samples, block).spectrum()
+    frequency_hz, density = welch(samples, RATE, "hann", 1000, 500, detrend=False)
+    assert np.allclose(found.frequency_hz, frequency_hz)
+    assert np.allclose(found.amplitude_density**2, density, rtol=1e-4)
+
+
+def test_old_samples_are_forgotten():
+    samples = np.zeros((1, 60_000))
+    samples[0, :30_000] = np.random.default_rng(2).standard_normal(30_000)
+    assert fed(samples, 1000).spectrum().amplitude_density.max() == 0.0
+
+
+def test_a_lost_sample_spoils_two_segments_and_no_more():
+    samples = np.random.default_rng(3).standard_normal((2, 20_500))
+    whole = fed(samples, 700).transmission((0, 1), low_hz=100.0, high_hz=1000.0)
+    samples[0, 10_250] = np.nan
+    torn = fed(samples, 700).transmission((0, 1), low_hz=100.0, high_hz=1000.0)
+    assert (whole.segments_used, torn.segments_used, torn.segments_excluded) == (40, 38, 2)
+    assert np.isfinite(torn.value).all()
+
+
+def test_the_transmission_of_an_integrator_is_known_and_within_its_bounds():
+    """Base acceleration a, response velocity 3 (integral of a): the displacements are as 3 to 1."""
+    rng = np.random.default_rng(4)
+    count = 40_500
+    spectrum = np.fft.rfft(rng.standard_normal(count))
+    omega = 2j * np.pi * np.fft.rfftfreq(count, 1 / RATE)
+    omega[0] = 1.0
+    base = np.fft.irfft(spectrum, count)
+    velocity = np.fft.irfft(3 * spectrum / omega, count)
+    noisy = velocity + 0.02 * velocity.std() * rng.standard_normal(count)
+    found = fed(np.stack((base, noisy, base)), 1000).transmission((0, 1, 2), low_hz=100.0, high_hz=900.0)
+    assert found.frequency_hz[0] >= 100.0
+    assert found.frequency_hz[-1] <= 900.0
+    assert np.median(found.magnitude) == pytest.approx(3.0, rel=0.01)
+    assert np.abs(found.phase_rad).max() < 0.3
+    inside = (found.magnitude_lower <= 3.0) & (found.magnitude_upper >= 3.0)
+    assert inside.mean() > 0.8
+    assert found.n_eff == pytest.approx(40 / (1 + 2 * 39 / 40 / 36), rel=1e-3)
+    assert found.coherence[0] > 0.95 > found.coherence[-1]
+
+
+def test_a_delay_of_the_response_channel_is_taken_off_the_phase():
+    samples = np.random.default_rng(5).standard_normal(40_500)
+    late = np.stack((samples, np.roll(samples, 3)))
+    late = fed(late, 1000)
+    straight = late.transmission((0, 1), low_hz=300.0, high_hz=3000.0, delay_s=3 / RATE)
+    # a velocity equal to an acceleration: displacement is i w times it
+    assert np.allclose(np.abs(straight.phase_rad), np.pi / 2, atol=0.05)
+
+
+def test_one_segment_has_no_transmission_and_none_no_spectrum():
+    spectra = LiveSpectra(2, RATE, SETTINGS)
+    assert spectra.spectrum() is None
+    spectra.add(np.ones((2, 1000), dtype=np.float32))
+    assert spectra.spectrum() is not None
+    assert spectra.transmission((0, 1), low_hz=100.0, high_hz=1000.0) is None
+
+
+def test_settings_that_average_nothing_are_refused():
+    with pytest.raises(InvalidRequest, match="1 segments"):
+        SpectrumSettings(averages=1)

@@ -1,0 +1,121 @@
+"""Views of a sine and of a sweep: the motion is in closed form, so every number is known."""
+
+import numpy as np
+import pytest
+
+from analysis.live.drive_tone import drive_tone, drive_turns
+from analysis.live.portrait import PoincareSection, portrait, portrait_samples
+from analysis.live.ring import Window
+from analysis.live.sine_response import SinePoint, look_samples, sine_point, stretch_samples
+from analysis.live.sweep_trace import SweepTrace
+
+RATE = 51_200.0
+A0 = 4e-6
+
+
+def motion(phase, omega):
+    """Base A0 cos; response 5 A0 cos(phase - 0.7) and a second harmonic of 1 A0."""
+    velocity = -5 * A0 * omega * np.sin(phase - 0.7) - 2 * A0 * omega * np.sin(2 * phase)
+    return np.stack((0.3 * np.cos(phase), -A0 * omega**2 * np.cos(phase), velocity))
+
+
+def sine(frequency_hz, samples, first=0):
+    omega = 2 * np.pi * frequency_hz
+    return Window(first, motion(omega * (first + np.arange(samples)) / RATE + 0.4, omega).astype(np.float32))
+
+
+@pytest.mark.parametrize("frequency_hz", [95.3, 260.01, 499.9])
+def test_a_tone_is_found_between_lines(frequency_hz):
+    tone = drive_tone(sine(frequency_hz, look_samples(RATE)).values[0], RATE)
+    assert tone.frequency_hz == pytest.approx(frequency_hz, abs=2e-3)
+    assert tone.amplitude == pytest.approx(0.3, rel=1e-3)
+
+
+def test_noise_is_no_tone():
+    assert drive_tone(np.random.default_rng(1).standard_normal(25_600), RATE) is None
+    assert drive_tone(np.zeros(25_600), RATE) is None
+
+
+@pytest.mark.parametrize("frequency_hz", [40.0, 260.0])
+def test_responses_of_a_known_motion_are_found(frequency_hz):
+    count = max(stretch_samples(frequency_hz, RATE), look_samples(RATE)) + 100
+    point = sine_point(sine(frequency_hz, count), (0, 1, 2), RATE)
+    phase = np.linspace(0, 2 * np.pi, 100_001)
+    largest = np.abs(5 * np.cos(phase - 0.7) + np.cos(2 * phase)).max()
+    assert point.frequency_hz == pytest.approx(frequency_hz, abs=0.01)
+    assert point.drive_amplitude_m == pytest.approx(A0, rel=2e-3)
+    assert point.response_ii == pytest.approx(5.0, rel=2e-3)
+    assert point.response_i == pytest.approx(largest, rel=5e-3)
+    slope = -5 * np.sin(phase - 0.7) - 2 * np.sin(2 * phase)
+    omega = 2 * np.pi * frequency_hz
+    assert point.upper == pytest.approx(A0 * omega * slope.max(), rel=2e-3)
+    assert point.lower == pytest.approx(A0 * omega * slope.min(), rel=2e-3)
+
+
+def test_a_point_of_a_sweep_stands_at_the_frequency_of_its_own_time():
+    time_s = np.arange(int(2 * RATE)) / RATE
+    phase = 2 * np.pi * (255.0 * time_s + 0.5 * 2.0 * time_s**2)
+    window = Window(0, motion(phase, 2 * np.pi * (255.0 + 2.0 * time_s)).astype(np.float32))
+    point = sine_point(window, (0, 1, 2), RATE)
+    assert point.frequency_hz == pytest.approx(255.0 + 2.0 * point.time_s, abs=0.02)
+    assert point.response_ii == pytest.approx(5.0, rel=0.01)
+
+
+def test_no_point_is_made_of_lost_samples_or_too_few():
+    window = sine(260.0, 60_000)
+    assert sine_point(Window(0, window.values[:, :1000]), (0, 1, 2), RATE) is None
+    window.values[1, -50] = np.nan
+    assert sine_point(window, (0, 1, 2), RATE) is None
+
+
+@pytest.mark.parametrize("rate_hz_per_s", [0.0, 1.0, -3.0])
+def test_periods_begin_where_the_drive_is_largest_in_a_sweep_too(rate_hz_per_s):
+    time_s = np.arange(int(0.5 * RATE)) / RATE
+    turns = 260.0 * time_s + 0.5 * rate_hz_per_s * time_s**2 + 0.31
+    found = drive_turns(np.cos(2 * np.pi * turns), RATE, 260.0 + 0.25 * rate_hz_per_s)
+    at = np.interp(found, np.arange(time_s.size), turns)
+    assert found.size > 95
+    assert np.abs(at - np.rint(at)).max() < 5e-4
+
+
+def test_a_motion_of_the_drives_period_has_one_poincare_point():
+    count = max(portrait_samples(260.0, RATE), look_samples(RATE))
+    window = sine(260.0, count, first=10_000)
+    found = portrait(window, 0, 2, RATE)
+    assert found.strobe_sample.size >= 15
+    assert np.allclose(found.strobe_displacement_m, A0 * (5 * np.cos(0.7) + 1), rtol=2e-3)
+    assert np.allclose(found.strobe_velocity_m_per_s, 5 * A0 * 2 * np.pi * 260 * np.sin(0.7), rtol=5e-3)
+    assert np.all(np.diff(found.strobe_sample) == pytest.approx(RATE / 260.0, abs=0.05))
+    assert found.strobe_sample[0] > 10_000
+    phase = np.linspace(0, 2 * np.pi, 1001)
+    assert found.orbit_displacement_m.max() == pytest.approx(
+        A0 * np.max(5 * np.cos(phase - 0.7) + np.cos(2 * phase)), rel=0.01
+    )
+
+
+def test_points_of_overlapping_portraits_are_kept_once_and_none_is_missed():
+    section, kept = PoincareSection(), []
+    count = portrait_samples(260.0, RATE)
+    for first in range(0, 30_000, 2560):
+        found = portrait(sine(260.0, count + 13_000, first), 0, 2, RATE)
+        before = section.displacement_m.size
+        section.add(found)
+        kept.append(section.displacement_m.size - before)
+    assert sum(kept) == section.displacement_m.size
+    # each portrait shows its 70 periods but 20 at either end; the last begins 28 160 samples after the first
+    assert section.displacement_m.size == pytest.approx(28_160 / RATE * 260 + 70 - 40, abs=2)
+
+
+def test_a_section_forgets_the_oldest():
+    section = PoincareSection(most=10)
+    section.add(portrait(sine(260.0, portrait_samples(260.0, RATE) + 13_000), 0, 2, RATE))
+    assert section.displacement_m.size == section.velocity_m_per_s.size == 10
+
+
+def test_a_trace_keeps_the_newest_points_in_order():
+    trace = SweepTrace(most=5)
+    for number in range(23):
+        trace.add(SinePoint(float(number), 100.0 + number, 1e-6, -1.0, 1.0, 2.0, 1.5))
+    assert trace.points == 5
+    assert np.array_equal(trace.course().time_s, [18, 19, 20, 21, 22])
+    assert np.array_equal(trace.course().frequency_hz, [118, 119, 120, 121, 122])
