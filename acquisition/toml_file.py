@@ -47,8 +47,12 @@ def validated(content: dict[str, Any], model: type[Model], origin: str) -> Model
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        complaints = "; ".join(_complaint(detail) for detail in error.errors())
-        raise ConfigurationError(f"{origin}: {complaints}") from error
+        raise ConfigurationError(f"{origin}: {complaints(error)}") from error
+
+
+def complaints(error: ValidationError) -> str:
+    """Say in one clause each what a model did not allow."""
+    return "; ".join(_complaint(detail) for detail in error.errors())
 
 
 def _complaint(detail: Any) -> str:

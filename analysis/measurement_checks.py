@@ -82,7 +82,7 @@ def _lost(facts: RecordingFacts) -> Check:
 
 
 def _drive(facts: RecordingFacts) -> Iterator[Check]:
-    setting_v = facts.measurement.excitation.amplitude_vpp / 2
+    setting_v = facts.measurement.excitation.highest_amplitude_vpp / 2
     reached_v = facts.level(DRIVE).peak
     is_high = reached_v > setting_v * (1 + _LEVEL_TOLERANCE)
     text = f"peak {reached_v:.4g} V recorded for a setting of {2 * setting_v:g} V peak to peak"

@@ -3,15 +3,31 @@
 from collections.abc import Iterator
 from typing import Literal
 
-from pydantic import NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from .plan import AbstractExcitation, FrequencyHz
+from ..toml_file import FrozenModel
+from .plan import AbstractExcitation, AmplitudeVpp, FrequencyHz
 from .preview import Preview, preview_of
 from .steps import Segment, Step, Tone
 
+MOST_LEAD_INS = 1000
+"""Tones that may be passed on the way to one dwell."""
+
+
+class LeadIn(FrozenModel):
+    """A tone that is passed on the way to a dwell."""
+
+    frequency_hz: FrequencyHz
+    amplitude_vpp: AmplitudeVpp
+
 
 class Dwell(AbstractExcitation):
-    """A sine at one frequency, recorded after it has settled."""
+    """A sine at one frequency, recorded after it has settled.
+
+    An impacting specimen may have several motions at one frequency, and which of them it takes depends
+    on where it comes from. ``lead_in`` brings it there along a path: tone after tone, without a break
+    in phase, recorded as a segment of its own that no result is taken from.
+    """
 
     kind: Literal["dwell"] = "dwell"
     frequency_hz: FrequencyHz
@@ -19,24 +35,37 @@ class Dwell(AbstractExcitation):
     """Wait until the transient has died out [s]."""
     duration_s: PositiveFloat
     """Time recorded after settling [s]."""
+    lead_in: tuple[LeadIn, ...] = Field(default=(), max_length=MOST_LEAD_INS)
+    """Tones passed before, in the order of time; none to begin at the dwell itself."""
+    lead_s: PositiveFloat = 0.5
+    """Time at each tone of ``lead_in`` [s]."""
 
     @property
     def highest_frequency_hz(self) -> float:
-        """The frequency itself [Hz]."""
-        return self.frequency_hz
+        """The highest frequency on the way, or the dwell's own [Hz]."""
+        return max(self.frequency_hz, *(tone.frequency_hz for tone in self.lead_in), 0.0)
+
+    @property
+    def highest_amplitude_vpp(self) -> float:
+        """The highest setting on the way, or the dwell's own [V]."""
+        return max(self.amplitude_vpp, *(tone.amplitude_vpp for tone in self.lead_in), 0.0)
 
     @property
     def playing_s(self) -> float:
-        """Settling and recording [s]."""
-        return self.settle_s + self.duration_s
+        """Lead-in, settling and recording [s]."""
+        return len(self.lead_in) * self.lead_s + self.settle_s + self.duration_s
 
     def steps(self) -> Iterator[Step]:
-        """One step."""
+        """List the tones of the lead-in, as one segment, then the dwell."""
+        way = Segment("lead_in", {"tones": len(self.lead_in)})
+        for tone in self.lead_in:
+            level = tone.amplitude_vpp / self.amplitude_vpp
+            yield Step(Tone(tone.frequency_hz, level), 0.0, self.lead_s, way)
         segment = Segment("dwell", {"frequency_hz": self.frequency_hz})
         yield Step(Tone(self.frequency_hz), self.settle_s, self.duration_s, segment)
 
     def preview(self, sample_rate_hz: float) -> Preview:
-        """Show the sine from the moment the wait begins."""
+        """Show the sine from the moment the lead-in, or the wait, begins."""
         return preview_of(
             self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
         )

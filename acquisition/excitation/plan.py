@@ -30,6 +30,11 @@ class AbstractExcitation(FrozenModel, ABC):
         """List what the generator does, in the order of time."""
 
     @property
+    def highest_amplitude_vpp(self) -> float:
+        """The highest setting there is on the way, peak to peak [V]."""
+        return self.amplitude_vpp
+
+    @property
     @abstractmethod
     def playing_s(self) -> float:
         """Time of all steps, settling included, ramps not [s]."""

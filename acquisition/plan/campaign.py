@@ -1,15 +1,19 @@
-"""An ordered list of measurements, and the TOML file that says it."""
+"""What to measure, in order: measurements and nested sweeps, and the TOML file that says them."""
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from ..excitation.kinds import KINDS
 from ..run.schedule import CHECK_S, duration_s
 from ..toml_file import FrozenModel, load_toml
 from .measurement import Measurement, Name
+from .point import Point
+from .retry import RetryPolicy
+from .sweep import Sweep
 
 DEFAULTS = "defaults"
 BYTES_PER_SAMPLE = 4
@@ -17,46 +21,55 @@ BYTES_PER_SAMPLE = 4
 
 
 class Campaign(FrozenModel):
-    """Measurements to be made one after the other.
+    """Measurements to be made one after the other, and sweeps after them.
 
     In a file, ``[defaults]`` holds what all measurements share, and ``[defaults.<kind>]`` what all
-    excitations of one kind share; a measurement's own values come first. The campaign itself has
-    every value in its place.
+    excitations of one kind share; a measurement's own values come first, and so do a sweep's. The
+    campaign itself has every value in its place. A file holds values and nothing that could be run.
     """
 
     name: Name
     notes: str = ""
-    measurements: tuple[Measurement, ...] = Field(min_length=1)
+    retry: RetryPolicy = RetryPolicy()
+    measurements: tuple[Measurement, ...] = ()
+    sweeps: tuple[Sweep, ...] = ()
 
     @model_validator(mode="before")
     @classmethod
     def _fill_in_defaults(cls, content: Any) -> Any:
         match content:
-            case {"defaults": dict(defaults), "measurements": list(measurements)}:
-                rest = {key: value for key, value in content.items() if key != DEFAULTS}
-                filled = [_filled(measurement, defaults) for measurement in measurements]
-                return {**rest, "measurements": filled}
+            case {"defaults": dict(defaults), **rest}:
+                measurements = [_filled(each, defaults) for each in _listed(rest, "measurements")]
+                sweeps = [_filled_sweep(each, defaults) for each in _listed(rest, "sweeps")]
+                return {**rest, "measurements": measurements, "sweeps": sweeps}
             case _:
                 return content
 
     @model_validator(mode="after")
-    def _names_differ(self) -> Self:
-        names = [name.lower() for name in self.recording_names()]
-        twice = sorted({name for name in names if names.count(name) > 1})
+    def _has_points_of_different_names(self) -> Self:
+        names = Counter(name.lower() for name in self.recording_names())
+        if not names:
+            raise ValueError("a campaign needs at least one of [[measurements]] and [[sweeps]]")
+        twice = sorted(name for name, count in names.items() if count > 1)
         if twice:
             raise ValueError(
-                f"two measurements would be recorded as {twice[0]!r}; give every measurement "
-                "a name of its own (capital letters do not count)"
+                f"two measurements would be recorded as {twice[0]!r}; give every measurement and sweep "
+                "a name of its own, and every axis different values (capital letters do not count)"
             )
         return self
 
+    def points(self) -> tuple[Point, ...]:
+        """Every recording that is wanted, in order: measurements, then sweeps."""
+        listed = (Point(name, each) for each in self.measurements for name in _names(each))
+        return (*listed, *(point for sweep in self.sweeps for point in sweep.points()))
+
     def recordings(self) -> tuple[tuple[str, Measurement], ...]:
         """Name of each recording, and the measurement it is one of, in order."""
-        return tuple((name, each) for each in self.measurements for name in _names(each))
+        return tuple((point.name, point.measurement) for point in self.points())
 
     def recording_names(self) -> tuple[str, ...]:
         """Names of all recordings, in order, without ``.h5``."""
-        return tuple(name for name, _ in self.recordings())
+        return tuple(point.name for point in self.points())
 
     @property
     def duration_s(self) -> float:
@@ -77,6 +90,25 @@ def _names(measurement: Measurement) -> tuple[str, ...]:
     if measurement.repeats == 1:
         return (measurement.name,)
     return tuple(f"{measurement.name}-{number}" for number in range(1, measurement.repeats + 1))
+
+
+def _listed(content: Mapping[Any, Any], key: str) -> list[Any]:
+    """Give a list as it stands; what is none is left for the validation to refuse."""
+    given = content.get(key, [])
+    return list(given) if isinstance(given, list | tuple) else [given]
+
+
+def _filled_sweep(sweep: object, defaults: Mapping[str, Any]) -> object:
+    """Put the defaults underneath a sweep's template, and underneath each of its excitations."""
+    match sweep:
+        case {"measurement": dict(template), **rest}:
+            others = [
+                {**defaults.get(str(each.get("kind")), {}), **each} if isinstance(each, dict) else each
+                for each in _listed(rest, "excitations")
+            ]
+            return {**rest, "measurement": _filled(template, defaults), "excitations": others}
+        case _:
+            return sweep
 
 
 def _filled(measurement: object, defaults: Mapping[str, Any]) -> object:

@@ -114,7 +114,7 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
     excitation = measurement.excitation
     yield LimitCheck(
         "the generator's setting",
-        excitation.amplitude_vpp,
+        excitation.highest_amplitude_vpp,
         rig.generator.amplitude_limit_vpp,
         "Vpp",
         "amplitude_limit_vpp of the hardware configuration",
@@ -146,7 +146,7 @@ def _streaming(measurement: Measurement, rig: Rig, output: OutputConfig) -> Iter
     excitation = measurement.excitation
     yield LimitCheck(
         "the analogue output's voltage (peak)",
-        0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor(),
+        0.5 * excitation.highest_amplitude_vpp * rig.generator.terminal_factor(),
         output.limit_v,
         "V",
         output.source,
@@ -186,7 +186,7 @@ def _loads(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
     name = f"the amplifier's voltage ({volts.cause}, peak)"
     yield LimitCheck(name, volts.peak, rig.amplifier.clip_v, "V", clip, "lower amplitude_vpp or the gain")
     yield from _inputs(
-        rig, measurement.excitation.amplitude_vpp, volts.peak, loads[Quantity.ACCELERATION].peak
+        rig, measurement.excitation.highest_amplitude_vpp, volts.peak, loads[Quantity.ACCELERATION].peak
     )
 
 

@@ -1,0 +1,221 @@
+"""Nested sweeps: their points, names, order and chains, and what is refused."""
+
+import pytest
+
+from acquisition.errors import ConfigurationError
+from acquisition.plan.campaign import Campaign, load_campaign
+from acquisition.plan.limits import require_within_limits
+from acquisition.plan.loads import predicted_loads
+from acquisition.rig.model import Quantity
+from acquisition.run.schedule import phases
+from acquisition.run.state import RunState
+from acquisition.toml_file import validated
+from acquisition.toml_text import toml_text
+
+DWELL = {"kind": "dwell", "settle_s": 1.0, "duration_s": 2.0}
+
+
+def campaign(**sweep):
+    sweep.setdefault("measurement", {"ramp_s": 0.3, "excitation": DWELL})
+    return validated({"name": "c", "sweeps": [{"name": "line", **sweep}]}, Campaign, "c.toml")
+
+
+def names(plan):
+    return list(plan.recording_names())
+
+
+class TestOrder:
+    def test_the_innermost_axis_changes_fastest(self):
+        plan = campaign(amplitude_vpp=[0.5, 1.5], frequency_hz={"start": 200, "stop": 210, "step": 5})
+        assert names(plan) == [
+            f"line-{level}-{frequency}"
+            for level in ("0p5vpp", "1p5vpp")
+            for frequency in ("200hz", "205hz", "210hz")
+        ]
+        assert [point.measurement.excitation.frequency_hz for point in plan.points()] == [200, 205, 210] * 2
+
+    def test_a_stated_order_turns_the_nesting_round(self):
+        plan = campaign(
+            amplitude_vpp=[0.5, 1.5], frequency_hz=[200, 210], order=["frequency_hz", "amplitude_vpp"]
+        )
+        assert names(plan) == [
+            "line-200hz-0p5vpp",
+            "line-200hz-1p5vpp",
+            "line-210hz-0p5vpp",
+            "line-210hz-1p5vpp",
+        ]
+
+    def test_repetitions_are_an_axis_like_others(self):
+        plan = campaign(amplitude_vpp=[0.5], frequency_hz=[200, 210], repetitions=2)
+        assert [name[:7] for name in names(plan)] == ["line-r1", "line-r1", "line-r2", "line-r2"]
+
+    def test_each_excitation_gets_the_template_s_values_and_its_own(self):
+        plan = campaign(
+            measurement={"excitation": {"amplitude_vpp": 1.0, "settle_s": 0.5}},
+            excitations=[
+                {"kind": "sine_sweep", "start_hz": 300, "stop_hz": 200, "duration_s": 5},
+                {"kind": "stepped_sine", "frequencies_hz": [200, 210]},
+            ],
+            direction=["up", "down"],
+        )
+        by_name = {point.name: point.measurement.excitation for point in plan.points()}
+        assert by_name["line-sine_sweep-up"].start_hz == 200
+        assert by_name["line-sine_sweep-down"].start_hz == 300
+        assert by_name["line-stepped_sine-down"].direction == "down"
+        assert {excitation.settle_s for excitation in by_name.values()} == {0.5}
+
+    def test_measurements_come_before_sweeps_and_defaults_reach_both(self, tmp_path):
+        path = tmp_path / "c.toml"
+        path.write_text("""
+name = "c"
+[defaults]
+ramp_s = 0.7
+[defaults.dwell]
+settle_s = 9.0
+duration_s = 4.0
+[[sweeps]]
+name = "line"
+frequency_hz = [200, 210]
+measurement = { excitation = { kind = "dwell", amplitude_vpp = 1.0 } }
+[[measurements]]
+name = "first"
+excitation = { kind = "dwell", amplitude_vpp = 1.0, frequency_hz = 260, settle_s = 1.0 }
+""")
+        points = load_campaign(path).points()
+        assert [point.name for point in points] == ["first", "line-200hz", "line-210hz"]
+        assert [point.measurement.excitation.settle_s for point in points] == [1.0, 9.0, 9.0]
+        assert {point.measurement.ramp_s for point in points} == {0.7}
+
+    def test_logarithmic_levels_have_equal_ratios(self):
+        plan = campaign(
+            amplitude_vpp={"start": 0.1, "stop": 1.0, "count": 3, "spacing": "logarithmic"},
+            frequency_hz=[200],
+        )
+        assert [point.measurement.excitation.amplitude_vpp for point in plan.points()] == pytest.approx(
+            [0.1, 0.1**0.5, 1.0]
+        )
+
+
+class TestChains:
+    def test_each_point_is_led_through_all_before_it(self):
+        plan = campaign(
+            amplitude_vpp=[0.5],
+            direction=["up", "down"],
+            frequency_hz=[210, 200, 205],
+            continue_from_previous="frequency_hz",
+            lead_s=0.25,
+        )
+        ways = {
+            point.name: [tone.frequency_hz for tone in point.measurement.excitation.lead_in]
+            for point in plan.points()
+        }
+        assert ways == {
+            "line-0p5vpp-up-200hz": [],
+            "line-0p5vpp-up-205hz": [200],
+            "line-0p5vpp-up-210hz": [200, 205],
+            "line-0p5vpp-down-210hz": [],
+            "line-0p5vpp-down-205hz": [210],
+            "line-0p5vpp-down-200hz": [210, 205],
+        }
+        assert [point.chain for point in plan.points()] == ["line-0p5vpp-up"] * 3 + ["line-0p5vpp-down"] * 3
+        assert {point.measurement.excitation.lead_s for point in plan.points()} == {0.25}
+
+    def test_there_and_back_is_one_chain(self):
+        plan = campaign(
+            amplitude_vpp=[0.5],
+            direction=["up_then_down"],
+            frequency_hz=[200, 205],
+            continue_from_previous="frequency_hz",
+        )
+        assert names(plan) == [
+            f"line-0p5vpp-{word}" for word in ("up-200hz", "up-205hz", "down-205hz", "down-200hz")
+        ]
+        last = plan.points()[-1].measurement.excitation
+        assert [tone.frequency_hz for tone in last.lead_in] == [200, 205, 205]
+
+    def test_a_level_chain_downwards_is_led_from_above_and_held_against_the_limits_there(self, rig):
+        plan = campaign(
+            measurement={"ramp_s": 0.3, "excitation": {**DWELL, "frequency_hz": 200}},
+            amplitude_vpp=[0.5, 1.0, 2.0],
+            direction=["down"],
+            continue_from_previous="amplitude_vpp",
+        )
+        last = plan.points()[-1].measurement
+        assert last.excitation.amplitude_vpp == 0.5
+        assert last.excitation.highest_amplitude_vpp == 2.0
+        playing = [phase.play.level for phase in phases(last) if phase.state is RunState.RECORDING]
+        assert playing == [4.0, 2.0, 1.0]
+        alone = plan.points()[0].measurement.excitation
+        peak = predicted_loads(last.excitation, rig)[Quantity.ACCELERATION].peak
+        assert peak == pytest.approx(predicted_loads(alone, rig)[Quantity.ACCELERATION].peak)
+        require_within_limits(last, rig)
+
+    def test_a_chain_comes_back_from_its_toml_text_as_it_was(self, tmp_path):
+        plan = campaign(amplitude_vpp=[0.5], frequency_hz=[200, 205], continue_from_previous="frequency_hz")
+        path = tmp_path / "c.toml"
+        path.write_text(toml_text(plan))
+        assert load_campaign(path).points() == plan.points()
+
+
+@pytest.mark.parametrize(
+    ("sweep", "said"),
+    [
+        (
+            {"frequency_hz": [200, 200.00000001], "amplitude_vpp": [1]},
+            "two measurements would be recorded as",
+        ),
+        (
+            {
+                "frequency_hz": {"start": 1, "stop": 1000, "step": 1},
+                "amplitude_vpp": {"start": 0.1, "stop": 2, "step": 0.1},
+            },
+            r"has 20000 points \(20 amplitude_vpp x 1000 frequency_hz\), allowed are 10000",
+        ),
+        ({"frequency_hz": {"start": 1, "stop": 1000, "step": 1e-9}}, "values, allowed are 10000"),
+        ({"frequency_hz": {"start": 300, "stop": 200, "step": 1}}, "is not above start"),
+        ({"frequency_hz": [200]}, "line-200hz: excitation.dwell.amplitude_vpp is missing"),
+        ({"frequency_hz": [200], "amplitude_vpp": [50]}, "less than or equal to 20"),
+        (
+            {"frequency_hz": [200], "amplitude_vpp": [1], "order": ["frequency_hz"]},
+            "leaves out 'amplitude_vpp'",
+        ),
+        (
+            {"frequency_hz": [200], "amplitude_vpp": [1], "continue_from_previous": "amplitude_vpp"},
+            "must be the innermost axis",
+        ),
+        (
+            {"frequency_hz": [200], "amplitude_vpp": [1], "continue_from_previous": "repetition"},
+            "no axis to go along",
+        ),
+        (
+            {"frequency_hz": [200], "amplitude_vpp": [1], "direction": ["up"]},
+            "says nothing to the excitation 'dwell'",
+        ),
+        (
+            {
+                "measurement": {"excitation": {"kind": "sine_sweep"}},
+                "amplitude_vpp": [1, 2],
+                "continue_from_previous": "amplitude_vpp",
+            },
+            "leads from dwell to dwell",
+        ),
+        ({"frequency_hz": [200], "amplitude_vpp": [1], "name": "x" * 60}, "give the sweep a shorter name"),
+        ({"frequency_hz": [200], "amplitude_vpp": [1], "command": "rm"}, "command is not a known key"),
+        (
+            {
+                "frequency_hz": {"start": 1, "stop": 1200, "step": 1},
+                "amplitude_vpp": [1],
+                "continue_from_previous": "frequency_hz",
+            },
+            "a chain of 1200 points was given, allowed are 1000",
+        ),
+    ],
+)
+def test_a_sweep_that_cannot_be_is_refused_with_what_is_allowed(sweep, said):
+    with pytest.raises(ConfigurationError, match=said):
+        campaign(**sweep)
+
+
+def test_a_campaign_without_points_is_refused():
+    with pytest.raises(ConfigurationError, match=r"at least one of \[\[measurements\]\] and \[\[sweeps\]\]"):
+        validated({"name": "c"}, Campaign, "c.toml")
