@@ -258,7 +258,7 @@ class Run:
         for block in tape.read_for(duration_s):
             if into is not None:
                 into.append(block.volts)
-            yield self._progress(tape, block)
+            yield self._told(tape, block)
             self._look(block)
             if self._switch.is_holding and self._look == self._go_on:
                 yield from self._held(tape)
@@ -280,7 +280,7 @@ class Run:
                 reason = f"held for {HOLD_LONGEST_S:g} s, the longest that its recording has room for"
                 raise _Stopped(StopRequest.by(Cause.OPERATOR, reason))
             block = tape.linger(BLOCK_S)
-            yield self._progress(tape, block)
+            yield self._told(tape, block)
             self._look(block)
         self._enter(tape, before)
 
@@ -290,7 +290,10 @@ class Run:
         if (request := self._switch.request) is not None:
             raise _Stopped(request)
 
-    def _progress(self, tape: Tape, block: Block) -> Progress:
+    def _told(self, tape: Tape, block: Block) -> Progress:
+        """Note what others want to be noted, and tell where the run stands."""
+        for text in self._switch.take_marks():
+            tape.log("mark", text)
         level_vpp = self._drive.setting_vpp
         frequency_hz = self._play.frequency_hz if isinstance(self._play, Tone) else None
         return Progress(

@@ -77,6 +77,7 @@ class CampaignProgress:
     """Of this recording, from 1."""
     count: int
     """Recordings in all."""
+    path: Path
     run: Progress
 
 
@@ -128,7 +129,7 @@ def run_campaign(
     for number, planned in enumerate(plan, start=1):
 
         def tell(progress: Progress, number: int = number, planned: PlannedRecording = planned) -> None:
-            on_progress(CampaignProgress(planned.name, number, len(plan), progress))
+            on_progress(CampaignProgress(planned.name, number, len(plan), planned.path, progress))
 
         item = _carried_out(bench, planned, after_failure, tell, stop)
         items.append(item)

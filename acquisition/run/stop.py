@@ -1,6 +1,7 @@
 """How a run is told to end: what may cause it, how hard each cause stops, and the switch in between."""
 
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -80,7 +81,7 @@ class StopRequest:
 
 
 class StopSwitch:
-    """What anybody may use to hold or to end a run, or a campaign: any thread, and signal handlers.
+    """What anybody may use to hold, to mark or to end a run, or a campaign: any thread, and signal handlers.
 
     It takes no lock, so that a signal handler cannot wait for one. A stop cannot be taken back, only
     be made harder.
@@ -89,6 +90,7 @@ class StopSwitch:
     def __init__(self) -> None:
         self._asked: dict[StopLevel, StopRequest] = {}
         self._holding = False
+        self._marks: deque[str] = deque()
 
     @property
     def request(self) -> StopRequest | None:
@@ -118,6 +120,15 @@ class StopSwitch:
     def resume(self) -> None:
         """Go on after a hold."""
         self._holding = False
+
+    def mark(self, text: str) -> None:
+        """Note an event at the next sample that is recorded."""
+        self._marks.append(text)
+
+    def take_marks(self) -> Iterator[str]:
+        """Give each mark once, oldest first."""
+        while self._marks:
+            yield self._marks.popleft()
 
     def harder_than(self, level: StopLevel) -> StopRequest | None:
         """Give a request that is harder than ``level``, if there is one."""

@@ -1,0 +1,57 @@
+"""``python -m acquisition.engine``: an engine's process. Its first line of output says where to ask it."""
+
+import argparse
+import signal
+import sys
+from threading import Thread
+from types import FrameType
+
+from ..run.stop import Cause
+from .desk import Desk
+from .engine import Engine
+from .server import LOOPBACK, Server, spoken
+from .state import Attendance
+from .watch import Watch
+
+
+def main() -> None:
+    """Serve until told to end, by a request, a signal, or the end of the one that started it."""
+    options = _options()
+    engine = Engine(options.attendance)
+    desk = Desk(engine)
+    server = Server(desk, options.host)
+    watch = Watch(desk)
+    _heed_signals(desk)
+    print(spoken(server.address), flush=True)  # noqa: T201 - this line is the handshake
+    if options.attendance is Attendance.ATTENDED:
+        Thread(target=_follow_parent, args=(desk,), name="engine parent", daemon=True).start()
+    try:
+        engine.run()
+    finally:
+        server.close()
+        watch.close()
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m acquisition.engine", description=__doc__)
+    parser.add_argument("--attendance", type=Attendance, default=Attendance.ATTENDED)
+    parser.add_argument("--host", default=LOOPBACK, help="loopback unless told otherwise; there is a token")
+    return parser.parse_args()
+
+
+def _heed_signals(desk: Desk) -> None:
+    def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
+        desk.shutdown(Cause.TERMINATED, f"{signal.Signals(number).name}: ended by the system")
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+
+
+def _follow_parent(desk: Desk) -> None:
+    """End with whoever started the engine: standard input is a pipe from there."""
+    sys.stdin.buffer.read()
+    desk.shutdown(Cause.PARENT_GONE, "the program that started the engine has ended")
+
+
+if __name__ == "__main__":
+    main()

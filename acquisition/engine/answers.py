@@ -1,0 +1,79 @@
+"""From a request as it came over the wire to the answer that goes back."""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from ..errors import AcquisitionError
+from ..run.stop import Cause, StopRequest
+from . import requests as ask
+from .desk import Desk
+from .recent import Glance
+from .wire import Message
+
+DONE = Message(b'{"ok": true}')
+
+
+def answered(desk: Desk, message: Message) -> Message:
+    """Do what a message asks for; what is refused comes back as one sentence."""
+    try:
+        request = ask.REQUEST.validate_json(message.text)
+        return _answer(desk, request)
+    except ValidationError as error:
+        detail = error.errors()[0]
+        where = ".".join(str(part) for part in detail["loc"])
+        return refused(
+            f"what was asked is not understood ({where}: {detail['msg']}); nothing was done", error
+        )
+    except AcquisitionError as error:
+        return refused(str(error), error)
+
+
+def refused(sentence: str, error: Exception) -> Message:
+    """Say no."""
+    return Message(json.dumps({"refused": sentence, "kind": type(error).__name__}).encode())
+
+
+def _answer(desk: Desk, request: ask.Request) -> Message:
+    match request:
+        case ask.Status():
+            return _model(desk.status())
+        case ask.Look(since_sample=since, most=most):
+            return _glance(desk.look(since, most))
+        case ask.Arm(campaign=campaign, folder=folder, existing=existing):
+            return _model(desk.arm(campaign, Path(folder), existing))
+        case _:
+            _ORDERS[type(request)](desk, request)
+            return DONE
+
+
+_ORDERS: Mapping[type, Callable[[Desk, Any], None]] = {
+    ask.Hello: lambda _desk, _order: None,
+    ask.Open: lambda desk, order: desk.open(order.rig, order.confirmations),
+    ask.Close: lambda desk, _order: desk.close(),
+    ask.Check: lambda desk, order: desk.check(Path(order.folder)),
+    ask.Disarm: lambda desk, _order: desk.disarm(),
+    ask.Start: lambda desk, _order: desk.start(),
+    ask.Stop: lambda desk, order: desk.stop(StopRequest(Cause.OPERATOR, order.level, order.reason)),
+    ask.Resume: lambda desk, _order: desk.resume(),
+    ask.Mark: lambda desk, order: desk.mark(order.text),
+    ask.Shutdown: lambda desk, _order: desk.shutdown(Cause.OPERATOR, "the engine was told to end"),
+}
+"""What is done, and answered with no more than that it was."""
+
+
+def _model(model: BaseModel) -> Message:
+    return Message(model.model_dump_json().encode())
+
+
+def _glance(glance: Glance) -> Message:
+    facts = {
+        "run_id": glance.run_id,
+        "first_sample": glance.first_sample,
+        "sample_rate_hz": glance.sample_rate_hz,
+        "shape": glance.volts.shape,
+    }
+    return Message(json.dumps(facts).encode(), glance.volts.astype("<f4").tobytes())

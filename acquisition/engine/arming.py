@@ -1,0 +1,50 @@
+"""Arming: a campaign is refused with reasons, or put into words that an experimenter can check."""
+
+from datetime import timedelta
+from pathlib import Path
+
+from ..bench import Bench
+from ..plan.campaign import Campaign
+from ..plan.limits import LimitCheck, require_within_limits
+from ..run.drive import drive_for
+from ..run.run_campaign import Existing, planned_recordings
+from .status import ArmedPlan
+
+ARMED_S = 60.0
+"""An armed engine disarms itself after this long [s]."""
+
+
+def armed_plan(bench: Bench, campaign: Campaign, folder: Path, existing: Existing) -> ArmedPlan:
+    """Hold a campaign against bench and folder; nothing is played and nothing written.
+
+    Raises
+    ------
+    AcquisitionError
+        With every reason why it cannot be carried out.
+
+    """
+    checks: list[tuple[str, LimitCheck]] = []
+    for measurement in campaign.measurements:
+        checks += [(measurement.name, check) for check in require_within_limits(measurement, bench.rig)]
+        drive_for(bench, measurement)  # refuses what nothing on this bench can play
+    planned = planned_recordings(campaign, folder, existing)
+    missing = [each for each in planned if not each.is_complete]
+    name, closest = max(checks, key=lambda named: named[1].use)
+    loudest = max(measurement.excitation.amplitude_vpp for measurement in campaign.measurements)
+    kinds = ", ".join(dict.fromkeys(each.excitation.kind for each in campaign.measurements))
+    size_mb = campaign.size_bytes(bench.digitizer.sample_rate_hz, len(bench.channels)) / 1e6
+    length = timedelta(seconds=round(campaign.duration_s))
+    bound = f"{closest.limit:.4g} {closest.unit}"
+    kept = len(planned) - len(missing)
+    return ArmedPlan(
+        campaign=campaign.name,
+        folder=str(folder),
+        lines=(
+            f"What: {len(missing)} recordings ({kinds})" + (f", {kept} kept from before" if kept else ""),
+            f"Level: at most {loudest:g} Vpp at the generator",
+            f"Limits: {closest.what} comes closest, {closest.use:.0%} of {bound} in {name}",
+            f"How long: {length} (h:min:s), ramps and checks included",
+            f"Saved in: {folder}, at most {size_mb:.0f} MB while recording",
+        ),
+        expires_in_s=ARMED_S,
+    )

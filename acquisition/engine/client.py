@@ -1,0 +1,150 @@
+"""Asking an engine, from a window, a command or a script: plain blocking calls that return at once."""
+
+import json
+import socket
+from pathlib import Path
+from threading import Lock
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+import numpy as np
+from pydantic import BaseModel
+
+from .. import errors
+from ..errors import AcquisitionError
+from ..plan.campaign import Campaign
+from ..rig.configuration import Rig
+from ..rig.knobs import KnobSheet
+from ..run.run_campaign import Existing
+from ..run.stop import StopLevel
+from . import requests as ask
+from .errors import EngineError, EngineGone
+from .recent import Glance
+from .server import EngineAddress
+from .status import ArmedPlan, EngineStatus
+from .wire import Message, receive, send
+
+PATIENCE_S = 5.0
+"""How long an answer may take; the engine answers from what it holds, in milliseconds [s]."""
+Answer = TypeVar("Answer", bound=BaseModel)
+
+
+class EngineClient:
+    """A connection to an engine.
+
+    Asking anything tells the engine that somebody is there: an attended run goes on only while
+    something is asked at least twice a second. Each method raises `EngineGone` when the engine's
+    process has ended, and the engine's own `AcquisitionError` when it refuses.
+    """
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._connection = connection
+        self._asking = Lock()
+
+    @classmethod
+    def attach(cls, address: EngineAddress) -> "EngineClient":
+        """Connect to a running engine."""
+        try:
+            connection = socket.create_connection((address.host, address.port), PATIENCE_S)
+        except OSError as error:
+            raise EngineGone(
+                f"no engine answers at {address.host}:{address.port} ({error}); start one, or see whether it "
+                "has ended"
+            ) from error
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        client = cls(connection)
+        client._do(ask.Hello(token=address.token))
+        return client
+
+    def status(self) -> EngineStatus:
+        """Where the engine stands."""
+        return self._told(ask.Status(), EngineStatus)
+
+    def look(self, since_sample: int, most: int) -> Glance:
+        """Give the newest samples of the run: from ``since_sample`` on, at most ``most`` a channel."""
+        facts, payload = self._asked(ask.Look(since_sample=since_sample, most=most))
+        volts = np.frombuffer(payload, "<f4").reshape(facts["shape"])
+        return Glance(facts["run_id"], facts["first_sample"], facts["sample_rate_hz"], volts)
+
+    def open(self, rig: Rig, confirmations: KnobSheet | None = None) -> None:
+        """Open the bench of a rig; the status says when it is open."""
+        self._do(ask.Open(rig=rig, confirmations=confirmations))
+
+    def close_bench(self) -> None:
+        """Close the bench."""
+        self._do(ask.Close())
+
+    def check(self, folder: Path = Path()) -> None:
+        """Check the bench; the status will hold what was found."""
+        self._do(ask.Check(folder=str(folder.absolute())))
+
+    def arm(self, campaign: Campaign, folder: Path, existing: Existing = Existing.REFUSE) -> ArmedPlan:
+        """Get ready to carry out a campaign, or be refused with the reasons."""
+        where = str(folder.absolute())
+        return self._told(ask.Arm(campaign=campaign, folder=where, existing=existing), ArmedPlan)
+
+    def disarm(self) -> None:
+        """Take back what was armed."""
+        self._do(ask.Disarm())
+
+    def start(self) -> None:
+        """Carry out what is armed."""
+        self._do(ask.Start())
+
+    def stop(self, level: StopLevel, reason: str = "stopped by the operator") -> None:
+        """Hold or end what runs."""
+        self._do(ask.Stop(level=level, reason=reason))
+
+    def resume(self) -> None:
+        """Go on after a hold."""
+        self._do(ask.Resume())
+
+    def mark(self, text: str) -> None:
+        """Note an event at the next sample of the recording."""
+        self._do(ask.Mark(text=text))
+
+    def shutdown(self) -> None:
+        """Let the engine ramp down, silence everything and end."""
+        self._do(ask.Shutdown())
+
+    def close(self) -> None:
+        """End the connection; the engine stays. Legal at any time."""
+        self._connection.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _do(self, request: ask.Request) -> None:
+        self._asked(request)
+
+    def _told(self, request: ask.Request, kind: type[Answer]) -> Answer:
+        facts, _ = self._asked(request)
+        return kind.model_validate(facts)
+
+    def _asked(self, request: ask.Request) -> tuple[dict[str, Any], bytes]:
+        try:
+            with self._asking:
+                send(self._connection, Message(request.model_dump_json().encode()))
+                answer = receive(self._connection)
+        except OSError as error:
+            raise EngineGone(
+                f"the engine does not answer ({error}); its process has ended or hangs. What it drove is "
+                "silent if it could ramp down: look at the bench"
+            ) from error
+        facts = json.loads(answer.text)
+        if "refused" in facts:
+            raise _refusal(facts["kind"], facts["refused"])
+        return facts, answer.payload
+
+
+def _refusal(kind: str, sentence: str) -> AcquisitionError:
+    """Raise here what was raised there, as far as it is one of ours."""
+    known = getattr(errors, kind, None)
+    if isinstance(known, type) and issubclass(known, AcquisitionError):
+        return known(sentence)
+    return EngineError(sentence)
