@@ -53,7 +53,11 @@ class EngineClient:
             ) from error
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         client = cls(connection)
-        client._do(ask.Hello(token=address.token))
+        try:
+            client._do(ask.Hello(token=address.token))
+        except AcquisitionError:
+            client.close()
+            raise
         return client
 
     def status(self) -> EngineStatus:

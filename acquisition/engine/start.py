@@ -41,15 +41,15 @@ class EngineProcess:
             except EngineGone:
                 self._process.terminate()
         self.client.close()
-        if self._process.stdin is not None:
-            self._process.stdin.close()
-        if self._process.stdout is not None:
-            self._process.stdout.close()
         try:
             self._process.wait(LEAVING_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        # Not before: the end of its input tells an engine that it has been left alone.
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                pipe.close()
 
     def __enter__(self) -> Self:
         return self

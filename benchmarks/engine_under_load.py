@@ -1,0 +1,84 @@
+"""Does the engine keep up on the wall clock, with a frozen viewer and both cores busy with something else?
+
+    python benchmarks/engine_under_load.py [MINUTES]
+
+An engine records 4 x 51.2 kS/s from the virtual rig on the wall clock (its samples are lost when they are
+read too late, as on the real device), unattended. One viewer asks for ten seconds of samples again and
+again and reads nothing of the answers; as many processes as there are cores calculate all the time.
+Counted are the samples that are missing and the gaps that the recording flags.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+from acquisition.engine.client import EngineClient
+from acquisition.engine.requests import Look
+from acquisition.engine.start import start_engine
+from acquisition.engine.state import Attendance, EngineState
+from acquisition.engine.wire import Message, send
+from acquisition.plan.campaign import Campaign
+from acquisition.recording import open_recording
+from acquisition.rig.configuration import load_rig
+
+RIG = Path(__file__).parent.parent / "hardware_configs" / "virtual_rig.toml"
+BUSY = "while True: sum(i * i for i in range(100_000))"
+
+
+def campaign(duration_s: float) -> Campaign:
+    """One dwell in the colliding range."""
+    dwell = {"kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "duration_s": duration_s}
+    return Campaign.model_validate({"name": "load", "measurements": [{"name": "dwell", "excitation": dwell}]})
+
+
+def frozen_viewer(stack: ExitStack, client: EngineClient) -> None:
+    """Ask for much and read nothing, until the connection's buffers are full."""
+    connection = client._connection  # noqa: SLF001 - a viewer that misbehaves must go behind the client's back
+    connection.setblocking(False)  # noqa: FBT003 - the name is the socket's
+    stack.callback(client.close)
+    try:
+        while True:
+            send(connection, Message(Look(most=512_000).model_dump_json().encode()))
+    except BlockingIOError:
+        return
+
+
+def main() -> None:
+    """Run for some minutes and tell."""
+    minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
+    rig = load_rig(RIG)
+    assert rig.virtual is not None
+    on_the_wall = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
+    with ExitStack() as stack, tempfile.TemporaryDirectory() as folder:
+        engine = stack.enter_context(start_engine(Attendance.UNATTENDED))
+        client = engine.client
+        client.open(on_the_wall)
+        while client.status().state is EngineState.OPENING:
+            time.sleep(0.05)
+        client.arm(campaign(60 * minutes), Path(folder))
+        client.start()
+        while client.status().samples == 0:
+            time.sleep(0.05)
+        for _ in range(os.cpu_count() or 1):
+            busy = subprocess.Popen([sys.executable, "-c", BUSY])
+            stack.callback(busy.wait)
+            stack.callback(busy.kill)
+        frozen_viewer(stack, EngineClient.attach(engine.address))
+        began_s = time.monotonic()
+        while (status := client.status()).state is not EngineState.READY:
+            time.sleep(1.0)
+        wall_s = time.monotonic() - began_s
+        row = status.rows[0]
+        with open_recording(Path(row.file)) as recording:
+            missing = sum(gap.last_sample - gap.first_sample + 1 for gap in recording.gaps)
+            recorded_s = recording.samples / recording.sample_rate_hz
+            print(f"recording: {row.state} ({row.reason}); {recorded_s:.1f} s in {wall_s:.1f} s of wall time")
+            print(f"samples missing: {missing} a channel in {len(recording.gaps)} flagged gaps")
+
+
+if __name__ == "__main__":
+    main()

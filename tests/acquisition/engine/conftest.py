@@ -1,0 +1,62 @@
+"""Real engine processes with the virtual rig, and ways to wait for them without guessing times."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from acquisition.engine.client import EngineClient
+from acquisition.engine.start import EngineProcess, start_engine
+from acquisition.engine.state import Attendance, EngineState
+from acquisition.engine.status import EngineStatus
+from acquisition.plan.campaign import Campaign
+from acquisition.rig.configuration import Rig, load_rig
+
+ROOT = Path(__file__).parent.parent.parent.parent
+PATIENCE_S = 60.0
+
+
+@pytest.fixture(autouse=True)
+def own_state(tmp_path_factory, monkeypatch) -> None:
+    """Keep locks out of the user's folder."""
+    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path_factory.mktemp("state")))
+
+
+@pytest.fixture
+def shipped_rig() -> Rig:
+    return load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+
+
+@pytest.fixture
+def engine() -> Iterator[Callable[..., EngineProcess]]:
+    """Start engines; they are ended with the test."""
+    with ExitStack() as running:
+        yield lambda attendance=Attendance.ATTENDED: running.enter_context(start_engine(attendance))
+
+
+def until(client: EngineClient, is_there: Callable[[EngineStatus], bool]) -> EngineStatus:
+    """Ask until something is so."""
+    give_up_s = time.monotonic() + PATIENCE_S
+    while not is_there(status := client.status()):
+        if time.monotonic() > give_up_s:
+            pytest.fail(f"still {status}")
+    return status
+
+
+def until_state(client: EngineClient, *states: EngineState) -> EngineStatus:
+    return until(client, lambda status: status.state in states)
+
+
+def campaign(*names: str, duration_s: float = 600.0) -> Campaign:
+    """Long dwells: far longer than any test lets them last."""
+    excitation = {
+        "kind": "dwell",
+        "amplitude_vpp": 1.5,
+        "frequency_hz": 260,
+        "settle_s": 0.2,
+        "duration_s": duration_s,
+    }
+    each = [{"name": name, "ramp_s": 0.3, "ramp_step_s": 0.03, "excitation": excitation} for name in names]
+    return Campaign.model_validate({"name": "trial", "measurements": each})

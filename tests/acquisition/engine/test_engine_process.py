@@ -1,0 +1,292 @@
+"""A real engine process on the virtual rig: the job, the stops, and what happens when nobody looks."""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.engine.client import EngineClient
+from acquisition.engine.errors import EngineError, EngineGone
+from acquisition.engine.lock import BenchLock
+from acquisition.engine.requests import Look
+from acquisition.engine.start import start_engine
+from acquisition.engine.state import Attendance, EngineState
+from acquisition.engine.status import MessageKind
+from acquisition.engine.wire import Message, send
+from acquisition.errors import InstrumentBusy, LimitExceeded, RecordingError
+from acquisition.recording import RecordingState, open_recording
+from acquisition.run.stop import StopLevel
+from acquisition.virtual.rig import VirtualRig
+
+from .conftest import campaign, until, until_state
+
+SILENT_V = 0.02
+"""Of the recorded drive: its noise, and the last stair of a ramp."""
+
+
+def running(client, rig, tmp_path, *names):
+    client.open(rig)
+    until_state(client, EngineState.READY)
+    client.arm(campaign(*names or ("run",)), tmp_path)
+    client.start()
+    return until(client, lambda status: status.run is not None and status.run.segment == "dwell")
+
+
+def kept(path, reason):
+    """Open what was recorded; its last samples are silent and it says why it ended."""
+    give_up_s = time.monotonic() + 30
+    while not path.exists():
+        assert time.monotonic() < give_up_s, f"{path} was never finished"
+    with open_recording(path) as recording:
+        assert recording.state is RecordingState.STOPPED
+        assert re.search(reason, recording.reason), recording.reason
+        assert np.max(np.abs(recording.read("drive_voltage", recording.samples - 32))) < SILENT_V
+        return [(event.kind, event.text) for event in recording.events]
+
+
+class TestTheJob:
+    def test_a_bench_is_opened_checked_armed_run_and_closed(self, engine, shipped_rig, tmp_path):
+        client = engine().client
+        assert client.status().state is EngineState.CLOSED
+        client.open(shipped_rig)
+        bench = until_state(client, EngineState.READY).bench
+        assert bench.is_simulated
+        assert bench.identities["generator"].startswith("TEKTRONIX,AFG1022")
+        client.check(tmp_path)
+        checked = until_state(client, EngineState.READY)
+        assert checked.check.verdict == "ok"
+        plan = client.arm(campaign("run", duration_s=3.0), tmp_path / "new")
+        assert [line.partition(":")[0] for line in plan.lines] == [
+            "What",
+            "Level",
+            "Limits",
+            "How long",
+            "Saved in",
+        ]
+        assert until_state(client, EngineState.ARMED).armed.expires_in_s > 50
+        assert not (tmp_path / "new").exists()
+        client.start()
+        ended = until(client, lambda status: status.state is EngineState.READY)
+        assert [row.state for row in ended.rows] == ["recorded"]
+        with open_recording(tmp_path / "new" / "run.h5") as recording:
+            assert recording.state is RecordingState.COMPLETE
+        client.close_bench()
+        until_state(client, EngineState.CLOSED)
+
+    def test_the_newest_samples_are_those_of_the_recording(self, engine, shipped_rig, tmp_path):
+        client = engine().client
+        running(client, shipped_rig, tmp_path)
+        glance = client.look(0, 10_000)
+        client.stop(StopLevel.ABORT)
+        until_state(client, EngineState.READY)
+        assert glance.volts.shape == (4, 10_000)
+        with open_recording(tmp_path / "run.h5") as recording:
+            first, last = glance.first_sample, glance.first_sample + 10_000
+            recorded = recording.read("m0_velocity", first, last)
+            per_volt = next(
+                each for each in recording.channels if each.role == "m0_velocity"
+            ).physical_per_volt
+        np.testing.assert_allclose(glance.volts[3] * per_volt, recorded, rtol=1e-5, atol=1e-8)
+
+    def test_a_mark_stands_at_its_sample(self, engine, shipped_rig, tmp_path):
+        client = engine().client
+        before = running(client, shipped_rig, tmp_path).samples
+        client.mark("the sphere was heard")
+        client.stop(StopLevel.ABORT)
+        until_state(client, EngineState.READY)
+        with open_recording(tmp_path / "run.h5") as recording:
+            marks = [event for event in recording.events if event.kind == "mark"]
+            assert [mark.text for mark in marks] == ["the sphere was heard"]
+            assert before <= marks[0].sample <= recording.samples
+
+    def test_a_held_run_goes_on(self, engine, shipped_rig, tmp_path):
+        client = engine().client
+        running(client, shipped_rig, tmp_path)
+        client.stop(StopLevel.HOLD)
+        until_state(client, EngineState.HELD)
+        client.resume()
+        until_state(client, EngineState.RUNNING)
+
+    def test_a_stop_ends_the_campaign_and_not_only_its_measurement(self, engine, shipped_rig, tmp_path):
+        client = engine().client
+        running(client, shipped_rig, tmp_path, "first", "second")
+        client.stop(StopLevel.RAMP, "enough for today")
+        rows = until_state(client, EngineState.READY).rows
+        assert [row.state for row in rows] == ["stopped", "queued"]
+        assert ("end", "enough for today") in kept(tmp_path / "first.h5", "enough for today")
+
+
+class TestRefusals:
+    def test_what_the_state_does_not_allow_is_refused_with_a_sentence(self, engine, tmp_path):
+        client = engine().client
+        with pytest.raises(EngineError, match=r"is closed and cannot start now; it can when it is armed"):
+            client.start()
+        with pytest.raises(EngineError, match="nothing is being recorded"):
+            client.mark("too early")
+        client.stop(StopLevel.OFF)
+        client.disarm()
+
+    def test_a_plan_past_a_limit_is_refused_when_it_is_armed(self, engine, shipped_rig, tmp_path):
+        client = engine().client
+        client.open(shipped_rig)
+        until_state(client, EngineState.READY)
+        low = campaign("low").measurements[0]
+        hard = low.excitation.model_copy(update={"amplitude_vpp": 10.0, "frequency_hz": 20.0})
+        plan = campaign("low").model_copy(
+            update={"measurements": (low.model_copy(update={"excitation": hard}),)}
+        )
+        with pytest.raises(LimitExceeded, match="the stroke"):
+            client.arm(plan, tmp_path)
+        assert client.status().state is EngineState.READY
+
+    def test_nothing_is_overwritten(self, engine, shipped_rig, tmp_path):
+        (tmp_path / "run.h5").write_bytes(b"precious")
+        client = engine().client
+        client.open(shipped_rig)
+        until_state(client, EngineState.READY)
+        with pytest.raises(RecordingError, match="nothing is ever overwritten"):
+            client.arm(campaign("run"), tmp_path)
+
+    def test_nobody_is_let_in_without_the_token(self, engine):
+        address = engine().address
+        with pytest.raises(EngineError, match="nobody was let in"):
+            EngineClient.attach(address.model_copy(update={"token": "guessed"}))
+
+    def test_it_listens_on_loopback_only(self, engine):
+        address = engine().address
+        assert address.host == "127.0.0.1"
+        others = [info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)]
+        for host in {other for other in others if not other.startswith("127.")}:
+            with pytest.raises(OSError, match="refused"):
+                socket.create_connection((host, address.port), 1.0)
+
+    @pytest.mark.parametrize(
+        "said", [b"GET / HTTP/1.1\r\n\r\n", b"VBE1\xff\xff\xff\xff\xff\xff\xff\xff", b"\0" * 64]
+    )
+    def test_what_is_no_message_closes_the_connection_and_harms_nobody(self, engine, said):
+        process = engine()
+        with socket.create_connection((process.address.host, process.address.port), 5.0) as stranger:
+            stranger.sendall(said)
+            with suppress(ConnectionResetError):
+                assert stranger.recv(1) == b""
+        assert process.client.status().state is EngineState.CLOSED
+
+    def test_two_engines_cannot_open_one_bench(self, engine, shipped_rig):
+        virtual = VirtualRig(shipped_rig)
+        with virtual:
+            served = shipped_rig.model_copy(
+                update={
+                    "virtual": None,
+                    "daq": shipped_rig.daq.model_copy(update={"server": virtual.daq_address}),
+                    "generator": shipped_rig.generator.model_copy(
+                        update={"resource": virtual.socket_resource}
+                    ),
+                }
+            )
+            mine = BenchLock.of(served)
+            client = engine().client
+            client.open(served)
+            fault = until_state(client, EngineState.FAULT).messages[-1]
+            assert fault.kind is MessageKind.FAULT
+            assert fault.code == InstrumentBusy.__name__
+            assert str(os.getpid()) in fault.what
+            mine.release()
+
+
+class TestNobodyLooks:
+    def test_an_attended_run_is_aborted_when_nobody_asks(self, engine, shipped_rig, tmp_path):
+        process = engine()
+        running(process.client, shipped_rig, tmp_path)
+        events = kept(tmp_path / "run.h5", "nobody has looked for 0.[5-9] s")  # asks nothing meanwhile
+        assert any(kind == "silence" and text.startswith("abort: 0.0") for kind, text in events)
+        assert process.client.status().messages[-2].what.startswith("The viewer is gone")
+
+    def test_a_frozen_viewer_does_not_hold_the_engine_up(self, engine, shipped_rig, tmp_path):
+        process = engine(Attendance.UNATTENDED)
+        client = process.client
+        running(client, shipped_rig, tmp_path)
+        with EngineClient.attach(process.address) as frozen:
+            # Asks for much, and reads nothing of it.
+            for _ in range(20):
+                send(frozen._connection, Message(Look(most=500_000).model_dump_json().encode()))
+            before = client.status().samples
+            until(client, lambda status: status.samples > before + 500_000)
+
+    def test_an_unattended_run_goes_on_alone(self, engine, shipped_rig, tmp_path):
+        process = engine(Attendance.UNATTENDED)
+        client = process.client
+        client.open(shipped_rig)
+        until_state(client, EngineState.READY)
+        client.arm(campaign("run", duration_s=15.0), tmp_path)
+        client.start()
+        path = tmp_path / "run.h5"
+        give_up_s = time.monotonic() + 60
+        while not path.exists():
+            assert time.monotonic() < give_up_s
+        with open_recording(path) as recording:
+            assert recording.state is RecordingState.COMPLETE
+
+    def test_an_armed_engine_disarms_itself_when_nobody_asks(self, engine, shipped_rig, tmp_path):
+        client = engine().client
+        client.open(shipped_rig)
+        until_state(client, EngineState.READY)
+        client.arm(campaign("run"), tmp_path)
+        alone_until_s = time.monotonic() + 0.8
+        while time.monotonic() < alone_until_s:
+            pass
+        assert client.status().state is EngineState.READY
+
+    @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
+    @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+    def test_a_viewer_killed_or_frozen_leaves_silence_and_a_recording(self, shipped_rig, tmp_path, number):
+        config = tmp_path / "rig.json"
+        config.write_text(shipped_rig.model_dump_json())
+        viewer = subprocess.Popen(
+            [sys.executable, str(Path(__file__).with_name("viewer_child.py")), str(config), str(tmp_path)],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            assert viewer.stdout.readline() == "running\n"
+            viewer.send_signal(number)
+            reason = {
+                signal.SIGKILL: "the program that started|nobody has looked",
+                signal.SIGSTOP: "nobody has looked",
+            }
+            kept(tmp_path / "run.h5", reason[number])
+        finally:
+            viewer.kill()
+            viewer.wait()
+            viewer.stdout.close()
+
+
+class TestItsEnd:
+    @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+    def test_a_signal_ramps_down_and_ends_the_process(self, shipped_rig, tmp_path, number):
+        with start_engine() as process:
+            running(process.client, shipped_rig, tmp_path)
+            os.kill(process.pid, number)
+            kept(tmp_path / "run.h5", signal.Signals(number).name)
+            process._process.wait(20)
+        assert not process.is_alive
+
+    def test_leaving_a_started_engine_ends_its_run(self, shipped_rig, tmp_path):
+        with start_engine() as process:
+            running(process.client, shipped_rig, tmp_path)
+        assert not process.is_alive
+        kept(tmp_path / "run.h5", "was told to end")
+
+    def test_a_client_of_an_engine_that_was_killed_is_told_so(self, engine, shipped_rig, tmp_path):
+        process = engine()
+        running(process.client, shipped_rig, tmp_path)
+        process._process.kill()
+        with pytest.raises(EngineGone, match="does not answer"):
+            until(process.client, lambda status: False)

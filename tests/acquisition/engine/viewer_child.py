@@ -1,0 +1,38 @@
+"""A viewer to be killed or frozen: starts an engine, runs a campaign on it, and looks at it for ever."""
+
+import sys
+from pathlib import Path
+
+from acquisition.engine.start import start_engine
+from acquisition.engine.state import EngineState
+from acquisition.plan.campaign import Campaign
+from acquisition.rig.configuration import Rig
+
+PLAN = {
+    "name": "trial",
+    "measurements": [
+        {
+            "name": "run",
+            "ramp_s": 0.3,
+            "ramp_step_s": 0.03,
+            "excitation": {
+                "kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "settle_s": 0.2, "duration_s": 600
+            },
+        }
+    ],
+}  # fmt: skip
+
+rig = Rig.model_validate_json(Path(sys.argv[1]).read_text())
+with start_engine() as engine:
+    client = engine.client
+    client.open(rig)
+    while client.status().state is EngineState.OPENING:
+        pass
+    client.arm(Campaign.model_validate(PLAN), Path(sys.argv[2]))
+    client.start()
+    is_told = False
+    while True:
+        run = client.status().run
+        if run is not None and run.segment == "dwell" and not is_told:
+            print("running", flush=True)  # noqa: T201 - its word to the test
+            is_told = True
