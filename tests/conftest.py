@@ -1,3 +1,30 @@
-"""One thread for linear algebra, as for the command, before any test imports numpy."""
+"""One thread for linear algebra, as for the command; and the window's tests wherever Qt can be loaded."""
 
-import cli.blas_threads  # noqa: F401 - it is the import that counts
+import os
+
+import cli.blas_threads  # noqa: F401 - it is the import that counts, before any test imports numpy
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+os.environ.setdefault("QT_SCALE_FACTOR", "1")
+os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
+
+# pytest-qt ends the whole run where Qt's system libraries are missing, so it is loaded here, after a look.
+QT_MISSING = ""
+try:
+    from PySide6 import QtGui, QtTest, QtWidgets  # noqa: F401 - to see whether they load
+except ImportError as error:
+    if os.environ.get("REQUIRE_GUI") == "1":
+        raise
+    QT_MISSING = str(error)
+    collect_ignore_glob = ["gui/*"]
+else:
+    pytest_plugins = ["pytestqt.plugin"]
+
+
+def pytest_report_header() -> str:
+    """Say aloud when the window is not tested: a green run must not hide it."""
+    if QT_MISSING:
+        return (
+            f"the window's tests were NOT RUN: Qt cannot be loaded ({QT_MISSING}); docs/gui.md names packages"
+        )
+    return "the window is tested offscreen"

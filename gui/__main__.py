@@ -1,0 +1,35 @@
+"""`vibench-gui` and `python -m gui`: the window, from the command line to its end.
+
+Qt is imported inside `main`: a process that is spawned for background work imports this module too.
+"""
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Open the window and stay until it is closed."""
+    options = _options(arguments)
+    # The same binding for all, and one thread for linear algebra: the matrices are small.
+    os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from .open_window import open_window  # noqa: PLC0415
+
+    return open_window(options.bench, options.settings)
+
+
+def _options(arguments: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="vibench gui", description="The window of vibench.")
+    parser.add_argument(
+        "--bench", type=Path, metavar="BENCH.toml", help="hardware configuration to begin with"
+    )
+    parser.add_argument(
+        "--settings", type=Path, metavar="FILE.ini", help="settings file; the user's if absent"
+    )
+    return parser.parse_args(arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,92 @@
+"""What a form says of a field, taken from the plan model: label, unit, limits, explanation."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, get_args
+
+import annotated_types
+from pydantic.fields import FieldInfo
+
+UNITS = (
+    ("_m_per_s2", "m/s²"),
+    ("_m_per_s", "m/s"),
+    ("_per_s", "1/s"),
+    ("_vpp", "Vpp"),
+    ("_hz", "Hz"),
+    ("_db", "dB"),
+    ("_deg", "°"),
+    ("_s", "s"),
+    ("_m", "m"),
+    ("_v", "V"),
+    ("_a", "A"),
+    ("_n", "N"),
+)
+"""Endings of names, longest first, and the unit they stand for."""
+
+
+@dataclass(frozen=True)
+class FieldFacts:
+    """A field as a person sees it."""
+
+    name: str
+    label: str
+    unit: str
+    limits: str
+    """``"above 0, at most 60 s"``; empty when anything goes."""
+    explanation: str
+
+    @property
+    def tooltip(self) -> str:
+        """Explanation and limits."""
+        limits = f"Allowed: {self.limits}" if self.limits else ""
+        return "\n".join(part for part in (self.explanation, limits) if part)
+
+    @property
+    def spoken(self) -> str:
+        """Name for screen readers."""
+        return f"{self.label} in {self.unit}" if self.unit else self.label
+
+
+def field_facts(name: str, field: FieldInfo) -> FieldFacts:
+    """Say what a form must know of a field."""
+    suffix, unit = next(((s, u) for s, u in UNITS if name.endswith(s)), ("", ""))
+    words = name.removesuffix(suffix).replace("_", " ")
+    return FieldFacts(
+        name=name,
+        label=words[:1].upper() + words[1:],
+        unit=unit,
+        limits=_limits(field, unit),
+        explanation=_plain(field.description or ""),
+    )
+
+
+def _limits(field: FieldInfo, unit: str) -> str:
+    # "above" and "at least" before "at most" and "below".
+    said = ", ".join(sorted(_limit_texts(field), key=lambda text: text.startswith(("at most", "below"))))
+    return f"{said} {unit}".strip() if said else ""
+
+
+def _limit_texts(field: FieldInfo) -> Iterator[str]:
+    for constraint in (*field.metadata, *_inner(field.annotation)):
+        match constraint:
+            case annotated_types.Ge(ge):
+                yield f"at least {ge:g}"
+            case annotated_types.Gt(gt):
+                yield f"above {gt:g}"
+            case annotated_types.Le(le):
+                yield f"at most {le:g}"
+            case annotated_types.Lt(lt):
+                yield f"below {lt:g}"
+
+
+def _inner(annotation: Any) -> Iterator[object]:
+    """Constraints of what a tuple holds, or of what an optional value is."""
+    for part in get_args(annotation):
+        yield from getattr(part, "__metadata__", ())
+        yield from _inner(part)
+
+
+def _plain(text: str) -> str:
+    """Take the marks of documentation out of a sentence."""
+    return re.sub(r"\s*\[[^\]]*\]", "", re.sub(r"`+([^`]*)`+", r"\1", text)).strip()

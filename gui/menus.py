@@ -1,0 +1,51 @@
+"""The menus: everything that a key or a click can do, in words."""
+
+from collections.abc import Callable
+
+from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtWidgets import QMainWindow, QMessageBox
+
+from .desk import Desk
+from .key_list import key_text
+from .theme import DARK, LIGHT, Theme
+
+EMERGENCY = "STOP is not an emergency stop: in an emergency, switch the amplifier off."
+
+
+def build_menus(
+    window: QMainWindow, desk: Desk, pages: tuple[str, ...], reset_layout: Callable[[], None]
+) -> None:
+    """Put the menus on a window."""
+    bar = window.menuBar()
+    bar.setAccessibleName("Menus")
+    file = bar.addMenu("&File")
+    _add(file.addAction("&Quit"), "Ctrl+Q", window.close)
+    view = bar.addMenu("&View")
+    for number, name in enumerate(pages, start=1):
+        _add(view.addAction(f"&{number}  {name}"), f"Ctrl+{number}", _showing(desk, name))
+    view.addSeparator()
+    _add(view.addAction("&Light or dark"), "Ctrl+T", lambda: desk.choose_theme(_other(desk)))
+    _add(view.addAction("&Reset layout"), "", reset_layout)
+    help_menu = bar.addMenu("&Help")
+    _add(help_menu.addAction("&Keys"), "F1", lambda: show_keys(window))
+
+
+def show_keys(window: QMainWindow) -> None:
+    """List the keys beside the window, which goes on meanwhile."""
+    box = QMessageBox(QMessageBox.Icon.NoIcon, "Keys", f"{key_text()}<p>{EMERGENCY}</p>", parent=window)
+    box.setModal(False)
+    box.show()
+
+
+def _add(action: QAction, key: str, act: Callable[[], object]) -> None:
+    if key:
+        action.setShortcut(QKeySequence(key))
+    action.triggered.connect(lambda _checked=False: act())
+
+
+def _showing(desk: Desk, name: str) -> Callable[[], None]:
+    return lambda: desk.page_wanted.emit(name)
+
+
+def _other(desk: Desk) -> Theme:
+    return DARK if desk.theme is LIGHT else LIGHT

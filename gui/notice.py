@@ -1,0 +1,46 @@
+"""What the window tells a person: what happened, what was done about it, what to do next."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class NoticeKind(StrEnum):
+    """How much it matters."""
+
+    INFO = "info"
+    WARNING = "warning"
+    FAULT = "fault"
+
+
+@dataclass(frozen=True)
+class Notice:
+    """One message; parts that say nothing are left empty."""
+
+    kind: NoticeKind
+    what: str
+    """What happened."""
+    done: str = ""
+    """What was done about it."""
+    next_step: str = ""
+    """What to do."""
+    code: str = ""
+    """A word to search for."""
+    details: str = ""
+
+    @property
+    def text(self) -> str:
+        """Everything, for the clipboard and for a log."""
+        code = f"[{self.code}] " if self.code else ""
+        parts = (f"{self.kind.value.upper()}: {code}{self.what}", self.done, self.next_step, self.details)
+        return "\n".join(part for part in parts if part)
+
+
+def notice_of(error: BaseException, next_step: str = "") -> Notice:
+    """Say an error whose own sentence holds what happened, what was done and what to do."""
+    return Notice(
+        NoticeKind.FAULT,
+        str(error) or type(error).__name__,
+        next_step=next_step,
+        code=type(error).__name__,
+        details="\n".join(getattr(error, "__notes__", ())),
+    )

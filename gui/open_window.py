@@ -1,0 +1,21 @@
+"""From nothing to a window on the screen, and from its end to the end of the process."""
+
+import sys
+from pathlib import Path
+
+from .app import application
+from .desk import Desk
+from .pages.catalogue import PAGES
+from .settings import Remembered, Settings, default_settings_path
+from .window import Window
+
+
+def open_window(bench: Path | None, settings: Path | None) -> int:
+    """Show the window until it is closed; gives the exit code of the process."""
+    app = application(sys.argv[:1])
+    kept = Settings(settings or default_settings_path())
+    if bench is not None:
+        kept.keep_text(Remembered.BENCH, str(bench.resolve()))
+    window = Window(Desk(kept), PAGES)
+    window.show()
+    return app.exec()

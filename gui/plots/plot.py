@@ -1,0 +1,233 @@
+"""A plot as all pages draw it: labelled axes, thin pens, a legend that follows the theme."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from math import log10
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import ArrayLike
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication, QKeyEvent
+from PySide6.QtWidgets import QWidget
+
+from ..theme import Colour, Theme
+from .axis import Axis, AxisItem, Scale
+
+# Antialiasing halves the frame rate, and OpenGL draws grey areas on machines without it.
+pg.setConfigOptions(antialias=False, useOpenGL=False)
+
+
+class Dash(Enum):
+    """How a line is drawn."""
+
+    SOLID = Qt.PenStyle.SolidLine
+    DASHED = Qt.PenStyle.DashLine
+    DOTTED = Qt.PenStyle.DotLine
+
+
+@dataclass(frozen=True)
+class Ink:
+    """Which colour of a theme, and which dash: told anew at every change of theme."""
+
+    colour: Callable[[Theme], Colour]
+    dash: Dash = Dash.SOLID
+    filled: float = 0.0
+    """Opacity of an area, 0 to 1."""
+
+
+def trace(number: int, dash: Dash = Dash.SOLID) -> Ink:
+    """Ink of the trace with this number."""
+    return Ink(lambda theme: theme.traces[number % len(theme.traces)], dash)
+
+
+PREDICTED = Ink(lambda theme: theme.predicted, Dash.DASHED)
+LIMIT = Ink(lambda theme: "#b3261e" if theme.name == "light" else "#ff8a80", Dash.DASHED)
+GUIDE = Ink(lambda theme: theme.line, Dash.DOTTED)
+FRAME_POINTS = 9
+
+
+class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
+    """One pair of axes. Values are given as they are; logarithms are taken here.
+
+    With the focus on it: A shows everything, L changes the upright axis between linear and logarithmic,
+    Ctrl+C copies the picture.
+    """
+
+    def __init__(
+        self, name: str, across: Axis, up: Axis, theme: Theme, parent: QWidget | None = None
+    ) -> None:
+        self.across = AxisItem("bottom", across)
+        self.up = AxisItem("left", up)
+        super().__init__(parent=parent, axisItems={"bottom": self.across, "left": self.up})
+        self.setAccessibleName(name)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.getPlotItem().hideButtons()
+        self.getPlotItem().setMenuEnabled(False)
+        self.getPlotItem().showGrid(x=True, y=True, alpha=0.25)
+        self.getPlotItem().setLogMode(across.scale is Scale.LOGARITHMIC, up.scale is Scale.LOGARITHMIC)
+        self._scales = [across.scale, up.scale]
+        self._inked: list[tuple[Ink, Callable[[Theme], None]]] = []
+        self._legend: pg.LegendItem | None = None
+        self._legend_entries: list[tuple[pg.PlotDataItem, str]] = []
+        self._theme = theme
+        self.retheme(theme)
+
+    def with_legend(self) -> "Plot":
+        """Show names of the curves that have one."""
+        self._legend = self.getPlotItem().addLegend(offset=(-10, 10))
+        self._relegend()
+        return self
+
+    def curve(self, ink: Ink, name: str = "") -> pg.PlotDataItem:
+        """Add a line; ``setData(x, y)`` draws it."""
+        item = pg.PlotDataItem()
+        item.setSkipFiniteCheck(False)
+        self.addItem(item)
+        if name:
+            self._legend_entries.append((item, name))
+        self._ink(ink, lambda theme: item.setPen(_pen(ink, theme)))
+        self._relegend()
+        return item
+
+    def dots(self, ink: Ink, name: str = "", size: int = 4) -> pg.PlotDataItem:
+        """Add points without a line."""
+        item = pg.PlotDataItem(pen=None, symbol="o", symbolSize=size, symbolPen=None)
+        self.addItem(item)
+        if name:
+            self._legend_entries.append((item, name))
+        self._ink(ink, lambda theme: item.setSymbolBrush(pg.mkBrush(ink.colour(theme))))
+        self._relegend()
+        return item
+
+    def band(self, ink: Ink) -> "Band":
+        """Add an area between two lines, for uncertainties and envelopes."""
+        band = Band(self)
+        self._ink(ink, lambda theme: band.paint(_shade(ink, theme)))
+        return band
+
+    def region(self, ink: Ink) -> pg.LinearRegionItem:
+        """Add an upright stripe that nobody can move; `place` puts it."""
+        item = pg.LinearRegionItem(movable=False)
+        for line in item.lines:
+            line.setPen(pg.mkPen(None))
+        self.addItem(item)
+        self._ink(ink, lambda theme: item.setBrush(pg.mkBrush(_shade(ink, theme))))
+        return item
+
+    def place(self, region: pg.LinearRegionItem, low: float, high: float) -> None:
+        """Put a stripe between two values of the axis across."""
+        region.setRegion((self._across(low), self._across(high)))
+
+    def upright(self, ink: Ink, value: float, label: str = "") -> pg.InfiniteLine:
+        """Add an upright line at a value."""
+        return self._line(ink, self._across(value), 90, label)
+
+    def level(self, ink: Ink, value: float, label: str = "") -> pg.InfiniteLine:
+        """Add a level line at a value."""
+        shown = log10(value) if self._scales[1] is Scale.LOGARITHMIC else value
+        return self._line(ink, shown, 0, label)
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self._theme = theme
+        self.setBackground(theme.base)
+        for axis in (self.across, self.up):
+            axis.setPen(pg.mkPen(theme.line))
+            axis.setTextPen(pg.mkPen(theme.text))
+        for _, paint in self._inked:
+            paint(theme)
+        self._relegend()
+
+    def show_everything(self) -> None:
+        """Let the axes follow the data."""
+        self.getPlotItem().enableAutoRange()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Act on A, L and Ctrl+C, while the plot has the focus."""
+        match event.key(), event.modifiers():
+            case Qt.Key.Key_A, Qt.KeyboardModifier.NoModifier:
+                self.show_everything()
+            case Qt.Key.Key_L, Qt.KeyboardModifier.NoModifier:
+                self._turn_scale()
+            case Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier:
+                QGuiApplication.clipboard().setPixmap(self.grab())
+            case _:
+                super().keyPressEvent(event)
+                return
+        event.accept()
+
+    def _turn_scale(self) -> None:
+        up = Scale.LINEAR if self._scales[1] is Scale.LOGARITHMIC else Scale.LOGARITHMIC
+        self._scales[1] = up
+        self.getPlotItem().setLogMode(y=up is Scale.LOGARITHMIC)
+        self.show_everything()
+
+    def _across(self, value: float) -> float:
+        return log10(value) if self._scales[0] is Scale.LOGARITHMIC else value
+
+    def _line(self, ink: Ink, position: float, angle: float, label: str) -> pg.InfiniteLine:
+        options = {"position": 0.92, "movable": False}
+        item = pg.InfiniteLine(position, angle, label=label or None, labelOpts=options if label else None)
+        self.addItem(item, ignoreBounds=True)
+
+        def paint(theme: Theme) -> None:
+            item.setPen(_pen(ink, theme))
+            if label:
+                item.label.setColor(ink.colour(theme))
+
+        self._ink(ink, paint)
+        return item
+
+    def _ink(self, ink: Ink, paint: Callable[[Theme], None]) -> None:
+        self._inked.append((ink, paint))
+        paint(self._theme)
+
+    def _relegend(self) -> None:
+        """Write the legend anew: its entries do not follow a change of colour."""
+        if self._legend is None:
+            return
+        self._legend.clear()
+        self._legend.setLabelTextColor(self._theme.text)
+        self._legend.setBrush(pg.mkBrush(_veil(self._theme)))
+        for item, name in self._legend_entries:
+            self._legend.addItem(item, name)
+
+
+class Band:
+    """An area between a lower and an upper line."""
+
+    def __init__(self, plot: Plot) -> None:
+        self._edges = [pg.PlotDataItem(pen=None) for _ in range(2)]
+        self._fill = pg.FillBetweenItem(*self._edges)
+        for item in (*self._edges, self._fill):
+            plot.addItem(item)
+
+    def set_data(self, across: ArrayLike, low: ArrayLike, high: ArrayLike) -> None:
+        """Draw the area; where an edge is not finite there is none."""
+        x, below, above = (np.asarray(values, dtype=np.float64) for values in (across, low, high))
+        drawn = np.isfinite(below) & np.isfinite(above)
+        for edge, values in zip(self._edges, (below, above), strict=True):
+            edge.setData(x[drawn], values[drawn])
+
+    def paint(self, shade: object) -> None:
+        """Fill it with a colour."""
+        self._fill.setBrush(shade)
+
+
+def _pen(ink: Ink, theme: Theme) -> object:
+    # One pixel: two cost five times the time of a frame.
+    return pg.mkPen(ink.colour(theme), width=1, style=ink.dash.value)
+
+
+def _shade(ink: Ink, theme: Theme) -> object:
+    colour = pg.mkColor(ink.colour(theme))
+    colour.setAlphaF(ink.filled or 0.25)
+    return colour
+
+
+def _veil(theme: Theme) -> object:
+    colour = pg.mkColor(theme.base)
+    colour.setAlphaF(0.8)
+    return colour

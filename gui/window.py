@@ -1,0 +1,129 @@
+"""The frame: banner and STOP, messages, the rail of pages, the status line."""
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import QApplication, QHBoxLayout, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
+
+from .abort_key import AbortKey
+from .banner import Banner
+from .desk import Desk
+from .menus import build_menus
+from .message_strip import MessageStrip
+from .page import Page
+from .pages.catalogue import PageEntry
+from .rail import Rail
+from .settings import Remembered
+from .status_line import StatusLine
+from .theme import Theme, palette, style_sheet
+
+TICK_MS = 50
+"""Twenty pictures a second: more cost a core, fewer look jerky."""
+
+
+class Window(QMainWindow):
+    """Holds the pages; what they show, and what the banner shows, comes from the engine at every tick."""
+
+    def __init__(self, desk: Desk, entries: tuple[PageEntry, ...]) -> None:
+        super().__init__()
+        self.desk = desk
+        self.setWindowTitle("vibench")
+        self.banner = Banner()
+        self.strip = MessageStrip()
+        self.status_line = StatusLine()
+        ordered = sorted(entries, key=lambda entry: entry.number)
+        self.pages: dict[str, Page] = {entry.name: entry.make(desk) for entry in ordered}
+        self.rail = Rail(tuple(self.pages))
+        self.rail.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._stack = QStackedWidget()
+        for name, page in self.pages.items():
+            page.setAccessibleName(f"{name} page")
+            self._stack.addWidget(page)
+        self._lay_out()
+        build_menus(self, desk, tuple(self.pages), self._reset_layout)
+        self._connect()
+        self._restore()
+        self._timer = QTimer(self, interval=TICK_MS)
+        self._timer.timeout.connect(self.tick)
+        self._timer.start()
+
+    @property
+    def page(self) -> Page:
+        """The page in sight."""
+        page = self._stack.currentWidget()
+        assert isinstance(page, Page)
+        return page
+
+    def show_page(self, name: str) -> None:
+        """Bring a page into sight."""
+        page = self.pages.get(name)
+        if page is None or page is self._stack.currentWidget():
+            return
+        self.page.left()
+        self._stack.setCurrentWidget(page)
+        self.rail.choose(name)
+        self.desk.settings.keep_text(Remembered.PAGE, name)
+        page.entered()
+        page.refresh()
+
+    def tick(self) -> None:
+        """Show what is true now."""
+        self.page.refresh()
+        self.rail.show_done({name: page.is_done for name, page in self.pages.items()})
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Keep the shape of the window, end what works for it."""
+        self._timer.stop()
+        self.page.left()
+        self.desk.settings.keep_state(Remembered.GEOMETRY, self.saveGeometry())
+        self.desk.background.close()
+        super().closeEvent(event)
+
+    def _lay_out(self) -> None:
+        body = QHBoxLayout()
+        body.setContentsMargins(0, 0, 0, 0)
+        body.setSpacing(0)
+        body.addWidget(self.rail)
+        body.addWidget(self._stack, 1)
+        middle = QWidget()
+        layout = QVBoxLayout(middle)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(self.banner)
+        layout.addWidget(self.strip)
+        layout.addLayout(body, 1)
+        layout.addWidget(self.status_line)
+        self.setCentralWidget(middle)
+
+    def _connect(self) -> None:
+        self.rail.chosen.connect(self.show_page)
+        self.desk.page_wanted.connect(self.show_page)
+        self.desk.noticed.connect(self.strip.say)
+        self.desk.theme_changed.connect(self._retheme)
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)
+        self.abort_key = AbortKey(application, self)
+
+    def _restore(self) -> None:
+        self._retheme(self.desk.theme)
+        self.resize(1280, 800)
+        geometry = self.desk.settings.state(Remembered.GEOMETRY)
+        if not geometry.isEmpty():
+            self.restoreGeometry(geometry)
+        first = next(iter(self.pages))
+        wanted = self.desk.settings.text(Remembered.PAGE, first)
+        name = wanted if wanted in self.pages else first
+        self._stack.setCurrentWidget(self.pages[name])
+        self.rail.choose(name)
+
+    def _retheme(self, theme: Theme) -> None:
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)
+        application.setPalette(palette(theme))
+        application.setStyleSheet(style_sheet(theme))
+        for page in self.pages.values():
+            page.retheme(theme)
+
+    def _reset_layout(self) -> None:
+        self.desk.settings.forget_layout()
+        self.showNormal()
+        self.resize(1280, 800)

@@ -1,0 +1,92 @@
+"""Every value of every plan has a field, and goes through the form unchanged."""
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel
+
+from acquisition.excitation.kinds import KINDS
+from acquisition.plan.campaign import load_campaign
+from acquisition.plan.measurement import Measurement
+from gui.forms.model_form import ModelForm
+
+CAMPAIGNS = Path(__file__).resolve().parents[3] / "campaigns"
+MEASUREMENTS = {
+    f"{path.stem}-{each.name}": each
+    for path in sorted(CAMPAIGNS.glob("*.toml"))
+    for each in load_campaign(path).measurements
+}
+
+
+@pytest.fixture
+def form(qtbot):
+    form = ModelForm(Measurement)
+    qtbot.addWidget(form)
+    return form
+
+
+@pytest.mark.parametrize("name", MEASUREMENTS)
+def test_a_measurement_comes_out_of_the_form_as_it_went_in(form, name):
+    measurement = MEASUREMENTS[name]
+    form.show_content(measurement.model_dump(mode="json", exclude_none=True))
+    assert Measurement.model_validate(form.content()) == measurement
+
+
+def leaves(form):
+    """Every field of a form, those of models inside included."""
+    for name, editor in form.editors.items():
+        inner = getattr(editor, "form", None)
+        if inner is None:
+            yield name, editor.widget
+        else:
+            yield from leaves(inner)
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_every_field_of_every_kind_is_there_named_and_labelled(form, kind):
+    example = next((m for m in MEASUREMENTS.values() if m.excitation.kind == kind), None)
+    excitation = form.editors["excitation"]
+    excitation.show_content({"kind": kind} if example is None else example.excitation)
+    model = excitation.form.model
+    assert model.model_fields["kind"].default == kind
+    assert set(excitation.form.editors) == set(model.model_fields) - {"kind"}
+    buddies = {label.buddy() for label in form.findChildren(QLabel) if label.buddy() is not None}
+    for name, widget in leaves(form):
+        assert widget.accessibleName(), name
+        assert widget in buddies, name
+
+
+def test_units_and_limits_stand_at_the_field(form):
+    widget = form.editors["ramp_s"].widget
+    assert widget.accessibleName() == "Ramp in s"
+    assert "above 0, at most 60 s" in widget.toolTip()
+    form.show_content({"ramp_s": 1.5})
+    assert widget.text() == "1.5 s"
+
+
+def test_what_is_typed_is_in_the_plan(form, qtbot):
+    form.show_content(MEASUREMENTS["quick-dwell"].model_dump(mode="json"))
+    widget = form.editors["excitation"].form.editors["frequency_hz"].widget
+    widget.lineEdit().setText("0,3 kHz")
+    qtbot.keyClick(widget, Qt.Key.Key_Return)
+    assert form.content()["excitation"]["frequency_hz"] == 300.0
+
+
+def test_a_text_that_is_no_number_is_complained_about_at_its_field_and_changes_nothing(form, qtbot):
+    form.show_content(MEASUREMENTS["quick-dwell"].model_dump(mode="json"))
+    editor = form.editors["ramp_s"]
+    editor.widget.lineEdit().setText("soon")
+    qtbot.keyClick(editor.widget, Qt.Key.Key_Return)
+    form.complain({})
+    assert "'soon' is not a number" in editor.complaint
+    assert form.content()["ramp_s"] == MEASUREMENTS["quick-dwell"].ramp_s
+
+
+def test_a_change_of_kind_keeps_what_both_kinds_have(form):
+    form.show_content(MEASUREMENTS["quick-dwell"].model_dump(mode="json"))
+    excitation = form.editors["excitation"]
+    excitation.kind_choice.setCurrentIndex(excitation.kind_choice.findText("sine sweep"))
+    content = excitation.content()
+    assert content["kind"] == "sine_sweep"
+    assert content["amplitude_vpp"] == MEASUREMENTS["quick-dwell"].excitation.amplitude_vpp

@@ -1,0 +1,49 @@
+"""A signal is drawn with every impact in it, at any zoom."""
+
+import numpy as np
+import pytest
+
+from gui.plots.axis import TIME, Axis
+from gui.plots.plot import Plot, trace
+from gui.plots.signal_curve import SignalCurve
+from gui.theme import LIGHT
+
+RATE_HZ = 51200.0
+
+
+@pytest.fixture
+def plot(qtbot):
+    plot = Plot("signal", TIME, Axis("Velocity", "m/s"), LIGHT)
+    qtbot.addWidget(plot)
+    plot.resize(800, 300)
+    plot.show()
+    return plot
+
+
+def drawn(plot):
+    (item,) = plot.getPlotItem().listDataItems()
+    return item.getData()
+
+
+@pytest.mark.parametrize("place", np.linspace(0.001, 1.999, 13))
+def test_an_impact_of_three_samples_is_seen_in_two_seconds(plot, place):
+    samples = np.zeros(round(2 * RATE_HZ))
+    first = round(place * RATE_HZ)
+    samples[first : first + 3] = (0.5, 1.0, -0.5)
+    SignalCurve(plot, trace(0)).set_samples(samples, RATE_HZ)
+    time_s, values = drawn(plot)
+    assert len(values) < 4000
+    assert values.max() == 1.0
+    assert values.min() == -0.5
+    assert abs(time_s[values.argmax()] - place) < 2 / 400
+
+
+def test_a_close_look_shows_the_samples_themselves(plot):
+    samples = np.sin(2 * np.pi * 100 * np.arange(round(2 * RATE_HZ)) / RATE_HZ)
+    curve = SignalCurve(plot, trace(0))
+    curve.set_samples(samples, RATE_HZ)
+    plot.setXRange(1.0, 1.01, padding=0)
+    time_s, values = drawn(plot)
+    np.testing.assert_allclose(values, np.sin(2 * np.pi * 100 * time_s), atol=1e-9)
+    assert time_s[0] <= 1.0
+    assert time_s[-1] >= 1.01

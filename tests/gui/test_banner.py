@@ -1,0 +1,41 @@
+"""The banner says the state by symbol and word, and STOP is part of it."""
+
+import pytest
+from PySide6.QtWidgets import QLabel, QPushButton
+
+from gui.banner import Banner, Face
+from gui.theme import DARK, LIGHT, Tone
+
+READABLE = 4.5
+
+
+def test_a_state_is_shown_by_symbol_and_word_not_by_colour_alone(qtbot):
+    banner = Banner()
+    qtbot.addWidget(banner)
+    banner.show_face(Face("▶", "RUNNING", Tone.ACTIVE, "0:42 of 2:00"))
+    label = banner.findChild(QLabel, "face")
+    assert label.text() == "▶  RUNNING"
+    assert label.accessibleName() == "State: RUNNING"
+    assert label.property("tone") == "active"
+
+
+def test_a_click_on_stop_asks_for_a_stop(qtbot):
+    banner = Banner()
+    qtbot.addWidget(banner)
+    with qtbot.waitSignal(banner.stop_wanted):
+        banner.findChild(QPushButton, "stop").click()
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
+@pytest.mark.parametrize("tone", list(Tone))
+def test_the_letters_of_every_tone_can_be_read(theme, tone, contrast):
+    paint = theme.tones[tone]
+    assert contrast(paint.letters, paint.ground) >= READABLE
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
+def test_text_and_accents_can_be_read_on_every_ground(theme, contrast):
+    for ground in (theme.window, theme.base, theme.raised):
+        for letters in (theme.text, theme.muted):
+            assert contrast(letters, ground) >= READABLE, (letters, ground)
+    assert contrast(theme.base, theme.accent) >= READABLE
