@@ -18,6 +18,7 @@ from .disk import sync_file, sync_folder
 from .disk_room import claim_room, extend_room, release_room
 from .fixed_text import decoded, encoded
 from .layout import RecordingState, Table
+from .overview import BIN_BYTES, OverviewSums, bins_of, write_overview
 from .preallocate import HEAD_BYTES, ITEM_BYTES
 from .tables import Columns
 
@@ -73,7 +74,8 @@ def _largest_size(part: Path) -> int:
     with h5py.File(part, "r", locking=False) as source:
         samples = int(source[layout.N_VALID][0])
         channels = len(str(read_attributes(source)["roles"]).split())
-    return HEAD_BYTES + samples * (channels * ITEM_BYTES + TIME_BYTES)
+    bins = bins_of(samples) * (channels * BIN_BYTES + ITEM_BYTES)
+    return HEAD_BYTES + samples * (channels * ITEM_BYTES + TIME_BYTES) + bins
 
 
 def _copy(part: Path, tmp: Path, room: int) -> None:
@@ -130,11 +132,12 @@ def _copy_channel(
     source: h5py.Dataset, copy: h5py.File, role: str, samples: int, time_axis: h5py.Dataset
 ) -> None:
     dataset = create_counts(copy, role, samples, layout.CHUNK_SAMPLES)
-    digest = hashlib.sha256()
-    write_chunks(dataset, _hashed(_pieces(source, samples), digest))
+    digest, overview = hashlib.sha256(), OverviewSums()
+    write_chunks(dataset, overview.watched(_hashed(_pieces(source, samples), digest)))
     write_attributes(dataset, {**read_attributes(source), "sha256": digest.hexdigest()})
     dataset.attrs["_FillValue"] = np.int32(layout.MISSING_COUNT)
     dataset.dims[0].attach_scale(time_axis)
+    write_overview(copy, role, overview.overview(), float(copy.attrs["sample_rate_hz"]))
 
 
 def _pieces(dataset: h5py.Dataset, samples: int) -> Iterator[Counts]:

@@ -38,6 +38,8 @@ TIME = "time"
 ROW = "row"
 CONFIGURATION = "configuration"
 RESULTS = "results"
+OVERVIEW = "overview"
+BIN = "bin"
 SETTINGS = "settings"
 
 ROLE_WIDTH = 64
@@ -115,7 +117,18 @@ OPEN_SEGMENT = -1
 """``last_sample`` of a segment that has not ended yet; never in a finished file."""
 
 RESERVED_NAMES = frozenset(
-    {N_VALID, N_ROWS, STATE, REASON, TIME, ROW, CONFIGURATION, RESULTS, *(table.name for table in TABLES)}
+    {
+        N_VALID,
+        N_ROWS,
+        STATE,
+        REASON,
+        TIME,
+        ROW,
+        CONFIGURATION,
+        RESULTS,
+        OVERVIEW,
+        *(table.name for table in TABLES),
+    }
 )
 
 

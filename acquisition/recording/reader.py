@@ -22,6 +22,7 @@ from .header import ChannelHeader
 from .json_text import json_text
 from .layout import Origin, RecordingState
 from .opening import open_hdf5
+from .overview import CountOverview, read_overview
 from .replacing import replace_with_change
 from .results import ResultArray, SavedResult, Setting, read_results, write_result
 from .tables import Event, Gap, Segment
@@ -130,6 +131,10 @@ class Recording:
                 f"Samples {begin} to {end} of {role!r} in {self.path} cannot be read: {error}."
                 " The file is damaged or closed; copy it again from where it was recorded."
             ) from error
+
+    def read_overview(self, role: str) -> CountOverview | None:
+        """Give the extremes of every 128 counts, as they were kept; None where the file has none."""
+        return read_overview(self._open.file, self.channel(role).role, self.samples)
 
     def blocks(
         self, roles: Sequence[str], samples: int, start: int = 0, stop: int | None = None

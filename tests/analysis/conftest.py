@@ -156,3 +156,9 @@ def streamed_file(streamed_noise, tmp_path_factory):
         return synthetic.write_recording(folder, plan, base, velocity, parts, **{"name": "streamed", **how})
 
     return write
+
+
+@pytest.fixture(scope="session")
+def synthetic_module():
+    """The module that writes recordings of a faultless bench."""
+    return synthetic

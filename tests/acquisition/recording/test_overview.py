@@ -1,0 +1,81 @@
+import h5py
+import numpy as np
+import pytest
+
+from acquisition.recording import create_recording, open_recording
+from acquisition.recording.layout import CHUNK_SAMPLES, MISSING_COUNT
+from acquisition.recording.overview import BIN_SAMPLES, OverviewSums, extremes
+
+SAMPLES = 2 * CHUNK_SAMPLES + 1000
+
+
+@pytest.fixture
+def recorded(tmp_path, make_header, make_block):
+    counts, block = make_block(0, SAMPLES)
+    with create_recording(tmp_path / "a.h5", make_header(expected_samples=SAMPLES)) as writer:
+        writer.append(block)
+    return tmp_path / "a.h5", counts
+
+
+def test_every_sample_lies_between_the_extremes_of_its_bin_and_touches_them(recorded):
+    path, counts = recorded
+    with open_recording(path) as recording:
+        for row, role in zip(counts, recording.roles, strict=True):
+            overview = recording.read_overview(role)
+            assert overview.low.size == overview.high.size == -(-SAMPLES // BIN_SAMPLES)
+            for number in (0, 1, 399, 400, overview.low.size - 1):
+                part = row[number * BIN_SAMPLES : (number + 1) * BIN_SAMPLES]
+                assert (overview.low[number], overview.high[number]) == (part.min(), part.max())
+
+
+def test_a_stranger_reads_the_overview_with_scale_and_axis(recorded):
+    path, counts = recorded
+    with h5py.File(path, "r") as file:
+        low = file["overview/m0_velocity_low"]
+        assert low.attrs["scale_factor"] == file["m0_velocity"].attrs["scale_factor"]
+        assert low.attrs["units"] == b"m s-1"
+        assert low[:].min() == counts[1].min()
+        axis = file["overview/bin"]
+        assert low.dims[0][0].name == "/overview/bin"
+        assert axis[3] * axis.attrs["scale_factor"] == pytest.approx(3 * BIN_SAMPLES / 1000.0)
+        assert file["overview"].attrs["samples_per_bin"] == BIN_SAMPLES
+
+
+def test_lost_samples_are_no_extreme_and_a_lost_bin_is_missing():
+    counts = np.arange(4 * BIN_SAMPLES, dtype=np.int32)
+    counts[5:9] = MISSING_COUNT
+    counts[BIN_SAMPLES : 2 * BIN_SAMPLES] = MISSING_COUNT
+    found = extremes(counts)
+    assert found.low.tolist() == [0, MISSING_COUNT, 2 * BIN_SAMPLES, 3 * BIN_SAMPLES]
+    assert found.high.tolist() == [BIN_SAMPLES - 1, MISSING_COUNT, 3 * BIN_SAMPLES - 1, 4 * BIN_SAMPLES - 1]
+
+
+def test_pieces_make_the_overview_of_the_whole():
+    counts = np.random.default_rng(1).integers(-1000, 1000, 10 * BIN_SAMPLES + 7, dtype=np.int32)
+    sums = OverviewSums()
+    for first in range(0, counts.size, 3 * BIN_SAMPLES):
+        sums.add(counts[first : first + 3 * BIN_SAMPLES])
+    assert np.array_equal(sums.overview().low, extremes(counts).low)
+    assert np.array_equal(sums.overview().high, extremes(counts).high)
+
+
+def test_a_recording_without_samples_has_an_empty_overview(tmp_path, make_header):
+    with create_recording(tmp_path / "a.h5", make_header()):
+        pass
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert recording.read_overview("m0_velocity").low.size == 0
+
+
+def test_a_file_without_an_overview_says_so(recorded):
+    path, _ = recorded
+    with h5py.File(path, "r+") as file:
+        del file["overview"]
+    with open_recording(path) as recording:
+        assert recording.read_overview("m0_velocity") is None
+
+
+def test_a_growing_recording_has_no_overview_yet(tmp_path, make_header, make_block):
+    with create_recording(tmp_path / "a.h5", make_header(expected_samples=1000)) as writer:
+        writer.append(make_block(0, 500)[1])
+        with open_recording(tmp_path / "a.h5.part") as recording:
+            assert recording.read_overview("m0_velocity") is None
