@@ -1,0 +1,249 @@
+"""Every state of a run, every way to stop it, every fault beside it: silence, a file that opens, a reason.
+
+Silence is looked at in the simulated world, at the generator's terminal. Times are rig time: from the moment
+of the cause to the end of the run, which is later than the zero of the drive. The whole product takes
+minutes (``pytest -m slow``); without it each state meets each stop, and each fault, on its own.
+"""
+
+import itertools
+import os
+import signal
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from acquisition.bench import open_bench
+from acquisition.errors import AcquisitionError, InstrumentLost
+from acquisition.excitation.dwell import Dwell
+from acquisition.plan.limits import shortest_ramp_s
+from acquisition.plan.measurement import Measurement
+from acquisition.recording import RecordingState, open_recording
+from acquisition.recording.writer import create_recording
+from acquisition.rig.calibration import CalibrationRule
+from acquisition.rig.knobs import confirm_simulated
+from acquisition.run.run import Run
+from acquisition.run.state import RunState
+from acquisition.run.stop import Cause, StopLevel, StopRequest
+from acquisition.run.stop_on_signal import stop_on_signal
+from acquisition.run.tape import BLOCK_S
+
+RAMP_S = 0.3
+PLAN = Measurement(
+    name="run",
+    excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.5, duration_s=1.0),
+    ramp_s=RAMP_S,
+    ramp_step_s=0.03,
+)
+STATES = [
+    RunState.CHECKING,
+    RunState.RAMPING_UP,
+    RunState.SETTLING,
+    RunState.RECORDING,
+    RunState.HELD,
+    RunState.RAMPING_DOWN,
+]
+SILENT_V = 1e-2
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A way to stop, and how long silence may take after it [s]; None: the plan is carried out."""
+
+    press: Callable[[Run], None]
+    reason: str
+    silent_within_s: float | None
+
+
+def ask(level: StopLevel) -> Callable[[Run], None]:
+    return lambda run: run.switch.ask(StopRequest(Cause.OPERATOR, level, f"{level} pressed"))
+
+
+def send(number: signal.Signals) -> Callable[[Run], None]:
+    return lambda run: os.kill(os.getpid(), number)
+
+
+ABORT_S = BLOCK_S + 0.09
+"""A block that was being read, and three periods of the loaded shaker (checked below)."""
+STOPS = {
+    "nothing": Stop(lambda run: None, "", None),
+    "ramp": Stop(ask(StopLevel.RAMP), "ramp pressed", BLOCK_S + RAMP_S),
+    "abort": Stop(ask(StopLevel.ABORT), "abort pressed", ABORT_S),
+    "off": Stop(ask(StopLevel.OFF), "off pressed", BLOCK_S),
+    "ramp then off": Stop(
+        lambda run: (ask(StopLevel.RAMP)(run), ask(StopLevel.OFF)(run)), "off pressed", BLOCK_S
+    ),
+    "SIGINT": Stop(send(signal.SIGINT), "SIGINT", BLOCK_S + RAMP_S),
+    "SIGTERM": Stop(send(signal.SIGTERM), "SIGTERM", ABORT_S),
+    "viewer gone": Stop(
+        lambda run: run.switch.ask(StopRequest.by(Cause.VIEWER_GONE, "nobody looks")), "nobody looks", ABORT_S
+    ),
+    "program left": Stop(lambda run: run.close(), "left it", ABORT_S),
+}
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What goes wrong, and whether the run survives it."""
+
+    happens: Callable[[object], None]
+    ends_the_run: bool
+    is_reachable: bool = True
+    """Whether the generator can still be told anything."""
+    is_left_in_peace: bool = True
+    """Whether leaving the bench finds everything there."""
+
+
+FAULTS = {
+    "none": Fault(lambda faults: None, ends_the_run=False),
+    "usb unplugged": Fault(
+        lambda faults: faults.pull_usb_cable(), ends_the_run=False, is_reachable=False, is_left_in_peace=False
+    ),
+    "buffer overrun": Fault(lambda faults: faults.overrun(), ends_the_run=True),
+    "device reserved": Fault(lambda faults: faults.fail_daq("ReadAnalogF64", -50103), ends_the_run=True),
+    "server gone": Fault(lambda faults: faults.lose_daq_server(), ends_the_run=True, is_left_in_peace=False),
+    "laser dropout": Fault(lambda faults: faults.drop_laser(0.2), ends_the_run=False),
+    "over-range": Fault(lambda faults: faults.over_range(0.2), ends_the_run=False),
+    "disk full": Fault(lambda faults: None, ends_the_run=True),
+}
+SILENT_AFTER_FAULT_S = BLOCK_S
+"""What still answers is silenced without reading another sample."""
+
+
+class FullDisk:
+    """A recorder whose disk can be filled at any moment."""
+
+    def __init__(self) -> None:
+        self.is_full = False
+
+    def create(self, path, header):
+        writer = create_recording(path, header)
+        write = writer._disk.write
+
+        def refuse_when_full(offset, data):
+            if self.is_full:
+                raise OSError(28, "No space left on device")
+            write(offset, data)
+
+        writer._disk.write = refuse_when_full
+        return writer
+
+
+def terminal_v(virtual):
+    """Largest voltage at the generator's terminal during the next tenth of a second."""
+    start_s = virtual.world.time_s
+    virtual.world.advance(0.1)
+    return np.max(np.abs(virtual.generator.render(start_s + 0.1, 1e-4, 1000)))
+
+
+def upto(run, state):
+    wanted = RunState.RECORDING if state is RunState.HELD else state
+    next(progress for progress in run if progress.state is wanted)
+    if state is RunState.HELD:
+        run.switch.hold()
+        next(progress for progress in run if progress.state is state)
+
+
+def ended(run):
+    """Go on to the end; what was raised there."""
+    try:
+        for _ in run:
+            if run.state is RunState.HELD:
+                run.switch.resume()
+    except AcquisitionError as error:
+        return error
+    return None
+
+
+def carried_out(laboratory, tmp_path, state, stop, fault_name):
+    fault = FAULTS[fault_name]
+    virtual, connected = laboratory()
+    disk = FullDisk()
+    run, error, cause_s, end_s = None, None, 0.0, 0.0
+    try:
+        with open_bench(connected, confirm_simulated, CalibrationRule.WAIVED) as bench:
+            run = Run(bench, PLAN, tmp_path / "run.h5", create=disk.create)
+            with stop_on_signal(run.switch), run:
+                upto(run, state)
+                fault.happens(virtual.faults)
+                disk.is_full = fault_name == "disk full"
+                cause_s = virtual.world.time_s
+                stop.press(run)
+                error = ended(run)
+            end_s = virtual.world.time_s
+            if fault.is_reachable:
+                assert terminal_v(virtual) < SILENT_V
+    except InstrumentLost as lost:
+        assert not fault.is_left_in_peace
+        error = error or lost
+    check_silence(virtual, fault, error)
+    check_time(stop, fault, error, state, end_s - cause_s)
+    check_recording(tmp_path / "run.h5", run, stop, error, disk)
+
+
+def check_silence(virtual, fault, error):
+    """Whoever cannot be reached is shouted out; everybody else is silent."""
+    if not fault.is_reachable and error is not None:
+        said = "".join([str(error), *getattr(error, "__notes__", [])])
+        assert "MAY STILL BE ON" in said or terminal_v(virtual) < SILENT_V
+    if not fault.is_reachable:
+        virtual.faults.plug_usb_cable()
+
+
+def check_time(stop, fault, error, state, took_s):
+    if error is not None and fault.ends_the_run:
+        assert took_s <= SILENT_AFTER_FAULT_S + 1e-3
+    elif stop.silent_within_s is not None and fault.is_reachable:
+        # A ramp down that was under way is finished first, unless something harder was asked for.
+        under_way_s = RAMP_S if state is RunState.RAMPING_DOWN else 0.0
+        assert took_s <= stop.silent_within_s + under_way_s + 1e-3
+
+
+def check_recording(path, run, stop, error, disk):
+    if disk.is_full and not path.exists():
+        # Nothing more could be written, the ending included: what was committed is recovered.
+        disk.is_full = False
+        from acquisition.recording.recover import recover
+
+        recover(path)
+        with open_recording(path) as recording:
+            assert recording.samples >= 0
+        return
+    with open_recording(path) as recording:
+        assert recording.samples > 0
+        match run.outcome.state:
+            case RunState.FINISHED:
+                assert recording.state is RecordingState.COMPLETE
+            case RunState.STOPPED:
+                assert recording.state is RecordingState.STOPPED
+                assert stop.reason in recording.reason or stop.reason in str(recording.events)
+            case RunState.FAILED:
+                assert recording.state is RecordingState.FAILED
+                assert error is not None
+                assert type(error).__name__ in recording.reason or str(error)[:40] in recording.reason
+
+
+@pytest.mark.parametrize("state", STATES)
+@pytest.mark.parametrize("stop", STOPS)
+def test_every_stop_in_every_state_leaves_silence_and_a_reason(laboratory, tmp_path, state, stop):
+    carried_out(laboratory, tmp_path, state, STOPS[stop], "none")
+
+
+@pytest.mark.parametrize("state", STATES)
+@pytest.mark.parametrize("fault", [name for name in FAULTS if name != "none"])
+def test_every_fault_in_every_state_leaves_silence_and_a_reason(laboratory, tmp_path, state, fault):
+    carried_out(laboratory, tmp_path, state, STOPS["nothing"], fault)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("state", "stop", "fault"),
+    [each for each in itertools.product(STATES, STOPS, FAULTS) if each[1] != "nothing" and each[2] != "none"],
+)
+def test_every_stop_beside_every_fault_in_every_state(laboratory, tmp_path, state, stop, fault):
+    carried_out(laboratory, tmp_path, state, STOPS[stop], fault)
+
+
+def test_the_stated_time_of_an_abort_is_that_of_the_shipped_rig(rig):
+    assert shortest_ramp_s(rig) + BLOCK_S < ABORT_S
