@@ -30,8 +30,12 @@ class Ending:
         self.state, self.reason, self._cause = RunState.STOPPED, reason, cause
 
     def is_failed(self, error: Exception, reason: str) -> None:
-        """Note what went wrong."""
-        self.state, self.reason, self._cause = RunState.FAILED, reason, _cause_of(error)
+        """Note what went wrong; what had ended the run before stays in front."""
+        if self._cause is None:
+            self.reason, self._cause = reason, _cause_of(error)
+        else:
+            self.reason = f"{self.reason}; then: {reason}"
+        self.state = RunState.FAILED
 
     def outcome(self, path: Path) -> Outcome:
         """Tell how it ended."""

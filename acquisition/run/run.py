@@ -133,19 +133,8 @@ class Run:
         recorder = self._admitted()
         tape = Tape(self._bench.digitizer, recorder)
         try:
-            yield from self._played(tape)
-            self._ending.is_finished()
-        except _Stopped as stop:
-            self._ending.is_stopped(str(stop), stop.request.cause)
-            yield from self._ramped_down_early(tape, stop.request.level)
-        except LimitExceeded as error:
-            self._ending.is_failed(error, str(error))
-            tape.log_trip(error)
-            yield from self._ramped_down_early(tape, LEVELS[Cause.LIMIT])
-            raise
-        except GeneratorExit:
-            self._ending.is_stopped("the program that carried it out left it", Cause.PROGRAM)
-            deque(self._ramped_down_early(tape, LEVELS[Cause.PROGRAM]), maxlen=0)
+            yield from self._played_or_stopped(tape)
+        except (GeneratorExit, LimitExceeded):
             raise
         except KeyboardInterrupt:
             self._ending.is_stopped("interrupted from the keyboard", Cause.KEYBOARD)
@@ -158,6 +147,23 @@ class Run:
                 self._ending.leave(self._drive, self._bench.digitizer, recorder)
             finally:
                 self._state = self._ending.state
+
+    def _played_or_stopped(self, tape: Tape) -> Iterator[Progress]:
+        """Play the plan; where somebody or a limit ends it, ramp down as hard as the cause asks for."""
+        try:
+            yield from self._played(tape)
+            self._ending.is_finished()
+        except _Stopped as stop:
+            self._ending.is_stopped(str(stop), stop.request.cause)
+            yield from self._ramped_down_early(tape, stop.request.level)
+        except LimitExceeded as error:
+            self._ending.is_failed(error, str(error))
+            yield from self._ramped_down_early(tape, LEVELS[Cause.LIMIT])
+            raise
+        except GeneratorExit:
+            self._ending.is_stopped("the program that carried it out left it", Cause.PROGRAM)
+            deque(self._ramped_down_early(tape, LEVELS[Cause.PROGRAM]), maxlen=0)
+            raise
 
     def _admitted(self) -> Recorder:
         """Refuse what can be refused before anything moves; then begin the recording."""

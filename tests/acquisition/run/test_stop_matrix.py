@@ -145,6 +145,15 @@ def upto(run, state):
         next(progress for progress in run if progress.state is state)
 
 
+def pressed(stop, run):
+    """Stop; what leaving the run raised, where that is the way to stop."""
+    try:
+        stop.press(run)
+    except AcquisitionError as error:
+        return error
+    return None
+
+
 def ended(run):
     """Go on to the end; what was raised there."""
     try:
@@ -169,8 +178,7 @@ def carried_out(laboratory, tmp_path, state, stop, fault_name):
                 fault.happens(virtual.faults)
                 disk.is_full = fault_name == "disk full"
                 cause_s = virtual.world.time_s
-                stop.press(run)
-                error = ended(run)
+                error = pressed(stop, run) or ended(run)
             end_s = virtual.world.time_s
             if fault.is_reachable:
                 assert terminal_v(virtual) < SILENT_V
