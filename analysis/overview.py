@@ -47,8 +47,8 @@ class Picture:
 
 
 @dataclass(frozen=True, eq=False)
-class _Level:
-    """Extremes of bins of one length, in a channel's unit."""
+class Level:
+    """Extremes of bins of one length, in a channel's unit; arrays of shape (bins,)."""
 
     bin_samples: int
     low: NDArray[np.float32]
@@ -60,7 +60,7 @@ class RecordingOverview:
     """A recording that can be looked at; made by `overview_of`."""
 
     recording: Recording
-    levels: dict[str, tuple[_Level, ...]]
+    levels: dict[str, tuple[Level, ...]]
     """By role; fine to coarse."""
 
     def picture(self, roles: Sequence[str], start: int, stop: int, columns: int) -> Picture:
@@ -119,14 +119,19 @@ def overview_of(recording: Recording, on_read: OnRead = ignore_reading) -> Recor
     A growing or interrupted recording, and one from an older version, has none: half a gigabyte of
     samples then takes one or two seconds.
     """
-    levels: dict[str, tuple[_Level, ...]] = {}
+    return RecordingOverview(recording, overview_levels(recording, on_read))
+
+
+def overview_levels(recording: Recording, on_read: OnRead = ignore_reading) -> dict[str, tuple[Level, ...]]:
+    """Give the extremes of every channel, fine to coarse: what crosses from a process that made them."""
+    levels: dict[str, tuple[Level, ...]] = {}
     values = recording.samples * len(recording.channels)
     for number, channel in enumerate(recording.channels):
         kept = recording.read_overview(channel.role)
         if kept is None:
             kept = _made(recording, channel.role, number * recording.samples, values, on_read)
         levels[channel.role] = _levels(kept, channel)
-    return RecordingOverview(recording, levels)
+    return levels
 
 
 def _made(recording: Recording, role: str, before: int, values: int, on_read: OnRead) -> CountOverview:
@@ -138,16 +143,16 @@ def _made(recording: Recording, role: str, before: int, values: int, on_read: On
     return sums.overview()
 
 
-def _levels(kept: CountOverview, channel: ChannelHeader) -> tuple[_Level, ...]:
+def _levels(kept: CountOverview, channel: ChannelHeader) -> tuple[Level, ...]:
     low, high = _scaled(kept.low, channel), _scaled(kept.high, channel)
     if channel.scale_factor < 0:
         low, high = high, low
-    levels = [_Level(BIN_SAMPLES, low, high)]
+    levels = [Level(BIN_SAMPLES, low, high)]
     while levels[-1].low.size > _LEAST_BINS:
         fine = levels[-1]
         starts = np.arange(0, fine.low.size, _COARSER)
         levels.append(
-            _Level(
+            Level(
                 fine.bin_samples * _COARSER,
                 np.fmin.reduceat(fine.low, starts),
                 np.fmax.reduceat(fine.high, starts),

@@ -24,6 +24,8 @@ class Desk(QObject):
     """Path of a recording that somebody wants to look at; Files opens it."""
     recording_made = Signal(object)
     """Path of a recording that has just been finished."""
+    comparison_wanted = Signal(object)
+    """Paths of recordings to lay over one another; Compare takes them."""
     theme_changed = Signal(object)
     """The `Theme` from now on."""
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 from ..desk import Desk
 from ..page import Page
+from ..page_names import FILES
+from .files.files_page import FilesPage
 
 
 @dataclass(frozen=True)
@@ -17,15 +19,4 @@ class PageEntry:
     make: Callable[[Desk], Page]
 
 
-RIG, TEST, RUN, FILES, COMPARE, SIMULATE, QUEUE = (
-    "Rig",
-    "Test",
-    "Run",
-    "Files",
-    "Compare",
-    "Simulate",
-    "Queue",
-)
-"""Names that pages call each other by."""
-
-PAGES: tuple[PageEntry, ...] = ()
+PAGES: tuple[PageEntry, ...] = (PageEntry(FILES, 4, FilesPage),)

@@ -1,0 +1,1 @@
+"""Recordings as they are listed, opened and looked at."""

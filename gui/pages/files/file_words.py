@@ -1,0 +1,64 @@
+"""How sizes, times and states of recordings are written in a list."""
+
+from datetime import datetime
+
+from acquisition.recording import RecordingState
+
+_STATE_SYMBOLS = {
+    RecordingState.COMPLETE: "✔",
+    RecordingState.STOPPED: "■",
+    RecordingState.FAILED: "✖",
+    RecordingState.INTERRUPTED: "▲",
+    RecordingState.RECORDING: "●",
+}
+
+
+def state_text(state: RecordingState | None) -> str:
+    """Symbol and word: never a colour alone."""
+    return "✖ unreadable" if state is None else f"{_STATE_SYMBOLS[state]} {state.value}"
+
+
+def size_text(size: int) -> str:
+    """``"344 MB"``."""
+    step = 1000.0
+    shown, units = float(size), ["B", "kB", "MB", "GB", "TB"]
+    while shown >= step and len(units) > 1:
+        shown, units = shown / step, units[1:]
+    return f"{shown:.3g} {units[0]}" if shown < step else f"{shown:.0f} {units[0]}"
+
+
+def moment_text(utc: str) -> str:
+    """Write when a recording began, by this machine's clock: ``"2026-03-01 13:00:05"``."""
+    try:
+        return datetime.fromisoformat(utc).astimezone().strftime("%Y-%m-%d %H:%M:%S")
+    except ValueError:
+        return utc
+
+
+def duration_text(duration_s: float) -> str:
+    """``"4.25 s"``, ``"3:20"``, ``"1:02:03"``."""
+    minute = 60
+    if duration_s < minute:
+        return f"{duration_s:.3g} s"
+    whole = round(duration_s)
+    hours, minutes, seconds = whole // 3600, whole // minute % minute, whole % minute
+    return f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes}:{seconds:02d}"
+
+
+def kind_text(kind: str) -> str:
+    """``"sine sweep"``."""
+    return kind.replace("_", " ")
+
+
+UNITS = {"m s-1": "m/s", "m s-2": "m/s²", "m": "m", "V": "V", "N": "N"}
+"""UDUNITS text of a file, and as it stands on an axis."""
+
+
+def unit_text(unit: str) -> str:
+    """Write a unit as people do."""
+    return UNITS.get(unit, unit)
+
+
+def role_text(role: str) -> str:
+    """``"m0 velocity"``."""
+    return role.replace("_", " ")

@@ -1,0 +1,258 @@
+"""A recording as lanes, one a channel: any zoom, drawn from what is in sight."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QKeyEvent, QPalette, QResizeEvent
+from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+
+from analysis.live.envelope import zigzag
+from analysis.overview import RecordingOverview
+
+from ...plots.axis import Axis
+from ...plots.plot import LIMIT, Dash, Ink, Plot, trace
+from ...theme import Theme
+from .file_words import role_text, unit_text
+
+LEAST_SAMPLES = 8
+"""The closest look."""
+_STEP, _ZOOM = 0.2, 0.6
+_LEFT_EM, _TIME_AXIS_EM = 5, 3
+MARKER = Ink(lambda theme: theme.accent)
+SEGMENT = Ink(lambda theme: theme.muted, Dash.DOTTED)
+_NAMED_SHARE = 0.08
+"""Part of the recording that a segment must fill for its name to find room."""
+
+
+@dataclass
+class _Lane:
+    role: str
+    plot: Plot
+    curve: pg.PlotDataItem
+    markers: tuple[pg.InfiniteLine, ...]
+
+
+class RecordingLanes(QWidget):
+    """Lanes over one time axis. Wheel and + - zoom, arrows move, Home shows all, drag moves."""
+
+    range_changed = Signal()
+    markers_moved = Signal()
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Lanes of the recording")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._theme = theme
+        self._overview: RecordingOverview | None = None
+        self._lanes: list[_Lane] = []
+        self._marker_s = [0.0, 0.0]
+        self._are_marked = False
+        self._layout = QVBoxLayout(self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+        self._layout.setSpacing(2)
+        # Several changes of the range come with one move: the picture is made once, after them.
+        self._later = QTimer(self, interval=0, singleShot=True)
+        self._later.timeout.connect(self._draw)
+
+    def show_recording(self, overview: RecordingOverview | None) -> None:
+        """Show another recording whole, or none."""
+        for lane in self._lanes:
+            self._layout.removeWidget(lane.plot)
+            lane.plot.deleteLater()
+        self._lanes = []
+        self._overview = overview
+        if overview is None or overview.recording.samples == 0:
+            return
+        roles = overview.recording.roles
+        self._lanes = [self._lane(number, role, role == roles[-1]) for number, role in enumerate(roles)]
+        first = self._lanes[0].plot
+        for lane in self._lanes[1:]:
+            lane.plot.setXLink(first)
+        first.getViewBox().sigXRangeChanged.connect(self._ranged)
+        self._mark_segments(overview)
+        self._mark_overloads(overview)
+        duration_s = overview.recording.duration_s
+        self._marker_s = [duration_s / 3, 2 * duration_s / 3]
+        self.show_markers(self._are_marked)
+        self._share_height()
+        self.show_all()
+        self._draw()
+
+    @property
+    def view_s(self) -> tuple[float, float]:
+        """What is in sight, in seconds since the first sample."""
+        if not self._lanes or self._overview is None:
+            return (0.0, 0.0)
+        low, high = self._lanes[0].plot.getViewBox().viewRange()[0]
+        return (max(0.0, float(low)), min(float(high), self._overview.recording.duration_s))
+
+    @property
+    def markers_s(self) -> tuple[float, float]:
+        """Moments of the two markers, the earlier first."""
+        early, late = sorted(self._marker_s)
+        return early, late
+
+    @property
+    def plots(self) -> tuple[Plot, ...]:
+        """One for each channel."""
+        return tuple(lane.plot for lane in self._lanes)
+
+    def show_all(self) -> None:
+        """Show the whole recording."""
+        if self._overview is not None:
+            self.show_range(0.0, self._overview.recording.duration_s)
+
+    def show_range(self, low_s: float, high_s: float) -> None:
+        """Show a stretch."""
+        if self._lanes:
+            self._lanes[0].plot.setXRange(low_s, high_s, padding=0.0)
+
+    def zoom(self, factor: float) -> None:
+        """Show ``factor`` times as much, around the middle."""
+        low_s, high_s = self.view_s
+        half_s = 0.5 * factor * (high_s - low_s)
+        middle_s = 0.5 * (low_s + high_s)
+        self.show_range(middle_s - half_s, middle_s + half_s)
+
+    def move(self, share: float) -> None:  # type: ignore[override] # a view moves in time
+        """Show what is a share of the view later."""
+        low_s, high_s = self.view_s
+        step_s = share * (high_s - low_s)
+        self.show_range(low_s + step_s, high_s + step_s)
+
+    def show_markers(self, are_shown: bool) -> None:  # noqa: FBT001 - as Qt's own toggled(bool)
+        """Show or hide the two markers."""
+        self._are_marked = are_shown
+        low_s, high_s = self.view_s
+        if are_shown and not all(low_s <= each <= high_s for each in self._marker_s) and high_s > low_s:
+            self._marker_s = [low_s + (high_s - low_s) / 3, low_s + 2 * (high_s - low_s) / 3]
+        for lane in self._lanes:
+            for marker, moment_s in zip(lane.markers, self._marker_s, strict=True):
+                marker.setVisible(are_shown)
+                marker.setValue(moment_s)
+        self.markers_moved.emit()
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self._theme = theme
+        for lane in self._lanes:
+            lane.plot.retheme(theme)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Draw for the new width."""
+        super().resizeEvent(event)
+        self._share_height()
+        self._later.start()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Move and zoom by keys."""
+        match event.key():
+            case Qt.Key.Key_Left:
+                self.move(-_STEP)
+            case Qt.Key.Key_Right:
+                self.move(_STEP)
+            case Qt.Key.Key_Plus | Qt.Key.Key_Equal | Qt.Key.Key_Up:
+                self.zoom(_ZOOM)
+            case Qt.Key.Key_Minus | Qt.Key.Key_Down:
+                self.zoom(1 / _ZOOM)
+            case Qt.Key.Key_Home | Qt.Key.Key_A:
+                self.show_all()
+            case _:
+                super().keyPressEvent(event)
+                return
+        event.accept()
+
+    def _lane(self, number: int, role: str, is_last: bool) -> _Lane:  # noqa: FBT001
+        assert self._overview is not None
+        recording = self._overview.recording
+        unit = unit_text(recording.channel(role).unit)
+        across = Axis("Time", "s") if is_last else Axis("")
+        plot = Plot(f"{role_text(role)} over time", across, Axis(unit), self._theme)
+        plot.setMinimumHeight(4 * self.fontMetrics().height())
+        plot.setMouseEnabled(x=True, y=False)
+        plot.setFocusProxy(self)
+        left = _LEFT_EM * self.fontMetrics().height()
+        plot.getPlotItem().getAxis("left").setWidth(left)
+        title = QLabel(role_text(role), plot)
+        title.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        title.setBackgroundRole(QPalette.ColorRole.Base)
+        title.setAutoFillBackground(True)
+        title.move(left + self.fontMetrics().height(), 2)
+        if not is_last:
+            plot.getPlotItem().getAxis("bottom").setStyle(showValues=False)
+            plot.getPlotItem().showLabel("bottom", show=False)
+        least_s = LEAST_SAMPLES / recording.sample_rate_hz
+        plot.getViewBox().setLimits(xMin=0.0, xMax=recording.duration_s, minXRange=least_s)
+        plot.getViewBox().enableAutoRange(x=False, y=False)
+        self._layout.addWidget(plot, 1)
+        return _Lane(role, plot, plot.curve(trace(number)), self._new_markers(plot))
+
+    def _new_markers(self, plot: Plot) -> tuple[pg.InfiniteLine, ...]:
+        made = []
+        for number in range(2):
+            marker = plot.upright(MARKER, 0.0)
+            marker.setMovable(True)
+            marker.setVisible(False)
+            marker.sigPositionChanged.connect(lambda line, number=number: self._moved(number, line.value()))
+            made.append(marker)
+        return tuple(made)
+
+    def _moved(self, number: int, moment_s: float) -> None:
+        if not self._are_marked or self._marker_s[number] == moment_s:
+            return
+        self._marker_s[number] = moment_s
+        for lane in self._lanes:
+            lane.markers[number].setValue(moment_s)
+        self.markers_moved.emit()
+
+    def _mark_segments(self, overview: RecordingOverview) -> None:
+        rate_hz = overview.recording.sample_rate_hz
+        for segment in overview.recording.segments:
+            length = segment.stop - segment.start
+            for lane in self._lanes:
+                is_named = lane is self._lanes[0] and length > _NAMED_SHARE * overview.recording.samples
+                label = segment.label.replace("_", " ") if is_named else ""
+                lane.plot.upright(SEGMENT, segment.first_sample / rate_hz, label)
+
+    def _mark_overloads(self, overview: RecordingOverview) -> None:
+        rate_hz = overview.recording.sample_rate_hz
+        for overload in overview.recording.overloads:
+            for lane in self._lanes:
+                if lane.role == overload.channel:
+                    stripe = lane.plot.region(LIMIT)
+                    last = overload.last_sample + 1
+                    lane.plot.place(stripe, overload.first_sample / rate_hz, last / rate_hz)
+
+    def _share_height(self) -> None:
+        """Give all lanes the same height; the last has the time axis on top of it."""
+        axis = _TIME_AXIS_EM * self.fontMetrics().height()
+        lane = max(1, (self.height() - axis) // max(1, len(self._lanes)))
+        for place in range(len(self._lanes)):
+            self._layout.setStretch(place, lane + (axis if place == len(self._lanes) - 1 else 0))
+
+    def _ranged(self) -> None:
+        self._later.start()
+        self.range_changed.emit()
+
+    def _draw(self) -> None:
+        if self._overview is None or not self._lanes:
+            return
+        rate_hz = self._overview.recording.sample_rate_hz
+        low_s, high_s = self.view_s
+        start, stop = int(low_s * rate_hz), int(np.ceil(high_s * rate_hz)) + 1
+        columns = max(100, int(self._lanes[0].plot.getViewBox().width()))
+        picture = self._overview.picture([lane.role for lane in self._lanes], start, stop, columns)
+        for row, lane in enumerate(self._lanes):
+            low, high = picture.low[row], picture.high[row]
+            if picture.samples_per_column > 1:
+                lane.curve.setData(np.repeat(picture.time_s, 2), zigzag(low, high), connect="finite")
+            else:
+                lane.curve.setData(picture.time_s, low, connect="finite")
+            known = low[np.isfinite(low)], high[np.isfinite(high)]
+            if known[0].size:
+                bottom, top = float(known[0].min()), float(known[1].max())
+                height = (top - bottom) or 1e-9
+                # Room above for the lane's name, which must not lie on the signal.
+                lane.plot.setYRange(bottom - 0.06 * height, top + 0.3 * height, padding=0.0)

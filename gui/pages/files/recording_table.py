@@ -1,0 +1,202 @@
+"""The list of recordings: one row a file, with its state in words and a small picture."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import (
+    QAbstractTableModel,
+    QModelIndex,
+    QPersistentModelIndex,
+    QPointF,
+    QSize,
+    QSortFilterProxyModel,
+    Qt,
+)
+from PySide6.QtGui import QColor, QPainter, QPen, QPixmap
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
+
+from analysis.recording_entry import THUMBNAIL_COLUMNS, RecordingEntry, Thumbnail
+
+from ...theme import Theme
+from .file_words import duration_text, kind_text, moment_text, size_text, state_text
+
+Index = QModelIndex | QPersistentModelIndex
+_NOWHERE = QModelIndex()
+HEADINGS = ("Response", "Name", "State", "Began", "Excitation", "Level", "Length", "Size")
+PICTURE, NAME = 0, 1
+PATH_ROLE = Qt.ItemDataRole.UserRole
+SORT_ROLE = Qt.ItemDataRole.UserRole + 1
+THUMBNAIL_SIZE = QSize(THUMBNAIL_COLUMNS, 30)
+
+
+class RecordingModel(QAbstractTableModel):
+    """Rows of what was found in a folder; pictures come later."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._entries: tuple[RecordingEntry, ...] = ()
+        self._thumbnails: dict[Path, Thumbnail | None] = {}
+        self._pictures: dict[Path, QPixmap] = {}
+
+    @property
+    def entries(self) -> tuple[RecordingEntry, ...]:
+        """In the order they were found."""
+        return self._entries
+
+    def show_entries(self, entries: tuple[RecordingEntry, ...]) -> None:
+        """List other files; pictures of those that stay are kept."""
+        self.beginResetModel()
+        self._entries = entries
+        kept = {entry.path for entry in entries}
+        self._thumbnails = {path: each for path, each in self._thumbnails.items() if path in kept}
+        self._draw_all()
+        self.endResetModel()
+
+    def missing_pictures(self) -> tuple[Path, ...]:
+        """Files whose picture nobody has made yet."""
+        return tuple(e.path for e in self._entries if not e.problem and e.path not in self._thumbnails)
+
+    def show_thumbnails(self, found: dict[Path, Thumbnail | None]) -> None:
+        """Put pictures into the rows."""
+        self._thumbnails |= found
+        self._draw_all()
+        if self._entries:
+            self.dataChanged.emit(self.index(0, PICTURE), self.index(len(self._entries) - 1, PICTURE))
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw the pictures in other colours."""
+        self._theme = theme
+        self.show_thumbnails({})
+
+    def rowCount(self, parent: Index = _NOWHERE) -> int:
+        """One for each file."""
+        return 0 if parent.isValid() else len(self._entries)
+
+    def columnCount(self, parent: Index = _NOWHERE) -> int:
+        """One for each heading."""
+        return 0 if parent.isValid() else len(HEADINGS)
+
+    def headerData(
+        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
+    ) -> Any:
+        """Headings above, nothing beside."""
+        if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
+            return HEADINGS[section]
+        return None
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        """Text, picture, tooltip and sorting value of a cell."""
+        entry, column = self._entries[index.row()], index.column()
+        content: Any = None
+        match role:
+            case Qt.ItemDataRole.DisplayRole:
+                content = _texts(entry)[column]
+            case Qt.ItemDataRole.DecorationRole if column == PICTURE:
+                content = self._pictures.get(entry.path)
+            case Qt.ItemDataRole.ToolTipRole:
+                content = entry.problem or f"{entry.path}\n{entry.reason}".strip()
+            case Qt.ItemDataRole.AccessibleTextRole:
+                content = f"{HEADINGS[column]}: {_texts(entry)[column] or 'picture'}"
+            case Qt.ItemDataRole.UserRole:
+                content = entry.path
+            case _ if role == SORT_ROLE:
+                content = _sorting(entry)[column]
+        return content
+
+    def _draw_all(self) -> None:
+        self._pictures = {
+            path: _drawn(each, self._theme) for path, each in self._thumbnails.items() if each is not None
+        }
+
+
+class RecordingTable(QTableView):
+    """The table itself: sorted by any column, several rows may be chosen."""
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Recordings")
+        self.recordings = RecordingModel(theme)
+        self._sorted = QSortFilterProxyModel(self)
+        self._sorted.setSourceModel(self.recordings)
+        self._sorted.setSortRole(SORT_ROLE)
+        self._sorted.setFilterKeyColumn(-1)
+        self._sorted.setFilterCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
+        self.setModel(self._sorted)
+        self.setSortingEnabled(True)
+        self.sortByColumn(HEADINGS.index("Began"), Qt.SortOrder.DescendingOrder)
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setAlternatingRowColors(True)
+        self.setShowGrid(False)
+        self.setTabKeyNavigation(False)
+        self.setIconSize(THUMBNAIL_SIZE)
+        self.verticalHeader().hide()
+        self.verticalHeader().setDefaultSectionSize(THUMBNAIL_SIZE.height() + 6)
+        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.horizontalHeader().setHighlightSections(False)
+        self.horizontalHeader().setStretchLastSection(True)
+        self.setColumnWidth(PICTURE, THUMBNAIL_SIZE.width() + 10)
+
+    def search(self, text: str) -> None:
+        """Show rows that hold a text anywhere."""
+        self._sorted.setFilterFixedString(text)
+
+    def chosen_paths(self) -> tuple[Path, ...]:
+        """Files of the chosen rows, from above."""
+        rows = sorted(self.selectionModel().selectedRows(NAME), key=lambda index: index.row())
+        return tuple(index.data(PATH_ROLE) for index in rows)
+
+    def choose(self, path: Path) -> None:
+        """Choose the row of a file, if it is there."""
+        for row in range(self._sorted.rowCount()):
+            index = self._sorted.index(row, NAME)
+            if index.data(PATH_ROLE) == path:
+                self.selectRow(row)
+                self.scrollTo(index)
+                return
+
+
+def _texts(entry: RecordingEntry) -> tuple[str, ...]:
+    level = "" if entry.amplitude_vpp is None else f"{entry.amplitude_vpp:g} Vpp"
+    played = " ".join(part for part in (kind_text(entry.kind), entry.what) if part)
+    return (
+        "",
+        entry.name,
+        state_text(entry.state),
+        moment_text(entry.started_utc),
+        played,
+        level,
+        duration_text(entry.duration_s) if not entry.problem else "",
+        size_text(entry.bytes),
+    )
+
+
+def _sorting(entry: RecordingEntry) -> tuple[str | float, ...]:
+    return (
+        entry.name,
+        entry.name,
+        state_text(entry.state),
+        entry.started_utc,
+        f"{entry.kind} {entry.what}",
+        -1.0 if entry.amplitude_vpp is None else entry.amplitude_vpp,
+        entry.duration_s,
+        float(entry.bytes),
+    )
+
+
+def _drawn(found: Thumbnail, theme: Theme) -> QPixmap:
+    """Paint each column from its lowest to its highest value."""
+    picture = QPixmap(THUMBNAIL_SIZE)
+    picture.fill(QColor(theme.base))
+    painter = QPainter(picture)
+    painter.setPen(QPen(QColor(theme.traces[0]), 1))
+    middle, reach = 0.5 * THUMBNAIL_SIZE.height(), 0.5 * THUMBNAIL_SIZE.height() - 1
+    for column, (low, high) in enumerate(zip(found.low, found.high, strict=True)):
+        if np.isfinite(low) and np.isfinite(high):
+            top, bottom = middle - reach * float(high), middle - reach * float(low)
+            painter.drawLine(QPointF(column, top), QPointF(column, max(bottom, top + 1)))
+    painter.end()
+    return picture

@@ -1,0 +1,87 @@
+"""Recordings to look at: small, real, of a motion that is known."""
+
+import time
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QCoreApplication, QEventLoop
+
+from acquisition.excitation.dwell import Dwell
+from acquisition.instruments import Block, Overload
+from acquisition.plan.measurement import Measurement
+from acquisition.recording import (
+    ChannelHeader,
+    Origin,
+    RecordingHeader,
+    RecordingState,
+    create_recording,
+)
+from gui.desk import Desk
+from gui.settings import Settings
+
+RATE_HZ = 6400.0
+SAMPLES = 64_000
+IMPACT_SAMPLE = 40_001
+ROLES = (
+    ("drive_voltage", "voltage", "V"),
+    ("base_acceleration", "acceleration", "m s-2"),
+    ("m0_velocity", "velocity", "m s-1"),
+)
+
+
+def _header(name, frequency_hz):
+    plan = Dwell(amplitude_vpp=1.0, frequency_hz=frequency_hz, settle_s=1.0, duration_s=8.0)
+    channels = tuple(
+        ChannelHeader(role, f"dev/{role}", quantity, unit, 1.0, 10.0) for role, quantity, unit in ROLES
+    )
+    return RecordingHeader(
+        channels=channels,
+        sample_rate_hz=RATE_HZ,
+        expected_samples=SAMPLES,
+        origin=Origin.SIMULATED,
+        plan_json=Measurement(name=name, excitation=plan).model_dump_json(),
+        bench_json='{"name": "a bench"}',
+    )
+
+
+@pytest.fixture(scope="module")
+def waited():
+    """Wait, with events, until something is so."""
+
+    def wait(is_so, within_s=30.0):
+        until = time.monotonic() + within_s
+        while not is_so():
+            assert time.monotonic() < until, "it did not come true in time"
+            QCoreApplication.processEvents(QEventLoop.ProcessEventsFlag.AllEvents, 20)
+
+    return wait
+
+
+@pytest.fixture(scope="module")
+def shared_desk(qapp, tmp_path_factory):
+    """A desk whose processes serve all tests of a file: they take seconds to begin."""
+    desk = Desk(Settings(tmp_path_factory.mktemp("settings") / "window.ini"))
+    yield desk
+    desk.background.close()
+
+
+@pytest.fixture(scope="session")
+def record():
+    """Write a dwell of ten seconds with one impact of three samples in its velocity."""
+
+    def write(folder, name, frequency_hz=260.0, state=RecordingState.COMPLETE):
+        phase = 2 * np.pi * frequency_hz * np.arange(SAMPLES) / RATE_HZ
+        base = -5e-6 * (2 * np.pi * frequency_hz) ** 2 * np.cos(phase)
+        velocity = -1.5e-5 * 2 * np.pi * frequency_hz * np.sin(phase)
+        velocity[IMPACT_SAMPLE : IMPACT_SAMPLE + 3] = (0.4, -0.5, 0.4)
+        volts = np.stack((0.5 * np.cos(phase), base, velocity))
+        writer = create_recording(folder / f"{name}.h5", _header(name, frequency_hz))
+        writer.append(Block(0, volts[:, :6400], ()))
+        writer.begin_segment("dwell", frequency_hz=frequency_hz)
+        writer.append(Block(6400, volts[:, 6400:57_600], (Overload("m0_velocity", 40_000, 40_010),)))
+        writer.end_segment()
+        writer.append(Block(57_600, volts[:, 57_600:], ()))
+        writer.finish(state, "the plan was carried out")
+        return folder / f"{name}.h5"
+
+    return write

@@ -1,0 +1,175 @@
+"""The Files page lists, opens and zooms real recordings."""
+
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+
+from acquisition.recording import RecordingState
+from gui.pages.files.files_page import FilesPage
+from gui.pages.files.recording_table import HEADINGS
+from gui.theme import DARK
+
+IMPACT_S = 40_002 / 6400.0
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, record):
+    folder = tmp_path_factory.mktemp("recordings")
+    record(folder, "whole")
+    record(folder, "stopped", 95.0, RecordingState.STOPPED)
+    shutil.copyfile(folder / "whole.h5", folder / "old.h5")
+    with h5py.File(folder / "old.h5", "r+") as file:
+        del file["overview"]
+    (folder / "broken.h5").write_bytes(b"no HDF5")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def shown(shared_desk, folder, waited):
+    """One page for all tests: its processes take seconds to begin."""
+    shared_desk.choose_folder(folder)
+    page = FilesPage(shared_desk)
+    page.resize(1200, 800)
+    page.show()
+    page.entered()
+    waited(lambda: len(page.table.recordings.entries) == 4 and not shared_desk.background.is_busy)
+    yield page
+    page.lanes.show_recording(None)
+    page.close()
+
+
+@pytest.fixture
+def page(shown, folder, waited):
+    if shown.desk.folder != folder:
+        shown.desk.choose_folder(folder)
+        shown.list_folder()
+    waited(lambda: not shown.desk.background.is_busy)
+    shown.table.search("")
+    return shown
+
+
+def cell(page, name, heading):
+    model = page.table.model()
+    for row in range(model.rowCount()):
+        if model.index(row, HEADINGS.index("Name")).data() == name:
+            return model.index(row, HEADINGS.index(heading)).data()
+    raise AssertionError(f"{name} is not listed")
+
+
+def drawn(page, number):
+    (curve, *_) = page.lanes.plots[number].getPlotItem().listDataItems()
+    return curve.getData()
+
+
+def test_states_plans_and_troubles_of_all_files_are_listed_in_words(page):
+    assert cell(page, "whole", "State") == "✔ complete"
+    assert cell(page, "stopped", "State") == "■ stopped"
+    assert cell(page, "broken", "State") == "✖ unreadable"
+    assert cell(page, "stopped", "Excitation") == "dwell 95 Hz"
+    assert cell(page, "whole", "Level") == "1 Vpp"
+    assert cell(page, "whole", "Length") == "10 s"
+
+
+def test_every_readable_recording_has_a_picture(page):
+    model = page.table.recordings
+    pictures = {
+        entry.name: model.index(row, 0).data(Qt.ItemDataRole.DecorationRole)
+        for row, entry in enumerate(model.entries)
+    }
+    assert {name for name, picture in pictures.items() if picture is not None} == {"whole", "stopped", "old"}
+
+
+def test_an_impact_of_three_samples_is_seen_in_the_whole_and_when_zoomed_to(page, folder):
+    page.table.choose(folder / "whole.h5")
+    for low_s, high_s in ((0.0, 10.0), (IMPACT_S - 0.5, IMPACT_S + 0.5), (IMPACT_S - 2e-3, IMPACT_S + 2e-3)):
+        page.lanes.show_range(low_s, high_s)
+        page.lanes._draw()
+        time_s, values = drawn(page, 2)
+        assert np.nanmax(values) == pytest.approx(0.4, rel=1e-5)
+        assert np.nanmin(values) == pytest.approx(-0.5, rel=1e-5)
+        assert time_s[0] <= low_s + 0.01
+        assert len(time_s) <= 2 * page.lanes.width()
+
+
+def test_a_recording_without_overview_is_opened_all_the_same(page, folder, qtbot):
+    page.table.choose(folder / "old.h5")
+    qtbot.waitUntil(lambda: bool(page.lanes.plots), timeout=20_000)
+    assert np.nanmax(drawn(page, 2)[1]) == pytest.approx(0.4, rel=1e-5)
+
+
+def test_a_broken_file_says_why_and_what_to_do(page, folder, qtbot):
+    with qtbot.waitSignal(page.desk.noticed) as said:
+        page.table.choose(folder / "broken.h5")
+    assert "no readable HDF5 file" in said.args[0].what
+    assert page.lanes.plots == ()
+    page.table.choose(folder / "whole.h5")
+    assert len(page.lanes.plots) == 3
+
+
+def test_keys_zoom_move_and_show_all(page, folder, qtbot):
+    page.table.choose(folder / "whole.h5")
+    qtbot.keyClick(page.lanes, Qt.Key.Key_Plus)
+    low_s, high_s = page.lanes.view_s
+    assert high_s - low_s == pytest.approx(6.0)
+    qtbot.keyClick(page.lanes, Qt.Key.Key_Right)
+    assert page.lanes.view_s[0] == pytest.approx(low_s + 1.2)
+    qtbot.keyClick(page.lanes, Qt.Key.Key_Home)
+    assert page.lanes.view_s == pytest.approx((0.0, 10.0))
+
+
+def test_no_view_goes_past_the_ends_or_closer_than_a_few_samples(page, folder):
+    page.table.choose(folder / "whole.h5")
+    page.lanes.show_range(-50.0, 100.0)
+    assert page.lanes.view_s == (0.0, 10.0)
+    page.lanes.show_range(5.0, 5.0 + 1e-9)
+    low_s, high_s = page.lanes.view_s
+    assert high_s - low_s == pytest.approx(8 / 6400.0, rel=1e-3)
+
+
+def test_markers_measure_between_two_moments(page, folder):
+    page.table.choose(folder / "whole.h5")
+    page._markers.setChecked(True)
+    first, second = page.lanes._lanes[1].markers
+    first.setValue(2.0)
+    second.setValue(2.5)
+    assert page.lanes.markers_s == (2.0, 2.5)
+    assert page.lanes._lanes[0].markers[0].value() == 2.0
+    assert "0.5 s apart = 1 / 2 Hz" in page._view.text()
+
+
+def test_a_search_leaves_rows_that_hold_the_words(page):
+    page.table.search("95 hz")
+    assert page.table.model().rowCount() == 1
+    page.table.search("")
+    assert page.table.model().rowCount() == 4
+
+
+def test_chosen_recordings_are_handed_to_compare(page, folder, qtbot):
+    page.table.selectAll()
+    with qtbot.waitSignals([page.desk.comparison_wanted, page.desk.page_wanted]):
+        page._compare.click()
+    assert set(page.table.chosen_paths()) == {
+        folder / f"{n}.h5" for n in ("whole", "stopped", "old", "broken")
+    }
+
+
+def test_a_recording_from_another_folder_is_opened_when_somebody_wants_it(page, record, tmp_path, qtbot):
+    path = record(tmp_path, "elsewhere")
+    page.desk.recording_wanted.emit(path)
+    assert page._opened.path == path
+    qtbot.waitUntil(lambda: page.table.chosen_paths() == (path,), timeout=20_000)
+
+
+def test_lanes_follow_the_theme_and_name_their_channels_and_units(page, folder):
+    page.table.choose(folder / "whole.h5")
+    page.retheme(DARK)
+    assert [plot.accessibleName() for plot in page.lanes.plots] == [
+        "drive voltage over time",
+        "base acceleration over time",
+        "m0 velocity over time",
+    ]
+    assert [plot.up.labelText for plot in page.lanes.plots] == ["V", "m/s²", "m/s"]
+    assert page.lanes.plots[0].backgroundBrush().color().name() == DARK.base
