@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from acquisition.rig.configuration import load_rig
+from acquisition.rig.server_token import METADATA_KEY, VARIABLE
 from acquisition.virtual.rig import VirtualRig
 
 from .output import console
@@ -19,7 +20,10 @@ def serve_rig(
         Path | None, typer.Option("--bench", metavar="BENCH.toml", help="A rig with a [virtual] table.")
     ] = None,
     address: Annotated[
-        str, typer.Option("--address", metavar="HOST:PORT", help="Where to listen; there is no password.")
+        str,
+        typer.Option(
+            "--address", metavar="HOST:PORT", help="Where to listen; beyond this computer, with a token."
+        ),
     ] = "127.0.0.1:31763",
 ) -> None:
     """Serve the virtual rig to any pyvisa and nidaqmx program until Ctrl-C."""
@@ -37,5 +41,9 @@ def serve_rig(
         console.print(f'  ResourceManager("@py").open_resource("{rig.visa_resource}")')
         console.print("The generator, for any other VISA program:")
         console.print(f"  {rig.socket_resource}")
+        if rig.token is not None:
+            console.print("\nIt is heard by other computers, and lets in whoever has the token:")
+            console.print(f"  export {VARIABLE}={rig.token}  # our own programs; others send it as metadata")
+            console.print(f"  {METADATA_KEY}: {rig.token}")
         stop.wait()
     console.print("The virtual rig is off.")

@@ -8,6 +8,8 @@ import grpc
 from nidaqmx import GrpcSessionOptions
 from nidaqmx.system import System
 
+from ..rig.server_token import METADATA_KEY, given_token
+
 # Longer than any single read (`daqmx.LONGEST_READ_S` plus its margin): a server that is silent for
 # so long is gone, even if its connection still stands.
 CALL_DEADLINE_S = 60.0
@@ -20,11 +22,13 @@ _CHANNEL_OPTIONS = (
 
 
 class _Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc] # grpc ships without types
-    """Ends every call that takes too long; the DAQmx client itself sets no deadline."""
+    """Ends every call that takes too long, and carries the token; the DAQmx client itself does neither."""
 
     def intercept_unary_unary(self, continuation: Callable[..., Any], details: Any, request: Any) -> Any:
         # A namedtuple's _replace is public in spite of its underscore.
-        return continuation(details._replace(timeout=CALL_DEADLINE_S), request)
+        carried = ((METADATA_KEY, given_token()),) if given_token() else ()
+        metadata = (*(details.metadata or ()), *carried)
+        return continuation(details._replace(timeout=CALL_DEADLINE_S, metadata=metadata), request)
 
 
 @dataclass(frozen=True)

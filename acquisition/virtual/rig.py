@@ -9,6 +9,7 @@ from ..rig.configuration import Rig, VirtualConfig
 from .daqmx.devices import catalogue_with
 from .daqmx.pace import OnDemandPace, Pace, WallPace
 from .daqmx.server import LOOPBACK, DaqServer, serve
+from .daqmx.token import token_for
 from .faults import RigFaults
 from .generator.afg1022 import AFG1022
 from .generator.output_signal import Panel
@@ -36,7 +37,8 @@ class VirtualRig:
     rig
         With a ``[virtual]`` section.
     address
-        ``"host:port"`` to serve on; port 0 takes a free one. Loopback by default: there is no password.
+        ``"host:port"`` to serve on; port 0 takes a free one. Loopback by default; anywhere else, every call
+        must carry `token`.
     quirks, panel
         Habits of the generator's firmware, and what only its front panel can set: a load that is told
         to be 50 ohm there, and cannot be set remotely, doubles the voltage at the amplifier.
@@ -54,6 +56,8 @@ class VirtualRig:
         virtual = virtual_section(rig)
         self.rig = rig
         self._address = address
+        self.token = token_for(address)
+        """What calls from other computers must carry; None on loopback."""
         self._pace = _pace(virtual)
         # The generator and the world need each other: the clock is looked up when it is asked for.
         self.generator = AFG1022(
@@ -115,6 +119,7 @@ class VirtualRig:
             self._address,
             catalogue=catalogue_with(self.rig.daq.product, self.rig.daq.device),
             handlers=(usb_service(self._usb),),
+            token=self.token,
         )
 
     @property

@@ -22,6 +22,7 @@ from .faults import Faults, Unavailable
 from .pace import OnDemandPace, Pace
 from .rig import Rig
 from .system import DaqmxSystem
+from .token import TokenRequired
 
 LOOPBACK = "127.0.0.1:0"
 """This computer only, on a free port: the server knows no passwords."""
@@ -50,6 +51,7 @@ class DaqServer:
         address: str,
         catalogue: Catalogue,
         handlers: Iterable[grpc.GenericRpcHandler],
+        token: str | None,
     ) -> None:
         """See `serve`."""
         self.faults = Faults()
@@ -57,7 +59,8 @@ class DaqServer:
         self._rig = Rig(world, pace)
         self._system = DaqmxSystem(self._rig, catalogue)
         self._workers = ThreadPoolExecutor(_WORKERS, thread_name_prefix="daqmx")
-        self._server = grpc.server(self._workers, options=_OPTIONS)
+        guards = () if token is None else (TokenRequired(token),)
+        self._server = grpc.server(self._workers, options=_OPTIONS, interceptors=guards)
         self._server.add_generic_rpc_handlers(
             (_service(self._unary_calls(), self._listening_calls()), *handlers)
         )
@@ -220,6 +223,7 @@ def serve(
     *,
     catalogue: Catalogue | None = None,
     handlers: Iterable[grpc.GenericRpcHandler] = (),
+    token: str | None = None,
 ) -> DaqServer:
     """Serve the simulated DAQmx system until the returned server is closed; use it in a ``with``.
 
@@ -235,6 +239,8 @@ def serve(
         The devices; default: a cDAQ with an NI 9234, a USB-4431 and a USB-6211.
     handlers
         Further gRPC services for the same port.
+    token
+        What every call must carry; None lets everybody in who can reach the port.
 
     Raises
     ------
@@ -242,4 +248,4 @@ def serve(
         When the address cannot be used.
 
     """
-    return DaqServer(world, pace or OnDemandPace(), address, catalogue or Catalogue(), handlers)
+    return DaqServer(world, pace or OnDemandPace(), address, catalogue or Catalogue(), handlers, token)

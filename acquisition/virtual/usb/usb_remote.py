@@ -12,6 +12,7 @@ from collections.abc import Callable
 import grpc
 
 from ...errors import InstrumentLost
+from ...rig.server_token import METADATA_KEY, given_token
 from .usb_device import Identification, Setup, UsbDevice
 
 SERVICE = "vibench.virtual.UsbDevice"
@@ -79,9 +80,10 @@ class RemoteUsbDevice:
 
     def __init__(self, address: str) -> None:
         self._channel = grpc.insecure_channel(address)
+        self._metadata = ((METADATA_KEY, given_token()),)
         self._methods: dict[str, grpc.UnaryUnaryMultiCallable] = {}
         try:
-            answer = self._method("Identify")(b"", timeout=CONNECT_TIMEOUT_S)
+            answer = self._method("Identify")(b"", timeout=CONNECT_TIMEOUT_S, metadata=self._metadata)
         except grpc.RpcError as error:
             self._channel.close()
             message = (
@@ -133,7 +135,7 @@ class RemoteUsbDevice:
         """Call a method; a dead server or connection is a device that is gone."""
         deadline_s = None if timeout_ms == _NEVER_MS else timeout_ms / 1e3 + NETWORK_MARGIN_S
         try:
-            answer = self._method(name)(request, timeout=deadline_s)
+            answer = self._method(name)(request, timeout=deadline_s, metadata=self._metadata)
         except (grpc.RpcError, ValueError) as error:  # ValueError: the channel was closed on this side
             raise OSError(errno.ENODEV, os.strerror(errno.ENODEV)) from error
         (number,) = _ERRNO.unpack_from(answer)
