@@ -6,8 +6,9 @@ from typing import Annotated
 import typer
 
 from acquisition.bench import open_bench
+from acquisition.campaign.item import CampaignItem, Item
+from acquisition.campaign.run_campaign import run_campaign
 from acquisition.plan.campaign import load_campaign
-from acquisition.run.run_campaign import CampaignItem, Item, run_campaign
 from analysis.report.report import write_report
 from analysis.summary import campaign_summary
 
@@ -35,15 +36,15 @@ def demo(
     with second_process(campaign.name) as analyst:
 
         def recorded(item: CampaignItem) -> None:
+            bars.ended(item)
             if item.result is Item.RECORDED:
                 analyst.take(item.path)
 
         rig = shipped("hardware_configs/virtual_rig.toml")
         with open_bench(rig) as bench, campaign_bars(campaign) as bars:
             items = run_campaign(bench, campaign, folder / "recordings", on_progress=bars, on_item=recorded)
-            bars.finish(items[-1].result)
         tell(items)
-        if any(item.result is not Item.RECORDED for item in items):
+        if {item.name for item in items if item.result is Item.RECORDED} != set(campaign.recording_names()):
             raise typer.Exit(STOPPED_EXIT_CODE)
         with analysis_bar(analyst.asked) as step:
             for _ in analyst.results():

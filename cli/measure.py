@@ -5,9 +5,11 @@ from typing import Annotated
 
 import typer
 
-from acquisition.bench import open_bench
+from acquisition.campaign.item import AfterFailure, CampaignItem, ChangedBench, Existing, Item
+from acquisition.campaign.kept_bench import KeptBench
+from acquisition.campaign.run_campaign import run_campaign
 from acquisition.plan.campaign import load_campaign
-from acquisition.run.run_campaign import CampaignItem, Existing, Item, run_campaign
+from acquisition.run.stop import StopSwitch
 
 from .output import console
 from .paths import BenchPath, bench_path
@@ -24,16 +26,34 @@ def measure(
     resume: Annotated[
         bool, typer.Option("--resume", help="Keep complete recordings in DIR and make the missing ones.")
     ] = False,
+    after_failure: Annotated[
+        AfterFailure, typer.Option("--after-failure", help="When a point has failed for good.")
+    ] = AfterFailure.STOP,
+    accept_changed_bench: Annotated[
+        bool, typer.Option("--accept-changed-bench", help="Resume on another bench than it was begun on.")
+    ] = False,
 ) -> None:
     """Measure: check the bench, ramp up, record and ramp down, for each measurement of a campaign."""
     plan = load_campaign(campaign)
-    existing = Existing.RESUME if resume else Existing.REFUSE
-    with open_bench(bench_path(bench)) as opened, campaign_bars(plan) as bars:
-        items = run_campaign(opened, plan, out, existing, on_progress=bars)
-        bars.finish(items[-1].result)
+    switch = StopSwitch()
+    with KeptBench(bench_path(bench)) as kept, campaign_bars(plan) as bars:
+        items = run_campaign(
+            kept.bench,
+            plan,
+            out,
+            Existing.RESUME if resume else Existing.REFUSE,
+            after_failure,
+            on_progress=bars,
+            on_item=bars.ended,
+            switch=switch,
+            reopen=kept.reopen,
+            changed_bench=ChangedBench.ACCEPT if accept_changed_bench else ChangedBench.REFUSE,
+        )
     tell(items)
-    if any(item.result is Item.STOPPED for item in items):
+    if switch.request is not None:
         raise typer.Exit(STOPPED_EXIT_CODE)
+    if any(item.result is Item.FAILED for item in items):
+        raise typer.Exit(1)
 
 
 def tell(items: tuple[CampaignItem, ...]) -> None:

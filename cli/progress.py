@@ -1,6 +1,7 @@
 """Progress bars of a campaign: one for the measurement that runs, one for the whole."""
 
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 from rich.progress import (
@@ -13,21 +14,25 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from acquisition.campaign.item import CampaignItem, CampaignProgress
 from acquisition.plan.campaign import Campaign
-from acquisition.run.run_campaign import CampaignProgress, Item
+from acquisition.run.schedule import measured_s
 
 from .output import console
 
+MOST_BARS = 6
+"""Of measurements, the newest: a campaign of hundreds must not fill the terminal."""
+
 
 class CampaignBars:
-    """Shows where a campaign stands; call it with each `CampaignProgress`."""
+    """Shows where a campaign stands; call it with each `CampaignProgress`, and `ended` with each item."""
 
-    def __init__(self, bars: Progress, whole: TaskID) -> None:
+    def __init__(self, bars: Progress, whole: TaskID, durations_s: Mapping[str, float]) -> None:
         self._bars = bars
         self._whole = whole
-        self._one: TaskID | None = None
+        self._durations_s = durations_s
+        self._shown: deque[TaskID] = deque()
         self._name = ""
-        self._total_s = 0.0
         self._done_s = 0.0
 
     def __call__(self, progress: CampaignProgress) -> None:
@@ -35,23 +40,24 @@ class CampaignBars:
         run = progress.run
         if progress.name != self._name:
             self._begin(progress)
-        if self._one is not None:
-            state = run.state.value.replace("_", " ")
-            self._bars.update(self._one, completed=run.elapsed_s, state=state)
+        state = run.state.value.replace("_", " ")
+        self._bars.update(self._shown[-1], completed=run.elapsed_s, total=run.total_s, state=state)
         self._bars.update(self._whole, completed=self._done_s + run.elapsed_s)
 
-    def _begin(self, progress: CampaignProgress) -> None:
-        self.finish(Item.RECORDED)
-        self._name = progress.name
-        self._total_s = progress.run.total_s
-        label = f"{progress.number}/{progress.count} {progress.name}"
-        self._one = self._bars.add_task(label, total=self._total_s, state="")
+    def ended(self, item: CampaignItem) -> None:
+        """Draw how a measurement came out."""
+        if item.name == self._name:
+            self._bars.update(self._shown[-1], state=item.result.value)
+            self._name = ""
+        self._done_s += self._durations_s.get(item.name, 0.0)
+        self._bars.update(self._whole, completed=self._done_s)
 
-    def finish(self, result: Item) -> None:
-        """Draw how the measurement that ran last came out."""
-        if self._one is not None:
-            self._bars.update(self._one, completed=self._total_s, state=result.value)
-            self._done_s += self._total_s
+    def _begin(self, progress: CampaignProgress) -> None:
+        self._name = progress.name
+        label = f"{progress.number}/{progress.count} {progress.name}"
+        self._shown.append(self._bars.add_task(label, total=progress.run.total_s, state=""))
+        if len(self._shown) > MOST_BARS:
+            self._bars.remove_task(self._shown.popleft())
 
 
 @contextmanager
@@ -65,9 +71,11 @@ def campaign_bars(campaign: Campaign) -> Iterator[CampaignBars]:
         TimeRemainingColumn(),
         TextColumn("{task.fields[state]}"),
     )
+    durations_s = {name: measured_s(each) for name, each in campaign.recordings()}
     with Progress(*columns, console=console, speed_estimate_period=10) as bars:
-        whole = bars.add_task(f"campaign {campaign.name}", total=campaign.duration_s, state="of rig time")
-        yield CampaignBars(bars, whole)
+        total_s = sum(durations_s.values())
+        whole = bars.add_task(f"campaign {campaign.name}", total=total_s, state="of rig time")
+        yield CampaignBars(bars, whole, durations_s)
 
 
 @contextmanager

@@ -4,10 +4,11 @@ from datetime import timedelta
 from pathlib import Path
 
 from ..bench import Bench
+from ..campaign.item import Existing
+from ..campaign.opening import planned_recordings
 from ..plan.campaign import Campaign
 from ..plan.limits import LimitCheck, require_within_limits
 from ..run.drive import drive_for
-from ..run.run_campaign import Existing, planned_recordings
 from .status import ArmedPlan
 
 ARMED_S = 60.0
@@ -24,14 +25,15 @@ def armed_plan(bench: Bench, campaign: Campaign, folder: Path, existing: Existin
 
     """
     checks: list[tuple[str, LimitCheck]] = []
-    for measurement in campaign.measurements:
-        checks += [(measurement.name, check) for check in require_within_limits(measurement, bench.rig)]
+    points = campaign.points()
+    for name, measurement in ((point.name, point.measurement) for point in points):
+        checks += [(name, check) for check in require_within_limits(measurement, bench.rig)]
         drive_for(bench, measurement)  # refuses what nothing on this bench can play
     planned = planned_recordings(campaign, folder, existing)
     missing = [each for each in planned if not each.is_complete]
-    name, closest = max(checks, key=lambda named: named[1].use)
-    loudest = max(measurement.excitation.amplitude_vpp for measurement in campaign.measurements)
-    kinds = ", ".join(dict.fromkeys(each.excitation.kind for each in campaign.measurements))
+    tightest, closest = max(checks, key=lambda named: named[1].use)
+    loudest = max(point.measurement.excitation.highest_amplitude_vpp for point in points)
+    kinds = ", ".join(dict.fromkeys(point.measurement.excitation.kind for point in points))
     size_mb = campaign.size_bytes(bench.digitizer.sample_rate_hz, len(bench.channels)) / 1e6
     length = timedelta(seconds=round(campaign.duration_s))
     bound = f"{closest.limit:.4g} {closest.unit}"
@@ -42,7 +44,7 @@ def armed_plan(bench: Bench, campaign: Campaign, folder: Path, existing: Existin
         lines=(
             f"What: {len(missing)} recordings ({kinds})" + (f", {kept} kept from before" if kept else ""),
             f"Level: at most {loudest:g} Vpp at the generator",
-            f"Limits: {closest.what} comes closest, {closest.use:.0%} of {bound} in {name}",
+            f"Limits: {closest.what} comes closest, {closest.use:.0%} of {bound} in {tightest}",
             f"How long: {length} (h:min:s), ramps and checks included",
             f"Saved in: {folder}, at most {size_mb:.0f} MB while recording",
         ),

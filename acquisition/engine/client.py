@@ -11,11 +11,11 @@ import numpy as np
 from pydantic import BaseModel
 
 from .. import errors
+from ..campaign.item import Existing
 from ..errors import AcquisitionError
 from ..plan.campaign import Campaign
 from ..rig.configuration import Rig
 from ..rig.knobs import KnobSheet
-from ..run.run_campaign import Existing
 from ..run.stop import StopLevel
 from . import requests as ask
 from .errors import EngineError, EngineGone

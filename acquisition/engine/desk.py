@@ -4,10 +4,10 @@ from pathlib import Path
 from threading import Lock
 from time import monotonic
 
+from ..campaign.item import Existing
 from ..plan.campaign import Campaign
 from ..rig.configuration import Rig
 from ..rig.knobs import KnobSheet
-from ..run.run_campaign import Existing
 from ..run.stop import Cause, StopLevel, StopRequest, StopSwitch
 from .arming import ARMED_S, armed_plan
 from .engine import Engine

@@ -6,12 +6,13 @@ from pathlib import Path
 from queue import SimpleQueue
 
 from ..bench import Bench, open_bench
+from ..campaign.item import AfterFailure, CampaignItem, CampaignProgress, Existing, Item
+from ..campaign.run_campaign import run_campaign
 from ..check.bench_report import check_bench
 from ..errors import AcquisitionError, InstrumentLost
 from ..plan.campaign import Campaign
 from ..rig.configuration import Rig
 from ..rig.knobs import KnobSheet
-from ..run.run_campaign import AfterFailure, CampaignItem, CampaignProgress, Existing, Item, run_campaign
 from ..run.stop import Cause, StopSwitch
 from .facts import bench_facts
 from .lock import BenchLock

@@ -4,10 +4,10 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, NonNegativeInt, PositiveInt, TypeAdapter
 
+from ..campaign.item import Existing
 from ..plan.campaign import Campaign
 from ..rig.configuration import Rig
 from ..rig.knobs import KnobSheet
-from ..run.run_campaign import Existing
 from ..run.stop import StopLevel
 from ..toml_file import FrozenModel
 

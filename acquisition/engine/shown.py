@@ -8,9 +8,9 @@ from time import monotonic
 
 import numpy as np
 
+from ..campaign.item import CampaignItem, CampaignProgress
 from ..check.finding import BenchReport
 from ..instruments import Block
-from ..run.run_campaign import CampaignItem, CampaignProgress
 from ..run.state import RunState
 from .messages import Messages
 from .recent import Recent

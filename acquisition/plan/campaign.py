@@ -8,7 +8,7 @@ from typing import Any, Self
 from pydantic import model_validator
 
 from ..excitation.kinds import KINDS
-from ..run.schedule import CHECK_S, duration_s
+from ..run.schedule import measured_s
 from ..toml_file import FrozenModel, load_toml
 from .measurement import Measurement, Name
 from .point import Point
@@ -74,7 +74,7 @@ class Campaign(FrozenModel):
     @property
     def duration_s(self) -> float:
         """Time of all measurements with their ramps and one bench check each, at most [s]."""
-        return sum(CHECK_S + duration_s(measurement) for _, measurement in self.recordings())
+        return sum(measured_s(measurement) for _, measurement in self.recordings())
 
     def size_bytes(self, sample_rate_hz: float, channels: int) -> int:
         """Disk space of all recordings while they are made; compressed afterwards, they need less."""

@@ -92,6 +92,11 @@ def duration_s(measurement: Measurement) -> float:
     return sum(phase.duration_s for phase in phases(measurement))
 
 
+def measured_s(measurement: Measurement) -> float:
+    """Time of a measurement with its bench check, at most [s]."""
+    return CHECK_S + duration_s(measurement)
+
+
 def stairs(measurement: Measurement) -> int:
     """Amplitude settings of one ramp."""
     return ceil(measurement.ramp_s / measurement.ramp_step_s * (1 - 1e-9))

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from acquisition.bench import open_bench
+from acquisition.campaign.item import Item
+from acquisition.campaign.run_campaign import run_campaign
 from acquisition.check.low_level import sine_amplitude
 from acquisition.errors import CheckFailed
 from acquisition.excitation.dwell import Dwell
@@ -20,7 +22,6 @@ from acquisition.recording.layout import RecordingState
 from acquisition.recording.reader import open_recording
 from acquisition.rig.configuration import load_rig
 from acquisition.run.run import Run
-from acquisition.run.run_campaign import Item, run_campaign
 from acquisition.run.run_measurement import run_measurement
 from acquisition.run.state import RunState
 

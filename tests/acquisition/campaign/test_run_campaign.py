@@ -4,13 +4,14 @@ import signal
 
 import pytest
 
+from acquisition.campaign.item import AfterFailure, Existing, Item
+from acquisition.campaign.run_campaign import run_campaign
 from acquisition.errors import DataLost, InstrumentLost, LimitExceeded, RecordingError
 from acquisition.excitation.dwell import Dwell
 from acquisition.plan.campaign import Campaign
 from acquisition.plan.measurement import Measurement
 from acquisition.recording.layout import RecordingState
 from acquisition.recording.reader import open_recording
-from acquisition.run.run_campaign import AfterFailure, Existing, Item, run_campaign
 from acquisition.run.run_measurement import run_measurement
 from acquisition.run.state import RunState
 
@@ -88,7 +89,7 @@ def test_resuming_keeps_what_is_complete_and_makes_another_attempt_at_what_is_no
         )
     items = run_campaign(bench, CAMPAIGN, tmp_path, Existing.RESUME)
     assert results(items) == [("one", Item.KEPT), ("two", Item.RECORDED), ("three", Item.RECORDED)]
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.h5", "three.h5", "two.2.h5", "two.h5"]
+    assert sorted(path.name for path in tmp_path.glob("*.h5")) == ["one.h5", "three.h5", "two.2.h5", "two.h5"]
     with open_recording(tmp_path / "two.h5") as first:
         assert first.state is RecordingState.FAILED
         assert "a hole" in first.reason
@@ -100,7 +101,7 @@ def test_resuming_keeps_what_is_complete_and_makes_another_attempt_at_what_is_no
 def test_resuming_with_another_plan_is_refused(bench, tmp_path):
     run_campaign(bench, CAMPAIGN, tmp_path)
     changed = Campaign(name="c", measurements=(dwell("one", amplitude_vpp=2.0),))
-    with pytest.raises(RecordingError, match=r"one\.h5 is complete, but was made by another plan"):
+    with pytest.raises(RecordingError, match=r"c\.campaign\.sqlite was begun with another plan"):
         run_campaign(bench, changed, tmp_path, Existing.RESUME)
 
 
@@ -125,7 +126,7 @@ def test_a_lost_instrument_ends_a_campaign_even_when_told_to_go_on(bench, tmp_pa
             after_failure=AfterFailure.GO_ON,
             on_progress=failing_in(bench, "one", lambda: InstrumentLost("gone")),
         )
-    assert [path.name for path in tmp_path.iterdir()] == ["one.h5"]
+    assert [path.name for path in tmp_path.glob("*.h5*")] == ["one.h5"]
 
 
 def test_a_campaign_with_one_plan_past_a_limit_does_not_begin(bench, tmp_path):

@@ -1,0 +1,35 @@
+"""What happens in a campaign, told to whoever writes it down or passes it on."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+
+class Event(StrEnum):
+    """What happened."""
+
+    BEGUN = "begun"
+    RESUMED = "resumed"
+    POINT_BEGUN = "point_begun"
+    POINT_DONE = "point_done"
+    POINT_STOPPED = "point_stopped"
+    FAULT = "fault"
+    """An attempt failed, or the campaign met something that ends it."""
+    RETRY = "retry"
+    BENCH_REOPENED = "bench_reopened"
+    FURTHER = "further"
+    """A result asked for more measurements."""
+    ENDED = "ended"
+
+
+@dataclass(frozen=True)
+class Happening:
+    """One thing that happened, as a sentence and as facts."""
+
+    event: Event
+    text: str
+    facts: Mapping[str, str | int | float] = field(default_factory=dict)
+
+
+Listener = Callable[[Happening], None]
+"""Told of every happening, in order; must not raise."""
