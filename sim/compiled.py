@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from numba import config, njit
 
@@ -38,6 +38,10 @@ def _cache_directory() -> str:
 config.CACHE_DIR = _cache_directory()  # type: ignore[attr-defined]
 
 
+_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+"""How every kernel is compiled. Nobody calls one as a C function, so that wrapper is left out."""
+
+
 def compiled(kernel: Kernel) -> Kernel:
     """Compile with numba: cached on disk, without the interpreter lock, IEEE division.
 
@@ -45,9 +49,9 @@ def compiled(kernel: Kernel) -> Kernel:
     denominators and must not raise. ``fastmath`` stays off: it may assume that no NaN exists,
     and the step control must see one.
     """
-    return cast("Kernel", njit(cache=True, nogil=True, error_model="numpy")(kernel))
+    return cast("Kernel", njit(**_OPTIONS)(kernel))
 
 
 def inlined(kernel: Kernel) -> Kernel:
     """Compile like `compiled` and copy into every caller: for what costs less than its call."""
-    return cast("Kernel", njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(kernel))
+    return cast("Kernel", njit(**_OPTIONS, forceinline=True)(kernel))

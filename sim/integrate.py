@@ -10,12 +10,12 @@ from .base_motion import BaseMotion, sampled_motion, sweep_interval_s, sweep_mot
 from .drive import Drive, Harmonic, LinearSweep, LogarithmicSweep, Sampled, Sweep
 from .engine.clock import clock_at
 from .engine.flight import flight_tables
-from .engine.harmonic_run import IMPACTS, NEXT_SAMPLE, Record, advance_harmonic
+from .engine.harmonic_run import advance_harmonic
 from .engine.interval import interval_tables, new_state
 from .engine.interval_run import advance_intervals
 from .engine.parameters import Vector
+from .engine.record import IMPACTS, NEXT_SAMPLE, Record
 from .engine.tally import TALLY_SIZE
-from .growth.tangent import no_tangent
 from .outcome import Outcome
 from .specimen import Specimen
 from .trajectory import Impacts, Trajectory
@@ -186,7 +186,7 @@ def new_record(
         impact_times=np.zeros(min(math.ceil(impact_rate_hz * duration_s) + SPARE_IMPACTS, MOST_IMPACTS)),
         counts=np.zeros(2, np.int64),
         tally=np.zeros(TALLY_SIZE),
-        tangent=no_tangent(),
+        tangent=None,
     )
 
 

@@ -10,8 +10,9 @@ from .accuracy import Accuracy
 from .drive import Harmonic
 from .engine.clock import clock_at
 from .engine.flight import flight_tables
-from .engine.harmonic_run import IMPACTS, advance_harmonic
+from .engine.harmonic_run import advance_harmonic
 from .engine.interval import new_state
+from .engine.record import IMPACTS
 from .engine.tally import (
     LINE_P_IM,
     LINE_P_RE,

@@ -26,12 +26,13 @@ from ..engine.contact import (
 from ..engine.contact_end import MOST_CORRECTIONS
 from ..engine.contact_flow import R, W, step_error
 from ..engine.detection import polynomial_at
-from ..engine.parameters import POWER, Table, Vector
+from ..engine.parameters import Table, Vector
 from .cell_flow import (
     MEMORY,
     MOMENT,
     MOMENTS,
     POINT,
+    POWER,
     RATE,
     RATE_SCALE,
     ROOT,

@@ -97,6 +97,10 @@ ARGUMENT, POINT, TRIAL, SPARE, CURVATURE = range(STAGES, WORK_ROWS)
 """Rows of a workspace after the stages, as in `sim.engine.contact_flow`; the last is a curvature long."""
 
 
+YIELDING, POWER = range(2)
+"""How a cell's force acts: by stops that give way, or everywhere."""
+
+
 class CellLaw(NamedTuple):
     """The stops of one cell as numbers; see `sim.engine.parameters.Parameters`."""
 

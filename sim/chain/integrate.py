@@ -10,13 +10,13 @@ from ..accuracy import Accuracy
 from ..drive import Harmonic
 from ..engine.clock import clock_at
 from ..engine.detection import SERIES_TERMS
-from ..engine.parameters import POWER, Table
+from ..engine.parameters import Table
 from ..integrate import MAX_IMPACT_RATE_HZ, ROUNDING, SPARE_IMPACTS
 from ..modes import Complex
 from ..outcome import Outcome
 from ..trajectory import Floats
 from .cell_contact import begin_pressing
-from .cell_flow import CURVATURE_TERMS, SIDE, fill_curvature
+from .cell_flow import CURVATURE_TERMS, POWER, SIDE, fill_curvature
 from .chain import MASSES_PER_CELL, Chain
 from .run import IMPACTS, NEXT_SAMPLE, ChainRecord, advance_chain, chain_cells
 from .tables import OBSERVED, PATH, ChainTables, chain_tables

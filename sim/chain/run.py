@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from ..compiled import compiled
 from ..engine.clock import advance_clock, time_until
-from ..engine.parameters import POWER, Table, Vector
+from ..engine.parameters import Table, Vector
 from ..modes import Complex
 from ..outcome import Outcome
-from .cell_flow import CELL_SIZE, MEMORY, SIDE
+from .cell_flow import CELL_SIZE, MEMORY, POWER, SIDE
 from .cell_power import begin_power
 from .cell_window import COUNT, cross_window
 from .tables import KIND, LOWER, OBSERVED, PATH, UPPER, ChainTables

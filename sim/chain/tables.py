@@ -13,7 +13,7 @@ from ..drive import Harmonic
 from ..engine.parameters import Table, Vector, parameters, power_terms
 from ..modes import Complex
 from ..specimen import Specimen
-from .cell_flow import MARKOV_TERMS, WINDOW_TURN
+from .cell_flow import MARKOV_TERMS, POWER, WINDOW_TURN, YIELDING
 from .chain import MASSES_PER_CELL, Chain
 from .modes import chain_impulses, chain_modal_form, chain_state_matrix, chain_transmissibility
 
@@ -157,14 +157,15 @@ def _law_row(cell: Specimen) -> Vector:
     par, power = parameters(cell), power_terms(cell)
     row = np.zeros(LAW_SIZE)
     row[:HALVES] = (
-        par.law,
+        YIELDING if power is None else POWER,
         par.lower,
         par.upper,
         par.linear_stiffness,
         par.contact_stiffness,
         par.loss,
-        power.inverse_reference,
+        0.0 if power is None else power.inverse_reference,
     )
-    row[HALVES : HALVES + MOST_TERMS] = power.halves
-    row[HALVES + MOST_TERMS :] = power.forces
+    if power is not None:
+        row[HALVES : HALVES + MOST_TERMS] = power.halves
+        row[HALVES + MOST_TERMS :] = power.forces
     return row

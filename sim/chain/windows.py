@@ -11,10 +11,10 @@ from ..contact_law import MOST_TERMS
 from ..engine.clock import advance_clock, angle_at
 from ..engine.detection import LARGEST_BOUND, SERIES_TERMS
 from ..engine.flight import fill_series
-from ..engine.parameters import POWER, PowerTerms, Table, Vector
+from ..engine.parameters import PowerTerms, Table, Vector
 from ..modes import Complex
 from .cell_contact import cell_workspace
-from .cell_flow import CELL_SIZE, MEMORY, MOMENTS, SIDE, WIDTH, CellLaw
+from .cell_flow import CELL_SIZE, MEMORY, MOMENTS, POWER, SIDE, WIDTH, CellLaw
 from .cell_window import LOG_ROWS, MOST_TOUCHES
 from .tables import (
     CONTACT,

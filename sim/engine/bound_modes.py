@@ -29,11 +29,6 @@ PLACES = [X, Z, VX, VZ]
 """Where the four unknowns of the bound motion stand in a state."""
 
 
-def no_bound_motion() -> Complex:
-    """Stand in where no stop is rigid."""
-    return np.zeros((0, COLUMNS), dtype=np.complex128)
-
-
 def bound_motion(specimen: Specimen, omega: float, amplitude_m: float) -> Complex:
     """Diagonalise the bound motion under U = amplitude sin(omega t): shape (n+1, COLUMNS), n is 2 to 4.
 

@@ -42,6 +42,7 @@ from .parameters import (
     Y,
     Z,
 )
+from .row import copy_row
 
 LEFT, HELD, NOT_FINITE, STALLED = range(4)
 """How a call ends: the stop was left; the time limit came first; NaN; no progress."""
@@ -71,6 +72,7 @@ NEAR = 0.1
 third power of it, is far less than the tolerance."""
 
 
+LOG_ROWS = 256
 LOGGED, DEEPEST, STAGES_ONLY = range(3)
 """Places of a log's first row: how many steps' ends are in the rows below; the largest w so far; 1 when no
 deepest point is wanted, only the stages."""
@@ -89,6 +91,16 @@ WIDE_LOG_COLUMNS = LOG_STEP + 1 + 2 * STAGES
 def contact_workspace() -> Table:
     """Memory that one run (one thread) hands to every contact."""
     return np.zeros((WORK_ROWS, WIDTH))
+
+
+@compiled
+def log_for(tally: Vector, tangent: Table | None) -> Table:
+    """Make the log of contacts that a tally (as `sim.engine.tally` says) or a tangent needs."""
+    if tangent is not None:
+        wide = np.zeros((LOG_ROWS, WIDE_LOG_COLUMNS))
+        wide[0, STAGES_ONLY] = 1.0 if tally[0] == 0.0 else 0.0
+        return wide
+    return np.zeros((LOG_ROWS if tally[0] != 0.0 else 0, LOG_COLUMNS))
 
 
 @compiled
@@ -202,7 +214,7 @@ def _log_apex(
     before, after = work[POINT, R], work[TRIAL, R]
     if not before > 0.0 > after:
         return
-    work[SPARE] = work[TRIAL]
+    copy_row(work[SPARE], work[TRIAL])
     low, high = 0.0, step
     for _ in range(APEX_SECANTS):
         part = low + (high - low) * before / (before - after)
@@ -212,7 +224,7 @@ def _log_apex(
             low, before = part, work[TRIAL, R]
         else:
             high, after = part, work[TRIAL, R]
-    work[TRIAL] = work[SPARE]
+    copy_row(work[TRIAL], work[SPARE])
 
 
 @compiled
@@ -295,7 +307,7 @@ def advance_contact(  # noqa: C901, PLR0912 - a step control and its three ends 
             log_stages(log, work, taken)
             if log[0, STAGES_ONLY] == 0.0:
                 _log_apex(log, work, taken, side, force, middle, par)
-        work[POINT] = work[TRIAL]
+        copy_row(work[POINT], work[TRIAL])
         if code == LEFT:
             work[POINT, W] = 0.0
         if len(log) > 0:

@@ -17,10 +17,12 @@ from ..contact_law import RigidStops
 from ..drive import Harmonic
 from ..modes import Complex, harmonic_motion, modal_form
 from ..specimen import Specimen
-from .bound_modes import bound_motion, no_bound_motion
+from .bound_modes import bound_motion
 from .clock import angle_at
+from .contact_flow import FORCE_TERMS
 from .detection import LARGEST_BOUND, LONGEST_TURN, NEVER, SERIES_TERMS, first_contact
 from .parameters import VX, VY, VZ, Parameters, PowerTerms, Vector, X, Y, Z, parameters, power_terms
+from .row import copy_row
 
 GRID_TURN = LONGEST_TURN
 """Grid step as the fastest rate times its length [rad]: half as long is slower by a seventh."""
@@ -38,8 +40,8 @@ class FlightTables(NamedTuple):
     """Specimen and drive, diagonalised. Terms 0..n-1 are modes, term n is the drive."""
 
     par: Parameters
-    power: PowerTerms
-    """Of a power law; no terms for other laws."""
+    power: PowerTerms | None
+    """Of a power law; None, by its type, keeps all that concerns one out of a kernel."""
     frequency: float
     omega: float
     phase: complex
@@ -62,8 +64,8 @@ class FlightTables(NamedTuple):
     """Grid step [s]."""
     factors: Complex
     """exp(l_j grid), shape (n+1,)."""
-    bound: Complex
-    """The motion with m1 held by a rigid stop (`sim.engine.bound_modes`); no rows for other laws."""
+    bound: Complex | None
+    """The motion with m1 held by a rigid stop (`sim.engine.bound_modes`); None, as above, for other laws."""
 
 
 def flight_tables(specimen: Specimen, drive: Harmonic) -> FlightTables:
@@ -90,7 +92,7 @@ def flight_tables(specimen: Specimen, drive: Harmonic) -> FlightTables:
         rows=modes.rows,
         grid=grid,
         factors=np.exp(rates * grid),
-        bound=bound_motion(specimen, omega, drive.amplitude_m) if is_rigid else no_bound_motion(),
+        bound=bound_motion(specimen, omega, drive.amplitude_m) if is_rigid else None,
     )
 
 
@@ -99,6 +101,15 @@ def drive_phasor(clock: Vector, later: float, tables: FlightTables) -> complex:
     """exp(i (omega t + phase)) at clock time plus ``later``."""
     angle = angle_at(clock, later, tables.frequency)
     return complex(math.cos(angle), math.sin(angle)) * tables.phase
+
+
+@inlined
+def fill_base_force(force: Vector, clock: Vector, middle: float, tables: FlightTables) -> None:
+    """Taylor coefficients of the base force about clock time plus ``middle``."""
+    term = tables.force * drive_phasor(clock, middle, tables)
+    for k in range(FORCE_TERMS):
+        force[k] = term.real
+        term *= complex(0.0, tables.omega / (k + 1.0))
 
 
 @inlined
@@ -207,7 +218,7 @@ def fly(
         if elapsed > 0.0:
             turn_phasors(now, phasors, elapsed, clock, tables)
         else:
-            now[:] = phasors
+            copy_row(now, phasors)
         p, reach, bound = 0.0, 0.0, 0.0
         for j in range(len(now)):
             terms[j] = now[j] * tables.path[j]

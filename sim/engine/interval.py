@@ -25,14 +25,13 @@ from .base_force import base_force, shifted
 from .contact import begin_contact
 from .detection import LONGEST_TURN
 from .parameters import (
-    POWER,
-    RIGID,
     SIDE,
     STATE_SIZE,
     VX,
     VY,
     VZ,
     Parameters,
+    PowerTerms,
     Table,
     Vector,
     X,
@@ -115,9 +114,9 @@ def new_state(
     state = np.zeros(STATE_SIZE)
     state[:6] = np.asarray(motion, dtype=np.float64)
     par = parameters(specimen)
-    if par.law == RIGID:
+    if par.restitution is not None:
         _refuse_inside_a_stop(state, specimen)
-    place_on_its_side(state, par, accuracy.tolerance)
+    place_on_its_side(state, par, power_terms(specimen), par.restitution, accuracy.tolerance)
     return state
 
 
@@ -134,14 +133,16 @@ def _refuse_inside_a_stop(state: Vector, specimen: Specimen) -> None:
 
 
 @compiled
-def place_on_its_side(state: Vector, par: Parameters, tolerance: float) -> None:
+def place_on_its_side(
+    state: Vector, par: Parameters, power: PowerTerms | None, restitution: float | None, tolerance: float
+) -> None:
     """Decide from the displacements whether a state is in flight or in contact."""
     p = state[Y] - state[Z]
     state[SIDE] = 0.0
-    if par.law == POWER:
+    if power is not None:
         begin_smooth(state)
-    elif par.law == RIGID:
-        place_between_rigid_stops(state, par, tolerance)
+    elif restitution is not None:
+        place_between_rigid_stops(state, par, restitution, tolerance)
     elif p > par.upper or p < -par.lower:
         begin_contact(state, math.copysign(1.0, p), par, tolerance)
 

@@ -7,9 +7,10 @@ import numpy as np
 from ..compiled import compiled
 from .base_force import Cubic, base_force, shifted
 from .clock import advance_clock, time_until
-from .harmonic_run import IMPACTS, LOST, NEXT_SAMPLE, REACHED_END, TOO_MANY_IMPACTS, Record
 from .parameters import Table, Vector
 from .piece import IntervalTables, advance_part, carry_if_clear
+from .record import IMPACTS, LOST, NEXT_SAMPLE, REACHED_END, TOO_MANY_IMPACTS, Record
+from .row import copy_row
 
 ALMOST = 1.0 - 1e-12
 """An interval is whole although its length, cut into pieces and joined, rounds differently."""
@@ -103,5 +104,5 @@ def _sample(
         shadow = state.copy()
         if later > 0.0:
             advance_part(shadow, force, later, tables, np.empty(0))
-        record.samples[counts[NEXT_SAMPLE]] = shadow[:6]
+        copy_row(record.samples[counts[NEXT_SAMPLE]], shadow)
         counts[NEXT_SAMPLE] += 1

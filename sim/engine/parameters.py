@@ -37,9 +37,6 @@ SCALES = 12
 """Under a power law, the first of seven: how large p, dp/dt, x, z, vx, vz have lately been, and time as 1."""
 STATE_SIZE = 20
 
-YIELDING, RIGID, POWER = range(3)
-"""How a force acts: by stops that give way, by stops that do not, or everywhere."""
-
 
 class Parameters(NamedTuple):
     """The specimen as numbers.
@@ -68,22 +65,20 @@ class Parameters(NamedTuple):
     """1 / m2."""
     inverse_pair: float
     """1 / reduced mass."""
-    law: int
-    """YIELDING, RIGID or POWER."""
     linear_stiffness: float
     contact_stiffness: float
     loss: float
-    restitution: float
+    restitution: float | None
+    """Of stops that do not yield; None tells a kernel, by its type, that they do."""
 
 
 class Stops(NamedTuple):
     """A contact law as numbers: the part of `Parameters` that depends on it."""
 
-    law: int
     linear_stiffness: float = 0.0
     contact_stiffness: float = 0.0
     loss: float = 0.0
-    restitution: float = 0.0
+    restitution: float | None = None
 
 
 def parameters(specimen: Specimen) -> Parameters:
@@ -105,18 +100,16 @@ def parameters(specimen: Specimen) -> Parameters:
 
 def _stops(specimen: Specimen) -> Stops:
     match specimen.contact:
-        case NoContact():
-            return Stops(YIELDING)
+        case NoContact() | PowerLaw():
+            return Stops()
         case Hertz(stiffness=stiffness):
-            return Stops(YIELDING, contact_stiffness=float(stiffness))
+            return Stops(contact_stiffness=float(stiffness))
         case LinearGap(stiffness=stiffness):
-            return Stops(YIELDING, linear_stiffness=float(stiffness))
+            return Stops(linear_stiffness=float(stiffness))
         case HuntCrossley(stiffness=stiffness, loss=loss):
-            return Stops(YIELDING, contact_stiffness=float(stiffness), loss=float(loss))
+            return Stops(contact_stiffness=float(stiffness), loss=float(loss))
         case RigidStops(restitution=restitution):
-            return Stops(RIGID, restitution=float(restitution))
-        case PowerLaw():
-            return Stops(POWER)
+            return Stops(restitution=float(restitution))
 
 
 class PowerTerms(NamedTuple):
@@ -132,16 +125,17 @@ class PowerTerms(NamedTuple):
     """Of each term at p_ref [N]."""
 
 
-def power_terms(specimen: Specimen) -> PowerTerms:
-    """Turn a power law into numbers; no terms for other laws."""
+def power_terms(specimen: Specimen) -> PowerTerms | None:
+    """Turn a power law into numbers; None for other laws, whose kernels then know nothing of it."""
     law = specimen.contact
-    terms = law.terms if isinstance(law, PowerLaw) else ()
-    reference = law.reference if isinstance(law, PowerLaw) else 1.0
+    if not isinstance(law, PowerLaw):
+        return None
+    terms = law.terms
     exponents = [1, *(exponent for exponent, _ in terms)]
     halves = [(after - before) // 2 for before, after in pairwise(exponents)]
     padding = MOST_TERMS - len(terms)
     return PowerTerms(
-        1.0 / float(reference),
+        1.0 / float(law.reference),
         (*halves, *[0] * padding),
         (*(float(force) for _, force in terms), *[0.0] * padding),
     )

@@ -13,7 +13,7 @@ from .departure import time_to_depart
 from .detection import LARGEST_BOUND, NEVER, SERIES_TERMS, first_contact
 from .flight import CLEAR, DEPARTS, OUT_OF_RANGE, TOUCHES
 from .flight_series import fill_flight_series, place_on_series
-from .parameters import CLOSED, RIGID, SIDE, VX, VY, VZ, Parameters, PowerTerms, Table, Vector, X, Y, Z
+from .parameters import CLOSED, SIDE, VX, VY, VZ, Parameters, PowerTerms, Table, Vector, X, Y, Z
 from .rigid_stop import closed_gap, is_resolved
 from .stick import hold_on_series
 from .touch import advance_touching, strike
@@ -29,8 +29,8 @@ class IntervalTables(NamedTuple):
     """Everything about specimen and interval that does not change from interval to interval."""
 
     par: Parameters
-    power: PowerTerms
-    """Of a power law; no terms for other laws."""
+    power: PowerTerms | None
+    """Of a power law; None for other laws, which a kernel tells by the type."""
     length: float
     """One piece of the interval [s]: short enough for the Taylor series of detection."""
     pieces: int
@@ -98,12 +98,14 @@ def advance_part(state: Vector, force: Cubic, length: float, tables: IntervalTab
     tau, impacts = 0.0, 0
     for _ in range(MOST_PHASES_IN_A_PIECE):
         if state[SIDE] != 0.0:
-            code, tau = _stay_on_stop(state, force, tau, length, tables, work, series, path)
+            code, tau = _stay_on_stop(
+                state, force, tau, length, tables, tables.par.restitution, work, series, path
+            )
             if code == HELD:
                 return impacts
             if code != LEFT:
                 return FAILED
-        ends, tau = _fly_part(state, force, tau, length, tables, series, path)
+        ends, tau = _fly_part(state, force, tau, length, tables, tables.par.restitution, series, path)
         if ends == CLEAR:
             return impacts
         if ends == OUT_OF_RANGE:
@@ -112,7 +114,7 @@ def advance_part(state: Vector, force: Cubic, length: float, tables: IntervalTab
             if impacts < len(times):
                 times[impacts] = tau
             impacts += 1
-            strike(state, tables.par, tables.tolerance)
+            strike(state, tables.par, tables.par.restitution, tables.tolerance)
     return FAILED
 
 
@@ -123,12 +125,13 @@ def _stay_on_stop(
     tau: float,
     length: float,
     tables: IntervalTables,
+    restitution: float | None,
     work: Table,
     series: Table,
     path: Vector,
 ) -> tuple[int, float]:
     """Advance from ``tau`` while a stop pushes; the codes of `sim.engine.contact`, and the time reached."""
-    if tables.par.law == RIGID:
+    if restitution is not None:
         lets_go = hold_on_series(series, path, state, shifted(force, tau), length - tau, tables.par)
         if lets_go == NEVER:
             return HELD, length
@@ -148,6 +151,7 @@ def _fly_part(
     tau: float,
     length: float,
     tables: IntervalTables,
+    restitution: float | None,
     series: Table,
     path: Vector,
 ) -> tuple[int, float]:
@@ -158,7 +162,7 @@ def _fly_part(
         return OUT_OF_RANGE, tau
     fill_flight_series(series, path, state, rest, par)
     scale = abs(state[Y]) + abs(state[Z])
-    if par.law == RIGID:
+    if restitution is not None:
         state[CLOSED] = closed_gap(scale, par)
         if not is_resolved(state[CLOSED], par):
             return OUT_OF_RANGE, tau

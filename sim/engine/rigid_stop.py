@@ -59,7 +59,7 @@ def place_on_stop(state: Vector, side: float, rate: float, par: Parameters) -> N
 
 
 @compiled
-def rebound(state: Vector, side: float, par: Parameters, tolerance: float) -> None:
+def rebound(state: Vector, side: float, par: Parameters, restitution: float, tolerance: float) -> None:
     """Strike a rigid stop; ``state[SIDE]`` says whether m1 stays on it.
 
     The touch was called a hair before the gap had closed; the speed is what it will be when it has, so that
@@ -68,12 +68,14 @@ def rebound(state: Vector, side: float, par: Parameters, tolerance: float) -> No
     short = gap_of(side, par) - side * (state[Y] - state[Z])
     approach = side * (state[VY] - state[VZ])
     speed = math.sqrt(max(approach * approach + 2.0 * press_on(side, state, par) * short, 0.0))
-    place_on_stop(state, side, -par.restitution * speed, par)
-    hold_if_pressed(state, side, par, tolerance)
+    place_on_stop(state, side, -restitution * speed, par)
+    hold_if_pressed(state, side, par, restitution, tolerance)
 
 
 @compiled
-def hold_if_pressed(state: Vector, side: float, par: Parameters, tolerance: float) -> None:
+def hold_if_pressed(
+    state: Vector, side: float, par: Parameters, restitution: float, tolerance: float
+) -> None:
     """Hold m1, which stands on a stop or leaves it, if the impacts still to come are too small to follow.
 
     Those are left out whose hops cannot be told from rest, and those whose speeds add up to less than
@@ -82,7 +84,7 @@ def hold_if_pressed(state: Vector, side: float, par: Parameters, tolerance: floa
     rate = state[VY] - state[VZ]
     press = press_on(side, state, par)
     gap = gap_of(side, par)
-    part = tolerance * (1.0 - par.restitution)
+    part = tolerance * (1.0 - restitution)
     too_low = RESOLVED * state[CLOSED] + part * part * gap
     if press >= 0.0 and rate * rate <= 2.0 * press * too_low:
         place_on_stop(state, side, 0.0, par)
@@ -90,7 +92,7 @@ def hold_if_pressed(state: Vector, side: float, par: Parameters, tolerance: floa
 
 
 @compiled
-def place_between_rigid_stops(state: Vector, par: Parameters, tolerance: float) -> None:
+def place_between_rigid_stops(state: Vector, par: Parameters, restitution: float, tolerance: float) -> None:
     """Decide whether a motion that is given starts held by a stop; one beyond a stop is put on it."""
     p = state[Y] - state[Z]
     side = math.copysign(1.0, p)
@@ -98,4 +100,4 @@ def place_between_rigid_stops(state: Vector, par: Parameters, tolerance: float) 
     state[CLOSED] = closed_gap(abs(state[X]) + abs(state[Y]) + abs(state[Z]), par)
     if short <= state[CLOSED]:
         place_on_stop(state, side, side * (state[VY] - state[VZ]), par)
-        hold_if_pressed(state, side, par, tolerance)
+        hold_if_pressed(state, side, par, restitution, tolerance)

@@ -66,6 +66,7 @@ from .parameters import (
     Z,
 )
 from .power_flow import PowerSystem, power_rates, stiffest_rate
+from .row import copy_row
 
 MOTIONS = 6
 """The unknowns whose errors count; time has none."""
@@ -253,7 +254,7 @@ def advance_smooth(
                 return NOT_FINITE, at[T]
             continue
         _log_stages(log, work, taken)
-        work[POINT] = work[TRIAL]
+        copy_row(work[POINT], work[TRIAL])
         if steps == 1:
             at[T] = limit
         # A step that was cut by the limit says little about the next one's length.

@@ -12,7 +12,7 @@ import numpy as np
 from ..compiled import compiled
 from ..modes import Complex
 from .base_force import Cubic
-from .bound_modes import PULL, RATE, ROW, SHAPE
+from .bound_modes import RATE, ROW, SHAPE
 from .contact import gap_of
 from .detection import LARGEST_BOUND, NEVER, SERIES_TERMS, derivative_bound, first_contact
 from .flight import (
@@ -36,9 +36,8 @@ LETS_GO = TOUCHES
 
 
 @compiled
-def held_tables(tables: FlightTables) -> FlightTables:
+def held_tables(tables: FlightTables, bound: Complex) -> FlightTables:
     """Put the bound modes in the place of the free ones; p, being constant, is left out."""
-    bound = tables.bound
     rates = bound[:, RATE].copy()
     grid = GRID_TURN / np.abs(rates).max()
     return FlightTables(
@@ -70,6 +69,7 @@ def hold(
     clock: Vector,
     longest: float,
     held: FlightTables,
+    pulls: Complex,
 ) -> tuple[int, float]:
     """Find how long a stop holds m1: until it lets go, or ``longest`` [s]; see `sim.engine.flight.fly`."""
     par, elapsed = held.par, 0.0
@@ -78,7 +78,7 @@ def hold(
         turn_phasors(now, phasors, elapsed, clock, held)
         reach, bound = spring, 0.0
         for j in range(len(now)):
-            terms[j] = weight * now[j] * held.bound[j, PULL]
+            terms[j] = weight * now[j] * pulls[j]
             reach += abs(terms[j])
             bound += abs(terms[j]) * held.squares[j]
         if not bound < LARGEST_BOUND:
@@ -89,7 +89,7 @@ def hold(
             elapsed += made * held.grid
             continue
         for j in range(len(now)):
-            terms[j] = weight * now[j] * held.bound[j, PULL]
+            terms[j] = weight * now[j] * pulls[j]
         length = min(held.grid, longest - elapsed)
         fill_series(series, terms, held.rates)
         series[0] += spring

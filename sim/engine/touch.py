@@ -3,18 +3,18 @@
 from ..compiled import compiled
 from .contact import advance_contact, begin_contact
 from .detection import touched_side
-from .parameters import POWER, RIGID, VY, VZ, Parameters, PowerTerms, Table, Vector, Y, Z
+from .parameters import VY, VZ, Parameters, PowerTerms, Table, Vector, Y, Z
 from .power_flow import PowerSystem
 from .rigid_stop import rebound
 from .smooth import advance_smooth
 
 
 @compiled
-def strike(state: Vector, par: Parameters, tolerance: float) -> None:
+def strike(state: Vector, par: Parameters, restitution: float | None, tolerance: float) -> None:
     """Touch the stop that m1 has come to; the state is placed on it."""
     side = touched_side(state[Y] - state[Z], state[VY] - state[VZ], par.lower, par.upper)
-    if par.law == RIGID:
-        rebound(state, side, par, tolerance)
+    if restitution is not None:
+        rebound(state, side, par, restitution, tolerance)
     else:
         begin_contact(state, side, par, tolerance)
 
@@ -27,12 +27,12 @@ def advance_touching(
     force: Vector,
     middle: float,
     par: Parameters,
-    power: PowerTerms,
+    power: PowerTerms | None,
     tolerance: float,
     work: Table,
     log: Table,
 ) -> tuple[int, float]:
     """Advance while a force acts that yields, to its end or ``limit``; see `sim.engine.contact`."""
-    if par.law == POWER:
+    if power is not None:
         return advance_smooth(state, tau, limit, force, middle, PowerSystem(par, power), tolerance, work, log)
     return advance_contact(state, tau, limit, force, middle, par, tolerance, work, log)

@@ -29,7 +29,7 @@ from ..engine.contact_flow import (
     motion_rates,
     trial_step,
 )
-from ..engine.parameters import POWER, VX, VY, VZ, Parameters, PowerTerms, Table, Vector, X, Y, Z
+from ..engine.parameters import VX, VY, VZ, Parameters, PowerTerms, Table, Vector, X, Y, Z
 from ..engine.power_flow import whole_power
 from .tangent import keep_in_range
 
@@ -115,12 +115,12 @@ def power_stiffness(p: float, power: PowerTerms) -> float:
 
 
 @compiled
-def _fill_slopes(slopes: Table, row: Vector, par: Parameters, power: PowerTerms) -> None:
+def _fill_slopes(slopes: Table, row: Vector, par: Parameters, power: PowerTerms | None) -> None:
     """Linearise the force at the stages that a row of a log holds."""
     for stage in range(STAGES):
         pace = row[LOG_STAGE_T + stage]
         slopes[stage, STEP_TIME] = pace
-        if par.law == POWER:
+        if power is not None:
             slopes[stage, PRESS_P] = par.k1 + power_stiffness(row[LOG_STAGE_W + stage], power)
             slopes[stage, PRESS_RATE] = par.c1
         else:
@@ -140,7 +140,7 @@ def tangent_workspace() -> Table:
 
 @compiled
 def carry_through_steps(
-    tangent: Table, log: Table, par: Parameters, power: PowerTerms, memory: Table
+    tangent: Table, log: Table, par: Parameters, power: PowerTerms | None, memory: Table
 ) -> None:
     """Carry every change over the steps of a wide log."""
     work, slopes, unforced = memory[:WORK_ROWS], memory[WORK_ROWS:], log[0, :FORCE_TERMS]

@@ -34,12 +34,14 @@ def _free_inner(state: Vector, par: Parameters) -> float:
 
 
 @compiled
-def carry_through_impact(tangent: Table, before: Vector, after: Vector, par: Parameters) -> None:
+def carry_through_impact(
+    tangent: Table, before: Vector, after: Vector, par: Parameters, restitution: float
+) -> None:
     """Carry every change through an impact from the state ``before`` to the state ``after``."""
     share1, share2 = par.reduced_mass / par.mass1, par.reduced_mass / par.mass2
     approach = before[VY] - before[VZ]
     approach = math.copysign(max(abs(approach), SLOWEST_TOUCH), approach)
-    turned = 1.0 + par.restitution
+    turned = 1.0 + restitution
     jump_y, jump_z = after[VY] - before[VY], after[VZ] - before[VZ]
     pull, pull_after = _free_pull(before, par), _free_pull(after, par)
     inner, inner_after = _free_inner(before, par), _free_inner(after, par)

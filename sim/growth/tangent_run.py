@@ -19,9 +19,10 @@ from ..compiled import compiled
 from ..drive import Harmonic
 from ..engine.clock import clock_at
 from ..engine.flight import FlightTables, flight_tables, take_off
-from ..engine.harmonic_run import IMPACTS, REACHED_END, Record, advance_harmonic
+from ..engine.harmonic_run import advance_by_law
 from ..engine.interval import new_state
-from ..engine.parameters import POWER, SIDE, Table, Vector
+from ..engine.parameters import SIDE, Table, Vector
+from ..engine.record import IMPACTS, REACHED_END, Record
 from ..integrate import MAX_IMPACT_RATE_HZ, new_record, start_motion
 from ..outcome import Outcome
 from ..specimen import Specimen
@@ -125,7 +126,8 @@ def run_with_tangent(
     state = new_state(specimen, start_motion(initial_state), accuracy)
     metric = energy_metric(specimen)
     record = new_record(0.0, duration_s, None, max_impact_rate_hz)
-    record = record._replace(tangent=starting_changes(metric, changes))
+    tangent = starting_changes(metric, changes)
+    record = record._replace(tangent=tangent)
     readings = Readings(np.zeros((count, changes)), np.zeros(count, np.int64), np.zeros((count, 6)))
     clock = clock_at(0.0)
     parts = _parts(tables, interval.length_s) if changes > 1 else 1
@@ -143,6 +145,7 @@ def run_with_tangent(
             tables,
             accuracy.tolerance,
             record,
+            tangent,
             metric,
             readings,
         )
@@ -194,16 +197,18 @@ def _take_readings(
     tables: FlightTables,
     tolerance: float,
     record: Record,
+    tangent: Table,
     metric: Table,
     readings: Readings,
 ) -> tuple[int, int]:
     """Advance from interval to interval; returns an `Outcome` code and the first that was not completed."""
-    tangent = record.tangent
     for k in range(first, last):
         before = record.counts[IMPACTS]
         for part in range(parts):
             until = (k + (part + 1.0) / parts) * interval
-            code = advance_harmonic(state, clock, until, tables, tolerance, record)
+            code = advance_by_law(
+                state, clock, until, tables, tolerance, record, tables.power, tables.bound, tangent
+            )
             if code != REACHED_END:
                 return code, k
             readings.growth[k] += tangent[:, GROWTH]
@@ -217,7 +222,7 @@ def _take_readings(
 @compiled
 def _is_quiet(state: Vector, clock: Vector, tables: FlightTables) -> int:
     """Say (1 or 0) whether it is certain that m1 will never touch a stop: free phasors only shrink."""
-    if tables.par.law == POWER or state[SIDE] != 0.0:
+    if tables.power is not None or state[SIDE] != 0.0:
         return 0
     phasors, reach = np.empty(len(tables.rates), np.complex128), 0.0
     take_off(phasors, state, clock, tables)

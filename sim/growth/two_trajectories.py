@@ -17,9 +17,10 @@ from ..compiled import compiled
 from ..drive import Harmonic
 from ..engine.clock import clock_at
 from ..engine.flight import FlightTables, flight_tables
-from ..engine.harmonic_run import REACHED_END, Record, advance_harmonic
+from ..engine.harmonic_run import advance_by_law
 from ..engine.interval import new_state, place_on_its_side
 from ..engine.parameters import Table, Vector
+from ..engine.record import REACHED_END, Record
 from ..integrate import MAX_IMPACT_RATE_HZ, new_record, start_motion
 from ..lyapunov import intervals_to_skip
 from ..outcome import Outcome
@@ -101,8 +102,11 @@ def _part(
     here, there, apart = clock_at(0.0), clock_at(0.0), np.zeros(HALF)
     for k in range(len(growth)):
         until = (k + 1.0) * interval
-        code = advance_harmonic(first, here, until, tables, tolerance, record)
-        code = max(code, advance_harmonic(second, there, until, tables, tolerance, record))
+        code = advance_by_law(first, here, until, tables, tolerance, record, tables.power, tables.bound, None)
+        code = max(
+            code,
+            advance_by_law(second, there, until, tables, tolerance, record, tables.power, tables.bound, None),
+        )
         if code != REACHED_END:
             return code
         for i in range(HALF):
@@ -112,6 +116,6 @@ def _part(
         for i in range(HALF):
             second[i] = first[i] + apart[i] * size / distance
         # Both begin the interval in the same manner, or the step control's memory would be a difference.
-        place_on_its_side(first, tables.par, tolerance)
-        place_on_its_side(second, tables.par, tolerance)
+        place_on_its_side(first, tables.par, tables.power, tables.par.restitution, tolerance)
+        place_on_its_side(second, tables.par, tables.power, tables.par.restitution, tolerance)
     return REACHED_END

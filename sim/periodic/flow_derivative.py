@@ -45,9 +45,10 @@ def flow_derivative(
 
     """
     moving = new_state(specimen, start_motion(state), accuracy)
-    record = new_record(0.0, duration_s, None, MAX_IMPACT_RATE_HZ)._replace(tangent=unit_tangent())
+    changes = unit_tangent()
+    record = new_record(0.0, duration_s, None, MAX_IMPACT_RATE_HZ)._replace(tangent=changes)
     tables = flight_tables(specimen, drive)
     code = advance_harmonic(moving, clock_at(0.0), duration_s, tables, accuracy.tolerance, record)
     if code != Outcome.REACHED_END:
         return np.full(6, np.nan), np.full((6, 6), np.nan)
-    return moving[:6].copy(), derivative_of(record.tangent)
+    return moving[:6].copy(), derivative_of(changes)

@@ -1,0 +1,189 @@
+"""A run between stops: flight, contact, flight, ... up to an instant. SI units."""
+
+import math
+
+import numpy as np
+
+from ..compiled import compiled, inlined
+from ..growth.tangent_contact import carry_through_steps, tangent_workspace
+from ..growth.tangent_flight import carry_through_flight
+from ..growth.tangent_impact import carry_through_impact
+from ..modes import Complex
+from .bound_modes import PULL
+from .clock import advance_clock, time_until
+from .contact import HELD, LEFT, NOT_FINITE, advance_contact, contact_workspace, gap_of, log_for
+from .contact_flow import FORCE_TERMS
+from .departure import closed_for, departure
+from .detection import SERIES_TERMS
+from .flight import (
+    CLEAR,
+    DEPARTS,
+    OUT_OF_RANGE,
+    FlightTables,
+    fill_base_force,
+    fly,
+    place_on_phasors,
+    take_off,
+    turn_phasors,
+)
+from .parameters import CLOSED, SIDE, Parameters, Table, Vector, X, Y, Z
+from .record import IMPACTS, LOST, NEXT_SAMPLE, REACHED_END, STUCK, TOO_MANY_IMPACTS, Record
+from .rigid_stop import is_resolved
+from .row import copy_row
+from .sampling import sample_contact, sample_flight
+from .stick import held_tables, hold, place_held, tally_held
+from .tally import MODE, NOTHING, tally_contact, tally_flight
+from .touch import strike
+
+STRETCH_TURN = 0.3
+"""Longest stretch of a contact, as drive phase [rad]: the base force is a polynomial of degree 7 about
+its middle, whose first term left out is 0.15^8/8! = 6e-12 of the force."""
+
+
+@compiled
+def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and their ends are one loop
+    state: Vector,
+    clock: Vector,
+    until: float,
+    tables: FlightTables,
+    tolerance: float,
+    record: Record,
+    bound: Complex | None,
+    tangent: Table | None,
+) -> int:
+    """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code.
+
+    ``bound`` is how m1 moves on a stop that holds it, None where stops yield.
+    """
+    terms = len(tables.rates)
+    phasors, now = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
+    workspace = np.zeros(terms, np.complex128)
+    series, force, work = np.zeros(SERIES_TERMS), np.zeros(FORCE_TERMS), contact_workspace()
+    shadow = np.zeros(len(state))
+    log, memory = log_for(record.tally, tangent), tangent_workspace()
+    counts = record.counts
+    while True:
+        longest = time_until(clock, until)
+        if longest <= 0.0:
+            return REACHED_END
+        if not math.isfinite(state[X] + state[Y] + state[Z]):
+            return LOST
+        if state[SIDE] == 0.0:
+            take_off(phasors, state, clock, tables)
+            ends, length = _fly_on(phasors, now, workspace, series, clock, longest, tables, bound)
+            if ends == OUT_OF_RANGE:
+                return LOST
+            if record.tally[MODE] != NOTHING:
+                tally_flight(record.tally, phasors, now, workspace, series, clock, length, tables)
+            if tangent is not None:
+                carry_through_flight(tangent, length, tables)
+            if counts[NEXT_SAMPLE] < len(record.samples):
+                sample_flight(phasors, now, clock, length, tables, record)
+            turn_phasors(now, phasors, length, clock, tables)
+            place_on_phasors(state, now, tables)
+            if ends == CLEAR:
+                clock[0], clock[1] = until, 0.0
+                continue
+            advance_clock(clock, length)
+            if ends == DEPARTS:
+                continue
+            if counts[IMPACTS] == len(record.impact_times):
+                return TOO_MANY_IMPACTS
+            record.impact_times[counts[IMPACTS]] = clock[0]
+            counts[IMPACTS] += 1
+            copy_row(shadow, state)
+            if bound is not None:
+                state[CLOSED] = closed_for(now, tables)
+            strike(state, tables.par, tables.par.restitution, tolerance)
+            if bound is not None:
+                _carry_through_impact(tangent, shadow, state, tables.par, tables.par.restitution)
+        elif bound is not None:
+            ends, length = _stay_held(state, clock, longest, series, tables, record, bound, tangent)
+            if ends == OUT_OF_RANGE:
+                return LOST
+            if ends == CLEAR:
+                clock[0], clock[1] = until, 0.0
+            else:
+                advance_clock(clock, length)
+                state[SIDE] = 0.0
+        else:
+            middle = min(0.5 * longest, 0.5 * STRETCH_TURN / tables.omega)
+            limit = min(longest, 2.0 * middle)
+            fill_base_force(force, clock, middle, tables)
+            copy_row(shadow, state)
+            code, length = advance_contact(state, 0.0, limit, force, middle, tables.par, tolerance, work, log)
+            if code == NOT_FINITE:
+                return LOST
+            if code not in (LEFT, HELD):
+                return STUCK
+            if record.tally[MODE] != NOTHING:
+                tally_contact(record.tally, log, clock, tables)
+            if tangent is not None:
+                carry_through_steps(tangent, log, tables.par, None, memory)
+            if counts[NEXT_SAMPLE] < len(record.samples):
+                sample_contact(shadow, clock, length, force, middle, tables, tolerance, work, record)
+            if length >= longest:
+                clock[0], clock[1] = until, 0.0
+            else:
+                advance_clock(clock, length)
+
+
+@inlined
+def _fly_on(
+    phasors: Complex,
+    now: Complex,
+    terms: Complex,
+    series: Vector,
+    clock: Vector,
+    longest: float,
+    tables: FlightTables,
+    bound: Complex | None,
+) -> tuple[int, float]:
+    """Find how long a flight lasts, as `sim.engine.flight.fly`; off a rigid stop it first departs."""
+    if bound is not None:
+        if not is_resolved(closed_for(phasors, tables), tables.par):
+            return OUT_OF_RANGE, 0.0
+        leaves = departure(phasors, terms, series, tables)
+        if leaves > 0.0:
+            return (DEPARTS, leaves) if leaves < longest else (CLEAR, longest)
+    return fly(phasors, now, terms, series, clock, longest, tables)
+
+
+@compiled
+def _carry_through_impact(
+    tangent: Table | None, before: Vector, after: Vector, par: Parameters, restitution: float | None
+) -> None:
+    if tangent is not None and restitution is not None:
+        carry_through_impact(tangent, before, after, par, restitution)
+
+
+@compiled
+def _stay_held(
+    state: Vector,
+    clock: Vector,
+    longest: float,
+    series: Vector,
+    tables: FlightTables,
+    record: Record,
+    bound: Complex,
+    tangent: Table | None,
+) -> tuple[int, float]:
+    """Advance while a rigid stop holds m1, to where it lets go or by ``longest``."""
+    held = held_tables(tables, bound)
+    terms, side, first = len(held.rates), state[SIDE], record.counts[NEXT_SAMPLE]
+    phasors, now = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
+    workspace = np.zeros(terms, np.complex128)
+    take_off(phasors, state, clock, held)
+    ends, length = hold(side, phasors, now, workspace, series, clock, longest, held, bound[:, PULL])
+    if ends == OUT_OF_RANGE:
+        return ends, length
+    tally_flight(record.tally, phasors, now, workspace, series, clock, length, held)
+    tally_held(record.tally, side, clock, length, held)
+    if tangent is not None:
+        carry_through_flight(tangent, length, held)
+    sample_flight(phasors, now, clock, length, held, record)
+    for row in range(first, record.counts[NEXT_SAMPLE]):
+        record.samples[row, Y] += side * gap_of(side, held.par)
+    turn_phasors(now, phasors, length, clock, held)
+    place_held(state, side, now, held)
+    return ends, length
