@@ -28,7 +28,7 @@ from ..engine.tally import (
     PEAKS,
     PEAKS_AND_LINES,
 )
-from ..growth.tangent import GROWTH, TANGENT_SIZE
+from ..growth.tangent import GROWTH, TANGENT_SIZE, no_tangent
 from ..integrate import MAX_IMPACT_RATE_HZ, new_record, start_motion
 from ..outcome import Outcome
 from ..periodic.poincare import state_scales
@@ -99,7 +99,7 @@ class FollowedRun:
         self._clock = clock_at(time_s)
         self._tables = flight_tables(specimen, drive)
         self._scales = state_scales(specimen, drive)
-        self._tangent: Floats | None = None
+        self._tangent = no_tangent()
 
     @property
     def time_s(self) -> float:
@@ -117,7 +117,7 @@ class FollowedRun:
         twin.__dict__.update(
             _state=self._state.copy(),
             _clock=self._clock.copy(),
-            _tangent=None if tolerance is not None or self._tangent is None else self._tangent.copy(),
+            _tangent=no_tangent() if tolerance is not None else self._tangent.copy(),
             _tolerance=self._tolerance if tolerance is None else tolerance,
         )
         return twin
@@ -160,7 +160,7 @@ class FollowedRun:
 
     def _size(self) -> float:
         """Natural logarithm of the size of the small change; NaN where there is none."""
-        if self._tangent is None:
+        if len(self._tangent) == 0:
             return math.nan
         change = self._tangent[0]
         return float(np.log(np.linalg.norm(change[:GROWTH] / self._scales)) + change[GROWTH])

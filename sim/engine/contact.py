@@ -96,7 +96,7 @@ def contact_workspace() -> Table:
 @compiled
 def log_for(tally: Vector, tangent: Table | None) -> Table:
     """Make the log of contacts that a tally (as `sim.engine.tally` says) or a tangent needs."""
-    if tangent is not None:
+    if tangent is not None and len(tangent) > 0:
         wide = np.zeros((LOG_ROWS, WIDE_LOG_COLUMNS))
         wide[0, STAGES_ONLY] = 1.0 if tally[0] == 0.0 else 0.0
         return wide

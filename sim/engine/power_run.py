@@ -52,7 +52,7 @@ def advance_under_power(
             return STUCK
         if record.tally[MODE] != NOTHING:
             tally_smooth(record.tally, log, clock, tables)
-        if tangent is not None:
+        if tangent is not None and len(tangent) > 0:
             carry_through_steps(tangent, log, tables.par, power, memory)
         if record.counts[NEXT_SAMPLE] < len(record.samples):
             sample_contact(shadow, clock, length, force, middle, tables, tolerance, work, record)

@@ -32,4 +32,4 @@ class Record(NamedTuple):
     tally: Vector
     tangent: Table | None
     """Small changes of the state that are carried along, as `sim.growth.tangent` says, shape (m,
-    TANGENT_SIZE); None carries none, and tells a kernel so by its type."""
+    TANGENT_SIZE). m = 0 carries none; None carries none either, and tells a kernel so by its type."""

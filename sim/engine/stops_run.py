@@ -75,7 +75,7 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
                 return LOST
             if record.tally[MODE] != NOTHING:
                 tally_flight(record.tally, phasors, now, workspace, series, clock, length, tables)
-            if tangent is not None:
+            if tangent is not None and len(tangent) > 0:
                 carry_through_flight(tangent, length, tables)
             if counts[NEXT_SAMPLE] < len(record.samples):
                 sample_flight(phasors, now, clock, length, tables, record)
@@ -118,7 +118,7 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
                 return STUCK
             if record.tally[MODE] != NOTHING:
                 tally_contact(record.tally, log, clock, tables)
-            if tangent is not None:
+            if tangent is not None and len(tangent) > 0:
                 carry_through_steps(tangent, log, tables.par, None, memory)
             if counts[NEXT_SAMPLE] < len(record.samples):
                 sample_contact(shadow, clock, length, force, middle, tables, tolerance, work, record)
@@ -179,7 +179,7 @@ def _stay_held(
         return ends, length
     tally_flight(record.tally, phasors, now, workspace, series, clock, length, held)
     tally_held(record.tally, side, clock, length, held)
-    if tangent is not None:
+    if tangent is not None and len(tangent) > 0:
         carry_through_flight(tangent, length, held)
     sample_flight(phasors, now, clock, length, held, record)
     for row in range(first, record.counts[NEXT_SAMPLE]):

@@ -20,6 +20,11 @@ LARGEST, SMALLEST = 1e100, 1e-100
 """A change beyond these is rescaled: its products with anything physical stay finite."""
 
 
+def no_tangent() -> Table:
+    """Make a tangent of no changes, for a run that may carry some at another time."""
+    return np.zeros((0, TANGENT_SIZE))
+
+
 def unit_tangent() -> Table:
     """Make the six unit changes, whose images are the columns of the flow's derivative."""
     return np.eye(UNITS, TANGENT_SIZE)

@@ -187,7 +187,7 @@ def test_an_impact_keeps_momentum_and_places_and_turns_the_approach_by_the_resti
     state = np.zeros_like(new_state(specimen))
     state[:6] = [1e-5, 3e-5 + side * gap, 3e-5, vx, vz + side * approach, vz]
     before = state.copy()
-    rebound(state, side, parameters(specimen), 1e-6)
+    rebound(state, side, parameters(specimen), restitution, 1e-6)
     m1, m2 = specimen.masses[1:]
     assert state[0] == before[0]
     assert state[3] == before[3]
