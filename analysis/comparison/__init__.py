@@ -1,0 +1,1 @@
+"""Measurements and predictions laid over one another, as curves of one kind."""

@@ -1,0 +1,43 @@
+import pickle
+
+import numpy as np
+import pytest
+
+from analysis.campaign_results import Simulation
+from analysis.comparison.recording_traces import compared_recording, kept_result
+from analysis.comparison.trace import Origin, Response
+from analysis.errors import NotEnoughData
+from analysis.noise_request import NoiseRequest
+from analysis.results import Estimator
+
+
+@pytest.fixture(scope="module")
+def compared(streamed_file):
+    return compared_recording(streamed_file(), NoiseRequest(), Simulation.LEFT_OUT)
+
+
+def test_a_transmission_crosses_to_another_process_with_its_spread(compared):
+    (trace,) = pickle.loads(pickle.dumps(compared)).traces
+    assert (trace.origin, trace.response) == (Origin.MEASURED, Response.TRANSMISSION)
+    assert np.median(trace.magnitude) == pytest.approx(2.0, rel=0.01)
+    assert trace.name == "streamed, transmission, measured"
+    assert (trace.lower < trace.magnitude).all()
+    assert "drive" in trace.note
+
+
+def test_the_whole_result_is_kept_for_reports(compared):
+    result, failures = kept_result(compared)
+    assert result.analysis.facts.name == compared.name == "streamed"
+    assert failures == ()
+
+
+def test_what_is_asked_for_is_what_is_estimated(streamed_file):
+    found = compared_recording(
+        streamed_file(), NoiseRequest(estimator=Estimator.H1, averages=10), Simulation.LEFT_OUT
+    )
+    assert found.traces[0].note.startswith("h1, ")
+
+
+def test_a_recording_that_ended_too_early_says_so(streamed_file):
+    with pytest.raises(NotEnoughData, match="streamed"):
+        compared_recording(streamed_file(samples=10), NoiseRequest(), Simulation.LEFT_OUT)

@@ -1,0 +1,108 @@
+"""Curves of a mode in closed form: peaks, differences and readings are known."""
+
+import re
+
+import numpy as np
+import pytest
+
+from analysis.comparison.trace import Origin, Response, Trace, sorted_trace, trace_difference
+from analysis.comparison.trace_peaks import trace_peaks
+from analysis.errors import NotEnoughData
+from analysis.figures.comparison import comparison_figure
+from analysis.figures.drawn import ImageKind
+
+MODE_HZ, DAMPING = 266.0, 0.01
+
+
+def mode(frequency_hz, scale=1.0, source="run", sd=0.01, origin=Origin.MEASURED):
+    r = frequency_hz / MODE_HZ
+    magnitude = scale * np.abs((1 + 2j * DAMPING * r) / (1 - r**2 + 2j * DAMPING * r))
+    return Trace(
+        source, origin, Response.TRANSMISSION, frequency_hz, magnitude, np.full(frequency_hz.shape, sd), "n"
+    )
+
+
+def test_a_peak_is_placed_between_the_points_with_its_width():
+    (peak,) = trace_peaks(mode(np.arange(50.0, 600.0, 0.7)))
+    assert peak.frequency_hz == pytest.approx(MODE_HZ * np.sqrt(1 - DAMPING**2), abs=0.1)
+    assert peak.magnitude == pytest.approx(50.0, rel=0.01)
+    assert peak.damping_ratio == pytest.approx(DAMPING, rel=0.05)
+
+
+def test_noise_that_its_own_spread_explains_is_no_peak():
+    rng = np.random.default_rng(1)
+    frequency_hz = np.arange(50.0, 600.0)
+    values = np.exp(0.3 * rng.standard_normal(frequency_hz.size))
+    flat = Trace(
+        "n", Origin.MEASURED, Response.TRANSMISSION, frequency_hz, values, np.full(values.shape, 0.3)
+    )
+    assert trace_peaks(flat) == ()
+
+
+def test_half_the_height_lies_six_decibels_below_at_any_frequencies():
+    upper, lower = mode(np.arange(100.0, 400.0, 1.0)), mode(np.arange(150.3, 500.0, 0.9), 0.5)
+    found = trace_difference(upper, lower)
+    assert found.frequency_hz[0] == 151.0
+    assert found.frequency_hz[-1] == 399.0
+    assert np.allclose(found.decibel, 6.0206, atol=0.25)
+    assert np.median(found.decibel) == pytest.approx(6.0206, abs=0.01)
+    away = np.abs(found.frequency_hz - MODE_HZ) > 20
+    assert np.allclose(found.standard_errors[away], np.log(2) / np.hypot(0.01, 0.01), rtol=0.01)
+
+
+def test_curves_without_a_common_frequency_have_no_difference():
+    with pytest.raises(NotEnoughData, match="no frequency in common"):
+        trace_difference(mode(np.arange(10.0, 20.0)), mode(np.arange(30.0, 40.0)))
+
+
+def test_a_curve_is_read_between_its_points_and_nowhere_else():
+    curve = mode(np.array([100.0, 200.0]))
+    values = curve.at(np.array([50.0, 100.0, np.sqrt(2) * 100, 300.0])).magnitude
+    assert np.isnan(values[[0, 3]]).all()
+    assert values[1] == pytest.approx(curve.magnitude[0])
+    assert values[2] == pytest.approx(np.sqrt(curve.magnitude[0] * curve.magnitude[1]))
+
+
+def test_a_sweep_downwards_is_turned_round():
+    frequency_hz = np.array([300.0, 200.0, 200.0, 100.0])
+    turned = sorted_trace(mode(frequency_hz))
+    assert np.array_equal(turned.frequency_hz, [100.0, 200.0, 300.0])
+    assert turned.magnitude[2] == mode(frequency_hz).magnitude[0]
+
+
+def test_a_known_point_of_the_exported_svg_lies_where_it_belongs(tmp_path):
+    """The corner of a curve of three points, measured against the ends of the same curve."""
+    frequency_hz = np.array([100.0, 300.0, 900.0])
+    curve = Trace(
+        "corner",
+        Origin.MEASURED,
+        Response.RESPONSE_I,
+        frequency_hz,
+        np.array([1.0, 100.0, 10.0]),
+        np.full(3, np.nan),
+    )
+    drawn = comparison_figure("corner", [curve])
+    drawn.save(tmp_path, (ImageKind.SVG, ImageKind.PDF, ImageKind.PNG))
+    svg = (tmp_path / "corner.svg").read_text()
+    path = re.search(r'<g id="corner, Response I, measured">\s*<path d="M ([^"]*)"', svg)[1]
+    (x0, y0), (x1, y1), (x2, y2) = [
+        tuple(float(part) for part in point.split()[-2:]) for point in path.strip().split("\n")
+    ]
+    # half of two triplings, and two decades up of which one comes down again; y grows downwards
+    assert (x1 - x0) / (x2 - x0) == pytest.approx(0.5, abs=1e-3)
+    assert (y0 - y1) / (y0 - y2) == pytest.approx(2.0, abs=1e-3)
+    axes = drawn.figure.axes[0]
+    expected = axes.transData.transform((300.0, 100.0)) * 72 / drawn.figure.dpi
+    height = float(re.search(r'viewBox="0 0 [\d.]+ ([\d.]+)"', svg)[1])
+    assert (x1, height - y1) == pytest.approx(tuple(expected), abs=0.2)
+
+
+def test_tables_carry_units_and_every_curve_its_own_file(tmp_path):
+    curves = [mode(np.arange(50.0, 600.0, 0.7)), mode(np.arange(100.0, 400.0), 0.5, "other")]
+    written = comparison_figure("both", curves, (curves[0], curves[1]), [266.0]).save(tmp_path)
+    names = {each.name for each in written}
+    assert {"both.png", "both.svg", "both_peaks.csv", "both_difference.csv"} <= names
+    text = (tmp_path / "both_1_run_transmission_measured.csv").read_text().splitlines()
+    assert text[0] == "frequency_hz,magnitude_displacement_over_displacement,relative_standard_deviation"
+    assert text[1].startswith("50,")
+    assert len(text) == 1 + curves[0].frequency_hz.size
