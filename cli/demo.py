@@ -9,6 +9,7 @@ from acquisition.bench import open_bench
 from acquisition.campaign.item import CampaignItem, Item
 from acquisition.campaign.run_campaign import run_campaign
 from acquisition.plan.campaign import load_campaign
+from acquisition.shipped import shipped
 from analysis.report.report import write_report
 from analysis.summary import campaign_summary
 
@@ -17,7 +18,6 @@ from .measure import STOPPED_EXIT_CODE, tell
 from .output import console, write_json
 from .paths import unused
 from .progress import analysis_bar, campaign_bars
-from .shipped import shipped
 
 
 def demo(

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .shipped import shipped
+from acquisition.shipped import shipped
 
 BenchPath = Annotated[
     Path | None,

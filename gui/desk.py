@@ -1,10 +1,15 @@
-"""What all pages share: settings, background work, the theme, and how to speak to the window."""
+"""What all pages share: the bridge, what is meant, settings, background work, and the way to the window."""
 
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
+from acquisition.engine.start import start_engine
+
 from .background import Background
+from .bridge import Bridge
+from .engine_line import Starter
+from .intent import Intent
 from .notice import Notice
 from .settings import Remembered, Settings
 from .theme import LIGHT, THEMES, Theme
@@ -29,9 +34,15 @@ class Desk(QObject):
     theme_changed = Signal(object)
     """The `Theme` from now on."""
 
-    def __init__(self, settings: Settings, parent: QObject | None = None) -> None:
+    def __init__(
+        self, settings: Settings, start: Starter = start_engine, parent: QObject | None = None
+    ) -> None:
         super().__init__(parent)
         self.settings = settings
+        self.intent = Intent(self)
+        self.bridge = Bridge(start, self)
+        self.bridge.noticed.connect(self.noticed)
+        self.bridge.recording_ended.connect(self.recording_made)
         self.background = Background(WORKERS, self)
         self._theme = THEMES.get(settings.text(Remembered.THEME), LIGHT)
 

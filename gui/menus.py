@@ -1,25 +1,35 @@
 """The menus: everything that a key or a click can do, in words."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QMainWindow, QMessageBox
+from PySide6.QtWidgets import QFileDialog, QMainWindow, QMessageBox
 
 from .desk import Desk
 from .key_list import key_text
+from .orders import Orders
 from .theme import DARK, LIGHT, Theme
 
 EMERGENCY = "STOP is not an emergency stop: in an emergency, switch the amplifier off."
 
 
 def build_menus(
-    window: QMainWindow, desk: Desk, pages: tuple[str, ...], reset_layout: Callable[[], None]
+    window: QMainWindow, desk: Desk, orders: Orders, pages: tuple[str, ...], reset_layout: Callable[[], None]
 ) -> None:
     """Put the menus on a window."""
     bar = window.menuBar()
     bar.setAccessibleName("Menus")
     file = bar.addMenu("&File")
+    _add(file.addAction("Recordings &folder…"), "", lambda: choose_folder(window, desk))
     _add(file.addAction("&Quit"), "Ctrl+Q", window.close)
+    test = bar.addMenu("&Test")
+    _add(test.addAction("&Check the bench"), "F6", orders.check)
+    _add(test.addAction("&Arm the test"), "Ctrl+Return", orders.arm_test)
+    _add(test.addAction("S&tart"), "F5", orders.start)
+    _add(test.addAction("&Hold or go on"), "", orders.hold_or_resume)
+    _add(test.addAction("&Stop (ramp down)"), "", orders.stop)
+    _add(test.addAction("A&bort (Esc)"), "", orders.abort)
     view = bar.addMenu("&View")
     for number, name in enumerate(pages, start=1):
         _add(view.addAction(f"&{number}  {name}"), f"Ctrl+{number}", _showing(desk, name))
@@ -28,6 +38,13 @@ def build_menus(
     _add(view.addAction("&Reset layout"), "", reset_layout)
     help_menu = bar.addMenu("&Help")
     _add(help_menu.addAction("&Keys"), "F1", lambda: show_keys(window))
+
+
+def choose_folder(window: QMainWindow, desk: Desk) -> None:
+    """Ask where recordings go from now on."""
+    chosen = QFileDialog.getExistingDirectory(window, "Folder for recordings", str(desk.folder))
+    if chosen:
+        desk.choose_folder(Path(chosen))
 
 
 def show_keys(window: QMainWindow) -> None:

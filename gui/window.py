@@ -2,14 +2,26 @@
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QCloseEvent
-from PySide6.QtWidgets import QApplication, QHBoxLayout, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QHBoxLayout,
+    QMainWindow,
+    QMessageBox,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
 
 from .abort_key import AbortKey
 from .banner import Banner
 from .desk import Desk
+from .faces import face_of, status_fields
+from .frame_count import FrameCount
 from .menus import build_menus
 from .message_strip import MessageStrip
+from .orders import Orders
 from .page import Page
+from .page_names import RUN
 from .pages.catalogue import PageEntry
 from .rail import Rail
 from .settings import Remembered
@@ -39,12 +51,14 @@ class Window(QMainWindow):
             page.setAccessibleName(f"{name} page")
             self._stack.addWidget(page)
         self._lay_out()
-        build_menus(self, desk, tuple(self.pages), self._reset_layout)
+        self.orders = Orders(desk, self)
+        build_menus(self, desk, self.orders, tuple(self.pages), self._reset_layout)
         self._connect()
         self._restore()
         self._timer = QTimer(self, interval=TICK_MS)
         self._timer.timeout.connect(self.tick)
         self._timer.start()
+        self._frames = FrameCount()
 
     @property
     def page(self) -> Page:
@@ -66,17 +80,36 @@ class Window(QMainWindow):
         page.refresh()
 
     def tick(self) -> None:
-        """Show what is true now."""
+        """Show what is true now, and let the engine know that somebody looks."""
+        self.desk.bridge.tick()
+        status = self.desk.bridge.status
+        self.banner.show_face(face_of(status))
+        self.status_line.show_fields(*status_fields(status, self._frames.counted()))
         self.page.refresh()
         self.rail.show_done({name: page.is_done for name, page in self.pages.items()})
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Keep the shape of the window, end what works for it."""
+        """Ask first while something runs; then let the engine end, and keep the shape of the window."""
+        if self.desk.bridge.is_driving and not self._may_close():
+            event.ignore()
+            return
         self._timer.stop()
+        self.desk.bridge.close()
         self.page.left()
         self.desk.settings.keep_state(Remembered.GEOMETRY, self.saveGeometry())
         self.desk.background.close()
         super().closeEvent(event)
+
+    def _may_close(self) -> bool:
+        """Ask whether to stop what runs; the drive goes on meanwhile, and Esc aborts it."""
+        answer = QMessageBox.question(
+            self,
+            "A measurement is running",
+            "Ramp down, keep the recording, and close the window?",
+            QMessageBox.StandardButton.Yes | QMessageBox.StandardButton.Cancel,
+            QMessageBox.StandardButton.Cancel,
+        )
+        return answer == QMessageBox.StandardButton.Yes
 
     def _lay_out(self) -> None:
         body = QHBoxLayout()
@@ -102,6 +135,9 @@ class Window(QMainWindow):
         application = QApplication.instance()
         assert isinstance(application, QApplication)
         self.abort_key = AbortKey(application, self)
+        self.abort_key.pressed.connect(self.orders.abort)
+        self.banner.stop_wanted.connect(self.orders.stop)
+        self.desk.bridge.armed.connect(lambda _plan: self.show_page(RUN))
 
     def _restore(self) -> None:
         self._retheme(self.desk.theme)

@@ -78,9 +78,15 @@ class ModelForm(QWidget):
                 row.editor.complain({loc: text for loc, text in inner.items() if loc})
 
     @property
-    def own_complaint(self) -> str:
-        """The first thing that cannot even be read."""
-        return next((row.editor.complaint for row in self._rows.values() if row.editor.complaint), "")
+    def unread(self) -> tuple[str, ...]:
+        """What was typed and cannot even be read, in this form and those inside."""
+        found: list[str] = []
+        for row in self._rows.values():
+            if isinstance(row.editor, GroupEditor):
+                found += row.editor.form.unread
+            elif row.editor.complaint:
+                found.append(row.editor.complaint)
+        return tuple(found)
 
     def _tell(self, *_: object) -> None:
         self.changed.emit()

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 from ..desk import Desk
 from ..page import Page
-from ..page_names import FILES
+from ..page_names import FILES, RIG, TEST
 from .files.files_page import FilesPage
+from .rig.rig_page import RigPage
+from .test.test_page import TestPage
 
 
 @dataclass(frozen=True)
@@ -19,4 +21,8 @@ class PageEntry:
     make: Callable[[Desk], Page]
 
 
-PAGES: tuple[PageEntry, ...] = (PageEntry(FILES, 4, FilesPage),)
+PAGES: tuple[PageEntry, ...] = (
+    PageEntry(RIG, 1, RigPage),
+    PageEntry(TEST, 2, TestPage),
+    PageEntry(FILES, 4, FilesPage),
+)

@@ -3,7 +3,7 @@
 import sysconfig
 from pathlib import Path
 
-from acquisition.errors import ConfigurationError
+from .errors import ConfigurationError
 
 FOLDERS = (
     Path(__file__).resolve().parent.parent,  # a checkout, or an editable install of one
@@ -18,3 +18,9 @@ def shipped(name: str) -> Path:
         if path.is_file():
             return path
     raise ConfigurationError(f"{name} is not part of this installation; give the path of your own file")
+
+
+def all_shipped(folder: str) -> tuple[Path, ...]:
+    """Every TOML file that comes with vibench in a folder, ``"campaigns"`` for example, by name."""
+    found = next((place / folder for place in FOLDERS if (place / folder).is_dir()), None)
+    return () if found is None else tuple(sorted(found.glob("*.toml")))

@@ -1,0 +1,29 @@
+"""A live view for a run that begins: channels from the bench, the band from the plan."""
+
+from acquisition.engine.status import BenchFacts
+from acquisition.plan.band import excited_band_hz
+from acquisition.plan.campaign import Campaign
+from acquisition.plan.measurement import Measurement
+from acquisition.rig.configuration import Rig
+from analysis.live.view import LiveChannel, LiveView
+
+WHOLE_BAND_HZ = (20.0, 2000.0)
+"""Looked at when the plan is not known: it was armed by somebody else."""
+
+
+def live_view(bench: BenchFacts, rig: Rig | None, campaign: Campaign | None, name: str) -> LiveView:
+    """Begin to watch the run of the recording ``name``."""
+    measurement = measurement_called(campaign, name)
+    band_hz = WHOLE_BAND_HZ if measurement is None else excited_band_hz(measurement.excitation)
+    channels = [
+        LiveChannel(each.role, each.unit, each.units_per_volt, each.full_scale_v) for each in bench.channels
+    ]
+    delay_s = 0.0 if rig is None else rig.vibrometer.delay_s
+    return LiveView(channels, bench.sample_rate_hz, band_hz=band_hz, delay_s=delay_s)
+
+
+def measurement_called(campaign: Campaign | None, name: str) -> Measurement | None:
+    """Find the measurement that a recording is one of."""
+    if campaign is None:
+        return None
+    return next((each for recording, each in campaign.recordings() if recording == name), None)

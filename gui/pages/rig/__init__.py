@@ -1,0 +1,1 @@
+"""The Rig page: which bench, is it there, is it well."""

@@ -1,0 +1,1 @@
+"""The Run page: armed in plain words, watched live."""

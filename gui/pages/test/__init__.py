@@ -1,0 +1,1 @@
+"""The Test page: what will be played, and what it will do."""

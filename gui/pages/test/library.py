@@ -1,0 +1,67 @@
+"""Tests by name: those of the campaigns that come with vibench, and one's own, as TOML files."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from acquisition.errors import ConfigurationError
+from acquisition.plan.campaign import load_campaign
+from acquisition.plan.measurement import Measurement
+from acquisition.shipped import all_shipped
+from acquisition.toml_file import load_toml
+from acquisition.toml_text import toml_text
+
+MOST_OF_ONE = 12
+"""Tests listed of one campaign; sweeps make hundreds."""
+
+
+@dataclass(frozen=True)
+class NamedTest:
+    """A test and where it is from."""
+
+    label: str
+    measurement: Measurement
+
+
+def shipped_tests() -> tuple[NamedTest, ...]:
+    """Every measurement of the campaigns that come with vibench."""
+    found: list[NamedTest] = []
+    for path in all_shipped("campaigns"):
+        campaign = load_campaign(path)
+        found += [
+            NamedTest(f"{campaign.name} / {each.name}", each) for each in campaign.measurements[:MOST_OF_ONE]
+        ]
+    return tuple(sorted(found, key=lambda test: (not test.label.startswith("quick"), test.label)))
+
+
+def own_tests(folder: Path) -> tuple[NamedTest, ...]:
+    """Every test that was saved in a folder; a file that cannot be read is left out."""
+    found: list[NamedTest] = []
+    for path in sorted(folder.glob("*.toml")):
+        try:
+            found.append(NamedTest(f"own / {path.stem}", load_test(path)))
+        except ConfigurationError:
+            continue
+    return tuple(found)
+
+
+def load_test(path: Path) -> Measurement:
+    """Read a test; raises ConfigurationError with file, key and what is allowed."""
+    return load_toml(path, Measurement)
+
+
+def save_test(measurement: Measurement, path: Path) -> None:
+    """Write a test so that it reads back as the same one.
+
+    Raises
+    ------
+    ConfigurationError
+        When the file cannot be written.
+
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(toml_text(measurement), encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(
+            f"{path}: cannot be written ({error.strerror}); save the test elsewhere"
+        ) from error

@@ -1,0 +1,44 @@
+"""What the specimen is predicted to do: Response I and II over frequency, and where it collides."""
+
+import numpy as np
+
+from analysis.foresight import Foresight
+
+from ...plots.axis import FREQUENCY, Axis, Scale
+from ...plots.plot import Dash, Ink, Plot, trace
+from ...theme import Theme
+
+COLLISION = Ink(lambda theme: theme.traces[3], filled=0.18)
+MOST_BANDS = 12
+
+
+class PredictionPlot(Plot):
+    """Simulated, and labelled so: dashed lines, the model in the legend, collision regions as stripes."""
+
+    def __init__(self, theme: Theme) -> None:
+        up = Axis("Response, simulated", "x / A0", scale=Scale.LOGARITHMIC)
+        super().__init__("Predicted response and collision regions", FREQUENCY, up, theme)
+        self.with_legend()
+        self._first = self.curve(Ink(lambda theme: theme.predicted, Dash.DASHED), "Response I, simulated")
+        self._second = self.curve(Ink(lambda theme: theme.traces[0], Dash.DOTTED), "Response II, simulated")
+        self._linear = self.curve(trace(2, Dash.DOTTED), "without contact")
+        self._stripes = [self.region(COLLISION) for _ in range(MOST_BANDS)]
+        for stripe in self._stripes:
+            stripe.hide()
+
+    def show_foresight(self, seen: Foresight | None) -> None:
+        """Draw a prediction; None clears the plot."""
+        if seen is None:
+            for curve in (self._first, self._second, self._linear):
+                curve.clear()
+        else:
+            found = seen.prediction
+            self._first.setData(found.frequency_hz, np.asarray(found.response_i))
+            self._second.setData(found.frequency_hz, np.asarray(found.response_ii))
+            self._linear.setData(found.frequency_hz, np.asarray(found.linear))
+        bands = () if seen is None else seen.collision_bands_hz[:MOST_BANDS]
+        for number, stripe in enumerate(self._stripes):
+            stripe.setVisible(number < len(bands))
+            if number < len(bands):
+                self.place(stripe, *bands[number])
+        self.show_everything()

@@ -1,0 +1,47 @@
+"""The signal as it will be played, in time and spectrum."""
+
+import numpy as np
+from PySide6.QtWidgets import QHBoxLayout, QWidget
+
+from acquisition.plan.outlook import Outlook
+
+from ...plots.axis import LOG_FREQUENCY, TIME, Axis, Scale
+from ...plots.plot import Plot, trace
+from ...plots.signal_curve import SignalCurve
+from ...theme import Theme
+
+_FLOOR = 1e-5
+"""Lines this far below the highest are numerical dust."""
+
+
+class PreviewPlots(QWidget):
+    """Two plots side by side; a zoom into the time signal shows its samples."""
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.time = Plot("Signal at the generator, in time", TIME, Axis("Generator", "V"), theme)
+        self.spectrum = Plot(
+            "Spectrum of the signal",
+            LOG_FREQUENCY,
+            Axis("Amplitude", "V", scale=Scale.LOGARITHMIC),
+            theme,
+        )
+        self._signal = SignalCurve(self.time, trace(0))
+        self._lines = self.spectrum.curve(trace(0))
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self.time, 1)
+        layout.addWidget(self.spectrum, 1)
+
+    def show_outlook(self, seen: Outlook) -> None:
+        """Draw another signal."""
+        self.time.show_everything()
+        self._signal.set_samples(seen.volts, seen.sample_rate_hz)
+        floor_v = _FLOOR * float(np.max(seen.spectrum_v))
+        self.spectrum.show_everything()
+        self._lines.setData(seen.spectrum_hz, np.maximum(seen.spectrum_v, floor_v))
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self.time.retheme(theme)
+        self.spectrum.retheme(theme)
