@@ -6,6 +6,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
+from acquisition.campaign.item import Existing
 from acquisition.engine.client import EngineClient
 from acquisition.engine.errors import EngineGone
 from acquisition.engine.recent import Glance
@@ -16,7 +17,6 @@ from acquisition.errors import AcquisitionError
 from acquisition.plan.campaign import Campaign
 from acquisition.rig.configuration import Rig
 from acquisition.rig.knobs import KnobSheet
-from acquisition.run.run_campaign import Existing
 from acquisition.run.stop import StopLevel
 from analysis.live.view import LiveView
 

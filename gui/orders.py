@@ -4,11 +4,11 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject
 
+from acquisition.campaign.item import Existing
 from acquisition.engine.state import EngineState
 from acquisition.plan.campaign import Campaign
 from acquisition.plan.measurement import Measurement
 from acquisition.recording.layout import SUFFIX
-from acquisition.run.run_campaign import Existing
 from acquisition.run.stop import StopLevel
 
 from .desk import Desk
