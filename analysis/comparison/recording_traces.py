@@ -1,4 +1,4 @@
-"""The curves of one recording, and of what the model says of it: what a comparison shows, ready to be sent."""
+"""The curves of one recording, and of what the model says of it, as a comparison shows them."""
 
 import pickle
 from collections.abc import Iterator
@@ -130,7 +130,7 @@ def _sweep(name: str, origin: Origin, found: SweepResponse) -> Iterator[Trace]:
 
 
 def _stepped(name: str, origin: Origin, found: SteppedResponse) -> Iterator[Trace]:
-    """Steps up and steps down are curves of their own: between jumps they differ."""
+    """Give steps up and steps down as curves of their own: between jumps they differ."""
     directions = np.array(found.direction)
     for direction in dict.fromkeys(found.direction):
         at = directions == direction

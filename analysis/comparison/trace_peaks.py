@@ -11,7 +11,7 @@ from .trace import Trace
 _LEAST_RISE_DB = 3.0
 """A peak stands above the valley beside it by at least so much ..."""
 _LEAST_RISE_SD = 8.0
-"""... and by so many standard deviations: of a thousand points of noise the highest and lowest are 6.5 apart."""
+"""... and by so many standard deviations: the ends of a thousand points of noise are 6.5 apart."""
 _HALF_POWER = 1 / np.sqrt(2)
 _PER_NEPER_DB = 20 / np.log(10)
 
