@@ -8,6 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from .check.result import CheckResult
 from .drivers.afg1022x import AFG1022X
 from .drivers.daqmx import DaqmxDigitizer
 from .drivers.daqmx_output import DaqmxOutput
@@ -47,6 +48,8 @@ class Bench:
         self.digitizer = digitizer
         self.output = output
         self.confirmations = confirmations
+        self.last_check: CheckResult | None = None
+        """The check that this bench was admitted on; see `check.admission`."""
         self._closing = closing
 
     @property

@@ -44,6 +44,8 @@ class RecordingFacts:
     whole_stretches: int
     check: str
     """What the check of the bench found before the run; empty when it was left out."""
+    bench_check: Mapping[str, Any]
+    """The last check of the whole bench before it, as the recording has it; may be empty."""
 
     @property
     def is_simulated(self) -> bool:
@@ -98,6 +100,7 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
         planned_stretches=len(steps),
         whole_stretches=sum(each.is_complete for each in played),
         check=" ".join(each.text for each in recording.events if each.kind == "check"),
+        bench_check=recording.bench_check,
     )
 
 

@@ -68,6 +68,7 @@ def _facts(facts: RecordingFacts) -> Json:
         "reason": facts.reason,
         "origin": facts.origin.value,
         "started_utc": facts.started_utc,
+        "bench_check": facts.bench_check,
         "recording_id": facts.recording_id,
         "duration_s": facts.duration_s,
         "sample_rate_hz": facts.sample_rate_hz,

@@ -8,9 +8,12 @@ from rich.markup import escape
 
 from acquisition.bench import open_bench
 from acquisition.bench_list import list_instruments, list_rig_instruments
-from acquisition.check.bench_report import check_bench
+from acquisition.check.admission import check_and_keep
+from acquisition.check.archive import last_result
 from acquisition.check.finding import Verdict
-from acquisition.rig.configuration import load_rig
+from acquisition.check.result import CheckResult
+from acquisition.errors import CheckFailed
+from acquisition.rig.configuration import Rig, load_rig
 
 from .output import console, print_json
 from .paths import AsJson, BenchPath, bench_path
@@ -46,14 +49,37 @@ def check(
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder that recordings would go to.")
     ] = Path(),
+    last: Annotated[
+        bool, typer.Option("--last", help="Show what the last check found; touch nothing.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Check the bench with a small sine: identities, noise, gains, clocks, disk. Exit code 1 if it fails."""
-    with open_bench(bench_path(bench)) as opened:
-        report = check_bench(opened, out)
+    """Check the bench with a small sine: identities, noise, gains, signs, clocks, disk, and what has changed.
+
+    The result is kept: a real bench is armed only on a check that passed lately. Exit code 1 if it fails.
+    """
+    result = _last(load_rig(bench_path(bench))) if last else _now(bench_path(bench), out)
     if as_json:
-        print_json(report.model_dump(mode="json"))
+        print_json(result.model_dump(mode="json"))
     else:
-        console.print(report.text(), markup=False, soft_wrap=True)
-    if report.verdict is Verdict.FAIL:
+        console.print(
+            f"{result.rig}: {result.verdict.value}, {result.checked:%Y-%m-%d %H:%M %Z}", markup=False
+        )
+        console.print(result.report.text(), markup=False, soft_wrap=True)
+    if result.verdict is Verdict.FAIL:
         raise typer.Exit(1)
+
+
+def _now(path: Path, out: Path) -> CheckResult:
+    with open_bench(path) as opened:
+        return check_and_keep(opened, out)
+
+
+def _last(rig: Rig) -> CheckResult:
+    result = last_result(rig.name)
+    if result is None:
+        raise CheckFailed(
+            f"the bench {rig.name!r} was never checked on this account, so nothing can be shown; leave out "
+            "--last to check it"
+        )
+    return result

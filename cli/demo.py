@@ -8,6 +8,7 @@ import typer
 from acquisition.bench import open_bench
 from acquisition.campaign.item import CampaignItem, Item
 from acquisition.campaign.run_campaign import run_campaign
+from acquisition.check.admission import require_fresh
 from acquisition.plan.campaign import load_campaign
 from acquisition.shipped import shipped
 from analysis.report.report import write_report
@@ -16,7 +17,7 @@ from analysis.summary import campaign_summary
 from .analyst import second_process
 from .measure import STOPPED_EXIT_CODE, tell
 from .output import console, write_json
-from .paths import unused
+from .paths import existing_folder, unused
 from .progress import analysis_bar, campaign_bars
 
 
@@ -42,6 +43,7 @@ def demo(
 
         rig = shipped("hardware_configs/virtual_rig.toml")
         with open_bench(rig) as bench, campaign_bars(campaign) as bars:
+            require_fresh(bench, existing_folder(folder))
             items = run_campaign(bench, campaign, folder / "recordings", on_progress=bars, on_item=recorded)
         tell(items)
         if {item.name for item in items if item.result is Item.RECORDED} != set(campaign.recording_names()):

@@ -8,11 +8,12 @@ import typer
 from acquisition.campaign.item import AfterFailure, CampaignItem, ChangedBench, Existing, Item
 from acquisition.campaign.kept_bench import KeptBench
 from acquisition.campaign.run_campaign import run_campaign
+from acquisition.check.admission import CheckRule, require_fresh
 from acquisition.plan.campaign import load_campaign
 from acquisition.run.stop import StopSwitch
 
 from .output import console
-from .paths import BenchPath, bench_path
+from .paths import BenchPath, bench_path, existing_folder
 from .progress import campaign_bars
 
 STOPPED_EXIT_CODE = 3
@@ -32,11 +33,15 @@ def measure(
     accept_changed_bench: Annotated[
         bool, typer.Option("--accept-changed-bench", help="Resume on another bench than it was begun on.")
     ] = False,
+    check: Annotated[
+        CheckRule, typer.Option(help="A passed check of the bench, of today: ask for it, make it, or not.")
+    ] = CheckRule.FRESH,
 ) -> None:
     """Measure: check the bench, ramp up, record and ramp down, for each measurement of a campaign."""
     plan = load_campaign(campaign)
     switch = StopSwitch()
     with KeptBench(bench_path(bench)) as kept, campaign_bars(plan) as bars:
+        require_fresh(kept.bench, existing_folder(out), check)
         items = run_campaign(
             kept.bench,
             plan,

@@ -19,6 +19,14 @@ def bench_path(given: Path | None) -> Path:
     return shipped("hardware_configs/virtual_rig.toml") if given is None else given
 
 
+def existing_folder(path: Path) -> Path:
+    """Give the folder itself, or the nearest above it that exists: both lie on the same disk."""
+    folder = path.absolute()
+    while not folder.is_dir():
+        folder = folder.parent
+    return folder
+
+
 def unused(path: Path) -> Path:
     """Give a path that is not taken: the wish itself, or with -2, -3, ... before its suffix."""
     candidate, number = path, 1

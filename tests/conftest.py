@@ -1,12 +1,17 @@
 """One thread for linear algebra, as for the command; and the window's tests wherever Qt can be loaded."""
 
 import os
+import tempfile
 
 import cli.blas_threads  # noqa: F401 - it is the import that counts, before any test imports numpy
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("QT_SCALE_FACTOR", "1")
 os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
+
+# Tests keep their bench checks apart from those of whoever runs them; processes they start inherit it.
+_state_folder = tempfile.TemporaryDirectory(prefix="vibench_state_")
+os.environ["VIBENCH_STATE_DIR"] = _state_folder.name
 
 # pytest-qt ends the whole run where Qt's system libraries are missing, so it is loaded here, after a look.
 QT_MISSING = ""

@@ -42,6 +42,8 @@ class KeptBench:
             with suppress(AcquisitionError):  # what is lost cannot be silenced; the others were
                 before.close()
         self._bench = open_bench(self._rig, self._confirm)
+        if before is not None:
+            self._bench.last_check = before.last_check
         return self._bench
 
     def close(self) -> None:

@@ -1,6 +1,8 @@
 """One sine round the loop: does every channel hear it, and as loud as generator, knob and model say?"""
 
-from math import log10, sqrt
+from math import log10, pi, sqrt
+
+import numpy as np
 
 from ..bench import Bench
 from ..instruments import Samples
@@ -21,6 +23,8 @@ CLOCK_PPM = Bounds(100.0, 500.0)
 HEARD = 10.0
 """A channel hears the sine when it is this many times its uncertainty."""
 WRONG_LOAD = 2.0
+PHASE_DEG = Bounds(45.0, 90.0)
+"""Of a channel against the drive from the rig's model: beyond a right angle its sign is wrong."""
 LEFT_OVER = Bounds(0.02, 0.05)
 """Share of the drive that may be left when the output is off."""
 
@@ -46,9 +50,11 @@ class LoopCheck:
         if self._hears(Role.DRIVE_VOLTAGE):
             found.append(self._clocks())
         if self._hears(Role.DRIVE_VOLTAGE) and self._hears(Role.AMPLIFIER_VOLTAGE):
-            found.append(self._gain())
+            found += [self._gain(), self._sign(Role.AMPLIFIER_VOLTAGE, Quantity.AMPLIFIER_VOLTAGE)]
         if self._hears(Role.BASE_ACCELERATION):
             found.append(self._base())
+        if self._hears(Role.DRIVE_VOLTAGE) and self._hears(Role.BASE_ACCELERATION):
+            found.append(self._sign(Role.BASE_ACCELERATION, Quantity.ACCELERATION))
         return found
 
     def _hears(self, role: Role) -> bool:
@@ -135,6 +141,18 @@ class LoopCheck:
         expected = f"{modelled:.3g} m/s2 within {BASE_DB.well:g} dB"
         advice = "check the accelerometer's sensitivity, the fixture's mass, the amplifier's power and gain"
         return judged("base acceleration", fit.amplitude, "m/s2", expected, verdict, advice, fit.uncertainty)
+
+    def _sign(self, role: Role, quantity: Quantity) -> Finding:
+        """Compare a channel's phase against the drive with the model's: half a turn is a wrong sign."""
+        turned_rad = self._fit(role).phase_rad - self._fit(Role.DRIVE_VOLTAGE).phase_rad
+        modelled_rad = float(np.angle(self._model.transfer(quantity, CHECK_FREQUENCY_HZ)))
+        off_deg = np.rad2deg((turned_rad - modelled_rad + pi) % (2 * pi) - pi)
+        advice = {
+            Role.BASE_ACCELERATION: "turn the accelerometer round, or swap the wires of coil or amplifier",
+        }.get(role, "swap the two wires of this input, or see whether the amplifier inverts")
+        expected = f"0 deg within {PHASE_DEG.well:g} deg"
+        verdict = PHASE_DEG.verdict(abs(off_deg))
+        return judged(f"sign of {role.value}", float(off_deg), "deg", expected, verdict, advice)
 
 
 def _db(ratio: float) -> float:

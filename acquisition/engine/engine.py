@@ -1,14 +1,13 @@
 """The engine: it owns a bench and does what it is asked, one job after the other, in one thread."""
 
 from collections.abc import Callable
-from datetime import UTC, datetime
 from pathlib import Path
 from queue import SimpleQueue
 
 from ..bench import Bench, open_bench
 from ..campaign.item import AfterFailure, CampaignItem, CampaignProgress, Existing, Item
 from ..campaign.run_campaign import run_campaign
-from ..check.bench_report import check_bench
+from ..check.admission import check_and_keep
 from ..errors import AcquisitionError, InstrumentLost
 from ..plan.campaign import Campaign
 from ..rig.configuration import Rig
@@ -93,11 +92,11 @@ class Engine:
     def check(self, folder: Path) -> None:
         """Job: check the bench with a small sine."""
         try:
-            report = check_bench(self.bench, folder)
+            result = check_and_keep(self.bench, folder)
         except AcquisitionError as error:
             self._failed(error)
             return
-        self.shown.checked(report, datetime.now(UTC).isoformat(timespec="seconds"))
+        self.shown.checked(result.report, result.checked.isoformat(timespec="seconds"))
         self.shown.enter(EngineState.READY)
 
     def carry_out(self, campaign: Campaign, folder: Path, existing: Existing) -> None:

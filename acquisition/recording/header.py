@@ -147,6 +147,8 @@ class RecordingHeader:
     """Who answered, by the instrument's part in the bench (``"generator"``, ``"digitizer"``)."""
     confirmations: Mapping[str, str | float] = field(default_factory=dict)
     """What the operator confirmed by hand: amplifier gain, vibrometer range and filters."""
+    bench_check_json: str = "{}"
+    """What the last check of the whole bench found, and when, as JSON; ``{}`` when there was none."""
     provenance: Provenance = field(default_factory=collect_provenance)
 
     def __post_init__(self) -> None:
@@ -158,7 +160,11 @@ class RecordingHeader:
         _require_positive("sample_rate_hz", self.sample_rate_hz)
         if self.expected_samples is not None:
             _require_positive("expected_samples", self.expected_samples)
-        for name, text in (("plan_json", self.plan_json), ("bench_json", self.bench_json)):
+        for name, text in (
+            ("plan_json", self.plan_json),
+            ("bench_json", self.bench_json),
+            ("bench_check_json", self.bench_check_json),
+        ):
             _require_json_object(name, text)
 
     def configuration(self) -> dict[str, str]:
@@ -169,6 +175,7 @@ class RecordingHeader:
             "bench_json": self.bench_json,
             "instruments_json": json.dumps(instruments),
             "confirmations_json": json_text("What the operator confirmed", self.confirmations),
+            "bench_check_json": self.bench_check_json,
             "provenance_json": json.dumps(asdict(self.provenance)),
         }
 

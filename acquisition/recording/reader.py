@@ -76,6 +76,8 @@ class Recording:
     instruments: Mapping[str, Identity]
     confirmations: Mapping[str, str | float]
     provenance: Mapping[str, Any]
+    bench_check: Mapping[str, Any]
+    """The last check of the bench before it: ``checked``, ``verdict``, ``findings``, ...; may be empty."""
     segments: tuple[Segment, ...]
     events: tuple[Event, ...]
     overloads: tuple[Overload, ...]
@@ -276,6 +278,7 @@ def _read(handle: _OpenFile) -> Recording:
         instruments={name: Identity(**each) for name, each in configuration["instruments_json"].items()},
         confirmations=configuration["confirmations_json"],
         provenance=configuration["provenance_json"],
+        bench_check=configuration.get("bench_check_json", {}),  # absent from files of earlier versions
         segments=tables.segments(columns[layout.SEGMENTS.name]),
         events=tables.events(columns[layout.EVENTS.name]),
         overloads=tables.overloads(columns[layout.OVERLOADS.name]),

@@ -244,6 +244,8 @@ class Rig(FrozenModel):
     daq: DaqConfig
     specimen: SpecimenConfig
     calibration_valid_days: PositiveInt = 730
+    check_valid_h: PositiveFloat = 12.0
+    """How long a bench check that passed allows to arm [h]."""
     virtual: VirtualConfig | None = None
     """Present when every instrument is simulated."""
 

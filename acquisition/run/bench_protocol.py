@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Protocol
 
+from ..check.result import CheckResult
 from ..instruments import AnalogOutput, Digitizer, FunctionGenerator, Identity
 from ..rig.channel import Channel
 from ..rig.configuration import Rig
@@ -47,3 +48,7 @@ class RunBench(Protocol):
     @property
     def confirmations(self) -> KnobSheet:
         """What the operator confirmed by hand."""
+
+    @property
+    def last_check(self) -> CheckResult | None:
+        """The check that the bench was admitted on; None when it was waived and there was none."""

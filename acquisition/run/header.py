@@ -23,6 +23,7 @@ def run_header(bench: RunBench, measurement: Measurement, planned_s: float) -> R
         requested_sample_rate_hz=rig.daq.sample_rate_hz,
         instruments=bench.identities,
         confirmations=_confirmations(bench.confirmations),
+        bench_check_json="{}" if bench.last_check is None else bench.last_check.model_dump_json(),
     )
 
 

@@ -67,6 +67,10 @@ class RigFaults:
         """Plug the cable of an input of the converter in again."""
         self._world.connect(physical_channel)
 
+    def reverse(self, physical_channel: str) -> None:
+        """Swap the two wires of an input of the converter; `connect` puts them right."""
+        self._world.reverse(physical_channel)
+
     def overrun(self, from_s: float = 0.0) -> None:
         """Let the converter's buffer be overwritten before it is read, from a rig time on [s]."""
         for call in _READS:

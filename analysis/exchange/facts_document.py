@@ -46,6 +46,7 @@ def facts_document(excerpt: Excerpt) -> dict[str, Any]:
         "instruments": {name: asdict(each) for name, each in recording.instruments.items()},
         "confirmations": recording.confirmations,
         "provenance": recording.provenance,
+        "bench_check": recording.bench_check,
     }
 
 

@@ -1,6 +1,7 @@
 """What a report says of each recording and of the bench it was made on."""
 
 from collections.abc import Mapping
+from datetime import datetime, timedelta
 from typing import Any
 
 from ..measurement_checks import Check
@@ -48,9 +49,25 @@ def bench_rows(facts: RecordingFacts) -> Rows:
     specimen = facts.bench.get("specimen")
     if specimen:
         rows.append(("specimen", ", ".join(f"{k} = {_value(v)}" for k, v in specimen.items())))
+    rows.append(("bench check", bench_check_text(facts)))
     rate = f"{facts.sample_rate_hz:.6g} samples/s, {facts.requested_sample_rate_hz:.6g} asked for"
     rows.append(("sample rate", rate))
     return tuple(rows)
+
+
+def bench_check_text(facts: RecordingFacts) -> str:
+    """Say how the last check of the whole bench came out, how long before, and what it did not like."""
+    check = facts.bench_check
+    if not check:
+        return "none"
+    before = datetime.fromisoformat(facts.started_utc) - datetime.fromisoformat(str(check["checked"]))
+    odd = [
+        f"{each['name']} {each['value']} ({each['verdict']}; expected {each['expected']})"
+        for each in check["findings"]
+        if each["verdict"] != "ok"
+    ]
+    head = f"{check['verdict']}, {before / timedelta(hours=1):.1f} h before"
+    return ": ".join([head, "; ".join(odd)]) if odd else head
 
 
 def _named(part: Mapping[str, Any]) -> str:

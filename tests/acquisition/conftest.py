@@ -285,6 +285,7 @@ class LoopbackBench:
         self.output = None
         self.identities = {"generator": self.generator.identity, "digitizer": self.digitizer.identity}
         self.confirmations = KnobSheet(operator="test", confirmed=datetime.now(UTC), knobs=rig.knobs)
+        self.last_check = None
         self.recorder = MemoryRecorder(self.world)
 
 

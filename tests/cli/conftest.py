@@ -17,11 +17,11 @@ Vibench = Callable[..., "subprocess.CompletedProcess[str]"]
 def vibench() -> Vibench:
     """Run ``vibench`` with arguments in a folder, and wait for its end."""
 
-    def run(*arguments, cwd, timeout_s=110):
+    def run(*arguments, cwd, timeout_s=110, environment=None):
         return subprocess.run(
             [sys.executable, "-m", "cli", *map(str, arguments)],
             cwd=cwd,
-            env=ENVIRONMENT,
+            env={**ENVIRONMENT, **(environment or {})},
             capture_output=True,
             text=True,
             check=False,

@@ -1,6 +1,7 @@
 """The analogue world: everything between the generator's terminal and the samples of the converter."""
 
 import threading
+from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
@@ -163,6 +164,11 @@ class World:
     def disconnect(self, physical_channel: str) -> None:
         """Pull the cable out of an input: it shows nothing, or its own excitation."""
         self._plug(physical_channel, OPEN_INPUT)
+
+    def reverse(self, physical_channel: str) -> None:
+        """Swap the two wires of an input: it shows the opposite sign."""
+        cable = self._plan.get(physical_channel, OPEN_INPUT)
+        self._plug(physical_channel, replace(cable, attenuation=-cable.attenuation))
 
     def keep_truth(self) -> None:
         """Begin to write down what no instrument shows: 72 bytes a step, 7.4 MB a second."""

@@ -1,7 +1,5 @@
 """The check of the bench: a healthy one passes, every fault is found by name, and the output ends silent."""
 
-import itertools
-from contextlib import contextmanager
 from math import inf
 from pathlib import Path
 
@@ -13,51 +11,30 @@ from acquisition.check.bench_report import check_bench
 from acquisition.check.finding import BenchReport, Bounds, Verdict
 from acquisition.check.sine_fit import clock_ratio, fit_sine
 from acquisition.errors import InstrumentLost
-from acquisition.rig.calibration import CalibrationRule
 from acquisition.rig.configuration import load_rig
-from acquisition.rig.knobs import confirm_simulated
 from acquisition.virtual.generator.output_signal import Panel
 from acquisition.virtual.generator.scpi_command import Quirks
-from acquisition.virtual.rig import VirtualRig
 
 ROOT = Path(__file__).parents[3]
-_serials = itertools.count(1)
 
 
 @pytest.fixture
-def rig():
-    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
-    resource = f"USB0::0x0699::0x0353::R{next(_serials):04d}::INSTR"
-    return rig.model_copy(
-        update={
-            "daq": rig.daq.model_copy(update={"sample_rate_hz": 5120}),
-            "generator": rig.generator.model_copy(update={"resource": resource}),
-        }
-    )
+def checked(bench_of):
+    def check(rig, tmp_path, fault=lambda virtual: None, **habits):
+        with bench_of(rig, **habits) as (bench, virtual):
+            fault(virtual)
+            report = check_bench(bench, tmp_path)
+            assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
+        return report
 
-
-@contextmanager
-def bench_of(rig, **habits):
-    with VirtualRig(rig, **habits) as virtual:
-        daq = rig.daq.model_copy(update={"server": virtual.daq_address})
-        laboratory = rig.model_copy(update={"virtual": None, "daq": daq})
-        with open_bench(laboratory, confirm_simulated, CalibrationRule.WAIVED) as bench:
-            yield bench, virtual
-
-
-def checked(rig, tmp_path, fault=lambda virtual: None, **habits):
-    with bench_of(rig, **habits) as (bench, virtual):
-        fault(virtual)
-        report = check_bench(bench, tmp_path)
-        assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
-    return report
+    return check
 
 
 def failed(report):
     return {finding.name for finding in report.findings if finding.verdict is Verdict.FAIL}
 
 
-def test_a_healthy_bench_fails_nothing_and_its_figures_are_those_of_the_configuration(rig, tmp_path):
+def test_a_healthy_bench_fails_nothing_and_its_figures_are_those_of_the_configuration(checked, rig, tmp_path):
     report = checked(rig, tmp_path)
     assert failed(report) == set()
     clock = report["drive's clock"]
@@ -77,17 +54,19 @@ def test_a_healthy_bench_fails_nothing_and_its_figures_are_those_of_the_configur
         (lambda v: v.faults.disconnect("cDAQ1Mod1/ai1"), "amplifier_voltage hears the sine", "cable"),
         (lambda v: v.faults.disconnect("cDAQ1Mod1/ai0"), "drive over setting", "cable"),
         (lambda v: v.faults.over_range(60.0), "offset of m0_velocity", "bias"),
+        (lambda v: v.faults.reverse("cDAQ1Mod1/ai2"), "sign of base_acceleration", "accelerometer round"),
+        (lambda v: v.faults.reverse("cDAQ1Mod1/ai1"), "sign of amplifier_voltage", "two wires"),
         (lambda v: v.faults.stick_output(), "drive left after stop", "switch the amplifier off"),
     ],
 )
-def test_a_fault_is_found_by_name_with_advice(rig, tmp_path, fault, name, advice):
+def test_a_fault_is_found_by_name_with_advice(checked, rig, tmp_path, fault, name, advice):
     report = checked(rig, tmp_path, fault)
     assert name in failed(report)
     assert advice in report[name].advice
     assert report.verdict is Verdict.FAIL
 
 
-def test_a_wrong_load_at_the_panel_is_named_as_such(rig, tmp_path):
+def test_a_wrong_load_at_the_panel_is_named_as_such(checked, rig, tmp_path):
     # Told 50 ohm at the panel, and nobody can ask: every amplitude is twice what was set.
     panel_only = Quirks(load_is_panel_only=True)
     report = checked(rig, tmp_path, quirks=panel_only, panel=Panel(declared_load_ohm=50.0))
@@ -95,12 +74,12 @@ def test_a_wrong_load_at_the_panel_is_named_as_such(rig, tmp_path):
     assert "a factor of 2 is a wrong load" in report["drive over setting"].advice
 
 
-def test_a_right_load_that_nobody_can_ask_for_passes(rig, tmp_path):
+def test_a_right_load_that_nobody_can_ask_for_passes(checked, rig, tmp_path):
     panel_only = Quirks(load_is_panel_only=True)
     assert failed(checked(rig, tmp_path, quirks=panel_only, panel=Panel(declared_load_ohm=inf))) == set()
 
 
-def test_a_lost_generator_is_an_error_and_no_finding(rig, tmp_path):
+def test_a_lost_generator_is_an_error_and_no_finding(bench_of, rig, tmp_path):
     with bench_of(rig) as (bench, virtual):
         virtual.faults.pull_usb_cable()
         with pytest.raises(InstrumentLost):
@@ -108,7 +87,7 @@ def test_a_lost_generator_is_an_error_and_no_finding(rig, tmp_path):
         virtual.faults.plug_usb_cable()
 
 
-def test_the_report_reads_as_a_table_and_survives_json(rig, tmp_path):
+def test_the_report_reads_as_a_table_and_survives_json(checked, rig, tmp_path):
     report = checked(rig, tmp_path, lambda virtual: virtual.faults.turn_amplifier_gain(20.0))
     assert BenchReport.model_validate_json(report.model_dump_json()) == report
     lines = report.text().splitlines()

@@ -1,0 +1,169 @@
+"""What a bench needs before it is armed: a check that is recent, passed, and of the same configuration."""
+
+import json
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+from acquisition.bench import open_bench
+from acquisition.check.admission import CheckRule, check_and_keep, require_fresh, why_not
+from acquisition.check.archive import archive_path, keep, last_result
+from acquisition.check.finding import BenchReport, Finding, Verdict
+from acquisition.check.result import CheckResult, rig_digest
+from acquisition.errors import CheckFailed, RecordingError
+from acquisition.excitation.dwell import Dwell
+from acquisition.plan.measurement import Measurement
+from acquisition.recording import open_recording
+from acquisition.run.run_measurement import run_measurement
+
+NOW = datetime(2026, 5, 4, 12, 0, tzinfo=UTC)
+DWELL = Measurement(
+    name="run",
+    excitation=Dwell(amplitude_vpp=0.5, frequency_hz=260, settle_s=0.1, duration_s=0.2),
+    ramp_s=0.3,
+    ramp_step_s=0.03,
+)
+
+
+def kept_result(rig, age_h=1.0, verdict=Verdict.OK):
+    found = Finding(name="amplifier gain", value="13 dB", expected="10 dB within 1 dB", verdict=verdict)
+    result = CheckResult.of(rig, BenchReport(findings=(found,)), NOW - timedelta(hours=age_h))
+    keep(result)
+    return result
+
+
+@pytest.fixture
+def real(bench_of, rig, state_folder):
+    """A bench that nothing tells from a real one."""
+    with bench_of(rig) as (bench, virtual):
+        yield bench, virtual
+
+
+def test_a_real_bench_that_was_never_checked_is_not_armed_and_nothing_plays(real, tmp_path):
+    bench, virtual = real
+    before_s = virtual.world.time_s
+    with pytest.raises(CheckFailed, match=r"was never checked on this account.*bench check.*--check waived"):
+        require_fresh(bench, tmp_path)
+    assert virtual.world.time_s == before_s
+
+
+@pytest.mark.parametrize(
+    ("age_h", "verdict", "said"),
+    [
+        (12.1, Verdict.OK, r"is 12\.1 h old, 12 h are allowed \(check_valid_h\)"),
+        (-0.1, Verdict.OK, r"is -0\.1 h old"),
+        (1.0, Verdict.FAIL, "did not pass: amplifier gain is 13 dB, expected 10 dB within 1 dB"),
+    ],
+)
+def test_an_old_or_failed_check_does_not_arm_a_real_bench(real, tmp_path, age_h, verdict, said):
+    bench, _ = real
+    kept_result(bench.rig, age_h, verdict)
+    with pytest.raises(CheckFailed, match=said):
+        require_fresh(bench, tmp_path, clock=lambda: NOW)
+
+
+@pytest.mark.parametrize("verdict", [Verdict.OK, Verdict.WARN])
+def test_a_recent_check_that_passed_arms_and_is_not_made_again(real, tmp_path, verdict):
+    bench, virtual = real
+    result = kept_result(bench.rig, 11.9, verdict)
+    before_s = virtual.world.time_s
+    assert require_fresh(bench, tmp_path, clock=lambda: NOW) == result
+    assert virtual.world.time_s == before_s
+
+
+def test_a_check_of_another_configuration_does_not_arm(real, tmp_path):
+    bench, _ = real
+    turned = bench.rig.amplifier.model_copy(update={"gain_db": 20.0})
+    kept_result(bench.rig.model_copy(update={"amplifier": turned}))
+    with pytest.raises(CheckFailed, match="was of another configuration"):
+        require_fresh(bench, tmp_path, clock=lambda: NOW)
+
+
+def test_the_time_that_a_check_holds_is_the_rigs_to_say(rig, state_folder):
+    patient = rig.model_copy(update={"check_valid_h": 48.0})
+    result = kept_result(rig, 30.0)
+    assert "12 h are allowed" in why_not(result, rig, NOW)
+    assert why_not(result, patient, NOW) is None
+
+
+def test_a_check_made_now_arms_and_stands_in_the_recording(real, tmp_path):
+    bench, _ = real
+    result = require_fresh(bench, tmp_path, CheckRule.NOW)
+    assert result == last_result(bench.rig.name)
+    run_measurement(bench, DWELL, tmp_path / "run.h5")
+    with open_recording(tmp_path / "run.h5") as recording:
+        assert recording.bench_check == json.loads(result.model_dump_json())
+        assert recording.bench_check["verdict"] in ("ok", "warn")
+
+
+def test_a_check_made_now_that_fails_does_not_arm_and_is_kept(real, tmp_path):
+    bench, virtual = real
+    virtual.faults.turn_amplifier_gain(20.0)
+    with pytest.raises(CheckFailed, match=r"did not pass its check.*amplifier gain is 20 "):
+        require_fresh(bench, tmp_path, CheckRule.NOW)
+    assert last_result(bench.rig.name).verdict is Verdict.FAIL
+    with pytest.raises(CheckFailed, match="did not pass"):
+        require_fresh(bench, tmp_path)
+
+
+def test_a_waived_check_arms_and_the_recording_says_that_there_was_none(real, tmp_path):
+    bench, _ = real
+    assert require_fresh(bench, tmp_path, CheckRule.WAIVED) is None
+    run_measurement(bench, DWELL, tmp_path / "run.h5")
+    with open_recording(tmp_path / "run.h5") as recording:
+        assert recording.bench_check == {}
+
+
+def test_a_virtual_bench_is_checked_unasked_once_and_then_trusted(rig, state_folder, tmp_path):
+    with open_bench(rig) as bench:
+        first = require_fresh(bench, tmp_path)
+    with open_bench(rig) as bench:
+        assert require_fresh(bench, tmp_path) == first
+        assert bench.last_check == first
+
+
+def test_what_has_changed_since_the_last_check_is_said_in_decibels_and_days(real, tmp_path):
+    bench, virtual = real
+    check_and_keep(bench, tmp_path, lambda: NOW - timedelta(days=2))
+    virtual.faults.turn_amplifier_gain(bench.rig.amplifier.gain_db - 0.8)
+    result = check_and_keep(bench, tmp_path, lambda: NOW)
+    drifted = result.report["amplifier gain since last time"]
+    assert drifted.value == "-0.80 dB since 2 days"
+    assert drifted.verdict is Verdict.WARN
+    assert "look for a knob" in drifted.advice
+    assert result.report["drive over setting since last time"].verdict is Verdict.OK
+    # The gain itself is still within a decibel of its knob: without memory nobody would have noticed.
+    assert result.report["amplifier gain"].verdict is Verdict.OK
+
+
+def test_another_configuration_is_not_compared_with(real, tmp_path):
+    bench, _ = real
+    kept_result(bench.rig.model_copy(update={"calibration_valid_days": 1}))
+    assert not [each for each in check_and_keep(bench, tmp_path).findings if "since" in each.name]
+
+
+class TestKeeping:
+    def test_each_rig_has_a_file_of_its_own_and_only_the_last_check_is_kept(self, rig, state_folder):
+        other = rig.model_copy(update={"name": "another: rig/1"})
+        kept_result(rig, 3.0)
+        last, apart = kept_result(rig, 2.0), kept_result(other)
+        assert last_result(rig.name) == last
+        assert last_result(other.name) == apart
+        assert len(list(state_folder.rglob("*"))) == 1 + 2
+
+    @pytest.mark.parametrize("content", ["", "{", '{"rig": 3}', "\x00\xff"])
+    def test_a_damaged_file_counts_as_no_check(self, rig, state_folder, content):
+        kept_result(rig)
+        archive_path(rig.name).write_bytes(content.encode("latin-1"))
+        assert last_result(rig.name) is None
+
+    def test_a_folder_that_cannot_be_written_is_a_sentence(self, rig, state_folder):
+        state_folder.write_text("a file in the way")
+        with pytest.raises(RecordingError, match="VIBENCH_STATE_DIR"):
+            kept_result(rig)
+
+    def test_how_fast_a_virtual_rig_is_played_makes_it_no_other_rig(self, rig):
+        fast = rig.virtual.model_copy(update={"pace": "wall", "speed": 3.0})
+        noisy = rig.virtual.model_copy(update={"seed": 99})
+        assert rig_digest(rig) == rig_digest(rig.model_copy(update={"virtual": fast}))
+        assert rig_digest(rig) != rig_digest(rig.model_copy(update={"virtual": noisy}))

@@ -1,0 +1,36 @@
+"""Where state is kept on each platform, and how to have it elsewhere."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from acquisition.state_folder import state_folder
+
+
+def test_the_variable_comes_before_everything(monkeypatch, tmp_path):
+    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
+    assert state_folder() == tmp_path
+
+
+@pytest.mark.parametrize(
+    ("platform", "variable", "expected"),
+    [
+        ("linux", "XDG_STATE_HOME", "given/vibench"),
+        ("linux", "", "home/.local/state/vibench"),
+        ("darwin", "", "home/Library/Application Support/vibench"),
+        ("win32", "LOCALAPPDATA", "given/vibench"),
+        ("win32", "", "home/AppData/Local/vibench"),
+    ],
+)
+def test_each_platform_keeps_state_where_it_keeps_such_things(
+    monkeypatch, tmp_path, platform, variable, expected
+):
+    monkeypatch.setattr(sys, "platform", platform)
+    for each in ("VIBENCH_STATE_DIR", "XDG_STATE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(each, raising=False)
+    monkeypatch.setattr(Path, "home", lambda: tmp_path / "home")
+    if variable:
+        monkeypatch.setenv(variable, str(tmp_path / "given"))
+    assert state_folder() == tmp_path / expected
+    assert (tmp_path / expected).is_dir()
