@@ -158,6 +158,7 @@ class Run:
             yield from self._ramped_down_early(tape, stop.request.level)
         except LimitExceeded as error:
             self._ending.is_failed(error, str(error))
+            tape.log_trip(error)
             yield from self._ramped_down_early(tape, LEVELS[Cause.LIMIT])
             raise
         except GeneratorExit:
