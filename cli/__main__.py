@@ -25,6 +25,7 @@ from .reproduce import reproduce
 from .serve_rig import serve_rig
 from .study import study
 from .tradeoff import tradeoff
+from .watch import stop, watch
 
 app = typer.Typer(
     name="vibench",
@@ -35,6 +36,8 @@ app = typer.Typer(
 )
 app.command()(demo)
 app.command()(measure)
+app.command()(watch)
+app.command()(stop)
 app.command()(analyse)
 app.command()(predict)
 app.command()(study)

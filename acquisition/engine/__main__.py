@@ -7,6 +7,7 @@ from threading import Thread
 from types import FrameType
 
 from ..run.stop import Cause
+from .announcement import announced
 from .desk import Desk
 from .engine import Engine
 from .server import LOOPBACK, Server, spoken
@@ -26,7 +27,8 @@ def main() -> None:
     if options.attendance is Attendance.ATTENDED:
         Thread(target=_follow_parent, args=(desk,), name="engine parent", daemon=True).start()
     try:
-        engine.run()
+        with announced(server.address, options.what):
+            engine.run()
     finally:
         server.close()
         watch.close()
@@ -35,6 +37,7 @@ def main() -> None:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m acquisition.engine", description=__doc__)
     parser.add_argument("--attendance", type=Attendance, default=Attendance.ATTENDED)
+    parser.add_argument("--what", default="engine", help="what it is started for, shown to others")
     parser.add_argument("--host", default=LOOPBACK, help="loopback unless told otherwise; there is a token")
     return parser.parse_args()
 

@@ -21,6 +21,7 @@ from . import requests as ask
 from .errors import EngineError, EngineGone
 from .recent import Glance
 from .server import EngineAddress
+from .state import Visit
 from .status import ArmedPlan, EngineStatus
 from .wire import Message, receive, send
 
@@ -32,9 +33,9 @@ Answer = TypeVar("Answer", bound=BaseModel)
 class EngineClient:
     """A connection to an engine.
 
-    Asking anything tells the engine that somebody is there: an attended run goes on only while
-    something is asked at least twice a second. Each method raises `EngineGone` when the engine's
-    process has ended, and the engine's own `AcquisitionError` when it refuses.
+    Asking anything over an attending connection tells the engine that somebody is there: an attended
+    run goes on only while something is asked at least twice a second. Each method raises `EngineGone`
+    when the engine's process has ended, and the engine's own `AcquisitionError` when it refuses.
     """
 
     def __init__(self, connection: socket.socket) -> None:
@@ -42,8 +43,8 @@ class EngineClient:
         self._asking = Lock()
 
     @classmethod
-    def attach(cls, address: EngineAddress) -> "EngineClient":
-        """Connect to a running engine."""
+    def attach(cls, address: EngineAddress, visit: Visit = Visit.VISITING) -> "EngineClient":
+        """Connect to a running engine, for a look or to attend to its run."""
         try:
             connection = socket.create_connection((address.host, address.port), PATIENCE_S)
         except OSError as error:
@@ -54,7 +55,7 @@ class EngineClient:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         client = cls(connection)
         try:
-            client._do(ask.Hello(token=address.token))
+            client._do(ask.Hello(token=address.token, visit=visit))
         except AcquisitionError:
             client.close()
             raise

@@ -10,6 +10,7 @@ from ..rig.configuration import Rig
 from ..rig.knobs import KnobSheet
 from ..run.stop import StopLevel
 from ..toml_file import FrozenModel
+from .state import Visit
 
 
 class Hello(FrozenModel):
@@ -17,6 +18,7 @@ class Hello(FrozenModel):
 
     ask: Literal["hello"] = "hello"
     token: str
+    visit: Visit = Visit.VISITING
 
 
 class Open(FrozenModel):

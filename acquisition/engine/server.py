@@ -14,6 +14,7 @@ from . import requests as ask
 from .answers import DONE, answered, refused
 from .desk import Desk
 from .errors import EngineError
+from .state import Visit
 from .wire import WireError, receive, send
 
 LOOPBACK = "127.0.0.1"
@@ -61,15 +62,18 @@ class Server:
         """Answer one viewer until it goes. A viewer that does not read blocks this thread, and no other."""
         with connection, suppress(WireError, OSError):
             connection.settimeout(GREETING_S)
-            if not self._is_let_in(connection):
+            visit = self._let_in(connection)
+            if visit is None:
                 return
             connection.settimeout(None)
             while True:
                 message = receive(connection)
-                self._desk.heard()
+                if visit is Visit.ATTENDING:
+                    self._desk.heard()
                 send(connection, answered(self._desk, message))
 
-    def _is_let_in(self, connection: socket.socket) -> bool:
+    def _let_in(self, connection: socket.socket) -> Visit | None:
+        """Say what the connection is for, or turn it away."""
         try:
             hello = ask.Hello.model_validate_json(receive(connection).text)
         except ValidationError:
@@ -77,9 +81,9 @@ class Server:
         if hmac.compare_digest(hello.token.encode(), self._token.encode()):
             self._desk.heard()
             send(connection, DONE)
-            return True
+            return hello.visit
         send(connection, refused("the token is not this engine's; nobody was let in", EngineError()))
-        return False
+        return None
 
 
 def spoken(address: EngineAddress) -> str:

@@ -8,7 +8,7 @@ from typing import Self
 from .client import EngineClient
 from .errors import EngineGone
 from .server import EngineAddress
-from .state import Attendance
+from .state import Attendance, Visit
 
 LEAVING_S = 10.0
 """How long an engine may take to ramp down, finish its recording and end [s]."""
@@ -21,7 +21,7 @@ class EngineProcess:
         self._process = process
         self.address = address
         """Where others may ask it as well."""
-        self.client = EngineClient.attach(address)
+        self.client = EngineClient.attach(address, Visit.ATTENDING)
 
     @property
     def pid(self) -> int:

@@ -39,5 +39,14 @@ class Attendance(StrEnum):
     """A campaign that is left alone: viewers may come and go."""
 
 
+class Visit(StrEnum):
+    """What a connection is for."""
+
+    ATTENDING = "attending"
+    """Whoever answers for the run: it goes on only while this one asks."""
+    VISITING = "visiting"
+    """A look from elsewhere: it keeps nothing running."""
+
+
 VIEWER_PATIENCE_S = 0.5
 """How long an attended run goes on while nobody asks [s]."""

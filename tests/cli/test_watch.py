@@ -1,0 +1,98 @@
+"""`vibench watch` and `vibench stop` find an engine that somebody else has started, and reach it."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from acquisition.engine.announcement import announced, announced_engines
+from acquisition.engine.server import EngineAddress
+from acquisition.engine.start import start_engine
+from acquisition.engine.state import Attendance, EngineState
+from acquisition.plan.campaign import Campaign
+from acquisition.recording import open_recording
+from acquisition.rig.configuration import load_rig
+
+ROOT = Path(__file__).resolve().parents[2]
+DWELL = {"kind": "dwell", "amplitude_vpp": 1.0, "frequency_hz": 260, "settle_s": 0.2, "duration_s": 900}
+LONG = Campaign.model_validate({"name": "night", "measurements": [{"name": "dwell", "excitation": DWELL}]})
+
+
+@pytest.fixture(autouse=True)
+def own_state(tmp_path_factory, monkeypatch):
+    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path_factory.mktemp("state")))
+
+
+@pytest.fixture
+def running(tmp_path):
+    with start_engine(Attendance.UNATTENDED) as engine:
+        engine.client.open(load_rig(ROOT / "hardware_configs" / "virtual_rig.toml"))
+        wait(engine, EngineState.READY)
+        engine.client.arm(LONG, tmp_path)
+        engine.client.start()
+        while engine.client.status().samples == 0:
+            pass
+        yield engine
+
+
+def wait(engine, state):
+    give_up_s = time.monotonic() + 60
+    while engine.client.status().state is not state:
+        assert time.monotonic() < give_up_s
+
+
+def vibench(*arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "cli", *arguments],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=100,
+    )
+
+
+def test_a_stop_from_another_terminal_ends_the_run_and_stands_in_the_recording(running, tmp_path):
+    seen = json.loads(vibench("watch", "--json").stdout)["engines"]
+    assert [each["pid"] for each in seen] == [running.pid]
+    assert seen[0]["status"]["run"]["name"] == "dwell"
+    told = vibench("stop", "--level", "abort", "--reason", "smoke in the laboratory")
+    assert told.returncode == 0, told.stderr
+    wait(running, EngineState.READY)
+    with open_recording(tmp_path / "dwell.h5") as recording:
+        assert recording.reason == "smoke in the laboratory"
+
+
+def test_watching_shows_the_run_and_its_end(running):
+    arguments = [sys.executable, "-m", "cli", "watch"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
+    with subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, text=True) as watcher:
+        assert f"process {running.pid}" in watcher.stdout.readline()
+        running.client.stop("ramp", "enough")
+        said = watcher.stdout.read()
+    assert watcher.returncode == 0
+    assert "dwell" in said
+
+
+def test_where_no_engine_runs_it_is_said():
+    told = vibench("stop")
+    assert told.returncode == 1
+    assert "no engine is running; 'vibench measure' and 'vibench gui' start one" in told.stderr
+
+
+def test_what_a_killed_engine_has_left_is_swept_away(tmp_path):
+    gone = EngineAddress(host="127.0.0.1", port=1, token="t")
+    with announced(gone, "killed"):
+        assert announced_engines() == ()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no modes")
+def test_nobody_else_can_read_the_token(tmp_path):
+    state = Path(os.environ["VIBENCH_STATE_DIR"])
+    with announced(EngineAddress(host="127.0.0.1", port=1, token="t"), "mine"):
+        (file,) = (state / "engines").iterdir()
+        assert file.stat().st_mode & 0o077 == 0
