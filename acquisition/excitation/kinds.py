@@ -5,15 +5,28 @@ from typing import Annotated, TypeAlias
 from pydantic import Field
 
 from .dwell import Dwell
+from .held_dwell import HeldDwell
+from .held_sweep import HeldSweep
 from .multisine_noise import MultisineNoise
 from .odd_multisine import OddMultisine
 from .plan import AbstractExcitation
+from .resonance_tracking import ResonanceTracking
+from .settled_sine import SettledSine
 from .sine_sweep import SineSweep
 from .stepped_sine import SteppedSine
 from .streamed_noise import StreamedNoise
 
 Excitation: TypeAlias = Annotated[
-    MultisineNoise | StreamedNoise | SineSweep | Dwell | SteppedSine | OddMultisine,
+    MultisineNoise
+    | StreamedNoise
+    | SineSweep
+    | Dwell
+    | SteppedSine
+    | OddMultisine
+    | SettledSine
+    | HeldSweep
+    | HeldDwell
+    | ResonanceTracking,
     Field(discriminator="kind"),
 ]
 
@@ -24,6 +37,10 @@ _PLANS: tuple[type[AbstractExcitation], ...] = (
     Dwell,
     SteppedSine,
     OddMultisine,
+    SettledSine,
+    HeldSweep,
+    HeldDwell,
+    ResonanceTracking,
 )
 KINDS = frozenset(str(plan.model_fields["kind"].default) for plan in _PLANS)
 """The words that a file may give as ``kind``."""

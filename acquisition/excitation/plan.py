@@ -29,6 +29,10 @@ class AbstractExcitation(FrozenModel, ABC):
     def steps(self) -> Iterator[Step]:
         """List what the generator does, in the order of time."""
 
+    def loudest_steps(self) -> Iterator[Step]:
+        """List what limits are checked against: the steps themselves, unless feedback may be louder."""
+        return self.steps()
+
     @property
     def highest_amplitude_vpp(self) -> float:
         """The highest setting there is on the way, peak to peak [V]."""
@@ -37,7 +41,7 @@ class AbstractExcitation(FrozenModel, ABC):
     @property
     @abstractmethod
     def playing_s(self) -> float:
-        """Time of all steps, settling included, ramps not [s]."""
+        """Time of all steps, settling included, ramps not [s]; with feedback the longest it may take."""
 
     @property
     @abstractmethod
@@ -54,3 +58,11 @@ class AbstractExcitation(FrozenModel, ABC):
             When ``sample_rate_hz`` is too low to show the highest frequency.
 
         """
+
+
+class AbstractFeedback(AbstractExcitation):
+    """An excitation whose next step depends on what was measured: `acquisition.control` conducts it.
+
+    Its ``steps`` are what it is expected to play, waits left out: for previews and for whoever lists
+    what will be recorded. ``amplitude_vpp`` is the largest setting that it may use.
+    """

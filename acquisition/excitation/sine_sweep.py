@@ -41,7 +41,7 @@ class Hold(StrEnum):
         return {Hold.ACCELERATION: 0, Hold.VELOCITY: 1, Hold.DISPLACEMENT: 2}[self]
 
 
-class SineSweep(AbstractExcitation):
+class MovingSine(AbstractExcitation):
     """A sine sweep, up or down, that the computer steps through: the generator has no sweep time to set.
 
     Each step plays the mean frequency of the ideal sweep over its time, so that at the end of every
@@ -49,7 +49,6 @@ class SineSweep(AbstractExcitation):
     recorded drive.
     """
 
-    kind: Literal["sine_sweep"] = "sine_sweep"
     start_hz: FrequencyHz
     """Frequency at the beginning [Hz]; above ``stop_hz`` for a sweep downwards."""
     stop_hz: FrequencyHz
@@ -57,12 +56,9 @@ class SineSweep(AbstractExcitation):
     duration_s: PositiveFloat
     """Time from start to stop [s]."""
     spacing: Spacing = Spacing.LINEAR
-    hold: Hold = Hold.ACCELERATION
-    """What stays constant; ``amplitude_vpp`` is then the setting at the highest frequency."""
+    """How the frequency moves with time."""
     step_s: PositiveFloat = 0.1
     """Time at one frequency [s]; the last step may be shorter."""
-    settle_s: NonNegativeFloat = 3.0
-    """Wait before the sweep starts, close to ``start_hz``, until the transient has died out [s]."""
 
     @model_validator(mode="after")
     def _sweep_moves(self) -> Self:
@@ -77,6 +73,40 @@ class SineSweep(AbstractExcitation):
                 "give a shorter step"
             )
         return self
+
+    @property
+    def highest_frequency_hz(self) -> float:
+        """The upper end of the sweep [Hz]."""
+        return max(self.start_hz, self.stop_hz)
+
+    def cycles(self, time_s: float) -> float:
+        """Cycles of the ideal sweep since its start, in closed form."""
+        match self.spacing:
+            case Spacing.LINEAR:
+                rate = (self.stop_hz - self.start_hz) / self.duration_s
+                return self.start_hz * time_s + 0.5 * rate * time_s**2
+            case Spacing.LOGARITHMIC:
+                rate = log(self.stop_hz / self.start_hz) / self.duration_s
+                return self.start_hz * expm1(rate * time_s) / rate
+
+    def mean_steps(self) -> Iterator[tuple[float, float]]:
+        """Give mean frequency [Hz] and duration [s] of each step, in the order of time."""
+        # 1e-9 keeps a duration that is a whole number of steps, but for rounding, from growing a sliver.
+        count = ceil(self.duration_s / self.step_s * (1 - 1e-9))
+        for number in range(count):
+            begin_s = number * self.step_s
+            end_s = min(begin_s + self.step_s, self.duration_s)
+            yield (self.cycles(end_s) - self.cycles(begin_s)) / (end_s - begin_s), end_s - begin_s
+
+
+class SineSweep(MovingSine):
+    """A sine sweep at an amplitude setting that follows a power of the frequency."""
+
+    kind: Literal["sine_sweep"] = "sine_sweep"
+    hold: Hold = Hold.ACCELERATION
+    """What stays constant; ``amplitude_vpp`` is then the setting at the highest frequency."""
+    settle_s: NonNegativeFloat = 3.0
+    """Wait before the sweep starts, close to ``start_hz``, until the transient has died out [s]."""
 
     @model_validator(mode="after")
     def _quietest_step_is_playable(self) -> Self:
@@ -95,29 +125,12 @@ class SineSweep(AbstractExcitation):
         return float((frequency_hz / self.highest_frequency_hz) ** self.hold.power)
 
     @property
-    def highest_frequency_hz(self) -> float:
-        """The upper end of the sweep [Hz]."""
-        return max(self.start_hz, self.stop_hz)
-
-    @property
     def playing_s(self) -> float:
         """Settling and sweep [s]."""
         return self.settle_s + self.duration_s
 
-    def cycles(self, time_s: float) -> float:
-        """Cycles of the ideal sweep since its start, in closed form."""
-        match self.spacing:
-            case Spacing.LINEAR:
-                rate = (self.stop_hz - self.start_hz) / self.duration_s
-                return self.start_hz * time_s + 0.5 * rate * time_s**2
-            case Spacing.LOGARITHMIC:
-                rate = log(self.stop_hz / self.start_hz) / self.duration_s
-                return self.start_hz * expm1(rate * time_s) / rate
-
     def steps(self) -> Iterator[Step]:
         """One step for every ``step_s``, all of one segment."""
-        # 1e-9 keeps a duration that is a whole number of steps, but for rounding, from growing a sliver.
-        count = ceil(self.duration_s / self.step_s * (1 - 1e-9))
         segment = Segment(
             "sweep",
             {
@@ -129,12 +142,10 @@ class SineSweep(AbstractExcitation):
                 "hold": self.hold.value,
             },
         )
-        for number in range(count):
-            begin_s = number * self.step_s
-            end_s = min(begin_s + self.step_s, self.duration_s)
-            mean_hz = (self.cycles(end_s) - self.cycles(begin_s)) / (end_s - begin_s)
-            settle_s = self.settle_s if number == 0 else 0.0
-            yield Step(Tone(mean_hz, self.level(mean_hz)), settle_s, end_s - begin_s, segment)
+        settle_s = self.settle_s
+        for mean_hz, duration_s in self.mean_steps():
+            yield Step(Tone(mean_hz, self.level(mean_hz)), settle_s, duration_s, segment)
+            settle_s = 0.0
 
     def preview(self, sample_rate_hz: float) -> Preview:
         """Show the whole sweep, without the wait before it."""

@@ -51,21 +51,14 @@ class FrequencyGrid(FrozenModel):
         return tuple(self.start_hz + number * self.step_hz for number in range(count))
 
 
-class SteppedSine(AbstractExcitation):
-    """A list of frequencies; each is played until it has settled, then recorded as its own segment.
+class FrequencySteps(AbstractExcitation):
+    """A list of frequencies and the way through it; each is recorded as its own segment."""
 
-    The phase goes on from one frequency to the next and the amplitude stays, so that the specimen
-    keeps to its branch.
-    """
-
-    kind: Literal["stepped_sine"] = "stepped_sine"
     frequencies_hz: tuple[FrequencyHz, ...] = ()
     """Rising [Hz]; or give ``grid``."""
     grid: FrequencyGrid | None = None
     """Frequencies at equal distances; or give ``frequencies_hz``."""
     direction: Direction = Direction.UP
-    settle_s: NonNegativeFloat = 3.0
-    """Wait at every frequency until the transient has died out [s]."""
     record_s: PositiveFloat = 1.0
     """Time recorded at every frequency [s]."""
 
@@ -79,7 +72,7 @@ class SteppedSine(AbstractExcitation):
                     f"frequencies_hz has {high:g} after {low:g}; "
                     "list every frequency once, rising, and choose the way through it with direction"
                 )
-        count = sum(len(frequencies_hz) for _, frequencies_hz in self._passes())
+        count = sum(len(frequencies_hz) for _, frequencies_hz in self.passes())
         if count > MOST_STEPS:
             raise ValueError(
                 f"the plan has {count} steps; one recording holds at most {MOST_STEPS}: "
@@ -97,13 +90,8 @@ class SteppedSine(AbstractExcitation):
         """The highest frequency of the list [Hz]."""
         return self.rising_hz[-1]
 
-    @property
-    def playing_s(self) -> float:
-        """Settling and recording of all steps [s]."""
-        passes = sum(1 for _ in self._passes())
-        return passes * len(self.rising_hz) * (self.settle_s + self.record_s)
-
-    def _passes(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+    def passes(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+        """Give each way through the list: its direction, and its frequencies in the order played [Hz]."""
         up = (Direction.UP.value, self.rising_hz)
         down = (Direction.DOWN.value, self.rising_hz[::-1])
         match self.direction:
@@ -116,9 +104,27 @@ class SteppedSine(AbstractExcitation):
             case Direction.DOWN_THEN_UP:
                 yield from (down, up)
 
+
+class SteppedSine(FrequencySteps):
+    """A list of frequencies; each is played until it has settled, then recorded as its own segment.
+
+    The phase goes on from one frequency to the next and the amplitude stays, so that the specimen
+    keeps to its branch.
+    """
+
+    kind: Literal["stepped_sine"] = "stepped_sine"
+    settle_s: NonNegativeFloat = 3.0
+    """Wait at every frequency until the transient has died out [s]."""
+
+    @property
+    def playing_s(self) -> float:
+        """Settling and recording of all steps [s]."""
+        passes = sum(1 for _ in self.passes())
+        return passes * len(self.rising_hz) * (self.settle_s + self.record_s)
+
     def steps(self) -> Iterator[Step]:
         """One step for every frequency, in the order of time."""
-        for direction, frequencies_hz in self._passes():
+        for direction, frequencies_hz in self.passes():
             for frequency_hz in frequencies_hz:
                 # The direction keeps the turning point of a way there and back
                 # from being one segment.

@@ -39,7 +39,7 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> dict[Quantity, Load]:
     """
     terminal_v = 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
     model = RigModel(rig)
-    tones, waveforms, sources = _sorted(step.play for step in excitation.steps())
+    tones, waveforms, sources = _sorted(step.play for step in excitation.loudest_steps())
 
     def worst(quantity: Quantity) -> Load:
         loads = [_of_tones(model, quantity, tones)] if tones else []

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil, cos, pi
 
+from ..excitation.plan import AbstractFeedback
 from ..excitation.steps import Play, Segment, Step, Tone
 from ..plan.measurement import Measurement
 from .state import RunState
@@ -62,14 +63,14 @@ def phases(measurement: Measurement) -> Iterator[Phase]:
     for step in measurement.excitation.steps():
         if previous is None or not _follows_without_a_jump(previous.play, step.play):
             if previous is not None:
-                yield _ramp(RunState.RAMPING_DOWN, previous.play, measurement)
-            yield _ramp(RunState.RAMPING_UP, step.play, measurement)
+                yield ramp(RunState.RAMPING_DOWN, previous.play, measurement)
+            yield ramp(RunState.RAMPING_UP, step.play, measurement)
         if step.settle_s > 0:
             yield Phase(RunState.SETTLING, step.play, step.settle_s)
         yield Phase(RunState.RECORDING, step.play, step.record_s, step.segment)
         previous = step
     if previous is not None:
-        yield _ramp(RunState.RAMPING_DOWN, previous.play, measurement)
+        yield ramp(RunState.RAMPING_DOWN, previous.play, measurement)
 
 
 def _follows_without_a_jump(before: Play, after: Play) -> bool:
@@ -80,7 +81,8 @@ def _follows_without_a_jump(before: Play, after: Play) -> bool:
             return before is after
 
 
-def _ramp(state: RunState, play: Play, measurement: Measurement) -> Phase:
+def ramp(state: RunState, play: Play, measurement: Measurement) -> Phase:
+    """Lay out one ramp up to, or down from, what is played."""
     return Phase(state, play, measurement.ramp_s, Segment(_RAMP_LABELS[state]))
 
 
@@ -88,7 +90,12 @@ _RAMP_LABELS = {RunState.RAMPING_UP: "ramp_up", RunState.RAMPING_DOWN: "ramp_dow
 
 
 def duration_s(measurement: Measurement) -> float:
-    """Time from the first ramp up to the end of the last ramp down, without the bench check [s]."""
+    """Time from the first ramp up to the end of the last ramp down, without the bench check [s].
+
+    With feedback it is the longest that it may take.
+    """
+    if isinstance(measurement.excitation, AbstractFeedback):
+        return 2 * measurement.ramp_s + measurement.excitation.playing_s
     return sum(phase.duration_s for phase in phases(measurement))
 
 

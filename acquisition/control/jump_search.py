@@ -1,0 +1,87 @@
+"""Finding a jump between two branches by bisection, never measuring a frequency from the wrong side."""
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from math import log
+
+
+class Side(StrEnum):
+    """On which branch of a jump a response lies."""
+
+    BEFORE = "before"
+    AFTER = "after"
+
+
+@dataclass(frozen=True)
+class Visit:
+    """A frequency at which the motion was let settle, and the Response II that was found."""
+
+    frequency_hz: float
+    response: float
+
+
+@dataclass(frozen=True)
+class LocatedJump:
+    """A jump between two settled frequencies of one pass."""
+
+    before: Visit
+    after: Visit
+
+    @property
+    def frequency_hz(self) -> float:
+        """Middle of the bracket [Hz]."""
+        return 0.5 * (self.before.frequency_hz + self.after.frequency_hz)
+
+    @property
+    def width_hz(self) -> float:
+        """Distance between the two frequencies [Hz]."""
+        return abs(self.after.frequency_hz - self.before.frequency_hz)
+
+    def is_jump(self, factor: float) -> bool:
+        """Whether the response still changes by more than ``factor`` across the bracket."""
+        return ratio(self.before, self.after) > factor
+
+
+Seek = Generator[float, Visit, LocatedJump]
+"""Asks for a frequency to be reached on the branch before the jump, and is told what was found there."""
+
+
+def located(before: Visit, after: Visit, resolution_hz: float) -> Seek:
+    """Halve the bracket until it is no wider than ``resolution_hz``.
+
+    A middle belongs to the side whose response it is nearer to, in decibels. Whoever answers must
+    reach each frequency from ``before``'s side.
+    """
+    while abs(after.frequency_hz - before.frequency_hz) > resolution_hz * (1 + 1e-9):
+        middle = yield 0.5 * (before.frequency_hz + after.frequency_hz)
+        match side(middle, before, after):
+            case Side.BEFORE:
+                before = middle
+            case Side.AFTER:
+                after = middle
+    return LocatedJump(before, after)
+
+
+def side(visit: Visit, before: Visit, after: Visit) -> Side:
+    """Say which of two responses a third one is nearer to."""
+    return Side.BEFORE if ratio(visit, before) <= ratio(visit, after) else Side.AFTER
+
+
+def ratio(one: Visit, other: Visit) -> float:
+    """Larger over smaller response; 1 when they are equal."""
+    return float(2.0 ** abs(log(one.response / other.response, 2)))
+
+
+def is_on_branch(visit: Visit, expected: Visit, factor: float) -> bool:
+    """Whether a response agrees with one measured before at the same frequency.
+
+    The branches differ by ``factor`` at least; half of that, in decibels, tells them apart.
+    """
+    return ratio(visit, expected) < factor**0.5
+
+
+def way_back(visited: Sequence[Visit], jumped: Visit) -> tuple[Visit, ...]:
+    """Give the steps of a pass before a jump, newest first: the way to where both branches are one."""
+    earlier = [visit for visit in visited if visit.frequency_hz != jumped.frequency_hz]
+    return tuple(reversed(earlier))

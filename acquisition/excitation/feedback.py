@@ -1,0 +1,91 @@
+"""What an excitation asks of its feedback: when a motion is settled, which level of the base is held."""
+
+from enum import StrEnum
+from math import pi
+from typing import Annotated, Self
+
+from pydantic import Field, PositiveFloat, model_validator
+
+from ..toml_file import FrozenModel
+
+MOST_PERIODS = 100_000
+Share = Annotated[float, Field(gt=0, lt=1)]
+
+
+class Settling(FrozenModel):
+    """When the motion of the specimen counts as settled.
+
+    It is seen once in each period of the recorded drive, as amplitude and phase of its first four
+    harmonics. It is settled with period k when these repeat after k drive periods, or when it does
+    not repeat and yet its statistics stay what they are.
+    """
+
+    tolerance: Share = 0.01
+    """How closely the motion must repeat, over its rms size."""
+    periods: int = Field(default=80, ge=12, le=MOST_PERIODS)
+    """For how many drive periods it must repeat."""
+    longest_period: int = Field(default=8, ge=1, le=32)
+    """Longest period that is looked for, in drive periods."""
+    aperiodic_periods: int = Field(default=400, ge=100, le=MOST_PERIODS)
+    """Over how many drive periods a motion that does not repeat must keep its statistics."""
+    shortest_wait_s: float = Field(default=0.2, ge=0, le=600)
+    """Wait at least this long at every frequency [s]."""
+    longest_wait_s: float = Field(default=15.0, gt=0, le=3600)
+    """Wait no longer than this; the motion is then recorded as not settled [s]."""
+
+    @model_validator(mode="after")
+    def _waits_in_order(self) -> Self:
+        if self.shortest_wait_s > self.longest_wait_s:
+            raise ValueError(
+                f"shortest_wait_s = {self.shortest_wait_s:g} is longer than longest_wait_s = "
+                f"{self.longest_wait_s:g}; lower the one or raise the other"
+            )
+        return self
+
+
+class BaseMotion(StrEnum):
+    """Which motion of the base has a stated amplitude."""
+
+    ACCELERATION = "acceleration"
+    """[m/s2]"""
+    DISPLACEMENT = "displacement"
+    """[m]"""
+
+    def acceleration(self, amplitude: float, frequency_hz: float) -> float:
+        """Acceleration amplitude of a sine of this motion [m/s2]."""
+        match self:
+            case BaseMotion.ACCELERATION:
+                return amplitude
+            case BaseMotion.DISPLACEMENT:
+                return amplitude * (2 * pi * frequency_hz) ** 2
+
+
+class BaseLevel(FrozenModel):
+    """A level of the base's motion that the generator's setting is made to follow.
+
+    Held is the fundamental: what impacts add at other frequencies is not counted. The setting of
+    the plan, ``amplitude_vpp``, is then the largest that may be used.
+    """
+
+    motion: BaseMotion = BaseMotion.ACCELERATION
+    amplitude: PositiveFloat
+    """Peak of the base's fundamental [m/s2, or m for displacement]."""
+    tolerance: Share = 0.025
+    """How far the measured level may lie from it, as a share."""
+    most_change: float = Field(default=1.25, gt=1, le=4)
+    """The setting changes by at most this factor at once."""
+
+    def acceleration_at(self, frequency_hz: float) -> float:
+        """Acceleration amplitude to be held [m/s2]."""
+        return self.motion.acceleration(self.amplitude, frequency_hz)
+
+
+class JumpSearch(FrozenModel):
+    """When two steps of a pass lie on different branches, and how closely the jump between is found."""
+
+    factor: float = Field(default=1.5, gt=1, le=100)
+    """A change of Response II (fundamental of m0 over the base's) by more than this is a jump."""
+    resolution_hz: PositiveFloat = 0.25
+    """The two frequencies around a jump are brought this close together [Hz]."""
+    most_jumps: int = Field(default=3, ge=1, le=20)
+    """How many jumps of one pass are looked into."""

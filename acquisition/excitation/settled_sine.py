@@ -1,0 +1,55 @@
+"""Sines one after the other, each recorded when its motion has settled, whatever kind of motion that is."""
+
+from collections.abc import Iterator
+from typing import Literal
+
+from pydantic import Field
+
+from .feedback import BaseLevel, JumpSearch, Settling
+from .plan import AbstractFeedback
+from .preview import Preview, preview_of
+from .steps import Segment, Step, Tone
+from .stepped_sine import FrequencySteps
+
+STEP_LABEL = "step"
+"""Segment of a frequency of the list."""
+SEARCH_LABEL = "search"
+"""Segment of a frequency that was added to localise a jump."""
+
+
+class SettledSine(FrequencySteps, AbstractFeedback):
+    """A stepped sine that waits as long as the motion needs, keeps to its branch and localises jumps.
+
+    The phase goes on from one frequency to the next. What is found at each step (period or none,
+    waiting time, level of the base, where the branch came from) stands in the recording beside it.
+    """
+
+    kind: Literal["settled_sine"] = "settled_sine"
+    settling: Settling = Settling()
+    base_level: BaseLevel | None = None
+    """Level of the base to be held; without it ``amplitude_vpp`` is played as it is."""
+    jumps: JumpSearch | None = None
+    """Look for jumps between steps, and localise them; without it they are only crossed."""
+    search_s: float = Field(default=180.0, gt=0, le=7200)
+    """Longest time spent on one jump; what is bracketed by then is kept [s]."""
+
+    @property
+    def playing_s(self) -> float:
+        """All steps with the longest waits, and all searches [s]."""
+        passes = sum(1 for _ in self.passes())
+        steps_s = passes * len(self.rising_hz) * (self.settling.longest_wait_s + self.record_s)
+        searches = 0 if self.jumps is None else passes * self.jumps.most_jumps
+        return steps_s + searches * self.search_s
+
+    def steps(self) -> Iterator[Step]:
+        """One step for every frequency of the list, without its wait, at the largest setting."""
+        for direction, frequencies_hz in self.passes():
+            for frequency_hz in frequencies_hz:
+                segment = Segment(STEP_LABEL, {"frequency_hz": frequency_hz, "direction": direction})
+                yield Step(Tone(frequency_hz), 0.0, self.record_s, segment)
+
+    def preview(self, sample_rate_hz: float) -> Preview:
+        """All steps of the list, waits left out, at the largest setting."""
+        return preview_of(
+            self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
+        )
