@@ -112,8 +112,8 @@ class GeneratorDrive:
     def _load(self, play: Play | None) -> None:
         before, self._play = self._play, play
         match before, play:
-            case Tone(_, level_before), Tone(frequency_hz, level):
-                self._change_tone(frequency_hz, level_before, level)
+            case Tone() as old, Tone() as new:
+                self._change_tone(old, new)
             case _, Tone(frequency_hz, _):
                 self._generator.load_sine(frequency_hz, self._due_vpp)
             case _, Waveform(values, repetition_hz):
@@ -125,12 +125,13 @@ class GeneratorDrive:
                 )
         self._setting_vpp = self._due_vpp
 
-    def _change_tone(self, frequency_hz: float, level_before: float, level: float) -> None:
+    def _change_tone(self, old: Tone, new: Tone) -> None:
         """Lower the amplitude before the frequency changes, or raise it after: never too loud on the way."""
-        if level < level_before:
+        if new.level < old.level:
             self._generator.set_amplitude(self._due_vpp)
-        self._generator.set_frequency(frequency_hz)
-        if level > level_before:
+        if new.frequency_hz != old.frequency_hz:
+            self._generator.set_frequency(new.frequency_hz)
+        if new.level > old.level:
             self._generator.set_amplitude(self._due_vpp)
 
     def _ramp(self, target: float, ramp_s: float) -> Iterator[float]:

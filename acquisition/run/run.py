@@ -6,18 +6,18 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-import numpy as np
-
 from ..check.low_level import BenchCheck, judged, require_checkable
+from ..control.move import Conduct, heard
 from ..errors import AcquisitionError, LimitExceeded
 from ..excitation.steps import Play, Tone
-from ..instruments import Block, Samples
+from ..instruments import Block
 from ..plan.limits import require_within_limits, shortest_ramp_s
 from ..plan.measurement import Measurement
 from ..recording.header import RecordingHeader
 from ..recording.preallocate import MARGIN_S
 from ..recording.writer import create_recording
 from .bench_protocol import RunBench
+from .conductor import conductor_for
 from .drive import Drive, drive_for
 from .ending import Ending
 from .guard import Guard
@@ -29,6 +29,7 @@ from .schedule import (
     check_amplitude_vpp,
     check_phases,
     duration_s,
+    known_phases,
     phases,
 )
 from .state import RunState
@@ -83,6 +84,7 @@ class Run:
         self._bench_check = bench_check
         self._create = create
         self._drive: Drive  # chosen when the plan is admitted; nothing plays before
+        self._conductor: Conduct[None] | None = None
         self._guard = Guard(bench.rig, bench.channels, measurement.limits, bench.digitizer.sample_rate_hz)
         self._total_s = duration_s(measurement)
         self._state = RunState.IDLE
@@ -173,6 +175,7 @@ class Run:
             require_checkable(self._bench.channels)
             require_within_limits(self._measurement, self._bench.rig)
             self._drive = drive_for(self._bench, self._measurement)
+            self._conductor = conductor_for(self._bench, self._measurement)
             self._total_s += self._before_s()
             return self._create(self._path, run_header(self._bench, self._measurement, self._total_s))
         except AcquisitionError as error:
@@ -186,16 +189,33 @@ class Run:
             case BenchCheck.AT_LOW_LEVEL:
                 self._begin(check_phases(self._measurement))
                 yield from self._checked(tape)
-                self._drive.announce(phases(self._measurement))
+                self._drive.announce(known_phases(self._measurement))
                 pause_s = self._drive.pause_s
             case BenchCheck.RECENTLY_PASSED:
-                self._begin(phases(self._measurement))
+                self._begin(known_phases(self._measurement))
                 tape.log("check", "left out: the bench was checked shortly before")
                 pause_s = 0.0
         yield from self._perform(tape, Phase(RunState.ARMED, None, pause_s))
-        for phase in phases(self._measurement):
-            yield from self._perform(tape, phase)
+        if self._conductor is None:
+            for phase in phases(self._measurement):
+                yield from self._perform(tape, phase)
+        else:
+            yield from self._conducted(tape, self._conductor)
         tape.enter(None)
+
+    def _conducted(self, tape: Tape, conductor: Conduct[None]) -> Iterator[Progress]:
+        """Carry out moves one by one; what was heard during each decides the next."""
+        try:
+            move = next(conductor)
+            while True:
+                for note in move.notes:
+                    tape.log(note.kind, note.text)
+                blocks: list[Block] = []
+                if move.phase is not None:
+                    yield from self._perform(tape, move.phase, blocks)
+                move = conductor.send(heard(blocks))
+        except StopIteration:
+            pass
 
     def _before_s(self) -> float:
         """Time before the first ramp [s]: what comes is told when the check has passed, and not before."""
@@ -211,23 +231,23 @@ class Run:
         self._bench.digitizer.start()
 
     def _checked(self, tape: Tape) -> Iterator[Progress]:
-        quiet: list[Samples] = []
-        heard: list[Samples] = []
+        before: list[Block] = []
+        during: list[Block] = []
         listening, settling, measuring = check_phases(self._measurement)
-        yield from self._perform(tape, listening, quiet)
+        yield from self._perform(tape, listening, before)
         yield from self._perform(tape, settling)
-        yield from self._perform(tape, measuring, heard)
+        yield from self._perform(tape, measuring, during)
         figures = judged(
             self._bench.rig,
             self._bench.channels,
-            np.concatenate(quiet, axis=1),
-            np.concatenate(heard, axis=1),
+            heard(before).volts,
+            heard(during).volts,
             self._bench.digitizer.sample_rate_hz,
             check_amplitude_vpp(self._measurement.excitation.amplitude_vpp),
         )
         tape.log("check", figures.text())
 
-    def _perform(self, tape: Tape, phase: Phase, into: list[Samples] | None = None) -> Iterator[Progress]:
+    def _perform(self, tape: Tape, phase: Phase, into: list[Block] | None = None) -> Iterator[Progress]:
         self._enter(tape, phase.state)
         tape.enter(phase.segment)
         self._play = phase.play
@@ -261,10 +281,10 @@ class Run:
         planned_s = self._measurement.ramp_s
         return planned_s if level is StopLevel.RAMP else min(planned_s, shortest_ramp_s(self._bench.rig))
 
-    def _read(self, tape: Tape, duration_s: float, into: list[Samples] | None = None) -> Iterator[Progress]:
+    def _read(self, tape: Tape, duration_s: float, into: list[Block] | None = None) -> Iterator[Progress]:
         for block in tape.read_for(duration_s):
             if into is not None:
-                into.append(block.volts)
+                into.append(block)
             yield self._told(tape, block)
             self._look(block)
             if self._switch.is_holding and self._look == self._go_on:

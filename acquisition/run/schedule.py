@@ -73,6 +73,11 @@ def phases(measurement: Measurement) -> Iterator[Phase]:
         yield ramp(RunState.RAMPING_DOWN, previous.play, measurement)
 
 
+def known_phases(measurement: Measurement) -> Iterator[Phase]:
+    """Lay out what can be said before anything was heard: all of it, or with feedback nothing."""
+    return iter(()) if isinstance(measurement.excitation, AbstractFeedback) else phases(measurement)
+
+
 def _follows_without_a_jump(before: Play, after: Play) -> bool:
     match before, after:
         case Tone(), Tone():

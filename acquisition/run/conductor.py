@@ -1,0 +1,28 @@
+"""Whether a measurement is conducted by what is heard, and by whom."""
+
+from ..control.conduct import conduct
+from ..control.move import Conduct
+from ..errors import ConfigurationError
+from ..excitation.plan import AbstractFeedback
+from ..plan.measurement import Measurement
+from ..plan.player import Player, player_of
+from .bench_protocol import RunBench
+
+
+def conductor_for(bench: RunBench, measurement: Measurement) -> Conduct[None] | None:
+    """Give who conducts a measurement; None for one whose course is known.
+
+    Raises
+    ------
+    ConfigurationError
+        When the bench cannot do it: before anything plays.
+
+    """
+    if not isinstance(measurement.excitation, AbstractFeedback):
+        return None
+    if player_of(measurement, bench.rig) is Player.OUTPUT:
+        raise ConfigurationError(
+            f"{measurement.excitation.kind} decides while it plays, and an analogue output is written ahead of "
+            "its time. Nothing was played; let daq.output play streams only, and connect the function generator"
+        )
+    return conduct(measurement, bench.rig, bench.channels, bench.digitizer.sample_rate_hz)
