@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum, auto
 
 from ..excitation.settled_sine import SEARCH_LABEL, SettledSine
 from ..excitation.steps import Segment
@@ -10,10 +11,19 @@ from .jump_search import LocatedJump, Side, Visit, is_on_branch, located, side
 from .move import Conduct
 from .record import recorded
 from .settle import Settled, Settler, shortened
-from .start import moved
+from .start import glided
 
-_MOST_RETURNS = 2
-"""How often a branch is looked for that is lost again on the way forward."""
+_MOST_BRACKETS = 4
+"""How often the search begins anew where the motion left its branch earlier than the last time."""
+
+
+class _Return(Enum):
+    """How the way back to the branch ended."""
+
+    BACK = auto()
+    NOT_FOUND = auto()
+    LEFT = auto()
+    """The branch was found, and left again before its end."""
 
 
 @dataclass
@@ -24,6 +34,34 @@ class _Hunted:
     """Visits on the branch before the jump, in the order of the pass."""
     after: Visit
     here: Side
+
+    @property
+    def bracket(self) -> LocatedJump:
+        """What is known of the jump."""
+        return LocatedJump(self.branch[-1], self.after)
+
+    def narrow(self, visit: Visit) -> None:
+        """Take in a visit between the two ends."""
+        self.here = side(visit, self.branch[-1], self.after)
+        match self.here:
+            case Side.BEFORE:
+                self.branch.append(visit)
+            case Side.AFTER:
+                self.after = visit
+
+    def left(self, place: int, visit: Visit) -> None:
+        """Take in that the branch was left on the way to its visit number ``place``."""
+        del self.branch[place:]
+        self.after = visit
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """Where a search has ended, at the frequency it was begun for."""
+
+    visit: Visit
+    branch: Side
+    is_jump: bool
 
 
 class JumpHunt:
@@ -38,74 +76,75 @@ class JumpHunt:
         self._number = number
         self._until_s = settler.play.elapsed_s + plan.search_s
 
-    def localised(self, visited: Sequence[Visit], after: Visit) -> Conduct[bool]:
+    def localised(self, visited: Sequence[Visit], after: Visit) -> Conduct[Arrival]:
         """Narrow the bracket between the last of ``visited`` and ``after``; end at ``after``'s frequency.
 
-        Returns whether it is a jump. A response that only changes steeply is none: it closes as the
-        bracket does.
+        A response that only changes steeply is no jump: it closes as the bracket does. Where both
+        branches are there at ``after``, the way to it may end on either, which is said.
         """
         hunted = _Hunted(list(visited), after, Side.AFTER)
         found, why = yield from self._bisected(hunted)
         is_jump = found.is_jump(self._rule.factor)
-        self._say(found, why if is_jump else "steep, but no jump")
-        moved(self._settler.play, after.frequency_hz, self._plan.base_level)
-        yield from self._settler.settled()
-        return is_jump
+        end = yield from self._led_to(after.frequency_hz)
+        visit = Visit(end.frequency_hz, end.response)
+        branch = side(visit, found.before, found.after) if is_jump else Side.AFTER
+        self._say(found, why if is_jump else "steep, but no jump", branch)
+        return Arrival(visit, branch, is_jump)
 
     def _bisected(self, hunted: _Hunted) -> Conduct[tuple[LocatedJump, str]]:
-        before, after = hunted.branch[-1], hunted.after
-        seek = located(before, after, self._rule.resolution_hz)
+        for _ in range(_MOST_BRACKETS):
+            found = yield from self._halved(hunted)
+            if found is not None:
+                return found
+        return hunted.bracket, "the motion jumped somewhere else each time"
+
+    def _halved(self, hunted: _Hunted) -> Conduct[tuple[LocatedJump, str] | None]:
+        """Halve the bracket to its end; None when the motion left its branch earlier, which is a new bracket."""
+        seek = located(hunted.branch[-1], hunted.after, self._rule.resolution_hz)
         try:
             frequency_hz = next(seek)
             while True:
-                if hunted.here is Side.AFTER and not (yield from self._led_back(hunted)):
-                    return LocatedJump(before, after), "its branch was not found again"
+                if hunted.here is Side.AFTER:
+                    match (yield from self._led_back(hunted)):
+                        case _Return.NOT_FOUND:
+                            return hunted.bracket, "its branch was not found again"
+                        case _Return.LEFT:
+                            return None
                 if self._is_late():
-                    return LocatedJump(before, after), "the time for the search was over"
+                    return hunted.bracket, "the time for the search was over"
                 visit = yield from self._searched(frequency_hz)
-                hunted.here = side(visit, before, after)
-                if hunted.here is Side.BEFORE:
-                    before = visit
-                    hunted.branch.append(visit)
-                else:
-                    after = visit
+                hunted.narrow(visit)
                 frequency_hz = seek.send(visit)
-        except StopIteration as end:
-            jump: LocatedJump = end.value
-            return jump, "localised"
+        except StopIteration:
+            return hunted.bracket, "localised"
 
-    def _led_back(self, hunted: _Hunted) -> Conduct[bool]:
+    def _led_back(self, hunted: _Hunted) -> Conduct[_Return]:
         """Go back along the pass until the responses of its branch are found again, then forward to its end."""
-        branch = hunted.branch
-        for _ in range(_MOST_RETURNS):
-            place = yield from self._rejoined(branch)
-            if place is None:
-                return False
-            if (yield from self._followed(branch[place + 1 :])):
-                return True
-        return False
+        place = yield from self._rejoined(hunted.branch)
+        if place is None:
+            return _Return.NOT_FOUND
+        for ahead in range(place + 1, len(hunted.branch)):
+            if self._is_late():
+                return _Return.NOT_FOUND
+            found = yield from self._led_to(hunted.branch[ahead].frequency_hz)
+            visit = Visit(found.frequency_hz, found.response)
+            if not is_on_branch(visit, hunted.branch[ahead], self._rule.factor):
+                hunted.left(ahead, visit)
+                return _Return.LEFT
+        return _Return.BACK
 
     def _rejoined(self, branch: Sequence[Visit]) -> Conduct[int | None]:
         for place in range(len(branch) - 1, -1, -1):
             if self._is_late():
                 return None
             found = yield from self._led_to(branch[place].frequency_hz)
-            visit = Visit(found.frequency_hz, found.response)
-            if is_on_branch(visit, branch[place], self._rule.factor):
+            if is_on_branch(Visit(found.frequency_hz, found.response), branch[place], self._rule.factor):
                 return place
         return None
 
-    def _followed(self, ahead: Sequence[Visit]) -> Conduct[bool]:
-        for expected in ahead:
-            if self._is_late():
-                return False
-            found = yield from self._led_to(expected.frequency_hz)
-            if not is_on_branch(Visit(found.frequency_hz, found.response), expected, self._rule.factor):
-                return False
-        return True
-
     def _led_to(self, frequency_hz: float) -> Conduct[Settled]:
-        moved(self._settler.play, frequency_hz, self._plan.base_level)
+        plan = self._plan
+        yield from glided(self._settler.play, frequency_hz, plan.base_level, plan.glide_step_hz)
         return (yield from self._settler.settled())
 
     def _searched(self, frequency_hz: float) -> Conduct[Visit]:
@@ -127,7 +166,7 @@ class JumpHunt:
         step_s = self._plan.settling.longest_wait_s
         return self._settler.play.elapsed_s + 2 * step_s + self._plan.record_s > self._until_s
 
-    def _say(self, found: LocatedJump, how: str) -> None:
+    def _say(self, found: LocatedJump, how: str, arrived: Side) -> None:
         said = {
             "direction": self._direction,
             "pass": self._number,
@@ -137,5 +176,6 @@ class JumpHunt:
             "response_before": shortened(found.before.response),
             "response_after": shortened(found.after.response),
             "how": how,
+            "arrived": arrived.value,
         }
         self._settler.play.note("jump", json.dumps(said))

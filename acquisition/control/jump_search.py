@@ -1,6 +1,6 @@
 """Finding a jump between two branches by bisection, never measuring a frequency from the wrong side."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import dataclass
 from enum import StrEnum
 from math import log
@@ -78,10 +78,4 @@ def is_on_branch(visit: Visit, expected: Visit, factor: float) -> bool:
 
     The branches differ by ``factor`` at least; half of that, in decibels, tells them apart.
     """
-    return ratio(visit, expected) < factor**0.5
-
-
-def way_back(visited: Sequence[Visit], jumped: Visit) -> tuple[Visit, ...]:
-    """Give the steps of a pass before a jump, newest first: the way to where both branches are one."""
-    earlier = [visit for visit in visited if visit.frequency_hz != jumped.frequency_hz]
-    return tuple(reversed(earlier))
+    return bool(ratio(visit, expected) < factor**0.5)

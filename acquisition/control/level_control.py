@@ -17,7 +17,7 @@ _SURE = 2.0
 _GAIN = 0.8
 """Share of the error, in decibels, that is taken out at once: the specimen answers a change slowly."""
 _BATCHES = 8
-"""Stretches whose scatter gives the uncertainty of a mean; consecutive periods of chaos are not independent."""
+"""Stretches whose scatter gives the uncertainty of a mean: single periods of chaos are not independent."""
 
 
 class Held(StrEnum):

@@ -5,10 +5,6 @@ from math import hypot
 
 import numpy as np
 
-FIRST_STEP = 0.004
-"""Share of the frequency by which the second try lies beside the first; the sharpest mode is 0.012 wide."""
-_WIDEST_STEP = 0.02
-"""Share of the frequency that one step takes at most while the resonance is not bracketed."""
 _NEAR_DEG = 35.0
 """Errors up to this are on the straight part of the phase: its slope is taken from them."""
 _FEWEST = 2
@@ -39,13 +35,15 @@ class PhaseSearch:
 
     low_hz: float
     high_hz: float
+    widest_step_hz: float
+    """What one step takes at most while the resonance is not bracketed [Hz]."""
     tries: list[PhaseError] = field(default_factory=list)
 
     def next_hz(self) -> float:
         """Give the next frequency to try, after at least one."""
         last = self.tries[-1]
         if len(self.tries) == 1:
-            step_hz = FIRST_STEP * last.frequency_hz
+            step_hz = 0.5 * self.widest_step_hz
             return self._bounded(last.frequency_hz + (step_hz if last.error_deg > 0 else -step_hz))
         below = [each for each in self.tries if each.error_deg > 0]
         above = [each for each in self.tries if each.error_deg <= 0]
@@ -83,7 +81,7 @@ class PhaseSearch:
 
     def _outwards(self, last: PhaseError) -> float:
         before = self.tries[-2]
-        widest_hz = _WIDEST_STEP * last.frequency_hz
+        widest_hz = self.widest_step_hz
         rise = last.frequency_hz - before.frequency_hz
         slope = (last.error_deg - before.error_deg) / rise if rise else 0.0
         step_hz = -last.error_deg / slope if slope < 0 else (widest_hz if last.error_deg > 0 else -widest_hz)

@@ -40,7 +40,7 @@ def track_resonance(play: SinePlay, plan: ResonanceTracking) -> Conduct[None]:
 def _tracked(play: SinePlay, plan: ResonanceTracking, number: int, start_hz: float) -> Conduct[float]:
     level = plan.base_level(number)
     settler = Settler(play, plan.settling, level)
-    search = PhaseSearch(plan.low_hz, plan.high_hz)
+    search = PhaseSearch(plan.low_hz, plan.high_hz, plan.widest_step_hz)
     frequency_hz, lock = start_hz, Lock.LOST
     found: Settled
     for _ in range(plan.most_tries):

@@ -48,6 +48,7 @@ class Settled:
             "waited_s": round(self.waited_s, 3),
             # Too few periods for a figure: as wide as the motion itself.
             "scatter": shortened(found.scatter) if isfinite(found.scatter) else 1.0,
+            "noise": shortened(found.noise) if isfinite(found.noise) else 0.0,
             "setting_vpp": shortened(self.setting_vpp),
             "base_m_per_s2": shortened(self.base.amplitude),
             "base_u": shortened(self.base.uncertainty),
@@ -118,7 +119,7 @@ class Settler:
             drive_hz=play.drive_hz,
             setting_vpp=play.played.setting_vpp,
             waited_s=waited_s,
-            judgement=judged(periods.response, self.rule),
+            judgement=judged(periods.response, self.rule, play.noise),
             base=measured,
             held=self.held(measured),
             transmissibility=play.ears.transmissibility(newest.base, newest.response[:, 1], play.drive_hz),

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from ..excitation.settled_sine import STEP_LABEL, SettledSine
 from ..excitation.steps import Segment
 from .jump_conductor import JumpHunt
-from .jump_search import Visit, ratio
+from .jump_search import Side, Visit, ratio
 from .move import Conduct
 from .record import recorded
 from .settle import Settler
 from .sine_play import SinePlay
-from .start import moved, started
+from .start import glided, started
 
 
 def step_settled(play: SinePlay, plan: SettledSine) -> Conduct[None]:
@@ -49,15 +49,17 @@ class Pass:
             if search is not None and has_jumped and searched < search.most_jumps:
                 searched += 1
                 hunt = JumpHunt(self._settler, self._plan, self._direction, self._number)
-                if (yield from hunt.localised(visited, visit)):
+                arrival = yield from hunt.localised(visited, visit)
+                if arrival.is_jump and arrival.branch is Side.AFTER:
                     self._branch += 1
                     visited = []
+                visit = arrival.visit
             visited.append(visit)
             came_from = f"{frequency_hz:g} Hz"
 
     def _stepped(self, frequency_hz: float, came_from: str) -> Conduct[Visit]:
         settler = self._settler
-        moved(settler.play, frequency_hz, self._plan.base_level)
+        yield from glided(settler.play, frequency_hz, self._plan.base_level, self._plan.glide_step_hz)
         found = yield from settler.settled()
         segment = Segment(
             STEP_LABEL,

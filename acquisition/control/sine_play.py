@@ -3,15 +3,17 @@
 from collections.abc import Generator
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..excitation.plan import LOWEST_AMPLITUDE_VPP
 from ..excitation.steps import Segment, Tone
 from ..plan.measurement import Measurement
+from ..plan.needed_setting import needed_vpp
 from ..rig.configuration import Rig
-from ..run.schedule import Phase, ramp
+from ..run.schedule import HUSH_S, Phase, ramp
 from ..run.state import RunState
 from .ears import Ears
 from .move import Conduct, Heard, Move, Note
-from ..plan.needed_setting import needed_vpp
 from .stroboscope import Periods, Stroboscope
 
 
@@ -30,6 +32,7 @@ class SinePlay:
         self._measurement = measurement
         self._notes: list[Note] = []
         self._scope: Stroboscope
+        self._silence = np.zeros(0)
         self.ears = ears
         self.rig = rig
         self.most_vpp = measurement.excitation.amplitude_vpp
@@ -47,6 +50,18 @@ class SinePlay:
     def drive_hz(self) -> float:
         """Frequency of the drive in the converter's time [Hz]."""
         return self._scope.clock.frequency_hz
+
+    @property
+    def noise(self) -> float:
+        """Rms of the response channel's own noise, in the orders seen at the frequency of now [m/s]."""
+        return Stroboscope.noise_of(self._silence, self.played.frequency_hz, self.ears.sample_rate_hz)
+
+    def hush(self) -> Conduct[None]:
+        """Listen to silence: what the response shows then is noise."""
+        heard = yield from self._move(Phase(RunState.ARMED, None, HUSH_S))
+        _, _, response = self.ears.rows(heard)
+        # The first half lets the bench check ring out.
+        self._silence = response[len(response) // 2 :]
 
     def change(self, frequency_hz: float, setting_vpp: float) -> None:
         """Play something else from the next move on."""

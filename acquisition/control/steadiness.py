@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from math import sqrt
+from math import hypot, sqrt
 
 import numpy as np
 from scipy.stats import kendalltau
@@ -20,6 +20,8 @@ _BLOCKS = 12
 """Stretches that a stationarity test compares."""
 _SIGNIFICANCE = 0.01 / 8
 """Of one test; eight statistics are tested, so that a steady motion fails once in a hundred times."""
+_NOISE_MARGIN = 1.5
+"""The noise of a channel is taken that much larger than it was in silence."""
 _SLOWEST = 0.9
 """Largest ratio of two changes that is extrapolated; slower ones count ninefold."""
 
@@ -44,36 +46,43 @@ class Judgement:
     """Rms distance of the points from their means, at that period (or at period 1)."""
     scatter_u: float
     """Standard uncertainty of it."""
+    noise: float
+    """What the channel's own noise makes of the scatter; nothing smaller can be seen."""
     remaining: float
     """How far the means have still to go, extrapolated; for an aperiodic motion how far they went."""
 
 
-def judged(points: Phasors, rule: Settling) -> Judgement:
+def judged(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
     """Judge the newest periods of a motion.
 
     Parameters
     ----------
     points
         Fourier coefficients of each drive period, shape (periods, orders).
+    noise
+        Rms of them in silence, all orders together; unit of the points.
 
     """
-    unsettled = Judgement(Steadiness.UNSETTLED, 0, float("nan"), float("nan"), float("nan"))
+    unknown = float("nan")
+    unsettled = Judgement(Steadiness.UNSETTLED, 0, unknown, unknown, unknown, unknown)
     for period in range(1, rule.longest_period + 1):
         shortest = _THIRDS * _FEWEST_TURNS * period
         window = -(-max(rule.periods, shortest) // (_THIRDS * period)) * _THIRDS * period
         if len(points) < window:
             break
-        figures = _clustered(points[-window:], period)
+        figures = _clustered(points[-window:], period, noise)
+        if period > 1 and not _differ(points[-window:], period, _allowed(figures, rule.tolerance)):
+            continue
         if period == 1:
             unsettled = replace(figures, steadiness=Steadiness.UNSETTLED, period=0)
         if _repeats(figures, rule.tolerance):
             return figures
-    if len(points) >= rule.aperiodic_periods and unsettled.scatter > rule.tolerance:
+    if len(points) >= rule.aperiodic_periods and unsettled.scatter > _allowed(unsettled, rule.tolerance):
         return _stationary(points[-rule.aperiodic_periods :], unsettled)
     return unsettled
 
 
-def _clustered(points: Phasors, period: int) -> Judgement:
+def _clustered(points: Phasors, period: int, noise: float) -> Judgement:
     """Measure the clusters that points make which lie a whole number of ``period`` apart."""
     turns = len(points) // period
     clusters = points.reshape(turns, period, -1)
@@ -91,12 +100,21 @@ def _clustered(points: Phasors, period: int) -> Judgement:
         period,
         scatter,
         scatter / sqrt(2 * freedom),
+        noise / size,
         _remaining(early, late, by_chance),
     )
 
 
+def _differ(points: Phasors, period: int, allowed: float) -> bool:
+    """Whether the clusters of a longer period lie further apart than one cluster may be wide."""
+    centres = points.reshape(-1, period, points.shape[1]).mean(axis=0)
+    away = centres - centres.mean(axis=0)
+    size = float(np.mean(np.sum(np.abs(points) ** 2, axis=1)))
+    return sqrt(float(np.sum(np.abs(away) ** 2)) / period / size) > allowed
+
+
 def _remaining(early: float, late: float, by_chance: float) -> float:
-    """Extrapolate two changes of a mean as a geometric series; a change that noise explains stays what it is."""
+    """Extrapolate two changes of a mean as a geometric series, unless chance explains the last one."""
     if late <= _SURE * by_chance:
         return late
     ratio = min(late / early, _SLOWEST) if early > 0 else _SLOWEST
@@ -104,7 +122,14 @@ def _remaining(early: float, late: float, by_chance: float) -> float:
 
 
 def _repeats(figures: Judgement, tolerance: float) -> bool:
-    return figures.scatter + _SURE * figures.scatter_u <= tolerance and figures.remaining <= tolerance
+    allowed = _allowed(figures, tolerance)
+    # The means of thirds differ by chance as well; noise is allowed to them as far as it explains that.
+    return figures.scatter + _SURE * figures.scatter_u <= allowed and figures.remaining <= allowed
+
+
+def _allowed(figures: Judgement, tolerance: float) -> float:
+    """Give the scatter up to which a motion repeats as far as can be seen."""
+    return hypot(tolerance, _NOISE_MARGIN * figures.noise)
 
 
 def _stationary(points: Phasors, found: Judgement) -> Judgement:
@@ -120,7 +145,7 @@ def _stationary(points: Phasors, found: Judgement) -> Judgement:
     size = sqrt(float(np.mean(np.sum(np.abs(points) ** 2, axis=1))))
     went = abs(fundamental[_BLOCKS // 2 :].mean() - fundamental[: _BLOCKS // 2].mean()) / size
     steadiness = Steadiness.APERIODIC if keeps_still else Steadiness.UNSETTLED
-    return Judgement(steadiness, 0, found.scatter, found.scatter_u, float(went))
+    return Judgement(steadiness, 0, found.scatter, found.scatter_u, found.noise, float(went))
 
 
 def _has_no_trend(figure: Samples) -> bool:

@@ -76,6 +76,18 @@ class Stroboscope:
         self._base.clear()
         self._response.clear()
 
+    @staticmethod
+    def noise_of(signal: Samples, frequency_hz: float, sample_rate_hz: float) -> float:
+        """Give the rms that a channel in silence, shape (samples,), shows in the orders of a frequency."""
+        turns = frequency_hz / sample_rate_hz
+        count = int((len(signal) - 1) * turns)
+        if count < 1:
+            return 0.0
+        coefficients = _orders(signal, np.arange(count + 1) / turns, turns, ORDERS)
+        away = coefficients[:, 1:]
+        mean = coefficients[:, 0] - coefficients[:, 0].mean()
+        return float(np.sqrt(np.mean(np.sum(np.abs(away) ** 2, axis=1) + np.abs(mean) ** 2)))
+
     def _keep_from(self, start_s: float) -> None:
         self._begun_s = start_s
         # A sample more than needed: the phase of the next block may shift the start a little to the left.

@@ -42,6 +42,8 @@ class ResonanceTracking(AbstractFeedback):
     """How far the measured level may lie from its own, as a share."""
     settling: Settling = Settling()
     """When a motion counts as settled."""
+    widest_step_hz: PositiveFloat = 1.0
+    """Longest step of the search; shorter than from the resonance to the antiresonance beside it [Hz]."""
     most_tries: int = Field(default=25, ge=3, le=200)
     """How many frequencies are tried for one level."""
     record_s: PositiveFloat = 1.0
@@ -72,7 +74,7 @@ class ResonanceTracking(AbstractFeedback):
         return BaseLevel(motion=self.motion, amplitude=self.levels[number], tolerance=self.level_tolerance)
 
     def segment(self, number: int, frequency_hz: float) -> Segment:
-        """What the recording on the resonance of a level is called."""
+        """Name the recording on the resonance of a level."""
         return Segment(
             RESONANCE_LABEL, {"level": number, "frequency_hz": frequency_hz, "base": self.levels[number]}
         )
@@ -83,7 +85,7 @@ class ResonanceTracking(AbstractFeedback):
             yield Step(Tone(self.start_hz), 0.0, self.record_s, self.segment(number, self.start_hz))
 
     def loudest_steps(self) -> Iterator[Step]:
-        """The largest setting at both ends of the range and inside it, a hertz apart or less."""
+        """List the largest setting at both ends of the range and inside it, a hertz apart or less."""
         count = int(self.high_hz - self.low_hz) + 2
         for number in range(count):
             frequency_hz = self.low_hz + (self.high_hz - self.low_hz) * number / (count - 1)

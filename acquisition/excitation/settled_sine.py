@@ -3,16 +3,18 @@
 from collections.abc import Iterator
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, PositiveFloat
 
 from .feedback import BaseLevel, JumpSearch, Settling
 from .plan import AbstractFeedback
 from .preview import Preview, preview_of
-from .steps import Segment, Step, Tone
 from .stepped_sine import FrequencySteps
+from .steps import Segment, Step, Tone
 
 STEP_LABEL = "step"
 """Segment of a frequency of the list."""
+GLIDE_TONE_S = 0.1
+"""Time at each tone that is only passed on the way to the next frequency [s]."""
 SEARCH_LABEL = "search"
 """Segment of a frequency that was added to localise a jump."""
 
@@ -30,6 +32,8 @@ class SettledSine(FrequencySteps, AbstractFeedback):
     """Level of the base to be held; without it ``amplitude_vpp`` is played as it is."""
     jumps: JumpSearch | None = None
     """Look for jumps between steps, and localise them; without it they are only crossed."""
+    glide_step_hz: PositiveFloat = 0.5
+    """On its way from one frequency to the next the tone takes no larger steps than this [Hz]."""
     search_s: float = Field(default=180.0, gt=0, le=7200)
     """Longest time spent on one jump; what is bracketed by then is kept [s]."""
 
@@ -37,9 +41,10 @@ class SettledSine(FrequencySteps, AbstractFeedback):
     def playing_s(self) -> float:
         """All steps with the longest waits, and all searches [s]."""
         passes = sum(1 for _ in self.passes())
-        steps_s = passes * len(self.rising_hz) * (self.settling.longest_wait_s + self.record_s)
-        searches = 0 if self.jumps is None else passes * self.jumps.most_jumps
-        return steps_s + searches * self.search_s
+        steps_s = len(self.rising_hz) * (self.settling.longest_wait_s + self.record_s)
+        glides = (self.rising_hz[-1] - self.rising_hz[0]) / self.glide_step_hz + len(self.rising_hz)
+        searches = 0 if self.jumps is None else self.jumps.most_jumps
+        return passes * (steps_s + glides * GLIDE_TONE_S + searches * self.search_s)
 
     def steps(self) -> Iterator[Step]:
         """One step for every frequency of the list, without its wait, at the largest setting."""

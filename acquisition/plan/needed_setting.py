@@ -5,7 +5,7 @@ from ..rig.model import Quantity, RigModel
 
 
 def needed_vpp(rig: Rig, acceleration: float, frequency_hz: float) -> float:
-    """Setting, peak to peak [V], at which the base's acceleration has an amplitude [m/s2].
+    """Give the setting, peak to peak [V], at which the base's acceleration has an amplitude [m/s2].
 
     The specimen is not in the model: where it pushes back, more or less is needed.
     """

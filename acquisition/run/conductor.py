@@ -22,7 +22,7 @@ def conductor_for(bench: RunBench, measurement: Measurement) -> Conduct[None] | 
         return None
     if player_of(measurement, bench.rig) is Player.OUTPUT:
         raise ConfigurationError(
-            f"{measurement.excitation.kind} decides while it plays, and an analogue output is written ahead of "
-            "its time. Nothing was played; let daq.output play streams only, and connect the function generator"
+            f"{measurement.name} is decided while it plays, and an analogue output is written ahead of its "
+            "time. Nothing was played; let daq.output play streams only, and connect the function generator"
         )
     return conduct(measurement, bench.rig, bench.channels, bench.digitizer.sample_rate_hz)

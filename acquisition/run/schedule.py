@@ -20,6 +20,8 @@ CHECK_QUIET_S = 0.1
 CHECK_SETTLE_S = 0.2
 CHECK_LISTEN_S = 0.3
 """How long the check measures: 48 periods [s]."""
+HUSH_S = 1.0
+"""Silence before the first ramp of a measurement with feedback: what is heard then is noise [s]."""
 CHECK_S = CHECK_QUIET_S + CHECK_SETTLE_S + CHECK_LISTEN_S
 
 
@@ -100,7 +102,7 @@ def duration_s(measurement: Measurement) -> float:
     With feedback it is the longest that it may take.
     """
     if isinstance(measurement.excitation, AbstractFeedback):
-        return 2 * measurement.ramp_s + measurement.excitation.playing_s
+        return HUSH_S + 2 * measurement.ramp_s + measurement.excitation.playing_s
     return sum(phase.duration_s for phase in phases(measurement))
 
 
