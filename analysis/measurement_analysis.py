@@ -5,8 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.excitation.dwell import Dwell
+from acquisition.excitation.held_dwell import HeldDwell
+from acquisition.excitation.held_sweep import HeldSweep
 from acquisition.excitation.multisine_noise import MultisineNoise
 from acquisition.excitation.odd_multisine import OddMultisine
+from acquisition.excitation.resonance_tracking import ResonanceTracking
+from acquisition.excitation.settled_sine import SettledSine
 from acquisition.excitation.sine_sweep import SineSweep
 from acquisition.excitation.stepped_sine import SteppedSine
 from acquisition.excitation.streamed_noise import StreamedNoise
@@ -25,7 +29,7 @@ from .noise_response import DEFAULT_REQUEST, Noise, NoiseResponse, noise_respons
 from .recorded_channels import Channels, RecordedChannels, only_stretch, read_whole
 from .recording_facts import RecordingFacts, recording_facts, specimen_of
 from .spectrogram import Spectrogram, SpectrogramSums
-from .stepped_response import SteppedResponse, stepped_response
+from .stepped_response import SteppedResponse, Steps, stepped_response
 from .sweep import SweepResponse, SweepSums
 from .terminal_level import TerminalLevel, terminal_levels
 from .watcher import Unwatched, WatchedChannels, Watcher
@@ -61,7 +65,7 @@ class SweepAnalysis:
 
     facts: RecordingFacts
     checks: tuple[Check, ...]
-    excitation: SineSweep
+    excitation: SineSweep | HeldSweep
     response: SweepResponse
     collisions: Collisions
     jumps: tuple[Jump, ...]
@@ -76,7 +80,7 @@ class DwellAnalysis:
 
     facts: RecordingFacts
     checks: tuple[Check, ...]
-    excitation: Dwell
+    excitation: Dwell | HeldDwell
     response: DwellResponse
     displacement: Envelope
     """x over the dwell [m], without the ends that integration disturbs."""
@@ -92,7 +96,7 @@ class SteppedSineAnalysis:
 
     facts: RecordingFacts
     checks: tuple[Check, ...]
-    excitation: SteppedSine
+    excitation: Steps
     response: SteppedResponse
 
 
@@ -136,19 +140,19 @@ def _analysed(facts: RecordingFacts, channels: Channels, request: NoiseRequest) 
     match facts.measurement.excitation:
         case MultisineNoise() | OddMultisine() | StreamedNoise() as noise:
             return NoiseAnalysis(facts, checks, noise, noise_response(channels, noise, request), request)
-        case SineSweep() as sweep:
+        case SineSweep() | HeldSweep() as sweep:
             response, picture = measured_sweep(channels, sweep)
             colliding = collisions(response)
             return SweepAnalysis(
                 facts, checks, sweep, response, colliding, smooth_jumps(response, colliding), picture
             )
-        case Dwell() as dwell:
+        case Dwell() | HeldDwell() as dwell:
             towards_hz = bound_frequencies_hz(facts)
             found = measured_dwell(channels, dwell, towards_hz)
             terminal = terminal_levels(found, towards_hz)
             motion = dwell_motion(channels, found)
             return DwellAnalysis(facts, checks, dwell, found, settled_envelope(found), terminal, motion)
-        case SteppedSine() as stepped:
+        case SteppedSine() | SettledSine() | ResonanceTracking() as stepped:
             return SteppedSineAnalysis(facts, checks, stepped, stepped_response(channels, stepped))
 
 
@@ -162,7 +166,7 @@ def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, 
     return jumps(response.time_s, response.frequency_hz, response.response_ii, ~colliding.is_colliding)
 
 
-def measured_sweep(channels: Channels, sweep: SineSweep) -> tuple[SweepResponse, Spectrogram]:
+def measured_sweep(channels: Channels, sweep: SineSweep | HeldSweep) -> tuple[SweepResponse, Spectrogram]:
     """Analyse what there is of a sweep, whichever way it ran, and picture its velocity."""
     stretch = only_stretch(channels, "sweep")
     ends = sorted((sweep.start_hz, sweep.stop_hz))
@@ -184,7 +188,9 @@ def measured_sweep(channels: Channels, sweep: SineSweep) -> tuple[SweepResponse,
     return sums.response(delay_s=channels.response_delay_s), picture.spectrogram()
 
 
-def measured_dwell(channels: Channels, dwell: Dwell, towards_hz: tuple[float, ...]) -> DwellResponse:
+def measured_dwell(
+    channels: Channels, dwell: Dwell | HeldDwell, towards_hz: tuple[float, ...]
+) -> DwellResponse:
     """Analyse the last 5 s of a dwell, or what there is of them."""
     stretch = only_stretch(channels, "dwell")
     drive, base, response = read_whole(channels, stretch)

@@ -31,7 +31,7 @@ from .prediction import Prediction, paper_amplitude_m, predicted
 from .recorded_channels import RecordedChannels
 from .recording_facts import specimen_of
 from .simulated_channels import SimulatedChannels, SimulatedSpecimen, played_impacts, simulated_specimen
-from .stepped_response import SteppedResponse, stepped_response
+from .stepped_response import SteppedResponse, step_label, stepped_response
 from .sweep import SweepResponse
 from .terminal_level import TerminalLevel, terminal_levels
 
@@ -269,7 +269,7 @@ def _stepped(analysis: SteppedSineAnalysis, channels: SimulatedChannels) -> Step
     response = stepped_response(channels, analysis.excitation)
     measured = analysis.response
     return SteppedSineOverlay(
-        run=_run(channels, "step"),
+        run=_run(channels, step_label(analysis.excitation)),
         response=response,
         difference=logarithmic_difference(
             measured.frequency_hz,

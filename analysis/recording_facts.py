@@ -14,6 +14,7 @@ from sim.specimen import Specimen, gong2025
 
 from .channel_levels import ChannelLevel, OnRead, channel_levels, ignore_reading
 from .errors import UnusableData
+from .feedback_notes import FeedbackNote, feedback_notes
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +47,8 @@ class RecordingFacts:
     """What the check of the bench found before the run; empty when it was left out."""
     bench_check: Mapping[str, Any]
     """The last check of the whole bench before it, as the recording has it; may be empty."""
+    feedback: tuple[FeedbackNote, ...] = ()
+    """What a measurement with feedback found while it ran; empty for any other."""
 
     @property
     def is_simulated(self) -> bool:
@@ -101,6 +104,7 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
         whole_stretches=sum(each.is_complete for each in played),
         check=" ".join(each.text for each in recording.events if each.kind == "check"),
         bench_check=recording.bench_check,
+        feedback=feedback_notes(recording),
     )
 
 

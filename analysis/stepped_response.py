@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from acquisition.excitation.resonance_tracking import RESONANCE_LABEL, ResonanceTracking
+from acquisition.excitation.settled_sine import STEP_LABEL, SettledSine
 from acquisition.excitation.stepped_sine import SteppedSine
 
 from .arrays import Reals
@@ -11,6 +13,8 @@ from .dwell import DwellResponse, dwell_response
 from .errors import NotEnoughData
 from .recorded_channels import Channels, Stretch
 
+Steps = SteppedSine | SettledSine | ResonanceTracking
+"""What is recorded frequency by frequency."""
 _EDGE_PERIODS = 60.0
 """Drive periods that integration disturbs at each end; read beyond the step, where there is more."""
 
@@ -33,7 +37,7 @@ class SteppedResponse:
     """Steps that were cut short or lost samples."""
 
 
-def stepped_response(channels: Channels, plan: SteppedSine) -> SteppedResponse:
+def stepped_response(channels: Channels, plan: Steps) -> SteppedResponse:
     """Analyse every whole step as a dwell of its own.
 
     Raises
@@ -42,7 +46,7 @@ def stepped_response(channels: Channels, plan: SteppedSine) -> SteppedResponse:
         When no step was recorded whole.
 
     """
-    stretches = channels.stretches("step")
+    stretches = channels.stretches(step_label(plan))
     whole = [each for each in stretches if each.is_complete]
     pairs = [(each, found) for each in whole if (found := _step(channels, each, plan)) is not None]
     if not pairs:
@@ -64,7 +68,12 @@ def stepped_response(channels: Channels, plan: SteppedSine) -> SteppedResponse:
     )
 
 
-def _step(channels: Channels, stretch: Stretch, plan: SteppedSine) -> DwellResponse | None:
+def step_label(plan: Steps) -> str:
+    """Say what the segments of a plan's steps are called."""
+    return RESONANCE_LABEL if isinstance(plan, ResonanceTracking) else STEP_LABEL
+
+
+def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | None:
     near_hz = float(stretch.numbers["frequency_hz"])
     rate = channels.sample_rate_hz
     edge = int(np.ceil(_EDGE_PERIODS / near_hz * rate)) + 1

@@ -76,6 +76,7 @@ def _facts(facts: RecordingFacts) -> Json:
         "excitation": facts.measurement.excitation.model_dump(mode="json"),
         "overload_s": dict(facts.overload_s),
         "lost_samples": facts.lost_samples,
+        "feedback": [{"kind": each.kind, "time_s": each.time_s, **each.numbers} for each in facts.feedback],
     }
 
 

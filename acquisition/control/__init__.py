@@ -1,1 +1,1 @@
-"""Steps that depend on what was measured: clocks, settling, level, jumps, resonances, and who conducts them."""
+"""Steps that depend on what was measured: clocks, settling, levels, jumps, resonances, conductors."""

@@ -46,7 +46,7 @@ class DriveClock:
         self._draw_line()
 
     def starts_s(self, first_s: float, last_s: float) -> Samples:
-        """Times between two times at which the drive passes zero upwards, shape (periods + 1,) [s]."""
+        """Give the times between two times at which the drive rises through zero [s]."""
         first = np.ceil(self.frequency_hz * first_s + self.phase_cycles - 1e-6)
         last = np.floor(self.frequency_hz * last_s + self.phase_cycles)
         return np.asarray((np.arange(first, last + 1) - self.phase_cycles) / self.frequency_hz)

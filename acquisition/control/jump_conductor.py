@@ -87,8 +87,9 @@ class JumpHunt:
         is_jump = found.is_jump(self._rule.factor)
         end = yield from self._led_to(after.frequency_hz)
         visit = Visit(end.frequency_hz, end.response)
-        branch = side(visit, found.before, found.after) if is_jump else Side.AFTER
-        self._say(found, why if is_jump else "steep, but no jump", branch)
+        has_arrived = is_on_branch(visit, after, self._rule.factor)
+        branch = Side.AFTER if has_arrived or not is_jump else Side.BEFORE
+        self._say(found, why, branch)
         return Arrival(visit, branch, is_jump)
 
     def _bisected(self, hunted: _Hunted) -> Conduct[tuple[LocatedJump, str]]:
@@ -99,7 +100,7 @@ class JumpHunt:
         return hunted.bracket, "the motion jumped somewhere else each time"
 
     def _halved(self, hunted: _Hunted) -> Conduct[tuple[LocatedJump, str] | None]:
-        """Halve the bracket to its end; None when the motion left its branch earlier, which is a new bracket."""
+        """Halve the bracket to its end; None when the motion left its branch earlier: a new bracket."""
         seek = located(hunted.branch[-1], hunted.after, self._rule.resolution_hz)
         try:
             frequency_hz = next(seek)
@@ -114,12 +115,14 @@ class JumpHunt:
                     return hunted.bracket, "the time for the search was over"
                 visit = yield from self._searched(frequency_hz)
                 hunted.narrow(visit)
+                if not hunted.bracket.is_jump(self._rule.factor):
+                    return hunted.bracket, "steep, but no jump"
                 frequency_hz = seek.send(visit)
         except StopIteration:
             return hunted.bracket, "localised"
 
     def _led_back(self, hunted: _Hunted) -> Conduct[_Return]:
-        """Go back along the pass until the responses of its branch are found again, then forward to its end."""
+        """Go back along the pass until its branch is found again, then forward to the branch's end."""
         place = yield from self._rejoined(hunted.branch)
         if place is None:
             return _Return.NOT_FOUND

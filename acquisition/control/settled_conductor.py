@@ -46,7 +46,7 @@ class Pass:
         for frequency_hz in frequencies_hz:
             visit = yield from self._stepped(frequency_hz, came_from)
             has_jumped = search is not None and visited and ratio(visited[-1], visit) > search.factor
-            if search is not None and has_jumped and searched < search.most_jumps:
+            if search is not None and has_jumped and searched < search.most_searches:
                 searched += 1
                 hunt = JumpHunt(self._settler, self._plan, self._direction, self._number)
                 arrival = yield from hunt.localised(visited, visit)

@@ -150,6 +150,8 @@ def _stationary(points: Phasors, found: Judgement) -> Judgement:
 
 def _has_no_trend(figure: Samples) -> bool:
     """Kendall's rank correlation with time (the reverse-arrangements test of Bendat and Piersol)."""
+    if float(np.ptp(figure)) == 0.0:
+        return True
     return float(kendalltau(np.arange(len(figure)), figure).pvalue) > _SIGNIFICANCE
 
 

@@ -87,5 +87,5 @@ class JumpSearch(FrozenModel):
     """A change of Response II (fundamental of m0 over the base's) by more than this is a jump."""
     resolution_hz: PositiveFloat = 0.25
     """The two frequencies around a jump are brought this close together [Hz]."""
-    most_jumps: int = Field(default=3, ge=1, le=20)
-    """How many jumps of one pass are looked into."""
+    most_searches: int = Field(default=6, ge=1, le=50)
+    """How many changes of one pass are looked into; some may prove to be steep only."""

@@ -34,7 +34,7 @@ class SettledSine(FrequencySteps, AbstractFeedback):
     """Look for jumps between steps, and localise them; without it they are only crossed."""
     glide_step_hz: PositiveFloat = 0.5
     """On its way from one frequency to the next the tone takes no larger steps than this [Hz]."""
-    search_s: float = Field(default=180.0, gt=0, le=7200)
+    search_s: float = Field(default=120.0, gt=0, le=7200)
     """Longest time spent on one jump; what is bracketed by then is kept [s]."""
 
     @property
@@ -43,7 +43,7 @@ class SettledSine(FrequencySteps, AbstractFeedback):
         passes = sum(1 for _ in self.passes())
         steps_s = len(self.rising_hz) * (self.settling.longest_wait_s + self.record_s)
         glides = (self.rising_hz[-1] - self.rising_hz[0]) / self.glide_step_hz + len(self.rising_hz)
-        searches = 0 if self.jumps is None else self.jumps.most_jumps
+        searches = 0 if self.jumps is None else self.jumps.most_searches
         return passes * (steps_s + glides * GLIDE_TONE_S + searches * self.search_s)
 
     def steps(self) -> Iterator[Step]:

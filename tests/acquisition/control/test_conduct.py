@@ -1,0 +1,189 @@
+"""Measurements that listen: a bistable oscillator whose folds and resonance are known in closed form."""
+
+import json
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from acquisition.excitation.feedback import BaseLevel, JumpSearch, Settling
+from acquisition.excitation.held_dwell import HeldDwell
+from acquisition.excitation.held_sweep import HeldSweep
+from acquisition.excitation.resonance_tracking import ResonanceTracking
+from acquisition.excitation.settled_sine import SettledSine
+from acquisition.excitation.stepped_sine import Direction, FrequencyGrid
+from acquisition.plan.measurement import Measurement
+from acquisition.run.schedule import duration_s
+
+HARDENING = 3e12
+LEVEL = 0.6
+SETTLING = Settling(longest_wait_s=6)
+
+
+def said(bench, kind):
+    return [json.loads(text) for _, each, text in bench.notes if each == kind]
+
+
+def folds_hz(oscillator, acceleration):
+    """Ends of the range with three steady amplitudes: where a sweep down, and one up, must jump."""
+    grid = np.arange(118, 150, 0.005)
+    three = [f for f in grid if len(oscillator.steady_amplitudes(f, acceleration)) == 3]
+    return three[0], three[-1]
+
+
+@pytest.fixture(scope="module")
+def both_ways(request):
+    """One measurement up and down through the bistable range, shared by what is asked of it."""
+    return {}
+
+
+@pytest.fixture
+def swept(new_control_bench, both_ways):
+    if not both_ways:
+        bench = new_control_bench(hardening=HARDENING)
+        plan = SettledSine(
+            amplitude_vpp=1.0,
+            grid=FrequencyGrid(start_hz=116, stop_hz=132, step_hz=2),
+            direction=Direction.UP_THEN_DOWN,
+            record_s=0.3,
+            settling=SETTLING,
+            base_level=BaseLevel(amplitude=LEVEL),
+            jumps=JumpSearch(factor=1.5, resolution_hz=0.25),
+        )
+        measurement = Measurement(name="swept", excitation=plan, ramp_s=0.2)
+        bench.carry_out(measurement)
+        both_ways["bench"], both_ways["measurement"] = bench, measurement
+    return both_ways["bench"]
+
+
+def test_jumps_up_and_down_are_bracketed_around_the_folds(swept):
+    jumps = {each["direction"]: each for each in said(swept, "jump") if each["how"] == "localised"}
+    lower, upper = folds_hz(swept.oscillator, LEVEL)
+    assert upper - lower > 1.0
+    for direction, fold in (("up", upper), ("down", lower)):
+        found = jumps[direction]
+        low, high = sorted((found["before_hz"], found["after_hz"]))
+        assert high - low <= 0.25
+        # The level is held to 0.75 %, which moves the folds; a step can only shake it over early.
+        assert low - 0.3 <= fold <= high + 0.3
+
+
+def test_every_step_says_its_pass_branch_and_where_it_came_from(swept):
+    steps = [numbers for label, numbers, *_ in swept.segments if label == "step"]
+    assert [each["frequency_hz"] for each in steps] == [*range(116, 133, 2), *range(132, 115, -2)]
+    assert [each["pass"] for each in steps] == [1] * 9 + [2] * 9
+    assert steps[0]["came_from"] == "rest"
+    assert steps[9]["came_from"].startswith("up pass 1")
+    for way in (steps[:9], steps[9:]):
+        branches = [each["branch"] for each in way]
+        assert branches == sorted(branches)
+        assert branches[-1] == 2
+    assert max(len(json.dumps(each)) for each in steps) < 480
+
+
+def test_steps_lie_on_the_branch_that_the_closed_form_has(swept):
+    up = [each for each in said(swept, "achieved") if each["segment"] == "step"][:9]
+    lower, upper = folds_hz(swept.oscillator, LEVEL)
+    for step in up:
+        if lower < step["frequency_hz"] < upper:
+            highest = max(swept.oscillator.steady_amplitudes(step["frequency_hz"], step["base_m_per_s2"]))
+            base_m = step["base_m_per_s2"] / (2 * np.pi * step["frequency_hz"]) ** 2
+            assert step["response_ii"] == pytest.approx(highest / base_m, rel=0.01)
+
+
+def test_it_takes_no_longer_than_planned(swept, both_ways):
+    assert swept.sample / 5120 <= duration_s(both_ways["measurement"])
+
+
+def test_a_level_is_reached_and_held_where_the_shaker_is_not_what_its_model_says(new_control_bench):
+    bench = new_control_bench(shaker_factor=lambda frequency_hz: 0.6 + 0.3 * (frequency_hz > 125))
+    plan = SettledSine(
+        amplitude_vpp=1.0,
+        grid=FrequencyGrid(start_hz=140, stop_hz=160, step_hz=5),
+        record_s=0.3,
+        settling=SETTLING,
+        base_level=BaseLevel(motion="displacement", amplitude=1e-6),
+    )
+    bench.carry_out(Measurement(name="held", excitation=plan, ramp_s=0.2))
+    steps = [each for each in said(bench, "achieved") if each["segment"] == "step"]
+    assert len(steps) == 5
+    for step in steps:
+        target = 1e-6 * (2 * np.pi * step["frequency_hz"]) ** 2
+        assert abs(step["base_m_per_s2"] / target - 1) < 0.01
+        assert step["level"] == "within tolerance"
+        assert step["motion"] == "periodic"
+    loudest = [setting for _, _, setting in bench.settings]
+    assert max(b / a for a, b in pairwise(loudest[2:-1])) <= 1.25 * (1 + 1e-9)
+
+
+def test_a_level_out_of_reach_is_flagged_and_the_plan_s_setting_never_passed(new_control_bench):
+    bench = new_control_bench(shaker_factor=lambda frequency_hz: 0.2)
+    plan = HeldDwell(
+        amplitude_vpp=0.05,
+        frequency_hz=150,
+        base_level=BaseLevel(amplitude=3.0),
+        settling=Settling(longest_wait_s=3),
+        duration_s=2,
+        update_s=0.5,
+    )
+    bench.carry_out(Measurement(name="out", excitation=plan, ramp_s=0.2))
+    looks = said(bench, "level")
+    assert len(looks) == 4
+    assert {each["level"] for each in looks} == {"outside tolerance"}
+    assert max(setting for *_, setting in bench.settings) == pytest.approx(0.05)
+
+
+def test_a_sweep_holds_its_level_over_a_shaker_resonance_and_says_where_not(new_control_bench):
+    bench = new_control_bench(
+        shaker_factor=lambda frequency_hz: 1 + 0.5 / (1 + ((frequency_hz - 150) / 4) ** 2)
+    )
+    plan = HeldSweep(
+        amplitude_vpp=1.0,
+        start_hz=130,
+        stop_hz=170,
+        duration_s=20,
+        base_level=BaseLevel(amplitude=1.0),
+        settling=SETTLING,
+    )
+    bench.carry_out(Measurement(name="sweep", excitation=plan, ramp_s=0.2))
+    achieved = said(bench, "achieved")[-1]
+    assert achieved["steps"] == 200
+    # 0.2 Hz a step over a flank of 9 % per Hz: the step before tells this one to within 2 %.
+    assert achieved["steps_outside"] <= 20
+    for outside in said(bench, "level"):
+        assert 140 < outside["from_hz"] <= outside["to_hz"] < 160
+        assert abs(outside["worst"]) < 0.1
+
+
+def test_a_phase_resonance_is_tracked_along_the_backbone(new_control_bench):
+    bench = new_control_bench(hardening=HARDENING / 20)
+    plan = ResonanceTracking(
+        amplitude_vpp=1.0,
+        start_hz=119,
+        low_hz=110,
+        high_hz=140,
+        levels=(0.1, 0.3, 0.6),
+        phase_tolerance_deg=1,
+        settling=SETTLING,
+    )
+    bench.carry_out(Measurement(name="backbone", excitation=plan, ramp_s=0.2))
+    found = said(bench, "resonance")
+    assert [each["lock"] for each in found] == ["locked"] * 3
+    oscillator = bench.oscillator
+    for each in found:
+        # The resonance of x over the base: detuned by hardening alone, where x lags a quarter period.
+        omega = 2 * np.pi * each["frequency_hz"]
+        x = each["response_ii"] * each["base_m_per_s2"] / omega**2
+        expected = np.sqrt((2 * np.pi * 120) ** 2 + 0.75 * oscillator.hardening * x**2) / (2 * np.pi)
+        assert abs(each["frequency_hz"] - expected) < 3 * each["frequency_u_hz"] + 0.02
+        assert each["frequency_u_hz"] < 0.02
+    assert found[2]["frequency_hz"] > found[0]["frequency_hz"] + 0.05
+
+
+def test_without_a_level_the_plan_s_setting_is_played_from_end_to_end(new_control_bench):
+    bench = new_control_bench()
+    plan = SettledSine(amplitude_vpp=0.3, frequencies_hz=(140, 150), record_s=0.3, settling=SETTLING)
+    bench.carry_out(Measurement(name="open", excitation=plan, ramp_s=0.2))
+    # The first is the silence that is listened to.
+    assert {setting for *_, setting in bench.settings[1:]} == {0.3}
+    assert {each["level"] for each in said(bench, "achieved")} == {"not controlled"}

@@ -1,0 +1,48 @@
+"""Halving the way to a jump, wherever it lies."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.control.jump_search import LocatedJump, Visit, is_on_branch, located
+
+
+def found(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=0.4):
+    """Answer a search by two smooth branches; returns the jump and the frequencies asked for."""
+
+    def response(frequency_hz):
+        is_before = (frequency_hz < jump_hz) == (before_hz < after_hz)
+        return (1.0 if is_before else height) * (1 + 0.01 * abs(frequency_hz - before_hz))
+
+    asked = []
+    search = located(
+        Visit(before_hz, response(before_hz)), Visit(after_hz, response(after_hz)), resolution_hz
+    )
+    try:
+        frequency_hz = next(search)
+        while True:
+            asked.append(frequency_hz)
+            frequency_hz = search.send(Visit(frequency_hz, response(frequency_hz)))
+    except StopIteration as end:
+        return end.value, asked
+
+
+@given(jump_hz=st.floats(100.01, 109.99), resolution_hz=st.floats(0.05, 4.0), height=st.floats(0.1, 0.6))
+def test_the_bracket_holds_the_jump_and_is_as_narrow_as_asked(jump_hz, resolution_hz, height):
+    for ends in ((100.0, 110.0), (110.0, 100.0)):
+        jump, asked = found(jump_hz, resolution_hz, *ends, height)
+        low, high = sorted((jump.before.frequency_hz, jump.after.frequency_hz))
+        assert low - 1e-9 <= jump_hz <= high + 1e-9
+        assert jump.width_hz <= resolution_hz * (1 + 1e-9)
+        assert len(asked) <= 8
+
+
+def test_a_bracket_that_is_narrow_enough_asks_for_nothing():
+    jump, asked = found(105.0, 10.0)
+    assert asked == []
+    assert jump == LocatedJump(jump.before, jump.after)
+
+
+@pytest.mark.parametrize(("response", "expected"), [(1.2, True), (1 / 1.2, True), (1.3, False), (0.6, False)])
+def test_half_the_factor_in_decibels_tells_two_branches_apart(response, expected):
+    assert is_on_branch(Visit(100, response), Visit(100, 1.0), factor=1.5) is expected

@@ -1,0 +1,51 @@
+"""The law that holds a level: converges, keeps its limits, and does not chase chance."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.control.level_control import Held, LevelControl, MeasuredLevel, measured_level
+from acquisition.excitation.feedback import BaseLevel
+
+CONTROL = LevelControl(BaseLevel(amplitude=10.0), most_vpp=5.0)
+
+
+@given(gain=st.floats(3.0, 300.0), start_vpp=st.floats(0.01, 5.0))
+def test_it_converges_on_any_shaker_whose_level_is_within_reach(gain, start_vpp):
+    setting_vpp = start_vpp
+    for _ in range(60):
+        measured = MeasuredLevel(gain * setting_vpp, 0.0)
+        next_vpp = CONTROL.next_vpp(setting_vpp, measured, 10.0)
+        assert max(next_vpp / setting_vpp, setting_vpp / next_vpp) <= 1.25 * (1 + 1e-12)
+        setting_vpp = next_vpp
+    assert MeasuredLevel(gain * setting_vpp, 0.0).held(10.0, 0.025) is Held.WITHIN
+    assert setting_vpp <= 5.0
+
+
+def test_the_plan_s_setting_is_the_end():
+    assert CONTROL.next_vpp(4.9, MeasuredLevel(1.0, 0.0), 10.0) == 5.0
+    assert CONTROL.next_vpp(2.1e-3, MeasuredLevel(100.0, 0.0), 10.0) == 2e-3
+
+
+def test_an_error_that_chance_explains_changes_nothing():
+    assert CONTROL.next_vpp(1.0, MeasuredLevel(9.5, 0.3), 10.0) == 1.0
+    assert CONTROL.next_vpp(1.0, MeasuredLevel(9.5, 0.1), 10.0) > 1.0
+
+
+def test_a_level_s_uncertainty_is_that_of_repetitions_also_when_neighbours_depend_on_each_other():
+    random = np.random.default_rng(3)
+    means, stated = [], []
+    for _ in range(200):
+        white = random.standard_normal(480)
+        correlated = np.convolve(white, np.ones(12) / 12, mode="valid")[:468]
+        found = measured_level((10 + correlated) * np.exp(0.7j))
+        means.append(found.amplitude)
+        stated.append(found.uncertainty)
+    assert np.mean(means) == pytest.approx(10, abs=0.02)
+    assert np.sqrt(np.mean(np.square(stated))) == pytest.approx(np.std(means), rel=0.2)
+
+
+def test_too_few_periods_know_nothing():
+    few = measured_level(np.full(10, 3.0 + 0j))
+    assert few.uncertainty == few.amplitude == 3.0

@@ -1,0 +1,53 @@
+"""Finding a phase resonance on a curve that is known."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from acquisition.control.phase_search import PhaseError, PhaseSearch
+
+
+def error_deg(frequency_hz, natural_hz, damping):
+    """Phase of a base-excited oscillator's relative motion, less minus 90 degrees."""
+    ratio = frequency_hz / natural_hz
+    return float(np.degrees(np.angle(1 / (1 - ratio**2 + 2j * damping * ratio)))) + 90
+
+
+def searched(natural_hz, damping, start_hz, noise_deg=0.0, seed=0):
+    random = np.random.default_rng(seed)
+    search = PhaseSearch(0.5 * natural_hz, 2 * natural_hz, widest_step_hz=0.01 * natural_hz)
+    frequency_hz = start_hz
+    for _ in range(25):
+        error = error_deg(frequency_hz, natural_hz, damping) + noise_deg * random.standard_normal()
+        search.tries.append(PhaseError(frequency_hz, error, noise_deg))
+        if abs(error) < 1 and len(search.tries) > 1:
+            break
+        frequency_hz = search.next_hz()
+    return search
+
+
+@settings(max_examples=60)
+@given(damping=st.floats(0.004, 0.05), start=st.floats(0.93, 1.07))
+def test_it_locks_on_from_either_side_of_sharp_and_broad_modes(damping, start):
+    search = searched(266.0, damping, 266.0 * start)
+    assert abs(search.tries[-1].error_deg) < 1
+    assert search.resonance(0.0).frequency_hz == pytest.approx(266.0, abs=266 * damping * 0.01)
+
+
+def test_the_stated_uncertainty_covers_what_noise_does():
+    found = [searched(266.0, 0.0167, 262.0, noise_deg=0.3, seed=seed).resonance(0.0) for seed in range(200)]
+    away = np.array([each.frequency_hz - 266.0 for each in found])
+    stated = np.array([each.uncertainty_hz for each in found])
+    assert np.mean(np.abs(away) <= 2 * stated) > 0.9
+
+
+def test_the_sensors_phase_widens_the_uncertainty_by_the_slope():
+    search = searched(266.0, 0.0167, 262.0)
+    slope = 2 / (2 * 0.0167 * 266.0) * 180 / np.pi
+    assert search.resonance(0.3).uncertainty_hz == pytest.approx(0.3 / slope, rel=0.15)
+
+
+def test_it_stays_in_its_range():
+    search = PhaseSearch(260.0, 270.0, 4.0, [PhaseError(258.0 + 4, 80.0, 0.1), PhaseError(268.0, 70.0, 0.1)])
+    assert search.next_hz() == 270.0

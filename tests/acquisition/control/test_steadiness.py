@@ -1,0 +1,106 @@
+"""Settled or not, and how: verdicts on motions whose nature is known."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from acquisition.control.steadiness import Steadiness, judged
+from acquisition.excitation.feedback import Settling
+
+RULE = Settling()
+
+
+def points(count, *columns):
+    """Coefficients of ``count`` periods: a unit fundamental, and what else is given for each order."""
+    table = np.zeros((count, 5), np.complex128)
+    table[:, 1] = 1.0
+    for order, values in columns:
+        table[:, order] += values
+    return table
+
+
+def noise(count, share, seed=0):
+    random = np.random.default_rng(seed)
+    return (
+        share * (random.standard_normal((count, 5)) + 1j * random.standard_normal((count, 5))) / np.sqrt(10)
+    )
+
+
+@settings(max_examples=30, deadline=None)
+@given(period=st.integers(1, 8), depth=st.floats(0.05, 0.5), seed=st.integers(0, 99))
+def test_a_motion_that_repeats_after_k_periods_has_period_k(period, depth, seed):
+    pattern = np.random.default_rng(seed).standard_normal(period)
+    pattern[0] = pattern.sum() + 3.0  # no shorter period by chance
+    signal = points(300, (0, depth * np.resize(pattern, 300))) + noise(300, 1e-3)
+    found = judged(signal, RULE)
+    assert (found.steadiness, found.period) == (Steadiness.PERIODIC, period)
+    assert found.scatter < 0.003
+
+
+@pytest.mark.parametrize("periods_of_decay", [20, 70, 200])
+def test_a_dying_transient_is_waited_for_until_it_is_small(periods_of_decay):
+    decay = 0.5 * np.exp(-np.arange(3000) / periods_of_decay)
+    turning = np.exp(0.3j * np.arange(3000))
+    for transient in (decay, decay * turning):
+        first = next(
+            n for n in range(80, 3000, 10) if judged(points(n, (1, transient[:n])), RULE).period == 1
+        )
+        assert abs(decay[first]) < 3 * RULE.tolerance
+
+
+def test_a_transient_is_never_called_aperiodic():
+    count = np.arange(1200)
+    for turn in (0.0, 0.3, 1.9):
+        transient = 2.0 * np.exp(-count / 250 + 1j * turn * count)
+        signal = points(1200, (1, transient))
+        verdicts = {judged(signal[:n], RULE).steadiness for n in range(400, 1200, 40)}
+        assert Steadiness.APERIODIC not in verdicts
+
+
+def chaos(count, seed):
+    """Give the logistic map at 3.9 from a random start."""
+    value = np.empty(count)
+    value[0] = np.random.default_rng(seed).uniform(0.2, 0.8)
+    for place in range(1, count):
+        value[place] = 3.9 * value[place - 1] * (1 - value[place - 1])
+    return value - value.mean()
+
+
+def test_a_stationary_chaotic_motion_is_aperiodic_nineteen_times_of_twenty():
+    verdicts = [judged(points(400, (1, 0.4 * chaos(400, seed))), RULE).steadiness for seed in range(100)]
+    assert verdicts.count(Steadiness.APERIODIC) >= 95
+    assert Steadiness.PERIODIC not in verdicts
+
+
+def test_chaos_that_grows_or_drifts_is_not_settled():
+    growing = np.linspace(0.5, 1.5, 400)
+    for seed in range(10):
+        for motion in (0.4 * growing * chaos(400, seed), 0.4 * chaos(400, seed) + 0.6 * growing):
+            assert judged(points(400, (1, motion)), RULE).steadiness is Steadiness.UNSETTLED
+
+
+def test_a_quasi_periodic_motion_is_aperiodic():
+    golden = 2 * np.pi * (np.sqrt(5) - 1) / 2
+    found = judged(points(600, (1, 0.2 * np.exp(1j * golden * np.arange(600)))), RULE)
+    assert found.steadiness is Steadiness.APERIODIC
+
+
+def test_noise_of_the_channel_is_not_taken_for_chaos():
+    loud = points(600) + noise(600, 0.05)
+    assert judged(loud, RULE).steadiness is Steadiness.APERIODIC
+    found = judged(loud, RULE, noise=0.05)
+    assert (found.steadiness, found.period) == (Steadiness.PERIODIC, 1)
+    assert found.noise == pytest.approx(0.05, rel=0.01)
+
+
+def test_the_scatter_has_the_uncertainty_that_repetitions_show():
+    found = [judged(points(81) + noise(81, 0.004, seed), Settling(periods=81)) for seed in range(300)]
+    scatter = np.array([each.scatter for each in found])
+    assert scatter.mean() == pytest.approx(0.004, rel=0.03)
+    # The stated one counts one degree of freedom a period; ten coordinates make it smaller in white noise.
+    assert scatter.std() <= np.mean([each.scatter_u for each in found])
+
+
+def test_too_few_periods_are_unsettled():
+    assert judged(points(40), RULE).steadiness is Steadiness.UNSETTLED
