@@ -13,7 +13,7 @@ from acquisition.plan.campaign import load_campaign
 from acquisition.run.stop import StopSwitch
 
 from .output import console
-from .paths import BenchPath, bench_path, existing_folder
+from .paths import BenchPath, FaultsPath, existing_folder, rig_at
 from .progress import campaign_bars
 
 STOPPED_EXIT_CODE = 3
@@ -33,6 +33,7 @@ def measure(
     accept_changed_bench: Annotated[
         bool, typer.Option("--accept-changed-bench", help="Resume on another bench than it was begun on.")
     ] = False,
+    faults: FaultsPath = None,
     check: Annotated[
         CheckRule, typer.Option(help="A passed check of the bench, of today: ask for it, make it, or not.")
     ] = CheckRule.FRESH,
@@ -40,7 +41,7 @@ def measure(
     """Measure: check the bench, ramp up, record and ramp down, for each measurement of a campaign."""
     plan = load_campaign(campaign)
     switch = StopSwitch()
-    with KeptBench(bench_path(bench)) as kept, campaign_bars(plan) as bars:
+    with KeptBench(rig_at(bench, faults)) as kept, campaign_bars(plan) as bars:
         require_fresh(kept.bench, existing_folder(out), check)
         items = run_campaign(
             kept.bench,

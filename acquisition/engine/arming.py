@@ -6,6 +6,7 @@ from pathlib import Path
 from ..bench import Bench
 from ..campaign.item import Existing
 from ..campaign.opening import planned_recordings
+from ..check.admission import require_on_record
 from ..plan.campaign import Campaign
 from ..plan.limits import LimitCheck, require_within_limits
 from ..run.drive import drive_for
@@ -24,6 +25,7 @@ def armed_plan(bench: Bench, campaign: Campaign, folder: Path, existing: Existin
         With every reason why it cannot be carried out.
 
     """
+    require_on_record(bench)
     checks: list[tuple[str, LimitCheck]] = []
     points = campaign.points()
     for name, measurement in ((point.name, point.measurement) for point in points):
