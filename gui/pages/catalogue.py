@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 from ..desk import Desk
 from ..page import Page
-from ..page_names import FILES, RIG, TEST
+from ..page_names import FILES, RIG, RUN, TEST
 from .files.files_page import FilesPage
 from .rig.rig_page import RigPage
+from .run.run_page import RunPage
 from .test.test_page import TestPage
 
 
@@ -24,5 +25,6 @@ class PageEntry:
 PAGES: tuple[PageEntry, ...] = (
     PageEntry(RIG, 1, RigPage),
     PageEntry(TEST, 2, TestPage),
+    PageEntry(RUN, 3, RunPage),
     PageEntry(FILES, 4, FilesPage),
 )
