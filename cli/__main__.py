@@ -17,7 +17,6 @@ from .bench import bench
 from .demo import demo
 from .export import export
 from .figure import figure
-from .gui import gui
 from .import_recording import import_file
 from .measure import measure
 from .predict import predict
@@ -43,7 +42,6 @@ app.command()(analyse)
 app.command()(predict)
 app.command()(study)
 app.command()(figure)
-app.command()(gui)
 app.command()(reproduce)
 app.command()(tradeoff)
 app.command()(export)

@@ -5,20 +5,18 @@ from typing import Annotated
 
 import typer
 
-from acquisition.bench import open_bench
 from acquisition.campaign.item import CampaignItem, Item
-from acquisition.campaign.run_campaign import run_campaign
-from acquisition.check.admission import require_fresh
+from acquisition.engine.orders import Orders
 from acquisition.plan.campaign import load_campaign
 from acquisition.shipped import shipped
 from analysis.report.report import write_report
 from analysis.summary import campaign_summary
 
+from .analysis_bar import analysis_bar
 from .analyst import second_process
-from .measure import STOPPED_EXIT_CODE, tell
+from .measure import STOPPED_EXIT_CODE, the_bench
 from .output import console, write_json
-from .paths import existing_folder, unused
-from .progress import analysis_bar, campaign_bars
+from .paths import unused
 
 
 def demo(
@@ -37,15 +35,12 @@ def demo(
     with second_process(campaign.name) as analyst:
 
         def recorded(item: CampaignItem) -> None:
-            bars.ended(item)
             if item.result is Item.RECORDED:
                 analyst.take(item.path)
 
         rig = shipped("hardware_configs/virtual_rig.toml")
-        with open_bench(rig) as bench, campaign_bars(campaign) as bars:
-            require_fresh(bench, existing_folder(folder))
-            items = run_campaign(bench, campaign, folder / "recordings", on_progress=bars, on_item=recorded)
-        tell(items)
+        with the_bench(rig, "demo") as engine:
+            items = engine.measure(Orders(campaign=campaign, folder=folder / "recordings"), recorded)
         if {item.name for item in items if item.result is Item.RECORDED} != set(campaign.recording_names()):
             raise typer.Exit(STOPPED_EXIT_CODE)
         with analysis_bar(analyst.asked) as step:

@@ -50,7 +50,7 @@ class EngineBars:
         for row in status.rows:
             self._row(row)
         for message in status.messages:
-            self._message(message)
+            self._warning(message)
         if status.run is not None and status.state in DRIVING:
             self._run(status, status.run)
 
@@ -82,13 +82,17 @@ class EngineBars:
             self._bars.remove_task(self._one)
             self._one = None
 
-    def _message(self, message: EngineMessage) -> None:
-        if message.number <= self._messages:
-            return
-        self._messages = message.number
-        if message.kind is not MessageKind.INFO:
-            text = " ".join(part for part in (message.what, message.done, message.next_step) if part)
-            self._bars.console.print(f"{message.kind.value:11} {text}", markup=False)
+    def _warning(self, message: EngineMessage) -> None:
+        if message.number > self._messages:
+            self._messages = message.number
+            if message.kind is MessageKind.WARNING:
+                self._bars.console.print(sentence(message), markup=False)
+
+
+def sentence(message: EngineMessage) -> str:
+    """Put what happened, what was done and what to do next into one line."""
+    text = " ".join(part for part in (message.what, message.done, message.next_step) if part)
+    return f"{message.kind.value:11} {text}"
 
 
 class Watching:

@@ -1,20 +1,25 @@
 """`vibench measure`: carry out a campaign, one recording a measurement."""
 
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from acquisition.campaign.item import AfterFailure, CampaignItem, ChangedBench, Existing, Item
-from acquisition.campaign.kept_bench import KeptBench
-from acquisition.campaign.run_campaign import run_campaign
-from acquisition.check.admission import CheckRule, require_fresh
+from acquisition.campaign.item import AfterFailure, ChangedBench, Existing, Item
+from acquisition.check.admission import CheckRule
+from acquisition.engine.desk import Desk
+from acquisition.engine.engine import Engine
+from acquisition.engine.hosted import hosted
+from acquisition.engine.orders import Orders
+from acquisition.engine.state import Attendance
+from acquisition.engine.work import Work
 from acquisition.plan.campaign import load_campaign
-from acquisition.run.stop import StopSwitch
+from acquisition.rig.configuration import load_rig
 
-from .output import console
-from .paths import BenchPath, FaultsPath, existing_folder, rig_at
-from .progress import campaign_bars
+from .engine_bars import Watching
+from .paths import BenchPath, bench_path
 
 STOPPED_EXIT_CODE = 3
 """Not everything was recorded, and nothing failed: somebody stopped it."""
@@ -33,36 +38,33 @@ def measure(
     accept_changed_bench: Annotated[
         bool, typer.Option("--accept-changed-bench", help="Resume on another bench than it was begun on.")
     ] = False,
-    faults: FaultsPath = None,
     check: Annotated[
         CheckRule, typer.Option(help="A passed check of the bench, of today: ask for it, make it, or not.")
     ] = CheckRule.FRESH,
 ) -> None:
     """Measure: check the bench, ramp up, record and ramp down, for each measurement of a campaign."""
-    plan = load_campaign(campaign)
-    switch = StopSwitch()
-    with KeptBench(rig_at(bench, faults)) as kept, campaign_bars(plan) as bars:
-        require_fresh(kept.bench, existing_folder(out), check)
-        items = run_campaign(
-            kept.bench,
-            plan,
-            out,
-            Existing.RESUME if resume else Existing.REFUSE,
-            after_failure,
-            on_progress=bars,
-            on_item=bars.ended,
-            switch=switch,
-            reopen=kept.reopen,
-            changed_bench=ChangedBench.ACCEPT if accept_changed_bench else ChangedBench.REFUSE,
-        )
-    tell(items)
-    if switch.request is not None:
+    orders = Orders(
+        campaign=load_campaign(campaign),
+        folder=out,
+        existing=Existing.RESUME if resume else Existing.REFUSE,
+        after_failure=after_failure,
+        changed_bench=ChangedBench.ACCEPT if accept_changed_bench else ChangedBench.REFUSE,
+        check=check,
+    )
+    with the_bench(bench_path(bench), orders.campaign.name) as engine:
+        items = engine.measure(orders)
+    if engine.switch.request is not None:
         raise typer.Exit(STOPPED_EXIT_CODE)
     if any(item.result is Item.FAILED for item in items):
         raise typer.Exit(1)
 
 
-def tell(items: tuple[CampaignItem, ...]) -> None:
-    """Say where each recording is and how it ended."""
-    for item in items:
-        console.print(f"{item.result.value:9} {item.path}  ({item.reason})")
+@contextmanager
+def the_bench(config: Path, what: str) -> Iterator[Engine]:
+    """Open a bench in this process, with bars on the terminal and a door for whoever watches or stops it."""
+    engine = Engine(Attendance.UNATTENDED)
+    desk = Desk(engine, Work(engine))
+    with closing(engine):
+        engine.open(load_rig(config))
+        with hosted(desk, what), Watching(desk.status):
+            yield engine

@@ -1,37 +1,33 @@
 """``python -m acquisition.engine``: an engine's process. Its first line of output says where to ask it."""
 
 import argparse
+import os
 import signal
 import sys
 from threading import Thread
 from types import FrameType
 
 from ..run.stop import Cause
-from .announcement import announced
 from .desk import Desk
 from .engine import Engine
-from .server import LOOPBACK, Server, spoken
+from .hosted import hosted
+from .server import LOOPBACK, spoken
 from .state import Attendance
-from .watch import Watch
+from .work import Work
 
 
 def main() -> None:
     """Serve until told to end, by a request, a signal, or the end of the one that started it."""
     options = _options()
     engine = Engine(options.attendance)
-    desk = Desk(engine)
-    server = Server(desk, options.host)
-    watch = Watch(desk)
+    work = Work(engine)
+    desk = Desk(engine, work)
     _heed_signals(desk)
-    print(spoken(server.address), flush=True)  # noqa: T201 - this line is the handshake
-    if options.attendance is Attendance.ATTENDED:
-        Thread(target=_follow_parent, args=(desk,), name="engine parent", daemon=True).start()
-    try:
-        with announced(server.address, options.what):
-            engine.run()
-    finally:
-        server.close()
-        watch.close()
+    with hosted(desk, options.what, options.host) as server:
+        print(spoken(server.address), flush=True)  # noqa: T201 - this line is the handshake
+        if options.attendance is Attendance.ATTENDED:
+            Thread(target=_follow_parent, args=(desk,), name="engine parent", daemon=True).start()
+        work.run()
 
 
 def _options() -> argparse.Namespace:
@@ -52,7 +48,9 @@ def _heed_signals(desk: Desk) -> None:
 
 def _follow_parent(desk: Desk) -> None:
     """End with whoever started the engine: standard input is a pipe from there."""
-    sys.stdin.buffer.read()
+    # Not through sys.stdin: a buffer that a thread waits in cannot be torn down at the process's end.
+    while os.read(sys.stdin.fileno(), 4096):
+        pass
     desk.shutdown(Cause.PARENT_GONE, "the program that started the engine has ended")
 
 

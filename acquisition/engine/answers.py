@@ -43,8 +43,8 @@ def _answer(desk: Desk, request: ask.Request) -> Message:
             return _model(desk.status())
         case ask.Look(since_sample=since, most=most):
             return _glance(desk.look(since, most))
-        case ask.Arm(campaign=campaign, folder=folder, existing=existing):
-            return _model(desk.arm(campaign, Path(folder), existing))
+        case ask.Arm(orders=orders):
+            return _model(desk.arm(orders))
         case _:
             _ORDERS[type(request)](desk, request)
             return DONE

@@ -1,22 +1,20 @@
 """Arming: a campaign is refused with reasons, or put into words that an experimenter can check."""
 
-from datetime import timedelta
-from pathlib import Path
+from datetime import UTC, datetime, timedelta
 
-from ..bench import Bench
-from ..campaign.item import Existing
+from ..bench import Bench, Reality
 from ..campaign.opening import planned_recordings
-from ..check.admission import require_on_record
-from ..plan.campaign import Campaign
+from ..check.admission import CheckRule, require_checked
 from ..plan.limits import LimitCheck, require_within_limits
 from ..run.drive import drive_for
+from .orders import Orders
 from .status import ArmedPlan
 
 ARMED_S = 60.0
 """An armed engine disarms itself after this long [s]."""
 
 
-def armed_plan(bench: Bench, campaign: Campaign, folder: Path, existing: Existing) -> ArmedPlan:
+def armed_plan(bench: Bench, orders: Orders) -> ArmedPlan:
     """Hold a campaign against bench and folder; nothing is played and nothing written.
 
     Raises
@@ -25,13 +23,17 @@ def armed_plan(bench: Bench, campaign: Campaign, folder: Path, existing: Existin
         With every reason why it cannot be carried out.
 
     """
-    require_on_record(bench)
+    if (
+        bench.reality is Reality.REAL and orders.check is CheckRule.FRESH
+    ):  # a virtual one is checked at the start, where that is due
+        require_checked(bench.rig, datetime.now(UTC))
     checks: list[tuple[str, LimitCheck]] = []
+    campaign, folder = orders.campaign, orders.folder
     points = campaign.points()
     for name, measurement in ((point.name, point.measurement) for point in points):
         checks += [(name, check) for check in require_within_limits(measurement, bench.rig)]
         drive_for(bench, measurement)  # refuses what nothing on this bench can play
-    planned = planned_recordings(campaign, folder, existing)
+    planned = planned_recordings(campaign, folder, orders.existing)
     missing = [each for each in planned if not each.is_complete]
     tightest, closest = max(checks, key=lambda named: named[1].use)
     loudest = max(point.measurement.excitation.highest_amplitude_vpp for point in points)

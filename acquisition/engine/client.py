@@ -19,6 +19,7 @@ from ..rig.knobs import KnobSheet
 from ..run.stop import StopLevel
 from . import requests as ask
 from .errors import EngineError, EngineGone
+from .orders import Orders
 from .recent import Glance
 from .server import EngineAddress
 from .state import Visit
@@ -85,8 +86,12 @@ class EngineClient:
 
     def arm(self, campaign: Campaign, folder: Path, existing: Existing = Existing.REFUSE) -> ArmedPlan:
         """Get ready to carry out a campaign, or be refused with the reasons."""
-        where = str(folder.absolute())
-        return self._told(ask.Arm(campaign=campaign, folder=where, existing=existing), ArmedPlan)
+        return self.arm_orders(Orders(campaign=campaign, folder=folder, existing=existing))
+
+    def arm_orders(self, orders: Orders) -> ArmedPlan:
+        """Get ready as `arm` does, with everything said that can be said."""
+        absolute = orders.model_copy(update={"folder": orders.folder.absolute()})
+        return self._told(ask.Arm(orders=absolute), ArmedPlan)
 
     def disarm(self) -> None:
         """Take back what was armed."""

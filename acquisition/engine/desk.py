@@ -4,17 +4,18 @@ from pathlib import Path
 from threading import Lock
 from time import monotonic
 
-from ..campaign.item import Existing
-from ..plan.campaign import Campaign
 from ..rig.configuration import Rig
 from ..rig.knobs import KnobSheet
 from ..run.stop import Cause, StopLevel, StopRequest, StopSwitch
 from .arming import ARMED_S, armed_plan
 from .engine import Engine
 from .errors import EngineError
+from .orders import Orders
 from .recent import Glance
+from .sheet import confirmed_by
 from .state import DRIVING, VIEWER_PATIENCE_S, Attendance, EngineState
 from .status import ArmedPlan, EngineStatus
+from .work import Work
 
 
 class Desk:
@@ -24,10 +25,11 @@ class Desk:
     raises `EngineError` with one sentence when the engine's state does not allow what was asked.
     """
 
-    def __init__(self, engine: Engine) -> None:
+    def __init__(self, engine: Engine, work: Work) -> None:
         self._engine = engine
+        self._work = work
         self._asking = Lock()
-        self._plan: tuple[Campaign, Path, Existing] | None = None
+        self._orders: Orders | None = None
         self._armed_s = 0.0
         self._heard_s = monotonic()
 
@@ -48,7 +50,8 @@ class Desk:
         with self._asking:
             self._require("open a bench", EngineState.CLOSED, EngineState.FAULT)
             self._engine.shown.enter(EngineState.OPENING)
-            self._engine.put(lambda: self._engine.open(rig, confirmations))
+            confirm = None if rig.virtual is not None else confirmed_by(confirmations)
+            self._work.put(lambda: self._engine.open(rig, confirm))
 
     def close(self) -> None:
         """Close the bench."""
@@ -57,23 +60,23 @@ class Desk:
                 "close the bench", EngineState.READY, EngineState.ARMED, EngineState.FAULT, EngineState.CLOSED
             )
             self._disarm()
-            self._engine.put(self._engine.close)
+            self._work.put(self._engine.close)
 
     def check(self, folder: Path = Path()) -> None:
         """Check the bench with a small sine; ``folder`` is where recordings will go."""
         with self._asking:
             self._require("check the bench", EngineState.READY)
             self._engine.shown.enter(EngineState.CHECKING)
-            self._engine.put(lambda: self._engine.check(folder))
+            self._work.put(lambda: self._engine.check(folder))
 
-    def arm(self, campaign: Campaign, folder: Path, existing: Existing = Existing.REFUSE) -> ArmedPlan:
+    def arm(self, orders: Orders) -> ArmedPlan:
         """Get ready to carry out a campaign; raises AcquisitionError with the reasons when it cannot be."""
         with self._asking:
             self._require("arm", EngineState.READY, EngineState.ARMED)
-            plan = armed_plan(self._engine.bench, campaign, folder, existing)
-            self._plan = (campaign, folder, existing)
+            plan = armed_plan(self._engine.bench, orders)
+            self._orders = orders
             self._armed_s = monotonic()
-            self._engine.shown.arm(plan, campaign.recording_names(), campaign.duration_s)
+            self._engine.shown.arm(plan, orders.campaign)
             return plan
 
     def disarm(self) -> None:
@@ -85,12 +88,11 @@ class Desk:
         """Carry out what is armed."""
         with self._asking:
             self._require("start", EngineState.ARMED)
-            assert self._plan is not None
-            campaign, folder, existing = self._plan
-            self._plan = None
+            assert self._orders is not None
+            orders, self._orders = self._orders, None
             self._engine.switch = StopSwitch()
             self._engine.shown.enter(EngineState.RUNNING)
-            self._engine.put(lambda: self._engine.carry_out(campaign, folder, existing))
+            self._work.put(lambda: self._engine.measure(orders))
 
     def stop(self, request: StopRequest) -> None:
         """Hold or end what runs, and disarm what is armed. Legal in every state, and never refused."""
@@ -112,7 +114,7 @@ class Desk:
     def shutdown(self, cause: Cause, reason: str) -> None:
         """End what runs, silence everything, and let the engine end. Legal in every state."""
         self.stop(StopRequest.by(cause, reason))
-        self._engine.leave()
+        self._work.leave()
 
     def look_after(self) -> None:
         """Do what time asks for: disarm what nobody starts, abort what nobody attends."""
@@ -136,7 +138,7 @@ class Desk:
 
     def _disarm(self) -> None:
         if self._engine.shown.state is EngineState.ARMED:
-            self._plan = None
+            self._orders = None
             self._engine.shown.enter(EngineState.READY)
 
     def _require(self, wanted: str, *allowed: EngineState) -> None:

@@ -1,147 +1,136 @@
-"""The engine: it owns a bench and does what it is asked, one job after the other, in one thread."""
+"""The engine: it owns a bench, and shows everybody what it does with it."""
 
 from collections.abc import Callable
 from pathlib import Path
-from queue import SimpleQueue
 
-from ..bench import Bench, open_bench
-from ..campaign.item import AfterFailure, CampaignItem, CampaignProgress, Existing, Item
-from ..campaign.run_campaign import run_campaign
-from ..check.admission import check_and_keep
+from ..bench import Bench
+from ..campaign.happening import Listener
+from ..campaign.item import CampaignItem, CampaignProgress, Item, ignore_item
+from ..campaign.kept_bench import KeptBench
+from ..campaign.opening import make_folder
+from ..campaign.run_campaign import ignore_happening, run_campaign
+from ..check.admission import check_and_keep, require_fresh
 from ..errors import AcquisitionError, InstrumentLost
-from ..plan.campaign import Campaign
 from ..rig.configuration import Rig
-from ..rig.knobs import KnobSheet
-from ..run.stop import Cause, StopSwitch
+from ..rig.knobs import Confirm
+from ..run.stop import StopSwitch
 from .facts import bench_facts
 from .lock import BenchLock
-from .sheet import confirmed_by
+from .orders import Orders
 from .shown import Shown
 from .state import Attendance, EngineState
 
-Job = Callable[[], None]
-ENDING_CAUSES = frozenset({Cause.TERMINATED, Cause.KEYBOARD, Cause.PARENT_GONE})
-"""After a campaign that one of these has stopped, the process ends too."""
-
 
 class Engine:
-    """Does jobs with a bench. Only the thread that calls `run` touches an instrument.
+    """A bench and what is done with it; one thread calls its methods, and only that one touches instruments.
 
-    What others ask reaches it through a `Desk`, which puts jobs into its queue and presses its switch.
+    Everybody else looks at `shown` and presses `switch`. A method raises what goes wrong, after it has
+    shown it; leave the engine through a ``with``, and the bench is silent and closed.
     """
 
     def __init__(self, attendance: Attendance) -> None:
-        self.shown = Shown(attendance)
         self.attendance = attendance
+        self.shown = Shown(attendance)
         self.switch = StopSwitch()
         """Holds or ends what runs; a new one for every campaign."""
-        self._jobs: SimpleQueue[Job | None] = SimpleQueue()
-        self._bench: Bench | None = None
+        self._kept: KeptBench | None = None
         self._lock: BenchLock | None = None
 
     @property
     def bench(self) -> Bench:
-        """The open bench, for looking at its rig; only in a state in which there is one."""
-        assert self._bench is not None, f"no bench is open while {self.shown.state}"
-        return self._bench
+        """The open bench; others may look at its rig, where the state says that there is one."""
+        assert self._kept is not None, f"no bench is open while {self.shown.state}"
+        return self._kept.bench
 
-    def put(self, job: Job) -> None:
-        """Do this after everything asked before; from any thread."""
-        self._jobs.put(job)
-
-    def leave(self) -> None:
-        """End after everything asked before; from any thread, and from a signal handler."""
-        self._jobs.put(None)
-
-    def run(self) -> None:
-        """Do jobs until told to leave. The bench is closed then, whatever happened."""
-        try:
-            while (job := self._jobs.get()) is not None:
-                self._done(job)
-        finally:
-            self._release()
-
-    def _done(self, job: Job) -> None:
-        try:
-            job()
-        except Exception as error:  # noqa: BLE001 - whatever it is: silence, and an engine that can tell of it
-            self.shown.messages.fault(error)
-            self._release()
-            self.shown.enter(EngineState.FAULT)
-
-    def open(self, rig: Rig, confirmations: KnobSheet | None) -> None:
-        """Job: open the bench of a rig."""
+    def open(self, rig: Rig, confirm: Confirm | None = None) -> None:
+        """Open the bench of a rig; ``confirm`` as `acquisition.bench.open_bench` takes it."""
         try:
             self._lock = BenchLock.of(rig)
-            confirm = None if rig.virtual is not None else confirmed_by(confirmations)
-            self._bench = open_bench(rig, confirm=confirm)
+            self._kept = KeptBench(rig, confirm)
+            self._kept.__enter__()
         except AcquisitionError as error:
-            self._release()
-            self.shown.messages.fault(error)
-            self.shown.enter(EngineState.FAULT)
-            return
-        self.shown.bench(bench_facts(self._bench))
+            self._kept = None
+            self._fails(error, EngineState.FAULT)
+            raise
+        self.shown.bench(bench_facts(self.bench))
         self.shown.messages.info(f"{rig.name} is open")
         self.shown.enter(EngineState.READY)
 
     def close(self) -> None:
-        """Job: close the bench, silent first."""
+        """Silence the bench and close it. Legal at any time."""
         self._release()
         self.shown.enter(EngineState.CLOSED)
 
     def check(self, folder: Path) -> None:
-        """Job: check the bench with a small sine."""
+        """Check the bench with a small sine, and keep what was found."""
         try:
             result = check_and_keep(self.bench, folder)
         except AcquisitionError as error:
-            self._failed(error)
-            return
+            self._fails(error, EngineState.READY)
+            raise
         self.shown.checked(result.report, result.checked.isoformat(timespec="seconds"))
         self.shown.enter(EngineState.READY)
 
-    def carry_out(self, campaign: Campaign, folder: Path, existing: Existing) -> None:
-        """Job: make the recordings of a campaign."""
+    def measure(
+        self,
+        orders: Orders,
+        on_item: Callable[[CampaignItem], None] = ignore_item,
+        on_happening: Listener = ignore_happening,
+    ) -> tuple[CampaignItem, ...]:
+        """Make the recordings of a campaign; see `run_campaign`, which calls what is given here."""
+        assert self._kept is not None
         facts = bench_facts(self.bench)
 
         def tell(progress: CampaignProgress) -> None:
             self.shown.tell(progress, facts)
 
+        def ended(item: CampaignItem) -> None:
+            self.shown.item(item)
+            on_item(item)
+
+        self.shown.begin(orders.campaign, orders.folder)
         try:
+            make_folder(orders.folder)
+            require_fresh(self.bench, orders.folder, orders.check)
             items = run_campaign(
                 self.bench,
-                campaign,
-                folder,
-                existing,
-                AfterFailure.STOP,
+                orders.campaign,
+                orders.folder,
+                orders.existing,
+                orders.after_failure,
                 on_progress=tell,
-                on_item=self.shown.item,
+                on_item=ended,
                 switch=self.switch,
+                reopen=self._kept.reopen,
+                changed_bench=orders.changed_bench,
+                on_happening=on_happening,
             )
         except AcquisitionError as error:
             self.shown.failed(str(error))
-            self._failed(error)
-        else:
-            self.shown.messages.info(_told(items))
-            self.shown.enter(EngineState.READY)
-        request = self.switch.request
-        if request is not None and request.cause in ENDING_CAUSES:
-            self.leave()
+            self._fails(error, EngineState.READY)
+            raise
+        self.shown.messages.info(_told(items))
+        self.shown.enter(EngineState.READY)
+        return items
 
-    def _failed(self, error: AcquisitionError) -> None:
-        """Say what went wrong; a bench that has lost an instrument is closed, any other stays open."""
+    def fault(self, error: Exception) -> None:
+        """Show what nobody has foreseen, and let the bench go."""
+        self._fails(error, EngineState.FAULT)
+
+    def _fails(self, error: Exception, otherwise: EngineState) -> None:
+        """Show what went wrong; a bench that has lost an instrument is closed."""
         self.shown.messages.fault(error)
-        if isinstance(error, InstrumentLost):
+        state = EngineState.FAULT if isinstance(error, InstrumentLost) else otherwise
+        if state is EngineState.FAULT:
             self._release()
-            self.shown.enter(EngineState.FAULT)
-        else:
-            self.shown.enter(EngineState.READY)
+        self.shown.enter(state)
 
     def _release(self) -> None:
-        bench, self._bench = self._bench, None
+        kept, self._kept = self._kept, None
         lock, self._lock = self._lock, None
         try:
-            if bench is not None:
-                bench.close()
+            if kept is not None:
+                kept.close()
         except AcquisitionError as error:
             self.shown.messages.fault(error)
         finally:

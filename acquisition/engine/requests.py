@@ -4,12 +4,11 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, NonNegativeInt, PositiveInt, TypeAdapter
 
-from ..campaign.item import Existing
-from ..plan.campaign import Campaign
 from ..rig.configuration import Rig
 from ..rig.knobs import KnobSheet
 from ..run.stop import StopLevel
 from ..toml_file import FrozenModel
+from .orders import Orders
 from .state import Visit
 
 
@@ -48,9 +47,7 @@ class Arm(FrozenModel):
     """Get ready to carry out a campaign, or refuse it with reasons."""
 
     ask: Literal["arm"] = "arm"
-    campaign: Campaign
-    folder: str
-    existing: Existing = Existing.REFUSE
+    orders: Orders
 
 
 class Disarm(FrozenModel):

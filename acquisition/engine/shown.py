@@ -2,7 +2,6 @@
 
 import shutil
 import threading
-from collections.abc import Iterable
 from pathlib import Path
 from time import monotonic
 
@@ -11,6 +10,7 @@ import numpy as np
 from ..campaign.item import CampaignItem, CampaignProgress
 from ..check.finding import BenchReport
 from ..instruments import Block
+from ..plan.campaign import Campaign
 from ..run.state import RunState
 from .messages import Messages
 from .recent import Recent
@@ -74,13 +74,16 @@ class Shown:
         """Show what the check has found."""
         self._put(check=report, checked_utc=utc)
 
-    def arm(self, plan: ArmedPlan, names: Iterable[str], campaign_s: float) -> None:
+    def arm(self, plan: ArmedPlan, campaign: Campaign) -> None:
         """Show what is going to happen."""
         self._armed_until_s = monotonic() + plan.expires_in_s
-        self._folder = Path(plan.folder)
-        self._campaign_s, self._done_s, self._name = campaign_s, 0.0, ""
-        rows = tuple(RowStatus(name=name, state="queued", reason="", file="") for name in names)
-        self._put(state=EngineState.ARMED, armed=plan, rows=rows)
+        self._put(state=EngineState.ARMED, armed=plan, rows=_queued(campaign))
+
+    def begin(self, campaign: Campaign, folder: Path) -> None:
+        """Show that a campaign is being carried out."""
+        self._folder = folder
+        self._campaign_s, self._done_s, self._name = campaign.duration_s, 0.0, ""
+        self._put(state=EngineState.RUNNING, rows=_queued(campaign))
 
     def tell(self, progress: CampaignProgress, bench: BenchFacts) -> None:
         """Show what a block has changed."""
@@ -146,6 +149,11 @@ class Shown:
     def _put(self, **changes: object) -> None:
         with self._lock:
             self._status = self._status.model_copy(update=changes)
+
+
+def _queued(campaign: Campaign) -> tuple[RowStatus, ...]:
+    names = campaign.recording_names()
+    return tuple(RowStatus(name=name, state="queued", reason="", file="") for name in names)
 
 
 def levels_of(block: Block, channels: tuple[ChannelFacts, ...]) -> tuple[ChannelLevel, ...]:

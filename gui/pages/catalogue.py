@@ -5,10 +5,9 @@ from dataclasses import dataclass
 
 from ..desk import Desk
 from ..page import Page
-from ..page_names import FILES, RIG, RUN, TEST
+from ..page_names import FILES, RIG, TEST
 from .files.files_page import FilesPage
 from .rig.rig_page import RigPage
-from .run.run_page import RunPage
 from .test.test_page import TestPage
 
 
@@ -25,6 +24,5 @@ class PageEntry:
 PAGES: tuple[PageEntry, ...] = (
     PageEntry(RIG, 1, RigPage),
     PageEntry(TEST, 2, TestPage),
-    PageEntry(RUN, 3, RunPage),
     PageEntry(FILES, 4, FilesPage),
 )

@@ -205,7 +205,7 @@ class TestNobodyLooks:
     def test_an_attended_run_is_aborted_when_nobody_asks(self, engine, shipped_rig, tmp_path):
         process = engine()
         running(process.client, shipped_rig, tmp_path)
-        events = kept(tmp_path / "run.h5", "nobody has looked for 0.[5-9] s")  # asks nothing meanwhile
+        events = kept(tmp_path / "run.h5", r"nobody has looked for \d+\.\d s")  # asks nothing meanwhile
         assert any(kind == "silence" and text.startswith("abort: 0.0") for kind, text in events)
         messages = until_state(process.client, EngineState.READY).messages
         assert any(message.what.startswith("The viewer is gone") for message in messages)
