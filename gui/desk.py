@@ -31,6 +31,8 @@ class Desk(QObject):
     """Path of a recording that has just been finished."""
     comparison_wanted = Signal(object)
     """Paths of recordings to lay over one another; Compare takes them."""
+    prediction_made = Signal(object)
+    """Curves of a prediction to lay over recordings; Compare takes them."""
     theme_changed = Signal(object)
     """The `Theme` from now on."""
 

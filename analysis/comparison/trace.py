@@ -56,14 +56,18 @@ class Trace:
 
     @property
     def lower(self) -> Reals:
-        """Magnitude less two standard deviations, on a logarithmic scale."""
-        return np.asarray(self.magnitude * np.exp(-2 * self.relative_sd))
+        """Magnitude less two standard deviations, on a logarithmic scale; a tenth of it at the least."""
+        return np.asarray(self.magnitude * np.exp(-self._reach))
 
     @property
     def upper(self) -> Reals:
-        """Magnitude and two standard deviations, on a logarithmic scale."""
-        with np.errstate(over="ignore"):
-            return np.asarray(self.magnitude * np.exp(2 * self.relative_sd))
+        """Magnitude and two standard deviations, on a logarithmic scale; ten times it at the most."""
+        return np.asarray(self.magnitude * np.exp(self._reach))
+
+    @property
+    def _reach(self) -> Reals:
+        """Bounds that reach further say that nothing is known, and would only fill the picture."""
+        return np.minimum(2 * self.relative_sd, np.log(10.0))
 
     def at(self, frequency_hz: Reals) -> "Trace":
         """Read the curve at other frequencies, straight between points in both logarithms; NaN outside."""

@@ -55,6 +55,7 @@ def comparison_figure(
         for number, trace in enumerate(traces):
             _curve(top, trace, LEVELS[number % len(LEVELS)])
         magnitude_axis(top)
+        top.set_ylim(*_heights(traces))
         top.set_ylabel("|x / U|  (m0 over base)")
         if difference is not None and pair is not None:
             _difference(panels[1], difference)
@@ -63,7 +64,7 @@ def comparison_figure(
                 axes.axvline(marker_hz, color=BOUNDS, linewidth=0.8, linestyle="-.")
         panels[-1].set_xlabel("frequency [Hz]")
         frequency_axis(top, *_span(traces))
-        legend_above(figure, [top], columns=1)
+        legend_above(figure, [top], columns=2)
         figure.align_ylabels()
     return DrawnFigure(
         name=name,
@@ -98,6 +99,13 @@ def _difference(axes: Axes, difference: Difference) -> None:
     axes.plot(difference.frequency_hz, difference.decibel, color=MEASURED, linewidth=0.8)
     axes.axhline(0, color=BOUNDS, linewidth=0.6)
     axes.set_ylabel("difference\n[dB]")
+
+
+def _heights(traces: Sequence[Trace]) -> tuple[float, float]:
+    """Let the curves fill the picture, not their bounds."""
+    known = np.concatenate([each.magnitude[np.isfinite(each.magnitude)] for each in traces])
+    positive = known[known > 0]
+    return (float(positive.min()) / 2, 2 * float(positive.max())) if positive.size else (0.1, 10.0)
 
 
 def _span(traces: Sequence[Trace]) -> tuple[float, float]:

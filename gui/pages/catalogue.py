@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from ..desk import Desk
 from ..page import Page
-from ..page_names import FILES, RIG, TEST
+from ..page_names import COMPARE, FILES, RIG, TEST
+from .compare.compare_page import ComparePage
 from .files.files_page import FilesPage
 from .rig.rig_page import RigPage
 from .test.test_page import TestPage
@@ -25,4 +26,5 @@ PAGES: tuple[PageEntry, ...] = (
     PageEntry(RIG, 1, RigPage),
     PageEntry(TEST, 2, TestPage),
     PageEntry(FILES, 4, FilesPage),
+    PageEntry(COMPARE, 5, ComparePage),
 )

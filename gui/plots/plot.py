@@ -129,6 +129,13 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         shown = log10(value) if self._scales[1] is Scale.LOGARITHMIC else value
         return self._line(ink, shown, 0, label)
 
+    def wipe(self) -> None:
+        """Take every curve, band and line away, for others."""
+        self.getPlotItem().clear()
+        self._inked.clear()
+        self._legend_entries.clear()
+        self._relegend()
+
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
         self._theme = theme
@@ -199,7 +206,8 @@ class Band:
     """An area between a lower and an upper line."""
 
     def __init__(self, plot: Plot) -> None:
-        self._edges = [pg.PlotDataItem(pen=None) for _ in range(2)]
+        # A pen that draws nothing: without any pen a curve would have no path, and the area no edge.
+        self._edges = [pg.PlotDataItem(pen=pg.mkPen(None)) for _ in range(2)]
         self._fill = pg.FillBetweenItem(*self._edges)
         for item in (*self._edges, self._fill):
             plot.addItem(item)

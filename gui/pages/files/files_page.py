@@ -8,7 +8,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QLineEdit,
-    QPushButton,
     QSplitter,
     QVBoxLayout,
     QWidget,
@@ -24,6 +23,7 @@ from ...desk import Desk
 from ...notice import Notice, NoticeKind, notice_of
 from ...page import Page
 from ...page_names import COMPARE, FILES
+from ...push_button import push_button
 from ...settings import Remembered
 from ...theme import Theme
 from .file_words import duration_text, state_text
@@ -223,13 +223,15 @@ class FilesPage(Page):
         search_label.setBuddy(search)
         bar.addWidget(label)
         bar.addWidget(self._folder_line, 3)
-        bar.addWidget(_button("C&hoose…", "Choose another folder", self._choose_folder))
+        bar.addWidget(push_button("C&hoose…", "Choose another folder", self._choose_folder))
         bar.addWidget(search_label)
         bar.addWidget(search, 1)
         self._count = QLabel("")
         self._count.setProperty("rank", "second")
         bar.addWidget(self._count)
-        self._compare = _button("Co&mpare", "Lay the chosen recordings on one another", self._hand_to_compare)
+        self._compare = push_button(
+            "Co&mpare", "Lay the chosen recordings over others", self._hand_to_compare
+        )
         self._compare.setEnabled(False)
         bar.addWidget(self._compare)
         layout = QVBoxLayout(browser)
@@ -248,14 +250,14 @@ class FilesPage(Page):
         self._facts.setWordWrap(True)
         bar = QHBoxLayout()
         self._view = QLabel("")
-        self._markers = _button("Mar&kers", "Show two markers to measure between", lambda: None)
+        self._markers = push_button("Mar&kers", "Show two markers to measure between", lambda: None)
         self._markers.setCheckable(True)
         self._markers.toggled.connect(self.lanes.show_markers)
         bar.addWidget(self._view, 1)
         bar.addWidget(self._markers)
-        bar.addWidget(_button("Show &all", "Show the whole recording (Home)", self.lanes.show_all))
-        bar.addWidget(_button("Zoom &in", "Show less, closer (+)", lambda: self.lanes.zoom(0.5)))
-        bar.addWidget(_button("Zoom o&ut", "Show more (-)", lambda: self.lanes.zoom(2.0)))
+        bar.addWidget(push_button("Show &all", "Show the whole recording (Home)", self.lanes.show_all))
+        bar.addWidget(push_button("Zoom &in", "Show less, closer (+)", lambda: self.lanes.zoom(0.5)))
+        bar.addWidget(push_button("Zoom o&ut", "Show more (-)", lambda: self.lanes.zoom(2.0)))
         layout = QVBoxLayout(viewer)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._title)
@@ -290,11 +292,3 @@ def _facts(recording: Recording) -> str:
         lost = sum(each.last_sample - each.first_sample + 1 for each in recording.gaps)
         parts.append(f"{lost} samples lost")
     return "  ·  ".join(parts)
-
-
-def _button(text: str, tip: str, act: object) -> QPushButton:
-    button = QPushButton(text)
-    button.setToolTip(tip)
-    button.setAccessibleName(text.replace("&", "").rstrip("…"))
-    button.clicked.connect(lambda _checked=False: act())  # type: ignore[operator]
-    return button

@@ -7,6 +7,7 @@ import pytest
 from PySide6.QtCore import QCoreApplication, QEventLoop
 
 from acquisition.excitation.dwell import Dwell
+from acquisition.excitation.streamed_noise import StreamedNoise
 from acquisition.instruments import Block, Overload
 from acquisition.plan.measurement import Measurement
 from acquisition.recording import (
@@ -29,8 +30,7 @@ ROLES = (
 )
 
 
-def _header(name, frequency_hz):
-    plan = Dwell(amplitude_vpp=1.0, frequency_hz=frequency_hz, settle_s=1.0, duration_s=8.0)
+def _header(name, plan):
     channels = tuple(
         ChannelHeader(role, f"dev/{role}", quantity, unit, 1.0, 10.0) for role, quantity, unit in ROLES
     )
@@ -70,12 +70,13 @@ def record():
     """Write a dwell of ten seconds with one impact of three samples in its velocity."""
 
     def write(folder, name, frequency_hz=260.0, state=RecordingState.COMPLETE):
+        plan = Dwell(amplitude_vpp=1.0, frequency_hz=frequency_hz, settle_s=1.0, duration_s=8.0)
         phase = 2 * np.pi * frequency_hz * np.arange(SAMPLES) / RATE_HZ
-        base = -5e-6 * (2 * np.pi * frequency_hz) ** 2 * np.cos(phase)
-        velocity = -1.5e-5 * 2 * np.pi * frequency_hz * np.sin(phase)
+        base = -3e-6 * (2 * np.pi * frequency_hz) ** 2 * np.cos(phase)
+        velocity = -9e-6 * 2 * np.pi * frequency_hz * np.sin(phase)
         velocity[IMPACT_SAMPLE : IMPACT_SAMPLE + 3] = (0.4, -0.5, 0.4)
         volts = np.stack((0.5 * np.cos(phase), base, velocity))
-        writer = create_recording(folder / f"{name}.h5", _header(name, frequency_hz))
+        writer = create_recording(folder / f"{name}.h5", _header(name, plan))
         writer.append(Block(0, volts[:, :6400], ()))
         writer.begin_segment("dwell", frequency_hz=frequency_hz)
         writer.append(Block(6400, volts[:, 6400:57_600], (Overload("m0_velocity", 40_000, 40_010),)))
@@ -83,5 +84,29 @@ def record():
         writer.append(Block(57_600, volts[:, 57_600:], ()))
         writer.finish(state, "the plan was carried out")
         return folder / f"{name}.h5"
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def record_noise():
+    """Write ten seconds of streamed noise, over which the mass moves a known number of times as far."""
+
+    def write(folder, name, factor):
+        omega = 2j * np.pi * np.fft.rfftfreq(SAMPLES, 1 / RATE_HZ)
+        inside = (np.abs(omega) >= 2 * np.pi * 20) & (np.abs(omega) <= 2 * np.pi * 700)
+        rng = np.random.default_rng(5)
+        spectrum = np.where(inside, rng.standard_normal(omega.size) + 1j * rng.standard_normal(omega.size), 0)
+        base = 3e-7 * spectrum / np.std(np.fft.irfft(spectrum, SAMPLES))
+        rows = (1e4 * base, omega**2 * base, factor * omega * base)
+        volts = np.stack([np.fft.irfft(each, SAMPLES) for each in rows])
+        plan = StreamedNoise(
+            amplitude_vpp=0.1, band_start_hz=40.0, band_stop_hz=600.0, settle_s=0.0, duration_s=10.0, seed=1
+        )
+        writer = create_recording(folder / f"{name}.h5", _header(name, plan))
+        writer.begin_segment("noise")
+        writer.append(Block(0, volts, ()))
+        writer.end_segment()
+        return writer.finish(RecordingState.COMPLETE, "the plan was carried out")
 
     return write

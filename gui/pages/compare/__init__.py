@@ -1,0 +1,1 @@
+"""Recordings and predictions laid over one another."""

@@ -1,0 +1,156 @@
+"""The Compare page lays real recordings and predictions over one another, and writes what it shows."""
+
+import re
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+
+from analysis.comparison.trace import Origin, Response, Trace
+from gui.pages.compare.compare_page import ComparePage
+from gui.theme import DARK
+
+
+def mode(source, scale=1.0, low_hz=50.0, high_hz=600.0):
+    frequency_hz = np.arange(low_hz, high_hz, 0.7)
+    r = frequency_hz / 266.0
+    magnitude = scale * np.abs((1 + 0.02j * r) / (1 - r**2 + 0.02j * r))
+    spread = np.full(frequency_hz.shape, 0.01)
+    return Trace(source, Origin.PREDICTED, Response.RESPONSE_I, frequency_hz, magnitude, spread, "a note")
+
+
+@pytest.fixture
+def page(desk, qtbot):
+    page = ComparePage(desk)
+    qtbot.addWidget(page)
+    page.resize(1300, 800)
+    page.show()
+    return page
+
+
+@pytest.fixture(scope="module")
+def working(shared_desk):
+    """A page whose processes serve the tests that need them."""
+    page = ComparePage(shared_desk)
+    page.resize(1300, 800)
+    page.show()
+    yield page
+    page.close()
+
+
+@pytest.fixture
+def laid(page):
+    page.add_prediction((mode("one"),))
+    page.add_prediction((mode("half", 0.5, 100.0, 500.0),))
+    return page
+
+
+def texts(table):
+    return [
+        [table.item(row, c).text() for c in range(table.columnCount())] for row in range(table.rowCount())
+    ]
+
+
+def test_curves_are_drawn_as_they_are(laid):
+    lines = [each.getOriginalDataset() for each in laid.plots.magnitudes.getPlotItem().listDataItems()]
+    assert any(np.array_equal(y, mode("one").magnitude) for _, y in lines)
+    assert any(np.array_equal(y, mode("half", 0.5, 100.0, 500.0).magnitude) for _, y in lines)
+    assert laid.is_done
+
+
+def test_peaks_stand_in_the_table_with_their_damping(laid):
+    first, second = texts(laid.peaks)
+    assert first[0] == "one, Response I, predicted"
+    assert float(first[1]) == pytest.approx(266.0, abs=0.2)
+    assert float(first[2]) == pytest.approx(50.0, rel=0.01)
+    assert float(first[5]) == pytest.approx(1.0, rel=0.05)
+    assert float(second[2]) == pytest.approx(25.0, rel=0.01)
+
+
+def test_the_second_curve_is_compared_with_the_first(laid):
+    curve, reference = laid.pair_box.pair()
+    assert (curve.source, reference.source) == ("half", "one")
+    assert laid.pair_box.said.startswith("Median 6 dB")
+    (line,) = laid.plots.differences.getPlotItem().listDataItems()
+    frequency_hz, decibel = line.getOriginalDataset()
+    assert np.median(decibel) == pytest.approx(-6.02, abs=0.02)
+    assert frequency_hz[0] >= 100.0
+
+
+def test_a_curve_that_is_not_ticked_is_neither_drawn_nor_listed(laid):
+    laid.curves.tick("half, Response I, predicted", Qt.CheckState.Unchecked)
+    assert len(texts(laid.peaks)) == 1
+    assert len(laid.curves.traces) == 2
+
+
+def test_markers_read_every_curve(laid):
+    laid._markers.setChecked(True)
+    laid.plots.put_marker(0, 150.0)
+    laid.plots.put_marker(1, 300.0)
+    assert laid.plots.markers_hz == (150.0, 300.0)
+    first, second = texts(laid.readings)
+    assert float(first[1]) == pytest.approx(2 * float(second[1]), rel=1e-3)
+    expected = mode("one").at(np.array([150.0, 300.0])).magnitude
+    assert float(first[3]) == pytest.approx(20 * np.log10(expected[1] / expected[0]), abs=0.01)
+
+
+def test_removed_curves_are_gone(laid):
+    laid.curves.setCurrentRow(0)
+    laid._remove()
+    assert [each.source for each in laid.curves.traces] == ["half"]
+    assert laid.pair_box.pair() is None
+
+
+def test_an_option_that_is_not_allowed_is_refused_in_words(page):
+    form = page.panel.form.form
+    form.show_content({"estimator": "hv"})
+    assert page.panel.options() is None
+    assert "hv was asked for without a noise ratio" in page.panel.form.complaint
+    assert not page.panel._again.isEnabled()
+    form.show_content({"estimator": "hv", "noise_ratio": 2.0})
+    assert page.panel.options().request.noise_ratio == 2.0
+
+
+def test_curves_follow_the_theme(laid):
+    laid.retheme(DARK)
+    assert laid.plots.magnitudes.backgroundBrush().color().name() == DARK.base
+
+
+def test_recordings_are_analysed_elsewhere_laid_over_and_written(working, record_noise, tmp_path, waited):
+    """The road of the page: two recordings, their curves, a picture with a known point, a report."""
+    paths = (record_noise(tmp_path, "twice", 2.0), record_noise(tmp_path, "thrice", 3.0))
+    notices = []
+    working.desk.noticed.connect(notices.append)
+    working.desk.comparison_wanted.emit(paths)
+    assert working.is_busy
+    waited(lambda: not working.is_busy, 90.0)
+    assert notices == []
+    by_name = {each.name: each for each in working.curves.traces}
+    for name, factor in (("twice", 2.0), ("thrice", 3.0)):
+        curve = by_name[f"{name}, transmission, measured"]
+        assert np.median(curve.magnitude) == pytest.approx(factor, rel=0.01)
+    assert working.pair_box.said.startswith("Median 3.5 dB")
+    working.add_prediction((mode("model"),))
+    for ending in ("svg", "csv", "html"):
+        working.export_to(tmp_path / f"out.{ending}")
+    waited(lambda: len(notices) == 3, 60.0)
+    assert {each.what for each in notices} == {
+        f"Written: {tmp_path / f'out.{e}'}" for e in ("svg", "csv", "html")
+    }
+    svg = (tmp_path / "out.svg").read_text()
+    assert re.search(r'id="model, Response I, predicted"', svg)
+    assert "twice, transmission, measured" in (tmp_path / "out.csv").read_text().splitlines()[0]
+
+
+def test_what_cannot_be_analysed_or_written_says_so_and_spoils_nothing(working, tmp_path, waited):
+    notices = []
+    working.desk.noticed.connect(notices.append)
+    working.add_prediction((mode("model"),))
+    known = len(working.curves.traces)
+    working.add_recordings((tmp_path / "missing.h5",))
+    working.export_to(tmp_path / "out.docx")
+    waited(lambda: len(notices) == 2, 60.0)
+    said = " ".join(each.what for each in notices)
+    assert "missing.h5 does not exist" in said
+    assert ".png, .svg" in said
+    assert len(working.curves.traces) == known
