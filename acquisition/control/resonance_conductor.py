@@ -31,7 +31,7 @@ def track_resonance(play: SinePlay, plan: ResonanceTracking) -> Conduct[None]:
     """Lock on to the resonance at every level, record there, go on to the next level from there."""
     yield from started(play, plan.start_hz, plan.base_level(0))
     frequency_hz = plan.start_hz
-    for number in range(len(plan.levels)):
+    for number in range(len(plan.accelerations_m_per_s2)):
         frequency_hz = yield from _tracked(play, plan, number, frequency_hz)
     yield from play.ramp_down()
     yield from play.say()
@@ -90,7 +90,7 @@ def _say(
     is_told = lock is Lock.LOCKED and found.judgement.steadiness is not Steadiness.UNSETTLED
     said = {
         "level": number,
-        "asked": plan.levels[number],
+        "asked_m_per_s2": plan.accelerations_m_per_s2[number],
         "frequency_hz": shortened(resonance.frequency_hz) if is_told else None,
         "frequency_u_hz": shortened(resonance.uncertainty_hz) if is_told else None,
         "at_hz": shortened(found.drive_hz),

@@ -1,6 +1,5 @@
 """What an excitation asks of its feedback: when a motion is settled, which level of the base is held."""
 
-from enum import StrEnum
 from math import pi
 from typing import Annotated, Self
 
@@ -43,23 +42,6 @@ class Settling(FrozenModel):
         return self
 
 
-class BaseMotion(StrEnum):
-    """Which motion of the base has a stated amplitude."""
-
-    ACCELERATION = "acceleration"
-    """[m/s2]"""
-    DISPLACEMENT = "displacement"
-    """[m]"""
-
-    def acceleration(self, amplitude: float, frequency_hz: float) -> float:
-        """Acceleration amplitude of a sine of this motion [m/s2]."""
-        match self:
-            case BaseMotion.ACCELERATION:
-                return amplitude
-            case BaseMotion.DISPLACEMENT:
-                return amplitude * (2 * pi * frequency_hz) ** 2
-
-
 class BaseLevel(FrozenModel):
     """A level of the base's motion that the generator's setting is made to follow.
 
@@ -67,17 +49,32 @@ class BaseLevel(FrozenModel):
     the plan, ``amplitude_vpp``, is then the largest that may be used.
     """
 
-    motion: BaseMotion = BaseMotion.ACCELERATION
-    amplitude: PositiveFloat
-    """Peak of the base's fundamental [m/s2, or m for displacement]."""
+    acceleration_m_per_s2: PositiveFloat | None = None
+    """Peak of the base's fundamental [m/s2]; or give ``displacement_m``."""
+    displacement_m: PositiveFloat | None = None
+    """Peak of the base's fundamental [m], the same at every frequency; or give ``acceleration_m_per_s2``."""
     tolerance: Share = 0.025
     """How far the measured level may lie from it, as a share."""
     most_change: float = Field(default=1.25, gt=1, le=4)
     """The setting changes by at most this factor at once."""
 
+    @model_validator(mode="after")
+    def _one_motion(self) -> Self:
+        if (self.acceleration_m_per_s2 is None) == (self.displacement_m is None):
+            raise ValueError("give either acceleration_m_per_s2 or displacement_m, and not both")
+        return self
+
+    @property
+    def quantity(self) -> str:
+        """The motion that is held: ``"acceleration"`` or ``"displacement"``."""
+        return "acceleration" if self.displacement_m is None else "displacement"
+
     def acceleration_at(self, frequency_hz: float) -> float:
         """Acceleration amplitude to be held [m/s2]."""
-        return self.motion.acceleration(self.amplitude, frequency_hz)
+        if self.displacement_m is not None:
+            return self.displacement_m * (2 * pi * frequency_hz) ** 2
+        assert self.acceleration_m_per_s2 is not None, "the validator asks for one of them"
+        return self.acceleration_m_per_s2
 
 
 class JumpSearch(FrozenModel):

@@ -45,6 +45,10 @@ class HeldDwell(AbstractFeedback):
         """One step, without its wait, at the largest setting."""
         yield Step(Tone(self.frequency_hz), 0.0, self.duration_s, self.segment)
 
+    def held_accelerations(self) -> Iterator[tuple[float, float]]:
+        """Give the level at the dwell's frequency."""
+        yield self.frequency_hz, self.base_level.acceleration_at(self.frequency_hz)
+
     def preview(self, sample_rate_hz: float) -> Preview:
         """Show the recorded part at the largest setting."""
         return preview_of(

@@ -39,7 +39,7 @@ class HeldSweep(MovingSine, AbstractFeedback):
                 "duration_s": self.duration_s,
                 "step_s": self.step_s,
                 "spacing": self.spacing.value,
-                "hold": f"measured {self.base_level.motion.value}",
+                "hold": f"measured {self.base_level.quantity}",
             },
         )
 
@@ -47,6 +47,11 @@ class HeldSweep(MovingSine, AbstractFeedback):
         """One step for every ``step_s``, all of one segment, at the largest setting."""
         for mean_hz, duration_s in self.mean_steps():
             yield Step(Tone(mean_hz), 0.0, duration_s, self.segment)
+
+    def held_accelerations(self) -> Iterator[tuple[float, float]]:
+        """Give the level at every step."""
+        for mean_hz, _ in self.mean_steps():
+            yield mean_hz, self.base_level.acceleration_at(mean_hz)
 
     def preview(self, sample_rate_hz: float) -> Preview:
         """Show the whole sweep at the largest setting."""

@@ -38,6 +38,10 @@ class AbstractExcitation(FrozenModel, ABC):
         """The highest setting there is on the way, peak to peak [V]."""
         return self.amplitude_vpp
 
+    def held_accelerations(self) -> Iterator[tuple[float, float]]:
+        """List frequencies [Hz] and amplitudes of the base's acceleration [m/s2] that feedback will hold."""
+        return iter(())
+
     @property
     @abstractmethod
     def playing_s(self) -> float:

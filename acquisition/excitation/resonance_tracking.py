@@ -5,7 +5,7 @@ from typing import Literal, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
-from .feedback import BaseLevel, BaseMotion, Settling
+from .feedback import BaseLevel, Settling
 from .plan import AbstractFeedback, FrequencyHz
 from .preview import Preview, preview_of
 from .steps import Segment, Step, Tone
@@ -34,10 +34,8 @@ class ResonanceTracking(AbstractFeedback):
     """How closely the phase must be met [degrees]."""
     sensor_phase_deg: float = Field(default=0.3, ge=0, le=30)
     """Standard uncertainty of the phase between accelerometer and vibrometer [degrees]."""
-    motion: BaseMotion = BaseMotion.ACCELERATION
-    """Which motion of the base the levels are of."""
-    levels: tuple[PositiveFloat, ...] = Field(min_length=1, max_length=100)
-    """Levels of the base's fundamental, peak, in the order played [m/s2, or m for displacement]."""
+    accelerations_m_per_s2: tuple[PositiveFloat, ...] = Field(min_length=1, max_length=100)
+    """Levels of the base's fundamental, peak, in the order played [m/s2]."""
     level_tolerance: float = Field(default=0.025, gt=0, lt=1)
     """How far the measured level may lie from its own, as a share."""
     settling: Settling = Settling()
@@ -67,21 +65,28 @@ class ResonanceTracking(AbstractFeedback):
     def playing_s(self) -> float:
         """All levels with the longest searches [s]."""
         tries_s = self.most_tries * self.settling.longest_wait_s
-        return len(self.levels) * (tries_s + self.record_s)
+        return len(self.accelerations_m_per_s2) * (tries_s + self.record_s)
 
     def base_level(self, number: int) -> BaseLevel:
         """Give one of the levels as what is held."""
-        return BaseLevel(motion=self.motion, amplitude=self.levels[number], tolerance=self.level_tolerance)
+        return BaseLevel(
+            acceleration_m_per_s2=self.accelerations_m_per_s2[number], tolerance=self.level_tolerance
+        )
 
     def segment(self, number: int, frequency_hz: float) -> Segment:
         """Name the recording on the resonance of a level."""
         return Segment(
-            RESONANCE_LABEL, {"level": number, "frequency_hz": frequency_hz, "base": self.levels[number]}
+            RESONANCE_LABEL,
+            {
+                "level": number,
+                "frequency_hz": frequency_hz,
+                "asked_m_per_s2": self.accelerations_m_per_s2[number],
+            },
         )
 
     def steps(self) -> Iterator[Step]:
         """One step for each level, where the search begins, at the largest setting."""
-        for number in range(len(self.levels)):
+        for number in range(len(self.accelerations_m_per_s2)):
             yield Step(Tone(self.start_hz), 0.0, self.record_s, self.segment(number, self.start_hz))
 
     def loudest_steps(self) -> Iterator[Step]:
@@ -90,6 +95,10 @@ class ResonanceTracking(AbstractFeedback):
         for number in range(count):
             frequency_hz = self.low_hz + (self.high_hz - self.low_hz) * number / (count - 1)
             yield Step(Tone(frequency_hz), 0.0, self.record_s, Segment(RESONANCE_LABEL))
+
+    def held_accelerations(self) -> Iterator[tuple[float, float]]:
+        """Give the largest level where the search begins."""
+        yield self.start_hz, max(self.accelerations_m_per_s2)
 
     def preview(self, sample_rate_hz: float) -> Preview:
         """Show the recorded parts where the search begins, at the largest setting."""

@@ -53,6 +53,12 @@ class SettledSine(FrequencySteps, AbstractFeedback):
                 segment = Segment(STEP_LABEL, {"frequency_hz": frequency_hz, "direction": direction})
                 yield Step(Tone(frequency_hz), 0.0, self.record_s, segment)
 
+    def held_accelerations(self) -> Iterator[tuple[float, float]]:
+        """Give the level at every frequency of the list; none without a level."""
+        if self.base_level is not None:
+            for frequency_hz in self.rising_hz:
+                yield frequency_hz, self.base_level.acceleration_at(frequency_hz)
+
     def preview(self, sample_rate_hz: float) -> Preview:
         """All steps of the list, waits left out, at the largest setting."""
         return preview_of(

@@ -13,6 +13,7 @@ from ..rig.model import Quantity, suspended_mass_kg
 from ..rig.output import OutputConfig
 from .loads import predicted_loads
 from .measurement import Measurement
+from .needed_setting import needed_vpp
 from .player import Player, player_of
 
 RAMP_PERIODS = 3.0
@@ -120,6 +121,7 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
         "amplitude_limit_vpp of the hardware configuration",
         "lower amplitude_vpp",
     )
+    yield from _held_levels(measurement, rig)
     yield LimitCheck(
         "the highest frequency",
         excitation.highest_frequency_hz,
@@ -139,6 +141,24 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
         "lengthen ramp_s",
         Side.AT_LEAST,
     )
+
+
+def _held_levels(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
+    """Check that the settings which held levels need, by the rig's model, are within the plan's largest."""
+    needed = [
+        (needed_vpp(rig, acceleration, frequency_hz), frequency_hz)
+        for frequency_hz, acceleration in measurement.excitation.held_accelerations()
+    ]
+    if needed:
+        most_vpp, at_hz = max(needed)
+        yield LimitCheck(
+            f"the setting that holds the base's level (at {at_hz:g} Hz)",
+            most_vpp,
+            measurement.excitation.amplitude_vpp,
+            "Vpp",
+            "amplitude_vpp of the plan, the largest that feedback may use",
+            "raise amplitude_vpp or lower the level",
+        )
 
 
 def _streaming(measurement: Measurement, rig: Rig, output: OutputConfig) -> Iterator[LimitCheck]:

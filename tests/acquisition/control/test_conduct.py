@@ -47,7 +47,7 @@ def swept(new_control_bench, both_ways):
             direction=Direction.UP_THEN_DOWN,
             record_s=0.3,
             settling=SETTLING,
-            base_level=BaseLevel(amplitude=LEVEL),
+            base_level=BaseLevel(acceleration_m_per_s2=LEVEL),
             jumps=JumpSearch(factor=1.5, resolution_hz=0.25),
         )
         measurement = Measurement(name="swept", excitation=plan, ramp_s=0.2)
@@ -102,7 +102,7 @@ def test_a_level_is_reached_and_held_where_the_shaker_is_not_what_its_model_says
         grid=FrequencyGrid(start_hz=140, stop_hz=160, step_hz=5),
         record_s=0.3,
         settling=SETTLING,
-        base_level=BaseLevel(motion="displacement", amplitude=1e-6),
+        base_level=BaseLevel(displacement_m=1e-6),
     )
     bench.carry_out(Measurement(name="held", excitation=plan, ramp_s=0.2))
     steps = [each for each in said(bench, "achieved") if each["segment"] == "step"]
@@ -121,7 +121,7 @@ def test_a_level_out_of_reach_is_flagged_and_the_plan_s_setting_never_passed(new
     plan = HeldDwell(
         amplitude_vpp=0.05,
         frequency_hz=150,
-        base_level=BaseLevel(amplitude=3.0),
+        base_level=BaseLevel(acceleration_m_per_s2=3.0),
         settling=Settling(longest_wait_s=3),
         duration_s=2,
         update_s=0.5,
@@ -142,7 +142,7 @@ def test_a_sweep_holds_its_level_over_a_shaker_resonance_and_says_where_not(new_
         start_hz=130,
         stop_hz=170,
         duration_s=20,
-        base_level=BaseLevel(amplitude=1.0),
+        base_level=BaseLevel(acceleration_m_per_s2=1.0),
         settling=SETTLING,
     )
     bench.carry_out(Measurement(name="sweep", excitation=plan, ramp_s=0.2))
@@ -162,7 +162,7 @@ def test_a_phase_resonance_is_tracked_along_the_backbone(new_control_bench):
         start_hz=119,
         low_hz=110,
         high_hz=140,
-        levels=(0.1, 0.3, 0.6),
+        accelerations_m_per_s2=(0.1, 0.3, 0.6),
         phase_tolerance_deg=1,
         settling=SETTLING,
     )

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from acquisition.control.level_control import Held, LevelControl, MeasuredLevel, measured_level
 from acquisition.excitation.feedback import BaseLevel
 
-CONTROL = LevelControl(BaseLevel(amplitude=10.0), most_vpp=5.0)
+CONTROL = LevelControl(BaseLevel(acceleration_m_per_s2=10.0), most_vpp=5.0)
 
 
 @given(gain=st.floats(3.0, 300.0), start_vpp=st.floats(0.01, 5.0))
