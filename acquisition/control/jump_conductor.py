@@ -26,6 +26,13 @@ class _Return(Enum):
     """The branch was found, and left again before its end."""
 
 
+class _Pace(Enum):
+    """How the way forward is gone."""
+
+    GLIDE = auto()
+    STEP = auto()
+
+
 @dataclass
 class _Hunted:
     """Where the search stands."""
@@ -86,7 +93,7 @@ class JumpHunt:
         found, why = yield from self._bisected(hunted)
         is_jump = found.is_jump(self._rule.factor)
         end = yield from self._led_to(after.frequency_hz)
-        visit = Visit(end.frequency_hz, end.response)
+        visit = end.visit
         has_arrived = is_on_branch(visit, after, self._rule.factor)
         branch = Side.AFTER if has_arrived or not is_jump else Side.BEFORE
         self._say(found, why, branch)
@@ -122,27 +129,45 @@ class JumpHunt:
             return hunted.bracket, "localised"
 
     def _led_back(self, hunted: _Hunted) -> Conduct[_Return]:
-        """Go back along the pass until its branch is found again, then forward to the branch's end."""
-        place = yield from self._rejoined(hunted.branch)
-        if place is None:
-            return _Return.NOT_FOUND
-        for ahead in range(place + 1, len(hunted.branch)):
+        """Go back along the pass until its branch is found again, then forward to the branch's end.
+
+        Forward in one glide, which is quick; if that leaves the branch, step by step, which tells where.
+        """
+        left: tuple[int, Visit] | None = None
+        for pace in _Pace:
+            place = yield from self._rejoined(hunted.branch)
+            if place is None:
+                return _Return.NOT_FOUND
+            end = len(hunted.branch)
+            steps = range(max(place + 1, end - 1), end) if pace is _Pace.GLIDE else range(place + 1, end)
+            left = yield from self._left(hunted.branch, steps)
+            if left is None:
+                return _Return.BACK
             if self._is_late():
                 return _Return.NOT_FOUND
-            found = yield from self._led_to(hunted.branch[ahead].frequency_hz)
-            visit = Visit(found.frequency_hz, found.response)
-            if not is_on_branch(visit, hunted.branch[ahead], self._rule.factor):
-                hunted.left(ahead, visit)
-                return _Return.LEFT
-        return _Return.BACK
+        assert left is not None, "both paces were gone"
+        hunted.left(*left)
+        return _Return.LEFT
+
+    def _left(self, branch: Sequence[Visit], steps: range) -> Conduct[tuple[int, Visit] | None]:
+        """Go forward; give place and finding where the motion has left the branch."""
+        for place in steps:
+            found = yield from self._led_to(branch[place].frequency_hz)
+            if self._is_late() or not is_on_branch(found.visit, branch[place], self._rule.factor):
+                return place, found.visit
+        return None
 
     def _rejoined(self, branch: Sequence[Visit]) -> Conduct[int | None]:
-        for place in range(len(branch) - 1, -1, -1):
-            if self._is_late():
-                return None
+        """Go back, in longer and longer strides, until a response of the branch is met; give its place."""
+        stride = 1
+        place = len(branch) - 1
+        while not self._is_late():
             found = yield from self._led_to(branch[place].frequency_hz)
-            if is_on_branch(Visit(found.frequency_hz, found.response), branch[place], self._rule.factor):
+            if is_on_branch(found.visit, branch[place], self._rule.factor):
                 return place
+            if place == 0:
+                return None
+            place, stride = max(0, place - stride), 2 * stride
         return None
 
     def _led_to(self, frequency_hz: float) -> Conduct[Settled]:
@@ -162,7 +187,7 @@ class JumpHunt:
             },
         )
         yield from recorded(self._settler, found, segment, self._plan.record_s)
-        return Visit(frequency_hz, found.response)
+        return found.visit
 
     def _is_late(self) -> bool:
         """Whether the time left is too short for one more step and the way to the end."""

@@ -19,6 +19,8 @@ class Visit:
 
     frequency_hz: float
     response: float
+    period: int = 1
+    """Of the motion, in drive periods; 0 when it has none."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,8 @@ def ratio(one: Visit, other: Visit) -> float:
 def is_on_branch(visit: Visit, expected: Visit, factor: float) -> bool:
     """Whether a response agrees with one measured before at the same frequency.
 
-    The branches differ by ``factor`` at least; half of that, in decibels, tells them apart.
+    The branches differ by ``factor`` at least; half of that, in decibels, tells them apart. Two looks at
+    one chaotic motion differ more than two at a periodic one: the whole factor is granted to them.
     """
-    return bool(ratio(visit, expected) < factor**0.5)
+    are_aperiodic = visit.period == expected.period == 0
+    return bool(ratio(visit, expected) < (factor if are_aperiodic else factor**0.5))

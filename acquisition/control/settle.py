@@ -6,6 +6,7 @@ from math import isfinite
 
 from ..excitation.feedback import BaseLevel, Settling
 from ..run.state import RunState
+from .jump_search import Visit
 from .level_control import Held, LevelControl, MeasuredLevel, measured_level
 from .move import Conduct
 from .sine_play import SinePlay
@@ -38,6 +39,11 @@ class Settled:
     def response(self) -> float:
         """Response II: the magnitude of the transmissibility."""
         return abs(self.transmissibility)
+
+    @property
+    def visit(self) -> Visit:
+        """What a search for a jump needs of it."""
+        return Visit(self.frequency_hz, self.response, self.judgement.period)
 
     def numbers(self) -> dict[str, int | float | str]:
         """Give what belongs beside the samples."""

@@ -73,4 +73,4 @@ class Pass:
             },
         )
         yield from recorded(settler, found, segment, self._plan.record_s)
-        return Visit(frequency_hz, found.response)
+        return found.visit

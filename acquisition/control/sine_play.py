@@ -8,7 +8,6 @@ import numpy as np
 from ..excitation.plan import LOWEST_AMPLITUDE_VPP
 from ..excitation.steps import Segment, Tone
 from ..plan.measurement import Measurement
-from ..plan.needed_setting import needed_vpp
 from ..rig.configuration import Rig
 from ..run.schedule import HUSH_S, Phase, ramp
 from ..run.state import RunState
@@ -73,19 +72,6 @@ class SinePlay:
     def forget(self) -> None:
         """Look anew from the next move on."""
         self._scope.forget()
-
-    def feedforward_vpp(self, frequency_hz: float, acceleration: float, acceleration_now: float) -> float:
-        """Guess the setting for another frequency and level from the one of now, by the rig's linear model.
-
-        Parameters
-        ----------
-        acceleration, acceleration_now
-            Of the base, there and here [m/s2].
-
-        """
-        there = needed_vpp(self.rig, acceleration, frequency_hz)
-        here = needed_vpp(self.rig, acceleration_now, self.played.frequency_hz)
-        return self.played.setting_vpp * there / here
 
     def note(self, kind: str, text: str) -> None:
         """Have something noted with the next move."""

@@ -1,4 +1,4 @@
-"""The first sine of a measurement: its setting guessed from the rig's model, ramped up."""
+"""From one sine to the next: the first one ramped up, the others reached without a kick."""
 
 from math import ceil
 
@@ -6,9 +6,13 @@ from ..excitation.feedback import BaseLevel
 from ..excitation.settled_sine import GLIDE_TONE_S
 from ..plan.needed_setting import needed_vpp
 from ..run.state import RunState
+from .gain_track import GainTrack
 from .level_control import LevelControl
 from .move import Conduct
 from .sine_play import SinePlay
+
+_GLIDE_MEMORY_S = 0.5
+"""Over which a glide averages the base's answer [s]."""
 
 
 def started(play: SinePlay, frequency_hz: float, level: BaseLevel | None) -> Conduct[None]:
@@ -26,21 +30,54 @@ def glided(play: SinePlay, frequency_hz: float, level: BaseLevel | None, step_hz
     """Go to another frequency through others at most ``step_hz`` apart: a large step would be a kick."""
     begin_hz = play.played.frequency_hz
     tones = max(1, ceil(abs(frequency_hz - begin_hz) / step_hz * (1 - 1e-9)))
+    track = GainTrack(_GLIDE_MEMORY_S)
     for tone in range(1, tones):
-        moved(play, begin_hz + (frequency_hz - begin_hz) * tone / tones, level)
+        tracked(play, begin_hz + (frequency_hz - begin_hz) * tone / tones, level, track, GLIDE_TONE_S)
         yield from play.listen(RunState.SETTLING, GLIDE_TONE_S)
-    moved(play, frequency_hz, level)
+        followed(play, level, track)
+    tracked(play, frequency_hz, level, track, GLIDE_TONE_S)
 
 
 def moved(play: SinePlay, frequency_hz: float, level: BaseLevel | None) -> None:
-    """Play another frequency: the setting follows the rig's model from where it is, and no faster."""
-    now = play.played
-    setting_vpp = now.setting_vpp
+    """Play another frequency: the setting follows the rig's model from where it is."""
+    setting_vpp = play.played.setting_vpp
     if level is not None:
-        control = LevelControl(level, play.most_vpp)
-        guess_vpp = play.feedforward_vpp(
-            frequency_hz, level.acceleration_at(frequency_hz), level.acceleration_at(now.frequency_hz)
-        )
-        slowest, fastest = now.setting_vpp / level.most_change, now.setting_vpp * level.most_change
-        setting_vpp = control.bounded_vpp(min(max(guess_vpp, slowest), fastest))
-    play.change(frequency_hz, setting_vpp)
+        setting_vpp *= needed_vpp(play.rig, level.acceleration_at(frequency_hz), frequency_hz)
+        setting_vpp /= _modelled_vpp(play, level)
+    _change(play, frequency_hz, setting_vpp, level)
+
+
+def tracked(
+    play: SinePlay, frequency_hz: float, level: BaseLevel | None, track: GainTrack, duration_s: float
+) -> None:
+    """Play another frequency for ``duration_s``, at the setting that the track foresees for its middle."""
+    if level is None or not track.is_known:
+        moved(play, frequency_hz, level)
+        return
+    modelled_vpp = needed_vpp(play.rig, level.acceleration_at(frequency_hz), frequency_hz)
+    gain = track.gain_at(play.elapsed_s + 0.5 * duration_s)
+    _change(play, frequency_hz, modelled_vpp / gain, level)
+
+
+def followed(play: SinePlay, level: BaseLevel | None, track: GainTrack) -> None:
+    """Take what was just heard into the track."""
+    if level is None:
+        return
+    target = level.acceleration_at(play.played.frequency_hz)
+    modelled = target * play.played.setting_vpp / _modelled_vpp(play, level)
+    track.add(play.elapsed_s, play.periods.base, modelled, target)
+
+
+def _modelled_vpp(play: SinePlay, level: BaseLevel) -> float:
+    """Give the setting that the model needs for the level at the frequency of now [V]."""
+    frequency_hz = play.played.frequency_hz
+    return needed_vpp(play.rig, level.acceleration_at(frequency_hz), frequency_hz)
+
+
+def _change(play: SinePlay, frequency_hz: float, wanted_vpp: float, level: BaseLevel | None) -> None:
+    """Change frequency and setting, the latter by no more than the level allows at once."""
+    if level is not None:
+        now_vpp = play.played.setting_vpp
+        slow_vpp = min(max(wanted_vpp, now_vpp / level.most_change), now_vpp * level.most_change)
+        wanted_vpp = LevelControl(level, play.most_vpp).bounded_vpp(slow_vpp)
+    play.change(frequency_hz, wanted_vpp)

@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from typing import Literal
 
+from pydantic import PositiveFloat
+
 from .feedback import BaseLevel, Settling
 from .plan import AbstractFeedback
 from .preview import Preview, preview_of
@@ -20,6 +22,8 @@ class HeldSweep(MovingSine, AbstractFeedback):
     kind: Literal["held_sweep"] = "held_sweep"
     base_level: BaseLevel
     """Level of the base to be held."""
+    average_s: PositiveFloat = 0.5
+    """Chance is averaged away, and the level judged, over this time; a trend is followed faster [s]."""
     settling: Settling = Settling()
     """When the sweep begins to move."""
 

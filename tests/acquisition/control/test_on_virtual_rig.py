@@ -1,0 +1,182 @@
+"""Feedback on the whole rig: verdicts, levels, jumps and modes against the simulation and the closed form."""
+
+import json
+
+import numpy as np
+import pytest
+
+from acquisition.bench import open_bench
+from acquisition.check.low_level import sine_amplitude
+from acquisition.excitation.feedback import BaseLevel, JumpSearch, Settling
+from acquisition.excitation.held_dwell import HeldDwell
+from acquisition.excitation.resonance_tracking import ResonanceTracking
+from acquisition.excitation.settled_sine import SettledSine
+from acquisition.excitation.stepped_sine import Direction
+from acquisition.plan.measurement import Measurement
+from acquisition.recording.reader import open_recording
+from acquisition.run.run_measurement import run_measurement
+from acquisition.run.state import RunState
+from sim.drive import Harmonic
+from sim.integrate import integrate
+from sim.specimen import gong2025
+
+SAMPLE_RATE_HZ = 10240.0
+HEAVY_KG = 0.6
+"""A fixture that the specimen hardly moves: the base is then the sine that the simulation is given."""
+SPECIMEN = gong2025()
+
+
+@pytest.fixture
+def carried_out(rig, tmp_path):
+    """Carry out an excitation on the virtual rig, and open its recording."""
+    opened = []
+
+    def carry_out(excitation, fixture_kg=HEAVY_KG):
+        shaker = rig.shaker.model_copy(update={"fixture_mass_kg": fixture_kg})
+        daq = rig.daq.model_copy(update={"sample_rate_hz": SAMPLE_RATE_HZ})
+        plan = Measurement(name="run", excitation=excitation, ramp_s=0.4, ramp_step_s=0.02)
+        path = tmp_path / f"run{len(opened)}.h5"
+        with open_bench(rig.model_copy(update={"shaker": shaker, "daq": daq})) as bench:
+            outcome = run_measurement(bench, plan, path)
+        assert outcome.state is RunState.FINISHED
+        opened.append(open_recording(outcome.path))
+        return opened[-1]
+
+    yield carry_out
+    for recording in opened:
+        recording.close()
+
+
+def said(recording, kind):
+    return [json.loads(event.text) for event in recording.events if event.kind == kind]
+
+
+def simulated_period(frequency_hz, amplitude_m, longest=8):
+    """Drive periods after which the simulated state repeats to a thousandth; 0 when it does not."""
+    periods = round(4 * frequency_hz)
+    drive = Harmonic(frequency_hz, amplitude_m)
+    motion = integrate(SPECIMEN, drive, periods / frequency_hz, sample_rate_hz=frequency_hz)
+    states = np.asarray(motion.states)[-80:]
+    size = np.sqrt(np.mean(states**2, axis=0))
+    for period in range(1, longest + 1):
+        if np.max(np.abs(states[period:] - states[:-period]) / size) < 1e-3:
+            return period
+    return 0
+
+
+@pytest.mark.parametrize(
+    ("frequency_hz", "amplitude_m", "period"),
+    [(260.0, 1e-6, 1), (74.0, 30e-6, 2), (70.0, 40e-6, 3), (260.0, 5e-6, 0)],
+)
+def test_the_period_of_a_steady_motion_is_the_simulation_s(carried_out, frequency_hz, amplitude_m, period):
+    assert simulated_period(frequency_hz, amplitude_m) == period
+    plan = HeldDwell(
+        amplitude_vpp=4.0,
+        frequency_hz=frequency_hz,
+        base_level=BaseLevel(displacement_m=amplitude_m),
+        duration_s=0.3,
+    )
+    found = said(carried_out(plan), "settled")[-1]
+    assert found["period"] == period
+    assert found["motion"] == ("periodic" if period else "aperiodic")
+    assert found["level"] == "within tolerance"
+
+
+def test_the_base_is_held_while_impacts_ring_on_a_light_table(carried_out):
+    plan = HeldDwell(
+        amplitude_vpp=2.0,
+        frequency_hz=260,
+        base_level=BaseLevel(displacement_m=5e-6),
+        duration_s=4,
+    )
+    recording = carried_out(plan, fixture_kg=0.07)
+    dwell = next(each for each in recording.segments if each.label == "dwell")
+    base = recording.read("base_acceleration", dwell.first_sample, dwell.last_sample + 1)
+    drive = recording.read("drive_voltage", dwell.first_sample, dwell.last_sample + 1)
+    target = 5e-6 * (2 * np.pi * 260) ** 2
+    # The recorded drive's own frequency: two clocks would smear the fit.
+    measured = sine_amplitude(base, true_frequency_hz(drive), SAMPLE_RATE_HZ)
+    assert abs(measured / target - 1) < 0.025
+    # And impacts do ring: the rest of the base's motion is not small.
+    assert np.var(base) - measured**2 / 2 > (0.1 * measured) ** 2 / 2
+    assert said(recording, "settled")[-1]["motion"] == "aperiodic"
+
+
+def true_frequency_hz(drive):
+    """Largest line of a long record, refined by its neighbours' phase."""
+    half = drive.size // 2
+    time_s = np.arange(half) / SAMPLE_RATE_HZ
+    turning = np.exp(-2j * np.pi * 260 * time_s)
+    first, second = np.sum(drive[:half] * turning), np.sum(drive[half : 2 * half] * turning)
+    turned = np.angle(second / first) - 2 * np.pi * 260 * half / SAMPLE_RATE_HZ
+    return 260 + ((turned + np.pi) % (2 * np.pi) - np.pi) * SAMPLE_RATE_HZ / (2 * np.pi * half)
+
+
+def linear_answer(frequency_hz):
+    """Displacements of m0, m1, m2 over the base's, without contact."""
+    omega = 2 * np.pi * frequency_hz
+    s = SPECIMEN
+    dynamic = s.stiffness_matrix + 1j * omega * s.damping_matrix - omega**2 * s.mass_matrix
+    return np.linalg.solve(dynamic, [s.stiffnesses[0] + 1j * omega * s.dampings[0], 0, 0])
+
+
+def simulated_return_hz(amplitude_m, start_hz, stop_hz, step_hz):
+    """Lead the simulated motion down from impacts; the first frequency without any."""
+    state = None
+    for frequency_hz in np.arange(start_hz, stop_hz, -step_hz):
+        motion = integrate(SPECIMEN, Harmonic(frequency_hz, amplitude_m), 3.0, initial_state=state)
+        state = motion.final_state
+        times_s = motion.impacts.times_s
+        if times_s.size == 0 or times_s[-1] < 2.0:
+            return frequency_hz
+    raise AssertionError("the simulated motion kept its impacts")
+
+
+def test_jumps_up_and_down_differ_and_lie_where_theory_and_simulation_have_them(carried_out):
+    plan = SettledSine(
+        amplitude_vpp=4.0,
+        frequencies_hz=(250.0, 257.0),
+        direction=Direction.UP_THEN_DOWN,
+        record_s=0.3,
+        base_level=BaseLevel(displacement_m=3e-6, tolerance=0.01),
+        jumps=JumpSearch(factor=1.4, resolution_hz=0.3),
+    )
+    jumps = {each["direction"]: each for each in said(carried_out(plan), "jump")}
+    assert {each["how"] for each in jumps.values()} == {"localised"}
+    # Upwards, impacts begin where the linear relative motion reaches the gap.
+    grid_hz = np.arange(248, 258, 0.01)
+    touching = [abs(np.subtract(*linear_answer(f)[1:])) * 3e-6 >= SPECIMEN.gap_m for f in grid_hz]
+    grazing_hz = grid_hz[int(np.argmax(touching))]
+    # The base is held to 0.3 %, which moves grazing by a tenth of a hertz.
+    assert jumps["up"]["before_hz"] - 0.15 <= grazing_hz <= jumps["up"]["after_hz"] + 0.15
+    back_hz = simulated_return_hz(3e-6, 254.0, 249.0, 0.3)
+    assert abs(jumps["down"]["frequency_hz"] - back_hz) <= 0.3 + 0.3
+    assert jumps["down"]["before_hz"] < jumps["up"]["before_hz"]
+
+
+@pytest.mark.parametrize(
+    ("start_hz", "span_hz", "step_hz", "acceleration", "paper_hz"),
+    [(94.5, 1.5, 0.4, 0.1, 95), (264.0, 20, 3, 0.5, 266), (496.0, 30, 6, 0.6, 500)],
+)
+def test_linear_modes_are_tracked_to_their_phase_resonance(
+    carried_out, start_hz, span_hz, step_hz, acceleration, paper_hz
+):
+    plan = ResonanceTracking(
+        amplitude_vpp=1.0,
+        start_hz=start_hz,
+        low_hz=start_hz - span_hz,
+        high_hz=start_hz + span_hz,
+        widest_step_hz=step_hz,
+        accelerations_m_per_s2=(acceleration,),
+        settling=Settling(tolerance=0.02),
+        record_s=0.3,
+    )
+    found = said(carried_out(plan, fixture_kg=0.07), "resonance")[0]
+    grid_hz = np.arange(start_hz - 1.2, start_hz + 6, 0.005)
+    quadrature = np.array([linear_answer(f)[0].real for f in grid_hz])
+    expected_hz = grid_hz[int(np.argmax(quadrature < 0))]
+    assert found["lock"] == "locked"
+    assert abs(found["frequency_hz"] - expected_hz) < 2 * found["frequency_u_hz"] + 0.01
+    assert found["frequency_u_hz"] < 0.15
+    # The paper's peaks, of a response whose modes overlap a little.
+    assert abs(found["frequency_hz"] - paper_hz) < 1
