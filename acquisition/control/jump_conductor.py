@@ -114,7 +114,7 @@ class JumpHunt:
             while True:
                 if hunted.here is Side.AFTER:
                     match (yield from self._led_back(hunted)):
-                        case _Return.NOT_FOUND:
+                        case _Return.NOT_FOUND if not self._is_late():
                             return hunted.bracket, "its branch was not found again"
                         case _Return.LEFT:
                             return None

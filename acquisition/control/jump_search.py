@@ -76,10 +76,12 @@ def ratio(one: Visit, other: Visit) -> float:
 
 
 def is_on_branch(visit: Visit, expected: Visit, factor: float) -> bool:
-    """Whether a response agrees with one measured before at the same frequency.
+    """Whether a motion is the one that was found before at the same frequency.
 
-    The branches differ by ``factor`` at least; half of that, in decibels, tells them apart. Two looks at
-    one chaotic motion differ more than two at a periodic one: the whole factor is granted to them.
+    It has the same period, or as little of one. The branches differ by ``factor`` at least; half of
+    that, in decibels, tells them apart. Two looks at one chaotic motion differ more than two at a
+    periodic one: the whole factor is granted to them.
     """
-    are_aperiodic = visit.period == expected.period == 0
-    return bool(ratio(visit, expected) < (factor if are_aperiodic else factor**0.5))
+    if visit.period != expected.period:
+        return False
+    return bool(ratio(visit, expected) < (factor if visit.period == 0 else factor**0.5))

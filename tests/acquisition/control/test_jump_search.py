@@ -46,3 +46,9 @@ def test_a_bracket_that_is_narrow_enough_asks_for_nothing():
 @pytest.mark.parametrize(("response", "expected"), [(1.2, True), (1 / 1.2, True), (1.3, False), (0.6, False)])
 def test_half_the_factor_in_decibels_tells_two_branches_apart(response, expected):
     assert is_on_branch(Visit(100, response), Visit(100, 1.0), factor=1.5) is expected
+
+
+def test_a_chaotic_motion_of_the_same_size_is_another_branch():
+    linear, chaotic = Visit(100, 1.0, period=1), Visit(100, 1.05, period=0)
+    assert not is_on_branch(chaotic, linear, factor=1.5)
+    assert is_on_branch(Visit(100, 1.4, period=0), chaotic, factor=1.5)
