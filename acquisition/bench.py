@@ -18,6 +18,7 @@ from .rig.calibration import CalibrationRule, check_calibrations
 from .rig.channel import Channel, channels_of
 from .rig.configuration import Rig, load_rig
 from .rig.knobs import Confirm, KnobSheet, confirm_at_terminal, confirm_simulated
+from .rig_power import RigPower
 
 
 class Reality(StrEnum):
@@ -85,6 +86,7 @@ def open_bench(
     config: Rig | Path,
     confirm: Confirm | None = None,
     calibration: CalibrationRule = CalibrationRule.ENFORCED,
+    power: RigPower | None = None,
 ) -> Bench:
     """Open every instrument of a rig, with generator and analogue output silent.
 
@@ -98,6 +100,8 @@ def open_bench(
         virtual rig without asking.
     calibration
         What a calibration that has run out does; a virtual rig's never runs out.
+    power
+        What keeps a virtual rig on beyond this bench; absent, it is switched off with it.
 
     Raises
     ------
@@ -114,14 +118,14 @@ def open_bench(
         check_calibrations(rig, datetime.now(UTC).astimezone().date())
     closing = ExitStack()
     try:
-        return _opened(rig, confirm, closing)
+        return _opened(rig, confirm, power, closing)
     except BaseException as error:
         _leave(closing, error)
         raise
 
 
-def _opened(rig: Rig, confirm: Confirm | None, closing: ExitStack) -> Bench:
-    connected = rig if rig.virtual is None else _virtual(rig, closing)
+def _opened(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: ExitStack) -> Bench:
+    connected = (closing.enter_context(RigPower(rig)) if power is None else power).connected
     digitizer = DaqmxDigitizer.open(connected)
     closing.callback(digitizer.close)
     output = _output(connected, digitizer, closing)
@@ -145,20 +149,6 @@ def _output(rig: Rig, digitizer: DaqmxDigitizer, closing: ExitStack) -> DaqmxOut
 
 def _usual_confirmation(rig: Rig) -> Callable[..., KnobSheet]:
     return confirm_at_terminal if rig.virtual is None else confirm_simulated
-
-
-def _virtual(rig: Rig, closing: ExitStack) -> Rig:
-    """Start the simulated instruments, and point the rig at them."""
-    # The one place where production code knows of them, and only when a rig asks for it.
-    from .virtual.rig import VirtualRig  # noqa: PLC0415 - a real bench must not load the simulation
-
-    virtual = closing.enter_context(VirtualRig(rig))
-    return rig.model_copy(
-        update={
-            "daq": rig.daq.model_copy(update={"server": virtual.daq_address}),
-            "generator": rig.generator.model_copy(update={"resource": virtual.visa_resource}),
-        }
-    )
 
 
 def _leave(closing: ExitStack, error: BaseException | None) -> None:

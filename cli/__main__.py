@@ -17,6 +17,7 @@ from .bench import bench
 from .demo import demo
 from .export import export
 from .figure import figure
+from .gui import gui
 from .import_recording import import_file
 from .measure import measure
 from .predict import predict
@@ -42,6 +43,7 @@ app.command()(analyse)
 app.command()(predict)
 app.command()(study)
 app.command()(figure)
+app.command()(gui)
 app.command()(reproduce)
 app.command()(tradeoff)
 app.command()(export)

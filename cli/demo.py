@@ -8,6 +8,7 @@ import typer
 from acquisition.campaign.item import CampaignItem, Item
 from acquisition.engine.orders import Orders
 from acquisition.plan.campaign import load_campaign
+from acquisition.rig.configuration import load_rig
 from acquisition.shipped import shipped
 from analysis.report.report import write_report
 from analysis.summary import campaign_summary
@@ -39,7 +40,7 @@ def demo(
                 analyst.take(item.path)
 
         rig = shipped("hardware_configs/virtual_rig.toml")
-        with the_bench(rig, "demo") as engine:
+        with the_bench(load_rig(rig), "demo") as engine:
             items = engine.measure(Orders(campaign=campaign, folder=folder / "recordings"), recorded)
         if {item.name for item in items if item.result is Item.RECORDED} != set(campaign.recording_names()):
             raise typer.Exit(STOPPED_EXIT_CODE)

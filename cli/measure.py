@@ -16,10 +16,10 @@ from acquisition.engine.orders import Orders
 from acquisition.engine.state import Attendance
 from acquisition.engine.work import Work
 from acquisition.plan.campaign import load_campaign
-from acquisition.rig.configuration import load_rig
+from acquisition.rig.configuration import Rig
 
 from .engine_bars import Watching
-from .paths import BenchPath, bench_path
+from .paths import BenchPath, FaultsPath, rig_at
 
 STOPPED_EXIT_CODE = 3
 """Not everything was recorded, and nothing failed: somebody stopped it."""
@@ -38,6 +38,7 @@ def measure(
     accept_changed_bench: Annotated[
         bool, typer.Option("--accept-changed-bench", help="Resume on another bench than it was begun on.")
     ] = False,
+    faults: FaultsPath = None,
     check: Annotated[
         CheckRule, typer.Option(help="A passed check of the bench, of today: ask for it, make it, or not.")
     ] = CheckRule.FRESH,
@@ -51,7 +52,7 @@ def measure(
         changed_bench=ChangedBench.ACCEPT if accept_changed_bench else ChangedBench.REFUSE,
         check=check,
     )
-    with the_bench(bench_path(bench), orders.campaign.name) as engine:
+    with the_bench(rig_at(bench, faults), orders.campaign.name) as engine:
         items = engine.measure(orders)
     if engine.switch.request is not None:
         raise typer.Exit(STOPPED_EXIT_CODE)
@@ -60,11 +61,11 @@ def measure(
 
 
 @contextmanager
-def the_bench(config: Path, what: str) -> Iterator[Engine]:
+def the_bench(rig: Rig, what: str) -> Iterator[Engine]:
     """Open a bench in this process, with bars on the terminal and a door for whoever watches or stops it."""
     engine = Engine(Attendance.UNATTENDED)
     desk = Desk(engine, Work(engine))
     with closing(engine):
-        engine.open(load_rig(config))
+        engine.open(rig)
         with hosted(desk, what), Watching(desk.status):
             yield engine

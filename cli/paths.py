@@ -5,11 +5,16 @@ from typing import Annotated
 
 import typer
 
+from acquisition.rig.configuration import Rig, load_rig, with_faults
 from acquisition.shipped import shipped
 
 BenchPath = Annotated[
     Path | None,
     typer.Option("--bench", metavar="BENCH.toml", help="Hardware configuration; the virtual rig if absent."),
+]
+FaultsPath = Annotated[
+    Path | None,
+    typer.Option("--faults", metavar="FAULTS.toml", help="What goes wrong with a virtual rig, and when."),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 
@@ -17,6 +22,12 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document an
 def bench_path(given: Path | None) -> Path:
     """Path of the hardware configuration: what was given, or the virtual rig."""
     return shipped("hardware_configs/virtual_rig.toml") if given is None else given
+
+
+def rig_at(bench: Path | None, faults: Path | None) -> Rig:
+    """Read the hardware configuration that was given, or the virtual rig's, with faults if any are given."""
+    rig = load_rig(bench_path(bench))
+    return rig if faults is None else with_faults(rig, faults)
 
 
 def unused(path: Path) -> Path:

@@ -7,12 +7,11 @@ from typing import Annotated
 
 import typer
 
-from acquisition.rig.configuration import load_rig
 from acquisition.rig.server_token import METADATA_KEY, VARIABLE
-from acquisition.virtual.rig import VirtualRig
+from acquisition.virtual.rig import DiskFaults, VirtualRig
 
 from .output import console
-from .paths import bench_path
+from .paths import FaultsPath, rig_at
 
 
 def serve_rig(
@@ -25,12 +24,13 @@ def serve_rig(
             "--address", metavar="HOST:PORT", help="Where to listen; beyond this computer, with a token."
         ),
     ] = "127.0.0.1:31763",
+    faults: FaultsPath = None,
 ) -> None:
     """Serve the virtual rig to any pyvisa and nidaqmx program until Ctrl-C."""
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    with VirtualRig(load_rig(bench_path(bench)), address) as rig:
+    with VirtualRig(rig_at(bench, faults), address, disk=DiskFaults.REFUSED) as rig:
         console.print(f"[bold]{rig.rig.name}[/] is on. Stop it with Ctrl-C.\n")
         console.print("The converter, for nidaqmx:")
         console.print(f'  grpc.insecure_channel("{rig.daq_address}")  # GrpcSessionOptions(channel, "")')

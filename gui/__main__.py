@@ -17,6 +17,10 @@ def main(arguments: list[str] | None = None) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from .open_window import open_window  # noqa: PLC0415
 
+    if options.screenshots is not None:
+        from .screenshots import make_screenshots  # noqa: PLC0415
+
+        return make_screenshots(options.bench, options.screenshots)
     return open_window(options.bench, options.settings)
 
 
@@ -27,6 +31,9 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
     )
     parser.add_argument(
         "--settings", type=Path, metavar="FILE.ini", help="settings file; the user's if absent"
+    )
+    parser.add_argument(
+        "--screenshots", type=Path, metavar="DIR", help="make a picture of every page there, and end"
     )
     return parser.parse_args(arguments)
 

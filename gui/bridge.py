@@ -21,7 +21,7 @@ from acquisition.run.stop import StopLevel
 from analysis.live.view import LiveView
 
 from .engine_line import EngineLine, Starter, Urgency
-from .live_run import live_view
+from .live_run import live_view, warm_up
 from .notice import Notice, NoticeKind, notice_of
 
 CATCH_UP_S = 2.0
@@ -106,7 +106,7 @@ class Bridge(QObject):
         if self._line is None:
             self._line = EngineLine(self._start)
         self._rig = rig
-        self._order(lambda client: client.open(rig, confirmations))
+        self._order(lambda client: _open(client, rig, confirmations))
 
     def close_bench(self) -> None:
         """Close the bench."""
@@ -224,6 +224,12 @@ class Bridge(QObject):
         self._status, self._heard, self._ended = None, 0, frozenset()
         line.leave()
         self.noticed.emit(notice_of(error, "Look at the bench, then open it again on the Rig page."))
+
+
+def _open(client: EngineClient, rig: Rig, confirmations: KnobSheet | None) -> None:
+    """Open a bench, and meanwhile load what the first picture of a run needs: no frame has time for that."""
+    client.open(rig, confirmations)
+    warm_up()
 
 
 def _done(_: object) -> None:

@@ -1,5 +1,7 @@
 """A live view for a run that begins: channels from the bench, the band from the plan."""
 
+import numpy as np
+
 from acquisition.engine.status import BenchFacts
 from acquisition.plan.band import excited_band_hz
 from acquisition.plan.campaign import Campaign
@@ -9,6 +11,7 @@ from analysis.live.view import LiveChannel, LiveView
 
 WHOLE_BAND_HZ = (20.0, 2000.0)
 """Looked at when the plan is not known: it was armed by somebody else."""
+WARM_RATE_HZ, WARM_S, WARM_HZ = 51200.0, 3.0, 200.0
 
 
 def live_view(bench: BenchFacts, rig: Rig | None, campaign: Campaign | None, name: str) -> LiveView:
@@ -20,6 +23,20 @@ def live_view(bench: BenchFacts, rig: Rig | None, campaign: Campaign | None, nam
     ]
     delay_s = 0.0 if rig is None else rig.vibrometer.delay_s
     return LiveView(channels, bench.sample_rate_hz, band_hz=band_hz, delay_s=delay_s)
+
+
+def warm_up() -> None:
+    """Watch a moment of silence and a sine, so that everything is loaded and every window is known."""
+    roles = ("drive_voltage", "base_acceleration", "m0_velocity")
+    channels = [LiveChannel(role, "V", 1.0, 1.0) for role in roles]
+    view = LiveView(channels, WARM_RATE_HZ, band_hz=WHOLE_BAND_HZ)
+    time_s = np.arange(round(WARM_S * WARM_RATE_HZ)) / WARM_RATE_HZ
+    sine = np.sin(2 * np.pi * WARM_HZ * time_s)
+    view.add(0, np.tile(sine, (len(roles), 1)).astype(np.float32))
+    view.lanes(1.0, 100)
+    view.spectrum()
+    view.transmission()
+    view.portrait()
 
 
 def measurement_called(campaign: Campaign | None, name: str) -> Measurement | None:

@@ -6,9 +6,14 @@ from types import TracebackType
 from typing import Self
 
 from ..bench import Bench, open_bench
+from ..check.result import CheckResult
 from ..errors import AcquisitionError, CheckFailed
 from ..rig.configuration import Knob, Rig, load_rig
 from ..rig.knobs import Confirm, KnobSheet
+from ..rig_power import RigPower
+
+LOOK_AGAIN_S = 1.0
+"""Rig time that passes on a virtual rig before its bench is opened again: cables are put back in it."""
 
 
 class KeptBench:
@@ -17,7 +22,9 @@ class KeptBench:
     def __init__(self, config: Rig | Path, confirm: Confirm | None = None) -> None:
         self._rig = config if isinstance(config, Rig) else load_rig(config)
         self._confirm = confirm
+        self._power = RigPower(self._rig)
         self._bench: Bench | None = None
+        self._last_check: CheckResult | None = None
 
     @property
     def bench(self) -> Bench:
@@ -37,31 +44,43 @@ class KeptBench:
         """
         before, self._bench = self._bench, None
         if before is not None:
+            self._last_check = before.last_check
             sheet = before.confirmations
             self._confirm = lambda knobs: _as_before(sheet, knobs)
             with suppress(AcquisitionError):  # what is lost cannot be silenced; the others were
                 before.close()
-        self._bench = open_bench(self._rig, self._confirm)
-        if before is not None:
-            self._bench.last_check = before.last_check
+        self._power.let_pass(LOOK_AGAIN_S)
+        self._bench = open_bench(self._rig, self._confirm, power=self._power)
+        self._bench.last_check = self._last_check
         return self._bench
 
     def close(self) -> None:
         """Silence and close everything. Legal at any time."""
         bench, self._bench = self._bench, None
-        if bench is not None:
-            bench.close()
+        try:
+            if bench is not None:
+                bench.close()
+        finally:
+            self._power.__exit__(None, None, None)
 
     def __enter__(self) -> Self:
-        self._bench = open_bench(self._rig, self._confirm)
+        self._power.__enter__()
+        try:
+            self._bench = open_bench(self._rig, self._confirm, power=self._power)
+        except BaseException as error:
+            self._power.__exit__(type(error), error, error.__traceback__)
+            raise
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         bench, self._bench = self._bench, None
-        if bench is not None:
-            bench.__exit__(kind, error, trace)
+        try:
+            if bench is not None:
+                bench.__exit__(kind, error, trace)
+        finally:
+            self._power.__exit__(kind, error, trace)
 
 
 def _as_before(sheet: KnobSheet, knobs: tuple[Knob, ...]) -> KnobSheet:

@@ -1,10 +1,10 @@
 """Arming: a campaign is refused with reasons, or put into words that an experimenter can check."""
 
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 
-from ..bench import Bench, Reality
+from ..bench import Bench
 from ..campaign.opening import planned_recordings
-from ..check.admission import CheckRule, require_checked
+from ..check.admission import CheckRule, require_on_record
 from ..plan.limits import LimitCheck, require_within_limits
 from ..run.drive import drive_for
 from .orders import Orders
@@ -23,10 +23,8 @@ def armed_plan(bench: Bench, orders: Orders) -> ArmedPlan:
         With every reason why it cannot be carried out.
 
     """
-    if (
-        bench.reality is Reality.REAL and orders.check is CheckRule.FRESH
-    ):  # a virtual one is checked at the start, where that is due
-        require_checked(bench.rig, datetime.now(UTC))
+    if orders.check is CheckRule.FRESH:
+        require_on_record(bench)
     checks: list[tuple[str, LimitCheck]] = []
     campaign, folder = orders.campaign, orders.folder
     points = campaign.points()

@@ -8,6 +8,7 @@ import os
 from pathlib import Path
 
 from .disk import allocate, opened_to_write
+from .disk_trouble import meet_trouble
 
 FILE_MODE = 0o666
 """Before the user's mask, as for any file a program makes."""
@@ -27,6 +28,7 @@ def claim_room(path: Path, allocated: int, length: int) -> None:
         When the file exists, or the disk or a limit refuses; a file made here is gone again.
 
     """
+    meet_trouble()
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, FILE_MODE)
     try:
         allocate(descriptor, 0, allocated)

@@ -19,7 +19,8 @@ from ..instruments import Block, Samples
 from . import layout
 from .committer import COMMIT_INTERVAL_S, Batch, Committer
 from .counts import Counts, CountScale
-from .disk import Buffer, Disk, PositionedFile
+from .disk import Buffer, Disk
+from .disk_trouble import open_disk
 from .finalise import discard, finalise
 from .fixed_text import encoded
 from .header import RecordingHeader
@@ -55,7 +56,7 @@ def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWri
                 " (a .part or .tmp is what an interrupted recording left: recover it first)."
             )
     places = preallocate(path, part, header)
-    return RecordingWriter(path, header, places, PositionedFile(part))
+    return RecordingWriter(path, header, places, open_disk(part))
 
 
 class RecordingWriter:

@@ -8,6 +8,7 @@ from typing import Literal, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
+from ..errors import ConfigurationError
 from ..toml_file import FrozenModel, load_toml
 from .output import OutputConfig
 
@@ -220,6 +221,8 @@ class VirtualConfig(FrozenModel):
     """White, rms in the same band [m/s2]."""
     vibrometer_noise_m_per_s_per_rthz: NonNegativeFloat
     vibrometer_dropouts_per_s: NonNegativeFloat
+    faults: str | None = None
+    """Path of a script of faults to play, from this file's folder on; see docs/faults.md."""
     converter_noise_v: NonNegativeFloat
     """rms of each input at whatever rate it converts [V]."""
 
@@ -271,4 +274,25 @@ class Rig(FrozenModel):
 
 def load_rig(path: Path) -> Rig:
     """Read a hardware configuration; raises ConfigurationError with file, key and what is allowed."""
-    return load_toml(path, Rig)
+    rig = load_toml(path, Rig)
+    if rig.virtual is None or rig.virtual.faults is None:
+        return rig
+    return with_faults(rig, path.absolute().parent / rig.virtual.faults)
+
+
+def with_faults(rig: Rig, script: Path) -> Rig:
+    """Have a script of faults played on a virtual rig.
+
+    Raises
+    ------
+    ConfigurationError
+        When the rig is a real one, whose faults come by themselves.
+
+    """
+    if rig.virtual is None:
+        raise ConfigurationError(
+            f"{script}: the rig {rig.name!r} is a real one, and faults can be scripted on a virtual one "
+            "only. Nothing was opened; leave the script out, or name a rig with a [virtual] table"
+        )
+    scripted = rig.virtual.model_copy(update={"faults": str(script.absolute())})
+    return rig.model_copy(update={"virtual": scripted})

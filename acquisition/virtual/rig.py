@@ -1,15 +1,20 @@
 """The whole virtual rig, switched on: a generator on the USB bus, a DAQ server, and the world between."""
 
 from contextlib import ExitStack
+from enum import Enum, auto
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from ..errors import AcquisitionError, ConfigurationError
+from ..recording.disk_trouble import DiskTrouble, troubled_disks
 from ..rig.configuration import Rig, VirtualConfig
 from .daqmx.devices import catalogue_with
 from .daqmx.pace import OnDemandPace, Pace, WallPace
 from .daqmx.server import LOOPBACK, DaqServer, serve
 from .daqmx.token import token_for
+from .fault_kinds import DISK_FAULTS
+from .fault_script import FaultPlay, FaultScript, PlayedFault, load_fault_script
 from .faults import RigFaults
 from .generator.afg1022 import AFG1022
 from .generator.output_signal import Panel
@@ -23,6 +28,15 @@ from .world.time_grid import FULL_BAND_HZ, relative_clock_ppm
 from .world.world import World, virtual_section
 
 _USB_RESOURCE_FIELDS = 5
+
+
+class DiskFaults(Enum):
+    """What becomes of a script's faults of the disk."""
+
+    PLAYED = auto()
+    """This process records, and meets them."""
+    REFUSED = auto()
+    """Another process records, whose disk is out of reach."""
 
 
 class VirtualRig:
@@ -42,6 +56,8 @@ class VirtualRig:
     quirks, panel
         Habits of the generator's firmware, and what only its front panel can set: a load that is told
         to be 50 ohm there, and cannot be set remotely, doubles the voltage at the amplifier.
+    disk
+        Whether a script of faults may trouble the recordings that this process makes.
 
     """
 
@@ -52,8 +68,10 @@ class VirtualRig:
         *,
         quirks: Quirks = Quirks(),  # noqa: B008 - frozen
         panel: Panel = Panel(),  # noqa: B008 - frozen
+        disk: DiskFaults = DiskFaults.PLAYED,
     ) -> None:
         virtual = virtual_section(rig)
+        self._script = _script(virtual, disk)
         self.rig = rig
         self._address = address
         self.token = token_for(address)
@@ -91,7 +109,18 @@ class VirtualRig:
     @property
     def faults(self) -> RigFaults:
         """What can go wrong, on demand."""
-        return self._switched_on.faults
+        return self._switched_on.play.rig
+
+    @property
+    def played_faults(self) -> tuple[PlayedFault, ...]:
+        """What the script of the configuration has done to the rig so far."""
+        return tuple(self._switched_on.play.played)
+
+    def let_pass(self, duration_s: float) -> None:
+        """Let rig time pass while nobody samples; a rig on the wall's clock needs nobody for that."""
+        match self._pace:
+            case OnDemandPace():
+                self._switched_on.daq.let_pass(duration_s)
 
     def __enter__(self) -> Self:
         """Switch everything on, or nothing."""
@@ -100,8 +129,11 @@ class VirtualRig:
             starting.callback(usb_bus.unplug, self._usb)
             daq = starting.enter_context(self._serve())
             socket = starting.enter_context(ScpiSocket(self.generator))
-            faults = RigFaults(self.world, self.generator, self._usb, daq)
-            self._running = _Running(daq, socket, faults, starting.pop_all())
+            disk = DiskTrouble()
+            starting.enter_context(troubled_disks(disk))
+            play = FaultPlay(self.world, RigFaults(self.world, self.generator, self._usb, daq, disk))
+            play.begin(self._script)
+            self._running = _Running(daq, socket, play, starting.pop_all())
         return self
 
     def __exit__(
@@ -134,10 +166,10 @@ class VirtualRig:
 class _Running:
     """What exists only while the rig is switched on."""
 
-    def __init__(self, daq: DaqServer, socket: ScpiSocket, faults: RigFaults, closing: ExitStack) -> None:
+    def __init__(self, daq: DaqServer, socket: ScpiSocket, play: FaultPlay, closing: ExitStack) -> None:
         self.daq = daq
         self.socket = socket
-        self.faults = faults
+        self.play = play
         self.closing = closing
 
 
@@ -147,6 +179,18 @@ def _pace(virtual: VirtualConfig) -> Pace:
             return OnDemandPace()
         case "wall":
             return WallPace(virtual.speed)
+
+
+def _script(virtual: VirtualConfig, disk: DiskFaults) -> FaultScript:
+    if virtual.faults is None:
+        return FaultScript()
+    script = load_fault_script(Path(virtual.faults))
+    if disk is DiskFaults.REFUSED and any(each.fault in DISK_FAULTS for each in script.faults):
+        raise ConfigurationError(
+            f"{virtual.faults}: {' and '.join(sorted(DISK_FAULTS))} befall the program that records, which "
+            "is not this one. Nothing was started; leave them out, or give the script to 'vibench measure'"
+        )
+    return script
 
 
 def _serial(resource: str) -> str:

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 from ..desk import Desk
 from ..page import Page
-from ..page_names import COMPARE, FILES, RIG, TEST
+from ..page_names import COMPARE, FILES, RIG, RUN, TEST
 from .compare.compare_page import ComparePage
 from .files.files_page import FilesPage
 from .rig.rig_page import RigPage
+from .run.run_page import RunPage
 from .test.test_page import TestPage
 
 
@@ -25,6 +26,7 @@ class PageEntry:
 PAGES: tuple[PageEntry, ...] = (
     PageEntry(RIG, 1, RigPage),
     PageEntry(TEST, 2, TestPage),
+    PageEntry(RUN, 3, RunPage),
     PageEntry(FILES, 4, FilesPage),
     PageEntry(COMPARE, 5, ComparePage),
 )

@@ -6,6 +6,7 @@ from enum import Enum, auto
 from math import ceil, floor, log10
 
 import pyqtgraph as pg
+from PySide6.QtWidgets import QGraphicsItem
 
 
 class Scale(Enum):
@@ -45,6 +46,8 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         self.enableAutoSIPrefix(False)
         self.setLabel(axis.text)
         self._factor = axis.factor
+        # Painted when it changes, and copied otherwise: its text is the dearest part of a frame.
+        self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
 
     def show_unit(self, axis: Axis) -> None:
         """Change what the axis shows."""
@@ -57,8 +60,9 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         """Choose the places of ticks: major ones carry a label, minor ones do not."""
         if not self.logMode:
             factor = self._factor
-            ticks = super().tickValues(low * factor, high * factor, size)
-            return [(step / factor, [value / factor for value in values]) for step, values in ticks]
+            # The labelled level alone: each line of a grid costs time in every frame.
+            step, values = super().tickValues(low * factor, high * factor, size)[0]
+            return [(step / factor, [value / factor for value in values])]
         shift = log10(self._factor)
         ticks = logarithmic_ticks(low + shift, high + shift)
         return [(step, [value - shift for value in values]) for step, values in ticks]

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QWidget
 
 from ..theme import Colour, Theme
 from .axis import Axis, AxisItem, Scale
+from .steady_range import steady_range
 
 # Antialiasing halves the frame rate, and OpenGL draws grey areas on machines without it.
 pg.setConfigOptions(antialias=False, useOpenGL=False)
@@ -72,11 +73,13 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._legend: pg.LegendItem | None = None
         self._legend_entries: list[tuple[pg.PlotDataItem, str]] = []
         self._theme = theme
+        self._follows = False
+        self.getViewBox().sigRangeChangedManually.connect(self._let_be)
         self.retheme(theme)
 
     def with_legend(self) -> "Plot":
         """Show names of the curves that have one."""
-        self._legend = self.getPlotItem().addLegend(offset=(-10, 10))
+        self._legend = self.getPlotItem().addLegend(offset=(-10, 10), labelTextSize="8pt", verSpacing=-4)
         self._relegend()
         return self
 
@@ -151,6 +154,19 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """Let the axes follow the data."""
         self.getPlotItem().enableAutoRange()
 
+    def keep_in_view(
+        self, across: tuple[float, float] | None = None, up: tuple[float, float] | None = None
+    ) -> None:
+        """Let the axes follow these extremes, but only when they must: a quiet axis costs nothing to draw."""
+        if not any(self.getViewBox().autoRangeEnabled()) and not self._follows:
+            return
+        self._follows = True
+        shown = self.getViewBox().viewRange()
+        if across is not None and (wanted := steady_range(tuple(shown[0]), across)) is not None:
+            self.setXRange(*wanted, padding=0)
+        if up is not None and (wanted := steady_range(tuple(shown[1]), up)) is not None:
+            self.setYRange(*wanted, padding=0)
+
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Act on A, L and Ctrl+C, while the plot has the focus."""
         match event.key(), event.modifiers():
@@ -161,9 +177,14 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             case Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier:
                 QGuiApplication.clipboard().setPixmap(self.grab())
             case _:
-                super().keyPressEvent(event)
+                # To the page: what it does with a key it does while a plot has the focus too.
+                event.ignore()
                 return
         event.accept()
+
+    def _let_be(self, *_: object) -> None:
+        """Follow the data no more: somebody looks at a part of the picture."""
+        self._follows = False
 
     def _turn_scale(self) -> None:
         up = Scale.LINEAR if self._scales[1] is Scale.LOGARITHMIC else Scale.LOGARITHMIC
@@ -237,5 +258,5 @@ def _shade(ink: Ink, theme: Theme) -> object:
 
 def _veil(theme: Theme) -> object:
     colour = pg.mkColor(theme.base)
-    colour.setAlphaF(0.8)
+    colour.setAlphaF(0.65)
     return colour

@@ -45,11 +45,25 @@ class Faults:
 
     rules: list[Fault | ServerGone] = field(default_factory=list)
     _seen: dict[int, int] = field(default_factory=dict)
+    _restart_is_due: bool = False
 
     def add(self, rule: Fault | ServerGone) -> None:
         """Put a rule in force; its calls are counted from now on."""
         self._seen[id(rule)] = 0
         self.rules.append(rule)
+
+    def remove(self, rule: Fault | ServerGone) -> None:
+        """Heal one rule; nothing happens when it is out of force already."""
+        self.rules = [other for other in self.rules if other is not rule]
+        self._seen.pop(id(rule), None)
+        match rule:
+            case ServerGone():
+                self._restart_is_due = True
+
+    def take_restart(self) -> bool:
+        """Say, once, whether the server has come back from being gone: with none of its tasks."""
+        is_due, self._restart_is_due = self._restart_is_due, False
+        return is_due
 
     def clear(self) -> None:
         """Heal everything."""

@@ -98,6 +98,11 @@ class DaqServer:
             self._system.reset()
             self.faults.clear()
 
+    def let_pass(self, duration_s: float) -> None:
+        """Let rig time pass while nobody asks for samples."""
+        with self._rig.changed:
+            self._rig.advance_to(self._rig.now_s + duration_s)
+
     def edge(self, terminal: str) -> None:
         """Raise a terminal, ``"/Dev1/PFI0"`` for example: what waits for it begins."""
         with self._rig.changed:
@@ -132,6 +137,8 @@ class DaqServer:
         def handle(request: Any, context: grpc.ServicerContext) -> Fields | bytes:
             with _refusals_reported(context), self._rig.changed:
                 self.faults.check(name, self._rig.now_s)
+                if self.faults.take_restart():
+                    self._system.reset()
                 return call(request)
 
         return handle

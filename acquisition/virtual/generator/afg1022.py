@@ -166,6 +166,11 @@ class AFG1022:
         with self._lock:
             self._output.repair_relay(self._channels[SOUNDING_CHANNEL], now_s)
 
+    def jump_clock(self, by_s: float) -> None:
+        """Let the generator's clock jump, and with it the phase of what plays [s]."""
+        with self._lock:
+            self._output.jump_clock(by_s)
+
     def delay_next_reply(self, delay_s: float) -> None:
         """Let the next reply come late; beyond the host's timeout it is found by the read after."""
         with self._lock:

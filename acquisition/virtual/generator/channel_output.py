@@ -46,6 +46,10 @@ class ChannelOutput:
         self._relay_is_stuck = False
         self.follow(settings, settings, now_s)
 
+    def jump_clock(self, by_s: float) -> None:
+        """Let whatever plays jump in phase, as if that time had passed."""
+        self._timeline.jump(by_s)
+
     def follow(self, previous: ChannelSettings, settings: ChannelSettings, now_s: float) -> None:
         """Bring the terminal in line with new settings, as of a rig time.
 

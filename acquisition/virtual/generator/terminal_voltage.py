@@ -5,7 +5,7 @@ functions of the generator's own time, so rendering in blocks of any size gives 
 """
 
 from bisect import bisect_right
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Protocol
 
@@ -152,6 +152,8 @@ class Terminal:
     noise_v_per_rt_hz: float = 50e-9
     """One-sided density of the output's own noise (assumed; the data sheet gives none)."""
     seed: int = 0
+    clock_offset_s: float = 0.0
+    """What its clock has jumped by since it was switched on."""
 
     @property
     def divider(self) -> float:
@@ -160,7 +162,7 @@ class Terminal:
 
     def own_time(self, time_s: Samples) -> Samples:
         """Return what the generator's clock says at a rig time."""
-        return time_s + time_s * (self.clock_error_ppm * 1e-6)
+        return time_s + time_s * (self.clock_error_ppm * 1e-6) + self.clock_offset_s
 
 
 class Timeline:
@@ -182,6 +184,10 @@ class Timeline:
     def latest(self) -> Signal:
         """The signal that the last command made."""
         return self._signals[-1]
+
+    def jump(self, by_s: float) -> None:
+        """Let the generator's own clock jump, from what is rendered next on."""
+        self.terminal = replace(self.terminal, clock_offset_s=self.terminal.clock_offset_s + by_s)
 
     def effective(self, time_s: float) -> float:
         """Return when a command that arrives at a rig time acts: never before what is already rendered."""

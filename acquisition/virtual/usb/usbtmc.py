@@ -130,6 +130,7 @@ class UsbTmcInstrument:
         )
         self._lock = threading.RLock()
         self._is_plugged_in = True
+        self._is_hung = False
         self._flight = _Flight()
 
     @property
@@ -146,6 +147,17 @@ class UsbTmcInstrument:
         """Put the cable back; whatever was in flight is gone."""
         with self._lock:
             self._is_plugged_in = True
+            self._flight = _Flight()
+
+    def hang(self) -> None:
+        """Let the instrument take no notice of anybody: every transfer times out, and it plays on."""
+        with self._lock:
+            self._is_hung = True
+
+    def wake(self) -> None:
+        """Let the instrument answer again; whatever was in flight is gone."""
+        with self._lock:
+            self._is_hung = False
             self._flight = _Flight()
 
     # Transfers
@@ -305,6 +317,8 @@ class UsbTmcInstrument:
     def _check_cable(self) -> None:
         if not self._is_plugged_in:
             raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
+        if self._is_hung:
+            _time_out()
 
     def _stall(self, endpoint: int) -> NoReturn:
         self._flight.stalled.add(endpoint)

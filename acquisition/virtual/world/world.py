@@ -1,6 +1,7 @@
 """The analogue world: everything between the generator's terminal and the samples of the converter."""
 
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Protocol
@@ -14,6 +15,7 @@ from ...errors import ConfigurationError
 from ...rig.configuration import Rig, VirtualConfig
 from ..analogue import Input
 from .analogue_output import AnalogueOutput
+from .appointments import Appointments
 from .conversion import Conversion, converter_input
 from .decimation import history_steps
 from .disturbance import Disturbance, RandomDropouts
@@ -68,6 +70,7 @@ class World:
             rig.accelerometer, virtual.accelerometer_noise_m_per_s2, noise("accelerometer")
         )
         self._terminal = terminal
+        self._gain_db = rig.amplifier.gain_db
         self._amplifier_noise = noise("amplifier")
         self._amplifier_noise_v = rms_per_step(virtual.amplifier_noise_v)
         self._noise = noise
@@ -78,6 +81,7 @@ class World:
         self._outputs: dict[str, AnalogueOutput] = {}
         self._conversions: list[Conversion] = []
         self._history = np.zeros((len(Signal), _HISTORY_STEPS))
+        self._appointments = Appointments()
         self._step = 0
         self._unspent_steps = 0.0
         self._truth: list[FloatArray] | None = None
@@ -95,6 +99,11 @@ class World:
             steps = max(round(wanted), 0)
             self._unspent_steps = wanted - steps
             self._compute_to(self._step + steps)
+
+    def at(self, time_s: float, action: Callable[[], None]) -> None:
+        """Let something happen at a rig time, to the step; a time that has passed is the next step."""
+        with self._turn:
+            self._appointments.make(time_s, action)
 
     def sample(self, inputs: tuple[Input, ...], sample_rate_hz: float) -> Conversion:
         """Begin a conversion now.
@@ -152,6 +161,10 @@ class World:
         with self._turn:
             self.plant.set_gain(10 ** (gain_db / 20))
 
+    def restore_amplifier_gain(self) -> None:
+        """Turn the amplifier's knob to what the rig's configuration says."""
+        self.set_amplifier_gain_db(self._gain_db)
+
     def disturb_vibrometer(self, duration_s: float, level: float) -> None:
         """Let the vibrometer show ``level`` (part of full scale) from now on, for a while."""
         with self._turn:
@@ -203,7 +216,9 @@ class World:
 
     def _compute_to(self, step: int) -> None:
         while self._step < step:
-            self._compute(min(step - self._step, _STRETCH_STEPS))
+            self._appointments.keep(self._step)
+            stop = self._appointments.stop_before(step)
+            self._compute(min(stop - self._step, _STRETCH_STEPS))
 
     def _compute(self, steps: int) -> None:
         first = self._step

@@ -6,10 +6,10 @@ from analysis.foresight import Foresight
 
 from ...plots.axis import FREQUENCY, Axis, Scale
 from ...plots.plot import Dash, Ink, Plot, trace
+from ...plots.stripes import Stripes
 from ...theme import Theme
 
 COLLISION = Ink(lambda theme: theme.traces[3], filled=0.18)
-MOST_BANDS = 12
 
 
 class PredictionPlot(Plot):
@@ -22,9 +22,7 @@ class PredictionPlot(Plot):
         self._first = self.curve(Ink(lambda theme: theme.predicted, Dash.DASHED), "Response I, simulated")
         self._second = self.curve(Ink(lambda theme: theme.traces[0], Dash.DOTTED), "Response II, simulated")
         self._linear = self.curve(trace(2, Dash.DOTTED), "without contact")
-        self._stripes = [self.region(COLLISION) for _ in range(MOST_BANDS)]
-        for stripe in self._stripes:
-            stripe.hide()
+        self._stripes = Stripes(self, COLLISION)
 
     def show_foresight(self, seen: Foresight | None) -> None:
         """Draw a prediction; None clears the plot."""
@@ -36,9 +34,5 @@ class PredictionPlot(Plot):
             self._first.setData(found.frequency_hz, np.asarray(found.response_i))
             self._second.setData(found.frequency_hz, np.asarray(found.response_ii))
             self._linear.setData(found.frequency_hz, np.asarray(found.linear))
-        bands = () if seen is None else seen.collision_bands_hz[:MOST_BANDS]
-        for number, stripe in enumerate(self._stripes):
-            stripe.setVisible(number < len(bands))
-            if number < len(bands):
-                self.place(stripe, *bands[number])
+        self._stripes.show_bands(() if seen is None else seen.collision_bands_hz)
         self.show_everything()

@@ -1,0 +1,61 @@
+"""The simulated instruments of a rig, kept on while benches on it are opened and closed."""
+
+from contextlib import ExitStack
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from .rig.configuration import Rig
+
+if TYPE_CHECKING:
+    from .virtual.fault_script import PlayedFault
+    from .virtual.rig import VirtualRig
+
+
+class RigPower:
+    """Switches the instruments of a virtual rig on and off, in a ``with``; nothing to do for a real one.
+
+    A virtual rig lives in rig time: what happens to it, a script of faults for example, goes on while
+    a bench on it is closed and opened again, because it stays the same rig.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+        self._virtual: VirtualRig | None = None
+        self._closing = ExitStack()
+
+    @property
+    def connected(self) -> Rig:
+        """The rig with the addresses at which its instruments answer now."""
+        if self._virtual is None:
+            return self.rig
+        rig, virtual = self.rig, self._virtual
+        return rig.model_copy(
+            update={
+                "daq": rig.daq.model_copy(update={"server": virtual.daq_address}),
+                "generator": rig.generator.model_copy(update={"resource": virtual.visa_resource}),
+            }
+        )
+
+    @property
+    def played_faults(self) -> "tuple[PlayedFault, ...]":
+        """What a script has done to the rig so far."""
+        return () if self._virtual is None else self._virtual.played_faults
+
+    def let_pass(self, duration_s: float) -> None:
+        """Let rig time pass on a virtual rig that is not sampled; on every other it passes by itself."""
+        if self._virtual is not None:
+            self._virtual.let_pass(duration_s)
+
+    def __enter__(self) -> Self:
+        if self.rig.virtual is not None:
+            # The one place where production code knows of them, and only when a rig asks for it.
+            from .virtual.rig import VirtualRig  # noqa: PLC0415 - a real bench must not load the simulation
+
+            self._virtual = self._closing.enter_context(VirtualRig(self.rig))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._virtual = None
+        self._closing.close()

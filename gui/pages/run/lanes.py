@@ -1,0 +1,77 @@
+"""The newest seconds of every channel, one lane each: smallest and largest sample of every column."""
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from analysis.live.envelope import zigzag
+from analysis.live.view import LiveView
+
+from ...plots.axis import Axis
+from ...plots.plot import Plot, trace
+from ...theme import Theme
+from .channel_words import channel_axis, channel_word
+
+AGO = Axis("Time before now", "s")
+"""An axis that stands still: one that scrolls would be painted anew in every frame."""
+COLUMNS = 1000
+AXIS_LETTERS = 9
+
+
+class Lanes(QWidget):
+    """Lanes over one time axis; they change with the channels of the run."""
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._theme = theme
+        self._curves: list[pg.PlotDataItem] = []
+        self._span_s = 0.0
+        self._channels: tuple[tuple[str, str], ...] = ()
+        self.plots: list[Plot] = []
+        self._layout = QVBoxLayout(self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+        self._layout.setSpacing(1)
+
+    def show_channels(self, channels: tuple[tuple[str, str], ...]) -> None:
+        """Have a lane for each channel, given by role and unit."""
+        if channels != self._channels:
+            self._build(channels)
+            self._channels = channels
+
+    def show_view(self, view: LiveView, span_s: float) -> None:
+        """Draw the newest seconds."""
+        self.show_channels(tuple((channel.role, channel.unit) for channel in view.channels))
+        seen = view.lanes(span_s, COLUMNS)
+        if len(seen.time_s) == 0:
+            return
+        time_s = np.repeat(seen.time_s - seen.time_s[-1], 2)
+        for row, plot in enumerate(self.plots):
+            low, high = (np.asarray(edge[row], dtype=np.float64) for edge in (seen.low, seen.high))
+            self._curves[row].setData(time_s, zigzag(low, high))
+            known = np.isfinite(low)
+            if known.any():
+                plot.keep_in_view(up=(float(low[known].min()), float(high[known].max())))
+            if span_s != self._span_s:
+                plot.setXRange(-span_s, 0, padding=0)
+        self._span_s = span_s
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self._theme = theme
+        for plot in self.plots:
+            plot.retheme(theme)
+
+    def _build(self, channels: tuple[tuple[str, str], ...]) -> None:
+        for plot in self.plots:
+            self._layout.removeWidget(plot)
+            plot.deleteLater()
+        self.plots, self._curves, self._span_s = [], [], 0.0
+        last = len(channels) - 1
+        for row, (role, unit) in enumerate(channels):
+            plot = Plot(f"Lane of {channel_word(role)}", AGO, channel_axis(role, unit), self._theme)
+            plot.across.setStyle(showValues=row == last)
+            plot.across.showLabel(row == last)
+            plot.up.setWidth(AXIS_LETTERS * self.fontMetrics().averageCharWidth())
+            self._curves.append(plot.curve(trace(row)))
+            self._layout.addWidget(plot, 1)
+            self.plots.append(plot)

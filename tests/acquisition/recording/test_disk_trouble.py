@@ -1,0 +1,102 @@
+"""A disk that is full or slow on demand: a recording meets it where it would meet a real one."""
+
+import errno
+import time
+
+import pytest
+
+from acquisition.errors import RecordingError
+from acquisition.recording import RecordingState, create_recording, open_recording, recover
+from acquisition.recording.disk_trouble import DiskTrouble, troubled_disks
+
+
+@pytest.fixture
+def trouble():
+    trouble = DiskTrouble()
+    with troubled_disks(trouble):
+        yield trouble
+
+
+def append_until_committed(writer, make_block, first, samples):
+    for begin in range(first, first + samples, 100):
+        writer.append(make_block(begin, 100)[1])
+    while writer.committed_samples < first + samples:
+        writer._committer._thread.join(0.01)
+
+
+def test_a_full_disk_refuses_a_new_recording_and_leaves_no_file(tmp_path, make_header, trouble):
+    trouble.fill()
+    with pytest.raises(RecordingError, match="Nothing was recorded; make room"):
+        create_recording(tmp_path / "a.h5", make_header())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_disk_that_fills_up_ends_the_recording_and_keeps_what_was_committed(
+    tmp_path, make_header, make_block, trouble
+):
+    writer = create_recording(tmp_path / "a.h5", make_header())
+    append_until_committed(writer, make_block, 0, 1000)
+    heal = trouble.fill()
+    writer.append(make_block(1000, 100)[1])
+    writer._committer._thread.join(10)
+    with pytest.raises(RecordingError, match="No space left"):
+        writer.log("note", "one more")
+    heal()
+    writer.finish(RecordingState.FAILED, "full")
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert (recording.state, recording.samples) == (RecordingState.FAILED, 1000)
+
+
+def test_a_disk_that_is_full_at_the_end_leaves_a_part_that_is_recovered_when_there_is_room(
+    tmp_path, make_header, make_block, trouble
+):
+    writer = create_recording(tmp_path / "a.h5", make_header())
+    append_until_committed(writer, make_block, 0, 500)
+    heal = trouble.fill()
+    with pytest.raises(RecordingError):
+        writer.finish(RecordingState.COMPLETE)
+    heal()
+    with open_recording(recover(tmp_path / "a.h5.part")) as recording:
+        assert recording.samples == 500
+
+
+def test_a_disk_that_refuses_twice_takes_the_third(trouble):
+    trouble.fill(2)
+    for _ in range(2):
+        with pytest.raises(OSError, match="No space") as refusal:
+            trouble.meet()
+        assert refusal.value.errno == errno.ENOSPC
+    trouble.meet()
+
+
+def test_a_slow_disk_delays_the_writer_and_not_the_reader(tmp_path, make_header, make_block, trouble):
+    heal = trouble.slow_down(0.2)
+    writer = create_recording(tmp_path / "a.h5", make_header())
+    began_s = time.monotonic()
+    for first in range(0, 1000, 100):
+        writer.append(make_block(first, 100)[1])
+    assert time.monotonic() - began_s < 0.2
+    heal()
+    writer.finish(RecordingState.COMPLETE)
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert recording.samples == 1000
+
+
+def test_a_slow_disk_takes_its_time(trouble):
+    heal = trouble.slow_down(0.1)
+    began_s = time.monotonic()
+    trouble.meet()
+    assert time.monotonic() - began_s >= 0.1
+    heal()
+    began_s = time.monotonic()
+    trouble.meet()
+    assert time.monotonic() - began_s < 0.1
+
+
+def test_a_disk_is_well_again_when_the_rig_is_switched_off(tmp_path, make_header):
+    with troubled_disks(DiskTrouble()) as _:
+        pass
+    trouble = DiskTrouble()
+    with troubled_disks(trouble):
+        trouble.fill()
+    create_recording(tmp_path / "a.h5", make_header()).finish(RecordingState.COMPLETE)
