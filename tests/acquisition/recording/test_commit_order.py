@@ -1,10 +1,16 @@
-"""A crash between any two writes, and a power cut that keeps any of the unsynced pages."""
+"""A crash between any two writes, and a power cut that keeps any part of what was not synced."""
 
+import hashlib
+import os
 import random
 from dataclasses import dataclass, field
+from itertools import chain, combinations, pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from acquisition.instruments import Overload
 from acquisition.recording import RecordingState, open_recording
@@ -15,6 +21,8 @@ from acquisition.recording.writer import RecordingWriter
 
 BLOCKS, BLOCK = 40, 7
 PAGE = 4096
+SECTOR = 512
+"""What a disk writes as a whole."""
 
 
 @dataclass
@@ -92,6 +100,84 @@ def test_a_crash_after_any_write_opens_and_loses_at_most_one_block(tmp_path, tra
     assert recording.state is RecordingState.COMPLETE
 
 
+class CutFile:
+    """A file on which power cuts are tried one after another: each begins from the empty recording."""
+
+    def __init__(self, path, empty):
+        path.write_bytes(empty)
+        self.path = path
+        self._empty = empty
+        self._file = path.open("r+b", buffering=0)
+        self._touched = []
+
+    def apply(self, writes):
+        for offset, data in writes:
+            self._file.seek(offset)
+            self._file.write(data)
+            self._touched.append((offset, len(data)))
+
+    def clear(self):
+        for offset, size in self._touched:
+            self._file.seek(offset)
+            self._file.write(self._empty[offset : offset + size])
+        self._touched.clear()
+
+    def close(self):
+        self._file.close()
+
+
+def sectors_of(write):
+    """A write in the pieces that a power cut keeps or loses as a whole."""
+    offset, data = write
+    edges = [offset, *range((offset // SECTOR + 1) * SECTOR, offset + len(data), SECTOR), offset + len(data)]
+    return [(begin, data[begin - offset : end - offset]) for begin, end in pairwise(edges)]
+
+
+def test_any_part_of_the_unsynced_writes_may_survive_a_power_cut(tmp_path, traced):
+    places, empty, trace, truth = traced
+    cut_file = CutFile(tmp_path / "cut.h5.part", empty)
+
+    @settings(max_examples=80, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+    @given(st.data())
+    def survives(data):
+        cut = data.draw(st.integers(0, len(trace)), label="operations before the cut")
+        last_sync = max((at for at in range(cut) if trace[at] is None), default=0)
+        synced = [write for write in trace[:last_sync] if write is not None]
+        pending = [
+            piece for write in trace[last_sync:cut] if write is not None for piece in sectors_of(write)
+        ]
+        keep = data.draw(st.lists(st.booleans(), min_size=len(pending), max_size=len(pending)), label="kept")
+        order = data.draw(st.permutations(range(len(pending))), label="order of the disk")
+        cut_file.clear()
+        cut_file.apply(synced)
+        with open_recording(cut_file.path) as recording:
+            durable = recording.samples
+        cut_file.apply(pending[index] for index in order if keep[index])
+        with open_recording(cut_file.path) as recording:
+            require_nothing_but_the_truth(recording, truth)
+            assert recording.samples >= durable
+            assert recording.samples >= handed_over(places, synced) - BLOCK
+
+    try:
+        survives()
+    finally:
+        cut_file.close()
+
+
+def require_nothing_but_the_truth(recording, truth):
+    """Whatever the file says is so: samples, segments, overloads, and how it ended."""
+    for row, role in enumerate(recording.roles):
+        np.testing.assert_array_equal(recording.read_counts(role), truth[row, : recording.samples])
+    for number, segment in enumerate(recording.segments):
+        assert segment.label == f"segment {4 * number}"
+        assert segment.stop <= recording.samples
+        assert segment.numbers == {"realisation": 4 * number}
+    for number, overload in enumerate(recording.overloads):
+        assert (overload.channel, overload.first_sample) == ("m0_velocity", 5 * BLOCK * number)
+    if recording.state is RecordingState.COMPLETE:
+        assert (recording.reason, recording.samples) == ("done", BLOCKS * BLOCK)
+
+
 def test_a_power_cut_never_counts_samples_that_are_not_there(traced):
     places, empty, trace, truth = traced
     chance = random.Random(3)
@@ -134,6 +220,79 @@ def test_nothing_but_data_is_written_after_the_start(traced):
     first_place = min(places.n_valid, places.state, places.reason)
     assert min(each[0] for each in trace if each is not None) >= first_place
     assert max(each[0] + len(each[1]) for each in trace if each is not None) <= len(empty)
+
+
+@dataclass
+class TracedFolder:
+    """What was done to the names in a folder, and when a file or the folder itself was synced."""
+
+    folder: object
+    operations: list = field(default_factory=list)
+
+    def watch(self, monkeypatch):
+        replace, unlink, fsync = os.replace, os.unlink, os.fsync
+
+        def traced_replace(source, target):
+            self.operations.append(("rename", Path(source).name, Path(target).name))
+            replace(source, target)
+
+        def traced_unlink(path, **where):
+            self.operations.append(("unlink", Path(path).name))
+            unlink(path, **where)
+
+        def traced_fsync(descriptor):
+            fsync(descriptor)
+            number = os.fstat(descriptor).st_ino
+            names = {each.stat().st_ino: each for each in self.folder.iterdir()}
+            if number in names:
+                digest = hashlib.sha256(names[number].read_bytes()).hexdigest()
+                self.operations.append(("sync file", names[number].name, digest))
+            else:
+                self.operations.append(("sync folder",))
+
+        monkeypatch.setattr(os, "replace", traced_replace)
+        monkeypatch.setattr(os, "unlink", traced_unlink)
+        monkeypatch.setattr(os, "fsync", traced_fsync)
+
+
+@pytest.mark.skipif(not hasattr(os, "fdatasync"), reason="folders are synced on POSIX only")
+def test_a_power_cut_while_finishing_leaves_the_whole_recording_under_one_of_its_names(
+    tmp_path, make_header, make_block, monkeypatch
+):
+    path = tmp_path / "a.h5"
+    places = preallocate(path, part_of(path), make_header())
+    writer = RecordingWriter(path, make_header(), places, PositionedFile(part_of(path)))
+    writer.append(make_block(0, 4000)[1])
+    folder = TracedFolder(tmp_path)
+    folder.watch(monkeypatch)
+    writer.finish(RecordingState.COMPLETE)
+    monkeypatch.undo()
+    whole = hashlib.sha256(path.read_bytes()).hexdigest()
+    kinds = [operation[0] for operation in folder.operations]
+    assert kinds.count("rename") == 1
+    assert kinds.count("unlink") == 1
+    for cut in range(len(folder.operations) + 1):
+        done = folder.operations[:cut]
+        synced = max((at for at, each in enumerate(done) if each == ("sync folder",)), default=-1)
+        certain = [each for each in done[: synced + 1] if each[0] in ("rename", "unlink")]
+        open_ones = [each for each in done[synced + 1 :] if each[0] in ("rename", "unlink")]
+        durable = {each[1]: each[2] for each in done if each[0] == "sync file"}
+        for survivors in chain.from_iterable(
+            combinations(open_ones, number) for number in range(len(open_ones) + 1)
+        ):
+            names = names_after([*certain, *survivors], durable)
+            assert "a.h5.part" in names or names.get("a.h5") == whole
+
+
+def names_after(operations, durable):
+    """Which names a folder holds after these operations, and the content that is safe under each."""
+    names = {"a.h5.part": None, "a.h5.tmp": durable.get("a.h5.tmp")}
+    for kind, *operands in operations:
+        if kind == "rename":
+            names[operands[1]] = names.pop(operands[0], None)
+        else:
+            names.pop(operands[0], None)
+    return names
 
 
 def valid_samples(places, image):
