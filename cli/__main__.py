@@ -14,6 +14,7 @@ from sim.study.errors import StudyError
 
 from .analyse import analyse
 from .bench import bench
+from .catalogue import show_catalogue
 from .demo import demo
 from .export import export
 from .figure import figure
@@ -40,6 +41,7 @@ app.command()(measure)
 app.command()(watch)
 app.command()(stop)
 app.command()(analyse)
+app.command(name="catalogue")(show_catalogue)
 app.command()(predict)
 app.command()(study)
 app.command()(figure)

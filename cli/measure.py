@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from acquisition.campaign.estimate import estimate
 from acquisition.campaign.item import AfterFailure, ChangedBench, Existing, Item
 from acquisition.check.admission import CheckRule
 from acquisition.engine.desk import Desk
@@ -19,6 +20,8 @@ from acquisition.plan.campaign import load_campaign
 from acquisition.rig.configuration import Rig
 
 from .engine_bars import Watching
+from .estimate_text import Form, tell_estimate
+from .messengers import MailPath, NotifyCommand, messengers_of
 from .paths import BenchPath, FaultsPath, rig_at
 
 STOPPED_EXIT_CODE = 3
@@ -42,18 +45,32 @@ def measure(
     check: Annotated[
         CheckRule, typer.Option(help="A passed check of the bench, of today: ask for it, make it, or not.")
     ] = CheckRule.FRESH,
+    only_estimate: Annotated[
+        bool, typer.Option("--estimate", help="Say how long it takes and how large it becomes; play nothing.")
+    ] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="With --estimate: print one JSON document and nothing else.")
+    ] = False,
+    notify: NotifyCommand = None,
+    mail: MailPath = None,
 ) -> None:
     """Measure: check the bench, ramp up, record and ramp down, for each measurement of a campaign."""
+    plan, rig = load_campaign(campaign), rig_at(bench, faults)
+    existing = Existing.RESUME if resume else Existing.REFUSE
+    tell_estimate(estimate(plan, rig, out, existing), Form.JSON if only_estimate and as_json else Form.TEXT)
+    if only_estimate:
+        return
+    messengers = messengers_of(notify, mail)
     orders = Orders(
-        campaign=load_campaign(campaign),
+        campaign=plan,
         folder=out,
-        existing=Existing.RESUME if resume else Existing.REFUSE,
+        existing=existing,
         after_failure=after_failure,
         changed_bench=ChangedBench.ACCEPT if accept_changed_bench else ChangedBench.REFUSE,
         check=check,
     )
-    with the_bench(rig_at(bench, faults), orders.campaign.name) as engine:
-        items = engine.measure(orders)
+    with the_bench(rig, plan.name) as engine:
+        items = engine.measure(orders, messengers=messengers)
     if engine.switch.request is not None:
         raise typer.Exit(STOPPED_EXIT_CODE)
     if any(item.result is Item.FAILED for item in items):

@@ -20,6 +20,8 @@ class Event(StrEnum):
     FURTHER = "further"
     """A result asked for more measurements."""
     ENDED = "ended"
+    NOTICE = "notice"
+    """Somebody was told, or could not be reached."""
 
 
 @dataclass(frozen=True)
@@ -33,3 +35,7 @@ class Happening:
 
 Listener = Callable[[Happening], None]
 """Told of every happening, in order; must not raise."""
+
+
+def ignore_happening(happening: Happening) -> None:
+    """Tell nobody."""

@@ -13,7 +13,7 @@ def is_begun(path: Path) -> bool:
     """Whether a journal stands there; one whose program died before its first commit does not."""
     if not path.exists():
         return False
-    with sentences(path), closing(opened(path.resolve().as_uri())) as connection:
+    with sentences(path), closing(opened_to_look(path)) as connection:
         return (
             connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'campaign'").fetchone() is not None
         )
@@ -33,6 +33,19 @@ def opened(uri: str) -> sqlite3.Connection:
     """Open a database as its address says; transactions are begun and ended by hand."""
     connection = sqlite3.connect(uri, uri=True, isolation_level=None)
     connection.row_factory = sqlite3.Row
+    return connection
+
+
+def opened_to_look(path: Path) -> sqlite3.Connection:
+    """Open a database to read it, also where nothing may be written."""
+    address = path.resolve().as_uri()
+    try:
+        # One that may write tidies up behind itself when it was the last to look.
+        connection = opened(f"{address}?mode=rw")
+        connection.execute("PRAGMA query_only = ON")
+        connection.execute("SELECT 1 FROM sqlite_master").fetchone()
+    except sqlite3.OperationalError:
+        return opened(f"{address}?mode=ro")
     return connection
 
 

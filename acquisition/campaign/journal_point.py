@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..errors import RecordingError
 from ..plan.measurement import Measurement
-from .journal_database import opened, require_version, sentences
+from .journal_database import opened_to_look, require_version, sentences
 from .journal_tables import POINTS
 from .why import Why
 
@@ -57,7 +57,7 @@ def read_journal(path: Path) -> tuple[JournalPoint, ...]:
     """
     if not path.exists():
         raise RecordingError(f"{path} does not exist; give the path of a campaign's journal.")
-    with sentences(path), closing(opened(f"{path.resolve().as_uri()}?mode=ro")) as connection:
+    with sentences(path), closing(opened_to_look(path)) as connection:
         require_version(path, connection)
         return points_of(connection)
 

@@ -12,7 +12,7 @@ from ..run.stop import StopSwitch
 from ..run.stop_on_signal import stop_on_signal
 from .attempts import Attempts, Reopen
 from .course import Course
-from .happening import Happening, Listener
+from .happening import Happening, Listener, ignore_happening
 from .item import (
     After,
     AfterFailure,
@@ -24,12 +24,9 @@ from .item import (
     ignore_item,
 )
 from .log import LOG_SUFFIX, CampaignLog
+from .notice import Messenger, Notifier
 from .opening import make_folder, opened_journal, require_all_within_limits, require_new
 from .status_line import STATUS_SUFFIX, StatusLine
-
-
-def ignore_happening(happening: Happening) -> None:
-    """Tell nobody."""
 
 
 def run_campaign(
@@ -45,6 +42,7 @@ def run_campaign(
     reopen: Reopen | None = None,
     changed_bench: ChangedBench = ChangedBench.REFUSE,
     on_happening: Listener = ignore_happening,
+    messengers: tuple[Messenger, ...] = (),
 ) -> tuple[CampaignItem, ...]:
     """Make every recording of ``campaign`` in ``folder``, in order, on an open bench.
 
@@ -70,6 +68,8 @@ def run_campaign(
     reopen
         Closes and opens the bench when an instrument is lost and the campaign's retries allow another
         attempt; absent, a lost instrument ends the campaign.
+    messengers
+        Ways to reach somebody at every fault and at the end.
 
     Returns
     -------
@@ -99,10 +99,11 @@ def run_campaign(
         log = session.enter_context(_log_alone(folder, campaign))
         journal = session.enter_context(opened_journal(bench, campaign, folder, existing, changed_bench))
         status = StatusLine(folder / f"{campaign.name}{STATUS_SUFFIX}", campaign.name, journal.points())
+        notifier = Notifier(campaign.name, folder, messengers, log)
         session.enter_context(stop_on_signal(stop))
 
         def say(happening: Happening) -> None:
-            for listener in (log, status, on_happening):
+            for listener in (log, status, notifier, on_happening):
                 listener(happening)
 
         def progress(stand: CampaignProgress) -> None:

@@ -4,11 +4,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..bench import Bench
-from ..campaign.happening import Listener
+from ..campaign.happening import Listener, ignore_happening
 from ..campaign.item import CampaignItem, CampaignProgress, Item, ignore_item
 from ..campaign.kept_bench import KeptBench
+from ..campaign.notice import Messenger
 from ..campaign.opening import make_folder
-from ..campaign.run_campaign import ignore_happening, run_campaign
+from ..campaign.run_campaign import run_campaign
 from ..check.admission import check_and_keep, require_fresh
 from ..errors import AcquisitionError, InstrumentLost
 from ..rig.configuration import Rig
@@ -76,6 +77,7 @@ class Engine:
         orders: Orders,
         on_item: Callable[[CampaignItem], None] = ignore_item,
         on_happening: Listener = ignore_happening,
+        messengers: tuple[Messenger, ...] = (),
     ) -> tuple[CampaignItem, ...]:
         """Make the recordings of a campaign; see `run_campaign`, which calls what is given here."""
         assert self._kept is not None
@@ -104,6 +106,7 @@ class Engine:
                 reopen=self._kept.reopen,
                 changed_bench=orders.changed_bench,
                 on_happening=on_happening,
+                messengers=messengers,
             )
         except AcquisitionError as error:
             self.shown.failed(str(error))

@@ -1,7 +1,7 @@
 """One sine, held: for the long look at one frequency."""
 
 from collections.abc import Iterator
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
@@ -39,6 +39,16 @@ class Dwell(AbstractExcitation):
     """Tones passed before, in the order of time; none to begin at the dwell itself."""
     lead_s: PositiveFloat = 0.5
     """Time at each tone of ``lead_in`` [s]."""
+
+    def next_to(self, frequency_hz: float, amplitude_vpp: float | None = None) -> Self:
+        """Plan the dwell to which this one leads: the specimen comes through this one, along its branch."""
+        passed = LeadIn(frequency_hz=self.frequency_hz, amplitude_vpp=self.amplitude_vpp)
+        changed = {
+            "lead_in": (*self.lead_in, passed),
+            "frequency_hz": frequency_hz,
+            "amplitude_vpp": self.amplitude_vpp if amplitude_vpp is None else amplitude_vpp,
+        }
+        return type(self).model_validate(self.model_dump() | changed)
 
     @property
     def highest_frequency_hz(self) -> float:

@@ -166,6 +166,12 @@ class Recording:
         """What analyses have saved, by name."""
         return read_results(self._open.file)
 
+    @property
+    def result_names(self) -> tuple[str, ...]:
+        """Names of what analyses have saved, without reading it."""
+        file = self._open.file
+        return tuple(file[layout.RESULTS]) if layout.RESULTS in file else ()
+
     def save_results(
         self,
         name: str,

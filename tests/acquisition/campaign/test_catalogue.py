@@ -1,0 +1,138 @@
+"""The catalogue of a folder: what it says, that it reads what has changed, and that it can be made again."""
+
+import os
+from dataclasses import replace
+
+import pytest
+
+from acquisition.campaign import catalogue as catalogue_module
+from acquisition.campaign.catalogue import CATALOGUE_NAME, Refresh, catalogue
+from acquisition.campaign.run_campaign import run_campaign
+from acquisition.errors import RecordingError
+from acquisition.excitation.dwell import Dwell
+from acquisition.excitation.sine_sweep import SineSweep
+from acquisition.instruments import Overload
+from acquisition.plan.campaign import Campaign
+from acquisition.plan.measurement import Measurement
+from acquisition.run.run import Run
+from acquisition.run.state import RunState
+
+DWELL = Measurement(
+    name="dwell",
+    excitation=Dwell(amplitude_vpp=1.0, frequency_hz=260, settle_s=0.1, duration_s=0.2),
+    ramp_s=0.2,
+    ramp_step_s=0.02,
+)
+SWEEP = DWELL.model_copy(
+    update={
+        "name": "sweep",
+        "excitation": SineSweep(amplitude_vpp=0.5, start_hz=300, stop_hz=200, duration_s=0.3, settle_s=0.1),
+    }
+)
+
+
+@pytest.fixture
+def folder(bench, tmp_path):
+    run_campaign(bench, Campaign(name="a", measurements=(DWELL,)), tmp_path / "monday")
+    run_campaign(bench, Campaign(name="b", measurements=(SWEEP,)), tmp_path / "tuesday" / "late")
+    return tmp_path
+
+
+@pytest.fixture
+def reads(monkeypatch):
+    """Names of the recordings that were opened."""
+    opened = []
+    read = catalogue_module.read_entry
+
+    def counted(folder, path, size_bytes):
+        opened.append(path.name)
+        return read(folder, path, size_bytes)
+
+    monkeypatch.setattr(catalogue_module, "read_entry", counted)
+    return opened
+
+
+def test_it_says_what_when_and_how_large_also_of_folders_in_the_folder(folder):
+    dwell, sweep = catalogue(folder)
+    assert (dwell.path, sweep.path) == ("monday/dwell.h5", "tuesday/late/sweep.h5")
+    assert (dwell.state, dwell.verdict, dwell.kind) == ("complete", "good", "dwell")
+    assert (sweep.amplitude_vpp, sweep.frequency_low_hz, sweep.frequency_high_hz) == (0.5, 200, 300)
+    assert dwell.size_bytes == (folder / dwell.path).stat().st_size
+    assert dwell.duration_s == pytest.approx(0.6 + 0.2 + 0.1 + 0.2 + 0.2)
+    assert "expected" in dwell.bench_check
+    assert dwell.started_utc < sweep.started_utc
+
+
+def test_only_what_is_new_or_changed_is_read_again(folder, reads):
+    before = catalogue(folder)
+    assert sorted(reads) == ["dwell.h5", "sweep.h5"]
+    reads.clear()
+    assert catalogue(folder) == before
+    assert reads == []
+    (folder / "monday" / "dwell.h5").rename(folder / "moved.h5")
+    os.utime(folder / "tuesday" / "late" / "sweep.h5", (1, 1))
+    assert [entry.path for entry in catalogue(folder)] == ["moved.h5", "tuesday/late/sweep.h5"]
+    assert sorted(reads) == ["moved.h5", "sweep.h5"]
+
+
+def test_it_can_be_made_again_from_the_files(folder, reads):
+    before = catalogue(folder)
+    (folder / CATALOGUE_NAME).unlink()
+    assert catalogue(folder) == before
+    reads.clear()
+    assert catalogue(folder, Refresh.ALL) == before
+    assert sorted(reads) == ["dwell.h5", "sweep.h5"]
+
+
+def test_what_is_to_be_minded_is_the_verdict(bench, folder):
+    loud = folder / "loud.h5"
+    read = bench.digitizer.read
+
+    def near_full_scale(samples):
+        block = read(samples)
+        overload = Overload("m0_velocity", block.first_sample, block.first_sample + 1)
+        return replace(block, overloads=(overload,))
+
+    bench.digitizer.read = near_full_scale
+    with Run(bench, DWELL, loud) as run:
+        for progress in run:
+            if progress.state is RunState.RECORDING:
+                run.cancel("seen enough")
+    entry = next(entry for entry in catalogue(folder) if entry.path == "loud.h5")
+    assert entry.verdict == "stopped; near full scale: m0_velocity"
+    assert entry.reason == "seen enough"
+
+
+def test_a_recording_that_runs_is_listed_and_one_whose_program_died_is_interrupted(bench, folder):
+    with Run(bench, DWELL, folder / "now.h5") as run:
+        next(iter(run))
+        running = next(entry for entry in catalogue(folder) if entry.path == "now.h5.part")
+    assert running.state == "recording"
+    assert not running.is_finished
+    assert "now.h5.part" not in [entry.path for entry in catalogue(folder)]
+
+
+def test_a_file_that_is_no_recording_is_listed_with_what_is_wrong(folder):
+    (folder / "junk.h5").write_bytes(b"no HDF5")
+    entry = next(entry for entry in catalogue(folder) if entry.path == "junk.h5")
+    assert entry.state == "unreadable"
+    assert "junk.h5" in entry.reason
+
+
+def test_a_file_of_the_catalogue_s_name_that_is_none_is_left_alone_until_it_is_to_be_rebuilt(folder):
+    (folder / CATALOGUE_NAME).write_text("my notes " * 200)
+    with pytest.raises(RecordingError, match="is no catalogue"):
+        catalogue(folder)
+    assert (folder / CATALOGUE_NAME).read_text().startswith("my notes")
+    assert len(catalogue(folder, Refresh.ALL)) == 2
+
+
+def test_a_folder_that_may_not_be_written_is_listed_all_the_same(folder, monkeypatch):
+    # A directory in the place of the database: what SQLite says of a folder that is read-only.
+    (folder / CATALOGUE_NAME).mkdir()
+    assert len(catalogue(folder)) == 2
+
+
+def test_a_folder_that_does_not_exist_is_one_sentence(tmp_path):
+    with pytest.raises(RecordingError, match="give the folder that the recordings are in"):
+        catalogue(tmp_path / "nowhere")

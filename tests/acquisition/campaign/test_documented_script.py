@@ -1,0 +1,52 @@
+"""The script in docs/campaigns.md runs as it stands there, and finds the jump it looks for."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from acquisition.campaign.journal import journal_path
+from acquisition.campaign.journal_point import PointState, read_journal
+
+ROOT = Path(__file__).parents[3]
+CAMPAIGN = """
+name = "jump"
+[[sweeps]]
+name = "line"
+amplitude_vpp = [0.5]
+frequency_hz = { start = 150, stop = 220, step = 10 }
+continue_from_previous = "frequency_hz"
+lead_s = 0.3
+[sweeps.measurement]
+ramp_s = 0.2
+ramp_step_s = 0.02
+excitation = { kind = "dwell", settle_s = 0.5, duration_s = 0.2 }
+"""
+
+
+@pytest.fixture
+def script():
+    page = (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    return compile(text, "docs/campaigns.md", "exec")
+
+
+def test_it_refines_the_step_around_the_jump_and_can_be_run_again(script, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rig = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text(encoding="utf-8")
+    Path("bench.toml").write_text(rig.replace("sample_rate_hz = 51200", "sample_rate_hz = 5120"))
+    # From 150 Hz on, where there is one motion, the specimen is led up the branch that collides.
+    Path("campaign.toml").write_text(CAMPAIGN)
+    exec(script, {})
+    points = read_journal(journal_path(Path("recordings"), "jump"))
+    assert {point.state for point in points} == {PointState.DONE}
+    added = [point for point in points if point.added_after]
+    assert len(added) == 3, "10 Hz are halved three times, to 1.25 Hz"
+    for point in added:
+        way = [tone.frequency_hz for tone in point.measurement.excitation.lead_in]
+        assert way == sorted(way)
+        assert way[0] == 150
+        assert 200 < point.measurement.excitation.frequency_hz < 220
+    before = sorted(Path("recordings").glob("*.h5"))
+    exec(script, {})
+    assert sorted(Path("recordings").glob("*.h5")) == before

@@ -1,0 +1,62 @@
+"""Estimates of time and bytes, held against what a campaign really takes."""
+
+import pytest
+
+from acquisition.campaign.estimate import estimate
+from acquisition.campaign.item import Existing
+from acquisition.campaign.run_campaign import run_campaign
+from acquisition.errors import RecordingError
+from acquisition.plan.campaign import Campaign
+from acquisition.recording import open_recording
+from acquisition.toml_file import validated
+
+CAMPAIGN = validated(
+    {
+        "name": "c",
+        "sweeps": [
+            {
+                "name": "line",
+                "amplitude_vpp": [0.5],
+                "frequency_hz": [200, 205, 210],
+                "continue_from_previous": "frequency_hz",
+                "lead_s": 0.25,
+                "measurement": {
+                    "ramp_s": 0.2,
+                    "ramp_step_s": 0.02,
+                    "excitation": {"kind": "dwell", "settle_s": 0.1, "duration_s": 0.2},
+                },
+            }
+        ],
+    },
+    Campaign,
+    "c.toml",
+)
+
+
+def test_the_time_is_what_the_recordings_last(bench, rig, tmp_path):
+    expected = estimate(CAMPAIGN, rig, tmp_path / "new" / "folder")
+    assert not (tmp_path / "new").exists()
+    made_s = 0.0
+    for item in run_campaign(bench, CAMPAIGN, tmp_path / "new" / "folder"):
+        with open_recording(item.path) as recording:
+            made_s += recording.duration_s
+    assert expected.duration_s == pytest.approx(made_s, abs=1e-3)
+    assert expected.lead_in_s == pytest.approx((1 + 2) * 0.25)
+    assert expected.recordings == 3
+
+
+def test_the_bytes_are_those_of_the_samples_and_the_largest_is_the_last(rig, tmp_path):
+    expected = estimate(CAMPAIGN, rig, tmp_path)
+    bytes_per_s = 5120 * 4 * 4
+    assert expected.largest_bytes == pytest.approx((0.6 + 0.4 + 0.5 + 0.3) * bytes_per_s)
+    assert expected.largest_bytes < expected.needed_bytes < 3 * expected.largest_bytes * 1.5
+    assert expected.fits
+
+
+def test_what_is_there_already_is_not_counted(bench, rig, tmp_path):
+    items = run_campaign(bench, CAMPAIGN, tmp_path)
+    with pytest.raises(RecordingError, match="exist already"):
+        estimate(CAMPAIGN, rig, tmp_path)
+    items[0].path.unlink()
+    expected = estimate(CAMPAIGN, rig, tmp_path, Existing.RESUME)
+    assert (expected.recordings, expected.kept) == (1, 2)

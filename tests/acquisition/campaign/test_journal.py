@@ -1,0 +1,131 @@
+"""The journal: what it keeps, that a cut transaction leaves no trace, and who may look."""
+
+import multiprocessing
+import os
+import sqlite3
+
+import pytest
+
+from acquisition.campaign.bench_identity import BenchIdentity
+from acquisition.campaign.journal import Journal, journal_path
+from acquisition.campaign.journal_database import is_begun
+from acquisition.campaign.journal_point import PointState, read_journal
+from acquisition.campaign.why import Why
+from acquisition.errors import RecordingError
+from acquisition.excitation.dwell import Dwell
+from acquisition.plan.campaign import Campaign
+from acquisition.plan.measurement import Measurement
+from acquisition.plan.point import Point
+
+
+def dwell(name):
+    return Measurement(name=name, excitation=Dwell(amplitude_vpp=1, frequency_hz=260, duration_s=1))
+
+
+CAMPAIGN = Campaign(name="c", measurements=(dwell("one"), dwell("two"), dwell("three")))
+
+
+@pytest.fixture
+def journal(bench, tmp_path):
+    with Journal.begin(journal_path(tmp_path, "c"), CAMPAIGN, BenchIdentity.of(bench)) as begun:
+        yield begun
+
+
+def states(points):
+    return [(point.name, point.state) for point in points]
+
+
+def test_it_keeps_plan_and_bench(journal, bench):
+    path = journal.path
+    journal.close()
+    with Journal.open(path) as again:
+        assert again.campaign == CAMPAIGN
+        assert again.bench.differences(BenchIdentity.of(bench)) == ()
+        assert [point.measurement for point in again.points()] == list(CAMPAIGN.measurements)
+        assert {point.state for point in again.points()} == {PointState.QUEUED}
+
+
+def test_attempts_are_counted_and_keep_their_files_and_reasons(journal):
+    journal.start("two", "two.h5")
+    assert states(journal.points())[1] == ("two", PointState.RUNNING)
+    journal.end("two", PointState.FAILED, Why.DATA_LOST, "a hole")
+    journal.start("two", "two.2.h5")
+    journal.end("two", PointState.DONE, Why.CARRIED_OUT, "the plan was carried out")
+    point = journal.points()[1]
+    assert (point.state, point.attempts, point.file) == (PointState.DONE, 2, "two.2.h5")
+    assert point.begun_utc <= point.ended_utc
+    with sqlite3.connect(journal.path) as plain:
+        kept = plain.execute(
+            "SELECT number, file, state, why, reason FROM attempts ORDER BY number"
+        ).fetchall()
+    plain.close()
+    assert kept == [
+        (1, "two.h5", "failed", "data_lost", "a hole"),
+        (2, "two.2.h5", "done", "carried_out", "the plan was carried out"),
+    ]
+
+
+def test_further_points_stand_behind_the_one_that_asked(journal):
+    journal.follow_up("one", (Point("between-1", dwell("between-1")), Point("between-2", dwell("between-2"))))
+    points = journal.points()
+    assert [point.name for point in points] == ["one", "between-1", "between-2", "two", "three"]
+    assert [point.added_after for point in points] == ["", "one", "one", "", ""]
+    assert points[0].is_followed_up
+    assert not points[3].is_followed_up
+
+
+def test_a_further_point_of_a_name_that_exists_is_refused_and_nothing_is_changed(journal):
+    with pytest.raises(RecordingError, match="give every further measurement a name of its own"):
+        journal.follow_up("one", (Point("new", dwell("new")), Point("Three", dwell("Three"))))
+    assert [point.name for point in journal.points()] == ["one", "two", "three"]
+    assert not journal.points()[0].is_followed_up
+
+
+def _start_and_die(path):
+    with Journal.open(path) as journal:
+        journal.start("one", "one.h5")
+        # Half of the next step: its transaction is open when the process ends without a word.
+        journal._connection.execute("BEGIN IMMEDIATE")
+        journal._connection.execute("UPDATE points SET state = 'done'")
+        os._exit(9)
+
+
+def test_a_process_that_dies_in_a_transaction_leaves_the_one_before_it(journal):
+    path = journal.path
+    journal.close()
+    child = multiprocessing.get_context("spawn").Process(target=_start_and_die, args=(path,))
+    child.start()
+    child.join()
+    assert child.exitcode == 9
+    assert states(read_journal(path)) == [
+        ("one", PointState.RUNNING),
+        ("two", PointState.QUEUED),
+        ("three", PointState.QUEUED),
+    ]
+
+
+def test_one_may_look_while_it_is_written_and_leaves_nothing_behind(journal, tmp_path):
+    journal.start("one", "one.h5")
+    assert read_journal(journal.path)[0].state is PointState.RUNNING
+    journal.end("one", PointState.DONE, Why.CARRIED_OUT, "")
+    journal.close()
+    assert read_journal(journal.path)[0].state is PointState.DONE
+    assert [path.name for path in tmp_path.iterdir()] == ["c.campaign.sqlite"]
+
+
+def test_a_journal_whose_program_died_before_its_first_commit_is_not_begun(tmp_path):
+    path = tmp_path / "c.campaign.sqlite"
+    path.touch()
+    assert not is_begun(path)
+
+
+def test_what_is_no_journal_or_a_newer_one_is_refused(journal, tmp_path):
+    other = tmp_path / "other.sqlite"
+    other.write_text("no database " * 100)
+    with pytest.raises(RecordingError, match=r"other\.sqlite"):
+        Journal.open(other)
+    with sqlite3.connect(journal.path) as plain:
+        plain.execute("UPDATE campaign SET value = '99' WHERE key = 'version'")
+    plain.close()
+    with pytest.raises(RecordingError, match="newer version"):
+        Journal.open(journal.path)

@@ -1,0 +1,86 @@
+"""E-mail about a campaign, through a mail server in a thread of this process."""
+
+import socketserver
+import threading
+
+import pytest
+
+from acquisition.campaign.mail import MailMessenger, MailSettings
+from acquisition.errors import ConfigurationError
+from acquisition.toml_file import load_toml
+
+NOTICE = {"campaign": "c", "event": "ended", "reason": "c is through", "recorded": 3}
+
+
+class Conversation(socketserver.StreamRequestHandler):
+    """As much of SMTP as a client without login needs."""
+
+    def handle(self):
+        self.say("220 here")
+        while line := self.rfile.readline().decode().strip():
+            self.server.heard.append(line)
+            match line.split(" ")[0].upper():
+                case "EHLO":
+                    self.say("250 here")
+                case "DATA":
+                    self.say("354 go on")
+                    while (text := self.rfile.readline().decode().rstrip("\r\n")) != ".":
+                        self.server.heard.append(text)
+                    self.say("250 kept")
+                case "QUIT":
+                    self.say("221 bye")
+                    return
+                case _:
+                    self.say("250 yes")
+
+    def say(self, line):
+        self.wfile.write(f"{line}\r\n".encode())
+
+
+@pytest.fixture
+def server():
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Conversation) as serving:
+        serving.heard = []
+        thread = threading.Thread(target=serving.serve_forever)
+        thread.start()
+        yield serving
+        serving.shutdown()
+        thread.join()
+
+
+def settings(tmp_path, port, security="none"):
+    path = tmp_path / "mail.toml"
+    path.write_text(
+        f'host = "127.0.0.1"\nport = {port}\nsecurity = "{security}"\n'
+        'sender = "rig@lab.example"\nrecipients = ["me@lab.example"]\ntimeout_s = 5\n'
+    )
+    return load_toml(path, MailSettings)
+
+
+def test_a_notice_becomes_one_message(server, tmp_path):
+    said = MailMessenger(settings(tmp_path, server.server_address[1])).send(NOTICE)
+    assert said == "mail sent to me@lab.example"
+    assert "Subject: vibench: c: ended" in server.heard
+    assert "reason: c is through" in server.heard
+    assert "recorded: 3" in server.heard
+
+
+def test_a_server_that_is_not_there_is_said_and_raises_nothing(server, tmp_path):
+    with socketserver.TCPServer(("127.0.0.1", 0), None) as closed:
+        port = closed.server_address[1]
+    assert MailMessenger(settings(tmp_path, port)).send(NOTICE).startswith("mail through 127.0.0.1 failed")
+
+
+def test_a_server_without_encryption_is_not_used_when_it_is_asked_for(server, tmp_path):
+    said = MailMessenger(settings(tmp_path, server.server_address[1], "starttls")).send(NOTICE)
+    assert said.startswith("mail through 127.0.0.1 failed")
+    assert not any(line.startswith("Subject") for line in server.heard)
+
+
+def test_a_password_is_never_shown_and_has_no_place_in_a_campaign(tmp_path):
+    shown = MailSettings(host="h", sender="a@b", recipients=("c@d",), user="me", password="secret!")
+    assert "secret!" not in repr(shown)
+    path = tmp_path / "mail.toml"
+    path.write_text('host = "h"\nsender = "nobody"\nrecipients = []\n')
+    with pytest.raises(ConfigurationError, match="sender"):
+        load_toml(path, MailSettings)

@@ -1,0 +1,285 @@
+"""When nobody is there: retries, a bench that comes back or has changed, results that ask for more."""
+
+import json
+import sys
+
+import pytest
+
+from acquisition.campaign.item import AfterFailure, ChangedBench, Existing, Item
+from acquisition.campaign.journal import journal_path
+from acquisition.campaign.journal_point import PointState, read_journal
+from acquisition.campaign.notice import CommandMessenger
+from acquisition.campaign.run_campaign import run_campaign
+from acquisition.campaign.why import Why
+from acquisition.errors import CheckFailed, DataLost, InstrumentLost, RecordingError
+from acquisition.excitation.dwell import Dwell
+from acquisition.instruments import Identity
+from acquisition.plan.campaign import Campaign
+from acquisition.plan.measurement import Measurement
+from acquisition.plan.retry import Retryable, RetryPolicy
+from acquisition.run.state import RunState
+from acquisition.run.stop import Cause, StopRequest, StopSwitch
+
+
+def dwell(name, frequency_hz=260.0):
+    excitation = Dwell(amplitude_vpp=1.0, frequency_hz=frequency_hz, settle_s=0.1, duration_s=0.2)
+    return Measurement(name=name, excitation=excitation, ramp_s=0.2, ramp_step_s=0.02)
+
+
+def campaign(*names, **policy):
+    return Campaign(name="c", measurements=tuple(dwell(name) for name in names), retry=RetryPolicy(**policy))
+
+
+def failing_once(bench, fault):
+    """Let one read fail while a recording is running."""
+    faults = [fault]
+
+    def watch(progress):
+        if faults and progress.run.state is RunState.RECORDING:
+            bench.world.faults["digitizer.read"] = [faults.pop()]
+
+    return watch
+
+
+def points(folder):
+    return read_journal(journal_path(folder, "c"))
+
+
+def log(folder):
+    return [json.loads(line) for line in (folder / "c.log.jsonl").read_text().splitlines()]
+
+
+class TestRetries:
+    def test_lost_data_is_measured_again_into_another_file(self, bench, tmp_path):
+        items = run_campaign(
+            bench,
+            campaign("one", "two", attempts=2),
+            tmp_path,
+            on_progress=failing_once(bench, lambda: DataLost("a hole")),
+        )
+        assert [(item.path.name, item.result) for item in items] == [
+            ("one.2.h5", Item.RECORDED),
+            ("two.h5", Item.RECORDED),
+        ]
+        assert [(point.state, point.attempts) for point in points(tmp_path)] == [
+            (PointState.DONE, 2),
+            (PointState.DONE, 1),
+        ]
+        assert [line["why"] for line in log(tmp_path) if line["event"] == "fault"] == ["data_lost"]
+
+    def test_what_the_policy_leaves_out_is_not_tried_again(self, bench, tmp_path):
+        with pytest.raises(DataLost):
+            run_campaign(
+                bench,
+                campaign("one", attempts=3, on=[Retryable.CHECK_FAILED]),
+                tmp_path,
+                on_progress=failing_once(bench, lambda: DataLost("a hole")),
+            )
+        (point,) = points(tmp_path)
+        assert (point.state, point.why, point.reason, point.attempts) == (
+            PointState.FAILED,
+            Why.DATA_LOST,
+            "a hole",
+            1,
+        )
+
+    def test_a_lost_instrument_is_opened_again(self, bench, new_bench, rig, tmp_path):
+        opened = []
+
+        def reopen():
+            opened.append(new_bench(rig))
+            return opened[-1]
+
+        items = run_campaign(
+            bench,
+            campaign("one", "two", attempts=2),
+            tmp_path,
+            on_progress=failing_once(bench, lambda: InstrumentLost("gone")),
+            reopen=reopen,
+        )
+        assert [item.result for item in items] == [Item.RECORDED, Item.RECORDED]
+        assert len(opened) == 1
+        assert any(name == "start" for name, _, _ in opened[0].world.calls)
+        assert "bench_reopened" in [line["event"] for line in log(tmp_path)]
+
+    def test_an_instrument_that_does_not_come_back_ends_the_campaign(self, bench, tmp_path):
+        def reopen():
+            raise InstrumentLost("still gone")
+
+        with pytest.raises(InstrumentLost, match="gone") as ended:
+            run_campaign(
+                bench,
+                campaign("one", "two", attempts=2, reopen_for_s=0),
+                tmp_path,
+                after_failure=AfterFailure.GO_ON,
+                on_progress=failing_once(bench, lambda: InstrumentLost("gone")),
+                reopen=reopen,
+            )
+        assert any("still gone" in note for note in ended.value.__notes__)
+        assert [point.state for point in points(tmp_path)] == [PointState.FAILED, PointState.QUEUED]
+
+    def test_a_bench_that_comes_back_as_another_one_is_not_used(self, bench, new_bench, rig, tmp_path):
+        other = new_bench(rig)
+        other.identities = {**other.identities, "generator": other_serial(other.identities["generator"])}
+        with pytest.raises(CheckFailed, match=r"instruments\.generator\.serial was"):
+            run_campaign(
+                bench,
+                campaign("one", attempts=2),
+                tmp_path,
+                on_progress=failing_once(bench, lambda: InstrumentLost("gone")),
+                reopen=lambda: other,
+            )
+        assert not any(name == "start" for name, _, _ in other.world.calls)
+
+
+def other_serial(identity):
+    return Identity(identity.maker, identity.model, "another", identity.firmware, identity.reply)
+
+
+class TestAnotherBench:
+    @pytest.fixture
+    def begun(self, bench, tmp_path):
+        with pytest.raises(DataLost):
+            run_campaign(
+                bench,
+                campaign("one", "two"),
+                tmp_path,
+                on_progress=failing_once(bench, lambda: DataLost("a hole")),
+            )
+        return tmp_path
+
+    def test_it_is_refused_with_what_differs(self, begun, new_bench, rig):
+        heavier = rig.model_copy(update={"shaker": rig.shaker.model_copy(update={"fixture_mass_kg": 0.2})})
+        bench = new_bench(heavier)
+        with pytest.raises(CheckFailed, match=r"rig\.shaker\.fixture_mass_kg was 0\.07 and is 0\.2"):
+            run_campaign(bench, campaign("one", "two"), begun, Existing.RESUME)
+        assert not any(name == "start" for name, _, _ in bench.world.calls)
+
+    def test_it_is_used_when_accepted_and_then_counts_as_the_campaign_s(self, begun, new_bench, rig):
+        bench = new_bench(rig)
+        bench.identities = {**bench.identities, "generator": other_serial(bench.identities["generator"])}
+        items = run_campaign(
+            bench, campaign("one", "two"), begun, Existing.RESUME, changed_bench=ChangedBench.ACCEPT
+        )
+        assert [item.result for item in items] == [Item.RECORDED, Item.RECORDED]
+        run_campaign(bench, campaign("one", "two"), begun, Existing.RESUME)
+
+
+class TestFurtherMeasurements:
+    def test_they_are_made_next_and_asked_for_once_also_over_a_resume(self, bench, tmp_path):
+        asked = []
+
+        def after(finished, recording):
+            asked.append((finished.point.name, [each.name for each in finished.done], recording.samples > 0))
+            return [dwell("more")] if finished.point.name == "one" else []
+
+        stop = StopSwitch()
+
+        def stop_at_two(progress):
+            if progress.name == "two":
+                stop.ask(StopRequest.by(Cause.OPERATOR, "enough"))
+
+        run_campaign(
+            bench, campaign("one", "two"), tmp_path, after=after, on_progress=stop_at_two, switch=stop
+        )
+        items = run_campaign(bench, campaign("one", "two"), tmp_path, Existing.RESUME, after=after)
+        assert [(item.name, item.result) for item in items] == [
+            ("one", Item.KEPT),
+            ("more", Item.KEPT),
+            ("two", Item.RECORDED),
+        ]
+        assert asked == [
+            ("one", ["one"], True),
+            ("more", ["one", "more"], True),
+            ("two", ["one", "more", "two"], True),
+        ]
+
+    def test_a_result_is_asked_again_when_the_program_ended_before_its_answer_was_kept(self, bench, tmp_path):
+        def broken(finished, recording):
+            raise ZeroDivisionError
+
+        with pytest.raises(ZeroDivisionError):
+            run_campaign(bench, campaign("one"), tmp_path, after=broken)
+        assert points(tmp_path)[0].state is PointState.DONE
+        names = iter([[dwell("more")], []])
+        items = run_campaign(
+            bench, campaign("one"), tmp_path, Existing.RESUME, after=lambda finished, recording: next(names)
+        )
+        assert [(item.name, item.result) for item in items] == [("one", Item.KEPT), ("more", Item.RECORDED)]
+
+
+class TestResuming:
+    def test_a_recording_that_was_taken_away_is_made_again(self, bench, tmp_path):
+        run_campaign(bench, campaign("one", "two"), tmp_path)
+        (tmp_path / "one.h5").unlink()
+        items = run_campaign(bench, campaign("one", "two"), tmp_path, Existing.RESUME)
+        assert [item.result for item in items] == [Item.RECORDED, Item.KEPT]
+
+    def test_a_lost_journal_is_made_again_from_the_recordings(self, bench, tmp_path):
+        run_campaign(bench, campaign("one", "two"), tmp_path)
+        journal_path(tmp_path, "c").unlink()
+        items = run_campaign(bench, campaign("one", "two"), tmp_path, Existing.RESUME)
+        assert [item.result for item in items] == [Item.KEPT, Item.KEPT]
+        assert [point.why for point in points(tmp_path)] == [Why.FOUND, Why.FOUND]
+
+    def test_two_programs_cannot_carry_out_one_campaign(self, bench, tmp_path):
+        def second(progress):
+            with pytest.raises(RecordingError, match="by another program"):
+                run_campaign(bench, campaign("one"), tmp_path, Existing.RESUME)
+
+        run_campaign(bench, campaign("one"), tmp_path, on_progress=second)
+        assert points(tmp_path)[0].state is PointState.DONE
+
+    def test_a_stop_between_two_points_leaves_the_rest_queued(self, bench, tmp_path):
+        stop = StopSwitch()
+        items = run_campaign(
+            bench,
+            campaign("one", "two"),
+            tmp_path,
+            on_item=lambda item: stop.ask(StopRequest.by(Cause.OPERATOR, "enough")),
+            switch=stop,
+        )
+        assert [item.name for item in items] == ["one"]
+        assert [point.state for point in points(tmp_path)] == [PointState.DONE, PointState.QUEUED]
+        assert log(tmp_path)[-1]["text"] == "c was stopped: enough"
+
+
+class TestWatching:
+    def test_log_and_status_line_tell_the_story(self, bench, tmp_path):
+        run_campaign(bench, campaign("one", "two"), tmp_path)
+        assert [line["event"] for line in log(tmp_path)] == [
+            "begun",
+            "point_begun",
+            "point_done",
+            "point_begun",
+            "point_done",
+            "ended",
+        ]
+        last = (tmp_path / "c.status").read_text().splitlines()[-1]
+        assert "c is through (2 done, about 0:00:00 left)" in last
+
+    def test_half_a_line_of_a_killed_program_does_not_spoil_the_next(self, bench, tmp_path):
+        (tmp_path / "c.log.jsonl").write_text('{"utc": "2026-01-01T00:00:00", "eve')
+        run_campaign(bench, campaign("one"), tmp_path)
+        lines = (tmp_path / "c.log.jsonl").read_text().splitlines()
+        assert json.loads(lines[1])["event"] == "begun"
+
+    def test_a_command_is_told_of_faults_and_of_the_end_and_its_failure_harms_nothing(self, bench, tmp_path):
+        told = tmp_path / "told.jsonl"
+        keep = "import sys; open(sys.argv[1], 'a').write(sys.stdin.read() + chr(10))"
+        messengers = (
+            CommandMessenger((sys.executable, "-c", keep, str(told))),
+            CommandMessenger.of("/no/such/program --now"),
+        )
+        run_campaign(
+            bench,
+            campaign("one", attempts=2),
+            tmp_path,
+            on_progress=failing_once(bench, lambda: DataLost("a hole")),
+            messengers=messengers,
+        )
+        fault, end = (json.loads(line) for line in told.read_text().splitlines())
+        assert (fault["event"], fault["why"], fault["reason"]) == ("fault", "data_lost", "one: a hole")
+        assert (end["event"], end["recorded"], end["campaign"]) == ("ended", 1, "c")
+        notices = [line["text"] for line in log(tmp_path) if line["event"] == "notice"]
+        assert notices[1] == "/no/such/program could not be run (No such file or directory)"

@@ -1,0 +1,134 @@
+"""A campaign of short points as a real process that is killed again and again, and what must come out."""
+
+import random
+import signal
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.campaign.journal import journal_path
+from acquisition.campaign.journal_database import is_begun
+from acquisition.campaign.journal_point import PointState, read_journal
+from acquisition.recording import RecordingState, open_recording
+
+from .conftest import ENVIRONMENT, ROOT
+
+LOOK_S = 0.02
+CAMPAIGN = "points"
+"""Name of every campaign here."""
+
+
+def slow_rig(folder: Path) -> Path:
+    """The virtual rig with a slow converter: short points are quick to make."""
+    text = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text(encoding="utf-8")
+    path = folder / "slow_rig.toml"
+    path.write_text(text.replace("sample_rate_hz = 51200", "sample_rate_hz = 5120"), encoding="utf-8")
+    return path
+
+
+def short_points(folder: Path, count: int) -> Path:
+    """A campaign of ``count`` dwells too weak to collide."""
+    path = folder / "points.toml"
+    path.write_text(
+        f"""
+name = "points"
+[[sweeps]]
+name = "line"
+amplitude_vpp = [0.05]
+frequency_hz = {{ start = 200, stop = {200 + count - 1}, step = 1 }}
+[sweeps.measurement]
+ramp_s = 0.08
+ramp_step_s = 0.02
+excitation = {{ kind = "dwell", settle_s = 0.3, duration_s = 0.1 }}
+""",
+        encoding="utf-8",
+    )
+    return path
+
+
+def branches(folder: Path) -> Path:
+    """A campaign up a range of frequencies with two motions each; at 190 Hz also without the way there."""
+    path = folder / "branches.toml"
+    path.write_text(
+        """
+name = "points"
+[defaults]
+ramp_s = 0.2
+ramp_step_s = 0.02
+[defaults.dwell]
+settle_s = 0.5
+duration_s = 0.3
+[[measurements]]
+name = "alone-190hz"
+excitation = { kind = "dwell", amplitude_vpp = 0.5, frequency_hz = 190 }
+[[sweeps]]
+name = "line"
+amplitude_vpp = [0.5]
+direction = ["up", "down"]
+frequency_hz = { start = 150, stop = 200, step = 10 }
+continue_from_previous = "frequency_hz"
+lead_s = 0.3
+measurement = { excitation = { kind = "dwell" } }
+""",
+        encoding="utf-8",
+    )
+    return path
+
+
+def command(plan: Path, bench: Path, out: Path, *options: str) -> list[str]:
+    """``vibench measure`` as a process of its own."""
+    paths = [str(plan), "--bench", str(bench), "--out", str(out)]
+    return [sys.executable, "-m", "cli", "measure", *paths, *options]
+
+
+def killed(arguments: list[str], out: Path, points: int, chance: random.Random) -> int:
+    """Start a campaign, and kill it without a word at a random moment after ``points`` more are done.
+
+    Returns how many were done then.
+    """
+    before = done(out)
+    with subprocess.Popen(arguments, env=ENVIRONMENT, stdout=subprocess.DEVNULL) as process:
+        while done(out) < before + points and process.poll() is None:
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(LOOK_S)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(chance.uniform(0.0, 0.15))
+        process.kill()
+        process.wait()
+        assert process.returncode == -signal.SIGKILL
+    return done(out)
+
+
+def done(out: Path) -> int:
+    """How many points the journal calls done."""
+    path = journal_path(out, CAMPAIGN)
+    if not is_begun_quietly(path):
+        return 0
+    return sum(point.state is PointState.DONE for point in read_journal(path))
+
+
+def is_begun_quietly(path: Path) -> bool:
+    """Whether there is a journal to look at; it may just be coming into being."""
+    try:
+        return is_begun(path)
+    except OSError:
+        return False
+
+
+def amplitudes(out: Path) -> dict[str, float]:
+    """Velocity of m0 at every point [m/s]; each has one complete recording, and only one."""
+    found: dict[str, float] = {}
+    for path in sorted(out.glob("*.h5")):
+        with open_recording(path) as recording:
+            if recording.state is not RecordingState.COMPLETE:
+                continue
+            name = str(recording.plan["name"])
+            assert name not in found, f"{name} was made twice"
+            assert recording.is_intact("m0_velocity")
+            (dwell,) = (each for each in recording.segments if each.label == "dwell")
+            values = recording.read("m0_velocity", dwell.first_sample, dwell.last_sample + 1)
+            found[name] = float(np.sqrt(2) * np.std(values))
+    return found

@@ -1,0 +1,60 @@
+"""A campaign killed without a word, again and again, ends like one that was left alone."""
+
+import random
+import subprocess
+
+import numpy as np
+import pytest
+
+from acquisition.campaign.journal_point import PointState, read_journal
+
+from .conftest import ENVIRONMENT
+from .killed_campaign import amplitudes, branches, command, done, killed, short_points, slow_rig
+
+
+@pytest.mark.parametrize(
+    ("points", "kills"),
+    [pytest.param(40, 2, id="40"), pytest.param(200, 10, id="200", marks=pytest.mark.slow)],
+)
+@pytest.mark.timeout(600)
+def test_a_campaign_that_is_killed_and_resumed_makes_every_point_once(tmp_path, points, kills):
+    chance = random.Random(points)
+    plan, bench = short_points(tmp_path, points), slow_rig(tmp_path)
+    left_alone, disturbed = tmp_path / "left_alone", tmp_path / "disturbed"
+    subprocess.run(command(plan, bench, left_alone), env=ENVIRONMENT, check=True, stdout=subprocess.DEVNULL)
+
+    reached = 0
+    for number in range(kills):
+        options = ["--resume"] if number else []
+        reached = killed(command(plan, bench, disturbed, *options), disturbed, points // (kills + 2), chance)
+        assert reached == done(disturbed) < points
+    resumed = command(plan, bench, disturbed, "--resume")
+    ended = subprocess.run(resumed, env=ENVIRONMENT, check=True, capture_output=True, text=True)
+    assert ended.stdout.count("kept") >= reached
+
+    journal = read_journal(disturbed / "points.campaign.sqlite")
+    assert [point.state for point in journal] == [PointState.DONE] * points
+    assert all(point.attempts <= 1 + kills for point in journal)
+    expected, found = amplitudes(left_alone), amplitudes(disturbed)
+    assert list(found) == list(expected)
+    assert len(found) == points
+    assert found == pytest.approx(expected, rel=0.02)
+
+
+def test_a_point_with_two_motions_is_measured_on_the_same_branch_after_a_kill(tmp_path):
+    plan, bench, out = branches(tmp_path), slow_rig(tmp_path), tmp_path / "out"
+    reached = killed(command(plan, bench, out), out, 4, random.Random(1))
+    assert 4 <= reached < 7, "killed on the way up"
+    subprocess.run(
+        command(plan, bench, out, "--resume"), env=ENVIRONMENT, check=True, stdout=subprocess.DEVNULL
+    )
+    displacement = {
+        name: velocity / (2 * np.pi * float(name.rsplit("-", 1)[1].removesuffix("hz")))
+        for name, velocity in amplitudes(out).items()
+    }
+    up = [displacement[f"line-0p5vpp-up-{frequency}hz"] for frequency in range(150, 201, 10)]
+    down = [displacement[f"line-0p5vpp-down-{frequency}hz"] for frequency in range(200, 169, -10)]
+    assert all(each > 35e-6 for each in up), "on the branch that collides, to its end"
+    assert all(each < 25e-6 for each in down)
+    # The branch is no property of the frequency: who goes there directly finds the other one.
+    assert displacement["alone-190hz"] < 25e-6 < up[4]
