@@ -14,9 +14,13 @@ Heal = Callable[[], None]
 
 
 class DiskTrouble:
-    """What is wrong with the disk at the moment; any thread may change it."""
+    """What is wrong with the disk at the moment; any thread may change it.
 
-    def __init__(self) -> None:
+    ``on_refusal`` is called whenever something was refused, before whoever asked is told.
+    """
+
+    def __init__(self, on_refusal: Callable[[], None] = lambda: None) -> None:
+        self._on_refusal = on_refusal
         self._changed = threading.Condition()
         self._refusals = 0.0
         self._delay_s = 0.0
@@ -38,9 +42,11 @@ class DiskTrouble:
         with self._changed:
             # A slow disk takes time; one that is well again lets go at once.
             self._changed.wait_for(lambda: self._delay_s == 0.0, timeout=self._delay_s)
-            if self._refusals > 0:
-                self._refusals -= 1
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            is_refused = self._refusals > 0
+            self._refusals -= is_refused
+        if is_refused:
+            self._on_refusal()
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def _make_room(self) -> None:
         with self._changed:

@@ -28,6 +28,8 @@ from .world.time_grid import FULL_BAND_HZ, relative_clock_ppm
 from .world.world import World, virtual_section
 
 _USB_RESOURCE_FIELDS = 5
+REFUSED_S = 1.0
+"""Rig time that a refusal of the disk takes, so that a full disk is emptied for who tries again."""
 
 
 class DiskFaults(Enum):
@@ -129,7 +131,7 @@ class VirtualRig:
             starting.callback(usb_bus.unplug, self._usb)
             daq = starting.enter_context(self._serve())
             socket = starting.enter_context(ScpiSocket(self.generator))
-            disk = DiskTrouble()
+            disk = DiskTrouble(lambda: self.let_pass(REFUSED_S))
             starting.enter_context(troubled_disks(disk))
             play = FaultPlay(self.world, RigFaults(self.world, self.generator, self._usb, daq, disk))
             play.begin(self._script)

@@ -12,6 +12,12 @@ QUESTION_S = 0.1
 A program that polls ("how many samples are there?") would otherwise poll for ever.
 """
 
+FAILED_CALL_S = 0.5
+"""Rig time that a call takes which fails on demand, when nothing else lets time pass [s].
+
+A fault that heals after a while would otherwise last for ever for a program that tries again.
+"""
+
 TICK_S = 0.01
 """How often a rig on the wall clock is brought up to date [s]: well below the shortest usual read."""
 
@@ -69,6 +75,9 @@ class Pace(Protocol):
     def glance(self, rig: RigClock) -> None:
         """Let a question about progress be answered with something newer than the last time."""
 
+    def stumble(self, rig: RigClock) -> None:
+        """Let a call that fails on demand take its time."""
+
 
 def _wait(rig: RigClock, is_there: Callable[[], bool], timeout_s: float) -> bool:
     return rig.changed.wait_for(is_there, None if timeout_s < 0 else timeout_s)
@@ -97,6 +106,10 @@ class OnDemandPace:
     def glance(self, rig: RigClock) -> None:
         """Let ``QUESTION_S`` of rig time pass."""
         rig.advance_to(rig.now_s + QUESTION_S)
+
+    def stumble(self, rig: RigClock) -> None:
+        """Let ``FAILED_CALL_S`` of rig time pass."""
+        rig.advance_to(rig.now_s + FAILED_CALL_S)
 
 
 class WallPace:
@@ -137,6 +150,10 @@ class WallPace:
         return is_there() or _wait(rig, is_there, timeout_s)
 
     def glance(self, rig: RigClock) -> None:
+        """Bring the rig up to the clock."""
+        self._step(rig)
+
+    def stumble(self, rig: RigClock) -> None:
         """Bring the rig up to the clock."""
         self._step(rig)
 

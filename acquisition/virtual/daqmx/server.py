@@ -136,12 +136,20 @@ class DaqServer:
     def _answer(self, name: str, call: Call) -> Handler:
         def handle(request: Any, context: grpc.ServicerContext) -> Fields | bytes:
             with _refusals_reported(context), self._rig.changed:
-                self.faults.check(name, self._rig.now_s)
+                self._check_faults(name)
                 if self.faults.take_restart():
                     self._system.reset()
                 return call(request)
 
         return handle
+
+    def _check_faults(self, name: str) -> None:
+        """Fail the call if a rule says so; that takes time, too."""
+        try:
+            self.faults.check(name, self._rig.now_s)
+        except DaqmxRefusal:  # a server that is gone takes no time: nobody is there
+            self._pace.stumble(self._rig)
+            raise
 
     def _listen(self, name: str, call: Callable[[Any, grpc.ServicerContext], Listener]) -> Handler:
         def handle(request: Any, context: grpc.ServicerContext) -> Iterator[Any]:

@@ -9,6 +9,7 @@ import pytest
 from acquisition.bench import open_bench
 from acquisition.campaign.kept_bench import KeptBench
 from acquisition.errors import ConfigurationError, DataLost, InstrumentBusy, InstrumentError, InstrumentLost
+from acquisition.recording.disk_room import claim_room
 from acquisition.rig.configuration import load_rig, with_faults
 from acquisition.rig_power import RigPower
 from acquisition.virtual.analogue import Coupling, Input
@@ -153,6 +154,30 @@ class TestEffects:
             kept.reopen()  # in another second of rig time
             kept.bench.digitizer.start()
             read_for(kept.bench, 0.5)
+
+    def test_a_fault_ends_in_time_for_a_program_that_does_nothing_but_try_again(self, scripted):
+        with open_bench(scripted(fault("overrun", 0.1, for_s=2.0))) as bench:
+            failures = 0
+            for _ in range(10):
+                bench.digitizer.start()
+                try:
+                    read_for(bench, 0.3)
+                except DataLost:
+                    failures += 1
+                bench.digitizer.stop()
+        # Half a second a failed call, and nothing else lets the time of this rig pass.
+        assert failures == 4
+
+    def test_a_full_disk_is_emptied_in_time_for_who_tries_again(self, scripted, tmp_path):
+        with RigPower(scripted(fault("fill_disk", 0.1, for_s=2.5))) as power:
+            power.let_pass(0.2)
+            refusals = 0
+            for attempt in range(10):
+                try:
+                    claim_room(tmp_path / f"{attempt}", 10, 10)
+                except OSError:
+                    refusals += 1
+            assert refusals == 3
 
     def test_a_device_taken_by_another_program_is_named_as_such_until_it_is_given_back(self, scripted):
         with KeptBench(scripted(fault("reserve_device", 0.2, for_s=1.5))) as kept:
