@@ -6,6 +6,7 @@ from math import ceil
 from ..excitation.held_dwell import HeldDwell
 from ..run.state import RunState
 from .level_control import Held, LevelControl, measured_level
+from .loop_watch import require_answer
 from .move import Conduct
 from .settle import Settler, shortened
 from .sine_play import SinePlay
@@ -27,6 +28,7 @@ def hold_dwell(play: SinePlay, plan: HeldDwell) -> Conduct[None]:
         piece_s = min(plan.update_s, plan.duration_s - begun_s)
         yield from play.listen(RunState.RECORDING, piece_s, plan.segment)
         measured = measured_level(play.periods.base)
+        require_answer(play.rig, plan.frequency_hz, play.played.setting_vpp, measured.amplitude)
         held = settler.held(measured)
         outside += held is Held.OUTSIDE
         said = {

@@ -42,7 +42,12 @@ class Ears:
         return Stroboscope(near_hz, self.sample_rate_hz)
 
     def transmissibility(self, base: Phasors, response: Phasors, frequency_hz: float) -> complex:
-        """Displacement of m0 over that of the base, from fundamentals of velocity and acceleration."""
+        """Displacement of m0 over that of the base, from fundamentals of velocity and acceleration.
+
+        Zero where the base shows nothing at all.
+        """
+        if not np.any(base):
+            return 0j
         turned = np.exp(2j * pi * frequency_hz * self.response_delay_s)
         return complex(2j * pi * frequency_hz * turned * np.mean(response) / np.mean(base))
 

@@ -3,7 +3,7 @@
 from collections.abc import Generator
 from dataclasses import dataclass
 from enum import StrEnum
-from math import log
+from math import inf, log
 
 
 class Side(StrEnum):
@@ -71,7 +71,9 @@ def side(visit: Visit, before: Visit, after: Visit) -> Side:
 
 
 def ratio(one: Visit, other: Visit) -> float:
-    """Larger over smaller response; 1 when they are equal."""
+    """Larger over smaller response; 1 when they are equal, and infinite when one of them is none."""
+    if min(one.response, other.response) <= 0.0:
+        return 1.0 if one.response == other.response else inf
     return float(2.0 ** abs(log(one.response / other.response, 2)))
 
 

@@ -42,6 +42,8 @@ class MeasuredLevel:
 
 def measured_level(base: Phasors) -> MeasuredLevel:
     """Average the fundamental over drive periods, shape (periods,), with the scatter of batches of them."""
+    if not len(base):
+        return MeasuredLevel(0.0, 0.0)
     mean = complex(np.mean(base))
     amplitude = abs(mean)
     if len(base) < 2 * _BATCHES or amplitude == 0.0:

@@ -8,6 +8,7 @@ from ..excitation.feedback import BaseLevel, Settling
 from ..run.state import RunState
 from .jump_search import Visit
 from .level_control import Held, LevelControl, MeasuredLevel, measured_level
+from .loop_watch import require_answer
 from .move import Conduct
 from .sine_play import SinePlay
 from .steadiness import Judgement, Steadiness, judged
@@ -109,8 +110,10 @@ class Settler:
         if self.level is None or self.play.periods.count < LOOK_PERIODS:
             return False
         now = self.play.played
+        measured = self.measured()
+        require_answer(self.play.rig, now.frequency_hz, now.setting_vpp, measured.amplitude)
         control = LevelControl(self.level, self.play.most_vpp)
-        next_vpp = control.next_vpp(now.setting_vpp, self.measured(), self._target)
+        next_vpp = control.next_vpp(now.setting_vpp, measured, self._target)
         if next_vpp == now.setting_vpp:
             return False
         self.play.change(now.frequency_hz, next_vpp)

@@ -2,12 +2,15 @@
 
 from math import ceil
 
+import numpy as np
+
 from ..excitation.feedback import BaseLevel
 from ..excitation.settled_sine import GLIDE_TONE_S
 from ..plan.needed_setting import needed_vpp
 from ..run.state import RunState
 from .gain_track import GainTrack
 from .level_control import LevelControl
+from .loop_watch import require_answer
 from .move import Conduct
 from .sine_play import SinePlay
 
@@ -63,8 +66,12 @@ def followed(play: SinePlay, level: BaseLevel | None, track: GainTrack) -> None:
     """Take what was just heard into the track."""
     if level is None:
         return
-    target = level.acceleration_at(play.played.frequency_hz)
-    modelled = target * play.played.setting_vpp / _modelled_vpp(play, level)
+    now = play.played
+    if play.periods.count:
+        acceleration = abs(complex(np.mean(play.periods.base)))
+        require_answer(play.rig, now.frequency_hz, now.setting_vpp, acceleration)
+    target = level.acceleration_at(now.frequency_hz)
+    modelled = target * now.setting_vpp / _modelled_vpp(play, level)
     track.add(play.elapsed_s, play.periods.base, modelled, target)
 
 

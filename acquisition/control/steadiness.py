@@ -65,6 +65,8 @@ def judged(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
     """
     unknown = float("nan")
     unsettled = Judgement(Steadiness.UNSETTLED, 0, unknown, unknown, unknown, unknown)
+    if not np.any(points):
+        return unsettled  # a channel without a signal shows no motion
     for period in range(1, rule.longest_period + 1):
         shortest = _THIRDS * _FEWEST_TURNS * period
         window = -(-max(rule.periods, shortest) // (_THIRDS * period)) * _THIRDS * period

@@ -1,0 +1,146 @@
+"""A run that is conducted: every way out of it, what it refuses, and what it leaves in the recording."""
+
+import json
+
+import numpy as np
+import pytest
+
+from acquisition.check.low_level import BenchCheck
+from acquisition.errors import ConfigurationError, LimitExceeded
+from acquisition.excitation.feedback import BaseLevel, Settling
+from acquisition.excitation.held_dwell import HeldDwell
+from acquisition.excitation.held_sweep import HeldSweep
+from acquisition.excitation.settled_sine import SettledSine
+from acquisition.plan.measurement import Measurement
+from acquisition.recording.layout import RecordingState
+from acquisition.rig.configuration import Role
+from acquisition.rig.output import OutputUse
+from acquisition.run.run import Run
+from acquisition.run.schedule import CHECK_S, duration_s
+from acquisition.run.state import RunState
+from acquisition.run.stop import Cause, StopRequest
+
+SETTLING = Settling(longest_wait_s=2, tolerance=0.02)
+# On the loop the base answers as the model does at 160 Hz; m0 stands still.
+DWELL = Measurement(
+    name="held",
+    excitation=HeldDwell(
+        amplitude_vpp=1.0,
+        frequency_hz=200,
+        base_level=BaseLevel(acceleration_m_per_s2=5.0),
+        settling=SETTLING,
+        duration_s=1,
+        update_s=0.5,
+    ),
+    ramp_s=0.2,
+    ramp_step_s=0.02,
+)
+
+
+def run_of(bench, tmp_path, measurement=DWELL, check=BenchCheck.AT_LOW_LEVEL):
+    return Run(bench, measurement, tmp_path / "run.h5", check, bench.recorder.create)
+
+
+@pytest.mark.parametrize("check", BenchCheck)
+def test_it_ends_silent_and_complete_with_its_level_in_the_recording(bench, tmp_path, check):
+    states = {progress.state for progress in run_of(bench, tmp_path, check=check)}
+    assert states >= {RunState.RAMPING_UP, RunState.SETTLING, RunState.RECORDING, RunState.RAMPING_DOWN}
+    assert not bench.world.is_on
+    assert bench.recorder.ending[0] is RecordingState.COMPLETE
+    (dwell,) = [each for each in bench.recorder.segments if each["label"] == "dwell"]
+    row = bench.digitizer.roles.index(Role.BASE_ACCELERATION.value)
+    base = (
+        bench.recorder.channel(row)[dwell["first"] : dwell["last"] + 1] * bench.channels[row].units_per_volt
+    )
+    assert np.sqrt(2) * np.std(base) == pytest.approx(5.0, rel=0.01)
+    assert dwell["last"] - dwell["first"] + 1 == 5120
+
+
+def test_it_is_no_longer_than_its_header_says(bench, tmp_path):
+    list(run_of(bench, tmp_path))
+    planned = round((CHECK_S + duration_s(DWELL)) * 5120)
+    assert bench.recorder.header.expected_samples == planned
+    assert bench.recorder.samples <= planned
+
+
+@pytest.mark.parametrize("state", [RunState.RAMPING_UP, RunState.SETTLING, RunState.RECORDING])
+@pytest.mark.parametrize("cause", [Cause.OPERATOR, Cause.EMERGENCY])
+def test_a_stop_in_any_state_silences_it(bench, tmp_path, state, cause):
+    run = run_of(bench, tmp_path)
+    for progress in run:
+        if progress.state is state:
+            run.switch.ask(StopRequest.by(cause, "enough"))
+    assert run.state is RunState.STOPPED
+    assert not bench.world.is_on
+    assert bench.recorder.ending == (RecordingState.STOPPED, "enough")
+
+
+def test_a_hold_while_settling_changes_nothing_that_is_heard(bench, tmp_path):
+    run = run_of(bench, tmp_path)
+    held = 0
+    for progress in run:
+        if progress.state is RunState.SETTLING and held == 0:
+            run.switch.hold()
+        if progress.state is RunState.HELD:
+            held += 1
+            if held == 5:
+                run.switch.resume()
+    assert held == 5
+    assert run.state is RunState.FINISHED
+    level = [json.loads(text) for _, kind, text in bench.recorder.events if kind == "level"]
+    assert {each["level"] for each in level} == {"within tolerance"}
+
+
+def test_a_sensor_that_comes_off_ends_the_run_before_the_setting_has_risen_far(bench, tmp_path):
+    run = run_of(bench, tmp_path)
+    while next(iter(run)).state is not RunState.RECORDING:
+        pass
+    bench.world.base_factor = 1e-4
+    with pytest.raises(LimitExceeded, match="look at the accelerometer"):
+        list(run)
+    assert not bench.world.is_on
+    assert bench.recorder.ending[0] is RecordingState.FAILED
+    settings = [value for _, value in bench.world.amplitudes()]
+    assert max(settings) < 0.5
+
+
+def test_a_level_beyond_the_plan_s_setting_is_refused_before_anything_moves(bench, tmp_path):
+    loud = DWELL.excitation.model_copy(update={"base_level": BaseLevel(acceleration_m_per_s2=50.0)})
+    with pytest.raises(LimitExceeded, match=r"the setting that holds the base's level \(at 200 Hz\)"):
+        list(run_of(bench, tmp_path, DWELL.model_copy(update={"excitation": loud})))
+    assert bench.world.calls == []
+
+
+@pytest.mark.parametrize(
+    "excitation",
+    [
+        SettledSine(amplitude_vpp=9.9, frequencies_hz=(20, 300), base_level=BaseLevel(displacement_m=1e-6)),
+        HeldSweep(
+            amplitude_vpp=9.9,
+            start_hz=300,
+            stop_hz=20,
+            duration_s=10,
+            base_level=BaseLevel(displacement_m=1e-6),
+        ),
+    ],
+)
+def test_limits_are_checked_for_the_loudest_that_feedback_may_play(bench, tmp_path, excitation):
+    """A micrometre asks for millivolts; the plan allows ten volts, which at 20 Hz pass the stroke."""
+    with pytest.raises(LimitExceeded, match="the stroke"):
+        list(run_of(bench, tmp_path, Measurement(name="loud", excitation=excitation)))
+
+
+def test_an_analogue_output_is_refused(streaming_bench, tmp_path):
+    output = streaming_bench.rig.daq.output.model_copy(update={"plays": OutputUse.TONES_AND_STREAMS})
+    daq = streaming_bench.rig.daq.model_copy(update={"output": output})
+    streaming_bench.rig = streaming_bench.rig.model_copy(update={"daq": daq})
+    with pytest.raises(ConfigurationError, match="connect the function generator"):
+        list(run_of(streaming_bench, tmp_path))
+    assert "write" not in {name for name, *_ in streaming_bench.world.calls}
+
+
+def test_a_rig_without_a_vibrometer_channel_is_refused(bench, tmp_path):
+    bench.channels = tuple(each for each in bench.channels if each.role is not Role.M0_VELOCITY)
+    with pytest.raises(ConfigurationError, match="m0_velocity"):
+        list(run_of(bench, tmp_path))
+    assert bench.world.calls == []
