@@ -8,6 +8,7 @@ from enum import Enum, auto
 from ..excitation.settled_sine import SEARCH_LABEL, SettledSine
 from ..excitation.steps import Segment
 from .jump_search import LocatedJump, Side, Visit, is_on_branch, located, side
+from .let_die import let_die
 from .move import Conduct
 from .record import recorded
 from .settle import Settled, Settler, shortened
@@ -166,9 +167,15 @@ class JumpHunt:
             if is_on_branch(found.visit, branch[place], self._rule.factor):
                 return place
             if place == 0:
-                return None
+                return (yield from self._revived(branch[0]))
             place, stride = max(0, place - stride), 2 * stride
         return None
+
+    def _revived(self, first: Visit) -> Conduct[int | None]:
+        """Let the motion die at the branch's first frequency: a branch that began from rest is back then."""
+        yield from let_die(self._settler.play)
+        found = yield from self._settler.settled()
+        return 0 if is_on_branch(found.visit, first, self._rule.factor) else None
 
     def _led_to(self, frequency_hz: float) -> Conduct[Settled]:
         plan = self._plan

@@ -72,8 +72,4 @@ class LevelControl:
             return setting_vpp
         most = self.level.most_change
         factor = min(max((target / measured.amplitude) ** _GAIN, 1 / most), most)
-        return self.bounded_vpp(setting_vpp * factor)
-
-    def bounded_vpp(self, setting_vpp: float) -> float:
-        """Keep a setting between the generator's smallest and the plan's largest [V]."""
-        return min(max(setting_vpp, LOWEST_AMPLITUDE_VPP), self.most_vpp)
+        return float(min(max(setting_vpp * factor, LOWEST_AMPLITUDE_VPP), self.most_vpp))

@@ -27,6 +27,6 @@ def require_answer(rig: Rig, frequency_hz: float, setting_vpp: float, accelerati
     if acceleration < LEAST_ANSWER * modelled:
         raise LimitExceeded(
             f"the base moved with {acceleration:.3g} m/s2 at {frequency_hz:g} Hz where the model says "
-            f"{modelled:.3g} m/s2, and feedback needs {LEAST_ANSWER:.0%} of that. The run was ramped down and "
+            f"{modelled:.3g} m/s2, and feedback needs {LEAST_ANSWER:.0%} of that. It was ramped down and "
             "its recording kept; look at the accelerometer, its cable and the amplifier"
         )

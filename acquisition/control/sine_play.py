@@ -69,6 +69,10 @@ class SinePlay:
         self.played = Played(frequency_hz, setting_vpp)
         self.forget()
 
+    def bounded_vpp(self, setting_vpp: float) -> float:
+        """Keep a setting between the generator's smallest and the plan's largest [V]."""
+        return min(max(setting_vpp, LOWEST_AMPLITUDE_VPP), self.most_vpp)
+
     def forget(self) -> None:
         """Look anew from the next move on."""
         self._scope.forget()

@@ -9,7 +9,6 @@ from ..excitation.settled_sine import GLIDE_TONE_S
 from ..plan.needed_setting import needed_vpp
 from ..run.state import RunState
 from .gain_track import GainTrack
-from .level_control import LevelControl
 from .loop_watch import require_answer
 from .move import Conduct
 from .sine_play import SinePlay
@@ -23,7 +22,7 @@ def started(play: SinePlay, frequency_hz: float, level: BaseLevel | None) -> Con
     setting_vpp = play.most_vpp
     if level is not None:
         guess_vpp = needed_vpp(play.rig, level.acceleration_at(frequency_hz), frequency_hz)
-        setting_vpp = LevelControl(level, play.most_vpp).bounded_vpp(guess_vpp)
+        setting_vpp = play.bounded_vpp(guess_vpp)
     play.change(frequency_hz, setting_vpp)
     yield from play.hush()
     yield from play.ramp_up()
@@ -86,5 +85,5 @@ def _change(play: SinePlay, frequency_hz: float, wanted_vpp: float, level: BaseL
     if level is not None:
         now_vpp = play.played.setting_vpp
         slow_vpp = min(max(wanted_vpp, now_vpp / level.most_change), now_vpp * level.most_change)
-        wanted_vpp = LevelControl(level, play.most_vpp).bounded_vpp(slow_vpp)
+        wanted_vpp = play.bounded_vpp(slow_vpp)
     play.change(frequency_hz, wanted_vpp)

@@ -1,9 +1,9 @@
 """Sines one after the other, each recorded when its motion has settled, whatever kind of motion that is."""
 
 from collections.abc import Iterator
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field, PositiveFloat
+from pydantic import Field, PositiveFloat, model_validator
 
 from .feedback import BaseLevel, JumpSearch, Settling
 from .plan import AbstractFeedback
@@ -11,6 +11,8 @@ from .preview import Preview, preview_of
 from .stepped_sine import FrequencySteps
 from .steps import Segment, Step, Tone
 
+MOST_SETTLED_STEPS = 600
+"""Four events a step, and as many again for searches, fit into a recording's table."""
 STEP_LABEL = "step"
 """Segment of a frequency of the list."""
 GLIDE_TONE_S = 0.1
@@ -36,6 +38,16 @@ class SettledSine(FrequencySteps, AbstractFeedback):
     """On its way from one frequency to the next the tone takes no larger steps than this [Hz]."""
     search_s: float = Field(default=120.0, gt=0, le=7200)
     """Longest time spent on one jump; what is bracketed by then is kept [s]."""
+
+    @model_validator(mode="after")
+    def _events_have_room(self) -> Self:
+        count = sum(len(frequencies_hz) for _, frequencies_hz in self.passes())
+        if count > MOST_SETTLED_STEPS:
+            raise ValueError(
+                f"the plan has {count} settled steps; one recording notes what is found at "
+                f"{MOST_SETTLED_STEPS} at most: widen the grid or split the measurement"
+            )
+        return self
 
     @property
     def playing_s(self) -> float:
