@@ -22,8 +22,10 @@ class _Section:
         self._state: NDArray[np.float64] | None = None
 
     def run(self, values: Samples) -> Samples:
-        if self._state is None:  # as if the first value had been there for ever: no step, no swing
-            self._state = lfilter_zi(self._b, self._a) * values[0]
+        if self._state is None:
+            # As if the first block's mean had been there for ever. Its first value alone would be the peak
+            # of whatever still rings from the run before, and swing for a second.
+            self._state = lfilter_zi(self._b, self._a) * float(np.mean(values))
         out, self._state = lfilter(self._b, self._a, values, zi=self._state)
         return np.asarray(out)
 

@@ -27,13 +27,30 @@ def test_velocity_and_stroke_of_a_sine_are_its_integrals(frequency_hz):
 def test_blocks_of_any_size_give_the_motion_of_the_whole():
     rng = np.random.default_rng(5)
     acceleration = rng.standard_normal(TIME_S.size)
-    whole = BaseTracker(RATE_HZ).follow(acceleration)
-    tracker = BaseTracker(RATE_HZ)
-    edges = np.unique(rng.integers(1, TIME_S.size, 40))
-    pieces = [tracker.follow(piece) for piece in np.split(acceleration, edges)]
+    first, rest = np.split(acceleration, [5120])  # by the first block alone it is known what was there before
+    at_once, tracker = BaseTracker(RATE_HZ), BaseTracker(RATE_HZ)
+    at_once.follow(first)
+    tracker.follow(first)
+    whole = at_once.follow(rest)
+    edges = np.unique(rng.integers(1, rest.size, 40))
+    pieces = [tracker.follow(piece) for piece in np.split(rest, edges)]
     np.testing.assert_allclose(
         np.concatenate([each.displacement for each in pieces]), whole.displacement, atol=1e-15
     )
+
+
+@pytest.mark.parametrize("phase", [0.0, 1.0, 2.0, 3.0])
+def test_what_still_rings_when_a_run_begins_has_gone_no_further_than_it_rings(phase):
+    """A run that follows the one before at once: base at 66 Hz and 3.6 m/s2, m0 at 95 Hz and 30 mm/s."""
+    time_s = TIME_S[: round(0.4 * RATE_HZ)]
+    acceleration = 3.6 * np.exp(-60 * time_s) * np.cos(2 * np.pi * 66 * time_s + phase)
+    velocity = 0.03 * np.exp(-3 * time_s) * np.cos(2 * np.pi * 95 * time_s + phase)
+    base, specimen = BaseTracker(RATE_HZ), SpecimenTracker(RATE_HZ)
+    for block, seen in zip(np.split(acceleration, 4), np.split(velocity, 4), strict=True):
+        motion = base.follow(block)
+        stretched = specimen.follow(seen, motion.velocity, np.zeros(seen.size, dtype=np.bool_))
+        assert np.max(np.abs(motion.displacement)) < 0.3e-3
+        assert np.max(np.abs(stretched)) < 0.3e-3
 
 
 def test_a_constant_offset_moves_nothing():
