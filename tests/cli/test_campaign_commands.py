@@ -1,0 +1,41 @@
+"""Campaigns on the command line: estimates, the catalogue, and who is told, as JSON and as sentences."""
+
+import json
+import sys
+
+from .killed_campaign import short_points, slow_rig
+
+
+def test_an_estimate_is_one_json_document_and_makes_nothing(vibench, tmp_path):
+    plan, bench = short_points(tmp_path, 3), slow_rig(tmp_path)
+    arguments = ("measure", plan, "--bench", bench, "--out", "out", "--estimate")
+    result = vibench(*arguments, "--json", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    told = json.loads(result.stdout)
+    assert (told["recordings"], told["kept"], told["fits"]) == (3, 0, True)
+    assert abs(told["duration_s"] - 3 * (0.6 + 0.08 + 0.3 + 0.1 + 0.08)) < 1e-6
+    assert not (tmp_path / "out").exists()
+    text = vibench(*arguments, cwd=tmp_path)
+    assert text.stdout.startswith("3 recordings, 0:00:03 (h:min:s) of rig time")
+
+
+def test_a_campaign_is_catalogued_and_its_end_is_told(vibench, tmp_path):
+    plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
+    keep = f"{sys.executable} -c \"import sys; open('told.json', 'w').write(sys.stdin.read())\""
+    made = vibench("measure", plan, "--bench", bench, "--out", "out", "--notify", keep, cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    told = json.loads((tmp_path / "told.json").read_text())
+    assert (told["event"], told["why"], told["recorded"]) == ("ended", "carried_out", 2)
+    listed = vibench("catalogue", "out", "--json", cwd=tmp_path)
+    entries = json.loads(listed.stdout)["recordings"]
+    assert [entry["path"] for entry in entries] == ["line-0p05vpp-200hz.h5", "line-0p05vpp-201hz.h5"]
+    assert {entry["verdict"] for entry in entries} == {"good"}
+    assert "line-0p05vpp-200hz.h5" in vibench("catalogue", "out", cwd=tmp_path).stdout
+
+
+def test_a_command_that_cannot_be_read_is_refused_before_anything_plays(vibench, tmp_path):
+    plan = short_points(tmp_path, 2)
+    result = vibench("measure", plan, "--out", "out", "--notify", "mail 'me", cwd=tmp_path)
+    assert result.returncode == 1
+    assert "close every quotation mark" in result.stderr
+    assert not list(tmp_path.glob("out/*.h5*"))
