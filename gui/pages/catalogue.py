@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 from ..desk import Desk
 from ..page import Page
-from ..page_names import COMPARE, FILES, RIG, RUN, TEST
+from ..page_names import COMPARE, FILES, RIG, RUN, SIMULATE, TEST
 from .compare.compare_page import ComparePage
 from .files.files_page import FilesPage
 from .rig.rig_page import RigPage
 from .run.run_page import RunPage
+from .simulate.simulate_page import SimulatePage
 from .test.test_page import TestPage
 
 
@@ -29,4 +30,5 @@ PAGES: tuple[PageEntry, ...] = (
     PageEntry(RUN, 3, RunPage),
     PageEntry(FILES, 4, FilesPage),
     PageEntry(COMPARE, 5, ComparePage),
+    PageEntry(SIMULATE, 6, SimulatePage),
 )

@@ -1,0 +1,71 @@
+"""What each accuracy costs and errs, as docs/accuracy.md has measured it, for whoever chooses one."""
+
+from dataclasses import dataclass
+
+from sim.accuracy import Accuracy
+
+from .request import Exponent, SimulationRequest
+
+MACHINE = "one core of a 2-core AMD EPYC"
+"""Where it was measured; `vibench tradeoff` measures it anew on any machine."""
+
+
+@dataclass(frozen=True)
+class MeasuredLevel:
+    """One level, on the paper's specimen; simulated seconds per second of one core."""
+
+    free: float
+    """Hertz's contact, 260 Hz and 1 um: no impact."""
+    periodic: float
+    """130 Hz and 20 um: impacts that repeat."""
+    chaos: float
+    """260 Hz and 5 um."""
+    power: float
+    """A force at every p, as of power:3 at 150 Hz and 10 um."""
+    state_error: float
+    """Of a periodic state after 2 s, in units of 100 um and 0.1 m/s."""
+    response_i_error: float
+    """Relative, of a periodic motion, against reference."""
+
+
+MEASURED = {
+    Accuracy.QUICK: MeasuredLevel(27567.0, 933.0, 760.0, 490.0, 7.8e-7, 3.8e-7),
+    Accuracy.STANDARD: MeasuredLevel(28110.0, 833.0, 680.0, 354.0, 5.7e-8, 2.8e-8),
+    Accuracy.REFERENCE: MeasuredLevel(29074.0, 471.0, 397.0, 160.0, 5.8e-12, 0.0),
+}
+CHAOS_SCATTER = 0.03
+"""Response I in chaos scatters by so much from start to start, at every level."""
+
+
+def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
+    """Say what a request's accuracy costs and errs, and how long it takes on so many idle cores."""
+    level = MEASURED[request.accuracy]
+    each_s = request.simulated_s / len(request.models)
+    shortest_s = sum(each_s / (level.power if _is_power(model) else level.free) for model in request.models)
+    longest_s = sum(each_s / (level.power if _is_power(model) else level.chaos) for model in request.models)
+    on_top = "; the exponent comes on top" if request.exponent is Exponent.COMPUTED else ""
+    error = f"{level.response_i_error:.0e}" if level.response_i_error else "none"
+    return (
+        (
+            f"{request.points} points of {request.duration_s:g} s: {_time(shortest_s / cores)} free "
+            f"to {_time(longest_s / cores)} in chaos, on {cores} idle cores{on_top}."
+        ),
+        (
+            f"A second simulates {level.free:.0f} s without impacts, {level.periodic:.0f} s of impacts that "
+            f"repeat, {level.chaos:.0f} s of chaos, {level.power:.0f} s of a power law."
+        ),
+        (
+            f"Error of a periodic state {level.state_error:.0e}, of Response I against reference {error}; "
+            f"in chaos Response I scatters by {CHAOS_SCATTER:.0%} at every level."
+        ),
+        f"Measured on {MACHINE}.",
+    )
+
+
+def _is_power(model: str) -> bool:
+    return model.startswith("power:")
+
+
+def _time(seconds: float) -> str:
+    minute = 60.0
+    return f"{seconds:.2g} s" if seconds < minute else f"{seconds / minute:.2g} min"

@@ -1,0 +1,1 @@
+"""The scene as a form, and its answer as it grows."""

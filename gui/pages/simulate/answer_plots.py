@@ -1,0 +1,113 @@
+"""Four pictures of a simulation: responses, exponents, similarity, and the motion itself."""
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtWidgets import QGridLayout, QWidget
+
+from analysis.similarity import THRESHOLD, Similarity
+from analysis.simulation.course import SimulationCourse
+
+from ...plots.axis import FREQUENCY, LOG_FREQUENCY, Axis, Scale
+from ...plots.plot import GUIDE, LIMIT, Dash, Ink, Plot, trace
+from ...theme import Theme
+
+RESPONSE = Axis("Motion of m0 over base, |x / U|", scale=Scale.LOGARITHMIC)
+EXPONENT = Axis("Largest Lyapunov exponent", "1/s")
+DIFFERENCE = Axis("Difference of log Response I", scale=Scale.LOGARITHMIC)
+TIME = Axis("Time, to the end of the run", "ms", factor=1e3)
+DISPLACEMENT = Axis("Displacement", "µm", factor=1e6)
+_COLLIDING = Ink(lambda theme: theme.muted, filled=0.14)
+_EDGE = Ink(lambda theme: theme.muted, Dash.DOTTED)
+_SMALLEST = 1e-6
+"""Equal curves have no logarithm: they are drawn at the foot of the axis."""
+
+
+class AnswerPlots(QWidget):
+    """Drawn anew from the course of a simulation, as often as it grows."""
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.responses = Plot("Responses over frequency", LOG_FREQUENCY, RESPONSE, theme)
+        self.exponents = Plot("Exponent over frequency", FREQUENCY, EXPONENT, theme)
+        self.likeness = Plot("Difference of the two models over frequency", FREQUENCY, DIFFERENCE, theme)
+        self.motion = Plot("Motion over time", TIME, DISPLACEMENT, theme)
+        layout = QGridLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        for number, plot in enumerate(self.plots):
+            plot.with_legend()
+            layout.addWidget(plot, number // 2, number % 2)
+            layout.setRowStretch(number // 2, 1)
+            layout.setColumnStretch(number % 2, 1)
+
+    @property
+    def plots(self) -> tuple[Plot, ...]:
+        """All four, row by row."""
+        return (self.responses, self.motion, self.exponents, self.likeness)
+
+    def show_course(self, course: SimulationCourse | None) -> None:
+        """Draw what is there."""
+        for plot in self.plots:
+            plot.wipe()
+        if course is None:
+            return
+        for number, model in enumerate(course.models):
+            self._responses(course, model, number)
+            self._exponents(course, model, number)
+        self._motion(course)
+        found = course.similarity()
+        if found is not None:
+            self._likeness(found)
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        for plot in self.plots:
+            plot.retheme(theme)
+
+    def _responses(self, course: SimulationCourse, model: str, number: int) -> None:
+        if number == 0:
+            for low_hz, high_hz in course.collision_bands_hz(model):
+                self.responses.place(self.responses.region(_COLLIDING), low_hz, high_hz)
+                self.responses.upright(_EDGE, low_hz, f"impacts, {model}")
+        for name, label, dash in (
+            ("response_i", "Response I", Dash.SOLID),
+            ("response_ii", "Response II", Dash.DOTTED),
+        ):
+            frequency_hz, values = course.column(model, name)
+            if frequency_hz.size:
+                line = self.responses.curve(trace(number, dash), f"{label}, {model}")
+                _draw(line, frequency_hz, values)
+
+    def _exponents(self, course: SimulationCourse, model: str, number: int) -> None:
+        frequency_hz, values = course.column(model, "lyapunov_per_s")
+        if np.isfinite(values).any():
+            _draw(self.exponents.curve(trace(number), model), frequency_hz, values)
+            if number == 0:
+                self.exponents.level(GUIDE, 0.0)
+
+    def _motion(self, course: SimulationCourse) -> None:
+        for number, signal in enumerate(course.signals):
+            time_s = signal.time_s - signal.time_s[0]
+            line = self.motion.curve(trace(number), f"x, {signal.model}, {signal.frequency_hz:g} Hz")
+            line.setData(time_s, signal.displacement_m)
+            line = self.motion.curve(trace(number, Dash.DOTTED), f"p = y - z, {signal.model}")
+            line.setData(time_s, signal.relative_m)
+        if course.signals:
+            gap_m = course.signals[0].gap_m
+            for stop_m in (gap_m, -gap_m):
+                self.motion.level(LIMIT, stop_m, "stop")
+            # Room above for the legend, which would lie on the motion.
+            self.motion.setYRange(-1.2 * gap_m, 2.2 * gap_m, padding=0.0)
+
+    def _likeness(self, found: Similarity) -> None:
+        name = f"{100 * found.rate:.0f} % similar ({100 * found.low:.0f} to {100 * found.high:.0f} %)"
+        shown = np.maximum(found.difference, _SMALLEST)
+        _draw(self.likeness.curve(trace(2), name), found.frequency_hz, shown)
+        self.likeness.level(LIMIT, THRESHOLD, "limit")
+
+
+def _draw(
+    line: pg.PlotDataItem,
+    frequency_hz: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]",
+    values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]",
+) -> None:
+    line.setData(frequency_hz, values, connect="finite")

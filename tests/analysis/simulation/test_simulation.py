@@ -1,0 +1,142 @@
+"""What a person may ask of the simulation, and the answer as it grows; linear scenes need no compiling."""
+
+import re
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from analysis.simulation.accuracy_cost import MEASURED, cost_sentences
+from analysis.simulation.answers import SimulatedPoint, Trouble
+from analysis.simulation.course import SimulationCourse
+from analysis.simulation.growing import simulate
+from analysis.simulation.request import SimulationRequest
+from analysis.simulation.worker import Begin, Cancel, Ended, Grown, serve
+from sim.accuracy import Accuracy
+from sim.modes import base_transmissibility
+from sim.specimen import gong2025
+
+LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "step_hz": 50.0, "start_hz": 50.0}
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"model": "rubber"}, "not known"),
+        ({"compared_with": "power:x"}, "not known"),
+        ({"start_hz": 200.0, "stop_hz": 100.0}, "start must not lie above stop"),
+        ({"step_hz": 0.001}, "at most 20000"),
+        ({"window_s": 50.0}, "Window 50.0 s is not allowed"),
+        ({"gap_m": -1.0}, "greater than 0"),
+    ],
+)
+def test_what_cannot_be_simulated_is_refused_in_words(given, said):
+    with pytest.raises(ValidationError, match=re.escape(said)):
+        SimulationRequest(**given)
+
+
+def test_one_model_named_twice_is_simulated_once():
+    assert SimulationRequest(compared_with="hertz").models == ("hertz",)
+    assert SimulationRequest(step_hz=50.0).points == 24
+
+
+def test_the_answer_grows_to_the_linear_transmission():
+    request = SimulationRequest(**LINEAR)
+    course, counts = SimulationCourse(request.amplitude_m, request.points, "n"), []
+    simulate(request, lambda pieces: (course.add(pieces), counts.append(course.done)), lambda: False, 2)
+    assert counts[-1] == course.asked == 12
+    frequency_hz, found = course.column("linear", "response_ii")
+    exact = np.abs(base_transmissibility(gong2025(contact="linear"), frequency_hz)[:, 0])
+    assert np.array_equal(frequency_hz, np.arange(50.0, 601.0, 50.0))
+    assert np.allclose(found, exact, rtol=1e-6)
+    trace = course.traces()[1]
+    assert np.array_equal(trace.magnitude, found)
+    assert trace.name == "model linear, Response II, predicted"
+
+
+def test_nothing_is_computed_after_a_cancellation():
+    told = []
+    simulate(SimulationRequest(**LINEAR), told.append, lambda: True, 1)
+    assert sum(len(pieces) for pieces in told) < 12
+
+
+def point(model, frequency_hz, response, impacts=0):
+    return SimulatedPoint(model, frequency_hz, response, response, impacts, "periodic", -3.5, 1e-6)
+
+
+def test_similarity_is_of_the_frequencies_that_both_models_have():
+    course = SimulationCourse(5e-6, 10, "n")
+    course.add((point("a", 100.0, 2.0), point("a", 200.0, 4.0), point("b", 200.0, 4.0)))
+    assert course.similarity().rate == 1.0
+    course.add((point("b", 100.0, 200.0), Trouble("b at 300 Hz: no")))
+    assert course.similarity().rate == 0.5
+    assert course.done == 5
+    assert course.troubles == ("b at 300 Hz: no",)
+
+
+def test_bands_of_impacts_are_told_apart():
+    course = SimulationCourse(5e-6, 10, "n")
+    course.add(tuple(point("a", float(f), 1.0, int(f in (30, 40, 60))) for f in range(10, 80, 10)))
+    assert course.collision_bands_hz("a") == ((30.0, 40.0), (60.0, 60.0))
+
+
+def is_about(found, stated):
+    """The page is measured anew now and then; a person choosing a level needs the size of the number."""
+    return found == stated or stated / 5 < found < 5 * stated
+
+
+def test_costs_and_errors_are_about_those_of_the_page_on_accuracy():
+    page = (Path(__file__).parents[3] / "docs" / "accuracy.md").read_text()
+    sections = {
+        "free": "## No contact: hertz, 260 Hz, 1 µm",
+        "periodic": "## Periodic: hertz, 130 Hz, 20 µm",
+        "chaos": "## Chaos: hertz, 260 Hz, 5 µm",
+        "power": "## Periodic: power:3, 150 Hz, 10 µm",
+    }
+    for accuracy, level in MEASURED.items():
+        for name, heading in sections.items():
+            section = page[page.index(heading) :]
+            row = re.search(rf"\| \*\*{accuracy.value}\*\* \|([^\n]*)", section)[1].split("|")
+            assert is_about(float(row[0]), getattr(level, name))
+            if name == "periodic":
+                assert is_about(float(row[1]), level.state_error)
+                assert is_about(float(row[2]), level.response_i_error)
+
+
+def test_a_stricter_accuracy_is_said_to_cost_more():
+    levels = (Accuracy.QUICK, Accuracy.REFERENCE)
+    quick, strict = (cost_sentences(SimulationRequest(accuracy=each), 2) for each in levels)
+    assert "760 s of chaos" in quick[1]
+    assert "397 s of chaos" in strict[1]
+    assert "8e-07" in quick[2]
+
+
+def test_the_process_that_simulates_drops_what_is_no_longer_wanted():
+    """The real process: a long request is overtaken by a short one, whose answer comes whole."""
+    context = get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=serve, args=(theirs,), daemon=True)
+    process.start()
+    theirs.close()
+    try:
+        ours.send(Begin(1, SimulationRequest(**{**LINEAR, "step_hz": 0.05})))
+        ours.send(Cancel())
+        ours.send(Begin(2, SimulationRequest(**LINEAR)))
+        counts = {1: 0, 2: 0}
+        while True:
+            assert ours.poll(60)
+            message = ours.recv()
+            match message:
+                case Grown():
+                    counts[message.number] += len(message.pieces)
+                case Ended(number=2):
+                    break
+        assert counts[1] < 11_001
+        assert counts[2] == 12
+        ours.close()
+        process.join(20)
+        assert process.exitcode == 0
+    finally:
+        process.kill()

@@ -1,0 +1,134 @@
+"""The Simulate page asks another process, draws what comes, and stops at once."""
+
+import numpy as np
+import pytest
+
+from analysis.simulation.answers import SimulatedPoint, SimulatedSignal, Trouble
+from analysis.simulation.request import SimulationRequest
+from gui.pages.simulate.simulate_page import SimulatePage
+from gui.theme import DARK
+
+LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "start_hz": 50.0, "step_hz": 10.0}
+
+
+@pytest.fixture(scope="module")
+def page(shared_desk):
+    """One page, whose process serves all tests."""
+    page = SimulatePage(shared_desk)
+    page.resize(1300, 800)
+    page.show()
+    yield page
+    page.simulator.close()
+    page.close()
+
+
+def asked(page, **changes):
+    page.form.show_value(SimulationRequest(**{**LINEAR, **changes}))
+    page.begin()
+
+
+def lines(plot):
+    return [item.getOriginalDataset() for item in plot.getPlotItem().listDataItems()]
+
+
+def point(model, frequency_hz, response=2.0, impacts=0, exponent=None):
+    return SimulatedPoint(model, frequency_hz, response, response / 2, impacts, "periodic", exponent, 1e-6)
+
+
+def test_a_simulation_is_complete_and_drawn(page, waited):
+    asked(page)
+    assert page.simulator.is_busy
+    waited(lambda: not page.simulator.is_busy, 60.0)
+    page.refresh()
+    assert page.course.done == page.course.asked == 56
+    assert page._state.text() == "Complete."
+    assert page._bar.value() == 56
+    first, _second = lines(page.plots.responses)
+    assert np.array_equal(first[0], np.arange(50.0, 601.0, 10.0))
+    assert first[1][0] == pytest.approx(1.05, abs=0.03)
+    assert page.is_done
+
+
+def test_cancelling_is_at_once_and_keeps_what_was_found(page, waited):
+    asked(page, step_hz=0.05)
+    waited(lambda: page.course.done > 0, 60.0)
+    page.cancel()
+    assert not page.simulator.is_busy
+    found = page.course.done
+    assert 0 < found < page.course.asked
+    assert page._state.text().startswith("Cancelled")
+    asked(page, step_hz=100.0)
+    waited(lambda: not page.simulator.is_busy, 60.0)
+    assert page.course.done == page.course.asked == 6
+
+
+def test_a_dead_process_is_told_and_the_next_request_begins_another(page, waited):
+    said = []
+    page.desk.noticed.connect(said.append)
+    asked(page, step_hz=0.05)
+    waited(lambda: page.course.done > 0, 60.0)
+    page.simulator._process.kill()
+    waited(lambda: bool(said), 30.0)
+    assert "has ended" in said[0].what
+    assert not page.simulator.is_busy
+    asked(page, step_hz=100.0)
+    waited(lambda: not page.simulator.is_busy, 60.0)
+    assert page.course.done == 6
+
+
+def test_what_is_not_allowed_cannot_be_begun(page):
+    page.form.form.show_content({"window_s": 50.0})
+    assert not page._begin.isEnabled()
+    assert "Window 50.0 s is not allowed" in page.form.complaint
+    page.form.form.show_content({})
+    assert page._begin.isEnabled()
+
+
+def test_cost_and_error_stand_beside_the_accuracy(page):
+    page.form.show_value(SimulationRequest(accuracy="quick"))
+    quick = page._cost.text()
+    page.form.show_value(SimulationRequest(accuracy="reference"))
+    strict = page._cost.text()
+    assert "760 s of chaos" in quick
+    assert "397 s of chaos" in strict
+    assert "6e-12" in strict
+
+
+def test_exponents_similarity_impacts_and_motion_are_drawn_as_they_come(page):
+    asked(page, step_hz=100.0)
+    page.cancel()
+    page._grow(
+        (point("a", 100.0, exponent=-3.0), point("a", 200.0, 4.0, 7, 90.0), point("b", 100.0, exponent=-3.5))
+    )
+    page.refresh()
+    assert len(lines(page.plots.exponents)) == 2
+    assert len(lines(page.plots.likeness)) == 1
+    time_s = np.linspace(1.0, 1.05, 200)
+    page._grow((SimulatedSignal("a", 260.0, time_s, 1e-6 * np.sin(time_s), 1e-5 * time_s, 45e-6),))
+    page.refresh()
+    (x_s, x), _ = lines(page.plots.motion)
+    assert x_s[0] == 0.0
+    assert np.array_equal(x, 1e-6 * np.sin(time_s))
+
+
+def test_points_that_failed_are_told_at_the_end(page):
+    said = []
+    page.desk.noticed.connect(said.append)
+    page._grow((Trouble("a at 300 Hz: a contact made no progress"),))
+    page._end()
+    assert "no progress" in said[-1].what
+
+
+def test_the_curves_go_to_compare(page, qtbot):
+    page._grow((point("a", 100.0), point("a", 200.0)))
+    with qtbot.waitSignal(page.desk.prediction_made) as made:
+        page._compare.click()
+    assert {each.name for each in made.args[0]} >= {"model a, Response I, predicted"}
+
+
+def test_plots_follow_the_theme_and_carry_units(page):
+    page.retheme(DARK)
+    assert {plot.backgroundBrush().color().name() for plot in page.plots.plots} == {DARK.base}
+    assert all(plot.accessibleName() for plot in page.plots.plots)
+    assert "1/s" in page.plots.exponents.up.labelText
+    assert "µm" in page.plots.motion.up.labelText
