@@ -20,6 +20,10 @@ RMS_S = 1.0
 REACTION = 1.1
 """How much the force on the table may pass the coil's limit: the specimen, a tenth of the moving mass,
 pushes back on the table, and that push is not the coil's."""
+SETTLING_S = 0.5
+"""For so long after its beginning [s], nothing integrated is judged: an AC-coupled input whose current has
+just been switched on drifts to its rest, which integrated twice is metres. A run is at the low level of its
+check then, and what is measured itself is judged from the first sample on."""
 _OFF = "The run was ramped down and its recording kept; lower amplitude_vpp"
 
 
@@ -51,21 +55,22 @@ class Guard:
         self._limits = limits
         self._rate_hz = sample_rate_hz
         self._next_sample = 0
-        self._begin()
+        self._begin(0)
 
     def require_safe(self, block: Block) -> None:
         """Raise LimitExceeded, with its `Trip`, when a block passes a limit; the run then ramps down."""
         if not block.volts.shape[1]:
             return
         if block.first_sample != self._next_sample:
-            self._begin()
+            self._begin(block.first_sample)
         self._next_sample = block.first_sample + block.volts.shape[1]
         for watched in self._watched(block):
             self._require(watched, block.first_sample)
         if block.overloads and self._limits.on_overload is OnOverload.STOP:
             raise self._overloaded(block, block.overloads[0])
 
-    def _begin(self) -> None:
+    def _begin(self, first_sample: int) -> None:
+        self._settled_sample = first_sample + round(SETTLING_S * self._rate_hz)
         self._base = BaseTracker(self._rate_hz)
         self._specimen = SpecimenTracker(self._rate_hz)
         self._mean_square_a2 = 0.0
@@ -77,28 +82,37 @@ class Guard:
             for channel, volts in zip(self._channels, block.volts, strict=True)
         }
         acceleration, voltage = rows.get(Role.BASE_ACCELERATION), rows.get(Role.AMPLIFIER_VOLTAGE)
-        still = np.zeros(block.volts.shape[1])
-        base = BaseMotion(still, still) if acceleration is None else self._base.follow(acceleration)
+        still = BaseMotion(np.zeros(block.volts.shape[1]), np.zeros(block.volts.shape[1]))
+        base = still if acceleration is None else self._base.follow(acceleration)
+        is_settled = block.first_sample >= self._settled_sample
         if acceleration is not None:
-            yield from self._at_the_base(acceleration, base)
+            yield self._acceleration(acceleration)
         if voltage is not None:
-            yield from self._at_the_amplifier(voltage, base)
-        if acceleration is not None:
-            yield from self._on_the_table(acceleration, base)
+            yield from self._at_the_amplifier(voltage, base if is_settled else still)
+        integrated = (
+            [] if acceleration is None else [*self._at_the_base(base), self._table(acceleration, base)]
+        )
         if Role.M0_VELOCITY in rows:
-            yield self._in_the_specimen(rows[Role.M0_VELOCITY], base, block)
+            integrated.append(self._in_the_specimen(rows[Role.M0_VELOCITY], base, block))
+        if is_settled:
+            yield from integrated
 
-    def _at_the_base(self, acceleration: Samples, base: BaseMotion) -> Iterator[_Watched]:
+    def _acceleration(self, acceleration: Samples) -> _Watched:
+        limit = self._rig.shaker.limits.acceleration_m_per_s2
+        allowed = limit.value * self._limits.base_acceleration
+        what = "the base acceleration"
+        return _Watched(Role.BASE_ACCELERATION, what, acceleration, allowed, "m/s2", limit.source)
+
+    def _at_the_base(self, base: BaseMotion) -> Iterator[_Watched]:
         shaker, share = self._rig.shaker.limits, self._limits
-        a, v, x = shaker.acceleration_m_per_s2, shaker.velocity_m_per_s, shaker.stroke_m
+        v, x = shaker.velocity_m_per_s, shaker.stroke_m
         for what, values, limit, fraction, unit in (
-            ("the base acceleration", acceleration, a, share.base_acceleration, "m/s2"),
             ("the base velocity", base.velocity, v, share.base_velocity, "m/s"),
             ("the stroke", base.displacement, x, share.stroke, "m"),
         ):
             yield _Watched(Role.BASE_ACCELERATION, what, values, limit.value * fraction, unit, limit.source)
 
-    def _on_the_table(self, acceleration: Samples, base: BaseMotion) -> Iterator[_Watched]:
+    def _table(self, acceleration: Samples, base: BaseMotion) -> _Watched:
         """Force that moves the table: mass times acceleration, and what its suspension takes."""
         shaker = self._rig.shaker
         force = (
@@ -107,7 +121,7 @@ class Guard:
             + shaker.suspension_stiffness_n_per_m * base.displacement
         )
         limit = shaker.limits.force_n
-        yield _Watched(
+        return _Watched(
             Role.BASE_ACCELERATION,
             "the force on the table",
             force,

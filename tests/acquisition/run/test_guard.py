@@ -198,3 +198,16 @@ def test_a_trip_stands_in_the_recording_with_its_numbers(bench, tmp_path):
         )
     ]
     assert bench.recorder.ending[1] == str(failure.value)
+
+
+def test_an_input_that_drifts_to_its_rest_at_the_beginning_is_not_taken_for_a_stroke(rig):
+    """An AC-coupled input with a time constant of 0.1 s, half a volt from its rest when the run begins."""
+    guard = guard_of(rig)
+    time_s = np.arange(round(2 * RATE_HZ)) / RATE_HZ
+    volts = np.zeros((4, time_s.size))
+    volts[2] = 0.5 * np.exp(-time_s / 0.1)
+    blocks = [Block(first, volts[:, first : first + BLOCK]) for first in range(0, time_s.size, BLOCK)]
+    watch(guard, blocks[:5])
+    volts[2, :] = 0.08 * np.sin(2 * np.pi * 6 * time_s)
+    trip, _ = trip_of(guard, blocks[5:])
+    assert trip.quantity == "stroke"
