@@ -122,3 +122,18 @@ def test_a_bench_check_is_kept_and_can_be_shown_again(vibench, tmp_path):
     shown = vibench("bench", "check", "--last", "--json", cwd=tmp_path, environment=environment)
     assert json.loads(shown.stdout) == json.loads(made.stdout)
     assert len(list((tmp_path / "state").rglob("*.json"))) == 1
+
+
+def test_faults_that_cannot_be_played_are_refused_before_anything_is_opened(vibench, tmp_path):
+    script = tmp_path / "faults.toml"
+    script.write_text('[[faults]]\nat_s = 1\nfault = "fill_disk"\n', encoding="utf-8")
+    served = vibench("serve-rig", "--address", "127.0.0.1:0", "--faults", script, cwd=tmp_path)
+    assert served.returncode == 1
+    assert "befall the program that records" in served.stderr
+    real = Path(__file__).parents[2] / "hardware_configs" / "lab_rig.toml"
+    measured = vibench(
+        "measure", campaign(tmp_path), "--bench", real, "--faults", script, "--out", "out", cwd=tmp_path
+    )
+    assert measured.returncode == 1
+    assert "is a real one" in measured.stderr
+    assert not (tmp_path / "out").exists()
