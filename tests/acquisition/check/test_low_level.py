@@ -1,0 +1,49 @@
+"""The check at the beginning of each run: what is still fading from before is no fault, what goes on is."""
+
+import numpy as np
+import pytest
+
+from acquisition.check.low_level import judged
+from acquisition.errors import CheckFailed
+from acquisition.rig.channel import channels_of
+from acquisition.rig.configuration import Role
+from acquisition.rig.model import Quantity, RigModel
+
+RATE_HZ = 51_200.0
+AMPLITUDE_VPP = 0.02
+HUM_V = 5e-3
+
+
+def sine(peak, count):
+    return peak * np.sin(2 * np.pi * 160.0 * np.arange(count) / RATE_HZ)
+
+
+@pytest.fixture
+def check(rig):
+    """Judge a quiet stretch of a tenth of a second before a sine that is as it should be."""
+    channels = channels_of(rig)
+    terminal_v = 0.5 * AMPLITUDE_VPP * rig.generator.terminal_factor()
+    accelerance = abs(complex(RigModel(rig).transfer(Quantity.ACCELERATION, 160.0)))
+    peaks = {Role.DRIVE_VOLTAGE: terminal_v, Role.BASE_ACCELERATION: terminal_v * accelerance}
+    heard = np.stack([sine(peaks.get(each.role, 0.0) / each.units_per_volt, 15_360) for each in channels])
+
+    def check(drive_v):
+        quiet = np.zeros((len(channels), 5120))
+        quiet[0] = drive_v / channels[0].units_per_volt
+        return judged(rig, channels, quiet, heard, RATE_HZ, AMPLITUDE_VPP)
+
+    return check
+
+
+def test_the_tail_of_what_was_cut_off_before_is_no_fault(check):
+    tail = sine(0.5, 5120)
+    tail[100:] = 0.0
+    figures = check(tail)
+    assert figures.drive_v == pytest.approx(figures.expected_drive_v, rel=1e-3)
+
+
+def test_another_source_at_the_checks_frequency_is_found_before_anything_plays(check):
+    with pytest.raises(
+        CheckFailed, match=r"the drive voltage shows 0\.005 V at 160 Hz before anything plays"
+    ):
+        check(sine(HUM_V, 5120))
