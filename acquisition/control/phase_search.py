@@ -1,13 +1,15 @@
 """Finding the frequency at which a phase has a wanted value: secants inside a bracket that only narrows."""
 
 from dataclasses import dataclass, field
-from math import hypot
+from math import hypot, pi
 
 import numpy as np
 
 _NEAR_DEG = 35.0
 """Errors up to this are on the straight part of the phase: its slope is taken from them."""
 _FEWEST = 2
+_BEND = 0.15
+"""How far the slope over that part is off the one at the resonance, at most."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,11 @@ class PhaseResonance:
     uncertainty_hz: float
     """Standard uncertainty, that of the sensors' phases included [Hz]."""
     slope_deg_per_hz: float
+
+    @property
+    def half_width_hz(self) -> float:
+        """Half of the half-power width: damping ratio times frequency, from the slope of the phase [Hz]."""
+        return 180 / (pi * abs(self.slope_deg_per_hz)) if self.slope_deg_per_hz else 0.0
 
 
 @dataclass
@@ -76,8 +83,8 @@ class PhaseSearch:
         slope = float(away_hz @ error_deg / (away_hz @ away_hz))
         # From the best try, not from the line's own crossing: the phase bends away from it further out.
         crossing_hz = best.frequency_hz - best.error_deg / slope
-        by_chance = best.uncertainty_deg / abs(slope)
-        return PhaseResonance(crossing_hz, hypot(by_chance, sensor_phase_deg / abs(slope)), slope)
+        uncertainty_deg = hypot(best.uncertainty_deg, sensor_phase_deg, _BEND * best.error_deg)
+        return PhaseResonance(crossing_hz, uncertainty_deg / abs(slope), slope)
 
     def _outwards(self, last: PhaseError) -> float:
         before = self.tries[-2]

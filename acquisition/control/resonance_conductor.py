@@ -1,12 +1,15 @@
 """Tracking a mode's phase resonance from level to level."""
 
 import json
+from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from math import degrees, sqrt
 
 import numpy as np
 
 from ..excitation.resonance_tracking import ResonanceTracking
+from .mode_fit import Mode, fitted_mode
 from .move import Conduct
 from .phase_search import PhaseError, PhaseResonance, PhaseSearch
 from .record import recorded
@@ -17,6 +20,8 @@ from .steadiness import Steadiness
 from .stroboscope import Periods
 
 _BATCHES = 8
+_FURTHEST = 1.5
+"""Half-widths of the resonance between it and the furthest point of a flank."""
 
 
 class Lock(StrEnum):
@@ -41,13 +46,13 @@ def _tracked(play: SinePlay, plan: ResonanceTracking, number: int, start_hz: flo
     level = plan.base_level(number)
     settler = Settler(play, plan.settling, level)
     search = PhaseSearch(plan.low_hz, plan.high_hz, plan.widest_step_hz)
+    visits: list[Settled] = []
     frequency_hz, lock = start_hz, Lock.LOST
-    found: Settled
     for _ in range(plan.most_tries):
         moved(play, frequency_hz, level)
-        found = yield from settler.settled()
-        search.tries.append(_phase_error(play.periods, found, plan.phase_deg))
-        error = search.tries[-1]
+        visits.append((yield from settler.settled()))
+        error = _phase_error(play.periods, visits[-1], plan.phase_deg)
+        search.tries.append(error)
         if abs(error.error_deg) <= plan.phase_tolerance_deg and len(search.tries) > 1:
             lock = Lock.LOCKED
             break
@@ -56,10 +61,46 @@ def _tracked(play: SinePlay, plan: ResonanceTracking, number: int, start_hz: flo
             lock = Lock.AT_THE_EDGE
             break
         frequency_hz = next_hz
+    found = visits[-1]
     resonance = search.resonance(plan.sensor_phase_deg)
     yield from recorded(settler, found, plan.segment(number, found.frequency_hz), plan.record_s)
-    _say(play, plan, number, found, resonance, lock, len(search.tries))
+    mode = None
+    if lock is Lock.LOCKED:
+        flanks = yield from _flanks(settler, plan, resonance)
+        mode = _mode([*visits, *flanks], resonance)
+    _say(play, plan, number, found, Tracked(resonance, mode, lock, len(search.tries)))
     return found.frequency_hz
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """What was found of a mode at one level."""
+
+    resonance: PhaseResonance
+    mode: Mode | None
+    lock: Lock
+    tries: int
+
+
+def _flanks(settler: Settler, plan: ResonanceTracking, resonance: PhaseResonance) -> Conduct[list[Settled]]:
+    """Measure on both sides, up to one and a half half-widths away."""
+    found: list[Settled] = []
+    pairs = plan.flank_pairs
+    for place in (*range(-pairs, 0), *range(1, pairs + 1)):
+        frequency_hz = resonance.frequency_hz + _FURTHEST * resonance.half_width_hz * place / pairs
+        if plan.low_hz <= frequency_hz <= plan.high_hz:
+            moved(settler.play, frequency_hz, settler.level)
+            found.append((yield from settler.settled()))
+    return found
+
+
+def _mode(visits: Sequence[Settled], resonance: PhaseResonance) -> Mode | None:
+    """Fit the mode to all that was visited near it."""
+    reach_hz = 1.1 * _FURTHEST * resonance.half_width_hz
+    near = [each for each in visits if abs(each.drive_hz - resonance.frequency_hz) <= reach_hz]
+    return fitted_mode(
+        np.array([each.drive_hz for each in near]), np.array([each.transmissibility for each in near])
+    )
 
 
 def _phase_error(periods: Periods, found: Settled, wanted_deg: float) -> PhaseError:
@@ -78,30 +119,25 @@ def _phase_error(periods: Periods, found: Settled, wanted_deg: float) -> PhaseEr
     return PhaseError(found.drive_hz, error_deg, degrees(spread) / sqrt(_BATCHES))
 
 
-def _say(
-    play: SinePlay,
-    plan: ResonanceTracking,
-    number: int,
-    found: Settled,
-    resonance: PhaseResonance,
-    lock: Lock,
-    tries: int,
-) -> None:
-    is_told = lock is Lock.LOCKED and found.judgement.steadiness is not Steadiness.UNSETTLED
-    said = {
+def _say(play: SinePlay, plan: ResonanceTracking, number: int, found: Settled, tracked: Tracked) -> None:
+    is_told = tracked.lock is Lock.LOCKED and found.judgement.steadiness is not Steadiness.UNSETTLED
+    said: dict[str, int | float | str | None] = {
         "level": number,
         "asked_m_per_s2": plan.accelerations_m_per_s2[number],
-        "frequency_hz": shortened(resonance.frequency_hz) if is_told else None,
-        "frequency_u_hz": shortened(resonance.uncertainty_hz) if is_told else None,
+        "frequency_hz": shortened(tracked.resonance.frequency_hz) if is_told else None,
+        "frequency_u_hz": shortened(tracked.resonance.uncertainty_hz) if is_told else None,
         "at_hz": shortened(found.drive_hz),
+        "phase_deg": shortened(degrees(float(np.angle(found.transmissibility)))),
+        "response_ii": shortened(found.response),
         "base_m_per_s2": shortened(found.base.amplitude),
         "base_u": shortened(found.base.uncertainty),
         "held": found.held.value,
-        "response_ii": shortened(found.response),
-        "phase_deg": shortened(degrees(float(np.angle(found.transmissibility)))),
         "motion": found.judgement.steadiness.value,
-        "period": found.judgement.period,
-        "tries": tries,
-        "lock": lock.value,
+        "tries": tracked.tries,
+        "lock": tracked.lock.value,
     }
+    if is_told and tracked.mode is not None:
+        said["mode_hz"] = shortened(tracked.mode.frequency_hz)
+        said["mode_u_hz"] = shortened(tracked.mode.frequency_u_hz)
+        said["damping_ratio"] = shortened(tracked.mode.damping_ratio)
     play.note("resonance", json.dumps(said))

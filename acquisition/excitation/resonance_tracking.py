@@ -18,7 +18,9 @@ class ResonanceTracking(AbstractFeedback):
     """Phase resonance of one mode at rising (or falling) levels of the base: its backbone.
 
     At the resonance m0 moves a quarter of a period behind the base. The loop measures that phase on
-    the fundamental of settled motion and moves the frequency until it is met.
+    the fundamental of settled motion and moves the frequency until it is met. Other modes shift it a
+    little; the flanks tell the natural frequency and the damping apart from them, as long as the motion
+    is linear.
     """
 
     kind: Literal["resonance_tracking"] = "resonance_tracking"
@@ -44,6 +46,8 @@ class ResonanceTracking(AbstractFeedback):
     """Longest step of the search; shorter than from the resonance to the antiresonance beside it [Hz]."""
     most_tries: int = Field(default=25, ge=3, le=200)
     """How many frequencies are tried for one level."""
+    flank_pairs: int = Field(default=3, ge=0, le=10)
+    """Pairs of frequencies measured on both flanks, for the mode's natural frequency and damping."""
     record_s: PositiveFloat = 1.0
     """Time recorded on each resonance [s]."""
 
@@ -64,7 +68,7 @@ class ResonanceTracking(AbstractFeedback):
     @property
     def playing_s(self) -> float:
         """All levels with the longest searches [s]."""
-        tries_s = self.most_tries * self.settling.longest_wait_s
+        tries_s = (self.most_tries + 2 * self.flank_pairs) * self.settling.longest_wait_s
         return len(self.accelerations_m_per_s2) * (tries_s + self.record_s)
 
     def base_level(self, number: int) -> BaseLevel:

@@ -1,0 +1,49 @@
+"""A mode told from its neighbours by a few points, with an uncertainty that repetitions bear out."""
+
+import numpy as np
+import pytest
+
+from acquisition.control.mode_fit import fitted_mode
+from sim.specimen import gong2025
+
+SPECIMEN = gong2025()
+MODES = list(zip(SPECIMEN.natural_frequencies_hz, SPECIMEN.damping_ratios, strict=True))
+
+
+def points(natural_hz, damping, count=7):
+    """Frequencies within one and a half half-widths, and what m0 does there over the base."""
+    frequency_hz = natural_hz * (1 + 1.5 * damping * np.linspace(-1, 1, count))
+    s = SPECIMEN
+    answers = []
+    for omega in 2 * np.pi * frequency_hz:
+        dynamic = s.stiffness_matrix + 1j * omega * s.damping_matrix - omega**2 * s.mass_matrix
+        answers.append(np.linalg.solve(dynamic, [s.stiffnesses[0] + 1j * omega * s.dampings[0], 0, 0])[0])
+    return frequency_hz, np.array(answers)
+
+
+@pytest.mark.parametrize(("natural_hz", "damping"), MODES)
+@pytest.mark.parametrize("turned", [0.0, 0.1])
+def test_frequency_and_damping_are_the_eigenvalue_s_whatever_phase_the_sensors_add(
+    natural_hz, damping, turned
+):
+    frequency_hz, answers = points(natural_hz, damping)
+    found = fitted_mode(frequency_hz, answers * np.exp(1j * turned))
+    assert found.frequency_hz == pytest.approx(natural_hz, rel=1e-4)
+    assert found.damping_ratio == pytest.approx(damping, rel=1e-3)
+
+
+@pytest.mark.parametrize(("natural_hz", "damping"), MODES)
+def test_the_stated_uncertainty_is_the_spread_of_repetitions(natural_hz, damping):
+    random = np.random.default_rng(2)
+    frequency_hz, answers = points(natural_hz, damping)
+    found = []
+    for _ in range(300):
+        noise = 1e-3 * (random.standard_normal(7) + 1j * random.standard_normal(7))
+        found.append(fitted_mode(frequency_hz, answers * (1 + noise)))
+    spread = np.std([each.frequency_hz for each in found])
+    stated = np.sqrt(np.mean([each.frequency_u_hz**2 for each in found]))
+    assert stated == pytest.approx(spread, rel=0.25)
+
+
+def test_four_points_are_too_few():
+    assert fitted_mode(*points(*MODES[1], count=4)) is None
