@@ -3,6 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 
+from ..feedback_words import feedback_sentences, noted_jumps
 from ..measurement_analysis import SteppedSineAnalysis
 from ..overlay import SteppedSineOverlay
 from ..tables import table
@@ -89,6 +90,8 @@ def _responses(axes: Axes, analysis: SteppedSineAnalysis, laid: SteppedSineOverl
                 marker=marker,
                 markersize=4,
             )
+    for jump in noted_jumps(analysis.facts.feedback):
+        axes.axvspan(jump.low_hz, jump.high_hz, color=MEASURED, alpha=0.3, linewidth=0)
     magnitude_axis(axes)
 
 
@@ -102,6 +105,7 @@ def stepped_sine_caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay
         f"at {found.frequency_hz[top]:.4g} Hz: {found.response_ii[top]:.3g} ± "
         f"{2 * found.sd_response_ii[top]:.2g}."
     )
+    text = " ".join([text, *feedback_sentences(analysis.facts.feedback)])
     if laid is None:
         return text
     return (

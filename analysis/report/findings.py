@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from ..campaign_results import CampaignResults, DwellResult, NoiseResult, SweepResult
+from ..feedback_words import feedback_sentences
 from ..figures.portraits import verdict_text
 from ..figures.sweep import regions_text
 
@@ -22,6 +23,7 @@ def findings(results: CampaignResults) -> Iterator[str]:
             f"Stepped sine at {stepped.analysis.excitation.amplitude_vpp:g} Vpp: Response II up to "
             f"{found.response_ii.max():.3g} in {found.frequency_hz.size} steps."
         )
+        yield from feedback_sentences(stepped.analysis.facts.feedback)
 
 
 def _noise(result: NoiseResult) -> str:

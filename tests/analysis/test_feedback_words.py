@@ -1,0 +1,96 @@
+"""What feedback noted in a recording comes back as numbers and sentences."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from acquisition.bench import open_bench
+from acquisition.excitation.resonance_tracking import ResonanceTracking
+from acquisition.excitation.settled_sine import SettledSine
+from acquisition.plan.measurement import Measurement
+from acquisition.recording.reader import open_recording
+from acquisition.rig.configuration import load_rig
+from acquisition.run.run_measurement import run_measurement
+from analysis.campaign_results import SteppedSineResult
+from analysis.feedback_notes import FeedbackNote
+from analysis.feedback_words import feedback_sentences, noted_jumps
+from analysis.figures.stepped_sine import stepped_sine_figure
+from analysis.measurement_analysis import analyse_recording
+from analysis.summary import summary
+
+ROOT = Path(__file__).parent.parent.parent
+JUMP = {"direction": "down", "before_hz": 101.25, "after_hz": 100.9375, "how": "localised"}
+STEP = {"segment": "step", "motion": "periodic", "period": 1, "level": "within tolerance"}
+
+
+def notes(*numbers, kind):
+    return [FeedbackNote(kind, 0.1 * place, each) for place, each in enumerate(numbers)]
+
+
+def test_only_bracketed_jumps_count():
+    steep = {**JUMP, "how": "steep, but no jump"}
+    (jump,) = noted_jumps(notes(JUMP, steep, kind="jump"))
+    assert (jump.low_hz, jump.high_hz, jump.direction) == (100.9375, 101.25, "down")
+
+
+def test_steps_are_counted_by_what_they_do():
+    found = [
+        STEP,
+        {**STEP, "period": 3},
+        {**STEP, "period": 3},
+        {**STEP, "motion": "aperiodic", "period": 0, "level": "outside tolerance"},
+    ]
+    said = list(feedback_sentences(notes(*found, kind="achieved")))
+    assert said == [
+        "Of 4 settled steps, by motion: period 3: 2, no period: 1.",
+        "The base was off its level in 1 of them.",
+    ]
+
+
+def test_nothing_is_said_without_feedback():
+    assert list(feedback_sentences(())) == []
+
+
+@pytest.fixture
+def analysed(tmp_path):
+    """Carry out an excitation on the virtual rig, and analyse its recording."""
+
+    def analyse(excitation):
+        shipped = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+        daq = shipped.daq.model_copy(update={"sample_rate_hz": 10240.0})
+        with open_bench(shipped.model_copy(update={"daq": daq})) as bench:
+            plan = Measurement(name="run", excitation=excitation, ramp_s=0.4, ramp_step_s=0.02)
+            outcome = run_measurement(bench, plan, tmp_path / "run.h5")
+        with open_recording(outcome.path) as recording:
+            return analyse_recording(recording)
+
+    return analyse
+
+
+def test_a_tracked_resonance_is_analysed_and_said(analysed):
+    tracked = ResonanceTracking(
+        amplitude_vpp=0.2,
+        start_hz=265,
+        low_hz=250,
+        high_hz=280,
+        accelerations_m_per_s2=(0.5,),
+        flank_pairs=2,
+    )
+    analysis = analysed(tracked)
+    # The analysis' own estimate of what the loop saw: 22.58 where m0 lags a quarter of a period.
+    assert analysis.response.response_ii[0] == pytest.approx(22.58, rel=0.01)
+    (sentence,) = feedback_sentences(analysis.facts.feedback)
+    assert sentence.startswith("Phase resonance at 266.")
+    assert "natural frequency 266.1" in sentence
+    document = json.loads(json.dumps(summary(SteppedSineResult(analysis, None))))
+    kinds = [each["kind"] for each in document["recording"]["feedback"]]
+    assert kinds.count("resonance") == 1
+
+
+def test_settled_steps_are_analysed_like_any_stepped_sine(analysed):
+    analysis = analysed(SettledSine(amplitude_vpp=0.05, frequencies_hz=(230, 240), record_s=0.5))
+    assert analysis.response.left_out == 0
+    assert analysis.response.response_ii == pytest.approx([3.21, 4.24], rel=0.02)
+    assert analysis.response.direction == ("up", "up")
+    assert "2 steps" in stepped_sine_figure(analysis).caption
