@@ -1,0 +1,32 @@
+"""What a report says of a bench: how its last check came out, how long before, and what it did not like."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from analysis.report.recording_section import bench_check_text
+
+STARTED = "2026-05-04T12:30:00+00:00"
+GOOD = {"name": "amplifier gain", "value": "10 dB", "expected": "10 dB within 1 dB", "verdict": "ok"}
+ODD = {
+    "name": "base acceleration since last time",
+    "value": "-0.80 dB since 2 days",
+    "expected": "0 dB within 0.5 dB",
+    "verdict": "warn",
+}
+
+
+@pytest.mark.parametrize(
+    ("check", "said"),
+    [
+        ({}, "none"),
+        ({"checked": "2026-05-04T09:00:00Z", "verdict": "ok", "findings": [GOOD]}, "ok, 3.5 h before"),
+        (
+            {"checked": "2026-05-04T12:00:00Z", "verdict": "warn", "findings": [GOOD, ODD]},
+            "warn, 0.5 h before: base acceleration since last time -0.80 dB since 2 days (warn; expected 0 dB "
+            "within 0.5 dB)",
+        ),
+    ],
+)
+def test_the_last_check_of_the_bench_is_said_in_a_line(check, said):
+    assert bench_check_text(SimpleNamespace(bench_check=check, started_utc=STARTED)) == said
