@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 
-from ..errors import AcquisitionError, InstrumentLost
+from ..errors import AcquisitionError, InstrumentLost, RecordingError
 from ..plan.campaign import Campaign
 from ..plan.measurement import Measurement
 from ..plan.point import Point
@@ -85,8 +85,8 @@ class Course:
             return CampaignItem(point.name, Item.KEPT, path, "complete before", point.why)
         try:
             return self._attempts.carry_out(Point(point.name, point.measurement, point.chain), tell)
-        except InstrumentLost:
-            raise
+        except (InstrumentLost, RecordingError):
+            raise  # without instruments, or without room on the disk, the next point would fail too
         except AcquisitionError as error:
             if self._after_failure is AfterFailure.STOP:
                 raise

@@ -25,7 +25,7 @@ class AfterFailure(StrEnum):
 
     STOP = "stop"
     GO_ON = "go_on"
-    """Make the next one, unless an instrument is lost: nothing can be measured then."""
+    """Make the next one, unless an instrument or the disk is lost: nothing can be measured then."""
 
 
 class ChangedBench(StrEnum):

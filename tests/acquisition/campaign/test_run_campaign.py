@@ -117,14 +117,15 @@ def test_a_campaign_told_to_go_on_passes_a_failed_measurement(bench, tmp_path):
     assert items[0].reason == "a hole"
 
 
-def test_a_lost_instrument_ends_a_campaign_even_when_told_to_go_on(bench, tmp_path):
-    with pytest.raises(InstrumentLost):
+@pytest.mark.parametrize("lost", [InstrumentLost("gone"), RecordingError("the disk is full")])
+def test_a_lost_instrument_or_disk_ends_a_campaign_even_when_told_to_go_on(bench, tmp_path, lost):
+    with pytest.raises(type(lost)):
         run_campaign(
             bench,
             CAMPAIGN,
             tmp_path,
             after_failure=AfterFailure.GO_ON,
-            on_progress=failing_in(bench, "one", lambda: InstrumentLost("gone")),
+            on_progress=failing_in(bench, "one", lambda: lost),
         )
     assert [path.name for path in tmp_path.glob("*.h5*")] == ["one.h5"]
 
