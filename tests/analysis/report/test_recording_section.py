@@ -23,8 +23,7 @@ ODD = {
         ({"checked": "2026-05-04T09:00:00Z", "verdict": "ok", "findings": [GOOD]}, "ok, 3.5 h before"),
         (
             {"checked": "2026-05-04T12:00:00Z", "verdict": "warn", "findings": [GOOD, ODD]},
-            "warn, 0.5 h before: base acceleration since last time -0.80 dB since 2 days (warn; expected 0 dB "
-            "within 0.5 dB)",
+            f"warn, 0.5 h before: {ODD['name']} -0.80 dB since 2 days (warn; expected 0 dB within 0.5 dB)",
         ),
     ],
 )
