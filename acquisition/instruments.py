@@ -1,6 +1,7 @@
 """What a bench needs of its instruments: the promises that every driver keeps."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
@@ -112,6 +113,13 @@ class Digitizer(Protocol):
         """Release the device. Legal at any time."""
 
 
+class IdleOutput(StrEnum):
+    """What an output does by itself when nobody feeds it any more."""
+
+    ZERO = "goes to zero volts"
+    HELD = "holds its last value"
+
+
 class AnalogOutput(Protocol):
     """An output that streams samples written ahead of their time, from the digitizer's start on."""
 
@@ -122,6 +130,10 @@ class AnalogOutput(Protocol):
     @property
     def sample_rate_hz(self) -> float:
         """The rate that the hardware really runs at."""
+
+    @property
+    def idle(self) -> IdleOutput:
+        """What the device does when it runs dry, or its program dies."""
 
     @property
     def ahead_samples(self) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 from ..bench import Bench
 from ..excitation.dwell import Dwell
 from ..excitation.steps import Tone
-from ..instruments import Samples
+from ..instruments import AnalogOutput, IdleOutput, Samples
 from ..plan.measurement import Measurement
 from ..plan.player import Player
 from ..rig.calibration import calibrations
@@ -67,6 +67,8 @@ def check_bench(bench: Bench, folder: Path) -> BenchReport:
     after = _listen(bench)
     if drive.player is Player.GENERATOR:
         findings.append(_latency(bench))
+    if bench.output is not None:
+        findings.append(_idle(bench.output))
     for channel, row in zip(bench.channels, quiet, strict=True):
         findings += [_noise(channel, row), _offset(channel, row)]
     findings += LoopCheck(bench, amplitude_vpp, heard, after).findings()
@@ -148,6 +150,18 @@ def _room(bench: Bench, folder: Path) -> Finding:
         f"{-ROOM_H.well:g} h or more",
         ROOM_H.verdict(-hours),
         "make room, or record elsewhere",
+    )
+
+
+def _idle(output: AnalogOutput) -> Finding:
+    is_zero = output.idle is IdleOutput.ZERO
+    advice = "a program that dies leaves the last value on the shaker: keep the amplifier's knob within reach"
+    return Finding(
+        name="output without a program",
+        value=output.idle.value,
+        expected=IdleOutput.ZERO.value,
+        verdict=Verdict.OK if is_zero else Verdict.WARN,
+        advice="" if is_zero else advice,
     )
 
 

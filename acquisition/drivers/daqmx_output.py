@@ -6,11 +6,13 @@ from typing import Self
 
 import numpy as np
 from nidaqmx import Task
-from nidaqmx.constants import AcquisitionType, RegenerationMode, TaskMode
+from nidaqmx.constants import AcquisitionType, AOIdleOutputBehavior, RegenerationMode, TaskMode
+from nidaqmx.errors import DaqError
 from nidaqmx.stream_writers import AnalogSingleChannelWriter
+from nidaqmx.task.channels import AOChannel
 
 from ..errors import DataLost, InstrumentError, InstrumentLost, LimitExceeded, SettingRefused
-from ..instruments import Identity, Samples
+from ..instruments import Identity, IdleOutput, Samples
 from ..rig.output import OutputConfig
 from .daqmx import DaqmxDigitizer
 from .daqmx_errors import daqmx_call
@@ -40,6 +42,7 @@ class DaqmxOutput:
         self._task: Task | None = None
         self._written = 0
         self._is_open = True
+        self._idle = IdleOutput.HELD
 
     @classmethod
     def open(cls, physical: str, config: OutputConfig, digitizer: DaqmxDigitizer) -> Self:
@@ -75,6 +78,11 @@ class DaqmxOutput:
     def sample_rate_hz(self) -> float:
         """The rate that the output was asked for, and takes."""
         return self._config.sample_rate_hz
+
+    @property
+    def idle(self) -> IdleOutput:
+        """What the device does when it runs dry: zero volts where it can be told to, and read back."""
+        return self._idle
 
     @property
     def ahead_samples(self) -> int:
@@ -151,7 +159,7 @@ class DaqmxOutput:
         with ExitStack() as undo, daqmx_call(f"opening {physical}"):
             undo.callback(self._resources.close)
             task = self._resources.enter_context(Task(grpc_options=self._digitizer.session.options))
-            self._add_channel(task)
+            self._idle = _told_to_idle_at_zero(self._add_channel(task))
             task.timing.cfg_samp_clk_timing(
                 config.sample_rate_hz,
                 sample_mode=AcquisitionType.CONTINUOUS,
@@ -190,6 +198,16 @@ class DaqmxOutput:
             task.write(zeros, auto_start=True)
             task.wait_until_done(_WRITE_TIMEOUT_S)
 
-    def _add_channel(self, task: Task) -> None:
+    def _add_channel(self, task: Task) -> AOChannel:
         limit_v = self._config.limit_v
-        task.ao_channels.add_ao_voltage_chan(self._physical, min_val=-limit_v, max_val=limit_v)
+        return task.ao_channels.add_ao_voltage_chan(self._physical, min_val=-limit_v, max_val=limit_v)
+
+
+def _told_to_idle_at_zero(channel: AOChannel) -> IdleOutput:
+    """Ask for zero volts when idle, and believe what is read back: many devices hold their last value."""
+    # A device that cannot refuses the setting, and one that does not know it refuses to be asked.
+    with suppress(DaqError):
+        channel.ao_idle_output_behavior = AOIdleOutputBehavior.ZERO_VOLTS
+        if channel.ao_idle_output_behavior is AOIdleOutputBehavior.ZERO_VOLTS:
+            return IdleOutput.ZERO
+    return IdleOutput.HELD

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from acquisition.errors import DataLost
-from acquisition.instruments import Block, Identity, Samples
+from acquisition.instruments import Block, Identity, IdleOutput, Samples
 from acquisition.recording.layout import RecordingState
 from acquisition.rig.channel import Channel, channels_of
 from acquisition.rig.configuration import Rig, Role, load_rig
@@ -137,6 +137,7 @@ class LoopbackOutput:
     identity = Identity("MAKER", "OUTPUT", "3", "1.0", "OUTPUT")
     sample_rate_hz = SAMPLE_RATE_HZ
     ahead_samples = 2560
+    idle = IdleOutput.ZERO
 
     def __init__(self, world: LoopbackWorld) -> None:
         self._world = world

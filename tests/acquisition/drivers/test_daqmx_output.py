@@ -3,11 +3,13 @@
 from contextlib import ExitStack
 from pathlib import Path
 
+import nidaqmx
 import numpy as np
 import pytest
 
 from acquisition.drivers.daqmx import DaqmxDigitizer
-from acquisition.drivers.daqmx_output import DaqmxOutput
+from acquisition.drivers.daqmx_output import DaqmxOutput, _told_to_idle_at_zero
+from acquisition.drivers.daqmx_session import daqmx_session
 from acquisition.errors import (
     ConfigurationError,
     DataLost,
@@ -17,7 +19,7 @@ from acquisition.errors import (
     LimitExceeded,
     SettingRefused,
 )
-from acquisition.instruments import AnalogOutput
+from acquisition.instruments import AnalogOutput, IdleOutput
 from acquisition.rig.configuration import load_rig
 from acquisition.rig.output import OutputConfig
 from acquisition.virtual.rig import VirtualRig
@@ -103,6 +105,19 @@ def test_an_output_that_runs_dry_is_lost_data_and_ends_at_zero(digitizer, output
         output.write(np.zeros(1280))
     output.stop()
     assert np.max(np.abs(digitizer.read(2560).volts[0][-640:])) < NOISE_V
+
+
+@pytest.mark.parametrize(
+    ("device", "idle"), [("Dev1", IdleOutput.ZERO), ("Dev2", IdleOutput.HELD)], ids=["USB-4431", "USB-6211"]
+)
+def test_an_output_is_told_to_idle_at_zero_and_says_when_it_cannot(virtual, device, idle):
+    with nidaqmx.Task(grpc_options=daqmx_session(virtual.daq_address).options) as task:
+        channel = task.ao_channels.add_ao_voltage_chan(f"{device}/ao0", min_val=-2, max_val=2)
+        assert _told_to_idle_at_zero(channel) is idle
+
+
+def test_the_output_of_a_4431_goes_to_zero_by_itself(output):
+    assert output.idle is IdleOutput.ZERO
 
 
 def test_stopping_goes_to_zero_at_once(digitizer, output):
