@@ -45,10 +45,11 @@ def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
     longest_s = sum(each_s / (level.power if _is_power(model) else level.chaos) for model in request.models)
     on_top = "; the exponent comes on top" if request.exponent is Exponent.COMPUTED else ""
     error = f"{level.response_i_error:.0e}" if level.response_i_error else "none"
+    shortest, longest = _time(shortest_s / cores), _time(longest_s / cores)
     return (
         (
-            f"{request.points} points of {request.duration_s:g} s: {_time(shortest_s / cores)} free "
-            f"to {_time(longest_s / cores)} in chaos, on {cores} idle cores{on_top}."
+            f"{request.points} points of {request.duration_s:g} s on {cores} idle cores: "
+            f"{shortest} without impacts to {longest} in chaos{on_top}."
         ),
         (
             f"A second simulates {level.free:.0f} s without impacts, {level.periodic:.0f} s of impacts that "

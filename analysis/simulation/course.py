@@ -52,6 +52,19 @@ class SimulationCourse:
         return tuple(self._signals.values())
 
     @property
+    def largest_signal_m(self) -> float:
+        """Furthest that a time signal goes from rest."""
+        reached = [np.max(np.abs((each.displacement_m, each.relative_m))) for each in self.signals]
+        return float(max(reached, default=0.0))
+
+    @property
+    def smallest_and_largest_response(self) -> tuple[float, float]:
+        """Range of all responses so far; zeros before the first."""
+        points = [point for found in self._found.values() for point in found.values()]
+        known = [v for p in points for v in (p.response_i, p.response_ii) if v is not None and v > 0]
+        return (min(known), max(known)) if known else (0.0, 0.0)
+
+    @property
     def troubles(self) -> tuple[str, ...]:
         """What could not be computed."""
         return tuple(self._troubles)

@@ -26,6 +26,7 @@ class Dash(Enum):
     SOLID = Qt.PenStyle.SolidLine
     DASHED = Qt.PenStyle.DashLine
     DOTTED = Qt.PenStyle.DotLine
+    DASH_DOTTED = Qt.PenStyle.DashDotLine
 
 
 @dataclass(frozen=True)

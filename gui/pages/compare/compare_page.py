@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from analysis.comparison.export import exported
 from analysis.comparison.recording_traces import ComparedRecording, compared_recording
 from analysis.comparison.trace import Trace
 
@@ -28,6 +27,7 @@ from ...theme import Theme
 from .analysis_panel import AnalysisPanel
 from .curve_list import CurveList
 from .curve_plots import CurvePlots
+from .export_elsewhere import exported_elsewhere
 from .number_tables import PEAK_HEADINGS, NumberTable, marker_headings, marker_rows, peak_rows
 from .pair_box import PairBox
 
@@ -121,7 +121,7 @@ class ComparePage(Page):
         pair = None if self.pair_box.difference() is None else self.pair_box.pair()
         marked = self.plots.markers_hz
         ask = self.desk.background.ask
-        ask(exported, self._exported, self._refused, path, shown, recordings, pair, marked)
+        ask(exported_elsewhere, self._exported, self._refused, path, shown, recordings, pair, marked)
 
     def _compared(self, found: ComparedRecording) -> None:
         self._recordings[found.path] = found

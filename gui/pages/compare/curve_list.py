@@ -11,7 +11,7 @@ from analysis.comparison.trace import Origin, Response, Trace
 from ...plots.plot import Dash, Ink, trace
 from ...theme import Theme
 
-_DASHES = {Origin.MEASURED: Dash.SOLID, Origin.SIMULATED: Dash.DASHED, Origin.PREDICTED: Dash.DOTTED}
+_DASHES = {Origin.MEASURED: Dash.SOLID, Origin.SIMULATED: Dash.DASHED, Origin.PREDICTED: Dash.DASH_DOTTED}
 _SHOWN_FIRST = {Response.TRANSMISSION, Response.RESPONSE_I}
 """Of a sweep's two responses the first is shown at once: both lie on one another where nothing collides."""
 _SWATCH = (28, 12)

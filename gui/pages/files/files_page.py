@@ -31,6 +31,9 @@ from .lanes import RecordingLanes
 from .recording_table import RecordingTable
 
 Levels = dict[str, tuple[Level, ...]]
+QUICK_VALUES = 30_000_000
+"""A recording of so many samples and fewer shows its overview at once; others would hold the window up
+for a tenth of a second, and are prepared elsewhere."""
 
 
 class FilesPage(Page):
@@ -125,10 +128,12 @@ class FilesPage(Page):
             return
         self._opened = recording
         self._title.setText(path.name)
-        if recording.samples == 0 or has_overview(recording):
-            self._show(overview_levels(recording) if recording.samples else {})
+        if recording.samples == 0:
+            self._show({})
+        elif has_overview(recording) and recording.samples * len(recording.roles) <= QUICK_VALUES:
+            self._show(overview_levels(recording))
         else:
-            self._facts.setText("Reading all samples, for this file keeps no overview…")
+            self._facts.setText("Reading…")
             self._making = self.desk.background.ask(made_levels, self._show, self._failed, path)
 
     def _show(self, levels: Levels) -> None:
@@ -268,7 +273,7 @@ class FilesPage(Page):
 
 
 def made_levels(path: Path) -> Levels:
-    """Read all samples of a recording for its overview; called in another process."""
+    """Take the overview of a recording, or read all samples for it; called in another process."""
     with open_recording(path) as recording:
         return overview_levels(recording)
 

@@ -1,5 +1,7 @@
 """Four pictures of a simulation: responses, exponents, similarity, and the motion itself."""
 
+from math import log10
+
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtWidgets import QGridLayout, QWidget
@@ -18,6 +20,8 @@ TIME = Axis("Time, to the end of the run", "ms", factor=1e3)
 DISPLACEMENT = Axis("Displacement", "µm", factor=1e6)
 _COLLIDING = Ink(lambda theme: theme.muted, filled=0.14)
 _EDGE = Ink(lambda theme: theme.muted, Dash.DOTTED)
+_LEGEND_DECADES = 0.9
+"""Room above the responses for the legend."""
 _SMALLEST = 1e-6
 """Equal curves have no logarithm: they are drawn at the foot of the axis."""
 
@@ -53,6 +57,9 @@ class AnswerPlots(QWidget):
         for number, model in enumerate(course.models):
             self._responses(course, model, number)
             self._exponents(course, model, number)
+        low, high = course.smallest_and_largest_response
+        if high > 0.0:
+            self.responses.setYRange(log10(low) - 0.1, log10(high) + _LEGEND_DECADES, padding=0.0)
         self._motion(course)
         found = course.similarity()
         if found is not None:
@@ -65,9 +72,9 @@ class AnswerPlots(QWidget):
 
     def _responses(self, course: SimulationCourse, model: str, number: int) -> None:
         if number == 0:
-            for low_hz, high_hz in course.collision_bands_hz(model):
+            for place, (low_hz, high_hz) in enumerate(course.collision_bands_hz(model)):
                 self.responses.place(self.responses.region(_COLLIDING), low_hz, high_hz)
-                self.responses.upright(_EDGE, low_hz, f"impacts, {model}")
+                self.responses.upright(_EDGE, low_hz, "" if place else f"impacts, {model}")
         for name, label, dash in (
             ("response_i", "Response I", Dash.SOLID),
             ("response_ii", "Response II", Dash.DOTTED),
@@ -95,8 +102,9 @@ class AnswerPlots(QWidget):
             gap_m = course.signals[0].gap_m
             for stop_m in (gap_m, -gap_m):
                 self.motion.level(LIMIT, stop_m, "stop")
+            reach_m = max(gap_m, course.largest_signal_m)
             # Room above for the legend, which would lie on the motion.
-            self.motion.setYRange(-1.2 * gap_m, 2.2 * gap_m, padding=0.0)
+            self.motion.setYRange(-1.1 * reach_m, 2.2 * reach_m, padding=0.0)
 
     def _likeness(self, found: Similarity) -> None:
         name = f"{100 * found.rate:.0f} % similar ({100 * found.low:.0f} to {100 * found.high:.0f} %)"

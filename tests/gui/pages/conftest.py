@@ -44,7 +44,7 @@ def _header(name, plan):
     )
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def waited():
     """Wait, with events, until something is so."""
 
@@ -57,9 +57,9 @@ def waited():
     return wait
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def shared_desk(qapp, tmp_path_factory):
-    """A desk whose processes serve all tests of a file: they take seconds to begin."""
+    """A desk whose processes serve all tests: they take seconds to begin."""
     desk = Desk(Settings(tmp_path_factory.mktemp("settings") / "window.ini"))
     yield desk
     desk.background.close()
