@@ -9,12 +9,10 @@ from typing import Self
 from ..check.low_level import BenchCheck, judged, require_checkable
 from ..control.move import Conduct, heard
 from ..errors import AcquisitionError, LimitExceeded
-from ..excitation.steps import Play, Tone
 from ..instruments import Block
 from ..plan.limits import require_within_limits, shortest_ramp_s
 from ..plan.measurement import Measurement
 from ..recording.header import RecordingHeader
-from ..recording.preallocate import MARGIN_S
 from ..recording.writer import create_recording
 from .bench_protocol import RunBench
 from .conductor import conductor_for
@@ -22,6 +20,7 @@ from .drive import Drive, drive_for
 from .ending import Ending
 from .guard import Guard
 from .header import run_header
+from .performance import Performance, Stopped
 from .progress import Outcome, Progress
 from .schedule import (
     CHECK_S,
@@ -34,20 +33,9 @@ from .schedule import (
 )
 from .state import RunState
 from .stop import LEVELS, Cause, StopLevel, StopRequest, StopSwitch
-from .tape import BLOCK_S, Recorder, Tape
+from .tape import Recorder, Tape
 
 CreateRecording = Callable[[Path, RecordingHeader], Recorder]
-
-HOLD_LONGEST_S = 0.8 * MARGIN_S
-"""How long a run may be held in all [s]: its recording has room for that and for the ramp after it."""
-
-
-class _Stopped(Exception):
-    """Somebody asked the run to end."""
-
-    def __init__(self, request: StopRequest) -> None:
-        super().__init__(request.reason)
-        self.request = request
 
 
 class Run:
@@ -89,15 +77,13 @@ class Run:
         self._total_s = duration_s(measurement)
         self._state = RunState.IDLE
         self._ending = Ending()
-        self._look: Callable[[Block], None] = self._go_on
-        self._held_s = 0.0
-        self._play: Play | None = None
+        self._performance: Performance | None = None
         self._blocks = self._carry_out()
 
     @property
     def state(self) -> RunState:
         """Where the run stands."""
-        return self._state
+        return self._state if self._performance is None else self._performance.state
 
     @property
     def outcome(self) -> Outcome:
@@ -134,8 +120,9 @@ class Run:
     def _carry_out(self) -> Generator[Progress, None, None]:
         recorder = self._admitted()
         tape = Tape(self._bench.digitizer, recorder)
+        self._performance = Performance(self._drive, tape, self._guard, self._switch, self._total_s)
         try:
-            yield from self._played_or_stopped(tape)
+            yield from self._played_or_stopped(self._performance)
         except (GeneratorExit, LimitExceeded):
             raise
         except KeyboardInterrupt:
@@ -148,24 +135,24 @@ class Run:
             try:
                 self._ending.leave(self._drive, self._bench.digitizer, recorder)
             finally:
-                self._state = self._ending.state
+                self._performance.state = self._ending.state
 
-    def _played_or_stopped(self, tape: Tape) -> Iterator[Progress]:
+    def _played_or_stopped(self, performance: Performance) -> Iterator[Progress]:
         """Play the plan; where somebody or a limit ends it, ramp down as hard as the cause asks for."""
         try:
-            yield from self._played(tape)
+            yield from self._played(performance)
             self._ending.is_finished()
-        except _Stopped as stop:
+        except Stopped as stop:
             self._ending.is_stopped(str(stop), stop.request.cause)
-            yield from self._ramped_down_early(tape, stop.request.level)
+            yield from self._ramped_down_early(performance, stop.request.level)
         except LimitExceeded as error:
             self._ending.is_failed(error, str(error))
-            tape.log_trip(error)
-            yield from self._ramped_down_early(tape, LEVELS[Cause.LIMIT])
+            performance.tape.log_trip(error)
+            yield from self._ramped_down_early(performance, LEVELS[Cause.LIMIT])
             raise
         except GeneratorExit:
             self._ending.is_stopped("the program that carried it out left it", Cause.PROGRAM)
-            deque(self._ramped_down_early(tape, LEVELS[Cause.PROGRAM]), maxlen=0)
+            deque(self._ramped_down_early(performance, LEVELS[Cause.PROGRAM]), maxlen=0)
             raise
 
     def _admitted(self) -> Recorder:
@@ -183,39 +170,26 @@ class Run:
             self._state = RunState.FAILED
             raise
 
-    def _played(self, tape: Tape) -> Iterator[Progress]:
+    def _played(self, performance: Performance) -> Iterator[Progress]:
+        tape = performance.tape
         tape.log("player", self._drive.player.value)
         match self._bench_check:
             case BenchCheck.AT_LOW_LEVEL:
                 self._begin(check_phases(self._measurement))
-                yield from self._checked(tape)
+                yield from self._checked(performance)
                 self._drive.announce(known_phases(self._measurement))
                 pause_s = self._drive.pause_s
             case BenchCheck.RECENTLY_PASSED:
                 self._begin(known_phases(self._measurement))
                 tape.log("check", "left out: the bench was checked shortly before")
                 pause_s = 0.0
-        yield from self._perform(tape, Phase(RunState.ARMED, None, pause_s))
+        yield from performance.perform(Phase(RunState.ARMED, None, pause_s))
         if self._conductor is None:
             for phase in phases(self._measurement):
-                yield from self._perform(tape, phase)
+                yield from performance.perform(phase)
         else:
-            yield from self._conducted(tape, self._conductor)
+            yield from _conducted(performance, self._conductor)
         tape.enter(None)
-
-    def _conducted(self, tape: Tape, conductor: Conduct[None]) -> Iterator[Progress]:
-        """Carry out moves one by one; what was heard during each decides the next."""
-        try:
-            move = next(conductor)
-            while True:
-                for note in move.notes:
-                    tape.log(note.kind, note.text)
-                blocks: list[Block] = []
-                if move.phase is not None:
-                    yield from self._perform(tape, move.phase, blocks)
-                move = conductor.send(heard(blocks))
-        except StopIteration:
-            pass
 
     def _before_s(self) -> float:
         """Time before the first ramp [s]: what comes is told when the check has passed, and not before."""
@@ -230,13 +204,13 @@ class Run:
         self._drive.arm(coming)
         self._bench.digitizer.start()
 
-    def _checked(self, tape: Tape) -> Iterator[Progress]:
+    def _checked(self, performance: Performance) -> Iterator[Progress]:
         before: list[Block] = []
         during: list[Block] = []
         listening, settling, measuring = check_phases(self._measurement)
-        yield from self._perform(tape, listening, before)
-        yield from self._perform(tape, settling)
-        yield from self._perform(tape, measuring, during)
+        yield from performance.perform(listening, before)
+        yield from performance.perform(settling)
+        yield from performance.perform(measuring, during)
         figures = judged(
             self._bench.rig,
             self._bench.channels,
@@ -245,93 +219,27 @@ class Run:
             self._bench.digitizer.sample_rate_hz,
             check_amplitude_vpp(self._measurement.excitation.amplitude_vpp),
         )
-        tape.log("check", figures.text())
+        performance.tape.log("check", figures.text())
 
-    def _perform(self, tape: Tape, phase: Phase, into: list[Block] | None = None) -> Iterator[Progress]:
-        self._enter(tape, phase.state)
-        tape.enter(phase.segment)
-        self._play = phase.play
-        for wait_s in self._drive.perform(phase):
-            yield from self._read(tape, wait_s, into)
-
-    def _ramped_down_early(self, tape: Tape, level: StopLevel) -> Iterator[Progress]:
-        """Ramp down from wherever the run is, unwatched; a segment that is open stays incomplete.
-
-        A harder stop that is asked for on the way takes over.
-        """
-        self._look = _look_away
-        tape.log("end", self._ending.reason)
-        tape.cut()
-        since_s = tape.elapsed_s
-        if self._drive.is_heard:
-            self._enter(tape, RunState.RAMPING_DOWN)
-        while level is not StopLevel.OFF and self._drive.is_heard:
-            for wait_s in self._drive.ramp_down(self._ramp_s(level)):
-                yield from self._read(tape, wait_s)
-                if (harder := self._switch.harder_than(level)) is not None:
-                    level = harder.level
-                    tape.log("end", harder.reason)
-                    break
-        if level is StopLevel.OFF:
-            self._drive.cut()
-        tape.log("silence", f"{level.value}: {tape.elapsed_s - since_s:.3f} s after the stop was seen")
+    def _ramped_down_early(self, performance: Performance, level: StopLevel) -> Iterator[Progress]:
+        return performance.ramp_down_early(self._ending.reason, level, self._ramp_s)
 
     def _ramp_s(self, level: StopLevel) -> float:
         """How long the ramp of a stop takes [s]."""
         planned_s = self._measurement.ramp_s
         return planned_s if level is StopLevel.RAMP else min(planned_s, shortest_ramp_s(self._bench.rig))
 
-    def _read(self, tape: Tape, duration_s: float, into: list[Block] | None = None) -> Iterator[Progress]:
-        for block in tape.read_for(duration_s):
-            if into is not None:
-                into.append(block)
-            yield self._told(tape, block)
-            self._look(block)
-            if self._switch.is_holding and self._look == self._go_on:
-                yield from self._held(tape)
 
-    def _held(self, tape: Tape) -> Iterator[Progress]:
-        """Stay where the run is, watched and recorded, until it is resumed or stopped.
-
-        What must be fed cannot stay, and the recording has room for `HOLD_LONGEST_S` in all: then it is
-        ramped down.
-        """
-        if not self._drive.can_hold:
-            reason = f"a stream from the {self._drive.player.value} cannot be held: it was ramped down"
-            raise _Stopped(StopRequest.by(Cause.OPERATOR, reason))
-        before = self._state
-        self._enter(tape, RunState.HELD)
-        while self._switch.is_holding:
-            self._held_s += BLOCK_S
-            if self._held_s > HOLD_LONGEST_S:
-                reason = f"held for {HOLD_LONGEST_S:g} s, the longest that its recording has room for"
-                raise _Stopped(StopRequest.by(Cause.OPERATOR, reason))
-            block = tape.linger(BLOCK_S)
-            yield self._told(tape, block)
-            self._look(block)
-        self._enter(tape, before)
-
-    def _go_on(self, block: Block) -> None:
-        """Raise what ends the run early: a limit, or somebody's wish."""
-        self._guard.require_safe(block)
-        if (request := self._switch.request) is not None:
-            raise _Stopped(request)
-
-    def _told(self, tape: Tape, block: Block) -> Progress:
-        """Note what others want to be noted, and tell where the run stands."""
-        for text in self._switch.take_marks():
-            tape.log("mark", text)
-        level_vpp = self._drive.setting_vpp
-        frequency_hz = self._play.frequency_hz if isinstance(self._play, Tone) else None
-        return Progress(
-            self._state, tape.segment, block, tape.elapsed_s, self._total_s, level_vpp, frequency_hz
-        )
-
-    def _enter(self, tape: Tape, state: RunState) -> None:
-        if state is not self._state:
-            self._state = state
-            tape.log("state", state.value)
-
-
-def _look_away(block: Block) -> None:
-    """Let a block pass: the run is ending already."""
+def _conducted(performance: Performance, conductor: Conduct[None]) -> Iterator[Progress]:
+    """Carry out moves one by one; what was heard during each decides the next."""
+    try:
+        move = next(conductor)
+        while True:
+            for note in move.notes:
+                performance.tape.log(note.kind, note.text)
+            blocks: list[Block] = []
+            if move.phase is not None:
+                yield from performance.perform(move.phase, blocks)
+            move = conductor.send(heard(blocks))
+    except StopIteration:
+        pass

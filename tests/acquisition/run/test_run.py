@@ -25,7 +25,8 @@ from acquisition.instruments import Overload
 from acquisition.plan.limits import shortest_ramp_s
 from acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
 from acquisition.recording.layout import RecordingState
-from acquisition.run.run import HOLD_LONGEST_S, Run
+from acquisition.run.performance import HOLD_LONGEST_S
+from acquisition.run.run import Run
 from acquisition.run.schedule import CHECK_S
 from acquisition.run.state import RunState
 from acquisition.run.stop import Cause, StopLevel, StopRequest, StopSwitch
