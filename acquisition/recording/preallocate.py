@@ -66,6 +66,9 @@ class Places:
 def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
     """Create ``part`` for the recording ``path`` and claim its room on the disk.
 
+    It is made under another name first, so that a ``.part`` can be opened from its first moment on:
+    a program that is killed here leaves a ``.tmp`` without a sample in it.
+
     Raises
     ------
     RecordingError
@@ -75,20 +78,22 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
     capacity, reserved = _lengths(header)
     _require_room(path, reserved * ITEM_BYTES * len(header.channels))
     channel_bytes = ITEM_BYTES * len(header.channels)
+    made = layout.tmp_of(path)
     try:
-        claim_room(part, HEAD_BYTES + reserved * channel_bytes, HEAD_BYTES + capacity * channel_bytes)
+        claim_room(made, HEAD_BYTES + reserved * channel_bytes, HEAD_BYTES + capacity * channel_bytes)
     except OSError as error:
         raise RecordingError(
             f"{part} cannot be created with {reserved * channel_bytes / 1e6:.0f} MB: {error}."
             " Nothing was recorded; make room, or choose another folder or a shorter measurement."
         ) from error
     try:
-        with h5py.File(part, "w", libver=layout.LIBVER, locking=False) as file:
+        with h5py.File(made, "w", libver=layout.LIBVER, locking=False) as file:
             places = _write_layout(file, header, capacity, reserved)
-        _claim(part, places)
+        _claim(made, places)
+        made.rename(part)
         sync_folder(part.parent)
     except OSError as error:
-        part.unlink(missing_ok=True)
+        made.unlink(missing_ok=True)
         raise RecordingError(
             f"{part} cannot be prepared for {reserved} samples of {len(header.channels)} channels: {error}."
             " Nothing was recorded; make room, or choose another folder or a shorter measurement."

@@ -121,7 +121,7 @@ def is_begun_quietly(path: Path) -> bool:
 def amplitudes(out: Path) -> dict[str, float]:
     """Velocity of m0 at every point [m/s]; each has one complete recording, and only one."""
     found: dict[str, float] = {}
-    for path in sorted(out.glob("*.h5")):
+    for path in sorted((*out.glob("*.h5"), *out.glob("*.h5.part"))):
         with open_recording(path) as recording:
             if recording.state is not RecordingState.COMPLETE:
                 continue

@@ -1,0 +1,37 @@
+"""Preparing a recording: a program that is killed in it leaves no .part that cannot be opened."""
+
+import multiprocessing
+import os
+
+import h5py
+
+from acquisition.recording import RecordingState, create_recording, open_recording
+from acquisition.recording import preallocate as preallocate_module
+
+
+def _die_before(step, path, header):
+    """Begin a recording, and end without a word when ``step`` of its preparation is reached."""
+    setattr(preallocate_module, step, lambda *_: os._exit(9))
+    create_recording(path, header)
+
+
+def test_a_kill_before_everything_stands_leaves_a_tmp_and_the_next_attempt_is_free(tmp_path, make_header):
+    path = tmp_path / "run.h5"
+    child = multiprocessing.get_context("spawn").Process(
+        target=_die_before, args=("_claim", path, make_header())
+    )
+    child.start()
+    child.join()
+    assert child.exitcode == 9
+    assert [each.name for each in tmp_path.iterdir()] == ["run.h5.tmp"]
+    create_recording(tmp_path / "run.2.h5", make_header()).finish(RecordingState.STOPPED)
+    with open_recording(tmp_path / "run.2.h5") as recording:
+        assert recording.samples == 0
+
+
+def test_a_part_that_stands_can_be_opened_by_any_reader(tmp_path, make_header):
+    writer = create_recording(tmp_path / "run.h5", make_header())
+    with h5py.File(tmp_path / "run.h5.part", "r", locking=False) as file:
+        assert file["n_valid"][0] == 0
+    writer.finish(RecordingState.STOPPED)
+    assert [each.name for each in tmp_path.iterdir()] == ["run.h5"]
