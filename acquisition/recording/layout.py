@@ -138,5 +138,5 @@ def part_of(path: Path) -> Path:
 
 
 def tmp_of(path: Path) -> Path:
-    """``NAME.h5.tmp``: the compressed copy while it is being made."""
+    """``NAME.h5.tmp``: the compressed copy while it is being made; and the ``.part`` before it is ready."""
     return path.with_name(path.name + TMP_SUFFIX)
