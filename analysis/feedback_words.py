@@ -36,7 +36,7 @@ def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
     unsettled = sum(each["motion"] == "unsettled" for each in steps)
     kinds += [f"no period: {aperiodic}"] * bool(aperiodic) + [f"not settled: {unsettled}"] * bool(unsettled)
     if kinds:
-        yield f"Of {len(steps)} settled steps, by motion: {', '.join(kinds)}."
+        yield f"Of {len(steps)} recorded motions, by kind: {', '.join(kinds)}."
     outside = sum(each.get("level") == "outside tolerance" for each in steps)
     if outside:
         yield f"The base was off its level in {outside} of them."

@@ -52,8 +52,7 @@ Seek = Generator[float, Visit, LocatedJump]
 def located(before: Visit, after: Visit, resolution_hz: float) -> Seek:
     """Halve the bracket until it is no wider than ``resolution_hz``.
 
-    A middle belongs to the side whose response it is nearer to, in decibels. Whoever answers must
-    reach each frequency from ``before``'s side.
+    `side` says where a middle belongs. Whoever answers must reach each frequency from ``before``'s side.
     """
     while abs(after.frequency_hz - before.frequency_hz) > resolution_hz * (1 + 1e-9):
         middle = yield 0.5 * (before.frequency_hz + after.frequency_hz)
@@ -66,8 +65,13 @@ def located(before: Visit, after: Visit, resolution_hz: float) -> Seek:
 
 
 def side(visit: Visit, before: Visit, after: Visit) -> Side:
-    """Say which of two responses a third one is nearer to."""
-    return Side.BEFORE if ratio(visit, before) <= ratio(visit, after) else Side.AFTER
+    """Say on which side of a jump a response lies that was found between them.
+
+    Before it is what is nearer to the response before, and no further from that than the one after: a
+    third branch has been jumped to, just as the second.
+    """
+    away = ratio(visit, before)
+    return Side.BEFORE if away <= min(ratio(visit, after), ratio(before, after)) else Side.AFTER
 
 
 def ratio(one: Visit, other: Visit) -> float:

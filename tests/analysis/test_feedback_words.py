@@ -43,7 +43,7 @@ def test_steps_are_counted_by_what_they_do():
     ]
     said = list(feedback_sentences(notes(*found, kind="achieved")))
     assert said == [
-        "Of 4 settled steps, by motion: period 3: 2, no period: 1.",
+        "Of 4 recorded motions, by kind: period 3: 2, no period: 1.",
         "The base was off its level in 1 of them.",
     ]
 

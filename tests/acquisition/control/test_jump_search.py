@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.control.jump_search import LocatedJump, Visit, is_on_branch, located
+from acquisition.control.jump_search import LocatedJump, Side, Visit, is_on_branch, located, side
 
 
 def found(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=0.4):
@@ -46,6 +46,13 @@ def test_a_bracket_that_is_narrow_enough_asks_for_nothing():
 @pytest.mark.parametrize(("response", "expected"), [(1.2, True), (1 / 1.2, True), (1.3, False), (0.6, False)])
 def test_half_the_factor_in_decibels_tells_two_branches_apart(response, expected):
     assert is_on_branch(Visit(100, response), Visit(100, 1.0), factor=1.5) is expected
+
+
+@pytest.mark.parametrize(
+    ("response", "expected"), [(3.6, Side.BEFORE), (4.1, Side.BEFORE), (5.0, Side.AFTER), (1.6, Side.AFTER)]
+)
+def test_a_third_branch_lies_after_the_jump(response, expected):
+    assert side(Visit(177, response), Visit(175, 3.6), Visit(180, 5.4)) is expected
 
 
 def test_a_chaotic_motion_of_the_same_size_is_another_branch():

@@ -1,0 +1,94 @@
+"""Plans with feedback: values like any other, whose course is open but bounded."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from acquisition.excitation.feedback import BaseLevel, JumpSearch, Settling
+from acquisition.excitation.held_dwell import HeldDwell
+from acquisition.excitation.held_sweep import HeldSweep
+from acquisition.excitation.plan import AbstractFeedback
+from acquisition.excitation.resonance_tracking import ResonanceTracking
+from acquisition.excitation.settled_sine import MOST_SETTLED_STEPS, SettledSine
+from acquisition.excitation.sine_sweep import SineSweep
+from acquisition.excitation.stepped_sine import FrequencyGrid
+from acquisition.plan.campaign import load_campaign
+from acquisition.plan.limits import limit_checks
+from acquisition.plan.measurement import Measurement
+from acquisition.plan.needed_setting import needed_vpp
+from acquisition.run.schedule import HUSH_S, duration_s
+
+SMART = load_campaign(Path(__file__).parent.parent.parent.parent / "campaigns" / "smart.toml").measurements
+every_plan = pytest.mark.parametrize("plan", SMART, ids=[each.name for each in SMART])
+
+
+@every_plan
+def test_a_plan_survives_its_file(plan):
+    assert Measurement.model_validate_json(plan.model_dump_json()) == plan
+    assert isinstance(plan.excitation, AbstractFeedback)
+
+
+@every_plan
+def test_a_preview_shows_the_recorded_steps_at_the_largest_setting(plan):
+    shown = plan.excitation.preview(2048.0)
+    assert shown.peak_v == pytest.approx(0.5 * plan.excitation.amplitude_vpp, rel=0.01)
+    recorded_s = sum(step.record_s for step in plan.excitation.steps())
+    assert len(shown.volts) == pytest.approx(2048 * recorded_s, abs=2)
+    assert shown.duration_s == plan.excitation.playing_s > recorded_s
+
+
+@every_plan
+def test_its_longest_time_counts_every_wait(plan):
+    assert duration_s(plan) == HUSH_S + 2 * plan.ramp_s + plan.excitation.playing_s
+
+
+@every_plan
+def test_a_held_level_is_checked_against_the_setting_that_it_needs(plan, rig):
+    held = list(plan.excitation.held_accelerations())
+    (check,) = [each for each in limit_checks(plan, rig) if "holds the base's level" in each.what]
+    assert check.value == max(needed_vpp(rig, acceleration, at_hz) for at_hz, acceleration in held)
+    assert check.is_kept
+
+
+def test_a_held_sweep_passes_the_frequencies_of_an_open_one():
+    shape = {"amplitude_vpp": 1.0, "start_hz": 150, "stop_hz": 350, "duration_s": 20}
+    held = HeldSweep(**shape, base_level=BaseLevel(displacement_m=1e-6))
+    played = [step.play.frequency_hz for step in held.steps()]
+    np.testing.assert_array_equal(played, [step.play.frequency_hz for step in SineSweep(**shape).steps()])
+    assert held.segment.numbers["hold"] == "measured displacement"
+
+
+def test_a_displacement_s_acceleration_grows_with_the_square_of_frequency():
+    level = BaseLevel(displacement_m=2e-6)
+    assert level.acceleration_at(260) == pytest.approx(2e-6 * (2 * np.pi * 260) ** 2)
+    assert level.acceleration_at(520) == pytest.approx(4 * level.acceleration_at(260))
+
+
+@pytest.mark.parametrize(
+    ("broken", "sentence"),
+    [
+        (BaseLevel, "give either acceleration_m_per_s2 or displacement_m"),
+        (lambda: BaseLevel(acceleration_m_per_s2=1, displacement_m=1e-6), "and not both"),
+        (lambda: Settling(shortest_wait_s=5, longest_wait_s=4), "shortest_wait_s = 5 is longer"),
+        (lambda: JumpSearch(factor=1.0), "greater than 1"),
+        (
+            lambda: ResonanceTracking(
+                amplitude_vpp=1, start_hz=95, low_hz=96, high_hz=99, accelerations_m_per_s2=(1,)
+            ),
+            "start_hz = 95 is not between",
+        ),
+        (
+            lambda: SettledSine(
+                amplitude_vpp=1,
+                grid=FrequencyGrid(start_hz=100, stop_hz=100 + MOST_SETTLED_STEPS, step_hz=1),
+            ),
+            f"the plan has {MOST_SETTLED_STEPS + 1} settled steps",
+        ),
+        (lambda: HeldDwell(amplitude_vpp=1, frequency_hz=260, duration_s=1), "base_level"),
+    ],
+)
+def test_a_plan_that_means_nothing_is_refused(broken, sentence):
+    with pytest.raises(ValidationError, match=sentence):
+        broken()
