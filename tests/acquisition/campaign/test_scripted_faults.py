@@ -1,0 +1,55 @@
+"""A campaign on a rig that goes wrong by a script: faults cost attempts, and no point is lost."""
+
+import json
+from pathlib import Path
+
+from acquisition.campaign.item import AfterFailure, Item
+from acquisition.campaign.kept_bench import KeptBench
+from acquisition.campaign.run_campaign import run_campaign
+from acquisition.excitation.dwell import Dwell
+from acquisition.plan.campaign import Campaign
+from acquisition.plan.measurement import Measurement
+from acquisition.plan.retry import Retryable, RetryPolicy
+from acquisition.recording import RecordingState, open_recording
+from acquisition.rig.configuration import with_faults
+
+SCRIPT = [
+    {"at_s": 1.9, "fault": "pull_usb_cable", "for_s": 1.5},
+    {"at_s": 6.0, "fault": "overrun", "for_s": 0.4},
+    {"at_s": 9.0, "fault": "lose_daq_server", "for_s": 1.5},
+    {"at_s": 12.5, "fault": "turn_amplifier_gain", "gain_db": 20, "for_s": 2.0},
+]
+
+
+def test_every_point_of_a_rehearsed_campaign_is_recorded_past_cable_overrun_server_and_knob(rig, tmp_path):
+    lines = [
+        ["[[faults]]", *(f"{key} = {json.dumps(value)}" for key, value in each.items())] for each in SCRIPT
+    ]
+    script = tmp_path / "faults.toml"
+    script.write_text("\n".join(line for each in lines for line in each), encoding="utf-8")
+    dwell = Dwell(amplitude_vpp=0.5, frequency_hz=260, settle_s=0.1, duration_s=1)
+    campaign = Campaign(
+        name="night",
+        measurements=tuple(
+            Measurement(name=f"point{number}", excitation=dwell, ramp_s=0.3, ramp_step_s=0.03)
+            for number in range(6)
+        ),
+        retry=RetryPolicy(attempts=4, on=(*RetryPolicy().on, Retryable.CHECK_FAILED, Retryable.LIMIT)),
+    )
+    with KeptBench(with_faults(rig, script)) as kept:
+        items = run_campaign(
+            kept.bench, campaign, tmp_path / "out", after_failure=AfterFailure.GO_ON, reopen=kept.reopen
+        )
+        assert [each.fault for each in kept._power.played_faults] == [each["fault"] for each in SCRIPT]
+    assert [(item.name, item.result) for item in items] == [
+        (f"point{number}", Item.RECORDED) for number in range(6)
+    ]
+    said = " ".join(reason_of(path) for path in sorted((tmp_path / "out").glob("*.h5")))
+    for cause in ("InstrumentLost", "overwritten", "the base moves with"):
+        assert cause in said
+
+
+def reason_of(path: Path) -> str:
+    with open_recording(path) as recording:
+        assert recording.state in (RecordingState.COMPLETE, RecordingState.FAILED)
+        return recording.reason
