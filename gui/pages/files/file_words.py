@@ -4,7 +4,7 @@ from datetime import datetime
 
 from acquisition.recording import RecordingState
 
-_STATE_SYMBOLS = {
+_STATE_SYMBOLS: dict[str, str] = {
     RecordingState.COMPLETE: "✔",
     RecordingState.STOPPED: "■",
     RecordingState.FAILED: "✖",
@@ -13,9 +13,9 @@ _STATE_SYMBOLS = {
 }
 
 
-def state_text(state: RecordingState | None) -> str:
+def state_text(state: str) -> str:
     """Symbol and word: never a colour alone."""
-    return "✖ unreadable" if state is None else f"{_STATE_SYMBOLS[state]} {state.value}"
+    return f"{_STATE_SYMBOLS.get(state, '✖')} {state}"
 
 
 def size_text(size: int) -> str:
@@ -43,11 +43,6 @@ def duration_text(duration_s: float) -> str:
     whole = round(duration_s)
     hours, minutes, seconds = whole // 3600, whole // minute % minute, whole % minute
     return f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes}:{seconds:02d}"
-
-
-def kind_text(kind: str) -> str:
-    """``"sine sweep"``."""
-    return kind.replace("_", " ")
 
 
 UNITS = {"m s-1": "m/s", "m s-2": "m/s²", "m": "m", "V": "V", "N": "N"}

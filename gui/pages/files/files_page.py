@@ -15,8 +15,8 @@ from PySide6.QtWidgets import (
 
 from acquisition.errors import RecordingError
 from acquisition.recording import Recording, open_recording
-from analysis.overview import Level, RecordingOverview, has_overview, overview_levels
-from analysis.recording_entry import RecordingEntry, Thumbnail, recording_entries, thumbnail
+from analysis.overview import RecordingOverview, has_overview, overview_levels
+from analysis.thumbnail import Thumbnail
 
 from ...background import Job
 from ...desk import Desk
@@ -28,9 +28,9 @@ from ...settings import Remembered
 from ...theme import Theme
 from .file_words import duration_text, state_text
 from .lanes import RecordingLanes
+from .listing import Levels, ListedRecording, listed_recordings, made_levels, thumbnails
 from .recording_table import RecordingTable
 
-Levels = dict[str, tuple[Level, ...]]
 QUICK_VALUES = 30_000_000
 """A recording of so many samples and fewer shows its overview at once; others would hold the window up
 for a tenth of a second, and are prepared elsewhere."""
@@ -76,7 +76,7 @@ class FilesPage(Page):
         self._folder_line.setText(str(folder))
         if self._listing is not None:
             self._listing.drop()
-        self._listing = self.desk.background.ask(recording_entries, self._listed, self._failed, folder)
+        self._listing = self.desk.background.ask(listed_recordings, self._listed, self._failed, folder)
 
     def open_path(self, path: Path) -> None:
         """Show a recording, whatever folder it lies in."""
@@ -87,7 +87,7 @@ class FilesPage(Page):
         self.table.choose(path)
         self._open(path)
 
-    def _listed(self, entries: tuple[RecordingEntry, ...]) -> None:
+    def _listed(self, entries: tuple[ListedRecording, ...]) -> None:
         chosen = self._wanted or next(iter(self.table.chosen_paths()), None)
         self._wanted = None
         self.table.recordings.show_entries(entries)
@@ -270,17 +270,6 @@ class FilesPage(Page):
         layout.addWidget(self.lanes, 1)
         layout.addLayout(bar)
         return viewer
-
-
-def made_levels(path: Path) -> Levels:
-    """Take the overview of a recording, or read all samples for it; called in another process."""
-    with open_recording(path) as recording:
-        return overview_levels(recording)
-
-
-def thumbnails(paths: tuple[Path, ...]) -> dict[Path, Thumbnail | None]:
-    """Draw recordings small; called in another process."""
-    return {path: thumbnail(path) for path in paths}
 
 
 def _facts(recording: Recording) -> str:

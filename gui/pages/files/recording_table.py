@@ -16,14 +16,15 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QColor, QPainter, QPen, QPixmap
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
-from analysis.recording_entry import THUMBNAIL_COLUMNS, RecordingEntry, Thumbnail
+from analysis.thumbnail import THUMBNAIL_COLUMNS, Thumbnail
 
 from ...theme import Theme
-from .file_words import duration_text, kind_text, moment_text, size_text, state_text
+from .file_words import duration_text, moment_text, size_text, state_text
+from .listing import ListedRecording
 
 Index = QModelIndex | QPersistentModelIndex
 _NOWHERE = QModelIndex()
-HEADINGS = ("Response", "Name", "State", "Began", "Excitation", "Level", "Length", "Size")
+HEADINGS = ("Response", "Name", "State", "Verdict", "Began", "Excitation", "Level", "Length", "Size")
 PICTURE, NAME = 0, 1
 PATH_ROLE = Qt.ItemDataRole.UserRole
 SORT_ROLE = Qt.ItemDataRole.UserRole + 1
@@ -36,16 +37,16 @@ class RecordingModel(QAbstractTableModel):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._entries: tuple[RecordingEntry, ...] = ()
+        self._entries: tuple[ListedRecording, ...] = ()
         self._thumbnails: dict[Path, Thumbnail | None] = {}
         self._pictures: dict[Path, QPixmap] = {}
 
     @property
-    def entries(self) -> tuple[RecordingEntry, ...]:
+    def entries(self) -> tuple[ListedRecording, ...]:
         """In the order they were found."""
         return self._entries
 
-    def show_entries(self, entries: tuple[RecordingEntry, ...]) -> None:
+    def show_entries(self, entries: tuple[ListedRecording, ...]) -> None:
         """List other files; pictures of those that stay are kept."""
         self.beginResetModel()
         self._entries = entries
@@ -56,7 +57,7 @@ class RecordingModel(QAbstractTableModel):
 
     def missing_pictures(self) -> tuple[Path, ...]:
         """Files whose picture nobody has made yet."""
-        return tuple(e.path for e in self._entries if not e.problem and e.path not in self._thumbnails)
+        return tuple(e.path for e in self._entries if e.is_readable and e.path not in self._thumbnails)
 
     def show_thumbnails(self, found: dict[Path, Thumbnail | None]) -> None:
         """Put pictures into the rows."""
@@ -96,7 +97,7 @@ class RecordingModel(QAbstractTableModel):
             case Qt.ItemDataRole.DecorationRole if column == PICTURE:
                 content = self._pictures.get(entry.path)
             case Qt.ItemDataRole.ToolTipRole:
-                content = entry.problem or f"{entry.path}\n{entry.reason}".strip()
+                content = f"{entry.path}\n{entry.said.reason}\n{entry.said.notes}".strip()
             case Qt.ItemDataRole.AccessibleTextRole:
                 content = f"{HEADINGS[column]}: {_texts(entry)[column] or 'picture'}"
             case Qt.ItemDataRole.UserRole:
@@ -159,31 +160,33 @@ class RecordingTable(QTableView):
                 return
 
 
-def _texts(entry: RecordingEntry) -> tuple[str, ...]:
-    level = "" if entry.amplitude_vpp is None else f"{entry.amplitude_vpp:g} Vpp"
-    played = " ".join(part for part in (kind_text(entry.kind), entry.what) if part)
+def _texts(entry: ListedRecording) -> tuple[str, ...]:
+    said = entry.said
     return (
         "",
         entry.name,
-        state_text(entry.state),
-        moment_text(entry.started_utc),
-        played,
-        level,
-        duration_text(entry.duration_s) if not entry.problem else "",
-        size_text(entry.bytes),
+        state_text(said.state),
+        said.verdict,
+        moment_text(said.started_utc),
+        entry.played,
+        "" if said.amplitude_vpp is None else f"{said.amplitude_vpp:g} Vpp",
+        "" if said.duration_s is None else duration_text(said.duration_s),
+        size_text(said.size_bytes),
     )
 
 
-def _sorting(entry: RecordingEntry) -> tuple[str | float, ...]:
+def _sorting(entry: ListedRecording) -> tuple[str | float, ...]:
+    said = entry.said
     return (
         entry.name,
         entry.name,
-        state_text(entry.state),
-        entry.started_utc,
-        f"{entry.kind} {entry.what}",
-        -1.0 if entry.amplitude_vpp is None else entry.amplitude_vpp,
-        entry.duration_s,
-        float(entry.bytes),
+        said.state,
+        said.verdict,
+        said.started_utc,
+        entry.played,
+        said.amplitude_vpp or 0.0,
+        said.duration_s or 0.0,
+        float(said.size_bytes),
     )
 
 

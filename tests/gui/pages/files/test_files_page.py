@@ -70,6 +70,7 @@ def test_states_plans_and_troubles_of_all_files_are_listed_in_words(page):
     assert cell(page, "broken", "State") == "✖ unreadable"
     assert cell(page, "stopped", "Excitation") == "dwell 95 Hz"
     assert cell(page, "whole", "Level") == "1 Vpp"
+    assert "full scale" in cell(page, "whole", "Verdict")
     assert cell(page, "whole", "Length") == "10 s"
 
 
