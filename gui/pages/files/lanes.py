@@ -242,7 +242,8 @@ class RecordingLanes(QWidget):
         rate_hz = self._overview.recording.sample_rate_hz
         low_s, high_s = self.view_s
         start, stop = int(low_s * rate_hz), int(np.ceil(high_s * rate_hz)) + 1
-        columns = max(100, int(self._lanes[0].plot.getViewBox().width()))
+        # A few more columns than pixels: with fewer, a pixel between two columns would stay empty.
+        columns = max(100, int(1.02 * self._lanes[0].plot.getViewBox().width()) + 2)
         picture = self._overview.picture([lane.role for lane in self._lanes], start, stop, columns)
         for row, lane in enumerate(self._lanes):
             low, high = picture.low[row], picture.high[row]
