@@ -13,8 +13,10 @@ from acquisition.plan.measurement import Measurement
 
 from .app import application
 from .desk import Desk
-from .page_names import RUN
+from .page_names import COMPARE, RUN, SIMULATE
 from .pages.catalogue import PAGES
+from .pages.compare.compare_page import ComparePage
+from .pages.simulate.simulate_page import SimulatePage
 from .pages.test.test_page import TestPage
 from .settings import Remembered, Settings
 from .theme import THEMES, Theme
@@ -57,6 +59,7 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
         window.show()
         try:
             _measure(window, lambda: _picture(window, (RUN,), folder))
+            _compare_and_simulate(window)
             _picture(window, tuple(name for name in window.pages if name != RUN), folder)
         finally:
             window.close()
@@ -86,6 +89,18 @@ def _measure(window: Window, during: Callable[[], None]) -> None:
 def _elapsed_s(window: Window) -> float:
     status = window.desk.bridge.status
     return 0.0 if status is None or status.run is None else status.run.elapsed_s
+
+
+def _compare_and_simulate(window: Window) -> None:
+    """Simulate what the form says at first, and lay it over what was measured."""
+    compare, simulation = window.pages[COMPARE], window.pages[SIMULATE]
+    assert isinstance(compare, ComparePage)
+    assert isinstance(simulation, SimulatePage)
+    simulation.begin()
+    compare.add_recordings(tuple(window.desk.folder.glob("*.h5")))
+    _wait(lambda: not simulation.simulator.is_busy and not compare.is_busy)
+    if simulation.course is not None:
+        compare.add_prediction(simulation.course.traces())
 
 
 def _picture(window: Window, pages: tuple[str, ...], folder: Path) -> None:

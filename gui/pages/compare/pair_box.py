@@ -23,7 +23,7 @@ class PairBox(QGroupBox):
         self._curve, self._reference, self._said = Choice(), Choice(), QLabel("")
         form = QFormLayout(self)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        for text, choice in (("C&urve", self._curve), ("O&ver", self._reference)):
+        for text, choice in (("C&urve", self._curve), ("Ov&er", self._reference)):
             label = QLabel(text)
             label.setBuddy(choice)
             choice.setAccessibleName(f"Difference: {text.replace('&', '').lower()}")

@@ -228,7 +228,7 @@ class FilesPage(Page):
         search_label.setBuddy(search)
         bar.addWidget(label)
         bar.addWidget(self._folder_line, 3)
-        bar.addWidget(push_button("C&hoose…", "Choose another folder", self._choose_folder))
+        bar.addWidget(push_button("&Choose…", "Choose another folder", self._choose_folder))
         bar.addWidget(search_label)
         bar.addWidget(search, 1)
         self._count = QLabel("")
