@@ -212,6 +212,7 @@ def test_recordings_killed_in_every_phase_open_and_miss_at_most_the_last_second(
 
 @forks
 @pytest.mark.slow
+@pytest.mark.timeout(600)
 def test_fifty_recordings_killed_in_every_phase_open_and_miss_at_most_the_last_second(tmp_path):
     left = killed_at(tmp_path, {"recording": 16, "committing": 16, "finalising": 18}, seed=2)
     assert [in_phase(left, phase) for phase in ("recording", "committing", "finalising")] == [16, 16, 18]
