@@ -26,9 +26,10 @@ from ...page_names import COMPARE, FILES
 from ...push_button import push_button
 from ...settings import Remembered
 from ...theme import Theme
+from .campaign_choice import CampaignChoice
 from .file_words import duration_text, state_text
 from .lanes import RecordingLanes
-from .listing import Levels, ListedRecording, listed_recordings, made_levels, thumbnails
+from .listing import Levels, Listing, listed, made_levels, thumbnails
 from .recording_table import RecordingTable
 
 QUICK_VALUES = 30_000_000
@@ -43,6 +44,8 @@ class FilesPage(Page):
         super().__init__(desk, parent)
         self.table = RecordingTable(desk.theme)
         self.lanes = RecordingLanes(desk.theme)
+        self.campaigns = CampaignChoice()
+        self.campaigns.chosen.connect(self.table.show_only)
         self._opened: Recording | None = None
         self._listing: Job | None = None
         self._making: Job | None = None
@@ -76,7 +79,7 @@ class FilesPage(Page):
         self._folder_line.setText(str(folder))
         if self._listing is not None:
             self._listing.drop()
-        self._listing = self.desk.background.ask(listed_recordings, self._listed, self._failed, folder)
+        self._listing = self.desk.background.ask(listed, self._listed, self._failed, folder)
 
     def open_path(self, path: Path) -> None:
         """Show a recording, whatever folder it lies in."""
@@ -87,7 +90,9 @@ class FilesPage(Page):
         self.table.choose(path)
         self._open(path)
 
-    def _listed(self, entries: tuple[ListedRecording, ...]) -> None:
+    def _listed(self, found: Listing) -> None:
+        entries = found.recordings
+        self.campaigns.offer(found.campaigns)
         chosen = self._wanted or next(iter(self.table.chosen_paths()), None)
         self._wanted = None
         self.table.recordings.show_entries(entries)
@@ -229,6 +234,7 @@ class FilesPage(Page):
         bar.addWidget(label)
         bar.addWidget(self._folder_line, 3)
         bar.addWidget(push_button("&Choose…", "Choose another folder", self._choose_folder))
+        bar.addWidget(self.campaigns, 1)
         bar.addWidget(search_label)
         bar.addWidget(search, 1)
         self._count = QLabel("")

@@ -1,10 +1,14 @@
 """What a folder holds, as its catalogue says; called in another process, for many files take seconds."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition.campaign.catalogue import catalogue
 from acquisition.campaign.catalogue_entry import UNREADABLE, CatalogueEntry
+from acquisition.campaign.journal import JOURNAL_SUFFIX
+from acquisition.campaign.journal_point import PointState, read_journal
+from acquisition.errors import RecordingError
 from acquisition.recording import open_recording
 from analysis.overview import Level, overview_levels
 from analysis.thumbnail import Thumbnail, thumbnail
@@ -37,11 +41,55 @@ class ListedRecording:
         return f"{self.said.kind.replace('_', ' ')} {band}".strip()
 
 
-def listed_recordings(folder: Path) -> tuple[ListedRecording, ...]:
+@dataclass(frozen=True)
+class ListedCampaign:
+    """A campaign as its journal knows it at the moment."""
+
+    name: str
+    states: tuple[PointState, ...]
+    """One a point."""
+    files: frozenset[Path]
+    """Recordings of the last attempts."""
+
+    @property
+    def text(self) -> str:
+        """``"✔ night: 40 of 40 done"``, ``"▲ night: 3 of 40 done, 2 failed, 35 queued"``."""
+        done = self.states.count(PointState.DONE)
+        others = [
+            f"{self.states.count(state)} {state.value}"
+            for state in PointState
+            if state is not PointState.DONE and state in self.states
+        ]
+        symbol = "✔" if done == len(self.states) else "▲"
+        return ", ".join([f"{symbol} {self.name}: {done} of {len(self.states)} done", *others])
+
+
+@dataclass(frozen=True)
+class Listing:
+    """What is in a folder."""
+
+    recordings: tuple[ListedRecording, ...] = ()
+    campaigns: tuple[ListedCampaign, ...] = ()
+
+
+def listed(folder: Path) -> Listing:
     """List a folder; one that is not there yet is empty."""
     if not folder.is_dir():
-        return ()
-    return tuple(ListedRecording(folder / each.path, each) for each in catalogue(folder))
+        return Listing()
+    recordings = tuple(ListedRecording(folder / each.path, each) for each in catalogue(folder))
+    return Listing(recordings, tuple(_campaigns(folder)))
+
+
+def _campaigns(folder: Path) -> Iterator[ListedCampaign]:
+    for path in sorted(folder.rglob(f"*{JOURNAL_SUFFIX}")):
+        try:
+            points = read_journal(path)
+        except RecordingError:
+            # Another program's file of that name is no campaign.
+            continue
+        files = frozenset(path.parent / each.file for each in points if each.file)
+        name = path.name.removesuffix(JOURNAL_SUFFIX)
+        yield ListedCampaign(name, tuple(each.state for each in points), files)
 
 
 def thumbnails(paths: tuple[Path, ...]) -> dict[Path, Thumbnail | None]:

@@ -112,6 +112,24 @@ class RecordingModel(QAbstractTableModel):
         }
 
 
+class _ChosenRows(QSortFilterProxyModel):
+    """Rows that hold the words, and belong to the campaign that was chosen."""
+
+    _only: frozenset[Path] | None = None
+
+    def show_only(self, paths: frozenset[Path] | None) -> None:
+        """Let rows of these files pass; of all when None."""
+        self.beginFilterChange()
+        self._only = paths
+        self.endFilterChange()
+
+    def filterAcceptsRow(self, row: int, parent: Index) -> bool:
+        """Ask both."""
+        if not super().filterAcceptsRow(row, parent):
+            return False
+        return self._only is None or self.sourceModel().index(row, NAME).data(PATH_ROLE) in self._only
+
+
 class RecordingTable(QTableView):
     """The table itself: sorted by any column, several rows may be chosen."""
 
@@ -119,7 +137,7 @@ class RecordingTable(QTableView):
         super().__init__(parent)
         self.setAccessibleName("Recordings")
         self.recordings = RecordingModel(theme)
-        self._sorted = QSortFilterProxyModel(self)
+        self._sorted = _ChosenRows(self)
         self._sorted.setSourceModel(self.recordings)
         self._sorted.setSortRole(SORT_ROLE)
         self._sorted.setFilterKeyColumn(-1)
@@ -144,6 +162,10 @@ class RecordingTable(QTableView):
     def search(self, text: str) -> None:
         """Show rows that hold a text anywhere."""
         self._sorted.setFilterFixedString(text)
+
+    def show_only(self, paths: frozenset[Path] | None) -> None:
+        """Show rows of these files; of all when None."""
+        self._sorted.show_only(paths)
 
     def chosen_paths(self) -> tuple[Path, ...]:
         """Files of the chosen rows, from above."""

@@ -7,12 +7,39 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
+from acquisition.campaign.bench_identity import BenchIdentity
+from acquisition.campaign.journal import Journal, journal_path
+from acquisition.campaign.journal_point import PointState
+from acquisition.campaign.why import Why
+from acquisition.excitation.dwell import Dwell
+from acquisition.plan.campaign import Campaign
+from acquisition.plan.measurement import Measurement
 from acquisition.recording import RecordingState
+from acquisition.rig.configuration import Rig
+from acquisition.shipped import shipped
+from acquisition.toml_file import load_toml
 from gui.pages.files.files_page import FilesPage
 from gui.pages.files.recording_table import HEADINGS
 from gui.theme import DARK
 
 IMPACT_S = 40_002 / 6400.0
+
+
+def _begin_campaign(folder):
+    """A journal of three points: one is done, one has failed, one waits."""
+    rig = load_toml(shipped("hardware_configs/virtual_rig.toml"), Rig)
+    played = Dwell(amplitude_vpp=1, frequency_hz=260, duration_s=1)
+    plans = tuple(Measurement(name=name, excitation=played) for name in ("whole", "stopped", "later"))
+    bench = BenchIdentity(rig=rig, instruments={}, knobs={})
+    with Journal.begin(
+        journal_path(folder, "night"), Campaign(name="night", measurements=plans), bench
+    ) as journal:
+        for name, state, why in (
+            ("whole", PointState.DONE, Why.CARRIED_OUT),
+            ("stopped", PointState.FAILED, Why.LIMIT),
+        ):
+            journal.start(name, f"{name}.h5")
+            journal.end(name, state, why, "so it was")
 
 
 @pytest.fixture(scope="module")
@@ -24,6 +51,7 @@ def folder(tmp_path_factory, record):
     with h5py.File(folder / "old.h5", "r+") as file:
         del file["overview"]
     (folder / "broken.h5").write_bytes(b"no HDF5")
+    _begin_campaign(folder)
     return folder
 
 
@@ -146,6 +174,17 @@ def test_a_search_leaves_rows_that_hold_the_words(page):
     assert page.table.model().rowCount() == 1
     page.table.search("")
     assert page.table.model().rowCount() == 4
+
+
+def test_a_campaign_says_how_far_it_is_and_shows_its_own_recordings(page):
+    assert page.campaigns.isVisible()
+    assert page.campaigns.itemText(1) == "▲ night: 1 of 3 done, 1 queued, 1 failed"
+    page.campaigns.setCurrentIndex(1)
+    model = page.table.model()
+    names = {model.index(row, HEADINGS.index("Name")).data() for row in range(model.rowCount())}
+    assert names == {"whole", "stopped"}
+    page.campaigns.setCurrentIndex(0)
+    assert model.rowCount() == 4
 
 
 def test_chosen_recordings_are_handed_to_compare(page, folder, qtbot):
