@@ -187,3 +187,26 @@ def test_without_a_level_the_plan_s_setting_is_played_from_end_to_end(new_contro
     # The first is the silence that is listened to.
     assert {setting for *_, setting in bench.settings[1:]} == {0.3}
     assert {each["level"] for each in said(bench, "achieved")} == {"not controlled"}
+
+
+def test_a_branch_that_no_way_leads_back_to_is_found_again_from_rest(new_control_bench):
+    """From 123 Hz down the lower branch ends; led back to 123 Hz the motion stays on the upper one."""
+    bench = new_control_bench(hardening=HARDENING)
+    plan = SettledSine(
+        amplitude_vpp=1.0,
+        frequencies_hz=(121.3, 123.0),
+        direction=Direction.DOWN,
+        record_s=0.3,
+        settling=SETTLING,
+        base_level=BaseLevel(acceleration_m_per_s2=LEVEL),
+        jumps=JumpSearch(factor=1.5, resolution_hz=0.25),
+    )
+    bench.carry_out(Measurement(name="stuck", excitation=plan, ramp_s=0.2))
+    lower, upper = folds_hz(bench.oscillator, LEVEL)
+    assert lower < 123.0 < upper
+    (jump,) = said(bench, "jump")
+    assert jump["how"] == "localised"
+    assert jump["after_hz"] - 0.3 <= lower <= jump["before_hz"] + 0.3
+    # The way back went over silence: the setting fell to a ninth, and came back.
+    settings = [setting for *_, setting in bench.settings[3:-1]]
+    assert min(settings) < 0.15 * max(settings)
