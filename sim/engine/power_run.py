@@ -7,14 +7,13 @@ import numpy as np
 from ..compiled import compiled
 from ..growth.tangent_contact import carry_through_steps, tangent_workspace
 from .clock import advance_clock, time_until
-from .contact import HELD, LEFT, NOT_FINITE, contact_workspace, log_for
+from .contact import HELD, LEFT, LOG_COLUMNS, NOT_FINITE, contact_workspace, log_for
 from .contact_flow import FORCE_TERMS
 from .flight import FlightTables, fill_base_force
 from .parameters import PowerTerms, Table, Vector, X, Y, Z
 from .power_flow import PowerSystem
 from .record import LOST, NEXT_SAMPLE, REACHED_END, STUCK, Record
 from .row import copy_row
-from .sampling import sample_contact
 from .smooth import advance_smooth, smooth_turn
 from .smooth_tally import tally_smooth
 from .tally import MODE, NOTHING
@@ -55,8 +54,33 @@ def advance_under_power(
         if tangent is not None and len(tangent) > 0:
             carry_through_steps(tangent, log, tables.par, power, memory)
         if record.counts[NEXT_SAMPLE] < len(record.samples):
-            sample_contact(shadow, clock, length, force, middle, tables, tolerance, work, record)
+            _sample_stretch(shadow, clock, length, force, middle, system, tolerance, work, record)
         if length >= longest:
             clock[0], clock[1] = until, 0.0
         else:
             advance_clock(clock, length)
+
+
+@compiled
+def _sample_stretch(
+    shadow: Vector,
+    clock: Vector,
+    length: float,
+    force: Vector,
+    middle: float,
+    system: PowerSystem,
+    tolerance: float,
+    work: Table,
+    record: Record,
+) -> None:
+    """Keep the samples that fall into a stretch, by a second run that lands on each of them."""
+    counts, reached = record.counts, 0.0
+    none = np.zeros((0, LOG_COLUMNS))
+    while counts[NEXT_SAMPLE] < len(record.samples):
+        later = time_until(clock, record.start + counts[NEXT_SAMPLE] / record.sample_rate)
+        if later > length:
+            return
+        if later > reached:
+            _, reached = advance_smooth(shadow, reached, later, force, middle, system, tolerance, work, none)
+        copy_row(record.samples[counts[NEXT_SAMPLE]], shadow)
+        counts[NEXT_SAMPLE] += 1

@@ -5,12 +5,11 @@ import numpy as np
 from ..compiled import compiled
 from ..modes import Complex
 from .clock import time_until
-from .contact import LOG_COLUMNS
+from .contact import LOG_COLUMNS, advance_contact
 from .flight import FlightTables, place_on_phasors, turn_phasors
 from .parameters import SIDE, Table, Vector
 from .record import NEXT_SAMPLE, Record
 from .row import copy_row
-from .touch import advance_touching
 
 
 @compiled
@@ -48,8 +47,8 @@ def sample_contact(
         if later > length:
             return
         if shadow[SIDE] != 0.0 and later > reached:
-            _, reached = advance_touching(
-                shadow, reached, later, force, middle, tables.par, tables.power, tolerance, work, none
+            _, reached = advance_contact(
+                shadow, reached, later, force, middle, tables.par, tolerance, work, none
             )
         copy_row(record.samples[counts[NEXT_SAMPLE]], shadow)
         counts[NEXT_SAMPLE] += 1
