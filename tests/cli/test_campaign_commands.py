@@ -3,20 +3,21 @@
 import json
 import sys
 
+from acquisition.campaign.estimate import Estimate
+from cli.estimate_text import estimate_text
+
 from .killed_campaign import short_points, slow_rig
 
 
 def test_an_estimate_is_one_json_document_and_makes_nothing(vibench, tmp_path):
     plan, bench = short_points(tmp_path, 3), slow_rig(tmp_path)
-    arguments = ("measure", plan, "--bench", bench, "--out", "out", "--estimate")
-    result = vibench(*arguments, "--json", cwd=tmp_path)
+    arguments = ("measure", plan, "--bench", bench, "--out", "out", "--estimate", "--json")
+    result = vibench(*arguments, cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     told = json.loads(result.stdout)
     assert (told["recordings"], told["kept"], told["fits"]) == (3, 0, True)
     assert abs(told["duration_s"] - 3 * (0.6 + 0.08 + 0.3 + 0.1 + 0.08)) < 1e-6
     assert not (tmp_path / "out").exists()
-    text = vibench(*arguments, cwd=tmp_path)
-    assert text.stdout.startswith("3 recordings, 0:00:03 (h:min:s) of rig time")
 
 
 def test_a_campaign_is_catalogued_and_its_end_is_told(vibench, tmp_path):
@@ -30,7 +31,22 @@ def test_a_campaign_is_catalogued_and_its_end_is_told(vibench, tmp_path):
     entries = json.loads(listed.stdout)["recordings"]
     assert [entry["path"] for entry in entries] == ["line-0p05vpp-200hz.h5", "line-0p05vpp-201hz.h5"]
     assert {entry["verdict"] for entry in entries} == {"good"}
-    assert "line-0p05vpp-200hz.h5" in vibench("catalogue", "out", cwd=tmp_path).stdout
+
+
+def test_an_estimate_in_words_names_lead_ins_and_a_disk_that_is_too_small():
+    expected = Estimate(
+        recordings=3,
+        kept=2,
+        duration_s=3723.4,
+        lead_in_s=60.0,
+        largest_bytes=10**6,
+        total_bytes=2 * 10**6,
+        free_bytes=10**6,
+    )
+    first, second, third = estimate_text(expected).splitlines()
+    assert first == "3 recordings (2 kept), 1:02:03 (h:min:s) of rig time, about 2 MB; 1 MB are free"
+    assert second == "0:01:00 of it lead to points along their chains"
+    assert third.startswith("The disk may be full before the end")
 
 
 def test_a_command_that_cannot_be_read_is_refused_before_anything_plays(vibench, tmp_path):
