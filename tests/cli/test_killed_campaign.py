@@ -16,7 +16,7 @@ from .killed_campaign import amplitudes, branches, command, done, killed, short_
     ("points", "kills"),
     [pytest.param(40, 2, id="40"), pytest.param(200, 10, id="200", marks=pytest.mark.slow)],
 )
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1500)
 def test_a_campaign_that_is_killed_and_resumed_makes_every_point_once(tmp_path, points, kills):
     chance = random.Random(points)
     plan, bench = short_points(tmp_path, points), slow_rig(tmp_path)
