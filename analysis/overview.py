@@ -134,6 +134,23 @@ def overview_levels(recording: Recording, on_read: OnRead = ignore_reading) -> d
     return levels
 
 
+def kept_levels(recording: Recording, role: str) -> tuple[Level, ...]:
+    """Give the extremes of one channel, fine to coarse, as the file keeps them; see `has_overview`.
+
+    Raises
+    ------
+    InvalidRequest
+        When the file keeps none.
+
+    """
+    kept = recording.read_overview(role)
+    if kept is None:
+        raise InvalidRequest(
+            f"{recording.path.name} keeps no overview of {role}; make it with overview_levels"
+        )
+    return _levels(kept, recording.channel(role))
+
+
 def _made(recording: Recording, role: str, before: int, values: int, on_read: OnRead) -> CountOverview:
     sums = OverviewSums()
     for first in range(0, recording.samples, _PIECE_SAMPLES):

@@ -2,7 +2,7 @@
 
 from datetime import datetime
 
-from acquisition.recording import RecordingState
+from acquisition.recording import Recording, RecordingState
 
 _STATE_SYMBOLS: dict[str, str] = {
     RecordingState.COMPLETE: "✔",
@@ -57,3 +57,20 @@ def unit_text(unit: str) -> str:
 def role_text(role: str) -> str:
     """``"m0 velocity"``."""
     return role.replace("_", " ")
+
+
+def facts_text(recording: Recording) -> str:
+    """Say in a line what a recording is."""
+    parts = [
+        state_text(recording.state) + (f" ({recording.reason})" if recording.reason else ""),
+        recording.origin.value,
+        duration_text(recording.duration_s),
+        f"{recording.sample_rate_hz:g} samples/s, {len(recording.roles)} channels",
+        f"bench {recording.bench.get('name', 'unnamed')}",
+    ]
+    if recording.overloads:
+        parts.append(f"{len(recording.overloads)} overloads (red)")
+    if recording.gaps:
+        lost = sum(each.last_sample - each.first_sample + 1 for each in recording.gaps)
+        parts.append(f"{lost} samples lost")
+    return "  ·  ".join(parts)

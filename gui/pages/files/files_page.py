@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 
 from acquisition.errors import RecordingError
 from acquisition.recording import Recording, open_recording
-from analysis.overview import RecordingOverview, has_overview, overview_levels
+from analysis.overview import RecordingOverview, has_overview, kept_levels
 from analysis.thumbnail import Thumbnail
 
 from ...background import Job
@@ -27,14 +27,10 @@ from ...push_button import push_button
 from ...settings import Remembered
 from ...theme import Theme
 from .campaign_choice import CampaignChoice
-from .file_words import duration_text, state_text
+from .file_words import facts_text
 from .lanes import RecordingLanes
 from .listing import Levels, Listing, listed, made_levels, thumbnails
 from .recording_table import RecordingTable
-
-QUICK_VALUES = 30_000_000
-"""A recording of so many samples and fewer shows its overview at once; others would hold the window up
-for a tenth of a second, and are prepared elsewhere."""
 
 
 class FilesPage(Page):
@@ -135,17 +131,28 @@ class FilesPage(Page):
         self._title.setText(path.name)
         if recording.samples == 0:
             self._show({})
-        elif has_overview(recording) and recording.samples * len(recording.roles) <= QUICK_VALUES:
-            self._show(overview_levels(recording))
+        elif has_overview(recording):
+            self._take_next(recording, {})
         else:
-            self._facts.setText("Reading…")
+            self._facts.setText("Reading all samples, for this file keeps no overview…")
             self._making = self.desk.background.ask(made_levels, self._show, self._failed, path)
+
+    def _take_next(self, recording: Recording, levels: Levels) -> None:
+        """Take one channel's overview at a time: all of a long recording's would hold the window up."""
+        if recording is not self._opened:
+            return
+        role = recording.roles[len(levels)]
+        levels[role] = kept_levels(recording, role)
+        if len(levels) == len(recording.roles):
+            self._show(levels)
+        else:
+            QTimer.singleShot(0, lambda: self._take_next(recording, levels))
 
     def _show(self, levels: Levels) -> None:
         self._making = None
         if self._opened is None:
             return
-        self._facts.setText(_facts(self._opened))
+        self._facts.setText(facts_text(self._opened))
         self.lanes.show_recording(RecordingOverview(self._opened, levels))
         self._say_view()
 
@@ -276,19 +283,3 @@ class FilesPage(Page):
         layout.addWidget(self.lanes, 1)
         layout.addLayout(bar)
         return viewer
-
-
-def _facts(recording: Recording) -> str:
-    parts = [
-        state_text(recording.state) + (f" ({recording.reason})" if recording.reason else ""),
-        recording.origin.value,
-        duration_text(recording.duration_s),
-        f"{recording.sample_rate_hz:g} samples/s, {len(recording.roles)} channels",
-        f"bench {recording.bench.get('name', 'unnamed')}",
-    ]
-    if recording.overloads:
-        parts.append(f"{len(recording.overloads)} overloads (red)")
-    if recording.gaps:
-        lost = sum(each.last_sample - each.first_sample + 1 for each in recording.gaps)
-        parts.append(f"{lost} samples lost")
-    return "  ·  ".join(parts)

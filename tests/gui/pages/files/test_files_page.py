@@ -79,6 +79,18 @@ def page(shown, folder, waited):
     return shown
 
 
+@pytest.fixture
+def opened(page, folder, waited):
+    """Open a recording by its row, and wait for its lanes."""
+
+    def open_row(name):
+        page.table.choose(folder / name)
+        waited(lambda: bool(page.lanes.plots) and page._opened.path == folder / name)
+        return page
+
+    return open_row
+
+
 def cell(page, name, heading):
     model = page.table.model()
     for row in range(model.rowCount()):
@@ -111,8 +123,8 @@ def test_every_readable_recording_has_a_picture(page):
     assert {name for name, picture in pictures.items() if picture is not None} == {"whole", "stopped", "old"}
 
 
-def test_an_impact_of_three_samples_is_seen_in_the_whole_and_when_zoomed_to(page, folder):
-    page.table.choose(folder / "whole.h5")
+def test_an_impact_of_three_samples_is_seen_in_the_whole_and_when_zoomed_to(opened):
+    page = opened("whole.h5")
     for low_s, high_s in ((0.0, 10.0), (IMPACT_S - 0.5, IMPACT_S + 0.5), (IMPACT_S - 2e-3, IMPACT_S + 2e-3)):
         page.lanes.show_range(low_s, high_s)
         page.lanes._draw()
@@ -123,23 +135,21 @@ def test_an_impact_of_three_samples_is_seen_in_the_whole_and_when_zoomed_to(page
         assert len(time_s) <= 2.1 * page.lanes.width()
 
 
-def test_a_recording_without_overview_is_opened_all_the_same(page, folder, qtbot):
-    page.table.choose(folder / "old.h5")
-    qtbot.waitUntil(lambda: bool(page.lanes.plots), timeout=20_000)
+def test_a_recording_without_overview_is_opened_all_the_same(opened):
+    page = opened("old.h5")
     assert np.nanmax(drawn(page, 2)[1]) == pytest.approx(0.4, rel=1e-5)
 
 
-def test_a_broken_file_says_why_and_what_to_do(page, folder, qtbot):
+def test_a_broken_file_says_why_and_what_to_do(page, opened, folder, qtbot):
     with qtbot.waitSignal(page.desk.noticed) as said:
         page.table.choose(folder / "broken.h5")
     assert "no readable HDF5 file" in said.args[0].what
     assert page.lanes.plots == ()
-    page.table.choose(folder / "whole.h5")
-    assert len(page.lanes.plots) == 3
+    assert len(opened("whole.h5").lanes.plots) == 3
 
 
-def test_keys_zoom_move_and_show_all(page, folder, qtbot):
-    page.table.choose(folder / "whole.h5")
+def test_keys_zoom_move_and_show_all(opened, qtbot):
+    page = opened("whole.h5")
     qtbot.keyClick(page.lanes, Qt.Key.Key_Plus)
     low_s, high_s = page.lanes.view_s
     assert high_s - low_s == pytest.approx(6.0)
@@ -149,8 +159,8 @@ def test_keys_zoom_move_and_show_all(page, folder, qtbot):
     assert page.lanes.view_s == pytest.approx((0.0, 10.0))
 
 
-def test_no_view_goes_past_the_ends_or_closer_than_a_few_samples(page, folder):
-    page.table.choose(folder / "whole.h5")
+def test_no_view_goes_past_the_ends_or_closer_than_a_few_samples(opened):
+    page = opened("whole.h5")
     page.lanes.show_range(-50.0, 100.0)
     assert page.lanes.view_s == (0.0, 10.0)
     page.lanes.show_range(5.0, 5.0 + 1e-9)
@@ -158,8 +168,8 @@ def test_no_view_goes_past_the_ends_or_closer_than_a_few_samples(page, folder):
     assert high_s - low_s == pytest.approx(8 / 6400.0, rel=1e-3)
 
 
-def test_markers_measure_between_two_moments(page, folder):
-    page.table.choose(folder / "whole.h5")
+def test_markers_measure_between_two_moments(opened):
+    page = opened("whole.h5")
     page._markers.setChecked(True)
     first, second = page.lanes._lanes[1].markers
     first.setValue(2.0)
@@ -203,8 +213,8 @@ def test_a_recording_from_another_folder_is_opened_when_somebody_wants_it(page, 
     qtbot.waitUntil(lambda: page.table.chosen_paths() == (path,), timeout=20_000)
 
 
-def test_lanes_follow_the_theme_and_name_their_channels_and_units(page, folder):
-    page.table.choose(folder / "whole.h5")
+def test_lanes_follow_the_theme_and_name_their_channels_and_units(opened):
+    page = opened("whole.h5")
     page.retheme(DARK)
     assert [plot.accessibleName() for plot in page.lanes.plots] == [
         "drive voltage over time",

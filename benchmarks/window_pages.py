@@ -1,0 +1,129 @@
+"""How long the window's own thread is busy on the Files, Compare and Simulate pages.
+
+    python benchmarks/window_pages.py RECORDING.h5
+
+Processor time of the thread that draws, offscreen, 1400 x 900: what other processes of the machine do
+is not in it. The recording should be large: benchmarks/overview.py leaves one in the folder it is given.
+"""
+
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
+
+import numpy as np
+from PySide6.QtWidgets import QApplication
+
+from analysis.comparison.trace import Origin, Response, Trace
+from analysis.simulation.answers import SimulatedPoint
+from analysis.simulation.course import SimulationCourse
+from gui.app import application
+from gui.desk import Desk
+from gui.pages.compare.compare_page import ComparePage
+from gui.pages.files.files_page import FilesPage
+from gui.pages.simulate.simulate_page import SimulatePage
+from gui.settings import Settings
+
+SIZE = (1400, 900)
+SPANS_S = (600.0, 60.0, 6.0, 2.4, 0.6, 0.06)
+TRIES = 7
+
+
+def main() -> None:
+    """Open, zoom, draw."""
+    application(["benchmark"])
+    with tempfile.TemporaryDirectory() as folder:
+        desk = Desk(Settings(Path(folder) / "window.ini"))
+        desk.choose_folder(Path(folder))
+        files(desk, Path(sys.argv[1]))
+        compare(desk)
+        simulate(desk)
+        desk.background.close()
+
+
+def files(desk: Desk, path: Path) -> None:
+    """Open the recording and zoom to random places."""
+    page = FilesPage(desk)
+    page.resize(*SIZE)
+    page.show()
+    begun = time.monotonic()
+    told("Files: open, in the window's thread", lambda: page.open_path(path), tries=1)
+    longest = 0.0
+    while not page.lanes.plots:
+        longest = max(longest, busy(QApplication.processEvents))
+    longest = max(longest, busy(QApplication.processEvents))
+    print(f"{'Files: from the click to the picture':<44} {time.monotonic() - begun:.2f} s of clock time")
+    print(f"{'Files: longest piece of that':<44} {1e3 * longest:.0f} ms")
+    rng = np.random.default_rng(1)
+    _, end_s = page.lanes.view_s
+    for span_s in (each for each in SPANS_S if each <= end_s):
+        starts_s = iter(rng.uniform(0, end_s - span_s + 1e-9, 1 + TRIES))
+        told(f"Files: zoom to {span_s:g} s", partial(zoom, page, starts_s, span_s))
+    page.close()
+
+
+def zoom(page: FilesPage, starts_s: Iterator[float], span_s: float) -> None:
+    """Show the next stretch."""
+    start_s = next(starts_s)
+    page.lanes.show_range(start_s, start_s + span_s)
+
+
+def compare(desk: Desk) -> None:
+    """Lay six curves of 4000 points over one another."""
+    page = ComparePage(desk)
+    page.resize(*SIZE)
+    page.show()
+    frequency_hz = np.linspace(10.0, 1000.0, 4000)
+    rng = np.random.default_rng(2)
+    for number in range(6):
+        values = np.exp(0.2 * rng.standard_normal(4000).cumsum() / 20)
+        curve = Trace(
+            f"run {number}", Origin.MEASURED, Response.TRANSMISSION, frequency_hz, values, np.full(4000, 0.02)
+        )
+        told(
+            f"Compare: curve {number + 1} of 4000 points", lambda c=curve: page.add_prediction((c,)), tries=1
+        )
+    page.close()
+
+
+def simulate(desk: Desk) -> None:
+    """Draw a simulation of 2 x 500 points anew, as each tick of the clock does while it grows."""
+    page = SimulatePage(desk)
+    page.resize(*SIZE)
+    page.show()
+    course = SimulationCourse(5e-6, 1000, "")
+    for model in ("a", "b"):
+        course.add(
+            tuple(
+                SimulatedPoint(model, 10.0 + n, 2.0 + n % 7, 1.0, n % 50, "", 3.0, 1e-6) for n in range(500)
+            )
+        )
+    told("Simulate: draw 2 x 500 points", lambda: page.plots.show_course(course))
+    page.close()
+
+
+def told(name: str, act: Callable[[], object], tries: int = TRIES) -> None:
+    """Print how long an act and the drawing after it keep the thread busy."""
+    if tries > 1:
+        busy(act)
+    taken = [busy(act) for _ in range(tries)]
+    print(f"{name:<44} median {1e3 * np.median(taken):.0f} ms, largest {1e3 * max(taken):.0f} ms")
+
+
+def busy(act: Callable[[], object]) -> float:
+    """Processor time of this thread, for an act and the events that follow from it [s]."""
+    begun = time.thread_time()
+    act()
+    QApplication.processEvents()
+    QApplication.processEvents()
+    return time.thread_time() - begun
+
+
+if __name__ == "__main__":
+    main()
