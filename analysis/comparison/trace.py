@@ -13,6 +13,7 @@ import numpy as np
 from ..arrays import Reals
 from ..difference import Difference, logarithmic_difference
 from ..errors import NotEnoughData
+from ..live.envelope import column_starts, envelope
 
 
 class Origin(StrEnum):
@@ -63,6 +64,13 @@ class Trace:
     def upper(self) -> Reals:
         """Magnitude and two standard deviations, on a logarithmic scale; ten times it at the most."""
         return np.asarray(self.magnitude * np.exp(self._reach))
+
+    def band(self, columns: int) -> tuple[Reals, Reals, Reals]:
+        """Give frequencies, lowest and highest bounds in at most so many columns: areas are slow to draw."""
+        starts = column_starts(self.frequency_hz.size, columns)
+        low, _ = envelope(self.lower, columns)
+        _, high = envelope(self.upper, columns)
+        return self.frequency_hz[starts], np.asarray(low, np.float64), np.asarray(high, np.float64)
 
     @property
     def _reach(self) -> Reals:

@@ -17,7 +17,7 @@ from ...theme import Theme
 MAGNITUDE = Axis("Motion of m0 over base, |x / U|", scale=Scale.LOGARITHMIC)
 DIFFERENCE = Axis("Difference", "dB")
 _MARKER = Ink(lambda theme: theme.accent)
-_BAND = 0.16
+_BAND, _BAND_COLUMNS = 0.16, 600
 _LEFT_EM = 5
 _DOTS = {Origin.MEASURED: 10, Origin.SIMULATED: 6, Origin.PREDICTED: 4}
 
@@ -96,7 +96,7 @@ class CurvePlots(QWidget):
             return
         if np.isfinite(curve.relative_sd).any():
             shade = Ink(ink.colour, Dash.SOLID, _BAND)
-            self.magnitudes.band(shade).set_data(curve.frequency_hz, curve.lower, curve.upper)
+            self.magnitudes.band(shade).set_data(*curve.band(_BAND_COLUMNS))
         line = self.magnitudes.curve(ink, curve.name)
         line.setData(curve.frequency_hz, curve.magnitude, connect="finite")
 

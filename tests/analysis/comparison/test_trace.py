@@ -106,3 +106,13 @@ def test_tables_carry_units_and_every_curve_its_own_file(tmp_path):
     assert text[0] == "frequency_hz,magnitude_displacement_over_displacement,relative_standard_deviation"
     assert text[1].startswith("50,")
     assert len(text) == 1 + curves[0].frequency_hz.size
+
+
+def test_a_band_in_few_columns_holds_the_whole_band():
+    curve = mode(np.arange(50.0, 600.0, 0.1), sd=0.05)
+    frequency_hz, low, high = curve.band(100)
+    assert frequency_hz.size == low.size == high.size == 100
+    assert low.min() == curve.lower.min()
+    assert high.max() == curve.upper.max()
+    whole = mode(np.arange(50.0, 60.0))
+    assert np.array_equal(whole.band(100)[1], whole.lower)
