@@ -1,5 +1,6 @@
 """Work that takes longer than a frame: done in another process, asked after by a timer."""
 
+import os
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from typing import Any, ParamSpec, TypeVar
 from PySide6.QtCore import QObject, QTimer
 
 POLL_MS = 50
+NICE = 10
 
 Asked = ParamSpec("Asked")
 Answer = TypeVar("Answer")
@@ -29,6 +31,12 @@ class Job:
         self.future.cancel()
 
 
+def give_way() -> None:
+    """Let a measurement, and the window, have the processor first; where the system knows of that."""
+    if hasattr(os, "nice"):
+        os.nice(NICE)
+
+
 class Background(QObject):
     """Spawned processes without Qt; answers come in the thread of the window.
 
@@ -40,6 +48,7 @@ class Background(QObject):
         self._workers = workers
         self._pool: ProcessPoolExecutor | None = None
         self._jobs: list[Job] = []
+        self._is_closed = False
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
         self._timer.timeout.connect(self._poll)
@@ -58,8 +67,13 @@ class Background(QObject):
         **kwargs: Asked.kwargs,
     ) -> Job:
         """Call ``function`` elsewhere; then ``on_answer`` or ``on_error`` here."""
+        if self._is_closed:
+            # Asked by a timer that outlived the window: nobody is left to be told.
+            return Job(Future(), on_answer, on_error, is_wanted=False)
         if self._pool is None:
-            self._pool = ProcessPoolExecutor(self._workers, mp_context=get_context("spawn"))
+            self._pool = ProcessPoolExecutor(
+                self._workers, mp_context=get_context("spawn"), initializer=give_way
+            )
         job = Job(self._pool.submit(function, *args, **kwargs), on_answer, on_error)
         self._jobs.append(job)
         self._timer.start()
@@ -67,6 +81,7 @@ class Background(QObject):
 
     def close(self) -> None:
         """End the processes; what has not been answered is dropped."""
+        self._is_closed = True
         self._timer.stop()
         self._jobs.clear()
         if self._pool is not None:

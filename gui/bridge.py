@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 from PySide6.QtCore import QObject, Signal
@@ -26,6 +27,9 @@ from .notice import Notice, NoticeKind, notice_of
 
 CATCH_UP_S = 2.0
 """Older samples than this are not asked for after a pause: the picture shows now, the file holds all."""
+
+BEAT_S = 0.04
+"""The engine is not told more often than this that the window lives; it waits for half a second."""
 
 Glimpse = tuple[EngineStatus, Glance | None]
 
@@ -56,6 +60,7 @@ class Bridge(QObject):
         self._heard = 0
         self._ended: frozenset[str] = frozenset()
         self._is_looking = False
+        self._beaten_s = 0.0
 
     @property
     def status(self) -> EngineStatus | None:
@@ -96,10 +101,22 @@ class Bridge(QObject):
         """Fetch what has come, and ask again."""
         if self._line is None:
             return
+        self.beat()
         self._line.drain()
         if not self._is_looking and self._line is not None:
             self._is_looking = True
             self._line.ask(Urgency.LOOK, self._look_question(), self._looked, self._look_refused)
+
+    def beat(self) -> None:
+        """Tell the engine that the window is alive, when it has not been told for a while.
+
+        It may be called while something is painted: no answer is fetched, so nothing is changed.
+        """
+        now_s = monotonic()
+        pulse = None if self._line is None else self._line.pulse
+        if pulse is not None and now_s - self._beaten_s > BEAT_S:
+            self._beaten_s = now_s
+            pulse.beat()
 
     def open(self, rig: Rig, confirmations: KnobSheet | None) -> None:
         """Open the bench of a rig, with an engine of its own if there is none yet."""

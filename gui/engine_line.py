@@ -9,6 +9,7 @@ from queue import Empty, PriorityQueue, SimpleQueue
 from typing import Any
 
 from acquisition.engine.client import EngineClient
+from acquisition.engine.pulse import Pulse
 from acquisition.engine.start import EngineProcess, start_engine
 from acquisition.errors import AcquisitionError
 
@@ -47,6 +48,7 @@ class EngineLine:
         self._answers: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._numbers = count()
         self._engine: EngineProcess | None = None
+        self._pulse: Pulse | None = None
         self._thread = threading.Thread(target=self._run, name="engine line", daemon=True)
         self._thread.start()
 
@@ -54,6 +56,11 @@ class EngineLine:
     def pid(self) -> int | None:
         """The engine's process, None before it runs."""
         return None if self._engine is None else self._engine.pid
+
+    @property
+    def pulse(self) -> Pulse | None:
+        """Tells the engine that the window is alive; None before there is an engine."""
+        return self._pulse
 
     def ask(
         self,
@@ -86,6 +93,8 @@ class EngineLine:
     def _run(self) -> None:
         while (call := self._calls.get()).urgency is not Urgency.END:
             self._answer(call)
+        if self._pulse is not None:
+            self._pulse.close()
         if self._engine is not None:
             self._engine.close()
 
@@ -93,6 +102,7 @@ class EngineLine:
         try:
             if self._engine is None:
                 self._engine = self._start()
+                self._pulse = Pulse(self._engine.address)
             answer = call.question(self._engine.client)
         except AcquisitionError as error:
             refusal = error

@@ -36,7 +36,7 @@ def build_menus(
     view.addSeparator()
     _add(view.addAction("&Light or dark"), "Ctrl+T", lambda: desk.choose_theme(_other(desk)))
     _add(view.addAction("&Reset layout"), "", reset_layout)
-    help_menu = bar.addMenu("&Help")
+    help_menu = bar.addMenu("Hel&p")
     _add(help_menu.addAction("&Keys"), "F1", lambda: show_keys(window))
 
 

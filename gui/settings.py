@@ -15,6 +15,7 @@ class Remembered(StrEnum):
     PAGE = "window/page"
     BENCH = "rig/configuration"
     TEST = "test/last"
+    CAMPAIGN = "queue/last"
     FOLDER = "recordings/folder"
 
 

@@ -1,5 +1,8 @@
 """The frame: banner and STOP, messages, the rail of pages, the status line."""
 
+from collections.abc import Callable
+from functools import partial
+
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
@@ -25,6 +28,7 @@ from .page_names import RUN
 from .pages.catalogue import PageEntry
 from .rail import Rail
 from .settings import Remembered
+from .sign_of_life import SignOfLife
 from .status_line import StatusLine
 from .theme import Theme, palette, style_sheet
 
@@ -135,6 +139,7 @@ class Window(QMainWindow):
         application = QApplication.instance()
         assert isinstance(application, QApplication)
         self.abort_key = AbortKey(application, self)
+        self.sign_of_life = SignOfLife(application, self.desk.bridge, self)
         self.abort_key.pressed.connect(self.orders.abort)
         self.banner.stop_wanted.connect(self.orders.stop)
         self.desk.bridge.armed.connect(lambda _plan: self.show_page(RUN))
@@ -154,10 +159,15 @@ class Window(QMainWindow):
     def _retheme(self, theme: Theme) -> None:
         application = QApplication.instance()
         assert isinstance(application, QApplication)
-        application.setPalette(palette(theme))
-        application.setStyleSheet(style_sheet(theme))
-        for page in self.pages.values():
-            page.retheme(theme)
+        steps: list[Callable[[], None]] = [
+            lambda: application.setPalette(palette(theme)),
+            lambda: application.setStyleSheet(style_sheet(theme)),
+            *(partial(page.retheme, theme) for page in self.pages.values()),
+        ]
+        for step in steps:
+            step()
+            # All of them take longer than the engine waits for a sign of life.
+            self.desk.bridge.beat()
 
     def _reset_layout(self) -> None:
         self.desk.settings.forget_layout()

@@ -43,6 +43,10 @@ class QuantityEdit(QAbstractSpinBox):
         self._value, self._complaint = value, ""
         self.lineEdit().setText("" if value is None else quantity_text(value, self._unit))
 
+    def show_unit(self, unit: str) -> None:
+        """Hold another quantity from now on."""
+        self._unit = unit
+
     def stepBy(self, steps: int) -> None:
         """Change by five per cent a step, or by one where numbers are whole."""
         self._take()

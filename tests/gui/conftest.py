@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from PySide6.QtCore import QEvent
 from PySide6.QtGui import QColor
 
 from gui.app import application
 from gui.desk import Desk
+from gui.pages.catalogue import PAGES
 from gui.settings import Settings
+from gui.window import Window
 
 
 @pytest.fixture(scope="session")
@@ -37,3 +40,31 @@ def contrast():
         return (bright + 0.05) / (dark + 0.05)
 
     return ratio
+
+
+@pytest.fixture(scope="module")
+def own_state(tmp_path_factory):
+    """Keep locks out of the user's folder."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("VIBENCH_STATE_DIR", str(tmp_path_factory.mktemp("state")))
+        yield
+
+
+@pytest.fixture
+def window(desk, own_state, tmp_path, qapp):
+    """The whole window, without a bench."""
+    desk.choose_folder(tmp_path / "recordings")
+    window = Window(desk, PAGES)
+    window.resize(1280, 720)
+    window.show()
+    yield window
+    end(window, qapp)
+
+
+def end(window, qapp):
+    """Close a window, and let Qt forget it: thousands of old widgets would slow down the next one."""
+    window.desk.bridge.close()
+    window.close()
+    window.deleteLater()
+    qapp.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)
+    qapp.processEvents()

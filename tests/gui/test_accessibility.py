@@ -1,0 +1,116 @@
+"""Everything that takes the focus has a name; mnemonics are unique; nothing is cut off."""
+
+import re
+from collections import Counter
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractScrollArea,
+    QAbstractSpinBox,
+    QComboBox,
+    QLabel,
+    QLineEdit,
+    QMenu,
+    QTabWidget,
+    QWidget,
+)
+
+from gui.theme import DARK, LIGHT
+
+NAMED_BY_TEXT = (QAbstractButton, QLabel)
+
+
+def inside(widget, kinds):
+    return any(isinstance(parent, kinds) for parent in parents(widget))
+
+
+def parents(widget):
+    while (widget := widget.parentWidget()) is not None:
+        yield widget
+
+
+def focusable(window):
+    for widget in window.findChildren(QWidget):
+        own = not widget.objectName().startswith("qt_") and not isinstance(
+            widget.parentWidget(), QAbstractScrollArea
+        )
+        part_of_another = inside(widget, (QComboBox, QAbstractSpinBox, QTabWidget)) and isinstance(
+            widget, QLineEdit | QAbstractScrollArea
+        )
+        if own and widget.focusPolicy() & Qt.FocusPolicy.TabFocus and not part_of_another:
+            yield widget
+
+
+def test_everything_that_takes_the_focus_has_a_name(window):
+    nameless = []
+    for widget in focusable(window):
+        text = widget.text() if isinstance(widget, NAMED_BY_TEXT) else ""
+        if not (widget.accessibleName() or text) and type(widget).__name__ not in ("QTabBar", "QScrollArea"):
+            nameless.append((type(widget).__name__, widget.parentWidget().accessibleName()))
+    assert nameless == []
+
+
+def test_every_page_and_every_tab_has_a_name(window):
+    for name, page in window.pages.items():
+        assert page.accessibleName() == f"{name} page"
+    for tabs in window.findChildren(QTabWidget):
+        for number in range(tabs.count()):
+            assert tabs.tabText(number)
+            assert tabs.widget(number).accessibleName()
+
+
+def mnemonic(text):
+    found = re.search(r"&([^&\s])", text)
+    return found[1].upper() if found else None
+
+
+def test_mnemonics_are_unique_in_each_menu_and_on_each_page(window):
+    bar = [mnemonic(action.text()) for action in window.menuBar().actions()]
+    for name, page in window.pages.items():
+        on_page = [mnemonic(button.text()) for button in page.findChildren(QAbstractButton)]
+        twice = [key for key, count in Counter(filter(None, (*bar, *on_page))).items() if count > 1]
+        assert twice == [], name
+    for menu in window.menuBar().findChildren(QMenu):
+        keys = Counter(filter(None, (mnemonic(action.text()) for action in menu.actions())))
+        assert max(keys.values(), default=1) == 1, menu.title()
+
+
+def test_keys_of_the_window_are_unique(window):
+    keys = [
+        action.shortcut().toString()
+        for menu in window.menuBar().findChildren(QMenu)
+        for action in menu.actions()
+        if not action.shortcut().isEmpty()
+    ]
+    assert len(keys) == len(set(keys))
+    assert all(len(key) > 1 for key in keys), "a bare letter must start nothing"
+
+
+def cut_off(window):
+    for widget in window.findChildren(QWidget):
+        if not widget.isVisible() or not isinstance(widget, QAbstractButton | QLabel):
+            continue
+        if isinstance(widget, QLabel) and (widget.wordWrap() or widget.sizePolicy().horizontalPolicy() == 13):
+            continue
+        # qt_ objects belong to Qt's own widgets; labels without text have nothing to show.
+        if widget.objectName().startswith("qt_") or not widget.text():
+            continue
+        if (
+            widget.width() < widget.minimumSizeHint().width()
+            or widget.height() < widget.minimumSizeHint().height()
+        ):
+            yield widget.text(), widget.size(), widget.minimumSizeHint()
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
+@pytest.mark.parametrize("size", [(1280, 720), (2560, 1440)], ids=lambda size: f"{size[0]}x{size[1]}")
+def test_no_text_is_cut_off(window, qapp, theme, size):
+    window.desk.choose_theme(theme)
+    window.resize(*size)
+    for name in window.pages:
+        window.show_page(name)
+        qapp.processEvents()
+        assert (window.width(), window.height()) == size, f"{name} page needs more room"
+        assert list(cut_off(window)) == [], name

@@ -1,0 +1,217 @@
+"""The job on the virtual rig: by keyboard from the open window to a recording, and every way to stop."""
+
+import os
+import signal
+import time
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QMenu, QVBoxLayout
+
+from acquisition.engine.state import EngineState
+from acquisition.plan.measurement import Measurement
+from acquisition.recording import open_recording
+from gui.desk import Desk
+from gui.orders import ABORT_KEY
+from gui.page_names import RUN, TEST
+from gui.pages.catalogue import PAGES
+from gui.settings import Settings
+from gui.window import Window
+
+CONTROL = Qt.KeyboardModifier.ControlModifier
+ALT = Qt.KeyboardModifier.AltModifier
+STOPPED_S = 2.0
+"""From the key to an engine that has finished its recording, on a machine that does other things too."""
+PATIENCE_MS = 30_000
+
+
+def dwell(name, duration_s):
+    return Measurement.model_validate(
+        {
+            "name": name,
+            "ramp_s": 0.3,
+            "ramp_step_s": 0.03,
+            "excitation": {
+                "kind": "dwell",
+                "amplitude_vpp": 1.5,
+                "frequency_hz": 260,
+                "settle_s": 0.2,
+                "duration_s": duration_s,
+            },
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def bench(qapp, own_state, tmp_path_factory):
+    """A window whose bench is open; the engine starts once for all tests here."""
+    folder = tmp_path_factory.mktemp("job")
+    desk = Desk(Settings(folder / "window.ini"))
+    desk.choose_folder(folder / "recordings")
+    window = Window(desk, PAGES)
+    window.show()
+    yield window
+    desk.bridge.close()
+    window.close()
+    window.deleteLater()
+
+
+def reach(qtbot, window, *states):
+    qtbot.waitUntil(lambda: window.desk.bridge.state in states, timeout=PATIENCE_MS)
+
+
+def press(qtbot, window, key, modifier=Qt.KeyboardModifier.NoModifier):
+    qtbot.keyClick(QApplication.focusWidget() or window, key, modifier)
+
+
+def recorded(window):
+    """The newest recording, opened and looked at."""
+    (row,) = window.desk.bridge.status.rows
+    return row
+
+
+def test_a_newcomer_measures_with_five_keys(bench, qtbot):
+    """Alt+O opens, Ctrl+Return arms, F5 starts, the run ends by itself: three keys, and two to look."""
+    keys = []
+
+    def key(*which):
+        keys.append(which)
+        press(qtbot, bench, *which)
+
+    assert bench.page is bench.pages["Rig"]
+    key(Qt.Key.Key_O, ALT)
+    reach(qtbot, bench, EngineState.READY)
+    key(Qt.Key.Key_Return, CONTROL)
+    reach(qtbot, bench, EngineState.ARMED)
+    assert bench.page is bench.pages[RUN]
+    qtbot.waitUntil(lambda: "1.5 Vpp" in bench.pages[RUN].arm_card.words, timeout=PATIENCE_MS)
+    key(Qt.Key.Key_F5)
+    reach(qtbot, bench, EngineState.RUNNING)
+    qtbot.waitUntil(lambda: bench.pages[RUN].is_done, timeout=PATIENCE_MS)
+    assert len(keys) <= 5
+    row = recorded(bench)
+    assert row.state == "recorded"
+    with open_recording(row.file) as recording:
+        assert recording.samples > 51_200
+
+
+def start_dwell(bench, qtbot, name):
+    bench.pages[TEST].form.show_measurement(dwell(name, 600.0))
+    reach(qtbot, bench, EngineState.READY)
+    bench.orders.arm_test()
+    reach(qtbot, bench, EngineState.ARMED)
+    qtbot.keyClick(bench, Qt.Key.Key_F5)
+    qtbot.waitUntil(lambda: drive_is_on(bench), timeout=PATIENCE_MS)
+
+
+def drive_is_on(bench):
+    run = bench.desk.bridge.status.run
+    return run is not None and run.amplitude_vpp >= 1.5
+
+
+def on_the_banner(bench):
+    bench.banner.setFocus()
+    return bench
+
+
+def on_a_plot(bench):
+    bench.show_page(RUN)
+    plot = bench.pages[RUN].lanes.plots[3]
+    plot.setFocus()
+    return plot
+
+
+def in_a_field(bench):
+    bench.show_page(TEST)
+    field = bench.pages[TEST].form.form.editors["ramp_s"].widget
+    field.setFocus()
+    return field
+
+
+def in_a_modal_dialog(bench):
+    dialog = QDialog(bench)
+    dialog.setModal(True)
+    field = QLineEdit(dialog)
+    QVBoxLayout(dialog).addWidget(field)
+    dialog.open()
+    return field
+
+
+def in_a_menu(bench):
+    menu = bench.menuBar().findChildren(QMenu)[0]
+    menu.popup(bench.pos())
+    return menu
+
+
+@pytest.mark.parametrize("place", [on_the_banner, on_a_plot, in_a_field, in_a_modal_dialog, in_a_menu])
+def test_esc_brings_the_drive_to_zero_wherever_the_focus_is(bench, qtbot, place):
+    start_dwell(bench, qtbot, place.__name__)
+    focus = place(bench)
+    began_s = time.monotonic()
+    qtbot.keyClick(focus, Qt.Key.Key_Escape)
+    reach(qtbot, bench, EngineState.READY)
+    assert time.monotonic() - began_s < STOPPED_S
+    row = recorded(bench)
+    assert row.state == "stopped"
+    assert ABORT_KEY in row.reason
+    with open_recording(row.file) as recording:
+        assert recording.samples > 0
+
+
+def test_a_hold_keeps_the_drive_and_stop_ramps_down(bench, qtbot):
+    start_dwell(bench, qtbot, "held")
+    bench.orders.hold_or_resume()
+    reach(qtbot, bench, EngineState.HELD)
+    qtbot.waitUntil(lambda: bench.banner.face.word == "HELD", timeout=PATIENCE_MS)
+    assert drive_is_on(bench)
+    bench.orders.hold_or_resume()
+    reach(qtbot, bench, EngineState.RUNNING)
+    bench.banner.stop_wanted.emit()
+    reach(qtbot, bench, EngineState.READY)
+    assert recorded(bench).state == "stopped"
+
+
+def test_the_live_pictures_show_the_run(bench, qtbot):
+    bench.show_page(RUN)
+    start_dwell(bench, qtbot, "live")
+    page = bench.pages[RUN]
+    qtbot.waitUntil(lambda: bench.desk.bridge.view.course().time_s.size > 3, timeout=PATIENCE_MS)
+    bench.tick()
+    drawn = [plot.getPlotItem().listDataItems()[0].getData()[1] for plot in page.lanes.plots]
+    assert all(values is not None and values.size > 100 for values in drawn)
+    assert abs(bench.desk.bridge.view.course().frequency_hz[-1] - 260) < 0.1
+    assert bench.banner.face.word == "RUNNING"
+    assert int(page.watch_card.impacts.text()) > 0
+    page.watch_card.freeze.setChecked(True)
+    frozen = page.lanes.plots[0].getPlotItem().listDataItems()[0].getData()[0].copy()
+    samples = bench.desk.bridge.status.samples
+    qtbot.waitUntil(lambda: bench.desk.bridge.status.samples > samples + 20_000, timeout=PATIENCE_MS)
+    assert (page.lanes.plots[0].getPlotItem().listDataItems()[0].getData()[0] == frozen).all()
+    page.watch_card.freeze.setChecked(False)
+    page.watch_card.mark.setText("tapped the table")
+    page.watch_card.wish_mark()
+    qtbot.waitUntil(lambda: bench.desk.bridge.status.samples > samples + 60_000, timeout=PATIENCE_MS)
+    bench.orders.abort()
+    reach(qtbot, bench, EngineState.READY)
+    with open_recording(recorded(bench).file) as recording:
+        assert any("tapped the table" in event.text for event in recording.events)
+
+
+def test_the_cancel_button_has_the_focus_when_armed_and_disarms(bench, qtbot):
+    bench.show_page(RUN)
+    reach(qtbot, bench, EngineState.READY)
+    bench.orders.arm_test()
+    reach(qtbot, bench, EngineState.ARMED)
+    bench.tick()
+    card = bench.pages[RUN].arm_card
+    assert card.cancel_button.isVisible()
+    card.cancel_button.click()
+    reach(qtbot, bench, EngineState.READY)
+
+
+def test_an_engine_that_dies_is_told_within_a_moment(bench, qtbot):
+    os.kill(bench.desk.bridge.engine_pid, signal.SIGKILL)
+    qtbot.waitUntil(lambda: bench.desk.bridge.status is None, timeout=5_000)
+    assert bench.strip.notices[-1].code == "EngineGone"
+    bench.tick()
+    assert bench.banner.face.word == "NO BENCH"

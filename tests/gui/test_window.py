@@ -1,0 +1,53 @@
+"""The frame: pages by key, themes, settings that are kept, and nothing armed after a start."""
+
+import pytest
+from PySide6.QtCore import Qt
+
+from gui.desk import Desk
+from gui.page_names import RIG, TEST
+from gui.pages.catalogue import PAGES
+from gui.settings import Settings
+from gui.theme import DARK
+from gui.window import Window
+
+
+def test_every_page_can_be_shown_by_its_key(window, qtbot):
+    for number, name in enumerate(window.pages, start=1):
+        qtbot.keyClick(window, getattr(Qt.Key, f"Key_{number}"), Qt.KeyboardModifier.ControlModifier)
+        assert window.page is window.pages[name], name
+
+
+def test_the_pages_lie_in_the_order_of_the_job(window):
+    names = [entry.name for entry in sorted(PAGES, key=lambda entry: entry.number)]
+    assert list(window.pages) == names
+    assert names[:3] == ["Rig", "Test", "Run"]
+
+
+def test_theme_page_and_test_are_there_again_and_nothing_is_armed(window, qapp, own_state, tmp_path):
+    window.desk.choose_theme(DARK)
+    window.show_page(TEST)
+    form = window.pages[TEST].form.form
+    form.show_content({**form.content(), "name": "kept"})
+    window.close()
+    again = Window(Desk(Settings(tmp_path / "window.ini")), PAGES)
+    assert again.desk.theme is DARK
+    assert again.page is again.pages[TEST]
+    assert again.desk.intent.measurement.name == "kept"
+    assert again.banner.face.word == "NO BENCH"
+    again.close()
+    again.deleteLater()
+
+
+def test_the_banner_and_stop_are_in_sight_on_every_page(window, qapp):
+    for name in window.pages:
+        window.show_page(name)
+        qapp.processEvents()
+        assert window.banner.isVisible(), name
+
+
+@pytest.mark.parametrize("order", ["arm_test", "start", "check"])
+def test_an_order_without_a_bench_is_answered_with_what_to_do(window, order):
+    getattr(window.orders, order)()
+    newest = window.strip.notices[-1]
+    assert newest.next_step
+    assert window.page is window.pages[RIG]
