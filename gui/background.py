@@ -58,6 +58,12 @@ class Background(QObject):
         """Whether an answer is still to come."""
         return bool(self._jobs)
 
+    def prepare(self) -> None:
+        """Start the processes now: to start one costs a moment that no frame of a run has."""
+        pool = self._started()
+        for _ in range(self._workers):
+            pool.submit(os.getpid)
+
     def ask(
         self,
         function: Callable[Asked, Answer],
@@ -70,14 +76,17 @@ class Background(QObject):
         if self._is_closed:
             # Asked by a timer that outlived the window: nobody is left to be told.
             return Job(Future(), on_answer, on_error, is_wanted=False)
+        job = Job(self._started().submit(function, *args, **kwargs), on_answer, on_error)
+        self._jobs.append(job)
+        self._timer.start()
+        return job
+
+    def _started(self) -> ProcessPoolExecutor:
         if self._pool is None:
             self._pool = ProcessPoolExecutor(
                 self._workers, mp_context=get_context("spawn"), initializer=give_way
             )
-        job = Job(self._pool.submit(function, *args, **kwargs), on_answer, on_error)
-        self._jobs.append(job)
-        self._timer.start()
-        return job
+        return self._pool
 
     def close(self) -> None:
         """End the processes; what has not been answered is dropped."""

@@ -3,6 +3,8 @@
 import sys
 from pathlib import Path
 
+from PySide6.QtCore import QTimer
+
 from .app import application
 from .desk import Desk
 from .pages.catalogue import PAGES
@@ -18,4 +20,5 @@ def open_window(bench: Path | None, settings: Path | None) -> int:
         kept.keep_text(Remembered.BENCH, str(bench.resolve()))
     window = Window(Desk(kept), PAGES)
     window.show()
+    QTimer.singleShot(0, window.desk.background.prepare)
     return app.exec()

@@ -8,7 +8,6 @@ from acquisition.campaign.item import Existing
 from acquisition.engine.state import EngineState
 from acquisition.plan.campaign import Campaign
 from acquisition.plan.measurement import Measurement
-from acquisition.recording.layout import SUFFIX
 from acquisition.run.stop import StopLevel
 
 from .desk import Desk
@@ -40,7 +39,7 @@ class Orders(QObject):
             return
         folder = self._desk.folder
         named = measurement.model_copy(update={"name": free_name(folder, measurement)})
-        self._desk.bridge.arm(Campaign(name=measurement.name, measurements=(named,)), folder)
+        self._desk.bridge.arm(Campaign(name=named.name, measurements=(named,)), folder)
 
     def arm_campaign(self, existing: Existing = Existing.REFUSE) -> None:
         """Arm the campaign of the Queue page, in a folder of its name."""
@@ -78,9 +77,9 @@ class Orders(QObject):
 
 
 def free_name(folder: Path, measurement: Measurement) -> str:
-    """Give a test a number, so that no recording of that name lies in the folder: ``dwell_003``."""
+    """Give a test a number, so that nothing of that name lies in the folder: ``dwell_003``."""
     stem = measurement.name[:LONGEST_NAME]
     number = 1
-    while any(folder.glob(f"{stem}_{number:03}*{SUFFIX}*")):
+    while any(folder.glob(f"{stem}_{number:03}*")):
         number += 1
     return f"{stem}_{number:03}"

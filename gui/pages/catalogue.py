@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 from ..desk import Desk
 from ..page import Page
-from ..page_names import COMPARE, FILES, RIG, RUN, SIMULATE, TEST
+from ..page_names import COMPARE, FILES, QUEUE, RIG, RUN, SIMULATE, TEST
 from .compare.compare_page import ComparePage
 from .files.files_page import FilesPage
+from .queue.queue_page import QueuePage
 from .rig.rig_page import RigPage
 from .run.run_page import RunPage
 from .simulate.simulate_page import SimulatePage
@@ -31,4 +32,5 @@ PAGES: tuple[PageEntry, ...] = (
     PageEntry(FILES, 4, FilesPage),
     PageEntry(COMPARE, 5, ComparePage),
     PageEntry(SIMULATE, 6, SimulatePage),
+    PageEntry(QUEUE, 7, QueuePage),
 )

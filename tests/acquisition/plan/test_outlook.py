@@ -1,0 +1,59 @@
+"""What a measurement will be is known before anything moves."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.plan.band import excited_band_hz
+from acquisition.plan.campaign import load_campaign
+from acquisition.plan.outlook import MOST_SAMPLES, SPECTRUM_POINTS, outlook
+from acquisition.rig.configuration import load_rig
+
+ROOT = Path(__file__).resolve().parents[3]
+QUICK = {each.name: each for each in load_campaign(ROOT / "campaigns" / "quick.toml").measurements}
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_peak_and_size_are_those_of_the_signal(rig, name):
+    seen = outlook(QUICK[name], rig)
+    assert seen.is_allowed
+    assert float(np.max(np.abs(seen.volts))) == pytest.approx(seen.peak_v, rel=1e-6)
+    assert seen.peak_v <= 0.5 * QUICK[name].excitation.amplitude_vpp * (1 + 1e-6)
+    assert seen.size_bytes == pytest.approx(seen.duration_s * 51200 * 4 * 4, rel=1e-4)
+    assert len(seen.spectrum_hz) <= SPECTRUM_POINTS
+
+
+def test_a_sine_is_one_line_at_its_place_and_height(rig):
+    seen = outlook(QUICK["dwell"], rig)
+    highest = int(np.argmax(seen.spectrum_v))
+    assert seen.spectrum_hz[highest] == pytest.approx(260, abs=0.5)
+    assert seen.spectrum_v[highest] == pytest.approx(0.75, rel=0.02)
+
+
+def test_limits_come_with_the_most_used_first_and_a_broken_one_is_said(rig):
+    excitation = QUICK["dwell"].excitation.model_copy(update={"amplitude_vpp": 15.0})
+    seen = outlook(QUICK["dwell"].model_copy(update={"excitation": excitation}), rig)
+    uses = [check.use for check in seen.checks]
+    assert uses == sorted(uses, reverse=True)
+    assert not seen.is_allowed
+    assert "generator" in seen.checks[0].complaint()
+
+
+def test_a_long_sweep_is_shown_from_a_bounded_number_of_samples(rig):
+    excitation = QUICK["sweep"].excitation.model_copy(update={"duration_s": 900.0})
+    seen = outlook(QUICK["sweep"].model_copy(update={"excitation": excitation}), rig)
+    assert len(seen.volts) <= 1.01 * MOST_SAMPLES
+    assert seen.sample_rate_hz > 2 * 310
+
+
+@pytest.mark.parametrize(
+    ("name", "band_hz"), [("noise", (20, 800)), ("sweep", (220, 310)), ("dwell", (130, 520))]
+)
+def test_the_band_is_what_is_excited(name, band_hz):
+    assert excited_band_hz(QUICK[name].excitation) == band_hz

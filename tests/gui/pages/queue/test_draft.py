@@ -1,0 +1,54 @@
+"""A campaign is put together entry by entry, and stays whole at every step."""
+
+import pytest
+
+from acquisition.errors import ConfigurationError
+from acquisition.plan.axis import Range
+from acquisition.plan.campaign import load_campaign
+from acquisition.plan.measurement import Measurement
+from acquisition.plan.sweep import Axis
+from gui.pages.queue.draft import moved_up, save_campaign, with_measurement, with_sweep, without
+
+DWELL = Measurement.model_validate(
+    {
+        "name": "dwell",
+        "excitation": {"kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "duration_s": 2},
+    }
+)
+LEVELS = Range(start=0.5, stop=2.5, count=5)
+
+
+def names(campaign):
+    return campaign.recording_names()
+
+
+def test_the_same_test_twice_gets_two_names():
+    campaign = with_measurement(with_measurement(None, DWELL), DWELL)
+    assert names(campaign) == ("dwell", "dwell-2")
+
+
+def test_a_sweep_over_the_level_makes_a_recording_a_level():
+    campaign = with_sweep(with_measurement(None, DWELL), DWELL, Axis.LEVEL, LEVELS)
+    levels = [each.excitation.amplitude_vpp for _, each in campaign.recordings()]
+    assert levels == [1.5, 0.5, 1.0, 1.5, 2.0, 2.5]
+
+
+def test_a_sweep_past_what_the_generator_can_play_is_refused():
+    with pytest.raises(ConfigurationError, match=r"amplitude_vpp"):
+        with_sweep(None, DWELL, Axis.LEVEL, Range(start=1, stop=100, count=2))
+
+
+def test_entries_change_places_and_go_away():
+    other = DWELL.model_copy(update={"name": "other"})
+    campaign = with_measurement(with_measurement(None, DWELL), other)
+    assert names(moved_up(campaign, 1)) == ("other", "dwell")
+    assert names(without(campaign, 0)) == ("other",)
+    assert without(without(campaign, 0), 0) is None
+
+
+def test_a_saved_campaign_reads_back_as_the_same_one(tmp_path):
+    campaign = with_sweep(
+        with_measurement(None, DWELL), DWELL, Axis.FREQUENCY, Range(start=200, stop=300, step=50)
+    )
+    save_campaign(campaign, tmp_path / "sub" / "queue.toml")
+    assert load_campaign(tmp_path / "sub" / "queue.toml") == campaign

@@ -1,0 +1,34 @@
+"""Knobs of a real bench are confirmed one by one, by somebody with a name."""
+
+from pathlib import Path
+
+from acquisition.rig.configuration import load_rig
+from gui.pages.rig.knob_sheet import KnobSheetForm
+
+CONFIGS = Path(__file__).resolve().parents[4] / "hardware_configs"
+
+
+def test_a_sheet_needs_every_tick_and_a_name(qtbot):
+    rig = load_rig(CONFIGS / "lab_rig.toml")
+    form = KnobSheetForm()
+    qtbot.addWidget(form)
+    form.show_rig(rig)
+    assert len(form.ticks) == len(rig.knobs)
+    for tick in form.ticks:
+        assert form.sheet() is None
+        tick.setChecked(True)
+    assert form.sheet() is None
+    form.operator_field.setText("C. Gong")
+    sheet = form.sheet()
+    assert sheet.knobs == rig.knobs
+    assert sheet.operator == "C. Gong"
+    form.show_rig(rig)
+    assert form.sheet() is None
+
+
+def test_a_simulated_rig_asks_for_nothing(qtbot):
+    form = KnobSheetForm()
+    qtbot.addWidget(form)
+    form.show_rig(load_rig(CONFIGS / "virtual_rig.toml"))
+    assert form.ticks == ()
+    assert form.isHidden()
