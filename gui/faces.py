@@ -1,6 +1,7 @@
 """What the banner and the status line show of what the engine says."""
 
 from dataclasses import replace
+from pathlib import Path
 
 from acquisition.engine.state import EngineState
 from acquisition.engine.status import EngineStatus, RunStatus
@@ -92,7 +93,7 @@ def status_fields(
         StatusField.OVERRUNS: f"overruns {status.lost_blocks}",
         StatusField.CLIPPED: f"clipped {status.overloads}",
         StatusField.DISK: disk,
-        StatusField.FILE: "" if status.run is None else f"file {status.run.file}",
+        StatusField.FILE: "" if status.run is None else f"file {Path(status.run.file).name}",
         StatusField.FRAMES: frames,
     }
     return texts, frozenset(marked)
