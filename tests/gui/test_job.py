@@ -17,6 +17,7 @@ from gui.desk import Desk
 from gui.orders import ABORT_KEY
 from gui.page_names import RUN, TEST
 from gui.pages.catalogue import PAGES
+from gui.pages.rig.rig_choice import PACES
 from gui.settings import Settings
 from gui.window import Window
 
@@ -55,6 +56,8 @@ def bench(qapp, own_state, tmp_path_factory):
     desk = Desk(Settings(folder / "window.ini"), partial(start_engine, Attendance.UNATTENDED))
     desk.choose_folder(folder / "recordings")
     window = Window(desk, PAGES)
+    # Free of the clock: a simulated converter that has to keep up with it may overrun on a busy machine.
+    window.pages["Rig"].choice.pace.setCurrentIndex(list(PACES).index("free"))
     window.show()
     yield window
     desk.bridge.close()
@@ -100,7 +103,7 @@ def test_a_newcomer_measures_with_five_keys(bench, qtbot):
     qtbot.waitUntil(lambda: bench.pages[RUN].is_done, timeout=PATIENCE_MS)
     assert len(keys) <= 5
     row = recorded(bench)
-    assert row.state == "recorded"
+    assert row.state == "recorded", row.reason
     with open_recording(row.file) as recording:
         assert recording.samples > 51_200
 

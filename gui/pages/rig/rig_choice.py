@@ -32,11 +32,11 @@ class RigChoice(QWidget):
         own = QPushButton("Own file…")
         own.setToolTip("Open a hardware configuration of your own")
         own.clicked.connect(self._ask)
-        self._pace = Choice()
-        self._pace.setAccessibleName("Pace of the simulated rig")
-        self._pace.setToolTip("How fast the simulated instruments run; a real bench has its own pace")
+        self.pace = Choice()
+        self.pace.setAccessibleName("Pace of the simulated rig")
+        self.pace.setToolTip("How fast the simulated instruments run; a real bench has its own pace")
         for words in PACES.values():
-            self._pace.addItem(words)
+            self.pace.addItem(words)
         line = QHBoxLayout()
         line.addWidget(self._box, 1)
         line.addWidget(own)
@@ -44,7 +44,7 @@ class RigChoice(QWidget):
         self._form.setContentsMargins(0, 0, 0, 0)
         for text, row, buddy in (
             ("Configuration", line, self._box),
-            ("Runs", self._pace, self._pace),
+            ("Runs", self.pace, self.pace),
         ):
             label = QLabel(text)
             label.setBuddy(buddy)
@@ -52,7 +52,7 @@ class RigChoice(QWidget):
         for path in sorted(all_shipped("hardware_configs"), key=lambda each: "virtual" not in each.stem):
             self._add(path)
         self._box.currentIndexChanged.connect(self._load)
-        self._pace.currentIndexChanged.connect(self.chosen)
+        self.pace.currentIndexChanged.connect(self.chosen)
 
     @property
     def path(self) -> Path | None:
@@ -65,7 +65,7 @@ class RigChoice(QWidget):
         """The chosen rig, at the chosen pace."""
         if self._rig is None or self._rig.virtual is None:
             return self._rig
-        pace = list(PACES)[self._pace.currentIndex()]
+        pace = list(PACES)[self.pace.currentIndex()]
         return self._rig.model_copy(update={"virtual": self._rig.virtual.model_copy(update={"pace": pace})})
 
     def choose(self, path: Path) -> None:
