@@ -1,6 +1,7 @@
 """Pictures of every page, light and dark, made by the window itself while it measures on the rig."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import monotonic
@@ -8,7 +9,8 @@ from time import monotonic
 from PySide6.QtCore import QEventLoop, QTimer
 from PySide6.QtWidgets import QApplication
 
-from acquisition.engine.state import EngineState
+from acquisition.engine.start import start_engine
+from acquisition.engine.state import Attendance, EngineState
 from acquisition.plan.measurement import Measurement
 
 from .app import application
@@ -52,7 +54,8 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
         settings = Settings(Path(scratch) / "window.ini")
         if bench is not None:
             settings.keep_text(Remembered.BENCH, str(bench.resolve()))
-        desk = Desk(settings)
+        # Unattended: to change the theme and to write pictures takes longer than an attended run waits.
+        desk = Desk(settings, partial(start_engine, Attendance.UNATTENDED))
         desk.choose_folder(Path(scratch) / "recordings")
         window = Window(desk, PAGES)
         window.resize(*SIZE)
