@@ -13,7 +13,7 @@ A program that polls ("how many samples are there?") would otherwise poll for ev
 """
 
 FAILED_CALL_S = 0.5
-"""Rig time that a call takes which fails on demand, when nothing else lets time pass [s].
+"""Rig time before a call that has failed on demand is tried again, when nothing else lets time pass [s].
 
 A fault that heals after a while would otherwise last for ever for a program that tries again.
 """
@@ -76,7 +76,7 @@ class Pace(Protocol):
         """Let a question about progress be answered with something newer than the last time."""
 
     def stumble(self, rig: RigClock) -> None:
-        """Let a call that fails on demand take its time."""
+        """Let time pass before a call that has failed on demand is tried again."""
 
 
 def _wait(rig: RigClock, is_there: Callable[[], bool], timeout_s: float) -> bool:

@@ -55,6 +55,8 @@ class DaqServer:
     ) -> None:
         """See `serve`."""
         self.faults = Faults()
+        self._refused: set[str] = set()
+        """Calls that were refused the last time they were made."""
         self._pace = pace
         self._rig = Rig(world, pace)
         self._system = DaqmxSystem(self._rig, catalogue)
@@ -144,12 +146,15 @@ class DaqServer:
         return handle
 
     def _check_faults(self, name: str) -> None:
-        """Fail the call if a rule says so; that takes time, too."""
+        """Fail the call if a rule says so. The first refusal comes at once; to try again takes time."""
+        if name in self._refused:
+            self._pace.stumble(self._rig)
         try:
             self.faults.check(name, self._rig.now_s)
         except DaqmxRefusal:  # a server that is gone takes no time: nobody is there
-            self._pace.stumble(self._rig)
+            self._refused.add(name)
             raise
+        self._refused.discard(name)
 
     def _listen(self, name: str, call: Callable[[Any, grpc.ServicerContext], Listener]) -> Handler:
         def handle(request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
