@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from acquisition.follow_parent import follow_parent
 from analysis.campaign_results import CampaignResults, analyse_files, assembled
 from sim.accuracy import Accuracy
 from sim.drive import Harmonic, Sampled
@@ -48,7 +49,7 @@ class Analyst:
 def second_process(name: str) -> Iterator[Analyst]:
     """Keep an analyst at work while inside; what it has not begun when an error leaves is dropped."""
     # A fresh interpreter: a fork would copy the threads' locks of the instrument libraries.
-    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_leave_ctrl_c_to_the_parent)
+    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_follow)
     pool.submit(_compile)
     try:
         yield Analyst(pool, name)
@@ -63,5 +64,7 @@ def _compile() -> None:
     follow_samples(specimen, Sampled(np.zeros(100), 51_200.0))
 
 
-def _leave_ctrl_c_to_the_parent() -> None:
+def _follow() -> None:
+    """Leave Ctrl-C to the command, and end with it."""
+    follow_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -9,6 +9,8 @@ from typing import Any, ParamSpec, TypeVar
 
 from PySide6.QtCore import QObject, QTimer
 
+from acquisition.follow_parent import follow_parent
+
 POLL_MS = 50
 NICE = 10
 
@@ -32,7 +34,8 @@ class Job:
 
 
 def give_way() -> None:
-    """Let a measurement, and the window, have the processor first; where the system knows of that."""
+    """Let a measurement, and the window, have the processor first; end with the window, however it ends."""
+    follow_parent()
     if hasattr(os, "nice"):
         os.nice(NICE)
 

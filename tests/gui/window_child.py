@@ -1,0 +1,56 @@
+"""A real window that runs a long measurement on the wall's clock, to be killed or frozen by a test."""
+
+import sys
+from pathlib import Path
+
+from PySide6.QtCore import QTimer
+
+from acquisition.engine.state import EngineState
+from acquisition.plan.campaign import Campaign
+from acquisition.rig.configuration import load_rig
+from gui.app import application
+from gui.desk import Desk
+from gui.pages.catalogue import PAGES
+from gui.settings import Settings
+from gui.window import Window
+
+DWELL = {"kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "settle_s": 0.2, "duration_s": 600}
+PLAN = {
+    "name": "trial",
+    "measurements": [{"name": "run", "ramp_s": 0.3, "ramp_step_s": 0.03, "excitation": DWELL}],
+}
+
+
+def main(folder: Path, config: Path) -> None:
+    """Open the window, and let it measure until it is killed."""
+    rig = load_rig(config)
+    rig = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
+    app = application(["vibench"])
+    window = Window(Desk(Settings(folder / "window.ini")), PAGES)
+    window.show()
+    bridge = window.desk.bridge
+    bridge.open(rig, None)
+    done: list[str] = []
+
+    def go_on() -> None:
+        """Do what comes next, once the engine is where it has to be."""
+        run = None if bridge.status is None else bridge.status.run
+        match done, bridge.state:
+            case [], EngineState.READY:
+                done.append("armed")
+                bridge.arm(Campaign.model_validate(PLAN), folder / "recordings")
+            case ["armed"], EngineState.ARMED:
+                done.append("started")
+                bridge.start()
+            case ["armed", "started"], EngineState.RUNNING if run is not None and run.segment == "dwell":
+                done.append("told")
+                print("running", flush=True)  # noqa: T201 - its word to the test
+
+    timer = QTimer()
+    timer.timeout.connect(go_on)
+    timer.start(20)
+    app.exec()
+
+
+if __name__ == "__main__":  # the window's own workers import this file
+    main(Path(sys.argv[1]), Path(sys.argv[2]))
