@@ -8,9 +8,8 @@ from types import FrameType
 
 from .stop import Cause, StopRequest, StopSwitch
 
-CAUSES = {signal.SIGINT: Cause.KEYBOARD, signal.SIGTERM: Cause.TERMINATED}
-if hasattr(signal, "SIGHUP"):  # Windows has none
-    CAUSES[signal.SIGHUP] = Cause.TERMINATED
+CAUSES = {"SIGINT": Cause.KEYBOARD, "SIGTERM": Cause.TERMINATED, "SIGHUP": Cause.TERMINATED}
+"""By name, since Windows has no SIGHUP."""
 
 
 @contextmanager
@@ -34,15 +33,21 @@ def stop_on_signal(switch: StopSwitch) -> Iterator[None]:
         name = signal.Signals(number).name
         match len(received):
             case 1:
-                cause = CAUSES[signal.Signals(number)]
-                switch.ask(StopRequest.by(cause, f"{name}: stopped from the keyboard or by the system"))
+                switch.ask(
+                    StopRequest.by(CAUSES[name], f"{name}: stopped from the keyboard or by the system")
+                )
             case 2:
                 raise KeyboardInterrupt
 
-    heeded = [number for number in CAUSES if signal.getsignal(number) is not signal.SIG_IGN]
-    before = {number: signal.signal(number, on_signal) for number in heeded}
+    before = {number: signal.signal(number, on_signal) for number in _heeded()}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _heeded() -> list[signal.Signals]:
+    """All but a SIGHUP that whoever started the program has chosen to ignore."""
+    known = [signal.Signals[name] for name in CAUSES if name in signal.Signals.__members__]
+    return [each for each in known if each.name != "SIGHUP" or signal.getsignal(each) is not signal.SIG_IGN]

@@ -148,6 +148,7 @@ def test_a_cancelled_run_ends_with_a_ramp_to_silence(virtual_bench, tmp_path):
 
 
 CHILD = """
+import signal
 import sys
 from pathlib import Path
 from acquisition.bench import open_bench
@@ -164,6 +165,7 @@ def tell(progress):
         print("recording", flush=True)
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whatever the test was started by
     plan = Measurement(
         name="run", excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.1, duration_s=20000)
     )
