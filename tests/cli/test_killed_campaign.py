@@ -14,7 +14,7 @@ from .killed_campaign import amplitudes, branches, command, done, killed, short_
 
 @pytest.mark.parametrize(
     ("points", "kills"),
-    [pytest.param(40, 2, id="40"), pytest.param(200, 10, id="200", marks=pytest.mark.slow)],
+    [pytest.param(16, 2, id="16"), pytest.param(200, 10, id="200", marks=pytest.mark.slow)],
 )
 @pytest.mark.timeout(1500)
 def test_a_campaign_that_is_killed_and_resumed_makes_every_point_once(tmp_path, points, kills):
