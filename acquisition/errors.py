@@ -72,5 +72,9 @@ class CheckFailed(AcquisitionError):
     """The bench check before arming found something that does not fit the configuration."""
 
 
+class CheckStopped(CheckFailed):
+    """Somebody ended the bench check before it was through: it says nothing about the bench."""
+
+
 class RecordingError(AcquisitionError, OSError):
     """A recording cannot be created, written, finished or read."""

@@ -1,5 +1,6 @@
 """`vibench bench`: what is there, and is it well."""
 
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
@@ -12,8 +13,11 @@ from acquisition.check.admission import check_and_keep
 from acquisition.check.archive import last_result
 from acquisition.check.finding import Verdict
 from acquisition.check.result import CheckResult
+from acquisition.engine.lock import BenchLock
 from acquisition.errors import CheckFailed
 from acquisition.rig.configuration import Rig, load_rig
+from acquisition.run.stop import StopSwitch
+from acquisition.run.stop_on_signal import stop_on_signal
 
 from .output import console, print_json
 from .paths import AsJson, BenchPath, bench_path
@@ -71,8 +75,9 @@ def check(
 
 
 def _now(path: Path, out: Path) -> CheckResult:
-    with open_bench(path) as opened:
-        return check_and_keep(opened, out)
+    rig, switch = load_rig(path), StopSwitch()
+    with closing(BenchLock.of(rig)), open_bench(rig) as opened, stop_on_signal(switch):
+        return check_and_keep(opened, out, switch=switch)
 
 
 def _last(rig: Rig) -> CheckResult:

@@ -9,6 +9,7 @@ from typing import assert_never
 from ..bench import Bench, Reality
 from ..errors import CheckFailed
 from ..rig.configuration import Rig
+from ..run.stop import StopSwitch
 from .archive import keep, last_result
 from .bench_report import check_bench
 from .drift import drift
@@ -34,9 +35,11 @@ def utc_now() -> datetime:
     return datetime.now(UTC)
 
 
-def check_and_keep(bench: Bench, folder: Path, clock: Clock = utc_now) -> CheckResult:
+def check_and_keep(
+    bench: Bench, folder: Path, clock: Clock = utc_now, switch: StopSwitch | None = None
+) -> CheckResult:
     """Check a bench, compare with the last time, and keep the result for later; see `check_bench`."""
-    report, at = check_bench(bench, folder), clock()
+    report, at = check_bench(bench, folder, switch), clock()
     last = last_result(bench.rig.name)
     if last is not None and last.rig_digest == rig_digest(bench.rig):
         report = BenchReport(findings=(*report.findings, *drift(report, last, at)))
@@ -47,7 +50,11 @@ def check_and_keep(bench: Bench, folder: Path, clock: Clock = utc_now) -> CheckR
 
 
 def require_fresh(
-    bench: Bench, folder: Path, rule: CheckRule = CheckRule.FRESH, clock: Clock = utc_now
+    bench: Bench,
+    folder: Path,
+    rule: CheckRule = CheckRule.FRESH,
+    clock: Clock = utc_now,
+    switch: StopSwitch | None = None,
 ) -> CheckResult | None:
     """Admit a bench to be armed, on its last check or on one made now; recordings then carry the result.
 
@@ -59,6 +66,8 @@ def require_fresh(
         Open, and not sampling.
     folder
         Where recordings will go.
+    switch
+        Lets others end a check that is made now.
 
     Raises
     ------
@@ -74,14 +83,14 @@ def require_fresh(
             bench.last_check = last_result(bench.rig.name)
             return bench.last_check
         case CheckRule.NOW:
-            return _passed(check_and_keep(bench, folder, clock))
+            return _passed(check_and_keep(bench, folder, clock, switch))
         case CheckRule.FRESH:
-            return _fresh(bench, folder, clock)
+            return _fresh(bench, folder, clock, switch)
         case _:
             assert_never(rule)
 
 
-def _fresh(bench: Bench, folder: Path, clock: Clock) -> CheckResult:
+def _fresh(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | None) -> CheckResult:
     last = last_result(bench.rig.name)
     complaint = why_not(last, bench.rig, clock())
     if last is not None and complaint is None:
@@ -89,7 +98,7 @@ def _fresh(bench: Bench, folder: Path, clock: Clock) -> CheckResult:
         return last
     match bench.reality:
         case Reality.SIMULATED:
-            return _passed(check_and_keep(bench, folder, clock))
+            return _passed(check_and_keep(bench, folder, clock, switch))
         case Reality.REAL:
             raise CheckFailed(
                 f"{complaint}. Nothing was played; check it with 'vibench bench check' or --check now, or go "

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..bench import Bench
+from ..errors import CheckStopped
 from ..excitation.dwell import Dwell
 from ..excitation.steps import Tone
 from ..instruments import AnalogOutput, IdleOutput, Samples
@@ -17,6 +18,8 @@ from ..rig.channel import Channel
 from ..run.drive import Drive, drive_for
 from ..run.schedule import CHECK_FREQUENCY_HZ, Phase
 from ..run.state import RunState
+from ..run.stop import StopSwitch
+from ..run.tape import BLOCK_S
 from .finding import BenchReport, Bounds, Finding, Verdict, judged
 from .loop import LoopCheck
 
@@ -39,7 +42,7 @@ ROOM_H = Bounds(-10.0, -1.0)
 """Recording time that the disk should hold, negative since more is better [h]."""
 
 
-def check_bench(bench: Bench, folder: Path) -> BenchReport:
+def check_bench(bench: Bench, folder: Path, switch: StopSwitch | None = None) -> BenchReport:
     """Look at everything that can be known before a measurement; the generator is silent afterwards.
 
     Listens in silence, plays two per cent of the amplitude limit at 160 Hz for some seconds by
@@ -51,9 +54,13 @@ def check_bench(bench: Bench, folder: Path) -> BenchReport:
         Open, and not sampling.
     folder
         Where recordings will go.
+    switch
+        Lets others end the check, within a block of samples.
 
     Raises
     ------
+    CheckStopped
+        When somebody did.
     InstrumentError
         When an instrument fails; what is merely wrong is a finding.
 
@@ -61,10 +68,11 @@ def check_bench(bench: Bench, folder: Path) -> BenchReport:
     findings = [*_identified(bench), *_calibrated(bench), _room(bench, folder)]
     amplitude_vpp = CHECK_SHARE * bench.rig.generator.amplitude_limit_vpp
     drive = drive_for(bench, _small_sine(amplitude_vpp))
+    ear = _Ear(bench, StopSwitch() if switch is None else switch)
     bench.generator.stop()
-    quiet = _listen(bench)
-    heard = _heard(bench, drive)
-    after = _listen(bench)
+    quiet = ear.in_silence()
+    heard = ear.during_sine(drive)
+    after = ear.in_silence()
     if drive.player is Player.GENERATOR:
         findings.append(_latency(bench))
     if bench.output is not None:
@@ -75,14 +83,54 @@ def check_bench(bench: Bench, folder: Path) -> BenchReport:
     return BenchReport(findings=tuple(findings))
 
 
-def _listen(bench: Bench) -> Samples:
-    rate_hz = bench.digitizer.sample_rate_hz
-    bench.digitizer.start()
-    try:
-        bench.digitizer.read(round(_SETTLE_S * rate_hz))
-        return bench.digitizer.read(round(_LISTEN_S * rate_hz)).volts
-    finally:
-        bench.digitizer.stop()
+class _Ear:
+    """Listens to a bench for the check, in blocks between which the check can be stopped."""
+
+    def __init__(self, bench: Bench, switch: StopSwitch) -> None:
+        self._bench = bench
+        self._switch = switch
+
+    def in_silence(self) -> Samples:
+        """Hear what there is when nothing plays, after couplings have settled."""
+        digitizer = self._bench.digitizer
+        digitizer.start()
+        try:
+            self._heard_for(_SETTLE_S)
+            return np.concatenate(self._heard_for(_LISTEN_S), axis=1)
+        finally:
+            digitizer.stop()
+
+    def during_sine(self, drive: Drive) -> Samples:
+        """Play the sine without a ramp, as the check of a run does, and hear it when all has settled."""
+        tone = Tone(CHECK_FREQUENCY_HZ)
+        settling = Phase(RunState.CHECKING, tone, _SETTLE_S)
+        listening = Phase(RunState.CHECKING, tone, _LISTEN_S)
+        try:
+            drive.arm((settling, listening))
+            self._bench.digitizer.start()
+            for wait_s in drive.perform(settling):
+                self._heard_for(wait_s)
+            heard = [block for wait_s in drive.perform(listening) for block in self._heard_for(wait_s)]
+            return np.concatenate(heard, axis=1)
+        finally:
+            try:
+                drive.silence()
+            finally:
+                self._bench.digitizer.stop()
+
+    def _heard_for(self, duration_s: float) -> list[Samples]:
+        digitizer = self._bench.digitizer
+        rate_hz = digitizer.sample_rate_hz
+        left, longest = round(duration_s * rate_hz), round(BLOCK_S * rate_hz)
+        heard = []
+        while left > 0:
+            if (request := self._switch.request) is not None:
+                raise CheckStopped(
+                    f"the bench check was stopped: {request.reason}. The output is off; check the bench again"
+                )
+            heard.append(digitizer.read(min(longest, left)).volts)
+            left -= heard[-1].shape[1]
+        return heard
 
 
 def _small_sine(amplitude_vpp: float) -> Measurement:
@@ -93,28 +141,6 @@ def _small_sine(amplitude_vpp: float) -> Measurement:
         duration_s=_LISTEN_S,
     )
     return Measurement(name="check", excitation=sine)
-
-
-def _heard(bench: Bench, drive: Drive) -> Samples:
-    """Play the sine without a ramp, as the check of a run does, and listen when all has settled."""
-    tone = Tone(CHECK_FREQUENCY_HZ)
-    settling = Phase(RunState.CHECKING, tone, _SETTLE_S)
-    listening = Phase(RunState.CHECKING, tone, _LISTEN_S)
-    try:
-        drive.arm((settling, listening))
-        bench.digitizer.start()
-        _read(bench, drive, settling)
-        return np.concatenate(_read(bench, drive, listening), axis=1)
-    finally:
-        try:
-            drive.silence()
-        finally:
-            bench.digitizer.stop()
-
-
-def _read(bench: Bench, drive: Drive, phase: Phase) -> list[Samples]:
-    rate_hz = bench.digitizer.sample_rate_hz
-    return [bench.digitizer.read(round(wait_s * rate_hz)).volts for wait_s in drive.perform(phase)]
 
 
 def _identified(bench: Bench) -> list[Finding]:

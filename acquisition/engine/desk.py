@@ -13,9 +13,12 @@ from .errors import EngineError
 from .orders import Orders
 from .recent import Glance
 from .sheet import confirmed_by
-from .state import DRIVING, VIEWER_PATIENCE_S, Attendance, EngineState
+from .state import DRIVING, SOUNDING, VIEWER_PATIENCE_S, Attendance, EngineState
 from .status import ArmedPlan, EngineStatus
 from .work import Work
+
+STALL_S = 0.2
+"""A look after this process's own viewers that comes so late tells of a stall of this process [s]."""
 
 
 class Desk:
@@ -31,7 +34,7 @@ class Desk:
         self._asking = Lock()
         self._orders: Orders | None = None
         self._armed_s = 0.0
-        self._heard_s = monotonic()
+        self._heard_s = self._looked_s = monotonic()
 
     def heard(self) -> None:
         """Note that somebody is there."""
@@ -66,6 +69,7 @@ class Desk:
         """Check the bench with a small sine; ``folder`` is where recordings will go."""
         with self._asking:
             self._require("check the bench", EngineState.READY)
+            self._engine.switch = StopSwitch()
             self._engine.shown.enter(EngineState.CHECKING)
             self._work.put(lambda: self._engine.check(folder))
 
@@ -119,6 +123,9 @@ class Desk:
     def look_after(self) -> None:
         """Do what time asks for: disarm what nobody starts, abort what nobody attends."""
         engine, now_s = self._engine, monotonic()
+        since_s, self._looked_s = now_s - self._looked_s, now_s
+        if since_s > STALL_S:  # whoever asked while this process did not run is not to blame
+            self._heard_s += since_s
         if engine.shown.state is EngineState.ARMED and now_s - self._armed_s > ARMED_S:
             self.disarm()
             engine.shown.messages.warn(f"Armed for {ARMED_S:g} s and not started.", "Disarmed.", "Arm again.")
@@ -130,11 +137,10 @@ class Desk:
         engine = self._engine
         if engine.shown.state is EngineState.ARMED:
             self.disarm()
-        elif engine.shown.state in DRIVING and engine.switch.request is None:
+        elif engine.shown.state in SOUNDING and engine.switch.request is None:
             engine.switch.ask(StopRequest.by(Cause.VIEWER_GONE, reason))
-            engine.shown.messages.warn(
-                f"The viewer is gone: {reason}.", "Ramped down; the recording is kept."
-            )
+            kept = "; the recording is kept" if engine.shown.state in DRIVING else ""
+            engine.shown.messages.warn(f"The viewer is gone: {reason}.", f"Ramped down{kept}.")
 
     def _disarm(self) -> None:
         if self._engine.shown.state is EngineState.ARMED:

@@ -11,10 +11,11 @@ from ..campaign.notice import Messenger
 from ..campaign.opening import make_folder
 from ..campaign.run_campaign import run_campaign
 from ..check.admission import check_and_keep, require_fresh
-from ..errors import AcquisitionError, InstrumentLost
+from ..errors import AcquisitionError, CheckStopped, InstrumentLost
 from ..rig.configuration import Rig
 from ..rig.knobs import Confirm
 from ..run.stop import StopSwitch
+from ..run.stop_on_signal import stop_on_signal
 from .facts import bench_facts
 from .lock import BenchLock
 from .orders import Orders
@@ -65,7 +66,10 @@ class Engine:
     def check(self, folder: Path) -> None:
         """Check the bench with a small sine, and keep what was found."""
         try:
-            result = check_and_keep(self.bench, folder)
+            result = check_and_keep(self.bench, folder, switch=self.switch)
+        except CheckStopped as stopped:
+            self._check_ended(stopped)
+            return
         except AcquisitionError as error:
             self._fails(error, EngineState.READY)
             raise
@@ -93,7 +97,8 @@ class Engine:
         self.shown.begin(orders.campaign, orders.folder)
         try:
             make_folder(orders.folder)
-            require_fresh(self.bench, orders.folder, orders.check)
+            with stop_on_signal(self.switch):
+                require_fresh(self.bench, orders.folder, orders.check, switch=self.switch)
             items = run_campaign(
                 self.bench,
                 orders.campaign,
@@ -108,6 +113,9 @@ class Engine:
                 on_happening=on_happening,
                 messengers=messengers,
             )
+        except CheckStopped as stopped:
+            self._check_ended(stopped)
+            return ()
         except AcquisitionError as error:
             self.shown.failed(str(error))
             self._fails(error, EngineState.READY)
@@ -115,6 +123,11 @@ class Engine:
         self.shown.messages.info(_told(items))
         self.shown.enter(EngineState.READY)
         return items
+
+    def _check_ended(self, stopped: CheckStopped) -> None:
+        """Show that somebody wanted the check to end; nothing is wrong."""
+        self.shown.messages.info(str(stopped))
+        self.shown.enter(EngineState.READY)
 
     def fault(self, error: Exception) -> None:
         """Show what nobody has foreseen, and let the bench go."""
@@ -139,7 +152,7 @@ class Engine:
         finally:
             self.shown.bench(None)
             if lock is not None:
-                lock.release()
+                lock.close()
 
 
 def _told(items: tuple[CampaignItem, ...]) -> str:

@@ -46,7 +46,7 @@ class BenchLock:
         os.pwrite(descriptor, str(os.getpid()).encode(), 0)
         return cls(descriptor)
 
-    def release(self) -> None:
+    def close(self) -> None:
         """Give the bench back. Legal at any time."""
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is not None:

@@ -27,7 +27,9 @@ class EngineState(StrEnum):
 
 
 DRIVING = frozenset({EngineState.RUNNING, EngineState.HELD, EngineState.RAMPING_DOWN})
-"""The drive may be on."""
+"""The drive may be on, for a recording."""
+SOUNDING = DRIVING | {EngineState.CHECKING}
+"""The drive may be on, if only for the small sine of a check."""
 
 
 class Attendance(StrEnum):

@@ -10,8 +10,9 @@ from acquisition.bench import open_bench
 from acquisition.check.bench_report import check_bench
 from acquisition.check.finding import BenchReport, Bounds, Verdict
 from acquisition.check.sine_fit import clock_ratio, fit_sine
-from acquisition.errors import InstrumentLost
+from acquisition.errors import CheckStopped, InstrumentLost
 from acquisition.rig.configuration import load_rig
+from acquisition.run.stop import Cause, StopRequest, StopSwitch
 from acquisition.virtual.generator.output_signal import Panel
 from acquisition.virtual.generator.scpi_command import Quirks
 
@@ -64,6 +65,28 @@ def test_a_fault_is_found_by_name_with_advice(checked, rig, tmp_path, fault, nam
     assert name in failed(report)
     assert advice in report[name].advice
     assert report.verdict is Verdict.FAIL
+
+
+class PressedOnceItSounds(StopSwitch):
+    """Asks for a stop when the generator's output is on."""
+
+    def __init__(self, generator):
+        super().__init__()
+        self.generator = generator
+
+    @property
+    def request(self):
+        if self.generator.execute(b"OUTP1?").data == b"1\n":
+            self.ask(StopRequest.by(Cause.TERMINATED, "SIGTERM"))
+        return super().request
+
+
+def test_a_check_can_be_stopped_while_it_sounds_and_leaves_silence(bench_of, rig, tmp_path):
+    with bench_of(rig) as (bench, virtual):
+        switch = PressedOnceItSounds(virtual.generator)
+        with pytest.raises(CheckStopped, match=r"was stopped: SIGTERM\. The output is off"):
+            check_bench(bench, tmp_path, switch)
+        assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
 
 
 def test_a_wrong_load_at_the_panel_is_named_as_such(checked, rig, tmp_path):
