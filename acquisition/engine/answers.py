@@ -39,8 +39,10 @@ def refused(sentence: str, error: Exception) -> Message:
 
 def _answer(desk: Desk, request: ask.Request) -> Message:
     match request:
-        case ask.Status():
-            return _model(desk.status())
+        case ask.Status(known_rows=known):
+            status = desk.status()
+            is_known = status.rows_number == known
+            return _model(status.model_copy(update={"rows": ()}) if is_known else status)
         case ask.Look(since_sample=since, most=most):
             return _glance(desk.look(since, most))
         case ask.Arm(orders=orders):
@@ -52,6 +54,7 @@ def _answer(desk: Desk, request: ask.Request) -> Message:
 
 _ORDERS: Mapping[type, Callable[[Desk, Any], None]] = {
     ask.Hello: lambda _desk, _order: None,
+    ask.Beat: lambda _desk, _order: None,
     ask.Open: lambda desk, order: desk.open(order.rig, order.confirmations),
     ask.Close: lambda desk, _order: desk.close(),
     ask.Check: lambda desk, order: desk.check(Path(order.folder)),

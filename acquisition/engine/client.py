@@ -23,7 +23,7 @@ from .orders import Orders
 from .recent import Glance
 from .server import EngineAddress
 from .state import Visit
-from .status import ArmedPlan, EngineStatus
+from .status import ArmedPlan, EngineStatus, RowStatus
 from .wire import Message, receive, send
 
 PATIENCE_S = 5.0
@@ -42,6 +42,7 @@ class EngineClient:
     def __init__(self, connection: socket.socket) -> None:
         self._connection = connection
         self._asking = Lock()
+        self._rows: tuple[int, tuple[RowStatus, ...]] = (-1, ())
 
     @classmethod
     def attach(cls, address: EngineAddress, visit: Visit = Visit.VISITING) -> "EngineClient":
@@ -64,7 +65,12 @@ class EngineClient:
 
     def status(self) -> EngineStatus:
         """Where the engine stands."""
-        return self._told(ask.Status(), EngineStatus)
+        number, rows = self._rows
+        status = self._told(ask.Status(known_rows=number), EngineStatus)
+        if status.rows_number == number:
+            return status.model_copy(update={"rows": rows})
+        self._rows = (status.rows_number, status.rows)
+        return status
 
     def look(self, since_sample: int, most: int) -> Glance:
         """Give the newest samples of the run: from ``since_sample`` on, at most ``most`` a channel."""
@@ -142,6 +148,8 @@ class EngineClient:
                 send(self._connection, Message(request.model_dump_json().encode()))
                 answer = receive(self._connection)
         except OSError as error:
+            # An answer that comes late must not be taken for that to the next question.
+            self._connection.close()
             raise EngineGone(
                 f"the engine does not answer ({error}); its process has ended or hangs. What it drove is "
                 "silent if it could ramp down: look at the bench"

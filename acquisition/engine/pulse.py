@@ -11,11 +11,11 @@ from .state import Visit
 from .wire import Message, receive, send
 
 READ_BYTES = 1 << 20
-_BEAT = Message(ask.Status().model_dump_json().encode())
+_BEAT = Message(ask.Beat().model_dump_json().encode())
 
 
 class Pulse:
-    """A connection of its own, on which the status is asked for and the answer is thrown away.
+    """A connection of its own, on which nothing is wanted and every answer is thrown away.
 
     A viewer's thread that paints can beat at any time: a beat takes some ten microseconds, takes no lock
     and lets no other thread in between.

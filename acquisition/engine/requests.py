@@ -87,6 +87,14 @@ class Status(FrozenModel):
     """Ask where the engine stands."""
 
     ask: Literal["status"] = "status"
+    known_rows: int = -1
+    """Number of the rows that the viewer has; the answer leaves them out if it is still the same."""
+
+
+class Beat(FrozenModel):
+    """Say that somebody is there, and want nothing."""
+
+    ask: Literal["beat"] = "beat"
 
 
 class Look(FrozenModel):
@@ -104,7 +112,20 @@ class Shutdown(FrozenModel):
 
 
 Request: TypeAlias = Annotated[
-    Hello | Open | Close | Check | Arm | Disarm | Start | Stop | Resume | Mark | Status | Look | Shutdown,
+    Hello
+    | Open
+    | Close
+    | Check
+    | Arm
+    | Disarm
+    | Start
+    | Stop
+    | Resume
+    | Mark
+    | Status
+    | Beat
+    | Look
+    | Shutdown,
     Field(discriminator="ask"),
 ]
 

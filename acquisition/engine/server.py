@@ -79,7 +79,8 @@ class Server:
         except ValidationError:
             hello = ask.Hello(token="")
         if hmac.compare_digest(hello.token.encode(), self._token.encode()):
-            self._desk.heard()
+            if hello.visit is Visit.ATTENDING:
+                self._desk.heard()
             send(connection, DONE)
             return hello.visit
         send(connection, refused("the token is not this engine's; nobody was let in", EngineError()))

@@ -33,7 +33,7 @@ class Shown:
         self._armed_until_s = 0.0
         self._folder = Path()
         self._disk_due_s = 0.0
-        self._name = ""
+        self._file = Path()
         self._done_s = 0.0
         self._campaign_s = 0.0
         self._overloads = 0
@@ -68,7 +68,8 @@ class Shown:
 
     def bench(self, bench: BenchFacts | None) -> None:
         """Show which bench is open; another one has not been checked."""
-        self._put(bench=bench, check=None, checked_utc="", rows=())
+        self._put(bench=bench, check=None, checked_utc="")
+        self._put_rows(())
 
     def checked(self, report: BenchReport, utc: str) -> None:
         """Show what the check has found."""
@@ -77,18 +78,20 @@ class Shown:
     def arm(self, plan: ArmedPlan, campaign: Campaign) -> None:
         """Show what is going to happen."""
         self._armed_until_s = monotonic() + plan.expires_in_s
-        self._put(state=EngineState.ARMED, armed=plan, rows=_queued(campaign))
+        self._put_rows(_queued(campaign))
+        self._put(state=EngineState.ARMED, armed=plan)
 
     def begin(self, campaign: Campaign, folder: Path) -> None:
         """Show that a campaign is being carried out."""
         self._folder = folder
-        self._campaign_s, self._done_s, self._name = campaign.duration_s, 0.0, ""
-        self._put(state=EngineState.RUNNING, rows=_queued(campaign))
+        self._campaign_s, self._done_s, self._file = campaign.duration_s, 0.0, Path()
+        self._put_rows(_queued(campaign))
+        self._put(state=EngineState.RUNNING, armed=None)
 
     def tell(self, progress: CampaignProgress, bench: BenchFacts) -> None:
         """Show what a block has changed."""
         run = progress.run
-        if progress.name != self._name:
+        if progress.path != self._file:  # another attempt at one point is another recording
             self._begin(progress, bench)
         self.recent.add(run.block)
         self._overloads += len(run.block.overloads)
@@ -102,7 +105,7 @@ class Shown:
 
     def item(self, item: CampaignItem) -> None:
         """Show how a recording came out."""
-        if self._status.run is not None and item.name == self._name:
+        if self._status.run is not None and item.name == self._status.run.name:
             self._done_s += self._status.run.total_s
         self._row(item.name, item.result.value, item.reason, str(item.path))
 
@@ -113,14 +116,14 @@ class Shown:
                 self._row(row.name, "failed", reason, row.file)
 
     def _begin(self, progress: CampaignProgress, bench: BenchFacts) -> None:
-        self._name = progress.name
+        self._file = progress.path
         self._overloads = 0
         self.recent.begin(len(bench.channels), bench.sample_rate_hz)
         self._row(progress.name, "running", "", str(progress.path))
 
     def _row(self, name: str, state: str, reason: str, file: str) -> None:
         told = RowStatus(name=name, state=state, reason=reason, file=file)
-        self._put(rows=tuple(told if row.name == name else row for row in self._status.rows))
+        self._put_rows(tuple(told if row.name == name else row for row in self._status.rows))
 
     def _run_status(self, progress: CampaignProgress) -> RunStatus:
         run = progress.run
@@ -144,7 +147,13 @@ class Shown:
         if monotonic() < self._disk_due_s:
             return {}
         self._disk_due_s = monotonic() + DISK_INTERVAL_S
-        return {"disk_free_bytes": shutil.disk_usage(self._folder).free}
+        try:
+            return {"disk_free_bytes": shutil.disk_usage(self._folder).free}
+        except OSError:  # the folder is gone: the recorder will say so, and a picture ends no run
+            return {"disk_free_bytes": 0}
+
+    def _put_rows(self, rows: tuple[RowStatus, ...]) -> None:
+        self._put(rows=rows, rows_number=self._status.rows_number + 1)
 
     def _put(self, **changes: object) -> None:
         with self._lock:

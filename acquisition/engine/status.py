@@ -111,6 +111,8 @@ class EngineStatus(FrozenModel):
     run: RunStatus | None = None
     levels: tuple[ChannelLevel, ...] = ()
     rows: tuple[RowStatus, ...] = ()
+    rows_number: int = 0
+    """Changes whenever a row does: thousands of rows go over the wire only when they are news."""
     overloads: int = 0
     """Ranges of samples past a channel's full scale, in this run."""
     lost_blocks: int = 0

@@ -1,5 +1,6 @@
 """Real engine processes with the virtual rig, and ways to wait for them without guessing times."""
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -16,6 +17,8 @@ from acquisition.rig.configuration import Rig, load_rig
 
 ROOT = Path(__file__).parent.parent.parent.parent
 PATIENCE_S = 60.0
+LOOK_S = 0.01
+"""Between two looks: whoever asks without a pause takes the time of the process that it waits for."""
 
 
 @pytest.fixture(autouse=True)
@@ -38,11 +41,20 @@ def engine() -> Iterator[Callable[..., EngineProcess]]:
 
 def until(client: EngineClient, is_there: Callable[[EngineStatus], bool]) -> EngineStatus:
     """Ask until something is so."""
-    give_up_s = time.monotonic() + PATIENCE_S
+    give_up_s, pause = time.monotonic() + PATIENCE_S, threading.Event()
     while not is_there(status := client.status()):
         if time.monotonic() > give_up_s:
             pytest.fail(f"still {status}")
+        pause.wait(LOOK_S)
     return status
+
+
+def until_there(path: Path) -> None:
+    """Look until a file is there, and ask nobody."""
+    give_up_s, pause = time.monotonic() + PATIENCE_S, threading.Event()
+    while not path.exists():
+        assert time.monotonic() < give_up_s, f"{path} was never finished"
+        pause.wait(LOOK_S)
 
 
 def until_state(client: EngineClient, *states: EngineState) -> EngineStatus:

@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from threading import Event
 
 from acquisition.engine.start import start_engine
 from acquisition.engine.state import EngineState
@@ -22,16 +23,19 @@ PLAN = {
     ],
 }  # fmt: skip
 
+PAUSE = Event()
+
 rig = Rig.model_validate_json(Path(sys.argv[1]).read_text())
 with start_engine() as engine:
     client = engine.client
     client.open(rig)
     while client.status().state is EngineState.OPENING:
-        pass
+        PAUSE.wait(0.01)
     client.arm(Campaign.model_validate(PLAN), Path(sys.argv[2]))
     client.start()
     is_told = False
     while True:
+        PAUSE.wait(0.01)
         run = client.status().run
         if run is not None and run.segment == "dwell" and not is_told:
             print("running", flush=True)  # noqa: T201 - its word to the test

@@ -1,0 +1,61 @@
+"""What viewers see of a run: begun anew with each recording, and its rows only when they are news."""
+
+import numpy as np
+import pytest
+
+from acquisition.campaign.item import CampaignItem, CampaignProgress, Item, Why
+from acquisition.engine.shown import Shown
+from acquisition.engine.state import Attendance
+from acquisition.engine.status import BenchFacts, ChannelFacts
+from acquisition.instruments import Block
+from acquisition.run.progress import Progress
+from acquisition.run.state import RunState
+
+from .conftest import campaign
+
+CHANNEL = ChannelFacts(role="m0_velocity", unit="m/s", units_per_volt=0.1, full_scale_v=5.0)
+BENCH = BenchFacts(
+    rig_name="bench", is_simulated=True, identities={}, channels=(CHANNEL,), sample_rate_hz=1000.0
+)
+
+
+def progress(path, first_sample, volts):
+    block = Block(first_sample, np.full((1, 100), volts))
+    run = Progress(RunState.RECORDING, None, block, 0.1, 10.0, 1.5, 260.0)
+    return CampaignProgress("point", 1, 1, path, run)
+
+
+@pytest.fixture
+def shown(tmp_path):
+    shown = Shown(Attendance.UNATTENDED)
+    shown.begin(campaign("point"), tmp_path)
+    return shown
+
+
+def test_another_attempt_at_a_point_is_another_run(shown, tmp_path):
+    shown.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
+    shown.tell(progress(tmp_path / "point.h5", 100, 1.0), BENCH)
+    first = shown.status()
+    shown.tell(progress(tmp_path / "point.attempt2.h5", 0, 2.0), BENCH)
+    second = shown.status()
+    assert (first.samples, second.samples) == (200, 100)
+    assert second.run_id == first.run_id + 1
+    assert second.lost_blocks == 0
+    np.testing.assert_array_equal(shown.recent.since(0, 1000).volts, np.full((1, 100), np.float32(2.0)))
+
+
+def test_the_rows_have_another_number_only_when_one_of_them_has_changed(shown, tmp_path):
+    shown.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
+    running = shown.status().rows_number
+    shown.tell(progress(tmp_path / "point.h5", 100, 1.0), BENCH)
+    assert shown.status().rows_number == running
+    shown.item(CampaignItem("point", Item.RECORDED, tmp_path / "point.h5", "", next(iter(Why))))
+    assert shown.status().rows_number > running
+    assert [row.state for row in shown.status().rows] == ["recorded"]
+
+
+def test_a_folder_that_went_away_is_a_disk_without_room_and_ends_no_run(shown, tmp_path):
+    gone = tmp_path / "gone"
+    shown.begin(campaign("point"), gone)
+    shown.tell(progress(gone / "point.h5", 0, 1.0), BENCH)
+    assert shown.status().disk_free_bytes == 0
