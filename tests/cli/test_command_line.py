@@ -1,5 +1,6 @@
 """The command line as a user meets it: real processes, one sentence for every wrong input, exit codes."""
 
+import contextlib
 import json
 import os
 import signal
@@ -101,6 +102,8 @@ def test_a_recording_that_was_cut_off_is_recovered(vibench, tmp_path):
         while running.poll() is None:
             if part.exists() and committed(part) > 0:
                 running.send_signal(signal.SIGKILL)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                running.wait(0.01)
     result = vibench("recover", part, cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     with open_recording(part.with_suffix("")) as recording:

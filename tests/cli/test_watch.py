@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from threading import Event
 
 import pytest
 
@@ -18,6 +19,7 @@ from acquisition.recording import open_recording
 from acquisition.rig.configuration import load_rig
 
 ROOT = Path(__file__).resolve().parents[2]
+PAUSE, LOOK_S = Event(), 0.01
 DWELL = {"kind": "dwell", "amplitude_vpp": 1.0, "frequency_hz": 260, "settle_s": 0.2, "duration_s": 900}
 LONG = Campaign.model_validate({"name": "night", "measurements": [{"name": "dwell", "excitation": DWELL}]})
 
@@ -35,7 +37,7 @@ def running(tmp_path):
         engine.client.arm(LONG, tmp_path)
         engine.client.start()
         while engine.client.status().samples == 0:
-            pass
+            PAUSE.wait(LOOK_S)
         yield engine
 
 
@@ -43,6 +45,7 @@ def wait(engine, state):
     give_up_s = time.monotonic() + 60
     while engine.client.status().state is not state:
         assert time.monotonic() < give_up_s
+        PAUSE.wait(LOOK_S)
 
 
 def vibench(*arguments):

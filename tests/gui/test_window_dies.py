@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from threading import Event
 
 import pytest
 
@@ -15,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 SILENT_WITHIN_S = 1.0
 """From the signal to zero drive, on the wall's clock."""
 PATIENCE_S = 60.0
+PAUSE = Event()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has neither signal")
@@ -36,6 +38,7 @@ def test_a_window_that_dies_or_freezes_leaves_silence_within_a_second(tmp_path, 
         path = tmp_path / "recordings" / "run.h5"
         while not path.exists():
             assert time.time() < signalled_s + PATIENCE_S, "the recording was never finished"
+            PAUSE.wait(0.01)
     finally:
         window.kill()
         window.wait()
