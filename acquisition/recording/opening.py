@@ -46,6 +46,14 @@ def open_hdf5(path: Path) -> h5py.File:
     return file
 
 
+def name_now(path: Path) -> Path:
+    """Give the name that a recording has by now: one that was growing a moment ago may be finished."""
+    if path.suffix != layout.PART_SUFFIX or path.exists():
+        return path
+    final = path.with_suffix("")
+    return final if final.exists() else path
+
+
 def _require_file(path: Path) -> None:
     if path.is_file():
         if path.stat().st_size == 0:

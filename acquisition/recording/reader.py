@@ -21,7 +21,7 @@ from .fixed_text import decoded
 from .header import ChannelHeader
 from .json_text import json_text
 from .layout import Origin, RecordingState
-from .opening import open_hdf5
+from .opening import name_now, open_hdf5
 from .overview import CountOverview, read_overview
 from .replacing import replace_with_change
 from .results import ResultArray, SavedResult, Setting, read_results, write_result
@@ -46,8 +46,15 @@ class _OpenFile:
     """The one thing about a recording that changes: its HDF5 handle."""
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        self.file: h5py.File = open_hdf5(path)
+        self.path = name_now(path)
+        try:
+            self.file: h5py.File = open_hdf5(self.path)
+        except RecordingError:
+            # It may have been finished, and got its final name, between the two lines above.
+            if name_now(self.path) == self.path:
+                raise
+            self.path = name_now(self.path)
+            self.file = open_hdf5(self.path)
 
     def reopen(self) -> None:
         self.file.close()
@@ -232,6 +239,8 @@ class Recording:
 
 def open_recording(path: Path | str) -> Recording:
     """Open ``NAME.h5``, or ``NAME.h5.part`` while it grows or after a crash.
+
+    A ``NAME.h5.part`` that has been finished in the meantime is opened as ``NAME.h5``.
 
     Raises
     ------

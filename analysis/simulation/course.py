@@ -94,7 +94,8 @@ class SimulationCourse:
                 np.full(len(self._found[model]), np.nan),
                 self._note,
             )
-            for model in self._found
+            for model in self.models
+            if model in self._found
             for response, name in ((Response.RESPONSE_I, "response_i"), (Response.RESPONSE_II, "response_ii"))
         )
 

@@ -32,13 +32,18 @@ class Editor(Protocol):
         """What is wrong before the plan is even asked."""
 
 
+_LEFT_OPEN = "left open"
+"""Stands in a field that may be empty, while it is."""
+
+
 class QuantityEditor:
     """A number with its unit."""
 
     def __init__(
-        self, facts: FieldFacts, kind: type[float] | type[int], changed: Callable[..., None]
+        self, facts: FieldFacts, kind: type[float] | type[int], changed: Callable[..., None], empty: str
     ) -> None:
         self._edit = QuantityEdit(facts.unit, kind)
+        self._edit.lineEdit().setPlaceholderText(empty)
         self._edit.changed.connect(changed)
 
     @property
@@ -177,9 +182,9 @@ def unwrapped(annotation: Any) -> tuple[Any, bool]:
 
 def value_editor(annotation: Any, facts: FieldFacts, changed: Callable[..., None]) -> Editor:
     """Choose the editor for a plain value."""
-    plain, _ = unwrapped(annotation)
+    plain, may_be_missing = unwrapped(annotation)
     if plain in (float, int):
-        return QuantityEditor(facts, plain, changed)
+        return QuantityEditor(facts, plain, changed, _LEFT_OPEN if may_be_missing else "")
     if get_origin(plain) is Literal:
         return ChoiceEditor(get_args(plain), changed)
     if isinstance(plain, type) and issubclass(plain, Enum):

@@ -6,7 +6,8 @@ from enum import Enum, auto
 from math import ceil, floor, log10
 
 import pyqtgraph as pg
-from PySide6.QtWidgets import QGraphicsItem
+from PySide6.QtGui import QFontMetricsF
+from PySide6.QtWidgets import QGraphicsItem, QGraphicsSceneResizeEvent
 
 
 class Scale(Enum):
@@ -14,6 +15,13 @@ class Scale(Enum):
 
     LINEAR = auto()
     LOGARITHMIC = auto()
+
+
+class Blankness(Enum):
+    """Whether numbers are written along an axis."""
+
+    WRITTEN = auto()
+    BLANK = auto()
 
 
 @dataclass(frozen=True)
@@ -26,6 +34,8 @@ class Axis:
     factor: float = 1.0
     """Shown value per plotted value: 1e6 shows metres as micrometres."""
     scale: Scale = Scale.LINEAR
+    short: str = ""
+    """What stands there where the label has no room; the unit, if nothing is given."""
 
     @property
     def text(self) -> str:
@@ -36,6 +46,10 @@ class Axis:
 FREQUENCY = Axis("Frequency", "Hz")
 LOG_FREQUENCY = Axis("Frequency", "Hz", scale=Scale.LOGARITHMIC)
 TIME = Axis("Time", "s")
+_LINE_DISTANCE = 1.25
+"""From one label to that above it, in heights of the font."""
+_WIDE = "2000"
+"""A label and the room beside it, on a logarithmic axis across."""
 
 
 class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
@@ -43,18 +57,50 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 
     def __init__(self, orientation: str, axis: Axis) -> None:
         super().__init__(orientation)
+        self._blankness = Blankness.WRITTEN
         self.enableAutoSIPrefix(False)
         self.setLabel(axis.text)
-        self._factor = axis.factor
+        self._axis, self._factor = axis, axis.factor
         # Painted when it changes, and copied otherwise: its text is the dearest part of a frame.
         self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
 
     def show_unit(self, axis: Axis) -> None:
         """Change what the axis shows."""
-        self.setLabel(axis.text)
-        self._factor = axis.factor
+        self._axis, self._factor = axis, axis.factor
+        self._fit_label()
         self.picture = None
         self.update()
+
+    def resizeEvent(self, event: QGraphicsSceneResizeEvent | None = None) -> None:
+        """Write as much of the label as there is room for."""
+        # pyqtgraph calls this before the item is whole.
+        if getattr(self, "_axis", None) is not None and self.label is not None:
+            self._fit_label()
+        super().resizeEvent(event)
+
+    def show_nothing(self) -> None:
+        """Leave numbers and label to the axis of the plot below."""
+        self.setStyle(showValues=False)
+        self.showLabel(False)
+
+    def blank(self, blankness: Blankness) -> None:
+        """Write no numbers while there is nothing that they could be about."""
+        if blankness is not self._blankness:
+            self._blankness = blankness
+            self.picture = None
+            self.update()
+
+    def _fit_label(self) -> None:
+        room = self.size().height() if self._is_upright else self.size().width()
+        metrics = QFontMetricsF(self.label.font())
+        texts = (self._axis.text, self._axis.short or self._axis.unit, "")
+        text = next(each for each in texts if metrics.horizontalAdvance(each) <= room or not each)
+        if text != self.labelText:
+            self.setLabel(text)
+
+    @property
+    def _is_upright(self) -> bool:
+        return self.orientation in ("left", "right")
 
     def tickValues(self, low: float, high: float, size: float) -> list[tuple[float, list[float]]]:
         """Choose the places of ticks: major ones carry a label, minor ones do not."""
@@ -62,17 +108,42 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
             factor = self._factor
             # The labelled level alone: each line of a grid costs time in every frame.
             step, values = super().tickValues(low * factor, high * factor, size)[0]
+            if self._is_upright:
+                step, values = thinned(step, values, self._most_labels(size))
             return [(step / factor, [value / factor for value in values])]
         shift = log10(self._factor)
         ticks = logarithmic_ticks(low + shift, high + shift)
+        if len(ticks[0][1]) > self._most_labels(size):
+            ticks = [thinned(1.0, ticks[0][1], self._most_labels(size)), *ticks[1:]]
         return [(step, [value - shift for value in values]) for step, values in ticks]
 
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
         """Write the labels of ticks."""
+        if self._blankness is Blankness.BLANK:
+            return [""] * len(values)
         if not self.logMode:
             factor = self._factor
             return list(super().tickStrings([v * factor for v in values], scale, spacing * factor))
         return [number_text(10**value * self._factor) for value in values]
+
+    def _most_labels(self, size: float) -> int:
+        """How many labels find room above or beside one another."""
+        metrics = QFontMetricsF(self.font())
+        each = _LINE_DISTANCE * metrics.height() if self._is_upright else metrics.horizontalAdvance(_WIDE)
+        return max(2, int(size / each))
+
+
+def thinned(step: float, values: Sequence[float], most: int) -> tuple[float, list[float]]:
+    """Leave out ticks between multiples of a larger step, until no more than ``most`` are left."""
+    for every in (1, 2, 5, 10, 20, 50, 100):
+        kept = [value for value in values if _is_multiple(value, every * step)]
+        if len(kept) <= most:
+            break
+    return every * step, kept or [values[0], values[-1]]
+
+
+def _is_multiple(value: float, step: float) -> bool:
+    return abs(value / step - round(value / step)) < 1e-6
 
 
 def logarithmic_ticks(low: float, high: float) -> list[tuple[float, list[float]]]:

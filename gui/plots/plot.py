@@ -5,15 +5,16 @@ from dataclasses import dataclass
 from enum import Enum
 from math import log10
 
-import numpy as np
 import pyqtgraph as pg
-from numpy.typing import ArrayLike
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QGuiApplication, QKeyEvent
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import QWidget
 
+from ..hint import paint_hint
 from ..theme import Colour, Theme
-from .axis import Axis, AxisItem, Scale
+from .axis import Axis, AxisItem, Blankness, Scale
+from .band import Band
+from .legend import LegendEntry, LegendLine
 from .steady_range import steady_range
 
 # Antialiasing halves the frame rate, and OpenGL draws grey areas on machines without it.
@@ -47,7 +48,8 @@ def trace(number: int, dash: Dash = Dash.SOLID) -> Ink:
 PREDICTED = Ink(lambda theme: theme.predicted, Dash.DASHED)
 LIMIT = Ink(lambda theme: "#b3261e" if theme.name == "light" else "#ff8a80", Dash.DASHED)
 GUIDE = Ink(lambda theme: theme.line, Dash.DOTTED)
-FRAME_POINTS = 9
+_SIGNS = {Dash.SOLID: "━━━", Dash.DASHED: "╍╍╍", Dash.DOTTED: "┉┉┉", Dash.DASH_DOTTED: "━╸╺"}
+_DOT = "●"
 
 
 class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
@@ -71,26 +73,33 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.getPlotItem().setLogMode(across.scale is Scale.LOGARITHMIC, up.scale is Scale.LOGARITHMIC)
         self._scales = [across.scale, up.scale]
         self._inked: list[tuple[Ink, Callable[[Theme], None]]] = []
-        self._legend: pg.LegendItem | None = None
-        self._legend_entries: list[tuple[pg.PlotDataItem, str]] = []
+        self._legend: LegendLine | None = None
+        self._legend_entries: list[tuple[Ink, str, str]] = []
+        self._curves: list[pg.PlotDataItem] = []
+        self._hint = ""
         self._theme = theme
         self._follows = False
         self.getViewBox().sigRangeChangedManually.connect(self._let_be)
         self.retheme(theme)
 
     def with_legend(self) -> "Plot":
-        """Show names of the curves that have one."""
-        self._legend = self.getPlotItem().addLegend(offset=(-10, 10), labelTextSize="8pt", verSpacing=-4)
+        """Show names of the curves that have one, above the axes."""
+        self._legend = LegendLine(self)
         self._relegend()
+        return self
+
+    def with_hint(self, text: str) -> "Plot":
+        """Say this while no curve has a point."""
+        self._hint = text
         return self
 
     def curve(self, ink: Ink, name: str = "") -> pg.PlotDataItem:
         """Add a line; ``setData(x, y)`` draws it."""
         item = pg.PlotDataItem()
         item.setSkipFiniteCheck(False)
-        self.addItem(item)
+        self._add(item)
         if name:
-            self._legend_entries.append((item, name))
+            self._legend_entries.append((ink, _SIGNS[ink.dash], name))
         self._ink(ink, lambda theme: item.setPen(_pen(ink, theme)))
         self._relegend()
         return item
@@ -98,16 +107,16 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def dots(self, ink: Ink, name: str = "", size: int = 4) -> pg.PlotDataItem:
         """Add points without a line."""
         item = pg.PlotDataItem(pen=None, symbol="o", symbolSize=size, symbolPen=None)
-        self.addItem(item)
+        self._add(item)
         if name:
-            self._legend_entries.append((item, name))
+            self._legend_entries.append((ink, _DOT, name))
         self._ink(ink, lambda theme: item.setSymbolBrush(pg.mkBrush(ink.colour(theme))))
         self._relegend()
         return item
 
-    def band(self, ink: Ink) -> "Band":
+    def band(self, ink: Ink) -> Band:
         """Add an area between two lines, for uncertainties and envelopes."""
-        band = Band(self)
+        band = Band(self.addItem)
         self._ink(ink, lambda theme: band.paint(_shade(ink, theme)))
         return band
 
@@ -124,20 +133,21 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """Put a stripe between two values of the axis across."""
         region.setRegion((self._across(low), self._across(high)))
 
-    def upright(self, ink: Ink, value: float, label: str = "") -> pg.InfiniteLine:
-        """Add an upright line at a value."""
-        return self._line(ink, self._across(value), 90, label)
+    def upright(self, ink: Ink, value: float, label: str = "", label_at: float = 0.92) -> pg.InfiniteLine:
+        """Add an upright line at a value; its label stands at a share of the height."""
+        return self._line(ink, self._across(value), 90, label, label_at)
 
     def level(self, ink: Ink, value: float, label: str = "") -> pg.InfiniteLine:
         """Add a level line at a value."""
         shown = log10(value) if self._scales[1] is Scale.LOGARITHMIC else value
-        return self._line(ink, shown, 0, label)
+        return self._line(ink, shown, 0, label, 0.92)
 
     def wipe(self) -> None:
         """Take every curve, band and line away, for others."""
         self.getPlotItem().clear()
         self._inked.clear()
         self._legend_entries.clear()
+        self._curves.clear()
         self._relegend()
 
     def retheme(self, theme: Theme) -> None:
@@ -168,6 +178,24 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         if up is not None and (wanted := steady_range(tuple(shown[1]), up)) is not None:
             self.setYRange(*wanted, padding=0)
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Give the legend the lines it needs for the new width."""
+        super().resizeEvent(event)
+        # pyqtgraph calls this before the widget is whole.
+        if getattr(self, "_legend", None) is not None:
+            self._place_legend()
+
+    def drawForeground(self, painter: QPainter, rect: QRectF) -> None:
+        """Say the hint where there is nothing else to see."""
+        super().drawForeground(painter, rect)
+        is_empty = bool(self._hint) and not any(_has_points(each) for each in self._curves)
+        for axis in (self.across, self.up):
+            axis.blank(Blankness.BLANK if is_empty else Blankness.WRITTEN)
+        if is_empty:
+            painter.resetTransform()
+            inside = self.mapFromScene(self.getViewBox().sceneBoundingRect()).boundingRect()
+            paint_hint(painter, inside, self._hint, self._theme.muted)
+
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Act on A, L and Ctrl+C, while the plot has the focus."""
         match event.key(), event.modifiers():
@@ -196,8 +224,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def _across(self, value: float) -> float:
         return log10(value) if self._scales[0] is Scale.LOGARITHMIC else value
 
-    def _line(self, ink: Ink, position: float, angle: float, label: str) -> pg.InfiniteLine:
-        options = {"position": 0.92, "movable": False}
+    def _line(self, ink: Ink, position: float, angle: float, label: str, at: float) -> pg.InfiniteLine:
+        options = {"position": at, "movable": False}
         item = pg.InfiniteLine(position, angle, label=label or None, labelOpts=options if label else None)
         self.addItem(item, ignoreBounds=True)
 
@@ -213,37 +241,31 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._inked.append((ink, paint))
         paint(self._theme)
 
+    def _add(self, item: pg.PlotDataItem) -> None:
+        self._curves.append(item)
+        self.addItem(item)
+
     def _relegend(self) -> None:
-        """Write the legend anew: its entries do not follow a change of colour."""
+        """Write the legend anew: its colours follow the theme."""
         if self._legend is None:
             return
-        self._legend.clear()
-        self._legend.setLabelTextColor(self._theme.text)
-        self._legend.setBrush(pg.mkBrush(_veil(self._theme)))
-        for item, name in self._legend_entries:
-            self._legend.addItem(item, name)
+        self._legend.setStyleSheet(f"background: {self._theme.base}; color: {self._theme.text}")
+        self._legend.show_entries(
+            tuple(
+                LegendEntry(sign, ink.colour(self._theme), name) for ink, sign, name in self._legend_entries
+            )
+        )
+        self._place_legend()
 
-
-class Band:
-    """An area between a lower and an upper line."""
-
-    def __init__(self, plot: Plot) -> None:
-        # A pen that draws nothing: without any pen a curve would have no path, and the area no edge.
-        self._edges = [pg.PlotDataItem(pen=pg.mkPen(None)) for _ in range(2)]
-        self._fill = pg.FillBetweenItem(*self._edges)
-        for item in (*self._edges, self._fill):
-            plot.addItem(item)
-
-    def set_data(self, across: ArrayLike, low: ArrayLike, high: ArrayLike) -> None:
-        """Draw the area; where an edge is not finite there is none."""
-        x, below, above = (np.asarray(values, dtype=np.float64) for values in (across, low, high))
-        drawn = np.isfinite(below) & np.isfinite(above)
-        for edge, values in zip(self._edges, (below, above), strict=True):
-            edge.setData(x[drawn], values[drawn])
-
-    def paint(self, shade: object) -> None:
-        """Fill it with a colour."""
-        self._fill.setBrush(shade)
+    def _place_legend(self) -> None:
+        """Put the legend into the row above the axes, which pyqtgraph keeps for a title."""
+        if self._legend is None:
+            return
+        left = self.fontMetrics().height()
+        width = max(1, self.width() - 2 * left)
+        height = self._legend.height_for(width)
+        self._legend.setGeometry(left, 0, width, height)
+        self.getPlotItem().layout.setRowFixedHeight(0, height)
 
 
 def _pen(ink: Ink, theme: Theme) -> object:
@@ -257,7 +279,5 @@ def _shade(ink: Ink, theme: Theme) -> object:
     return colour
 
 
-def _veil(theme: Theme) -> object:
-    colour = pg.mkColor(theme.base)
-    colour.setAlphaF(0.65)
-    return colour
+def _has_points(item: pg.PlotDataItem) -> bool:
+    return item.xData is not None and len(item.xData) > 0

@@ -6,7 +6,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
-    QScrollArea,
     QSplitter,
     QTabWidget,
     QVBoxLayout,
@@ -22,8 +21,8 @@ from ...notice import Notice, NoticeKind, notice_of
 from ...page import Page
 from ...page_names import COMPARE
 from ...push_button import push_button
-from ...settings import Remembered
 from ...theme import Theme
+from ..side_and_picture import SideAndPicture
 from .analysis_panel import AnalysisPanel
 from .curve_list import CurveList
 from .curve_plots import CurvePlots
@@ -43,8 +42,10 @@ class ComparePage(Page):
         self.plots = CurvePlots(desk.theme)
         self.panel = AnalysisPanel()
         self.pair_box = PairBox()
-        self.peaks = NumberTable("Peaks of the curves")
-        self.readings = NumberTable("Curves at the markers")
+        self.peaks = NumberTable("Peaks of the curves", "Peaks of the ticked curves: place, height, damping.")
+        self.readings = NumberTable(
+            "Curves at the markers", "Show the markers (Alt+M) to read the ticked curves at two frequencies."
+        )
         self._recordings: dict[Path, ComparedRecording | None] = {}
         self._jobs: list[Job] = []
         self._asked = 0
@@ -69,7 +70,7 @@ class ComparePage(Page):
 
     def left(self) -> None:
         """Keep how the page is divided."""
-        self.desk.settings.keep_state(Remembered.SPLITTERS, self._splitter.saveState(), COMPARE)
+        self._parts.keep()
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
@@ -186,25 +187,9 @@ class ComparePage(Page):
             self.export_to(path if path.suffix else path.with_suffix(suffix))
 
     def _build(self) -> None:
-        self._splitter = QSplitter(Qt.Orientation.Horizontal)
-        self._splitter.setAccessibleName("Curves and picture")
-        side = QScrollArea()
-        side.setAccessibleName("Curves and analysis")
-        side.setWidgetResizable(True)
-        side.setFrameShape(QScrollArea.Shape.NoFrame)
-        side.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        content = self._side()
-        side.setWidget(content)
-        side.setMinimumWidth(content.minimumSizeHint().width() + 2 * self.fontMetrics().height())
-        self._splitter.addWidget(side)
-        self._splitter.addWidget(self._picture())
-        self._splitter.setStretchFactor(1, 1)
-        self._splitter.setChildrenCollapsible(False)
+        self._parts = SideAndPicture(self.desk, COMPARE, self._side(), self._picture())
         layout = QVBoxLayout(self)
-        layout.addWidget(self._splitter)
-        kept = self.desk.settings.state(Remembered.SPLITTERS, COMPARE)
-        if not kept.isEmpty():
-            self._splitter.restoreState(kept)
+        layout.addWidget(self._parts)
 
     def _side(self) -> QWidget:
         add = push_button("&Add recordings…", "Choose recordings to compare", self._choose_recordings)

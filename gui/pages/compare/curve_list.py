@@ -3,11 +3,12 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPen, QPixmap
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
 from analysis.comparison.trace import Origin, Response, Trace
 
+from ...hint import paint_hint
 from ...plots.plot import Dash, Ink, trace
 from ...theme import Theme
 
@@ -43,6 +44,13 @@ class CurveList(QListWidget):
             for row, each in enumerate(self._traces)
             if self.item(row).checkState() is Qt.CheckState.Checked
         )
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Say what will be here."""
+        super().paintEvent(event)
+        if not self._traces:
+            words = "No curves yet: add recordings, or simulate and lay over."
+            paint_hint(QPainter(self.viewport()), self.viewport().rect(), words, self._theme.muted)
 
     def ink(self, curve: Trace) -> Ink:
         """Colour of its source, dash of its origin."""

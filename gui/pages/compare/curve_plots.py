@@ -14,7 +14,7 @@ from ...plots.axis import LOG_FREQUENCY, Axis, Scale
 from ...plots.plot import GUIDE, Dash, Ink, Plot, trace
 from ...theme import Theme
 
-MAGNITUDE = Axis("Motion of m0 over base, |x / U|", scale=Scale.LOGARITHMIC)
+MAGNITUDE = Axis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
 DIFFERENCE = Axis("Difference", "dB")
 _MARKER = Ink(lambda theme: theme.accent)
 _BAND, _BAND_COLUMNS = 0.16, 600
@@ -29,9 +29,16 @@ class CurvePlots(QWidget):
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.magnitudes = Plot("Curves over frequency", LOG_FREQUENCY, MAGNITUDE, theme)
-        self.differences = Plot("Difference over frequency", LOG_FREQUENCY, DIFFERENCE, theme)
+        self.magnitudes = Plot("Curves over frequency", LOG_FREQUENCY, MAGNITUDE, theme).with_hint(
+            "Add recordings, or lay a prediction of the Simulate page over them: "
+            "their curves appear here, and their peaks below."
+        )
+        self.differences = Plot("Difference over frequency", LOG_FREQUENCY, DIFFERENCE, theme).with_hint(
+            "Choose a curve and what it is compared with, at the left."
+        )
         self.differences.setXLink(self.magnitudes)
+        # One frequency axis for both: the lower one's.
+        self.magnitudes.across.show_nothing()
         left = _LEFT_EM * self.fontMetrics().height()
         for plot in (self.magnitudes, self.differences):
             plot.getPlotItem().getAxis("left").setWidth(left)

@@ -3,12 +3,14 @@
 from math import isfinite
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem, QWidget
 
 from analysis.comparison.reading import readings
 from analysis.comparison.trace import Trace
 from analysis.comparison.trace_peaks import trace_peaks
+
+from ...hint import paint_hint
 
 PEAK_HEADINGS = ("Curve", "Peak at (Hz)", "|x / U|", "±", "Width at -3 dB (Hz)", "Damping ratio (%)")
 
@@ -16,27 +18,36 @@ PEAK_HEADINGS = ("Curve", "Peak at (Hz)", "|x / U|", "±", "Width at -3 dB (Hz)"
 class NumberTable(QTableWidget):
     """A table to read and to copy; Ctrl+C takes the chosen cells, with tabs between them."""
 
-    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+    def __init__(self, name: str, hint: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self._hint = hint
         self.setAccessibleName(name)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setAlternatingRowColors(True)
         self.setTabKeyNavigation(False)
         self.verticalHeader().hide()
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        self.horizontalHeader().setStretchLastSection(True)
 
     def show_rows(self, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
         """Show other numbers."""
         self.setColumnCount(len(headings))
         self.setRowCount(len(rows))
         self.setHorizontalHeaderLabels(list(headings))
+        # Names take what is left: numbers stand together at the right.
+        self.horizontalHeader().setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
         for row, cells in enumerate(rows):
             for column, cell in enumerate(cells):
                 item = QTableWidgetItem(cell)
                 if column:
                     item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
                 self.setItem(row, column, item)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Say the hint where there is no row."""
+        super().paintEvent(event)
+        if self.rowCount() == 0:
+            colour = self.palette().placeholderText().color()
+            paint_hint(QPainter(self.viewport()), self.viewport().rect(), self._hint, colour)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Copy."""

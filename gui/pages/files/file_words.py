@@ -1,7 +1,5 @@
 """How sizes, times and states of recordings are written in a list."""
 
-from datetime import datetime
-
 from acquisition.recording import Recording, RecordingState
 
 _STATE_SYMBOLS: dict[str, str] = {
@@ -25,14 +23,6 @@ def size_text(size: int) -> str:
     while shown >= step and len(units) > 1:
         shown, units = shown / step, units[1:]
     return f"{shown:.3g} {units[0]}" if shown < step else f"{shown:.0f} {units[0]}"
-
-
-def moment_text(utc: str) -> str:
-    """Write when a recording began, by this machine's clock: ``"2026-03-01 13:00:05"``."""
-    try:
-        return datetime.fromisoformat(utc).astimezone().strftime("%Y-%m-%d %H:%M:%S")
-    except ValueError:
-        return utc
 
 
 def duration_text(duration_s: float) -> str:

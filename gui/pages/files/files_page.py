@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
 
 from acquisition.errors import RecordingError
 from acquisition.recording import Recording, open_recording
+from acquisition.recording.opening import name_now
 from analysis.overview import RecordingOverview, has_overview, kept_levels
 from analysis.thumbnail import Thumbnail
 
@@ -93,12 +94,13 @@ class FilesPage(Page):
         self._wanted = None
         self.table.recordings.show_entries(entries)
         count = f"{len(entries)} recording{'s' if len(entries) != 1 else ''}"
-        self._count.setText(count if entries else "No recordings here: choose another folder, or run a test")
+        self._count.setText(count)
         missing = self.table.recordings.missing_pictures()
         if missing:
             self.desk.background.ask(thumbnails, self._pictured, self._failed, missing)
         if chosen is not None:
-            self.table.choose(chosen)
+            # What grew when it was chosen may have got its final name since.
+            self.table.choose(name_now(chosen))
         elif entries and self._opened is None:
             self.table.selectRow(0)
 
@@ -128,7 +130,11 @@ class FilesPage(Page):
             self.desk.say(notice_of(error))
             return
         self._opened = recording
-        self._title.setText(path.name)
+        self._title.setText(recording.path.name)
+        if recording.path != path:
+            # It was finished since it was listed.
+            self._wanted = recording.path
+            self.list_folder()
         if recording.samples == 0:
             self._show({})
         elif has_overview(recording):
@@ -211,7 +217,7 @@ class FilesPage(Page):
         self._splitter.setAccessibleName("List and recording")
         self._splitter.addWidget(self._browser())
         self._splitter.addWidget(self._viewer())
-        self._splitter.setSizes([250, 550])
+        self._splitter.setSizes([200, 600])
         self._splitter.setStretchFactor(1, 1)
         self._splitter.setChildrenCollapsible(False)
         layout = QVBoxLayout(self)

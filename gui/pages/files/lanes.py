@@ -19,9 +19,11 @@ from .file_words import role_text, unit_text
 LEAST_SAMPLES = 8
 """The closest look."""
 _STEP, _ZOOM = 0.2, 0.6
-_LEFT_EM, _TIME_AXIS_EM = 5, 3
+_LEFT_EM, _TIME_AXIS_EM, _LEAST_EM = 5, 3, 3
 MARKER = Ink(lambda theme: theme.accent)
 SEGMENT = Ink(lambda theme: theme.muted, Dash.DOTTED)
+_LABEL_AT = 0.1
+"""Names of segments stand at the foot of the first lane: above is the name of the channel."""
 _NAMED_SHARE = 0.08
 """Part of the recording that a segment must fill for its name to find room."""
 
@@ -170,7 +172,8 @@ class RecordingLanes(QWidget):
         unit = unit_text(recording.channel(role).unit)
         across = Axis("Time", "s") if is_last else Axis("")
         plot = Plot(f"{role_text(role)} over time", across, Axis(unit), self._theme)
-        plot.setMinimumHeight(4 * self.fontMetrics().height())
+        em = self.fontMetrics().height()
+        plot.setMinimumHeight(_LEAST_EM * em + (_TIME_AXIS_EM * em if is_last else 0))
         plot.setMouseEnabled(x=True, y=False)
         plot.setFocusProxy(self)
         left = _LEFT_EM * self.fontMetrics().height()
@@ -214,7 +217,7 @@ class RecordingLanes(QWidget):
             for lane in self._lanes:
                 is_named = lane is self._lanes[0] and length > _NAMED_SHARE * overview.recording.samples
                 label = segment.label.replace("_", " ") if is_named else ""
-                lane.plot.upright(SEGMENT, segment.first_sample / rate_hz, label)
+                lane.plot.upright(SEGMENT, segment.first_sample / rate_hz, label, _LABEL_AT)
 
     def _mark_overloads(self, overview: RecordingOverview) -> None:
         rate_hz = overview.recording.sample_rate_hz

@@ -13,19 +13,23 @@ from PySide6.QtCore import (
     QSortFilterProxyModel,
     Qt,
 )
-from PySide6.QtGui import QColor, QPainter, QPen, QPixmap
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
 from analysis.thumbnail import THUMBNAIL_COLUMNS, Thumbnail
 
+from ...faces import moment_text
+from ...hint import paint_hint
 from ...theme import Theme
-from .file_words import duration_text, moment_text, size_text, state_text
+from .file_words import duration_text, size_text, state_text
 from .listing import ListedRecording
 
 Index = QModelIndex | QPersistentModelIndex
 _NOWHERE = QModelIndex()
 HEADINGS = ("Response", "Name", "State", "Verdict", "Began", "Excitation", "Level", "Length", "Size")
 PICTURE, NAME = 0, 1
+_NUMBERS = tuple(HEADINGS.index(each) for each in ("Level", "Length", "Size"))
+_WIDE = HEADINGS.index("Excitation")
 PATH_ROLE = Qt.ItemDataRole.UserRole
 SORT_ROLE = Qt.ItemDataRole.UserRole + 1
 THUMBNAIL_SIZE = QSize(THUMBNAIL_COLUMNS, 30)
@@ -98,6 +102,8 @@ class RecordingModel(QAbstractTableModel):
                 content = self._pictures.get(entry.path)
             case Qt.ItemDataRole.ToolTipRole:
                 content = f"{entry.path}\n{entry.said.reason}\n{entry.said.notes}".strip()
+            case Qt.ItemDataRole.TextAlignmentRole if column in _NUMBERS:
+                content = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
             case Qt.ItemDataRole.AccessibleTextRole:
                 content = f"{HEADINGS[column]}: {_texts(entry)[column] or 'picture'}"
             case Qt.ItemDataRole.UserRole:
@@ -156,8 +162,23 @@ class RecordingTable(QTableView):
         self.verticalHeader().setDefaultSectionSize(THUMBNAIL_SIZE.height() + 6)
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.horizontalHeader().setHighlightSections(False)
-        self.horizontalHeader().setStretchLastSection(True)
+        self.horizontalHeader().setSectionResizeMode(_WIDE, QHeaderView.ResizeMode.Stretch)
+        self.horizontalHeader().setDefaultAlignment(
+            Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+        )
         self.setColumnWidth(PICTURE, THUMBNAIL_SIZE.width() + 10)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Say how recordings come here."""
+        super().paintEvent(event)
+        if self._sorted.rowCount() == 0:
+            words = (
+                "No recording fits the search and the campaign that are chosen."
+                if self.recordings.entries
+                else "No recordings in this folder yet: choose another folder, or run a test (Ctrl+3)."
+            )
+            colour = self.palette().placeholderText().color()
+            paint_hint(QPainter(self.viewport()), self.viewport().rect(), words, colour)
 
     def search(self, text: str) -> None:
         """Show rows that hold a text anywhere."""

@@ -47,8 +47,17 @@ class QueuePage(Page):
         super().__init__(desk, parent)
         self._orders = Orders(desk, self)
         self.choice = Choice()
-        self.entries = ReadTable("Entries of the campaign", ("entry", "what", "recordings", "takes"))
-        self.rows = ReadTable("Recordings of the campaign", ("", "recording", "how it stands"))
+        self.entries = ReadTable(
+            "Entries of the campaign",
+            ("entry", "what", "recordings", "takes"),
+            "Take over a campaign above, or add the test of the Test page, once or as a sweep.",
+            wide=1,
+        )
+        self.rows = ReadTable(
+            "Recordings of the campaign",
+            ("", "recording", "how it stands"),
+            "Each recording of the campaign is listed here, with how it stands.",
+        )
         self.sweep = SweepForm()
         self.summary = QLabel()
         self.summary.setWordWrap(True)

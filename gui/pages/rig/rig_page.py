@@ -20,14 +20,21 @@ from acquisition.engine.status import EngineStatus
 from acquisition.shipped import shipped
 
 from ...desk import Desk
+from ...faces import moment_text
 from ...notice import notice_of
 from ...orders import Orders
 from ...page import Page
 from ...read_table import ReadTable
 from ...settings import Remembered
+from .finding_words import expected_text, finding_name, measured_text
 from .knob_sheet import KnobSheetForm
 from .rig_choice import RigChoice
 
+FIRST_STEPS = (
+    "A first measurement takes three keys: Alt+O opens this bench, Ctrl+Return arms the test of the Test "
+    "page and says in words what will happen, F5 starts it. It ends by itself; Files and Compare show what "
+    "was recorded. F1 lists all keys."
+)
 VERDICTS = {Verdict.OK: "✔ ok", Verdict.WARN: "⚠ look", Verdict.FAIL: "✖ fail"}
 
 
@@ -49,10 +56,21 @@ class RigPage(Page):
             "Check bench  (F6)", "A small sine for some seconds: noise, gains, clocks"
         )
         self.find_button = self._button("Find instruments", "List every instrument that can be seen")
-        self.instruments = ReadTable("Instruments", ("part", "what answered"))
-        self.findings = ReadTable("Findings of the check", ("", "finding", "measured", "expected"))
+        self.instruments = ReadTable(
+            "Instruments",
+            ("part", "what answered"),
+            "Who answers is listed here once a bench is open.",
+        )
+        self.findings = ReadTable(
+            "Findings of the check",
+            ("", "finding", "measured", "expected"),
+            "Noise, gains, clocks and the answer to a small sine, each beside what is expected of it.",
+        )
         self.verdict = QLabel()
         self.verdict.setWordWrap(True)
+        self.first_steps = QLabel(FIRST_STEPS)
+        self.first_steps.setWordWrap(True)
+        self.first_steps.setProperty("rank", "second")
         self._lay_out()
         self._connect()
         self._choose_first()
@@ -104,12 +122,13 @@ class RigPage(Page):
         else:
             worst = VERDICTS[report.verdict]
             assert status is not None
-            self.verdict.setText(f"{worst}   ·   {len(report.findings)} findings   ·   {status.checked_utc}")
+            at = moment_text(status.checked_utc)
+            self.verdict.setText(f"{worst}   ·   {len(report.findings)} findings   ·   {at}")
             order = (Verdict.FAIL, Verdict.WARN, Verdict.OK)
             found = sorted(report.findings, key=lambda each: order.index(each.verdict))
             self.findings.show_rows(
                 [
-                    (VERDICTS[each.verdict], each.name, each.value, _expected(each.expected, each.advice))
+                    (VERDICTS[each.verdict], finding_name(each), measured_text(each), expected_text(each))
                     for each in found
                 ]
             )
@@ -181,6 +200,8 @@ class RigPage(Page):
         left.addWidget(self.knobs)
         for button in (self.open_button, self.check_button, self.find_button, self.close_button):
             left.addWidget(button)
+        left.addSpacing(self.fontMetrics().height())
+        left.addWidget(self.first_steps)
         left.addStretch(1)
         column = QWidget()
         column.setLayout(left)
@@ -202,7 +223,3 @@ class RigPage(Page):
         for widget in widgets:
             layout.addWidget(widget)
         return box
-
-
-def _expected(expected: str, advice: str) -> str:
-    return f"{expected}. {advice[0].upper()}{advice[1:]}" if advice else expected

@@ -15,11 +15,13 @@ class CoursePlot(QWidget):
     """Response I and II of a sine or a sweep as it goes."""
 
     title = "Response over frequency"
+    tab = "Responses"
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         up = Axis("Response I, II", "x / A0", scale=Scale.LOGARITHMIC)
         self.plot = Plot("Response over frequency", FREQUENCY, up, theme).with_legend()
+        self.plot.with_hint("A point every tenth of a second of a dwell or a sweep; the prediction beneath.")
         self._stripes = Stripes(self.plot, Ink(lambda theme: theme.traces[3], filled=0.15))
         self._predicted = self.plot.curve(PREDICTED, "I, simulated")
         self._linear = self.plot.curve(trace(2, Dash.DOTTED), "linear, simulated")
@@ -65,10 +67,12 @@ class SweepEnvelopePlot(QWidget):
     """Extremes of m0's velocity against the frequency really played."""
 
     title = "Sweep envelope"
+    tab = "Envelope"
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.plot = Plot("Sweep envelope", FREQUENCY, Axis("m0 velocity", "mm/s", 1e3), theme).with_legend()
+        self.plot.with_hint("Largest and smallest velocity of m0 while a sweep passes by.")
         self._stripes = Stripes(self.plot, Ink(lambda theme: theme.traces[3], filled=0.15))
         self._upper = self.plot.curve(trace(3), "largest")
         self._lower = self.plot.curve(trace(0), "smallest")

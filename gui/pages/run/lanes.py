@@ -2,6 +2,7 @@
 
 import numpy as np
 import pyqtgraph as pg
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from analysis.live.envelope import zigzag
@@ -16,6 +17,9 @@ AGO = Axis("Time before now", "s")
 """An axis that stands still: one that scrolls would be painted anew in every frame."""
 COLUMNS = 1000
 AXIS_LETTERS = 9
+TIME_AXIS_EM = 3
+USUAL_SPAN_S = 2.0
+"""What a lane shows at first."""
 
 
 class Lanes(QWidget):
@@ -69,9 +73,24 @@ class Lanes(QWidget):
         last = len(channels) - 1
         for row, (role, unit) in enumerate(channels):
             plot = Plot(f"Lane of {channel_word(role)}", AGO, channel_axis(role, unit), self._theme)
+            plot.with_hint(f"The newest seconds of {channel_word(role)}, while a test runs.")
+            plot.setXRange(-USUAL_SPAN_S, 0, padding=0)
             plot.across.setStyle(showValues=row == last)
             plot.across.showLabel(row == last)
             plot.up.setWidth(AXIS_LETTERS * self.fontMetrics().averageCharWidth())
             self._curves.append(plot.curve(trace(row)))
             self._layout.addWidget(plot, 1)
             self.plots.append(plot)
+        self._share_height()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Keep all lanes equally high."""
+        super().resizeEvent(event)
+        self._share_height()
+
+    def _share_height(self) -> None:
+        """Give the last lane as much more as its time axis takes."""
+        axis = TIME_AXIS_EM * self.fontMetrics().height()
+        lane = max(1, (self.height() - axis) // max(1, len(self.plots)))
+        for place in range(len(self.plots)):
+            self._layout.setStretch(place, lane + (axis if place == len(self.plots) - 1 else 0))

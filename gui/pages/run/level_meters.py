@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from analysis.live.levels import OVER_SHARE, Level, LevelVerdict
 from analysis.live.view import LiveView
 
+from ...hint import paint_hint
 from ...theme import Theme, Tone
 from .channel_words import channel_word
 
@@ -54,6 +55,8 @@ class LevelMeters(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         """Paint every row."""
         painter = QPainter(self)
+        if not self._rows:
+            paint_hint(painter, self.rect(), "Levels of all channels, while a test runs.", self._theme.muted)
         row_height = _ROW * self.fontMetrics().height()
         for number, (word, level) in enumerate(self._rows):
             self._paint_row(painter, QRectF(0, number * row_height, self.width(), row_height), word, level)

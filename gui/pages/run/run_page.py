@@ -68,7 +68,11 @@ class RunPage(Page):
         """Draw the newest samples, unless the picture is frozen."""
         status = self.desk.bridge.status
         measurement = self.desk.intent.measurement
-        test = "" if measurement is None else f"{measurement.name} ({measurement.excitation.kind})"
+        test = (
+            ""
+            if measurement is None
+            else f"{measurement.name} ({measurement.excitation.kind.replace('_', ' ')})"
+        )
         reason = "" if measurement is not None else "The test is not complete; see the Test page (Ctrl+2)."
         self.arm_card.show_status(status, test, reason)
         self.watch_card.show_status(status)
@@ -189,7 +193,7 @@ class RunPage(Page):
             tabs.setDocumentMode(True)
             for picture in pictures:
                 picture.setAccessibleName(picture.title)
-                tabs.addTab(picture, picture.title)
+                tabs.setTabToolTip(tabs.addTab(picture, picture.tab), picture.title)
         below = QSplitter(Qt.Orientation.Horizontal)
         below.addWidget(self.left_tabs)
         below.addWidget(self.right_tabs)

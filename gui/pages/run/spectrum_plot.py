@@ -18,12 +18,14 @@ _LEAST = 1e-12
 class SpectrumPlot(QWidget):
     """All channels over one frequency axis."""
 
-    title = "Spectrum"
+    title = "Spectral density of every channel"
+    tab = "Spectrum"
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        up = Axis("Amplitude density", "unit of the channel / √Hz", scale=Scale.LOGARITHMIC)
+        up = Axis("Amplitude density", "channel's unit / √Hz", scale=Scale.LOGARITHMIC, short="unit / √Hz")
         self.plot = Plot("Spectral density of every channel", LOG_FREQUENCY, up, theme).with_legend()
+        self.plot.with_hint("Spectra of all channels, of the newest seconds of a run.")
         self._curves: list[pg.PlotDataItem] = []
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)

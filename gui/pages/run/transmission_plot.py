@@ -13,13 +13,15 @@ from ...theme import Theme
 class TransmissionPlot(QWidget):
     """|x / U| over frequency."""
 
-    title = "Transmission"
+    title = "Transmission from base to m0"
+    tab = "Transmission"
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         up = Axis("|x / U|", scale=Scale.LOGARITHMIC)
         self.magnitude = Plot("Transmission from base to m0", FREQUENCY, up, theme).with_legend()
-        self.coherence = Plot("Coherence", FREQUENCY, Axis("Coherence"), theme)
+        self.magnitude.with_hint("Response of m0 over motion of the base, with bounds, while a test runs.")
+        self.coherence = Plot("Coherence", FREQUENCY, Axis("Coherence", short="γ²"), theme)
         self._band = self.magnitude.band(Ink(lambda theme: theme.traces[0], filled=0.25))
         self._predicted = self.magnitude.curve(PREDICTED, "I under sines, simulated")
         self._linear = self.magnitude.curve(trace(2, Dash.DOTTED), "linear, simulated")
@@ -30,7 +32,9 @@ class TransmissionPlot(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(1)
-        layout.addWidget(self.magnitude, 3)
+        # One frequency axis for both: the lower one's.
+        self.magnitude.across.show_nothing()
+        layout.addWidget(self.magnitude, 2)
         layout.addWidget(self.coherence, 1)
 
     def show_view(self, view: LiveView) -> None:

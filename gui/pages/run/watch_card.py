@@ -14,17 +14,18 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from acquisition.engine.state import DRIVING
 from acquisition.engine.status import EngineStatus, RunStatus
 from analysis.live.view import LiveView
 
 from ...faces import clock
 from ...forms.editor import Choice
 from ...theme import Theme
+from .lanes import USUAL_SPAN_S
 from .level_meters import LevelMeters
 
 SPANS_S = (0.05, 0.2, 1.0, 2.0, 5.0, 10.0)
 """Seconds in a lane."""
-USUAL_SPAN_S = 2.0
 
 
 class WatchCard(QGroupBox):
@@ -38,6 +39,7 @@ class WatchCard(QGroupBox):
         self.progress.setAccessibleName("Progress of the run")
         self.progress.setRange(0, 1000)
         self.progress.setFormat("no run yet")
+        self.progress.setValue(0)
         self.impacts = QLabel("0")
         self.impacts.setAccessibleName("Impacts so far")
         self.impacts.setProperty("rank", "title")
@@ -69,10 +71,11 @@ class WatchCard(QGroupBox):
     def show_status(self, status: EngineStatus | None) -> None:
         """Show where the run stands."""
         run = None if status is None else status.run
-        self.mark_button.setEnabled(run is not None)
+        is_running = status is not None and status.state in DRIVING
+        self.mark_button.setEnabled(is_running)
         if run is not None:
             self.progress.setValue(round(1000 * min(1.0, run.elapsed_s / max(run.total_s, 1e-9))))
-            self.progress.setFormat(_progress_text(run))
+            self.progress.setFormat(_progress_text(run) if is_running else "the last run has ended")
 
     def show_view(self, view: LiveView) -> None:
         """Show impacts and levels."""

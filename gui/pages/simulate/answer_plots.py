@@ -9,19 +9,23 @@ from PySide6.QtWidgets import QGridLayout, QWidget
 from analysis.similarity import THRESHOLD, Similarity
 from analysis.simulation.course import SimulationCourse
 
-from ...plots.axis import FREQUENCY, LOG_FREQUENCY, Axis, Scale
+from ...plots.axis import LOG_FREQUENCY, Axis, Scale
 from ...plots.plot import GUIDE, LIMIT, Dash, Ink, Plot, trace
 from ...theme import Theme
 
-RESPONSE = Axis("Motion of m0 over base, |x / U|", scale=Scale.LOGARITHMIC)
-EXPONENT = Axis("Largest Lyapunov exponent", "1/s")
-DIFFERENCE = Axis("Difference of log Response I", scale=Scale.LOGARITHMIC)
+RESPONSE = Axis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
+EXPONENT = Axis("Largest Lyapunov exponent", "1/s", short="Exponent (1/s)")
+DIFFERENCE = Axis("Difference of log Response I", short="Difference", scale=Scale.LOGARITHMIC)
 TIME = Axis("Time, to the end of the run", "ms", factor=1e3)
 DISPLACEMENT = Axis("Displacement", "µm", factor=1e6)
 _COLLIDING = Ink(lambda theme: theme.muted, filled=0.14)
 _EDGE = Ink(lambda theme: theme.muted, Dash.DOTTED)
-_LEGEND_DECADES = 0.9
-"""Room above the responses for the legend."""
+_HINTS = (
+    "Responses I and II of every model, as they are found.",
+    "The motion of the masses at the frequency given under Signal.",
+    "Largest Lyapunov exponents: choose them under Exponent in the scene.",
+    "How far the two models differ, where both are known.",
+)
 _SMALLEST = 1e-6
 """Equal curves have no logarithm: they are drawn at the foot of the axis."""
 
@@ -32,13 +36,13 @@ class AnswerPlots(QWidget):
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.responses = Plot("Responses over frequency", LOG_FREQUENCY, RESPONSE, theme)
-        self.exponents = Plot("Exponent over frequency", FREQUENCY, EXPONENT, theme)
-        self.likeness = Plot("Difference of the two models over frequency", FREQUENCY, DIFFERENCE, theme)
+        self.exponents = Plot("Exponent over frequency", LOG_FREQUENCY, EXPONENT, theme)
+        self.likeness = Plot("Difference of the two models over frequency", LOG_FREQUENCY, DIFFERENCE, theme)
         self.motion = Plot("Motion over time", TIME, DISPLACEMENT, theme)
         layout = QGridLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        for number, plot in enumerate(self.plots):
-            plot.with_legend()
+        for number, (plot, hint) in enumerate(zip(self.plots, _HINTS, strict=True)):
+            plot.with_legend().with_hint(hint)
             layout.addWidget(plot, number // 2, number % 2)
             layout.setRowStretch(number // 2, 1)
             layout.setColumnStretch(number % 2, 1)
@@ -59,7 +63,7 @@ class AnswerPlots(QWidget):
             self._exponents(course, model, number)
         low, high = course.smallest_and_largest_response
         if high > 0.0:
-            self.responses.setYRange(log10(low) - 0.1, log10(high) + _LEGEND_DECADES, padding=0.0)
+            self.responses.setYRange(log10(low) - 0.1, log10(high) + 0.1, padding=0.0)
         self._motion(course)
         found = course.similarity()
         if found is not None:
@@ -103,8 +107,7 @@ class AnswerPlots(QWidget):
             for stop_m in (gap_m, -gap_m):
                 self.motion.level(LIMIT, stop_m, "stop")
             reach_m = max(gap_m, course.largest_signal_m)
-            # Room above for the legend, which would lie on the motion.
-            self.motion.setYRange(-1.1 * reach_m, 2.2 * reach_m, padding=0.0)
+            self.motion.setYRange(-1.1 * reach_m, 1.1 * reach_m, padding=0.0)
 
     def _likeness(self, found: Similarity) -> None:
         name = f"{100 * found.rate:.0f} % similar ({100 * found.low:.0f} to {100 * found.high:.0f} %)"

@@ -2,14 +2,11 @@
 
 import os
 
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QGroupBox,
     QHBoxLayout,
     QLabel,
     QProgressBar,
-    QScrollArea,
-    QSplitter,
     QVBoxLayout,
     QWidget,
 )
@@ -25,8 +22,8 @@ from ...notice import Notice, NoticeKind
 from ...page import Page
 from ...page_names import COMPARE, SIMULATE
 from ...push_button import push_button
-from ...settings import Remembered
 from ...theme import Theme
+from ..side_and_picture import SideAndPicture
 from .answer_plots import AnswerPlots
 from .simulator import Simulator
 
@@ -68,7 +65,7 @@ class SimulatePage(Page):
 
     def left(self) -> None:
         """Keep how the page is divided."""
-        self.desk.settings.keep_state(Remembered.SPLITTERS, self._splitter.saveState(), SIMULATE)
+        self._parts.keep()
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
@@ -125,6 +122,7 @@ class SimulatePage(Page):
         done, asked = (0, 1) if self._course is None else (self._course.done, self._course.asked)
         self._bar.setMaximum(asked)
         self._bar.setValue(done)
+        self._bar.setFormat("no points yet" if self._course is None else "%v of %m points")
         self._state.setText(text)
         self._cancel.setEnabled(is_busy)
         self._compare.setEnabled(self._course is not None and bool(self._course.traces()))
@@ -135,25 +133,9 @@ class SimulatePage(Page):
             self.desk.page_wanted.emit(COMPARE)
 
     def _build(self) -> None:
-        self._splitter = QSplitter(Qt.Orientation.Horizontal)
-        self._splitter.setAccessibleName("Scene and answer")
-        side = QScrollArea()
-        side.setAccessibleName("Scene")
-        side.setWidgetResizable(True)
-        side.setFrameShape(QScrollArea.Shape.NoFrame)
-        side.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        content = self._side()
-        side.setWidget(content)
-        side.setMinimumWidth(content.minimumSizeHint().width() + 2 * self.fontMetrics().height())
-        self._splitter.addWidget(side)
-        self._splitter.addWidget(self._answer())
-        self._splitter.setStretchFactor(1, 1)
-        self._splitter.setChildrenCollapsible(False)
+        self._parts = SideAndPicture(self.desk, SIMULATE, self._side(), self._answer())
         layout = QVBoxLayout(self)
-        layout.addWidget(self._splitter)
-        kept = self.desk.settings.state(Remembered.SPLITTERS, SIMULATE)
-        if not kept.isEmpty():
-            self._splitter.restoreState(kept)
+        layout.addWidget(self._parts)
 
     def _side(self) -> QWidget:
         scene = QGroupBox("Scene")

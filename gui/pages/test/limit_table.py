@@ -3,19 +3,23 @@
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QTableWidgetItem, QWidget
 
-from acquisition.plan.limits import LimitCheck
+from acquisition.plan.limits import LimitCheck, Side
 
 from ...plots.bar_delegate import SHARE_ROLE, BarDelegate
 from ...read_table import ReadTable
 
 _USED = 0
+_SIGNS = {Side.AT_MOST: "≤", Side.AT_LEAST: "≥"}
+_UNITS = {"m s-2": "m/s²", "m/s2": "m/s²", "m s-1": "m/s"}
 
 
 class LimitTable(ReadTable):
     """One row a limit, the most used first."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Predicted loads and limits", ("used", "quantity", "predicted", "limit"), parent)
+        super().__init__(
+            "Predicted loads and limits", ("used", "quantity", "predicted", "limit"), wide=1, parent=parent
+        )
         self.setItemDelegateForColumn(_USED, BarDelegate(self))
 
     def show_checks(self, checks: tuple[LimitCheck, ...]) -> None:
@@ -24,9 +28,9 @@ class LimitTable(ReadTable):
             [
                 (
                     f"{100 * check.use:.1f} %",
-                    check.what if check.is_kept else f"✖ {check.what}",
-                    f"{check.value:.3g} {check.unit}",
-                    f"{check.side.value} {check.limit:.3g} {check.unit}",
+                    _short(check.what) if check.is_kept else f"✖ {_short(check.what)}",
+                    f"{check.value:.3g} {_unit(check.unit)}",
+                    f"{_SIGNS[check.side]} {check.limit:.3g} {_unit(check.unit)}",
                 )
                 for check in checks
             ]
@@ -40,3 +44,11 @@ class LimitTable(ReadTable):
                     item.setData(SHARE_ROLE, float(check.use) if column == _USED else None)
                     if column == _USED:
                         item.setTextAlignment(Qt.AlignmentFlag.AlignCenter)
+
+
+def _short(what: str) -> str:
+    return what.removeprefix("the ").replace("(at ", "(").replace("_", " ")
+
+
+def _unit(unit: str) -> str:
+    return _UNITS.get(unit, unit)

@@ -16,9 +16,10 @@ class PredictionPlot(Plot):
     """Simulated, and labelled so: dashed lines, the model in the legend, collision regions as stripes."""
 
     def __init__(self, theme: Theme) -> None:
-        up = Axis("Response, simulated", "x / A0", scale=Scale.LOGARITHMIC)
+        up = Axis("Response", "x / A0", scale=Scale.LOGARITHMIC)
         super().__init__("Predicted response and collision regions", FREQUENCY, up, theme)
         self.with_legend()
+        self.with_hint("The specimen is being simulated under this test.")
         self._first = self.curve(Ink(lambda theme: theme.predicted, Dash.DASHED), "Response I, simulated")
         self._second = self.curve(Ink(lambda theme: theme.traces[0], Dash.DOTTED), "Response II, simulated")
         self._linear = self.curve(trace(2, Dash.DOTTED), "without contact")

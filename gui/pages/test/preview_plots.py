@@ -12,6 +12,10 @@ from ...theme import Theme
 
 _FLOOR = 1e-5
 """Lines this far below the highest are numerical dust."""
+_LEAST_HZ = 1.0
+"""Nothing below is of interest: no shaker moves there."""
+_LEAST_LINES = 9
+"""Of text: less says nothing."""
 
 
 class PreviewPlots(QWidget):
@@ -26,6 +30,8 @@ class PreviewPlots(QWidget):
             Axis("Amplitude", "V", scale=Scale.LOGARITHMIC),
             theme,
         )
+        for plot in (self.time, self.spectrum):
+            plot.setMinimumHeight(_LEAST_LINES * self.fontMetrics().height())
         self._signal = SignalCurve(self.time, trace(0))
         self._lines = self.spectrum.curve(trace(0))
         layout = QHBoxLayout(self)
@@ -39,7 +45,8 @@ class PreviewPlots(QWidget):
         self._signal.set_samples(seen.volts, seen.sample_rate_hz)
         floor_v = _FLOOR * float(np.max(seen.spectrum_v))
         self.spectrum.show_everything()
-        self._lines.setData(seen.spectrum_hz, np.maximum(seen.spectrum_v, floor_v))
+        shown = seen.spectrum_hz >= min(_LEAST_HZ, float(seen.spectrum_hz[-1]))
+        self._lines.setData(seen.spectrum_hz[shown], np.maximum(seen.spectrum_v[shown], floor_v))
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""

@@ -2,7 +2,7 @@
 
 from pydantic import ValidationError
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QLabel, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGroupBox, QLabel, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
 
 from acquisition.plan.measurement import Measurement
 
@@ -17,6 +17,9 @@ class TestForm(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.form = ModelForm(Measurement, hidden=frozenset({"repeats"}))
+        limits = self.form.editors["limits"].widget
+        assert isinstance(limits, QGroupBox)
+        limits.setTitle("Limits  (1 = the rig's own)")
         self._measurement: Measurement | None = None
         self._complaint = QLabel()
         self._complaint.setProperty("rank", "complaint")

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QPushButton,
+    QSizePolicy,
     QSplitter,
     QVBoxLayout,
     QWidget,
@@ -225,8 +226,11 @@ class TestPage(Page):
         cells.addWidget(
             _boxed("What the specimen is predicted to do", self.prediction, self.prediction_note), 2, 1
         )
-        cells.setRowStretch(1, 1)
-        cells.setRowStretch(2, 1)
+        for row in (1, 2):
+            cells.setRowStretch(row, 1)
+        for table in (self.limits, self.prediction):
+            # Neither asks for more height than the preview: they share what is there.
+            table.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         splitter = QSplitter()
         splitter.addWidget(left)
         splitter.addWidget(grid)

@@ -79,6 +79,12 @@ def test_a_closed_recording_says_so(path):
         recording.read("m0_velocity")
 
 
+def test_a_recording_that_was_finished_a_moment_ago_is_found_under_its_former_name(path):
+    with open_recording(path.with_name("a.h5.part")) as recording:
+        assert recording.path == path
+        assert recording.state == "complete"
+
+
 def test_a_changed_sample_breaks_the_checksum(path):
     with h5py.File(path, "r+") as file:
         file["m0_velocity"][17] += 1

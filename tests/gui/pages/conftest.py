@@ -89,6 +89,19 @@ def record():
 
 
 @pytest.fixture(scope="session")
+def begin_recording():
+    """Begin a recording that grows until somebody finishes it: gives its writer and its name so far."""
+
+    def begin(folder, name):
+        plan = Dwell(amplitude_vpp=1.0, frequency_hz=260.0, settle_s=1.0, duration_s=8.0)
+        writer = create_recording(folder / f"{name}.h5", _header(name, plan))
+        writer.append(Block(0, np.ones((len(ROLES), 6400)), ()))
+        return writer, folder / f"{name}.h5.part"
+
+    return begin
+
+
+@pytest.fixture(scope="session")
 def record_noise():
     """Write ten seconds of streamed noise, over which the mass moves a known number of times as far."""
 

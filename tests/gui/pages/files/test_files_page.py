@@ -18,7 +18,9 @@ from acquisition.recording import RecordingState
 from acquisition.rig.configuration import Rig
 from acquisition.shipped import shipped
 from acquisition.toml_file import load_toml
+from analysis.thumbnail import thumbnail
 from gui.pages.files.files_page import FilesPage
+from gui.pages.files.listing import made_levels
 from gui.pages.files.recording_table import HEADINGS
 from gui.theme import DARK
 
@@ -211,6 +213,25 @@ def test_a_recording_from_another_folder_is_opened_when_somebody_wants_it(page, 
     page.desk.recording_wanted.emit(path)
     assert page._opened.path == path
     qtbot.waitUntil(lambda: page.table.chosen_paths() == (path,), timeout=20_000)
+
+
+def test_a_recording_that_is_finished_while_it_is_looked_at_is_no_fault(
+    page, begin_recording, tmp_path, waited
+):
+    writer, part = begin_recording(tmp_path, "growing")
+    page.desk.choose_folder(tmp_path)
+    page.list_folder()
+    waited(lambda: [entry.path for entry in page.table.recordings.entries] == [part])
+    said = []
+    page.desk.noticed.connect(said.append)
+    final = writer.finish(RecordingState.COMPLETE, "the plan was carried out")
+    page.open_path(part)
+    waited(lambda: len(page.lanes.plots) == 3 and page.table.chosen_paths() == (final,))
+    assert page._opened.path == final
+    assert set(made_levels(part)) == set(page._opened.roles)
+    assert thumbnail(part) is not None
+    page.desk.noticed.disconnect(said.append)
+    assert said == []
 
 
 def test_lanes_follow_the_theme_and_name_their_channels_and_units(opened):
