@@ -24,11 +24,13 @@ from .layout import Table
 MARGIN_S = 10.0
 MARGIN_FRACTION = 0.05
 """A plan may run over by 5 % or 10 s, whichever is longer."""
+HOLD_ROOM_S = 600.0
+"""And be held this long: declared, but given by the disk only as samples come."""
 
 OPEN_ENDED_S = 24 * 3600.0
 """Declared length of a recording without a planned end; the disk fills only as samples come."""
 RESERVE_AHEAD_S = 60.0
-"""How far ahead of the samples an open-ended recording claims room on the disk."""
+"""How much room a recording claims on the disk at once when it outgrows what it has."""
 
 ROOM_FACTOR = 2
 """While a recording is finished, it and its compressed copy lie side by side."""
@@ -107,8 +109,8 @@ def _lengths(header: RecordingHeader) -> tuple[int, int]:
         declared_s, ahead_s = OPEN_ENDED_S, RESERVE_AHEAD_S
         return round(declared_s * header.sample_rate_hz), round(ahead_s * header.sample_rate_hz)
     margin = max(MARGIN_FRACTION * header.expected_samples, MARGIN_S * header.sample_rate_hz)
-    capacity = header.expected_samples + round(margin)
-    return capacity, capacity
+    reserved = header.expected_samples + round(margin)
+    return reserved + round(HOLD_ROOM_S * header.sample_rate_hz), reserved
 
 
 def _require_room(path: Path, needed_bytes: int) -> None:

@@ -26,7 +26,7 @@ from .fixed_text import encoded
 from .header import RecordingHeader
 from .journal import Journal, Number
 from .layout import RecordingState
-from .preallocate import ITEM_BYTES, RESERVE_AHEAD_S, Places, preallocate
+from .preallocate import ITEM_BYTES, MARGIN_S, RESERVE_AHEAD_S, Places, preallocate
 
 QUEUE_S = 10.0
 """Seconds of samples that may wait for the disk; the slowest sync measured took 0.12 s."""
@@ -219,9 +219,12 @@ class RecordingWriter:
             )
 
     def _reserve_up_to(self, end: int) -> None:
-        """Keep an open-ended recording's claim on the disk well ahead of its samples."""
-        ahead = round(RESERVE_AHEAD_S * self._header.sample_rate_hz)
-        if end + ahead // 2 <= self._reserved or self._reserved == self._places.capacity:
+        """Keep the claim on the disk ahead of the samples, where the plan has no end or runs far over."""
+        rate_hz, planned = self._header.sample_rate_hz, self._header.expected_samples
+        ahead = round(RESERVE_AHEAD_S * rate_hz)
+        # A recording that keeps to its plan never comes here, and so never asks a full disk for more.
+        lead = ahead // 2 if planned is None else round(MARGIN_S / 2 * rate_hz)
+        if end + lead <= self._reserved or self._reserved == self._places.capacity:
             return
         target = min(end + ahead, self._places.capacity)
         size = (target - self._reserved) * ITEM_BYTES

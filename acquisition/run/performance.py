@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 
 from ..excitation.steps import Play, Tone
 from ..instruments import Block
-from ..recording.preallocate import MARGIN_S
+from ..recording.preallocate import HOLD_ROOM_S
 from .drive import Drive
 from .guard import Guard
 from .progress import Progress
@@ -13,8 +13,8 @@ from .state import RunState
 from .stop import Cause, StopLevel, StopRequest, StopSwitch
 from .tape import BLOCK_S, Tape
 
-HOLD_LONGEST_S = 0.8 * MARGIN_S
-"""How long a run may be held in all [s]: its recording has room for that and for the ramp after it."""
+HOLD_LONGEST_S = HOLD_ROOM_S
+"""How long a run may be held in all [s]: its recording has room for that."""
 
 
 class Stopped(Exception):

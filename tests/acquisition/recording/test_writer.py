@@ -1,3 +1,5 @@
+from threading import Event
+
 import numpy as np
 import pytest
 
@@ -89,24 +91,36 @@ def test_a_block_of_the_wrong_shape_is_refused(tmp_path, make_header, make_block
         writer.append(make_block(0, 100, channels=3)[1])
 
 
-def test_a_plan_may_run_over_by_its_margin_and_no_further(tmp_path, make_header, make_block):
-    planned, margin = 4000, 10_000
+def test_a_plan_may_run_over_by_its_margin_and_a_long_hold_and_no_further(tmp_path, make_header, make_block):
+    planned, margin, hold = 4000, 10_000, 600_000
     with create_recording(tmp_path / "a.h5", make_header(expected_samples=planned)) as writer:
-        writer.append(make_block(0, planned + margin)[1])
-        with pytest.raises(RecordingError, match=r"full.*14000 fit"):
-            writer.append(make_block(planned + margin, 1)[1])
+        claimed = disk_bytes(tmp_path)
+        writer.append(make_block(0, planned)[1])
+        while writer.committed_samples < planned:
+            Event().wait(0.01)
+        assert disk_bytes(tmp_path) == claimed, "a plan that is kept to asks the disk for nothing more"
+        for first in range(planned, planned + margin + hold, 10_000):
+            counts, block = make_block(first, 10_000)
+            writer.append(block)
+        with pytest.raises(RecordingError, match=r"full.*614000 fit"):
+            writer.append(make_block(planned + margin + hold, 1)[1])
     with open_recording(tmp_path / "a.h5") as recording:
-        assert recording.samples == planned + margin
+        assert recording.samples == planned + margin + hold
+        np.testing.assert_array_equal(recording.read_counts("m0_velocity", 604_000), counts[1])
+
+
+def disk_bytes(folder):
+    return (folder / "a.h5.part").stat().st_blocks * 512
 
 
 def test_an_open_ended_recording_takes_what_comes(tmp_path, make_header, make_block):
     header = make_header(expected_samples=None)
     with create_recording(tmp_path / "a.h5", header) as writer:
-        disk_bytes = (tmp_path / "a.h5.part").stat().st_blocks * 512
+        claimed = disk_bytes(tmp_path)
         for first in range(0, 200_000, 10_000):  # 200 s: three times what is reserved at the start
             counts, block = make_block(first, 10_000)
             writer.append(block)
-    assert disk_bytes < 20e6, "a day is declared, but only a minute may be claimed"
+    assert claimed < 20e6, "a day is declared, but only a minute may be claimed"
     with open_recording(tmp_path / "a.h5") as recording:
         assert recording.expected_samples is None
         assert recording.samples == 200_000
