@@ -3,7 +3,9 @@
 import os
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import get_context
 from typing import Any, ParamSpec, TypeVar
 
@@ -13,6 +15,8 @@ from acquisition.follow_parent import follow_parent
 
 POLL_MS = 50
 NICE = 10
+BEGUN_EACH = 2
+"""Jobs handed to each process: the one that it does, and the next, so that it need not wait for a poll."""
 
 Asked = ParamSpec("Asked")
 Answer = TypeVar("Answer")
@@ -22,15 +26,21 @@ Answer = TypeVar("Answer")
 class Job:
     """One piece of work; an answer that nobody wants any more is dropped."""
 
-    future: Future[Any]
+    work: Callable[[], Any]
     on_answer: Callable[[Any], None]
     on_error: Callable[[BaseException], None]
     is_wanted: bool = True
+    future: Future[Any] | None = None
+    """None until it is begun; never cancelled, since a process that dies chokes on that."""
+
+    @property
+    def is_over(self) -> bool:
+        """Whether there is nothing to come: it was done, or dropped before it was begun."""
+        return not self.is_wanted if self.future is None else self.future.done()
 
     def drop(self) -> None:
         """Want the answer no more; work that has not begun is not done."""
         self.is_wanted = False
-        self.future.cancel()
 
 
 def give_way() -> None:
@@ -78,11 +88,23 @@ class Background(QObject):
         """Call ``function`` elsewhere; then ``on_answer`` or ``on_error`` here."""
         if self._is_closed:
             # Asked by a timer that outlived the window: nobody is left to be told.
-            return Job(Future(), on_answer, on_error, is_wanted=False)
-        job = Job(self._started().submit(function, *args, **kwargs), on_answer, on_error)
+            return Job(os.getpid, on_answer, on_error, is_wanted=False)
+        job = Job(partial(function, *args, **kwargs), on_answer, on_error)
         self._jobs.append(job)
+        self._begin()
         self._timer.start()
         return job
+
+    def _begin(self) -> None:
+        """Hand over as many jobs as keep the processes busy."""
+        begun = sum(job.future is not None for job in self._jobs)
+        waiting = [job for job in self._jobs if job.future is None and job.is_wanted]
+        for job in waiting[: max(0, BEGUN_EACH * self._workers - begun)]:
+            try:
+                job.future = self._started().submit(job.work)
+            except BrokenProcessPool:  # a process was killed; its jobs are told so, and others do the rest
+                self._pool = None
+                job.future = self._started().submit(job.work)
 
     def _started(self) -> ProcessPoolExecutor:
         if self._pool is None:
@@ -96,20 +118,25 @@ class Background(QObject):
         self._is_closed = True
         self._timer.stop()
         self._jobs.clear()
-        if self._pool is not None:
-            processes = list((self._pool._processes or {}).values())  # noqa: SLF001 - it offers no kill
-            self._pool.shutdown(wait=False, cancel_futures=True)
+        pool, self._pool = self._pool, None
+        if pool is not None:
+            # It offers no kill; and its thread, left alone, would outlive the pool that it works for.
+            processes = list((pool._processes or {}).values())  # noqa: SLF001
+            thread: Any = pool._executor_manager_thread  # noqa: SLF001
+            pool.shutdown(wait=False, cancel_futures=True)
             for process in processes:
                 process.kill()
-            self._pool = None
+            if thread is not None:
+                thread.join()
 
     def _poll(self) -> None:
-        ended = [job for job in self._jobs if job.future.done()]
-        self._jobs = [job for job in self._jobs if not job.future.done()]
+        over = [job for job in self._jobs if job.is_over]
+        self._jobs = [job for job in self._jobs if not job.is_over]
+        self._begin()
         if not self._jobs:
             self._timer.stop()
-        for job in ended:
-            if not job.is_wanted or job.future.cancelled():
+        for job in over:
+            if job.future is None or not job.is_wanted:
                 continue
             error = job.future.exception()
             if error is None:

@@ -137,7 +137,7 @@ class ComparePage(Page):
         self._end_job()
 
     def _end_job(self) -> None:
-        self._jobs = [job for job in self._jobs if not job.future.done()]
+        self._jobs = [job for job in self._jobs if not job.is_over]
         self._say_progress()
 
     def _say_progress(self) -> None:

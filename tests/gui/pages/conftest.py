@@ -48,7 +48,7 @@ def _header(name, plan):
 def waited():
     """Wait, with events, until something is so."""
 
-    def wait(is_so, within_s=30.0):
+    def wait(is_so, within_s=90.0):
         until = time.monotonic() + within_s
         while not is_so():
             assert time.monotonic() < until, "it did not come true in time"
