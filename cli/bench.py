@@ -22,7 +22,7 @@ from acquisition.run.stop_on_signal import stop_on_signal
 from .output import console, print_json
 from .paths import AsJson, BenchPath, bench_path
 
-bench = typer.Typer(help="Look at the instruments.", no_args_is_help=True)
+bench = typer.Typer(help="Look at the instruments.", no_args_is_help=True, add_completion=False)
 
 
 @bench.command("list")

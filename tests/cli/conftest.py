@@ -1,12 +1,16 @@
-"""The command line in processes of its own."""
+"""The command line in processes of its own, or in this one where nothing of a process matters."""
 
 import os
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import pytest
+
+from cli.__main__ import main
 
 ROOT = Path(__file__).resolve().parents[2]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
@@ -27,5 +31,23 @@ def vibench() -> Vibench:
             check=False,
             timeout=timeout_s,
         )
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def vibench_here() -> Vibench:
+    """Run ``vibench`` as `vibench` does, without the seconds in which a new process imports."""
+
+    def run(*arguments, cwd, environment=None):
+        words = ["vibench", *map(str, arguments)]
+        out, err = StringIO(), StringIO()
+        with pytest.MonkeyPatch.context() as patch, chdir(cwd), redirect_stdout(out), redirect_stderr(err):
+            patch.setattr(sys, "argv", words)
+            for name, value in {"COLUMNS": "200", **(environment or {})}.items():
+                patch.setenv(name, value)
+            with pytest.raises(SystemExit) as ended:
+                main()
+        return subprocess.CompletedProcess(words, ended.value.code or 0, out.getvalue(), err.getvalue())
 
     return run

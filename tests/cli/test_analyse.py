@@ -58,10 +58,10 @@ def changed(good, folder, change):
 
 
 def test_options_choose_estimator_quantity_and_resolution_and_are_named_in_the_answer(
-    vibench, good, tmp_path
+    vibench_here, good, tmp_path
 ):
     asked = ("--estimator", "h1", "--quantity", "velocity/acceleration", "--resolution", "5", "--scale", "db")
-    done = vibench(
+    done = vibench_here(
         "analyse", good, "--no-simulate", "--json", "--out", tmp_path / "out", *asked, cwd=tmp_path
     )
     assert done.returncode == 0, done.stderr
@@ -77,7 +77,7 @@ def test_options_choose_estimator_quantity_and_resolution_and_are_named_in_the_a
     assert "Estimator h1; hann segments of 0.3 s overlapping by 50 %, lines 5 Hz wide." in page
 
 
-def test_a_growing_recording_is_analysed_as_far_as_it_is_written(vibench, noise, tmp_path):
+def test_a_growing_recording_is_analysed_as_far_as_it_is_written(vibench_here, noise, tmp_path):
     plan, base, velocity, parts = noise
     half = round(SECONDS * synthetic.RATE / 2)
     with synthetic.begun_recording(
@@ -86,7 +86,7 @@ def test_a_growing_recording_is_analysed_as_far_as_it_is_written(vibench, noise,
         deadline_s = time.monotonic() + PATIENCE_S
         while writer.committed_samples < half:
             assert time.monotonic() < deadline_s
-        done = vibench("analyse", "growing.h5.part", "--no-simulate", "--json", cwd=tmp_path)
+        done = vibench_here("analyse", "growing.h5.part", "--no-simulate", "--json", cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         answer = json.loads(done.stdout)["results"][0]
         assert answer["recording"]["state"] == "recording"
@@ -106,16 +106,16 @@ def test_a_bad_recording_in_a_folder_is_one_sentence_and_the_others_are_analysed
     assert (tmp_path / "out" / "report.html").exists()
 
 
-def test_a_single_bad_recording_leaves_no_report_behind(vibench, tmp_path):
+def test_a_single_bad_recording_leaves_no_report_behind(vibench_here, tmp_path):
     (tmp_path / "nothing.h5").touch()
-    done = vibench("analyse", "nothing.h5", cwd=tmp_path)
+    done = vibench_here("analyse", "nothing.h5", cwd=tmp_path)
     assert done.returncode == 1
     assert "nothing.h5 is empty (0 bytes)" in done.stderr
     assert [each.name for each in tmp_path.iterdir()] == ["nothing.h5"]
 
 
-def test_options_that_contradict_each_other_are_one_sentence(vibench, good, tmp_path):
-    done = vibench("analyse", good, "--resolution", "1", "--averages", "9", cwd=tmp_path)
+def test_options_that_contradict_each_other_are_one_sentence(vibench_here, good, tmp_path):
+    done = vibench_here("analyse", good, "--resolution", "1", "--averages", "9", cwd=tmp_path)
     assert done.returncode == 1
     assert "a resolution and a number of averages were given; give one" in done.stderr
     assert "Traceback" not in done.stderr

@@ -50,8 +50,8 @@ def folder(tmp_path_factory):
     return place
 
 
-def test_the_fit_stands_in_the_json_with_its_interval_and_what_it_could_not_tell(vibench, folder):
-    result = vibench("analyse", folder, "--fit", "--no-simulate", "--json", cwd=folder)
+def test_the_fit_stands_in_the_json_with_its_interval_and_what_it_could_not_tell(vibench_here, folder):
+    result = vibench_here("analyse", folder, "--fit", "--no-simulate", "--json", cwd=folder)
     assert result.returncode == 0, result.stderr
     fit = json.loads(result.stdout)["specimen_fit"]
     damping = fit["values"]["damping_time_s"]
@@ -62,8 +62,10 @@ def test_the_fit_stands_in_the_json_with_its_interval_and_what_it_could_not_tell
     assert any("gap stays as the bench says" in each for each in fit["not_told"])
 
 
-def test_the_fit_is_said_in_words(vibench, folder, tmp_path):
-    result = vibench("analyse", folder, "--fit", "--no-simulate", "--out", tmp_path / "report", cwd=folder)
+def test_the_fit_is_said_in_words(vibench_here, folder, tmp_path):
+    result = vibench_here(
+        "analyse", folder, "--fit", "--no-simulate", "--out", tmp_path / "report", cwd=folder
+    )
     assert result.returncode == 0, result.stderr
     assert "Fitted c / k = 3" in result.stdout
     assert "the bench says 20.0" in result.stdout

@@ -9,10 +9,10 @@ from cli.estimate_text import estimate_text
 from .killed_campaign import short_points, slow_rig
 
 
-def test_an_estimate_is_one_json_document_and_makes_nothing(vibench, tmp_path):
+def test_an_estimate_is_one_json_document_and_makes_nothing(vibench_here, tmp_path):
     plan, bench = short_points(tmp_path, 3), slow_rig(tmp_path)
     arguments = ("measure", plan, "--bench", bench, "--out", "out", "--estimate", "--json")
-    result = vibench(*arguments, cwd=tmp_path)
+    result = vibench_here(*arguments, cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     told = json.loads(result.stdout)
     assert (told["recordings"], told["kept"], told["fits"]) == (3, 0, True)
@@ -49,9 +49,9 @@ def test_an_estimate_in_words_names_lead_ins_and_a_disk_that_is_too_small():
     assert third.startswith("The disk may be full before the end")
 
 
-def test_a_command_that_cannot_be_read_is_refused_before_anything_plays(vibench, tmp_path):
+def test_a_command_that_cannot_be_read_is_refused_before_anything_plays(vibench_here, tmp_path):
     plan = short_points(tmp_path, 2)
-    result = vibench("measure", plan, "--out", "out", "--notify", "mail 'me", cwd=tmp_path)
+    result = vibench_here("measure", plan, "--out", "out", "--notify", "mail 'me", cwd=tmp_path)
     assert result.returncode == 1
     assert "close every quotation mark" in result.stderr
     assert not list(tmp_path.glob("out/*.h5*"))

@@ -55,8 +55,8 @@ def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(vib
         ("[[measurements]]", "[[measurements]", "not valid TOML"),
     ],
 )
-def test_a_wrong_campaign_is_one_sentence_and_plays_nothing(vibench, tmp_path, old, new, said):
-    result = vibench(
+def test_a_wrong_campaign_is_one_sentence_and_plays_nothing(vibench_here, tmp_path, old, new, said):
+    result = vibench_here(
         "measure", campaign(tmp_path, QUICK.replace(old, new)), "--out", "recordings", cwd=tmp_path
     )
     assert result.returncode == 1
@@ -66,12 +66,14 @@ def test_a_wrong_campaign_is_one_sentence_and_plays_nothing(vibench, tmp_path, o
     assert not list(tmp_path.glob("recordings/*"))
 
 
-def test_a_bench_without_its_instruments_is_one_sentence(vibench, tmp_path):
+def test_a_bench_without_its_instruments_is_one_sentence(vibench_here, tmp_path):
     text = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text(encoding="utf-8")
     bench = tmp_path / "bench.toml"
     real = text.split("\n[virtual]\n")[0]
     bench.write_text("calibration_valid_days = 100000\n" + real, encoding="utf-8")
-    result = vibench("measure", campaign(tmp_path), "--bench", bench, "--out", "recordings", cwd=tmp_path)
+    result = vibench_here(
+        "measure", campaign(tmp_path), "--bench", bench, "--out", "recordings", cwd=tmp_path
+    )
     assert result.returncode == 1
     assert "Traceback" not in result.stderr
     assert "NI-DAQmx" in result.stderr
@@ -84,9 +86,9 @@ def test_a_bench_check_says_what_it_found_as_one_json_document(vibench, tmp_path
     assert {finding["verdict"] for finding in report["findings"]} == {"ok"}
 
 
-def test_the_instruments_of_the_virtual_rig_are_listed_by_name(vibench, tmp_path):
+def test_the_instruments_of_the_virtual_rig_are_listed_by_name(vibench_here, tmp_path):
     rig = ROOT / "hardware_configs" / "virtual_rig.toml"
-    result = vibench("bench", "list", "--bench", rig, "--json", cwd=tmp_path)
+    result = vibench_here("bench", "list", "--bench", rig, "--json", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     found = json.loads(result.stdout)
     assert any("1689::851" in name for name in found["visa"])
@@ -119,22 +121,22 @@ def committed(part):
         return 0
 
 
-def test_a_bench_check_is_kept_and_can_be_shown_again(vibench, tmp_path):
+def test_a_bench_check_is_kept_and_can_be_shown_again(vibench_here, tmp_path):
     environment = {"VIBENCH_STATE_DIR": str(tmp_path / "state")}
-    made = vibench("bench", "check", "--json", cwd=tmp_path, environment=environment)
-    shown = vibench("bench", "check", "--last", "--json", cwd=tmp_path, environment=environment)
+    made = vibench_here("bench", "check", "--json", cwd=tmp_path, environment=environment)
+    shown = vibench_here("bench", "check", "--last", "--json", cwd=tmp_path, environment=environment)
     assert json.loads(shown.stdout) == json.loads(made.stdout)
     assert len(list((tmp_path / "state").rglob("*.json"))) == 1
 
 
-def test_faults_that_cannot_be_played_are_refused_before_anything_is_opened(vibench, tmp_path):
+def test_faults_that_cannot_be_played_are_refused_before_anything_is_opened(vibench_here, tmp_path):
     script = tmp_path / "faults.toml"
     script.write_text('[[faults]]\nat_s = 1\nfault = "fill_disk"\n', encoding="utf-8")
-    served = vibench("serve-rig", "--address", "127.0.0.1:0", "--faults", script, cwd=tmp_path)
+    served = vibench_here("serve-rig", "--address", "127.0.0.1:0", "--faults", script, cwd=tmp_path)
     assert served.returncode == 1
     assert "befall the program that records" in served.stderr
     real = Path(__file__).parents[2] / "hardware_configs" / "lab_rig.toml"
-    measured = vibench(
+    measured = vibench_here(
         "measure", campaign(tmp_path), "--bench", real, "--faults", script, "--out", "out", cwd=tmp_path
     )
     assert measured.returncode == 1

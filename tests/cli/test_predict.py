@@ -36,12 +36,11 @@ def test_a_prediction_is_the_answer_of_the_engine_for_every_frequency(vibench, t
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_until_it_settles_a_motion_has_a_kind_and_an_error(vibench, tmp_path):
-    ran = vibench(
+def test_until_it_settles_a_motion_has_a_kind_and_an_error(vibench_here, tmp_path):
+    ran = vibench_here(
         "predict",
         *("--amplitude", 5e-6, "--frequency", "94:260:166", "--duration", "auto", "--json"),
         cwd=tmp_path,
-        timeout_s=COMPILING_S,
     )
     assert ran.returncode == 0, ran.stderr
     periodic, chaotic = json.loads(ran.stdout)["points"]
@@ -53,13 +52,12 @@ def test_until_it_settles_a_motion_has_a_kind_and_an_error(vibench, tmp_path):
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_an_exponent_is_carried_where_it_is_asked_for(vibench, tmp_path):
-    ran = vibench(
+def test_an_exponent_is_carried_where_it_is_asked_for(vibench_here, tmp_path):
+    ran = vibench_here(
         "predict",
         *("--amplitude", 5e-6, "--frequency", 260, "--observe", "response,lyapunov", "--json"),
         *("--duration", 6, "--window", 1),
         cwd=tmp_path,
-        timeout_s=COMPILING_S,
     )
     assert ran.returncode == 0, ran.stderr
     (point,) = json.loads(ran.stdout)["points"]
@@ -68,12 +66,9 @@ def test_an_exponent_is_carried_where_it_is_asked_for(vibench, tmp_path):
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_a_reader_gets_a_table_and_the_reasons(vibench, tmp_path):
-    ran = vibench(
-        "predict",
-        *("--amplitude", 1e-6, "--frequency", 300, "--explain", *SHORT),
-        cwd=tmp_path,
-        timeout_s=COMPILING_S,
+def test_a_reader_gets_a_table_and_the_reasons(vibench_here, tmp_path):
+    ran = vibench_here(
+        "predict", *("--amplitude", 1e-6, "--frequency", 300, "--explain", *SHORT), cwd=tmp_path
     )
     assert ran.returncode == 0, ran.stderr
     assert "Responses I and II" in ran.stdout
@@ -81,12 +76,11 @@ def test_a_reader_gets_a_table_and_the_reasons(vibench, tmp_path):
 
 
 @pytest.mark.timeout(COMPILING_S)
-def test_points_that_are_answered_alike_are_explained_once(vibench, tmp_path):
-    ran = vibench(
+def test_points_that_are_answered_alike_are_explained_once(vibench_here, tmp_path):
+    ran = vibench_here(
         "predict",
         *("--amplitude", 5e-6, "--frequency", "200:244:2", "--explain", *("--duration", 8, "--window", 1)),
         cwd=tmp_path,
-        timeout_s=COMPILING_S,
     )
     assert ran.returncode == 0, ran.stderr
     told = [line for line in ran.stdout.splitlines() if " points, " in line]
@@ -108,8 +102,8 @@ def test_points_that_are_answered_alike_are_explained_once(vibench, tmp_path):
         (("--amplitude", "nan", "--frequency", 100), "--amplitude"),
     ],
 )
-def test_what_cannot_be_predicted_is_said_in_one_sentence(vibench, tmp_path, arguments, said):
-    ran = vibench("predict", *arguments, "--json", cwd=tmp_path)
+def test_what_cannot_be_predicted_is_said_in_one_sentence(vibench_here, tmp_path, arguments, said):
+    ran = vibench_here("predict", *arguments, "--json", cwd=tmp_path)
     assert ran.returncode != 0
     assert ran.stdout == ""
     (line,) = [each for each in ran.stderr.splitlines() if each.startswith("error:")]

@@ -104,9 +104,9 @@ def some_kept(path):
         ("duration_s = 0.5", 'models = ["herz"]', "models.0 = 'herz': contact 'herz' is not known"),
     ],
 )
-def test_a_wrong_study_is_one_sentence_and_makes_no_file(vibench, tmp_path, old, new, said):
+def test_a_wrong_study_is_one_sentence_and_makes_no_file(vibench_here, tmp_path, old, new, said):
     assert old in SMALL
-    result = vibench("study", plan(tmp_path, SMALL.replace(old, new)), "--out", "a.h5", cwd=tmp_path)
+    result = vibench_here("study", plan(tmp_path, SMALL.replace(old, new)), "--out", "a.h5", cwd=tmp_path)
     assert result.returncode == 1
     assert said in result.stderr
     assert "Traceback" not in result.stderr
@@ -114,9 +114,11 @@ def test_a_wrong_study_is_one_sentence_and_makes_no_file(vibench, tmp_path, old,
     assert not (tmp_path / "a.h5").exists()
 
 
-def test_a_cluster_that_does_not_answer_is_one_sentence_and_makes_no_file(vibench, tmp_path):
+def test_a_cluster_that_does_not_answer_is_one_sentence_and_makes_no_file(vibench_here, tmp_path):
     pytest.importorskip("distributed", reason="a cluster needs the extra 'cluster'")
-    result = vibench("study", plan(tmp_path), "--out", "a.h5", "--cluster", "nonsense:what", cwd=tmp_path)
+    result = vibench_here(
+        "study", plan(tmp_path), "--out", "a.h5", "--cluster", "nonsense:what", cwd=tmp_path
+    )
     assert result.returncode == 1
     assert "No Dask scheduler answers at 'nonsense:what'" in result.stderr
     assert "Traceback" not in result.stderr

@@ -1,0 +1,36 @@
+"""Commands are listed without importing what they need, and their lines are those of the commands."""
+
+import subprocess
+import sys
+from inspect import getdoc
+
+import pytest
+import typer
+
+from cli.__main__ import COMMANDS
+
+HEAVY = {"numpy", "scipy", "numba", "matplotlib", "h5py", "pyvisa", "nidaqmx", "grpc", "PySide6"}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_line_of_a_command_is_the_first_of_its_help(name):
+    place = COMMANDS[name]
+    application = place.load()
+    told = application.info.help
+    if not isinstance(told, str):
+        (command,) = application.registered_commands
+        told = getdoc(command.callback)
+    assert told.splitlines()[0] == place.summary
+
+
+def test_the_list_of_commands_needs_none_of_the_large_libraries():
+    loaded = "import cli.__main__, sys; print(*sys.modules)"
+    process = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True)
+    assert HEAVY.isdisjoint(process.stdout.split())
+
+
+def test_a_group_reads_its_own_commands(vibench_here, tmp_path):
+    asked = vibench_here("bench", "check", "--help", cwd=tmp_path)
+    assert asked.returncode == 0
+    assert "vibench bench check [OPTIONS]" in asked.stdout
+    assert isinstance(COMMANDS["bench"].load(), typer.Typer)
