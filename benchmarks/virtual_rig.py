@@ -21,7 +21,7 @@ from acquisition.virtual.analogue import Coupling, Input
 from acquisition.virtual.generator.afg1022 import AFG1022
 from acquisition.virtual.generator.terminal_voltage import Terminal
 from acquisition.virtual.rig import VirtualRig
-from acquisition.virtual.world.time_grid import GRID_RATE_HZ
+from acquisition.virtual.world.time_grid import USUAL_GRID
 from acquisition.virtual.world.world import World
 
 RATE_HZ = 51_200
@@ -37,7 +37,7 @@ def main() -> None:
     print(f"{'motion at 260 Hz':22}{'level':>10}{'impacts/s':>11}{'steps/s':>12}{'x real time':>13}")
     for motion, amplitude_vpp in LEVELS_VPP.items():
         factor, impacts_per_s = world_speed(rig, amplitude_vpp)
-        steps = factor * GRID_RATE_HZ
+        steps = factor * USUAL_GRID.rate_hz
         print(f"{motion:22}{amplitude_vpp:>6} Vpp{impacts_per_s:>11.0f}{steps:>12.3g}{factor:>13.1f}")
     print(f"through pyvisa and nidaqmx, 1.5 Vpp: {whole_chain_speed(rig, 1.5):.1f} x real time")
 

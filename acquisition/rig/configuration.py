@@ -11,6 +11,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_
 from ..errors import ConfigurationError
 from ..toml_file import FrozenModel, load_toml
 from .output import OutputConfig
+from .virtual import VirtualConfig, fastest_sample_rate_hz
 
 HIGH_Z: Literal["high-z"] = "high-z"
 
@@ -204,29 +205,6 @@ class SpecimenConfig(FrozenModel):
     """Largest displacement of a mass that the springs bear."""
 
 
-class VirtualConfig(FrozenModel):
-    """How the simulated rig behaves where a real one just is."""
-
-    seed: int = Field(ge=0)
-    pace: Literal["free", "wall"] = "free"
-    """``"free"``: as fast as it goes. ``"wall"``: ``speed`` times the clock on the wall."""
-    speed: PositiveFloat = 1.0
-    generator_clock_ppm: float = Field(ge=-200, le=200)
-    converter_clock_ppm: float = Field(ge=-200, le=200)
-    generator_noise_v: NonNegativeFloat
-    """White, rms from zero to 25.6 kHz, at the terminal while the output is on [V]."""
-    amplifier_noise_v: NonNegativeFloat
-    """White, rms in the same band, at the output [V]."""
-    accelerometer_noise_m_per_s2: NonNegativeFloat
-    """White, rms in the same band [m/s2]."""
-    vibrometer_noise_m_per_s_per_rthz: NonNegativeFloat
-    vibrometer_dropouts_per_s: NonNegativeFloat
-    faults: str | None = None
-    """Path of a script of faults to play, from this file's folder on; see docs/faults.md."""
-    converter_noise_v: NonNegativeFloat
-    """rms of each input at whatever rate it converts [V]."""
-
-
 class Knob(FrozenModel):
     """A setting made by hand that no instrument reports: the operator confirms it."""
 
@@ -251,6 +229,17 @@ class Rig(FrozenModel):
     """How long a bench check that passed allows to arm [h]."""
     virtual: VirtualConfig | None = None
     """Present when every instrument is simulated."""
+
+    @model_validator(mode="after")
+    def _grid_carries_the_sample_rate(self) -> Self:
+        fastest_hz = None if self.virtual is None else fastest_sample_rate_hz(self.virtual.grid_rate_hz)
+        if self.virtual is None or fastest_hz is None or self.daq.sample_rate_hz <= fastest_hz:
+            return self
+        raise ValueError(
+            f"virtual.grid_rate_hz = {self.virtual.grid_rate_hz:g} carries {fastest_hz:g} samples a second "
+            f"at most, and daq.sample_rate_hz is {self.daq.sample_rate_hz:g}; lower that, or "
+            "make the grid finer"
+        )
 
     @property
     def knobs(self) -> tuple[Knob, ...]:

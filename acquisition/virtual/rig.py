@@ -8,7 +8,8 @@ from typing import Self
 
 from ..errors import AcquisitionError, ConfigurationError
 from ..recording.disk_trouble import DiskTrouble, troubled_disks
-from ..rig.configuration import Rig, VirtualConfig
+from ..rig.configuration import Rig
+from ..rig.virtual import VirtualConfig
 from .daqmx.devices import catalogue_with
 from .daqmx.pace import OnDemandPace, Pace, WallPace
 from .daqmx.server import LOOPBACK, DaqServer, serve

@@ -50,15 +50,15 @@ class RunningFilter:
     """A low-pass running on a grid of time, its state carried from call to call.
 
     The poles are mapped exactly (z = exp(s T)), so a resonance sits where it belongs even close to
-    the grid's Nyquist frequency; the zeros are the least-squares fit to the analogue response,
-    phase included, with the gain at zero hertz exact.
+    the grid's Nyquist frequency; one that lies beyond has no place there, and would ring at another. The
+    zeros are the least-squares fit to the analogue response, phase included, with the gain at zero hertz
+    exact.
     """
 
     def __init__(self, analogue: LowPass, step_s: float) -> None:
         """Design for a grid of ``step_s`` and start at rest."""
-        self._denominator = np.asarray(
-            np.poly(np.exp(np.array(analogue.poles) * step_s)).real, dtype=np.float64
-        )
+        poles = np.array([pole for pole in analogue.poles if abs(pole.imag) * step_s < np.pi])
+        self._denominator = np.atleast_1d(np.asarray(np.poly(np.exp(poles * step_s)).real, dtype=np.float64))
         self._numerator = _fitted_zeros(analogue, self._denominator, step_s)
         self._state = np.zeros(max(len(self._denominator), _ZEROS) - 1)
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from .time_grid import GRID_RATE_HZ
+from .time_grid import USUAL_GRID, TimeGrid
 
 FloatArray = NDArray[np.float64]
 
@@ -15,7 +15,8 @@ class AnalogueOutput:
     interpolating output filter would show weaker images than this plain hold.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, grid: TimeGrid = USUAL_GRID) -> None:
+        self._grid = grid
         self._queue = np.empty(0)
         self._steps_per_sample = 1.0
         self._begin_step = 0.0
@@ -30,7 +31,7 @@ class AnalogueOutput:
         if left == 0:
             self._queue = np.empty(0)
             self._begin_step = max(float(now_step), self._begin_step)
-        steps_per_sample = GRID_RATE_HZ / sample_rate_hz
+        steps_per_sample = self._grid.rate_hz / sample_rate_hz
         if left and steps_per_sample != self._steps_per_sample:
             self._begin_step = float(now_step)
         self._steps_per_sample = steps_per_sample

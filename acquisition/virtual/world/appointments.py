@@ -4,19 +4,20 @@ import heapq
 from collections.abc import Callable
 from itertools import count
 
-from .time_grid import step_at
+from .time_grid import USUAL_GRID, TimeGrid
 
 
 class Appointments:
     """Actions by the step at which they are due; those of one step keep the order they were given in."""
 
-    def __init__(self) -> None:
+    def __init__(self, grid: TimeGrid = USUAL_GRID) -> None:
+        self._grid = grid
         self._due: list[tuple[int, int, Callable[[], None]]] = []
         self._number = count()
 
     def make(self, time_s: float, action: Callable[[], None]) -> None:
         """Let ``action`` happen at a rig time; one that has passed is kept at the next step."""
-        heapq.heappush(self._due, (step_at(time_s), next(self._number), action))
+        heapq.heappush(self._due, (self._grid.step_at(time_s), next(self._number), action))
 
     def keep(self, step: int) -> None:
         """Do everything that is due at a step."""

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .noise import PAGE, NoiseStream
+from .time_grid import USUAL_GRID, TimeGrid
 
 
 @dataclass(frozen=True)
@@ -26,12 +27,13 @@ class RandomDropouts:
     exponentially distributed time.
     """
 
-    MEAN_STEPS = 30.0
-    """About 0.3 ms; assumed."""
+    MEAN_S = 30.0 / 102_400
+    """Mean length, about 0.3 ms; assumed."""
 
-    def __init__(self, per_step: float, stream: NoiseStream) -> None:
-        """``per_step`` is the expected number of dropouts in one step."""
-        self._per_page = per_step * PAGE
+    def __init__(self, per_s: float, stream: NoiseStream, grid: TimeGrid = USUAL_GRID) -> None:
+        """``per_s`` is the expected number of dropouts in a second."""
+        self._per_page = per_s * grid.step_s * PAGE
+        self._mean_steps = self.MEAN_S * grid.rate_hz
         self._stream = stream
 
     def between(self, first: int, stop: int) -> list[Disturbance]:
@@ -47,7 +49,7 @@ class RandomDropouts:
         random = self._stream.generator(page)
         count = int(random.poisson(self._per_page))
         begins = page * PAGE + random.integers(0, PAGE, count)
-        lengths = np.minimum(np.ceil(random.exponential(self.MEAN_STEPS, count)), PAGE).astype(np.int64)
+        lengths = np.minimum(np.ceil(random.exponential(self._mean_steps, count)), PAGE).astype(np.int64)
         levels = random.uniform(-1.0, 1.0, count)
         return [
             Disturbance(int(begin), int(begin + length), float(level))

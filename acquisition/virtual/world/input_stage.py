@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from ..analogue import Coupling, Input
 from .sensors import IEPE_BIAS_V
-from .time_grid import STEP_S
+from .time_grid import USUAL_GRID, TimeGrid
 from .wiring import Behind, Cable
 
 FloatArray = NDArray[np.float64]
@@ -31,13 +31,13 @@ def clip_v(range_v: float) -> float:
 class InputStage:
     """One input from its connector to the converter, running along with the world."""
 
-    def __init__(self, configured: Input, cable: Cable) -> None:
+    def __init__(self, configured: Input, cable: Cable, grid: TimeGrid = USUAL_GRID) -> None:
         """``cable`` says what the input is connected to."""
         self.configured = configured
         self.cable = cable
         self._offset_v, self._gain = _operating_point(configured, cable)
         self._clip_v = clip_v(configured.range_v)
-        half_turn = np.pi * AC_CUT_HZ * STEP_S
+        half_turn = np.pi * AC_CUT_HZ * grid.step_s
         self._numerator = np.array([1.0, -1.0]) / (1 + half_turn)
         self._denominator = np.array([1.0, -(1 - half_turn) / (1 + half_turn)])
         self._state = np.zeros(1)

@@ -8,7 +8,7 @@ from ...rig.configuration import AccelerometerConfig, VibrometerConfig
 from .analogue_filter import RunningFilter, first_order, resonant
 from .disturbance import Disturbance, RandomDropouts, overwrite
 from .noise import NoiseStream
-from .time_grid import GRID_RATE_HZ, rms_per_step
+from .time_grid import USUAL_GRID, TimeGrid
 
 FloatArray = NDArray[np.float64]
 
@@ -29,7 +29,12 @@ class Vibrometer:
     """
 
     def __init__(
-        self, config: VibrometerConfig, noise_density: float, dropouts: RandomDropouts, noise: NoiseStream
+        self,
+        config: VibrometerConfig,
+        noise_density: float,
+        dropouts: RandomDropouts,
+        noise: NoiseStream,
+        grid: TimeGrid = USUAL_GRID,
     ) -> None:
         """``noise_density`` in (m/s)/sqrt(Hz)."""
         if config.delay_s > LONGEST_DELAY_S:
@@ -38,11 +43,11 @@ class Vibrometer:
                 f"{LONGEST_DELAY_S} s; give a smaller delay"
             )
         bandwidth = first_order(config.bandwidth_hz)
-        self.delay_steps = (config.delay_s - bandwidth.delay_s) * GRID_RATE_HZ
+        self.delay_steps = (config.delay_s - bandwidth.delay_s) * grid.rate_hz
         self.over_range_steps = 0
         """Steps at full scale since the instrument was switched on: what its red lamp shows."""
-        self._filter = RunningFilter(bandwidth, 1 / GRID_RATE_HZ)
-        self._noise_rms = noise_density * np.sqrt(GRID_RATE_HZ / 2)
+        self._filter = RunningFilter(bandwidth, grid.step_s)
+        self._noise_rms = noise_density * np.sqrt(grid.rate_hz / 2)
         self._full_scale_m_per_s = config.full_scale_m_per_s
         self._full_scale_v = config.full_scale_v
         self._noise = noise
@@ -74,11 +79,17 @@ class Vibrometer:
 class Accelerometer:
     """A piezoelectric accelerometer: its resonance, noise, sensitivity, and clipping at full scale."""
 
-    def __init__(self, config: AccelerometerConfig, noise_m_per_s2: float, noise: NoiseStream) -> None:
+    def __init__(
+        self,
+        config: AccelerometerConfig,
+        noise_m_per_s2: float,
+        noise: NoiseStream,
+        grid: TimeGrid = USUAL_GRID,
+    ) -> None:
         """``noise_m_per_s2``: rms in ``FULL_BAND_HZ``."""
         mounted = resonant(config.resonance_hz, ACCELEROMETER_DAMPING_RATIO)
-        self._filter = RunningFilter(mounted, 1 / GRID_RATE_HZ)
-        self._noise_rms = rms_per_step(noise_m_per_s2)
+        self._filter = RunningFilter(mounted, grid.step_s)
+        self._noise_rms = grid.rms_per_step(noise_m_per_s2)
         self._sensitivity = config.sensitivity_v_per_m_per_s2
         self._full_scale_v = config.full_scale_v
         self._noise = noise

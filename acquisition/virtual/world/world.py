@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from sim.specimen import Specimen, gong2025
 
 from ...errors import ConfigurationError
-from ...rig.configuration import Rig, VirtualConfig
+from ...rig.configuration import Rig
+from ...rig.virtual import VirtualConfig, fastest_sample_rate_hz
 from ..analogue import Input
 from .analogue_output import AnalogueOutput
 from .appointments import Appointments
@@ -23,7 +24,7 @@ from .input_stage import InputStage
 from .noise import NoiseStream
 from .plant import TRUTH_COLUMNS, Plant
 from .sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer
-from .time_grid import GRID_RATE_HZ, PPM, STEP_S, physical_step_s, rms_per_step, step_at
+from .time_grid import PPM, TimeGrid
 from .wiring import OPEN_INPUT, Cable, Signal, amplifier_input, cables_of
 
 FloatArray = NDArray[np.float64]
@@ -35,7 +36,6 @@ HIGHEST_RATE_HZ = 250e3
 
 _STRETCH_STEPS = 8192
 """Steps computed in one go: long enough to amortise the calls, short enough to stay in the cache."""
-_HISTORY_STEPS = history_steps(GRID_RATE_HZ / LOWEST_RATE_HZ, LONGEST_DELAY_S * GRID_RATE_HZ) + 2
 
 
 class TerminalVoltage(Protocol):
@@ -56,23 +56,24 @@ class World:
     def __init__(self, rig: Rig, terminal: TerminalVoltage, specimen: Specimen | None = None) -> None:
         """``specimen`` defaults to the one the rig describes."""
         virtual = virtual_section(rig)
+        self._grid = grid = TimeGrid(virtual.grid_rate_hz)
         noise = partial(NoiseStream, virtual.seed)
-        dropouts_per_step = virtual.vibrometer_dropouts_per_s * STEP_S
         self.vibrometer = Vibrometer(
             rig.vibrometer,
             virtual.vibrometer_noise_m_per_s_per_rthz,
-            RandomDropouts(dropouts_per_step, noise("laser dropouts")),
+            RandomDropouts(virtual.vibrometer_dropouts_per_s, noise("laser dropouts"), grid),
             noise("vibrometer"),
+            grid,
         )
-        step_s = physical_step_s(virtual.converter_clock_ppm)
+        step_s = grid.physical_step_s(virtual.converter_clock_ppm)
         self.plant = Plant(rig, specimen or specimen_of(rig), step_s)
         self._accelerometer = Accelerometer(
-            rig.accelerometer, virtual.accelerometer_noise_m_per_s2, noise("accelerometer")
+            rig.accelerometer, virtual.accelerometer_noise_m_per_s2, noise("accelerometer"), grid
         )
         self._terminal = terminal
         self._gain_db = rig.amplifier.gain_db
         self._amplifier_noise = noise("amplifier")
-        self._amplifier_noise_v = rms_per_step(virtual.amplifier_noise_v)
+        self._amplifier_noise_v = grid.rms_per_step(virtual.amplifier_noise_v)
         self._noise = noise
         self._converter_noise_v = virtual.converter_noise_v
         self._plan = cables_of(rig, self.vibrometer.delay_steps)
@@ -80,8 +81,8 @@ class World:
         self._amplifier_input = amplifier_input(rig)
         self._outputs: dict[str, AnalogueOutput] = {}
         self._conversions: list[Conversion] = []
-        self._history = np.zeros((len(Signal), _HISTORY_STEPS))
-        self._appointments = Appointments()
+        self._history = np.zeros((len(Signal), _history_steps(grid)))
+        self._appointments = Appointments(grid)
         self._step = 0
         self._unspent_steps = 0.0
         self._truth: list[FloatArray] | None = None
@@ -90,12 +91,12 @@ class World:
     @property
     def time_s(self) -> float:
         """Rig time: how far the world has been computed [s]."""
-        return self._step * STEP_S
+        return self._step * self._grid.step_s
 
     def advance(self, duration_s: float) -> None:
         """Let rig time pass; fractions of a step add up until they are one."""
         with self._turn:
-            wanted = self._unspent_steps + duration_s * GRID_RATE_HZ
+            wanted = self._unspent_steps + duration_s * self._grid.rate_hz
             steps = max(round(wanted), 0)
             self._unspent_steps = wanted - steps
             self._compute_to(self._step + steps)
@@ -108,8 +109,9 @@ class World:
     def sample(self, inputs: tuple[Input, ...], sample_rate_hz: float) -> Conversion:
         """Begin a conversion now.
 
-        Any rate from 500 Hz to 250 kHz; whole divisors of 102.4 kHz are the fast case. All inputs
-        share one delay of 40 samples (at most 102.4 kHz counted), as behind a delta-sigma converter.
+        Any rate from 500 Hz to 250 kHz, and to half the grid's on a coarser grid than the usual one; whole
+        divisors of the grid's are the fast case. All inputs share one delay of 40 samples (at most the
+        grid's rate counted), as behind a delta-sigma converter.
 
         Raises
         ------
@@ -117,17 +119,21 @@ class World:
             When the rate lies outside.
 
         """
-        if not LOWEST_RATE_HZ <= sample_rate_hz <= HIGHEST_RATE_HZ:
+        fastest_hz = fastest_sample_rate_hz(self._grid.rate_hz) or HIGHEST_RATE_HZ
+        if not LOWEST_RATE_HZ <= sample_rate_hz <= fastest_hz:
             raise ConfigurationError(
-                f"A sample rate of {sample_rate_hz:g} Hz is not possible on the virtual rig: "
-                f"{LOWEST_RATE_HZ:g} to {HIGHEST_RATE_HZ:g} Hz is; nothing was started, choose one of those"
+                f"A sample rate of {sample_rate_hz:g} Hz is not possible on the virtual rig with its "
+                f"{self._grid.rate_hz:g} steps a second: {LOWEST_RATE_HZ:g} to {fastest_hz:g} Hz is; nothing "
+                "was started, choose one of those"
             )
         with self._turn:
-            ratio = GRID_RATE_HZ / sample_rate_hz
+            ratio = self._grid.rate_hz / sample_rate_hz
             ratio = round(ratio) if abs(ratio - round(ratio)) < PPM else ratio
             channels = tuple(
                 converter_input(
-                    InputStage(configured, self._cables.get(configured.physical_channel, OPEN_INPUT)),
+                    InputStage(
+                        configured, self._cables.get(configured.physical_channel, OPEN_INPUT), self._grid
+                    ),
                     ratio,
                     self._step,
                     self._converter_noise_v,
@@ -136,7 +142,7 @@ class World:
                 for configured in inputs
             )
             for channel in channels:
-                channel.begin(self._history, self._step - _HISTORY_STEPS)
+                channel.begin(self._history, self._step - self._history.shape[1])
             conversion = Conversion(channels, ratio, self._step, self._go_on_to, self._end)
             self._conversions.append(conversion)
             return conversion
@@ -168,7 +174,9 @@ class World:
     def disturb_vibrometer(self, duration_s: float, level: float) -> None:
         """Let the vibrometer show ``level`` (part of full scale) from now on, for a while."""
         with self._turn:
-            self.vibrometer.disturb(Disturbance(self._step, self._step + step_at(duration_s), level))
+            self.vibrometer.disturb(
+                Disturbance(self._step, self._step + self._grid.step_at(duration_s), level)
+            )
 
     def connect(self, physical_channel: str) -> None:
         """Plug the cable of an input in, as the rig describes it."""
@@ -204,7 +212,7 @@ class World:
                 conversion.plug(physical_channel, cable)
 
     def _output(self, physical_channel: str) -> AnalogueOutput:
-        return self._outputs.setdefault(physical_channel, AnalogueOutput())
+        return self._outputs.setdefault(physical_channel, AnalogueOutput(self._grid))
 
     def _go_on_to(self, step: int) -> None:
         with self._turn:
@@ -221,8 +229,8 @@ class World:
             self._compute(min(stop - self._step, _STRETCH_STEPS))
 
     def _compute(self, steps: int) -> None:
-        first = self._step
-        drive = np.array(self._terminal.render(first * STEP_S, STEP_S, steps), dtype=np.float64)
+        first, step_s = self._step, self._grid.step_s
+        drive = np.array(self._terminal.render(first * step_s, step_s, steps), dtype=np.float64)
         for channel, output in self._outputs.items():
             played = output.render(first, steps)
             if channel == self._amplifier_input:
@@ -242,12 +250,17 @@ class World:
             conversion.take(signals, first)
 
     def _remember(self, signals: FloatArray) -> None:
-        steps = signals.shape[1]
-        if steps >= _HISTORY_STEPS:
-            self._history[:] = signals[:, -_HISTORY_STEPS:]
+        steps, kept = signals.shape[1], self._history.shape[1]
+        if steps >= kept:
+            self._history[:] = signals[:, -kept:]
         else:
             self._history[:, :-steps] = self._history[:, steps:]
             self._history[:, -steps:] = signals
+
+
+def _history_steps(grid: TimeGrid) -> int:
+    """Count the steps that the slowest conversion looks back on when it begins."""
+    return history_steps(grid.rate_hz / LOWEST_RATE_HZ, LONGEST_DELAY_S * grid.rate_hz) + 2
 
 
 def specimen_of(rig: Rig) -> Specimen:

@@ -6,7 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.virtual.world.analogue_output import AnalogueOutput
-from acquisition.virtual.world.time_grid import GRID_RATE_HZ
+from acquisition.virtual.world.time_grid import USUAL_GRID
+
+GRID_RATE_HZ = USUAL_GRID.rate_hz
 
 
 @given(

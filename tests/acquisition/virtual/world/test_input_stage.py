@@ -6,7 +6,7 @@ import pytest
 from acquisition.virtual.analogue import Coupling, Input
 from acquisition.virtual.world.input_stage import AC_CUT_HZ, OVER_RANGE, InputStage, clip_v
 from acquisition.virtual.world.sensors import IEPE_BIAS_V
-from acquisition.virtual.world.time_grid import STEP_S
+from acquisition.virtual.world.time_grid import USUAL_GRID
 from acquisition.virtual.world.wiring import OPEN_INPUT, Behind, Cable, Signal
 
 SENSOR = Cable(Behind.IEPE_SENSOR, Signal.BASE_ACCELERATION)
@@ -21,6 +21,7 @@ def signals(value):
     return np.tile(value, (len(Signal), 1))
 
 
+STEP_S = USUAL_GRID.step_s
 SINE = 0.5 * np.sin(2 * np.pi * 400 * STEP_S * np.arange(20_480))
 
 

@@ -13,11 +13,12 @@ import pytest
 from acquisition.rig.configuration import load_rig
 from acquisition.rig.model import Quantity, RigModel
 from acquisition.virtual.world.plant import TRUTH_COLUMNS, Plant
-from acquisition.virtual.world.time_grid import GRID_RATE_HZ, STEP_S
+from acquisition.virtual.world.time_grid import USUAL_GRID
 from acquisition.virtual.world.world import specimen_of
 
 RIG = load_rig(Path(__file__).parents[4] / "hardware_configs" / "virtual_rig.toml")
-SECOND = int(GRID_RATE_HZ)
+STEP_S = USUAL_GRID.step_s
+SECOND = int(USUAL_GRID.rate_hz)
 BAND_HZ = np.arange(50, 601)
 WEAK_VPP, MODERATE_VPP, STRONG_VPP = 0.05, 1.5, 10.0
 DWELL_HZ = 260.0

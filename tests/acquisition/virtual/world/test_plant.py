@@ -9,12 +9,13 @@ from acquisition.errors import AcquisitionError
 from acquisition.rig.configuration import load_rig
 from acquisition.rig.model import Quantity, RigModel, amplifier_gain, suspended_mass_kg
 from acquisition.virtual.world.plant import TRUTH_COLUMNS, Plant
-from acquisition.virtual.world.time_grid import GRID_RATE_HZ, STEP_S
+from acquisition.virtual.world.time_grid import USUAL_GRID
 from sim.modes import base_transmissibility
 from sim.specimen import gong2025
 
 RIG = load_rig(Path(__file__).parents[4] / "hardware_configs" / "virtual_rig.toml")
-SECOND = int(GRID_RATE_HZ)
+STEP_S = USUAL_GRID.step_s
+SECOND = int(USUAL_GRID.rate_hz)
 LINES_HZ = np.array([30, 94, 150, 201, 266, 310, 436, 500, 777])
 COLUMN = {name: number for number, name in enumerate(TRUTH_COLUMNS)}
 

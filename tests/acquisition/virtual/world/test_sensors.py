@@ -10,15 +10,16 @@ from acquisition.rig.configuration import load_rig
 from acquisition.virtual.world.disturbance import Disturbance, RandomDropouts
 from acquisition.virtual.world.noise import PAGE, NoiseStream
 from acquisition.virtual.world.sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer
-from acquisition.virtual.world.time_grid import FULL_BAND_HZ, GRID_RATE_HZ
+from acquisition.virtual.world.time_grid import FULL_BAND_HZ, USUAL_GRID
 
 RIG = load_rig(Path(__file__).parents[4] / "hardware_configs" / "virtual_rig.toml")
+GRID_RATE_HZ = USUAL_GRID.rate_hz
 FULL_SCALE_V = RIG.vibrometer.full_scale_v
 FULL_SCALE_M_PER_S = RIG.vibrometer.full_scale_m_per_s
 
 
-def vibrometer(noise_density=0.0, dropouts_per_step=0.0, **config):
-    dropouts = RandomDropouts(dropouts_per_step, NoiseStream(1, "dropouts"))
+def vibrometer(noise_density=0.0, dropouts_per_s=0.0, **config):
+    dropouts = RandomDropouts(dropouts_per_s, NoiseStream(1, "dropouts"))
     return Vibrometer(
         RIG.vibrometer.model_copy(update=config), noise_density, dropouts, NoiseStream(1, "vibrometer")
     )
@@ -86,19 +87,19 @@ def test_a_dropout_on_demand_replaces_the_signal_for_its_time():
 
 
 def test_dropouts_come_at_random_as_often_as_configured():
-    per_step, steps = 5e-4, 1_000_000
-    found = RandomDropouts(per_step, NoiseStream(2, "dropouts")).between(0, steps)
+    per_s, steps = 50.0, 1_000_000
+    found = RandomDropouts(per_s, NoiseStream(2, "dropouts")).between(0, steps)
     begun = [one for one in found if 0 <= one.first_step < steps]
-    expected = per_step * steps
+    expected = per_s * steps / GRID_RATE_HZ
     assert abs(len(begun) - expected) < 5 * np.sqrt(expected)
     lengths = [one.stop_step - one.first_step for one in begun]
-    assert np.mean(lengths) == pytest.approx(RandomDropouts.MEAN_STEPS, rel=0.15)
+    assert np.mean(lengths) == pytest.approx(RandomDropouts.MEAN_S * GRID_RATE_HZ, rel=0.15)
 
 
 def test_dropouts_do_not_depend_on_the_blocks_they_are_looked_up_in():
     steps = 5 * PAGE  # a multiple of 640
-    whole = vibrometer(dropouts_per_step=2e-3).show(np.zeros(steps), 0)
-    instrument = vibrometer(dropouts_per_step=2e-3)
+    whole = vibrometer(dropouts_per_s=200.0).show(np.zeros(steps), 0)
+    instrument = vibrometer(dropouts_per_s=200.0)
     parts = [instrument.show(np.zeros(640), start) for start in range(0, steps, 640)]
     assert np.count_nonzero(whole) > 500
     assert np.array_equal(np.concatenate(parts), whole)

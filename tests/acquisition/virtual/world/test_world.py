@@ -15,10 +15,11 @@ from acquisition.virtual.analogue import Coupling, Input
 from acquisition.virtual.world.conversion import volts_per_count
 from acquisition.virtual.world.decimation import GROUP_DELAY_SAMPLES
 from acquisition.virtual.world.plant import TRUTH_COLUMNS
-from acquisition.virtual.world.time_grid import GRID_RATE_HZ, STEP_S, physical_step_s, relative_clock_ppm
+from acquisition.virtual.world.time_grid import USUAL_GRID, relative_clock_ppm
 from acquisition.virtual.world.world import World, specimen_of
 from sim.modes import base_transmissibility
 
+GRID_RATE_HZ, STEP_S = USUAL_GRID.rate_hz, USUAL_GRID.step_s
 RIG = load_rig(Path(__file__).parents[4] / "hardware_configs" / "virtual_rig.toml")
 QUIET = RIG.model_copy(
     update={
@@ -247,7 +248,7 @@ def test_a_dropout_on_demand_is_seen_by_the_vibrometer_alone():
 def test_a_fast_converter_clock_shows_every_instrument_slow():
     assert relative_clock_ppm(12.0, 12.0) == pytest.approx(0.0, abs=1e-9)
     assert relative_clock_ppm(12.0, -5.0) == pytest.approx(17.0, abs=1e-3)
-    assert physical_step_s(100.0) == pytest.approx(STEP_S * (1 - 1e-4), rel=1e-7)
+    assert USUAL_GRID.physical_step_s(100.0) == pytest.approx(STEP_S * (1 - 1e-4), rel=1e-7)
 
 
 def test_a_rate_that_is_not_possible_is_refused_with_those_that_are():

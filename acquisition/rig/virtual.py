@@ -1,0 +1,65 @@
+"""What a hardware configuration says of simulated instruments, where real ones just are as they are."""
+
+from math import pi
+from typing import Literal
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
+
+from ..toml_file import FrozenModel
+
+USUAL_GRID_RATE_HZ = 102_400.0
+"""Steps per second on which the analogue world is computed, unless the configuration says otherwise."""
+COARSEST_GRID_RATE_HZ = 25_600.0
+"""Coarser, the base would move by 0.25 % less than it should at `WATCHED_HZ`: see `hold_error`."""
+WATCHED_HZ = 1e3
+"""Above every resonance of the specimen, the bound ones included, and above every drive of the paper."""
+STEPS_PER_SAMPLE = 2
+"""The least on a coarser grid than the usual one: room for the transition band of the converter's filter."""
+
+
+class VirtualConfig(FrozenModel):
+    """How the simulated rig behaves where a real one just is."""
+
+    seed: int = Field(ge=0)
+    pace: Literal["free", "wall"] = "free"
+    """``"free"``: as fast as it goes. ``"wall"``: ``speed`` times the clock on the wall."""
+    speed: PositiveFloat = 1.0
+    grid_rate_hz: float = USUAL_GRID_RATE_HZ
+    """Steps per second that are computed: 25.6 to 102.4 kHz, and at least twice the sample rate. A coarser
+    grid is faster; see docs/decisions/0006-virtual-rig.md for what it costs."""
+    generator_clock_ppm: float = Field(ge=-200, le=200)
+    converter_clock_ppm: float = Field(ge=-200, le=200)
+    generator_noise_v: NonNegativeFloat
+    """White, rms from zero to 25.6 kHz, at the terminal while the output is on [V]."""
+    amplifier_noise_v: NonNegativeFloat
+    """White, rms in the same band, at the output [V]."""
+    accelerometer_noise_m_per_s2: NonNegativeFloat
+    """White, rms in the same band [m/s2]."""
+    vibrometer_noise_m_per_s_per_rthz: NonNegativeFloat
+    vibrometer_dropouts_per_s: NonNegativeFloat
+    faults: str | None = None
+    """Path of a script of faults to play, from this file's folder on; see docs/faults.md."""
+    converter_noise_v: NonNegativeFloat
+    """rms of each input at whatever rate it converts [V]."""
+
+    @field_validator("grid_rate_hz")
+    @classmethod
+    def _is_fine_enough(cls, rate_hz: float) -> float:
+        if not COARSEST_GRID_RATE_HZ <= rate_hz <= USUAL_GRID_RATE_HZ:
+            raise ValueError(
+                f"the virtual rig is computed in {COARSEST_GRID_RATE_HZ:g} to {USUAL_GRID_RATE_HZ:g} steps a "
+                f"second: coarser, the base would move by more than "
+                f"{hold_error(WATCHED_HZ, COARSEST_GRID_RATE_HZ):.2%} too little at {WATCHED_HZ:g} Hz; give "
+                "a rate in between, or leave it out"
+            )
+        return rate_hz
+
+
+def hold_error(frequency_hz: float, grid_rate_hz: float) -> float:
+    """By what part a sine that is held over each step of a grid comes out too small."""
+    return (pi * frequency_hz / grid_rate_hz) ** 2 / 6
+
+
+def fastest_sample_rate_hz(grid_rate_hz: float) -> float | None:
+    """Give the fastest rate that a converter can have on a grid; None on the usual one, which takes all."""
+    return None if grid_rate_hz >= USUAL_GRID_RATE_HZ else grid_rate_hz / STEPS_PER_SAMPLE
