@@ -184,6 +184,8 @@ class DaqmxDigitizer:
             )
         task.control(TaskMode.TASK_RESERVE)
         self._reader = AnalogMultiChannelReader(task.in_stream)
+        # Every array is made here for the channels of this task; the check would be a call of its own.
+        self._reader.verify_array_shape = False
 
     def _identify(self) -> Identity:
         identity = daqmx_identity(self._session, self._config.device)

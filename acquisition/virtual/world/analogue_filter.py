@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+
+from .recursive_filter import RecursiveFilter
 
 _FIT_BAND = 0.2
 """The fit covers zero to this part of the grid's rate: what a converter at half the rate can pass."""
@@ -60,12 +61,11 @@ class RunningFilter:
         poles = np.array([pole for pole in analogue.poles if abs(pole.imag) * step_s < np.pi])
         self._denominator = np.atleast_1d(np.asarray(np.poly(np.exp(poles * step_s)).real, dtype=np.float64))
         self._numerator = _fitted_zeros(analogue, self._denominator, step_s)
-        self._state = np.zeros(max(len(self._denominator), _ZEROS) - 1)
+        self._running = RecursiveFilter(self._numerator, self._denominator)
 
     def run(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the next output values, one for each input value."""
-        result, self._state = lfilter(self._numerator, self._denominator, values, zi=self._state)
-        return np.asarray(result)
+        return self._running.run(values)
 
     def response(self, frequency_hz: NDArray[np.float64], step_s: float) -> NDArray[np.complex128]:
         """Complex gain of the filter as it runs, shape of ``frequency_hz``."""

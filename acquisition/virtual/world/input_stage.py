@@ -2,9 +2,9 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from ..analogue import Coupling, Input
+from .recursive_filter import RecursiveFilter
 from .sensors import IEPE_BIAS_V
 from .time_grid import USUAL_GRID, TimeGrid
 from .wiring import Behind, Cable
@@ -38,9 +38,9 @@ class InputStage:
         self._offset_v, self._gain = _operating_point(configured, cable)
         self._clip_v = clip_v(configured.range_v)
         half_turn = np.pi * AC_CUT_HZ * grid.step_s
-        self._numerator = np.array([1.0, -1.0]) / (1 + half_turn)
-        self._denominator = np.array([1.0, -(1 - half_turn) / (1 + half_turn)])
-        self._state = np.zeros(1)
+        self._capacitor = RecursiveFilter(
+            np.array([1.0, -1.0]) / (1 + half_turn), [1.0, -(1 - half_turn) / (1 + half_turn)]
+        )
 
     def plug(self, cable: Cable) -> None:
         """Change what the input is connected to."""
@@ -53,7 +53,7 @@ class InputStage:
         match self.configured.coupling:
             case Coupling.AC:
                 # The capacitor has long been charged to the constant part when a conversion begins.
-                volts, self._state = lfilter(self._numerator, self._denominator, volts, zi=self._state)
+                volts = self._capacitor.run(volts)
             case Coupling.DC:
                 volts = volts + self._offset_v
         clips = bool(np.max(np.abs(volts), initial=0.0) > self._clip_v)

@@ -27,7 +27,10 @@ class NoiseStream:
     def draw(self, first: int, count: int) -> NDArray[np.float64]:
         """Return samples ``first`` to ``first + count - 1`` of the stream, shape (count,)."""
         pages = range(first // PAGE, (first + count - 1) // PAGE + 1)
-        drawn = np.concatenate([self._samples_of(page) for page in pages]) if pages else np.empty(0)
+        if not pages:
+            return np.empty(0)
+        parts = [self._samples_of(page) for page in pages]
+        drawn = parts[0] if len(parts) == 1 else np.concatenate(parts)
         offset = first % PAGE
         return np.asarray(drawn[offset : offset + count])
 
