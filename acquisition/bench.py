@@ -42,6 +42,7 @@ class Bench:
         digitizer: DaqmxDigitizer,
         output: DaqmxOutput | None,
         confirmations: KnobSheet,
+        power: RigPower,
         closing: ExitStack,
     ) -> None:
         self.rig = rig
@@ -51,6 +52,7 @@ class Bench:
         self.confirmations = confirmations
         self.last_check: CheckResult | None = None
         """The check that this bench was admitted on; see `check.admission`."""
+        self._power = power
         self._closing = closing
 
     @property
@@ -68,6 +70,10 @@ class Bench:
     def reality(self) -> Reality:
         """Whether the instruments are simulated."""
         return Reality.REAL if self.rig.virtual is None else Reality.SIMULATED
+
+    def idle(self, duration_s: float) -> None:
+        """Wait while nothing is sampled [s]; a virtual rig at its own pace lets its own time pass."""
+        self._power.idle(duration_s)
 
     def close(self) -> None:
         """Silence everything that plays, then close everything. Legal at any time."""
@@ -125,7 +131,8 @@ def open_bench(
 
 
 def _opened(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: ExitStack) -> Bench:
-    connected = (closing.enter_context(RigPower(rig)) if power is None else power).connected
+    power = closing.enter_context(RigPower(rig)) if power is None else power
+    connected = power.connected
     digitizer = DaqmxDigitizer.open(connected)
     closing.callback(digitizer.close)
     output = _output(connected, digitizer, closing)
@@ -135,7 +142,8 @@ def _opened(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: 
     if output is not None:
         closing.callback(output.stop)
     ask = confirm or _usual_confirmation(rig)
-    return Bench(rig, generator, digitizer, output, ask((*rig.knobs, *generator.unconfirmed)), closing)
+    sheet = ask((*rig.knobs, *generator.unconfirmed))
+    return Bench(rig, generator, digitizer, output, sheet, power, closing)
 
 
 def _output(rig: Rig, digitizer: DaqmxDigitizer, closing: ExitStack) -> DaqmxOutput | None:

@@ -1,6 +1,7 @@
 """The simulated instruments of a rig, kept on while benches on it are opened and closed."""
 
 from contextlib import ExitStack
+from threading import Event as Alarm
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -45,6 +46,13 @@ class RigPower:
         """Let rig time pass on a virtual rig that is not sampled; on every other it passes by itself."""
         if self._virtual is not None:
             self._virtual.let_pass(duration_s)
+
+    def idle(self, duration_s: float) -> None:
+        """Wait while nothing is sampled: by the clock, or in rig time on a virtual rig at its own pace."""
+        if self._virtual is not None and self.rig.virtual is not None and self.rig.virtual.pace == "free":
+            self._virtual.let_pass(duration_s)
+        else:
+            Alarm().wait(duration_s)
 
     def __enter__(self) -> Self:
         if self.rig.virtual is not None:

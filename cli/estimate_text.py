@@ -31,6 +31,8 @@ def estimate_text(expected: Estimate) -> str:
     kept = f" ({expected.kept} kept)" if expected.kept else ""
     room = f"about {expected.total_bytes / 1e6:.0f} MB; {expected.free_bytes / 1e6:.0f} MB are free"
     lines = [f"{expected.recordings} recordings{kept}, {length} (h:min:s) of rig time, {room}"]
+    if expected.rest_s:
+        lines.append(f"{timedelta(seconds=round(expected.rest_s))} of it are silence between recordings")
     if expected.lead_in_s:
         lead_in = timedelta(seconds=round(expected.lead_in_s))
         lines.append(f"{lead_in} of it lead to points along their chains")

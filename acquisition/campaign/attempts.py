@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from threading import Event as Alarm
 from time import monotonic
 
 from ..errors import AcquisitionError, InstrumentError
@@ -22,6 +21,7 @@ from .item import CampaignItem, Item
 from .journal import Journal
 from .journal_point import PointState
 from .opening import require_same_bench
+from .rest import Rest
 from .why import Why, why_of
 
 Reopen = Callable[[], RunBench]
@@ -43,6 +43,7 @@ class Attempts:
         policy: RetryPolicy,
         switch: StopSwitch,
         say: Listener,
+        rest: Rest,
         reopen: Reopen | None,
     ) -> None:
         self._bench = bench
@@ -50,7 +51,12 @@ class Attempts:
         self._policy = policy
         self._switch = switch
         self._say = say
+        self._rest = rest
         self._reopen = reopen
+
+    def rest_before(self, name: str) -> None:
+        """Leave the time between two recordings that the campaign asks for; a stop ends it."""
+        self._rest.take(self._bench, name)
 
     def carry_out(self, point: Point, tell: Callable[[Path, Progress], None]) -> CampaignItem:
         """Make one recording of a point that counts; ``tell`` is called after every block.
@@ -63,6 +69,7 @@ class Attempts:
         """
         for left in reversed(range(self._policy.attempts)):
             path = next_attempt(self._journal.path.parent, point.name)
+            self._rest.owe()
             self._journal.start(point.name, path.name)
             self._tell(Event.POINT_BEGUN, f"{path.name} begins", point, path)
             try:
@@ -74,6 +81,7 @@ class Attempts:
                 if not (left and self._may_mend(why_of(error))):
                     raise
                 self._made_ready(point, path, error)
+                self._rested(point, error)
             except BaseException as error:
                 reason = f"{type(error).__name__}: {error}".removesuffix(": ")
                 self._journal.end(point.name, PointState.INTERRUPTED, Why.STOPPED, reason)
@@ -83,6 +91,9 @@ class Attempts:
                 if not (left and item.why is Why.OVER_RANGE and self._may_mend(item.why)):
                     return item
                 self._tell(Event.RETRY, f"{point.name} is tried again: {item.reason}", point, path)
+                self.rest_before(point.name)
+                if self._switch.request is not None:
+                    return item
         raise AssertionError("the last attempt returns or raises")
 
     def _ended(self, point: Point, outcome: Outcome) -> CampaignItem:
@@ -121,18 +132,26 @@ class Attempts:
             self._tell(Event.BENCH_REOPENED, "the bench was closed and opened again", point, path)
         self._tell(Event.RETRY, f"{point.name} is tried again", point, path)
 
+    def _rested(self, point: Point, failed: AcquisitionError) -> None:
+        """Rest before another attempt; where a stop comes meanwhile there is none."""
+        self.rest_before(point.name)
+        if self._switch.request is not None:
+            raise failed
+
     def _reopened(self, reopen: Reopen, lost: AcquisitionError) -> RunBench:
-        until = monotonic() + self._policy.reopen_for_s
-        pause = Alarm()
+        began, idled_s = monotonic(), 0.0
         while True:
             try:
                 bench = reopen()
             except AcquisitionError as error:
-                if monotonic() >= until or self._switch.request is not None:
+                # A virtual rig at its own pace idles at once: its time counts, or else the clock's.
+                looked_s = max(monotonic() - began, idled_s)
+                if looked_s >= self._policy.reopen_for_s or self._switch.request is not None:
                     lost.add_note(f"The bench could not be opened again: {error}")
                     raise lost from error
                 # An instrument comes back when somebody plugs it in: there is nothing to be told by.
-                pause.wait(LOOK_EVERY_S)
+                self._bench.idle(LOOK_EVERY_S)
+                idled_s += LOOK_EVERY_S
             else:
                 require_same_bench(self._journal.bench, BenchIdentity.of(bench))
                 return bench

@@ -55,7 +55,7 @@ class Course:
         text = f"{campaign.name}: {self._count} points, {done} done before"
         self._say(Happening(begun, text, {"points": self._count, "done": done}))
         try:
-            while self._coming and self._stop.request is None:
+            while self._coming and self._may_begin(self._coming[0]):
                 point = self._coming.popleft()
                 number = len(self._items) + 1
 
@@ -78,6 +78,12 @@ class Course:
             raise
         self._ended(f"{campaign.name} {self._closing()}", "stopped" if self._coming else "carried_out")
         return tuple(self._items)
+
+    def _may_begin(self, point: JournalPoint) -> bool:
+        """Rest before a point that is to be made; a stop ends the rest, and the campaign."""
+        if point.state is not PointState.DONE and self._stop.request is None:
+            self._attempts.rest_before(point.name)
+        return self._stop.request is None
 
     def _made(self, point: JournalPoint, tell: Callable[[Path, Progress], None]) -> CampaignItem:
         if point.state is PointState.DONE:

@@ -25,6 +25,8 @@ class Estimate:
     """Complete already."""
     duration_s: float
     """On the rig, with bench checks, lead-ins and ramps."""
+    rest_s: float
+    """Of that, silence between recordings."""
     lead_in_s: float
     """Of that, on the way to points along their chains."""
     largest_bytes: int
@@ -58,10 +60,12 @@ def estimate(campaign: Campaign, rig: Rig, folder: Path, existing: Existing = Ex
     missing = [each.measurement for each in planned if not each.is_complete]
     durations_s = [measured_s(each) for each in missing]
     bytes_per_s = rig.daq.sample_rate_hz * len(channels_of(rig)) * BYTES_PER_SAMPLE
+    rest_s = campaign.rest_s * max(0, len(missing) - 1)
     return Estimate(
         recordings=len(missing),
         kept=len(planned) - len(missing),
-        duration_s=sum(durations_s),
+        duration_s=sum(durations_s) + rest_s,
+        rest_s=rest_s,
         lead_in_s=sum(
             each.excitation.lead_s * len(each.excitation.lead_in)
             for each in missing

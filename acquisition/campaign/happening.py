@@ -16,6 +16,8 @@ class Event(StrEnum):
     FAULT = "fault"
     """An attempt failed, or the campaign met something that ends it."""
     RETRY = "retry"
+    RESTING = "resting"
+    """Silence between two recordings."""
     BENCH_REOPENED = "bench_reopened"
     FURTHER = "further"
     """A result asked for more measurements."""

@@ -33,6 +33,11 @@ class KeptBench:
             raise AcquisitionError("the bench is not open: enter it with 'with KeptBench(...) as kept'")
         return self._bench
 
+    @property
+    def played_faults(self) -> tuple[str, ...]:
+        """What a script of faults has done to a virtual rig so far, in order."""
+        return tuple(each.fault for each in self._power.played_faults)
+
     def reopen(self) -> Bench:
         """Close the bench and open it again; knobs count as they were confirmed, for nobody has turned them.
 

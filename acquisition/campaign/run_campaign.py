@@ -26,6 +26,7 @@ from .item import (
 from .log import LOG_SUFFIX, CampaignLog
 from .notice import Messenger, Notifier
 from .opening import make_folder, opened_journal, require_all_within_limits, require_new
+from .rest import Rest
 from .status_line import STATUS_SUFFIX, StatusLine
 
 
@@ -98,7 +99,8 @@ def run_campaign(
     with ExitStack() as session:
         log = session.enter_context(_log_alone(folder, campaign))
         journal = session.enter_context(opened_journal(bench, campaign, folder, existing, changed_bench))
-        status = StatusLine(folder / f"{campaign.name}{STATUS_SUFFIX}", campaign.name, journal.points())
+        where = folder / f"{campaign.name}{STATUS_SUFFIX}"
+        status = StatusLine(where, campaign.name, journal.points(), campaign.rest_s)
         notifier = Notifier(campaign.name, folder, messengers, log)
         session.enter_context(stop_on_signal(stop))
 
@@ -110,7 +112,8 @@ def run_campaign(
             status.progress(stand)
             on_progress(stand)
 
-        attempts = Attempts(bench, journal, campaign.retry, stop, say, reopen)
+        rest = Rest(campaign.rest_s, stop, say)
+        attempts = Attempts(bench, journal, campaign.retry, stop, say, rest, reopen)
         course = Course(journal, folder, attempts, stop, after_failure, after, say)
         return course.gone_through(campaign, progress, on_item)
 

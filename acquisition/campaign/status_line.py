@@ -20,13 +20,15 @@ LINE_EVERY_S = 5.0
 class StatusLine:
     """Appends a line whenever something happens, and every few seconds while a point runs."""
 
-    def __init__(self, path: Path, campaign: str, points: Sequence[JournalPoint]) -> None:
+    def __init__(
+        self, path: Path, campaign: str, points: Sequence[JournalPoint], rest_s: float = 0.0
+    ) -> None:
+        """``rest_s`` lies between two points."""
         self._path = path
         self._campaign = campaign
         self._counts = Counter(done=sum(point.state is PointState.DONE for point in points))
-        self._left_s = sum(
-            measured_s(point.measurement) for point in points if point.state is not PointState.DONE
-        )
+        left_s = [measured_s(each.measurement) for each in points if each.state is not PointState.DONE]
+        self._left_s = sum(left_s) + rest_s * max(0, len(left_s) - 1)
         self._begun = monotonic()
         self._made_s = 0.0
         """Rig time behind the point that runs."""
@@ -40,6 +42,8 @@ class StatusLine:
             case Event.POINT_DONE:
                 self._counts["done"] += 1
                 self._made_s, self._point_s = self._made_s + self._point_s, 0.0
+            case Event.RESTING:
+                self._made_s += float(happening.facts["rest_s"])
             case Event.FAULT if "point" in happening.facts:
                 self._counts["failed attempts"] += 1
         self._write(happening.text)

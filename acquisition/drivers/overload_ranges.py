@@ -26,7 +26,10 @@ def overload_ranges(
 
     """
     found: list[Overload] = []
-    for role, row, full_scale_v in zip(roles, volts, full_scales_v, strict=True):
+    peaks_v = np.max(np.abs(volts), axis=1, initial=0.0)
+    for role, row, peak_v, full_scale_v in zip(roles, volts, peaks_v, full_scales_v, strict=True):
+        if peak_v < OVERLOAD_FRACTION * full_scale_v:
+            continue
         past = np.flatnonzero(np.abs(row) >= OVERLOAD_FRACTION * full_scale_v)
         if past.size:
             breaks = np.flatnonzero(np.diff(past) > _RECOVERY_SAMPLES)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..bench import Bench
-from ..campaign.happening import Listener, ignore_happening
+from ..campaign.happening import Event, Happening, Listener, ignore_happening
 from ..campaign.item import CampaignItem, CampaignProgress, Item, ignore_item
 from ..campaign.kept_bench import KeptBench
 from ..campaign.notice import Messenger
@@ -43,6 +43,11 @@ class Engine:
         """The open bench; others may look at its rig, where the state says that there is one."""
         assert self._kept is not None, f"no bench is open while {self.shown.state}"
         return self._kept.bench
+
+    @property
+    def played_faults(self) -> tuple[str, ...]:
+        """What a script of faults has done to a virtual rig so far, in order."""
+        return () if self._kept is None else self._kept.played_faults
 
     def open(self, rig: Rig, confirm: Confirm | None = None) -> None:
         """Open the bench of a rig; ``confirm`` as `acquisition.bench.open_bench` takes it."""
@@ -94,6 +99,11 @@ class Engine:
             self.shown.item(item)
             on_item(item)
 
+        def happened(happening: Happening) -> None:
+            if happening.event is Event.RESTING:
+                self.shown.rests(orders.campaign.rest_s, happening.text)
+            on_happening(happening)
+
         self.shown.begin(orders.campaign, orders.folder)
         try:
             make_folder(orders.folder)
@@ -110,7 +120,7 @@ class Engine:
                 switch=self.switch,
                 reopen=self._kept.reopen,
                 changed_bench=orders.changed_bench,
-                on_happening=on_happening,
+                on_happening=happened,
                 messengers=messengers,
             )
         except CheckStopped as stopped:

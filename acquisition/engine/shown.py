@@ -103,6 +103,11 @@ class Shown:
             **self._disk(),
         )
 
+    def rests(self, rest_s: float, text: str) -> None:
+        """Show that the campaign rests between two recordings."""
+        self._done_s += rest_s
+        self.messages.info(text)
+
     def item(self, item: CampaignItem) -> None:
         """Show how a recording came out."""
         if self._status.run is not None and item.name == self._status.run.name:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import model_validator
+from pydantic import Field, NonNegativeFloat, model_validator
 
 from ..excitation.kinds import KINDS
 from ..run.schedule import measured_s
@@ -31,6 +31,8 @@ class Campaign(FrozenModel):
     name: Name
     notes: str = ""
     retry: RetryPolicy = RetryPolicy()
+    rest_s: NonNegativeFloat = Field(default=0.0, le=86400)
+    """Silence between two recordings [s]: specimen and amplifier cool."""
     measurements: tuple[Measurement, ...] = ()
     sweeps: tuple[Sweep, ...] = ()
 
@@ -73,12 +75,17 @@ class Campaign(FrozenModel):
 
     @property
     def duration_s(self) -> float:
-        """Time of all measurements with their ramps and one bench check each, at most [s]."""
-        return sum(measured_s(measurement) for _, measurement in self.recordings())
+        """Time of all measurements with their ramps, one bench check each, and rests in between [s]."""
+        points = self.points()
+        return _recorded_s(points) + self.rest_s * (len(points) - 1)
 
     def size_bytes(self, sample_rate_hz: float, channels: int) -> int:
         """Disk space of all recordings while they are made; compressed afterwards, they need less."""
-        return round(self.duration_s * sample_rate_hz) * channels * BYTES_PER_SAMPLE
+        return round(_recorded_s(self.points()) * sample_rate_hz) * channels * BYTES_PER_SAMPLE
+
+
+def _recorded_s(points: tuple[Point, ...]) -> float:
+    return sum(measured_s(point.measurement) for point in points)
 
 
 def load_campaign(path: Path) -> Campaign:

@@ -10,7 +10,7 @@ from ..toml_file import FrozenModel
 USUAL_GRID_RATE_HZ = 102_400.0
 """Steps per second on which the analogue world is computed, unless the configuration says otherwise."""
 COARSEST_GRID_RATE_HZ = 25_600.0
-"""Coarser, the base would move by 0.25 % less than it should at `WATCHED_HZ`: see `hold_error`."""
+"""Coarser, the base would move by 0.8 % less than it should at `WATCHED_HZ`: see `level_error`."""
 WATCHED_HZ = 1e3
 """Above every resonance of the specimen, the bound ones included, and above every drive of the paper."""
 STEPS_PER_SAMPLE = 2
@@ -49,15 +49,19 @@ class VirtualConfig(FrozenModel):
             raise ValueError(
                 f"the virtual rig is computed in {COARSEST_GRID_RATE_HZ:g} to {USUAL_GRID_RATE_HZ:g} steps a "
                 f"second: coarser, the base would move by more than "
-                f"{hold_error(WATCHED_HZ, COARSEST_GRID_RATE_HZ):.2%} too little at {WATCHED_HZ:g} Hz; give "
+                f"{level_error(WATCHED_HZ, COARSEST_GRID_RATE_HZ):.1%} too little at {WATCHED_HZ:g} Hz; give "
                 "a rate in between, or leave it out"
             )
         return rate_hz
 
 
-def hold_error(frequency_hz: float, grid_rate_hz: float) -> float:
-    """By what part a sine that is held over each step of a grid comes out too small."""
-    return (pi * frequency_hz / grid_rate_hz) ** 2 / 6
+def level_error(frequency_hz: float, grid_rate_hz: float) -> float:
+    """By what part the base moves too little in a sine, at most.
+
+    The drive is averaged over a step and held, (pi f h)^2 / 3; the rest is the specimen's force on the
+    table, which is extrapolated to the middle of the step. How the specimen answers to the base is exact.
+    """
+    return 0.55 * (pi * frequency_hz / grid_rate_hz) ** 2
 
 
 def fastest_sample_rate_hz(grid_rate_hz: float) -> float | None:

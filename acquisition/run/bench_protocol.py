@@ -49,6 +49,9 @@ class RunBench(Protocol):
     def confirmations(self) -> KnobSheet:
         """What the operator confirmed by hand."""
 
+    def idle(self, duration_s: float) -> None:
+        """Wait while nothing is sampled [s], in the rig's own time."""
+
     @property
     def last_check(self) -> CheckResult | None:
         """The check that the bench was admitted on; None when it was waived and there was none."""

@@ -288,6 +288,11 @@ class LoopbackBench:
         self.confirmations = KnobSheet(operator="test", confirmed=datetime.now(UTC), knobs=rig.knobs)
         self.last_check = None
         self.recorder = MemoryRecorder(self.world)
+        self.idled_s = 0.0
+
+    def idle(self, duration_s: float) -> None:
+        """Let time pass at once."""
+        self.idled_s += duration_s
 
 
 @pytest.fixture

@@ -38,13 +38,15 @@ def test_an_estimate_in_words_names_lead_ins_and_a_disk_that_is_too_small():
         recordings=3,
         kept=2,
         duration_s=3723.4,
+        rest_s=120.0,
         lead_in_s=60.0,
         largest_bytes=10**6,
         total_bytes=2 * 10**6,
         free_bytes=10**6,
     )
-    first, second, third = estimate_text(expected).splitlines()
+    first, rest, second, third = estimate_text(expected).splitlines()
     assert first == "3 recordings (2 kept), 1:02:03 (h:min:s) of rig time, about 2 MB; 1 MB are free"
+    assert rest == "0:02:00 of it are silence between recordings"
     assert second == "0:01:00 of it lead to points along their chains"
     assert third.startswith("The disk may be full before the end")
 

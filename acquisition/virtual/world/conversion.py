@@ -6,6 +6,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.compiled import compiled
+
 from .decimation import Decimator, decimator
 from .input_stage import InputStage
 from .noise import NoiseStream
@@ -55,14 +57,20 @@ class ConverterInput:
         done = self._filter.first_step(sample + count) - 1 - self._means_first_step
         self._means = self._means[max(done, 0) :]
         self._means_first_step += max(done, 0)
-        samples += self._noise_v * self._noise.draw(sample, count)
-        return self._quantised(samples)
+        noise = self._noise.draw(sample, count)
+        self.has_clipped |= _quantise(samples, noise, self._noise_v, self._count_v)
+        return samples
 
-    def _quantised(self, volts: FloatArray) -> FloatArray:
-        limit = 2 ** (CONVERTER_BITS - 1)
-        counts = np.rint(volts / self._count_v)
-        self.has_clipped |= bool(np.any((counts > limit - 1) | (counts < -limit)))
-        return np.clip(counts, -limit, limit - 1) * self._count_v
+
+@compiled
+def _quantise(volts: FloatArray, noise: FloatArray, noise_v: float, count_v: float) -> bool:
+    """Add noise and round to whole counts, in place; tell whether one lay beyond the range."""
+    most, clips = 2.0 ** (CONVERTER_BITS - 1), False
+    for k in range(volts.size):
+        counts = np.rint((volts[k] + noise_v * noise[k]) / count_v)
+        clips |= counts > most - 1.0 or counts < -most
+        volts[k] = min(max(counts, -most), most - 1.0) * count_v
+    return clips
 
 
 class Conversion:

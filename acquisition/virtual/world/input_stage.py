@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.compiled import compiled
+
 from ..analogue import Coupling, Input
 from .recursive_filter import RecursiveFilter
 from .sensors import IEPE_BIAS_V
@@ -49,15 +51,27 @@ class InputStage:
 
     def pass_on(self, signals: FloatArray) -> tuple[FloatArray, bool]:
         """Volts at the converter and whether they clip, from the world's signals, shape (signals, steps)."""
-        volts = signals[self.cable.signal] * self._gain
+        volts = np.empty(signals.shape[1])
         match self.configured.coupling:
             case Coupling.AC:
                 # The capacitor has long been charged to the constant part when a conversion begins.
-                volts = self._capacitor.run(volts)
+                passed = self._capacitor.run(signals[self.cable.signal] * self._gain)
+                clips = _clipped(passed, 1.0, 0.0, self._clip_v, volts)
             case Coupling.DC:
-                volts = volts + self._offset_v
-        clips = bool(np.max(np.abs(volts), initial=0.0) > self._clip_v)
-        return np.clip(volts, -self._clip_v, self._clip_v), clips
+                signal = signals[self.cable.signal]
+                clips = _clipped(signal, self._gain, self._offset_v, self._clip_v, volts)
+        return volts, clips
+
+
+@compiled
+def _clipped(signal: FloatArray, gain: float, offset_v: float, clip_v: float, volts: FloatArray) -> bool:
+    """Turn a signal into volts and clip them; tell whether it was necessary."""
+    clips = False
+    for k in range(signal.size):
+        value = signal[k] * gain + offset_v
+        clips |= abs(value) > clip_v
+        volts[k] = min(max(value, -clip_v), clip_v)
+    return clips
 
 
 def _operating_point(configured: Input, cable: Cable) -> tuple[float, float]:

@@ -1,0 +1,137 @@
+"""Silence between recordings: how long, how silent, who hears a stop, and what a kill leaves behind."""
+
+import shutil
+from datetime import timedelta
+from time import monotonic
+
+import pytest
+
+from acquisition.campaign.estimate import estimate
+from acquisition.campaign.happening import Event
+from acquisition.campaign.item import Existing, Item
+from acquisition.campaign.journal import journal_path
+from acquisition.campaign.journal_point import PointState, read_journal
+from acquisition.campaign.kept_bench import KeptBench
+from acquisition.campaign.run_campaign import run_campaign
+from acquisition.errors import ConfigurationError, DataLost
+from acquisition.excitation.dwell import Dwell
+from acquisition.plan.campaign import Campaign
+from acquisition.plan.measurement import Measurement
+from acquisition.plan.retry import RetryPolicy
+from acquisition.run.state import RunState
+from acquisition.run.stop import Cause, StopRequest, StopSwitch
+from acquisition.toml_file import validated
+
+REST_S = 12.0
+
+
+def campaign(*names, rest_s=REST_S, **policy):
+    dwell = Dwell(amplitude_vpp=1.0, frequency_hz=260, settle_s=0.1, duration_s=0.2)
+    plans = (Measurement(name=name, excitation=dwell, ramp_s=0.3, ramp_step_s=0.03) for name in names)
+    return Campaign(name="c", rest_s=rest_s, measurements=tuple(plans), retry=RetryPolicy(**policy))
+
+
+def points(folder):
+    return read_journal(journal_path(folder, "c"))
+
+
+def test_the_rig_rests_between_recordings_in_its_own_time_with_nothing_on_the_terminal(rig, tmp_path):
+    coarse = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"grid_rate_hz": 25_600.0})})
+    with KeptBench(coarse) as kept:
+        world = kept._power._virtual.world
+        began_s, loudest_v = [], []
+
+        def happened(happening):
+            match happening.event:
+                case Event.RESTING:
+                    world.keep_truth()
+                    began_s.append(world.time_s)
+                case Event.POINT_BEGUN if began_s:
+                    assert world.time_s - began_s[-1] == pytest.approx(REST_S, abs=1e-3)
+                    loudest_v.append(abs(world.truth()[-1000:, 1]).max())
+
+        begun = monotonic()
+        items = run_campaign(kept.bench, campaign("one", "two"), tmp_path, on_happening=happened)
+        assert monotonic() - begun < REST_S
+    assert [item.result for item in items] == [Item.RECORDED] * 2
+    assert len(began_s) == 1
+    assert max(loudest_v) < 1e-4  # the table's velocity [m/s]: noise of the amplifier
+    told = (tmp_path / "c.status").read_text()
+    assert "resting for 12 s before two" in told
+
+
+def test_a_rest_is_told_in_the_plan_and_in_the_estimate(rig, tmp_path):
+    with_rest, without = campaign("one", "two", "three"), campaign("one", "two", "three", rest_s=0)
+    assert with_rest.duration_s - without.duration_s == pytest.approx(2 * REST_S)
+    assert with_rest.size_bytes(5120, 4) == without.size_bytes(5120, 4)
+    expected = estimate(with_rest, rig, tmp_path)
+    assert expected.rest_s == pytest.approx(2 * REST_S)
+    assert expected.duration_s == pytest.approx(estimate(without, rig, tmp_path).duration_s + 2 * REST_S)
+
+
+def test_a_stop_is_heard_in_the_middle_of_a_rest(bench, tmp_path):
+    switch = StopSwitch()
+    idle = bench.idle
+
+    def idle_and_stop(duration_s):
+        idle(duration_s)
+        if bench.idled_s > 5.0:
+            switch.ask(StopRequest.by(Cause.OPERATOR, "enough"))
+
+    bench.idle = idle_and_stop
+    items = run_campaign(bench, campaign("one", "two"), tmp_path, switch=switch)
+    assert bench.idled_s == pytest.approx(5.1, abs=0.05)
+    assert [item.name for item in items] == ["one"]
+    assert [point.state for point in points(tmp_path)] == [PointState.DONE, PointState.QUEUED]
+
+
+def test_a_hold_keeps_a_rest_up_until_it_is_taken_back(bench, tmp_path):
+    switch = StopSwitch()
+    idle = bench.idle
+
+    def idle_and_press(duration_s):
+        idle(duration_s)
+        switch.hold() if bench.idled_s < 2 * REST_S else switch.resume()
+
+    bench.idle = idle_and_press
+    items = run_campaign(bench, campaign("one", "two"), tmp_path, switch=switch)
+    assert bench.idled_s == pytest.approx(2 * REST_S, abs=0.2)
+    assert [item.result for item in items] == [Item.RECORDED, Item.RECORDED]
+
+
+def test_a_campaign_killed_in_a_rest_goes_on_at_the_next_point(bench, new_bench, rig, tmp_path):
+    def as_left_by_a_kill(happening):
+        if happening.event is Event.RESTING:
+            # What a process leaves that is killed now: the files as they are, the journal's log included.
+            shutil.copytree(tmp_path / "out", tmp_path / "killed", dirs_exist_ok=True)
+
+    plan = campaign("one", "two")
+    run_campaign(bench, plan, tmp_path / "out", on_happening=as_left_by_a_kill)
+    killed = tmp_path / "killed"
+    assert [(point.state, point.attempts) for point in points(killed)] == [
+        (PointState.DONE, 1),
+        (PointState.QUEUED, 0),
+    ]
+    fresh = new_bench(rig)
+    items = run_campaign(fresh, plan, killed, Existing.RESUME)
+    assert [item.result for item in items] == [Item.KEPT, Item.RECORDED]
+    assert fresh.idled_s == 0.0  # nothing has been played in this session
+
+
+def test_another_attempt_comes_after_a_rest_too(bench, tmp_path):
+    faults = [DataLost("a hole")]
+
+    def watch(progress):
+        if faults and progress.run.state is RunState.RECORDING:
+            bench.world.faults["digitizer.read"] = [faults.pop]
+
+    items = run_campaign(bench, campaign("one", attempts=2), tmp_path, on_progress=watch)
+    assert [item.path.name for item in items] == ["one.2.h5"]
+    assert bench.idled_s == pytest.approx(REST_S)
+
+
+def test_a_rest_that_is_none_is_refused():
+    longest = timedelta(days=1).total_seconds()
+    for given in (-1.0, longest + 1):
+        with pytest.raises(ConfigurationError, match="rest_s"):
+            validated({"name": "c", "rest_s": given}, Campaign, "c.toml")
