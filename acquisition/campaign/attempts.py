@@ -28,7 +28,7 @@ Reopen = Callable[[], RunBench]
 """Closes a bench that has lost an instrument, and opens it again; raises AcquisitionError."""
 
 LOOK_EVERY_S = 1.0
-"""How often a lost instrument is looked for [s]."""
+"""How often a lost instrument is looked for, and how long another attempt waits [s]."""
 BESIDE = frozenset({"check", "lead_in", "ramp_up", "ramp_down"})
 """Segments that no result is taken from."""
 
@@ -124,12 +124,14 @@ class Attempts:
         return not is_stopping and why.value in {each.value for each in self._policy.on}
 
     def _made_ready(self, point: Point, path: Path, error: AcquisitionError) -> None:
-        """Open the bench again when an instrument failed; then another attempt has a chance."""
+        """Wait a little, or open the bench again when an instrument failed: another attempt has a chance."""
         if isinstance(error, InstrumentError):
             if self._reopen is None:
                 raise error
             self._bench = self._reopened(self._reopen, error)
             self._tell(Event.BENCH_REOPENED, "the bench was closed and opened again", point, path)
+        else:
+            self._bench.idle(LOOK_EVERY_S)  # what has just failed seldom works in the next instant
         self._tell(Event.RETRY, f"{point.name} is tried again", point, path)
 
     def _rested(self, point: Point, failed: AcquisitionError) -> None:

@@ -146,12 +146,15 @@ class DaqServer:
         return handle
 
     def _check_faults(self, name: str) -> None:
-        """Fail the call if a rule says so. The first refusal comes at once; to try again takes time."""
-        if name in self._refused:
-            self._pace.stumble(self._rig)
+        """Fail the call if a rule says so. The first refusal comes at once; to be refused again takes time.
+
+        A call that is let through takes none: a reader would be behind by what had passed.
+        """
         try:
             self.faults.check(name, self._rig.now_s)
         except DaqmxRefusal:  # a server that is gone takes no time: nobody is there
+            if name in self._refused:
+                self._pace.stumble(self._rig)
             self._refused.add(name)
             raise
         self._refused.discard(name)

@@ -6,6 +6,7 @@ from time import monotonic
 
 import pytest
 
+from acquisition.campaign.attempts import LOOK_EVERY_S
 from acquisition.campaign.estimate import estimate
 from acquisition.campaign.happening import Event
 from acquisition.campaign.item import Existing, Item
@@ -127,7 +128,7 @@ def test_another_attempt_comes_after_a_rest_too(bench, tmp_path):
 
     items = run_campaign(bench, campaign("one", attempts=2), tmp_path, on_progress=watch)
     assert [item.path.name for item in items] == ["one.2.h5"]
-    assert bench.idled_s == pytest.approx(REST_S)
+    assert bench.idled_s == pytest.approx(LOOK_EVERY_S + REST_S)
 
 
 def test_a_rest_that_is_none_is_refused():

@@ -15,9 +15,9 @@ from acquisition.rig.configuration import with_faults
 
 SCRIPT = [
     {"at_s": 1.9, "fault": "pull_usb_cable", "for_s": 1.5},
-    {"at_s": 6.0, "fault": "overrun", "for_s": 0.4},
-    {"at_s": 9.0, "fault": "lose_daq_server", "for_s": 1.5},
-    {"at_s": 12.5, "fault": "turn_amplifier_gain", "gain_db": 20, "for_s": 2.0},
+    {"at_s": 9.0, "fault": "overrun", "for_s": 0.4},
+    {"at_s": 14.0, "fault": "lose_daq_server", "for_s": 1.5},
+    {"at_s": 19.0, "fault": "turn_amplifier_gain", "gain_db": 20, "for_s": 2.0},
 ]
 
 
