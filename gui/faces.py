@@ -79,10 +79,10 @@ def moment_text(utc: str) -> str:
 
 
 def status_fields(
-    status: EngineStatus | None, frames_per_s: float
+    status: EngineStatus | None, frames_per_s: float, longest_wait_s: float
 ) -> tuple[dict[StatusField, str], frozenset[StatusField]]:
     """Fill the status line, and say which fields ask for a look."""
-    frames = f"{frames_per_s:.0f} fps"
+    frames = f"{frames_per_s:.0f} fps, latency {1e3 * longest_wait_s:.0f} ms"
     if status is None or status.bench is None:
         return {StatusField.RIG: "no bench", StatusField.FRAMES: frames}, frozenset()
     bench = status.bench

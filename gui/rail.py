@@ -26,6 +26,11 @@ class Rail(QListWidget):
         self.show_done({})
         self.currentRowChanged.connect(self._chosen)
 
+    @property
+    def chosen_name(self) -> str:
+        """The page that is marked."""
+        return self._names[self.currentRow()] if self.currentRow() >= 0 else ""
+
     def choose(self, name: str) -> None:
         """Mark a page as the one that is shown."""
         self.setCurrentRow(self._names.index(name))

@@ -37,9 +37,26 @@ class StatusLine(QFrame):
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             self._labels[field] = label
             layout.addWidget(label)
+        frames = self._labels[StatusField.FRAMES]
+        # As wide as it ever gets: numbers that change twenty times a second move nothing.
+        frames.setMinimumWidth(frames.fontMetrics().horizontalAdvance("00 fps, latency 0000 ms "))
+        frames.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         # The file takes what is left, and gives way first.
         self._labels[StatusField.FILE].setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         layout.setStretchFactor(self._labels[StatusField.FILE], 1)
+
+    def text_of(self, field: str) -> str:
+        """Give what a field shows."""
+        return self._labels[StatusField(field)].text()
+
+    def tip_of(self, field: str) -> str:
+        """Give what is said more of it."""
+        return self._labels[StatusField(field)].toolTip()
+
+    def explain(self, field: StatusField, text: str) -> None:
+        """Say more of a field where somebody points at it."""
+        if self._labels[field].toolTip() != text:
+            self._labels[field].setToolTip(text)
 
     def show_fields(
         self, texts: Mapping[StatusField, str], marked: frozenset[StatusField] = frozenset()
@@ -51,7 +68,8 @@ class StatusLine(QFrame):
             shown = f"⚠ {text}" if tone else text
             if label.text() != shown:
                 label.setText(shown)
-                label.setToolTip(shown)
+                if field is not StatusField.FRAMES:
+                    label.setToolTip(shown)
             if (label.property("tone") or "") != tone:
                 label.setProperty("tone", tone)
                 label.style().polish(label)

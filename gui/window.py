@@ -20,6 +20,7 @@ from .banner import Banner
 from .desk import Desk
 from .faces import face_of, status_fields
 from .frame_count import FrameCount
+from .loop_watch import LoopWatch
 from .menus import build_menus
 from .message_strip import MessageStrip
 from .orders import Orders
@@ -29,7 +30,7 @@ from .pages.catalogue import PageEntry
 from .rail import Rail
 from .settings import Remembered
 from .sign_of_life import SignOfLife
-from .status_line import StatusLine
+from .status_line import StatusField, StatusLine
 from .theme import Theme, palette, style_sheet
 
 TICK_MS = 50
@@ -51,6 +52,7 @@ class Window(QMainWindow):
         self.rail = Rail(tuple(self.pages))
         self.rail.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._stack = QStackedWidget()
+        self._unthemed: list[Callable[[], None]] = []
         for name, page in self.pages.items():
             page.setAccessibleName(f"{name} page")
             self._stack.addWidget(page)
@@ -63,6 +65,7 @@ class Window(QMainWindow):
         self._timer.timeout.connect(self.tick)
         self._timer.start()
         self._frames = FrameCount()
+        self.loop_watch = LoopWatch(lambda: f"{self.rail.chosen_name} page", self)
 
     @property
     def page(self) -> Page:
@@ -88,7 +91,10 @@ class Window(QMainWindow):
         self.desk.bridge.tick()
         status = self.desk.bridge.status
         self.banner.show_face(face_of(status))
-        self.status_line.show_fields(*status_fields(status, self._frames.counted()))
+        self.status_line.show_fields(
+            *status_fields(status, self._frames.counted(), self.loop_watch.longest_s)
+        )
+        self.status_line.explain(StatusField.FRAMES, self.loop_watch.text)
         self.page.refresh()
         self.rail.show_done({name: page.is_done for name, page in self.pages.items()})
 
@@ -98,6 +104,7 @@ class Window(QMainWindow):
             event.ignore()
             return
         self._timer.stop()
+        self.loop_watch.stop()
         self.desk.bridge.close()
         self.page.left()
         self.desk.settings.keep_state(Remembered.GEOMETRY, self.saveGeometry())
@@ -145,7 +152,6 @@ class Window(QMainWindow):
         self.desk.bridge.armed.connect(lambda _plan: self.show_page(RUN))
 
     def _restore(self) -> None:
-        self._retheme(self.desk.theme)
         self.resize(1280, 800)
         geometry = self.desk.settings.state(Remembered.GEOMETRY)
         if not geometry.isEmpty():
@@ -155,19 +161,40 @@ class Window(QMainWindow):
         name = wanted if wanted in self.pages else first
         self._stack.setCurrentWidget(self.pages[name])
         self.rail.choose(name)
+        self._prepare_theme(self.desk.theme)
+        while self._unthemed:
+            self._unthemed.pop(0)()
 
     def _retheme(self, theme: Theme) -> None:
+        """Put on other colours: the frame at once, then page by page, so that nobody has to wait."""
+        self._prepare_theme(theme)
+        QTimer.singleShot(0, self, self._theme_next)
+
+    def _prepare_theme(self, theme: Theme) -> None:
         application = QApplication.instance()
         assert isinstance(application, QApplication)
-        steps: list[Callable[[], None]] = [
-            lambda: application.setPalette(palette(theme)),
-            lambda: application.setStyleSheet(style_sheet(theme)),
-            *(partial(page.retheme, theme) for page in self.pages.values()),
+        application.setPalette(palette(theme))
+        sheet = style_sheet(theme)
+        # A style sheet for the whole application would hold the window up for a third of a second.
+        for part in (self.banner, self.strip, self.rail, self.status_line):
+            part.setStyleSheet(sheet)
+        pages = sorted(self.pages.values(), key=lambda each: each is not self._stack.currentWidget())
+        self._unthemed = [
+            step
+            for page in pages
+            for step in (partial(page.retheme, theme), partial(page.setStyleSheet, sheet))
         ]
-        for step in steps:
-            step()
-            # All of them take longer than the engine waits for a sign of life.
+
+    @property
+    def is_themed(self) -> bool:
+        """Whether every page has its colours."""
+        return not self._unthemed
+
+    def _theme_next(self) -> None:
+        if self._unthemed:
+            self._unthemed.pop(0)()
             self.desk.bridge.beat()
+            QTimer.singleShot(0, self, self._theme_next)
 
     def _reset_layout(self) -> None:
         self.desk.settings.forget_layout()

@@ -64,11 +64,11 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     ) -> None:
         self.across = AxisItem("bottom", across)
         self.up = AxisItem("left", up)
-        super().__init__(parent=parent, axisItems={"bottom": self.across, "left": self.up})
+        # Menus that nobody can open would take half of the time of making a plot.
+        super().__init__(parent=parent, axisItems={"bottom": self.across, "left": self.up}, enableMenu=False)
         self.setAccessibleName(name)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.getPlotItem().hideButtons()
-        self.getPlotItem().setMenuEnabled(False)
         self.getPlotItem().showGrid(x=True, y=True, alpha=0.25)
         self.getPlotItem().setLogMode(across.scale is Scale.LOGARITHMIC, up.scale is Scale.LOGARITHMIC)
         self._scales = [across.scale, up.scale]

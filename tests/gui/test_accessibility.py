@@ -106,8 +106,9 @@ def cut_off(window):
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
 @pytest.mark.parametrize("size", [(1280, 720), (2560, 1440)], ids=lambda size: f"{size[0]}x{size[1]}")
-def test_no_text_is_cut_off(window, qapp, theme, size):
+def test_no_text_is_cut_off(window, qapp, qtbot, theme, size):
     window.desk.choose_theme(theme)
+    qtbot.waitUntil(lambda: window.is_themed)
     window.resize(*size)
     for name in window.pages:
         window.show_page(name)

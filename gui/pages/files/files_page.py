@@ -149,6 +149,7 @@ class FilesPage(Page):
             return
         role = recording.roles[len(levels)]
         levels[role] = kept_levels(recording, role)
+        self.lanes.prepare(recording.channel(role))
         if len(levels) == len(recording.roles):
             self._show(levels)
         else:

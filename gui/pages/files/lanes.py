@@ -8,6 +8,7 @@ from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent, QPalette, QResizeEvent
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
+from acquisition.recording import ChannelHeader, Recording
 from analysis.live.envelope import zigzag
 from analysis.overview import RecordingOverview
 
@@ -22,18 +23,20 @@ _STEP, _ZOOM = 0.2, 0.6
 _LEFT_EM, _TIME_AXIS_EM, _LEAST_EM = 5, 3, 3
 MARKER = Ink(lambda theme: theme.accent)
 SEGMENT = Ink(lambda theme: theme.muted, Dash.DOTTED)
+_MOST_KEPT = 12
+"""Lanes: to make one takes as long as to draw ten."""
 _LABEL_AT = 0.1
 """Names of segments stand at the foot of the first lane: above is the name of the channel."""
 _NAMED_SHARE = 0.08
 """Part of the recording that a segment must fill for its name to find room."""
 
 
-@dataclass
+@dataclass(eq=False)
 class _Lane:
     role: str
     plot: Plot
     curve: pg.PlotDataItem
-    markers: tuple[pg.InfiniteLine, ...]
+    markers: tuple[pg.InfiniteLine, ...] = ()
 
 
 class RecordingLanes(QWidget):
@@ -49,6 +52,7 @@ class RecordingLanes(QWidget):
         self._theme = theme
         self._overview: RecordingOverview | None = None
         self._lanes: list[_Lane] = []
+        self._kept: dict[tuple[str, str], _Lane] = {}
         self._marker_s = [0.0, 0.0]
         self._are_marked = False
         self._layout = QVBoxLayout(self)
@@ -58,21 +62,23 @@ class RecordingLanes(QWidget):
         self._later = QTimer(self, interval=0, singleShot=True)
         self._later.timeout.connect(self._draw)
 
+    def prepare(self, channel: ChannelHeader) -> None:
+        """Have a lane for a channel ready: to make all lanes at once would hold the window up."""
+        self._lane_of(channel)
+
     def show_recording(self, overview: RecordingOverview | None) -> None:
         """Show another recording whole, or none."""
         for lane in self._lanes:
             self._layout.removeWidget(lane.plot)
-            lane.plot.deleteLater()
+            lane.plot.hide()
         self._lanes = []
         self._overview = overview
         if overview is None or overview.recording.samples == 0:
             return
-        roles = overview.recording.roles
-        self._lanes = [self._lane(number, role, role == roles[-1]) for number, role in enumerate(roles)]
-        first = self._lanes[0].plot
-        for lane in self._lanes[1:]:
-            lane.plot.setXLink(first)
-        first.getViewBox().sigXRangeChanged.connect(self._ranged)
+        self._lanes = [self._lane_of(channel) for channel in overview.recording.channels]
+        for number, lane in enumerate(self._lanes):
+            self._begin(lane, number, overview.recording)
+        self._forget_others()
         self._mark_segments(overview)
         self._mark_overloads(overview)
         duration_s = overview.recording.duration_s
@@ -139,7 +145,7 @@ class RecordingLanes(QWidget):
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
         self._theme = theme
-        for lane in self._lanes:
+        for lane in self._kept.values():
             lane.plot.retheme(theme)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -166,31 +172,51 @@ class RecordingLanes(QWidget):
                 return
         event.accept()
 
-    def _lane(self, number: int, role: str, is_last: bool) -> _Lane:  # noqa: FBT001
-        assert self._overview is not None
-        recording = self._overview.recording
-        unit = unit_text(recording.channel(role).unit)
-        across = Axis("Time", "s") if is_last else Axis("")
-        plot = Plot(f"{role_text(role)} over time", across, Axis(unit), self._theme)
+    def _lane_of(self, channel: ChannelHeader) -> _Lane:
+        """Give the lane of a channel, as it was left by another recording, or a new one."""
+        kind = (channel.role, channel.unit)
+        if kind not in self._kept:
+            unit = unit_text(channel.unit)
+            plot = Plot(f"{role_text(channel.role)} over time", Axis("Time", "s"), Axis(unit), self._theme)
+            plot.setMouseEnabled(x=True, y=False)
+            plot.setFocusProxy(self)
+            left = _LEFT_EM * self.fontMetrics().height()
+            plot.getPlotItem().getAxis("left").setWidth(left)
+            title = QLabel(role_text(channel.role), plot)
+            title.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+            title.setBackgroundRole(QPalette.ColorRole.Base)
+            title.setAutoFillBackground(True)
+            title.move(left + self.fontMetrics().height(), 2)
+            plot.getViewBox().sigXRangeChanged.connect(self._ranged)
+            self._kept[kind] = _Lane(channel.role, plot, plot.curve(trace(0)))
+        return self._kept[kind]
+
+    def _begin(self, lane: _Lane, number: int, recording: Recording) -> None:
+        """Make a lane ready for a recording: its place, its limits, nothing drawn yet."""
+        plot, is_last = lane.plot, number == len(recording.channels) - 1
+        plot.wipe()
+        lane.curve = plot.curve(trace(number))
+        lane.markers = self._new_markers(plot)
         em = self.fontMetrics().height()
         plot.setMinimumHeight(_LEAST_EM * em + (_TIME_AXIS_EM * em if is_last else 0))
-        plot.setMouseEnabled(x=True, y=False)
-        plot.setFocusProxy(self)
-        left = _LEFT_EM * self.fontMetrics().height()
-        plot.getPlotItem().getAxis("left").setWidth(left)
-        title = QLabel(role_text(role), plot)
-        title.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        title.setBackgroundRole(QPalette.ColorRole.Base)
-        title.setAutoFillBackground(True)
-        title.move(left + self.fontMetrics().height(), 2)
-        if not is_last:
-            plot.getPlotItem().getAxis("bottom").setStyle(showValues=False)
-            plot.getPlotItem().showLabel("bottom", show=False)
+        plot.across.setStyle(showValues=is_last)
+        plot.across.showLabel(is_last)
+        box = plot.getViewBox()
+        box.setXLink(None)
         least_s = LEAST_SAMPLES / recording.sample_rate_hz
-        plot.getViewBox().setLimits(xMin=0.0, xMax=recording.duration_s, minXRange=least_s)
-        plot.getViewBox().enableAutoRange(x=False, y=False)
+        box.setLimits(xMin=0.0, xMax=recording.duration_s, minXRange=least_s)
+        box.enableAutoRange(x=False, y=False)
+        if number:
+            box.setXLink(self._lanes[0].plot.getViewBox())
         self._layout.addWidget(plot, 1)
-        return _Lane(role, plot, plot.curve(trace(number)), self._new_markers(plot))
+        plot.show()
+
+    def _forget_others(self) -> None:
+        """Let lanes go that neither this recording nor, perhaps, the next one needs."""
+        for kind, lane in list(self._kept.items()):
+            if len(self._kept) > _MOST_KEPT and lane not in self._lanes:
+                del self._kept[kind]
+                lane.plot.deleteLater()
 
     def _new_markers(self, plot: Plot) -> tuple[pg.InfiniteLine, ...]:
         made = []
@@ -235,7 +261,9 @@ class RecordingLanes(QWidget):
         for place in range(len(self._lanes)):
             self._layout.setStretch(place, lane + (axis if place == len(self._lanes) - 1 else 0))
 
-    def _ranged(self) -> None:
+    def _ranged(self, view: pg.ViewBox, _range: object) -> None:
+        if not self._lanes or view is not self._lanes[0].plot.getViewBox():
+            return
         self._later.start()
         self.range_changed.emit()
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from PySide6.QtCore import (
     QAbstractTableModel,
+    QItemSelectionModel,
     QModelIndex,
     QPersistentModelIndex,
     QPointF,
@@ -29,6 +30,7 @@ _NOWHERE = QModelIndex()
 HEADINGS = ("Response", "Name", "State", "Verdict", "Began", "Excitation", "Level", "Length", "Size")
 PICTURE, NAME = 0, 1
 _NUMBERS = tuple(HEADINGS.index(each) for each in ("Level", "Length", "Size"))
+_THIS_ROW_ALONE = QItemSelectionModel.SelectionFlag.ClearAndSelect | QItemSelectionModel.SelectionFlag.Rows
 _WIDE = HEADINGS.index("Excitation")
 PATH_ROLE = Qt.ItemDataRole.UserRole
 SORT_ROLE = Qt.ItemDataRole.UserRole + 1
@@ -198,7 +200,8 @@ class RecordingTable(QTableView):
         for row in range(self._sorted.rowCount()):
             index = self._sorted.index(row, NAME)
             if index.data(PATH_ROLE) == path:
-                self.selectRow(row)
+                # Not selectRow: that one adds the row to others while somebody holds Ctrl.
+                self.selectionModel().setCurrentIndex(index, _THIS_ROW_ALONE)
                 self.scrollTo(index)
                 return
 

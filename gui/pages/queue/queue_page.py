@@ -30,14 +30,19 @@ from acquisition.toml_text import toml_text
 from ...desk import Desk
 from ...faces import clock
 from ...forms.editor import Choice
+from ...latest import Latest
 from ...notice import Notice, NoticeKind, notice_of
 from ...orders import Orders
 from ...page import Page
 from ...read_table import ReadTable
 from ...settings import Remembered
+from .campaign_outlook import CampaignOutlook, campaign_outlook
 from .draft import moved_up, save_campaign, with_measurement, with_sweep, without
-from .row_words import entry_rows, point_rows
+from .row_words import point_rows
 from .sweep_form import SweepForm
+
+LOOK_MS = 50
+"""How long a campaign stands unchanged before it is looked at."""
 
 
 class QueuePage(Page):
@@ -72,6 +77,9 @@ class QueuePage(Page):
             "Arm what is missin&g…", "Keep what is complete in its folder, make the rest", self._arm_missing
         )
         self.hold_button = self._button("Pause", "Stay where the run is; the drive stays on", self._hold)
+        self._looking = Latest(
+            desk.background, campaign_outlook, self._looked, self._look_failed, LOOK_MS, self
+        )
         self._lay_out()
         self._connect()
         self._restore()
@@ -119,19 +127,31 @@ class QueuePage(Page):
         self.progress.setFormat(f"{run.number} of {run.count}, {clock(left_s)} left, ends about {end:%H:%M}")
 
     def _show_campaign(self) -> None:
-        campaign = self.desk.intent.campaign
-        self.entries.show_rows(() if campaign is None else entry_rows(campaign))
+        campaign, rig = self.desk.intent.campaign, self.desk.intent.rig
         if campaign is None:
+            self._looking.drop()
+            self.entries.show_rows(())
             self.summary.setText("No campaign yet: open one, or add the test of the Test page.")
             return
-        rig = self.desk.intent.rig
-        size = "" if rig is None else _size_text(campaign, rig.daq.sample_rate_hz, len(rig.daq.channels))
-        count = len(campaign.recording_names())
-        end = datetime.now().astimezone() + timedelta(seconds=campaign.duration_s)
+        self.summary.setText(f"{campaign.name}: …")
+        self._looking.ask((campaign, rig))
+
+    def _looked(self, seen: CampaignOutlook) -> None:
+        campaign = self.desk.intent.campaign
+        if campaign is None:
+            return
+        row = self.entries.currentRow()
+        self.entries.show_rows(seen.rows)
+        self.entries.selectRow(min(row, len(seen.rows) - 1))
+        size = "" if seen.size_bytes is None else f"   ·   {seen.size_bytes / 1e9:.2f} GB"
+        end = datetime.now().astimezone() + timedelta(seconds=seen.duration_s)
         self.summary.setText(
-            f"{campaign.name}: {count} recordings   ·   takes {clock(campaign.duration_s)}   ·   "
+            f"{campaign.name}: {len(seen.names)} recordings   ·   takes {clock(seen.duration_s)}   ·   "
             f"started now, it ends about {end:%H:%M}{size}   ·   in {self.desk.folder / campaign.name}"
         )
+
+    def _look_failed(self, error: BaseException) -> None:
+        self.desk.say(notice_of(error))
 
     def _add_test(self) -> None:
         measurement = self.desk.intent.measurement
@@ -161,7 +181,7 @@ class QueuePage(Page):
         campaign, number = self.desk.intent.campaign, self.entries.currentRow()
         if campaign is not None and number > 0:
             self.desk.intent.choose_campaign(moved_up(campaign, number))
-            self.entries.selectRow(number - 1)
+            self.entries.setCurrentCell(number - 1, 0)
 
     def _arm(self) -> None:
         self._orders.arm_campaign(Existing.REFUSE)
@@ -258,10 +278,6 @@ class QueuePage(Page):
         layout = QHBoxLayout(self)
         layout.addLayout(left, 1)
         layout.addLayout(right, 1)
-
-
-def _size_text(campaign: Campaign, sample_rate_hz: float, channels: int) -> str:
-    return f"   ·   {campaign.size_bytes(sample_rate_hz, channels) / 1e9:.2f} GB"
 
 
 def _boxed(title: str, table: QWidget, below: QHBoxLayout | None = None) -> QGroupBox:

@@ -1,0 +1,32 @@
+"""The loop's own watch sees what holds the window up."""
+
+from time import thread_time
+
+import pytest
+
+from gui.loop_watch import BOUND_S, LoopWatch
+
+
+def work_for(duration_s):
+    until_s = thread_time() + duration_s
+    while thread_time() < until_s:
+        sum(range(1000))
+
+
+def test_work_that_holds_the_window_up_is_noted_with_what_was_in_sight(qapp, qtbot):
+    watch = LoopWatch(lambda: "Files page")
+    qtbot.waitUntil(lambda: watch.longest_s > 0 or watch.busiest_s > 0)
+    watch.begin()
+    work_for(1.6 * BOUND_S)
+    qtbot.waitUntil(lambda: bool(watch.noted))
+    (wait,) = watch.noted
+    assert wait.about == "Files page"
+    assert wait.busy_s == pytest.approx(1.6 * BOUND_S, abs=0.04)
+    assert wait.own_s > BOUND_S
+    assert "Files page: 1" in watch.text
+    watch.stop()
+
+
+def test_a_loop_that_is_free_is_told_so_on_the_status_line(window, qtbot):
+    qtbot.waitUntil(lambda: "latency" in window.status_line.text_of("frames"))
+    assert "Longest wait" in window.status_line.tip_of("frames")
