@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QCoreApplication, QEventLoop
+from PySide6.QtCore import QEventLoop, QTimer
 
 from acquisition.excitation.dwell import Dwell
 from acquisition.excitation.streamed_noise import StreamedNoise
@@ -52,7 +52,10 @@ def waited():
         until = time.monotonic() + within_s
         while not is_so():
             assert time.monotonic() < until, "it did not come true in time"
-            QCoreApplication.processEvents(QEventLoop.ProcessEventsFlag.AllEvents, 20)
+            # Asking for events without a pause would take the time of the processes that it waits for.
+            pause = QEventLoop()
+            QTimer.singleShot(10, pause.quit)
+            pause.exec()
 
     return wait
 
