@@ -12,9 +12,10 @@ from ..rig.configuration import Rig, Role
 from ..rig.model import Quantity, suspended_mass_kg
 from ..rig.output import OutputConfig
 from .loads import predicted_loads
-from .measurement import Measurement
+from .measurement import Measurement, OnOverload
 from .needed_setting import needed_vpp
 from .player import Player, player_of
+from .specimen_loads import predicted_specimen_loads
 
 RAMP_PERIODS = 3.0
 """A ramp must take this many periods of the shaker's suspension, or it shakes like a step."""
@@ -27,6 +28,15 @@ class Side(StrEnum):
 
     AT_MOST = "at most"
     AT_LEAST = "at least"
+
+
+class Consequence(StrEnum):
+    """What follows when a limit would be passed."""
+
+    REFUSED = "refused"
+    """The plan is not played."""
+    TOLD = "told"
+    """It is said beforehand, and marked in the recording if it comes true."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +52,7 @@ class LimitCheck:
     remedy: str
     """What to change when it is exceeded."""
     side: Side = Side.AT_MOST
+    consequence: Consequence = Consequence.REFUSED
 
     @property
     def use(self) -> float:
@@ -51,6 +62,11 @@ class LimitCheck:
                 return self.value / self.limit
             case Side.AT_LEAST:
                 return self.limit / self.value
+
+    @property
+    def forbids(self) -> bool:
+        """Whether the plan must not be played."""
+        return not self.is_kept and self.consequence is Consequence.REFUSED
 
     @property
     def is_kept(self) -> bool:
@@ -67,7 +83,7 @@ class LimitCheck:
 
 def limit_checks(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
     """Every predicted load of ``measurement`` beside the limit of ``rig`` it must keep."""
-    return (*_settings(measurement, rig), *_loads(measurement, rig))
+    return (*_settings(measurement, rig), *_loads(measurement, rig), *_specimen(measurement, rig))
 
 
 def require_within_limits(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
@@ -80,7 +96,7 @@ def require_within_limits(measurement: Measurement, rig: Rig) -> tuple[LimitChec
 
     """
     checks = limit_checks(measurement, rig)
-    violations = [check.complaint() for check in checks if not check.is_kept]
+    violations = [check.complaint() for check in checks if check.forbids]
     if violations:
         raise LimitExceeded(f"{measurement.name}: {'; '.join(violations)}. Nothing was played.")
     return checks
@@ -210,8 +226,34 @@ def _loads(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
     )
 
 
+def _specimen(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
+    """Check the estimate of the specimen's motion against its springs and the vibrometer."""
+    loads = predicted_specimen_loads(measurement.excitation, rig)
+    limit = rig.specimen.amplitude_limit_m
+    yield LimitCheck(
+        f"the specimen's amplitude (about, {loads.amplitude.cause})",
+        loads.amplitude.peak,
+        limit.value,
+        "m",
+        limit.source,
+        "lower amplitude_vpp or keep away from that frequency",
+    )
+    flagged = measurement.limits.on_overload is OnOverload.FLAG
+    for channel in channels_of(rig):
+        if channel.role is Role.M0_VELOCITY:
+            yield LimitCheck(
+                f"the velocity of m0 (about, {loads.velocity.cause})",
+                loads.velocity.peak,
+                channel.full_scale_v * channel.units_per_volt,
+                channel.unit,
+                f"range of {channel.physical} and of the vibrometer",
+                "lower amplitude_vpp or widen the vibrometer's range",
+                consequence=Consequence.TOLD if flagged else Consequence.REFUSED,
+            )
+
+
 def _inputs(rig: Rig, amplitude_vpp: float, amplifier_v: float, acceleration: float) -> Iterator[LimitCheck]:
-    """Whether the converter can show what is predicted; the vibrometer depends on the specimen."""
+    """Whether the converter can show what is predicted of the rig."""
     peaks = {
         Role.DRIVE_VOLTAGE: 0.5 * amplitude_vpp * rig.generator.terminal_factor(),
         Role.AMPLIFIER_VOLTAGE: amplifier_v,

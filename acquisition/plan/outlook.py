@@ -42,8 +42,8 @@ class Outlook:
 
     @property
     def is_allowed(self) -> bool:
-        """Whether every limit is kept."""
-        return all(check.is_kept for check in self.checks)
+        """Whether it may be played."""
+        return not any(check.forbids for check in self.checks)
 
     @property
     def crest_factor(self) -> float:

@@ -9,10 +9,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.specimen import Specimen, gong2025
+from sim.specimen import Specimen
 
 from ...errors import ConfigurationError
 from ...rig.configuration import Rig
+from ...rig.specimen import specimen_of
 from ...rig.virtual import VirtualConfig, fastest_sample_rate_hz
 from ..analogue import Input
 from .analogue_output import AnalogueOutput
@@ -261,12 +262,6 @@ class World:
 def _history_steps(grid: TimeGrid) -> int:
     """Count the steps that the slowest conversion looks back on when it begins."""
     return history_steps(grid.rate_hz / LOWEST_RATE_HZ, LONGEST_DELAY_S * grid.rate_hz) + 2
-
-
-def specimen_of(rig: Rig) -> Specimen:
-    """Make the specimen that a rig describes, as the simulation knows it."""
-    config = rig.specimen
-    return gong2025(damping_time_s=config.damping_time_s, gap_m=config.gap_m, contact=config.contact)
 
 
 def virtual_section(rig: Rig) -> VirtualConfig:

@@ -28,7 +28,7 @@ class LimitTable(ReadTable):
             [
                 (
                     f"{100 * check.use:.1f} %",
-                    _short(check.what) if check.is_kept else f"✖ {_short(check.what)}",
+                    f"{_mark(check)}{_short(check.what)}",
                     f"{check.value:.3g} {_unit(check.unit)}",
                     f"{_SIGNS[check.side]} {check.limit:.3g} {_unit(check.unit)}",
                 )
@@ -46,8 +46,14 @@ class LimitTable(ReadTable):
                         item.setTextAlignment(Qt.AlignmentFlag.AlignCenter)
 
 
+def _mark(check: LimitCheck) -> str:
+    if check.is_kept:
+        return ""
+    return "✖ " if check.forbids else "⚠ "
+
+
 def _short(what: str) -> str:
-    return what.removeprefix("the ").replace("(at ", "(").replace("_", " ")
+    return what.removeprefix("the ").replace("(at ", "(").replace("(about, at ", "(about, ").replace("_", " ")
 
 
 def _unit(unit: str) -> str:

@@ -15,11 +15,13 @@ def summary_text(seen: Outlook) -> str:
     parts.append(f"generator {seen.peak_v:.3g} V peak, crest {seen.crest_factor:.2f}")
     parts.append(f"takes {clock(seen.duration_s)}")
     parts.append(f"file {seen.size_bytes / 1e6:.0f} MB")
-    broken = [check for check in seen.checks if not check.is_kept]
+    passed = [check for check in seen.checks if not check.is_kept]
+    broken = sorted(passed, key=lambda check: not check.forbids)
     said = "   ·   ".join(parts)
     if not broken:
         return f"✔ within all limits   ·   {said}"
-    return f"✖ {broken[0].complaint()}   ·   {said}"
+    sign = "✖" if broken[0].forbids else "⚠"
+    return f"{sign} {broken[0].complaint()}   ·   {said}"
 
 
 def _load(check: LimitCheck) -> str:

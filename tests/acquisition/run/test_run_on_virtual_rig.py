@@ -18,6 +18,7 @@ from acquisition.excitation.multisine_noise import MultisineNoise
 from acquisition.excitation.sine_sweep import SineSweep
 from acquisition.plan.campaign import load_campaign
 from acquisition.plan.measurement import Measurement
+from acquisition.plan.specimen_loads import predicted_specimen_loads
 from acquisition.recording.layout import RecordingState
 from acquisition.recording.reader import open_recording
 from acquisition.rig.configuration import load_rig
@@ -112,6 +113,11 @@ def test_the_quick_campaign_is_recorded_without_an_overload(virtual_bench, tmp_p
             assert recording.state is RecordingState.COMPLETE
             assert not recording.overloads
             assert not recording.gaps
+            # What the plan said of the specimen, within what impacts add and a band that is not driven takes.
+            measurement = Measurement.model_validate(recording.plan)
+            foretold = predicted_specimen_loads(measurement.excitation, virtual_bench.rig)
+            peak = np.max(np.abs(recording.read("m0_velocity")))
+            assert 0.1 < peak / foretold.velocity.peak < 3
 
 
 def test_an_amplifier_turned_up_is_found_before_the_full_level(tmp_path):

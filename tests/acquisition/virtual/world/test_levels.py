@@ -12,9 +12,9 @@ import pytest
 
 from acquisition.rig.configuration import load_rig
 from acquisition.rig.model import Quantity, RigModel
+from acquisition.rig.specimen import specimen_of
 from acquisition.virtual.world.plant import TRUTH_COLUMNS, Plant
 from acquisition.virtual.world.time_grid import USUAL_GRID
-from acquisition.virtual.world.world import specimen_of
 
 RIG = load_rig(Path(__file__).parents[4] / "hardware_configs" / "virtual_rig.toml")
 STEP_S = USUAL_GRID.step_s

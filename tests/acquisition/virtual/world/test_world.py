@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 from acquisition.errors import ConfigurationError
 from acquisition.rig.configuration import load_rig
 from acquisition.rig.model import Quantity, RigModel
+from acquisition.rig.specimen import specimen_of
 from acquisition.virtual.analogue import Coupling, Input
 from acquisition.virtual.world.conversion import volts_per_count
 from acquisition.virtual.world.decimation import GROUP_DELAY_SAMPLES
 from acquisition.virtual.world.plant import TRUTH_COLUMNS
 from acquisition.virtual.world.time_grid import USUAL_GRID, relative_clock_ppm
-from acquisition.virtual.world.world import World, specimen_of
+from acquisition.virtual.world.world import World
 from sim.modes import base_transmissibility
 
 GRID_RATE_HZ, STEP_S = USUAL_GRID.rate_hz, USUAL_GRID.step_s
