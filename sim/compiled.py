@@ -40,6 +40,8 @@ config.CACHE_DIR = _cache_directory()  # type: ignore[attr-defined]
 
 _OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """How every kernel is compiled. Nobody calls one as a C function, so that wrapper is left out."""
+_COUNTING, _LEAN = ({**_OPTIONS, "_nrt": counts} for counts in (True, False))
+"""With numba's memory and without. Said outright, or a kernel would take after the first that calls it."""
 
 
 def compiled(kernel: Kernel) -> Kernel:
@@ -49,9 +51,18 @@ def compiled(kernel: Kernel) -> Kernel:
     denominators and must not raise. ``fastmath`` stays off: it may assume that no NaN exists,
     and the step control must see one.
     """
-    return cast("Kernel", njit(**_OPTIONS)(kernel))
+    return cast("Kernel", njit(**_COUNTING)(kernel))
+
+
+def lean(kernel: Kernel) -> Kernel:
+    """Compile like `compiled` what makes no array and hands none back.
+
+    Such a kernel need not count references to the arrays that it is given. Counting is atomic, twice for
+    every array of a named tuple in every call: more than half of the time of a step under a power law.
+    """
+    return cast("Kernel", njit(**_LEAN)(kernel))
 
 
 def inlined(kernel: Kernel) -> Kernel:
-    """Compile like `compiled` and copy into every caller: for what costs less than its call."""
-    return cast("Kernel", njit(**_OPTIONS, forceinline=True)(kernel))
+    """Compile like `lean` and copy into every caller: for what costs less than its call."""
+    return cast("Kernel", njit(**_LEAN, forceinline=True)(kernel))

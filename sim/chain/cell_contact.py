@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from ..compiled import compiled, inlined
+from ..compiled import compiled, inlined, lean
 from ..engine.contact import (
     APEX_SECANTS,
     DEEPEST,
@@ -60,13 +60,13 @@ def cell_workspace() -> Table:
     return np.zeros((WORK_ROWS, WIDTH))
 
 
-@compiled
+@lean
 def gap_on(side: float, law: CellLaw) -> float:
     """Clearance of the stop on one side [m]."""
     return law.upper if side > 0.0 else law.lower
 
 
-@compiled
+@lean
 def motion_in_series(cell: Vector, series: Vector, markov: Vector, tau: float) -> tuple[float, float]:
     """Displacement and velocity ``tau`` after the window began: the series less what the force has done."""
     value, slope = polynomial_at(series, tau)
@@ -77,7 +77,7 @@ def motion_in_series(cell: Vector, series: Vector, markov: Vector, tau: float) -
     return value, slope
 
 
-@compiled
+@lean
 def begin_pressing(
     cell: Vector,
     side: float,
@@ -124,7 +124,7 @@ def _try_step(work: Table, step: float, side: float, curvature: Vector, markov: 
         stop_step(work, step, side, curvature, markov, law)
 
 
-@compiled
+@lean
 def _land(
     work: Table,
     longest: float,
@@ -168,7 +168,7 @@ def copy_row(to: Vector, source: Vector) -> None:
         to[k] = source[k]
 
 
-@compiled
+@lean
 def log_moment(log: Table, at: Vector) -> None:
     """Add a point of the motion as the log's next row, if there is room."""
     row = int(log[0, LOGGED]) + 1
@@ -177,13 +177,13 @@ def log_moment(log: Table, at: Vector) -> None:
         log[0, LOGGED] = row
 
 
-@compiled
+@lean
 def _far(w: float, side: float, law: CellLaw) -> float:
     """abs(p) of a pressed cell [m]."""
     return abs(w) if law.kind == POWER else gap_on(side, law) + w * w
 
 
-@compiled
+@lean
 def _log_apex(
     log: Table, work: Table, step: float, side: float, curvature: Vector, markov: Vector, law: CellLaw
 ) -> None:
@@ -205,7 +205,7 @@ def _log_apex(
     copy_row(work[TRIAL], work[SPARE])
 
 
-@compiled
+@lean
 def _gather(work: Table, cell: Vector, tau: float) -> None:
     at = work[POINT]
     at[W], at[R], at[T] = cell[ROOT], cell[RATE], tau
@@ -213,7 +213,7 @@ def _gather(work: Table, cell: Vector, tau: float) -> None:
         at[MOMENT + k] = cell[MEMORY + k]
 
 
-@compiled
+@lean
 def _scatter(work: Table, cell: Vector, series: Vector, markov: Vector, law: CellLaw) -> None:
     """Hand back the point reached; the first two moments become those that lead to its p and dp/dt exactly.
 

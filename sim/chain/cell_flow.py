@@ -11,7 +11,7 @@ every rate is a polynomial, and one step is Dormand and Prince's 8(5,3), both as
 
 from typing import NamedTuple
 
-from ..compiled import compiled, inlined
+from ..compiled import inlined, lean
 from ..engine.contact_flow import (
     A21,
     A31,
@@ -117,7 +117,7 @@ class CellLaw(NamedTuple):
 CURVATURE_TERMS = SERIES_TERMS - 2
 
 
-@compiled
+@lean
 def fill_curvature(curvature: Vector, series: Vector) -> None:
     """Write the second derivative of a polynomial, coefficients ascending, shape (CURVATURE_TERMS,)."""
     for k in range(CURVATURE_TERMS):
@@ -162,7 +162,7 @@ def stop_rates(
         rates[k] = w * at[k - 1]
 
 
-@compiled
+@lean
 def stop_step(  # noqa: C901 - the twelve stages of one formula, in order
     work: Table, step: float, side: float, curvature: Vector, markov: Vector, law: CellLaw
 ) -> None:

@@ -9,7 +9,7 @@ import math
 import numpy as np
 from scipy.integrate._ivp import dop853_coefficients as _dop
 
-from ..compiled import compiled
+from ..compiled import lean
 from ..engine.contact_flow import STAGES, R, W
 from ..engine.parameters import PowerTerms, Table, Vector
 from ..engine.power_flow import power_force
@@ -40,7 +40,7 @@ FADING = 0.999
 """How much of a past size is left after a window."""
 
 
-@compiled
+@lean
 def power_cell_rates(at: Vector, rates: Vector, curvature: Vector, markov: Vector, power: PowerTerms) -> None:
     """Write d/dt of the unknowns at ``at`` into ``rates``."""
     force = power_force(at[W], power)
@@ -53,7 +53,7 @@ def power_cell_rates(at: Vector, rates: Vector, curvature: Vector, markov: Vecto
         rates[k] = at[k - 1]
 
 
-@compiled
+@lean
 def power_cell_step(  # noqa: C901 - stages, terms and unknowns are three loops
     work: Table, step: float, curvature: Vector, markov: Vector, power: PowerTerms
 ) -> None:
@@ -79,7 +79,7 @@ def power_cell_step(  # noqa: C901 - stages, terms and unknowns are three loops
         end[i] = point[i] + step * end[i]
 
 
-@compiled
+@lean
 def begin_power(cell: Vector, series: Vector, markov: Vector, law: CellLaw, length: float) -> None:
     """Take p and dp/dt of a cell under a power law from the chain, and the sizes that errors are held to."""
     p, rate = series[0], series[1]
@@ -92,7 +92,7 @@ def begin_power(cell: Vector, series: Vector, markov: Vector, law: CellLaw, leng
         cell[STEP] = FIRST_PART * length
 
 
-@compiled
+@lean
 def short_of_the_wall(step: float, at: Vector, markov: Vector, law: CellLaw) -> float:
     """Shorten a step until it turns the steepest spring on its way by little: see `sim.engine.smooth`."""
     exponent = 1

@@ -1,6 +1,6 @@
 """One cell through one window: flight, contact, flight, ... and nothing else of the chain. SI units."""
 
-from ..compiled import compiled
+from ..compiled import lean
 from ..engine.contact import DEEPEST, HELD, LEFT, LOGGED, NOT_FINITE
 from ..engine.contact_flow import R, W
 from ..engine.detection import NEVER, SERIES_TERMS, first_contact, touched_side
@@ -39,7 +39,7 @@ COUNT = 0
 """Place 0 of a list of touches: how many follow."""
 
 
-@compiled
+@lean
 def age_moments(cell: Vector, by: float) -> None:
     """Let time pass without a force: I_k+1 grows by the integral of I_k, exactly."""
     for k in range(MOMENTS - 1, 0, -1):
@@ -50,7 +50,7 @@ def age_moments(cell: Vector, by: float) -> None:
         cell[MEMORY + k] += added
 
 
-@compiled
+@lean
 def fill_later_series(later: Vector, series: Vector, cell: Vector, markov: Vector, tau: float) -> None:
     """Write p as a polynomial in the time since ``tau``, without a force from then on."""
     for k in range(SERIES_TERMS):
@@ -70,7 +70,7 @@ def fill_later_series(later: Vector, series: Vector, cell: Vector, markov: Vecto
         later[n] -= inverse_factorial * done
 
 
-@compiled
+@lean
 def curvature_bound(series: Vector, length: float) -> float:
     """Bound of the second derivative of a polynomial on [0, length]."""
     bound = 0.0
@@ -79,7 +79,7 @@ def curvature_bound(series: Vector, length: float) -> float:
     return bound
 
 
-@compiled
+@lean
 def _log_now(log: Table, work: Table, cell: Vector, tau: float) -> None:
     if len(log) > 0:
         node = work[ARGUMENT]
@@ -89,7 +89,7 @@ def _log_now(log: Table, work: Table, cell: Vector, tau: float) -> None:
         log_moment(log, node)
 
 
-@compiled
+@lean
 def cross_window(
     cell: Vector,
     start: float,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled
+from ..compiled import compiled, lean
 from ..engine.clock import advance_clock, time_until
 from ..engine.parameters import Table, Vector
 from ..modes import Complex
@@ -150,7 +150,7 @@ def _go_quietly(
     phasors[drive] = drive_term(clock, 0.0, tables)
 
 
-@compiled
+@lean
 def _march_on(
     space: Space,
     phasors: Complex,
@@ -181,7 +181,7 @@ def _march_on(
     return march(space, phasors, clock, observed, steps, tables)
 
 
-@compiled
+@lean
 def _choose_window(
     space: Space,
     cells: Table,
@@ -206,7 +206,7 @@ def _choose_window(
     return length, count
 
 
-@compiled
+@lean
 def is_quiet(space: Space, cells: Table, tables: ChainTables) -> int:
     """Say (1 or 0) whether no cell can ever touch: free phasors only shrink."""
     for i in range(len(cells)):
@@ -216,7 +216,7 @@ def is_quiet(space: Space, cells: Table, tables: ChainTables) -> int:
     return 1
 
 
-@compiled
+@lean
 def _cross(
     space: Space,
     cells: Table,
@@ -263,7 +263,7 @@ def _cross(
     return worst
 
 
-@compiled
+@lean
 def _record_touches(touches: Vector, place: int, clock: Vector, record: ChainRecord) -> int:
     for k in range(1, int(touches[COUNT]) + 1):
         impact = record.counts[IMPACTS]

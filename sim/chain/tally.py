@@ -7,7 +7,7 @@ latter are summed.
 
 from typing import NamedTuple
 
-from ..compiled import compiled
+from ..compiled import lean
 from ..engine.contact import DEEPEST, LOGGED
 from ..engine.detection import polynomial_at
 from ..engine.parameters import Table, Vector
@@ -33,7 +33,7 @@ class ChainTally(NamedTuple):
     """Integral of each cell's force against exp(-i (omega t + phase)), shape (cells,) [N s]."""
 
 
-@compiled
+@lean
 def tally_forces(tally: ChainTally, cell: Vector, place: int, end: complex, omega: float) -> None:
     """Add the moments of a window's force; ``end`` is the drive's term at the window's end."""
     total = complex(0.0, 0.0)
@@ -42,7 +42,7 @@ def tally_forces(tally: ChainTally, cell: Vector, place: int, end: complex, omeg
     tally.forces[place] += end.conjugate() * total
 
 
-@compiled
+@lean
 def tally_idle(
     tally: ChainTally, place: int, space: Space, phasors: Complex, length: float, tables: ChainTables
 ) -> None:
@@ -62,7 +62,7 @@ def tally_idle(
         tally.peaks[what, place] = series_peak(tally.peaks[what, place], series[what], 0.0, length)
 
 
-@compiled
+@lean
 def _node(series: Vector, markov: Vector, at: Vector) -> tuple[float, float]:
     """Value and slope of an observed motion at a logged instant."""
     value, slope = polynomial_at(series, at[T])
@@ -72,7 +72,7 @@ def _node(series: Vector, markov: Vector, at: Vector) -> tuple[float, float]:
     return value, slope - markov[MOMENTS] * at[MOMENT + MOMENTS - 1]
 
 
-@compiled
+@lean
 def tally_busy(tally: ChainTally, place: int, series: Table, log: Table, tables: ChainTables) -> None:
     """Look for larger motions of a cell between the logged instants of its window."""
     tally.peaks[PATH, place] = max(tally.peaks[PATH, place], log[0, DEEPEST])
@@ -87,7 +87,7 @@ def tally_busy(tally: ChainTally, place: int, series: Table, log: Table, tables:
         tally.peaks[what, place] = best
 
 
-@compiled
+@lean
 def _cubic_peak(best: float, x0: float, v0: float, x1: float, v1: float) -> float:
     """Largest magnitude on [0, 1] of the cubic with these end values and slopes, or ``best``."""
     best = max(best, abs(x0), abs(x1))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled, inlined
+from ..compiled import compiled, inlined, lean
 from ..contact_law import MOST_TERMS
 from ..engine.clock import advance_clock, angle_at
 from ..engine.detection import LARGEST_BOUND, SERIES_TERMS
@@ -200,7 +200,7 @@ def set_ceilings(space: Space, peaks: Table, observed: int, length: float, table
                 space.floor[what, i] = max(space.floor[what, i], margin - law[LOWER])
 
 
-@compiled
+@lean
 def march(
     space: Space, phasors: Complex, clock: Vector, observed: int, steps: int, tables: ChainTables
 ) -> int:
@@ -274,7 +274,7 @@ def deposit(turned: Complex, cell: Vector, place: int, tables: ChainTables) -> N
         turned[j] -= tables.push[place, j] * total
 
 
-@compiled
+@lean
 def place_motion(motion: Vector, phasors: Complex, tables: ChainTables) -> None:
     """Write displacements and velocities, shape (6 cells,)."""
     for i in range(len(motion)):

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ..compiled import compiled
+from ..compiled import lean
 from .parameters import Parameters, Vector
 
 
@@ -15,7 +15,7 @@ class Cubic(NamedTuple):
     f3: float
 
 
-@compiled
+@lean
 def base_force(base: Vector, par: Parameters) -> Cubic:
     """Turn the base displacement c0 + c1 tau + c2 tau^2 + c3 tau^3 [m], shape (4,), into force."""
     return Cubic(
@@ -26,7 +26,7 @@ def base_force(base: Vector, par: Parameters) -> Cubic:
     )
 
 
-@compiled
+@lean
 def shifted(force: Cubic, by: float) -> Cubic:
     """Express the same force in the time since ``by``."""
     return Cubic(

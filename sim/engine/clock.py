@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from ..compiled import compiled
+from ..compiled import compiled, lean
 from .parameters import Vector
 
 SPLITTER = 134217729.0
@@ -23,7 +23,7 @@ def clock_at(time: float) -> Vector:
     return clock
 
 
-@compiled
+@lean
 def advance_clock(clock: Vector, by: float) -> None:
     """Let time pass; what the sum rounds off is kept in the low part."""
     high = clock[0]
@@ -34,14 +34,14 @@ def advance_clock(clock: Vector, by: float) -> None:
     clock[1] = low - (clock[0] - total)
 
 
-@compiled
+@lean
 def time_until(clock: Vector, instant: float) -> float:
     """How long it is from now to an instant [s]."""
     left: float = (instant - clock[0]) - clock[1]
     return left
 
 
-@compiled
+@lean
 def angle_at(clock: Vector, later: float, frequency: float) -> float:
     """Phase of a harmonic at clock time plus ``later``, in (-2 pi, 4 pi): whole turns are dropped exactly."""
     turns = frequency * clock[0]

@@ -11,7 +11,7 @@ crossed to the other stop.
 
 import math
 
-from ..compiled import compiled
+from ..compiled import lean
 from ..modes import Complex
 from .detection import derivative_bound
 from .flight import FlightTables, fill_series
@@ -25,7 +25,7 @@ NEARLY = 0.99
 """Part of the least time to the other stop: the speed at the start, which is rounding, is in the rest."""
 
 
-@compiled
+@lean
 def time_to_depart(series: Vector, length: float, closed: float, par: Parameters) -> float:
     """Time for which m1 surely leaves the stop on which it stands [s]; 0 where it does not stand on one.
 
@@ -57,7 +57,7 @@ def time_to_depart(series: Vector, length: float, closed: float, par: Parameters
     return min(length, across, max(sure, SHORTEST_PART * length))
 
 
-@compiled
+@lean
 def closed_for(phasors: Complex, tables: FlightTables) -> float:
     """How far from a stop m1 counts as touching it in a flight with these phasors [m]."""
     reach = 0.0
@@ -66,7 +66,7 @@ def closed_for(phasors: Complex, tables: FlightTables) -> float:
     return closed_gap(reach, tables.par)
 
 
-@compiled
+@lean
 def departure(phasors: Complex, terms: Complex, series: Vector, tables: FlightTables) -> float:
     """Find how long a flight from these phasors surely leaves a stop [s]; see `time_to_depart`."""
     for j in range(len(phasors)):

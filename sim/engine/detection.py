@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ..compiled import compiled
+from ..compiled import lean
 from .parameters import Vector
 
 LARGEST_BOUND = 1e150
@@ -37,7 +37,7 @@ IMPATIENT = 1e-4
 """... to this part of the stretch."""
 
 
-@compiled
+@lean
 def polynomial_at(series: Vector, tau: float) -> tuple[float, float]:
     """Value and derivative of a polynomial, coefficients ascending."""
     value, slope = 0.0, 0.0
@@ -47,7 +47,7 @@ def polynomial_at(series: Vector, tau: float) -> tuple[float, float]:
     return value, slope
 
 
-@compiled
+@lean
 def derivative_bound(series: Vector, length: float, derivative: int) -> float:
     """Bound of a derivative of a polynomial on [0, length]; coefficients ascending."""
     bound, power = 0.0, 1.0
@@ -60,7 +60,7 @@ def derivative_bound(series: Vector, length: float, derivative: int) -> float:
     return bound
 
 
-@compiled
+@lean
 def _earliest(gap: float, approach: float, bound: float) -> float:
     """Earliest time [s] at which a gap can close when it closes now at ``approach`` [m/s]."""
     root = math.sqrt(approach * approach + 2.0 * bound * gap)
@@ -69,7 +69,7 @@ def _earliest(gap: float, approach: float, bound: float) -> float:
     return JUST_SHORT * (root - approach) / bound
 
 
-@compiled
+@lean
 def first_contact(
     series: Vector, length: float, lowest: float, highest: float, bound: float, scale: float
 ) -> float:
@@ -113,7 +113,7 @@ def first_contact(
     return NEVER
 
 
-@compiled
+@lean
 def touched_side(p: float, rate: float, lowest: float, highest: float) -> float:
     """Side of the stop that is touched at p: the nearer one, not the one moved towards.
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import inlined
-from ..contact_law import RigidStops
+from ..contact_law import PowerLaw, RigidStops
 from ..drive import Harmonic
 from ..modes import Complex, harmonic_motion, modal_form
 from ..specimen import Specimen
@@ -22,6 +22,7 @@ from .clock import angle_at
 from .contact_flow import FORCE_TERMS
 from .detection import LARGEST_BOUND, LONGEST_TURN, NEVER, SERIES_TERMS, first_contact
 from .parameters import VX, VY, VZ, Parameters, PowerTerms, Vector, X, Y, Z, parameters, power_terms
+from .power_tables import PowerTables, power_tables
 from .row import copy_row
 
 GRID_TURN = LONGEST_TURN
@@ -64,6 +65,8 @@ class FlightTables(NamedTuple):
     """Grid step [s]."""
     factors: Complex
     """exp(l_j grid), shape (n+1,)."""
+    steps: PowerTables | None
+    """Of long steps under a power law; None, as above, for other laws."""
     bound: Complex | None
     """The motion with m1 held by a rigid stop (`sim.engine.bound_modes`); None, as above, for other laws."""
 
@@ -77,6 +80,7 @@ def flight_tables(specimen: Specimen, drive: Harmonic) -> FlightTables:
     shapes = np.vstack([modes.shapes, motion])
     grid = GRID_TURN / float(np.max(np.abs(rates)))
     is_rigid = isinstance(specimen.contact, RigidStops)
+    is_power = isinstance(specimen.contact, PowerLaw)
     return FlightTables(
         par=parameters(specimen),
         power=power_terms(specimen),
@@ -92,6 +96,7 @@ def flight_tables(specimen: Specimen, drive: Harmonic) -> FlightTables:
         rows=modes.rows,
         grid=grid,
         factors=np.exp(rates * grid),
+        steps=power_tables(specimen, omega, force, np.abs(modes.rates)) if is_power else None,
         bound=bound_motion(specimen, omega, drive.amplitude_m) if is_rigid else None,
     )
 

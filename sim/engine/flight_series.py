@@ -1,12 +1,12 @@
 """Flight as a Taylor series in time: the exact motion over a short stretch, at any instant. SI units."""
 
-from ..compiled import compiled
+from ..compiled import lean
 from .base_force import Cubic
 from .detection import SERIES_TERMS
 from .parameters import VX, VY, VZ, Parameters, Table, Vector, X, Y, Z
 
 
-@compiled
+@lean
 def fill_flight_series(series: Table, path: Vector, state: Vector, force: Cubic, par: Parameters) -> None:
     """Write the coefficients of the motion to ``series`` (terms, 6) and those of p to ``path`` (terms,).
 
@@ -31,7 +31,7 @@ def fill_flight_series(series: Table, path: Vector, state: Vector, force: Cubic,
         path[k + 1] = share * (vy - vz)
 
 
-@compiled
+@lean
 def place_on_series(state: Vector, series: Table, tau: float) -> None:
     """Set the motion of ``state`` to that of the series at ``tau``."""
     for i in range(6):

@@ -8,11 +8,12 @@ What a run needs is chosen by types, before anything is compiled: `FlightTables.
 power law, no rigid stop and no tangent. To compile all of them took twice as long as a first run may.
 """
 
-from ..compiled import compiled
+from ..compiled import lean
 from ..modes import Complex
 from .flight import FlightTables
 from .parameters import PowerTerms, Table, Vector
 from .power_run import advance_under_power
+from .power_tables import PowerTables
 from .record import Record
 from .stops_run import advance_between_stops
 
@@ -21,13 +22,13 @@ def advance_harmonic(
     state: Vector, clock: Vector, until: float, tables: FlightTables, tolerance: float, record: Record
 ) -> int:
     """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code."""
-    power, bound, tangent = tables.power, tables.bound, record.tangent
-    if power is not None:
-        return advance_under_power(state, clock, until, tables, tolerance, record, power, tangent)
+    power, steps, bound, tangent = tables.power, tables.steps, tables.bound, record.tangent
+    if power is not None and steps is not None:
+        return advance_under_power(state, clock, until, tables, tolerance, record, power, steps, tangent)
     return advance_between_stops(state, clock, until, tables, tolerance, record, bound, tangent)
 
 
-@compiled
+@lean
 def advance_by_law(
     state: Vector,
     clock: Vector,
@@ -36,6 +37,7 @@ def advance_by_law(
     tolerance: float,
     record: Record,
     power: PowerTerms | None,
+    steps: PowerTables | None,
     bound: Complex | None,
     tangent: Table | None,
 ) -> int:
@@ -43,6 +45,6 @@ def advance_by_law(
 
     numba leaves out a branch on an argument that is None, but not one on an attribute.
     """
-    if power is not None:
-        return advance_under_power(state, clock, until, tables, tolerance, record, power, tangent)
+    if power is not None and steps is not None:
+        return advance_under_power(state, clock, until, tables, tolerance, record, power, steps, tangent)
     return advance_between_stops(state, clock, until, tables, tolerance, record, bound, tangent)

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
 from ..accuracy import Accuracy
-from ..compiled import compiled
+from ..compiled import compiled, lean
 from ..modes import state_matrix
 from ..specimen import Specimen
 from .base_force import base_force, shifted
@@ -132,7 +132,7 @@ def _refuse_inside_a_stop(state: Vector, specimen: Specimen) -> None:
         raise ValueError(msg)
 
 
-@compiled
+@lean
 def place_on_its_side(
     state: Vector, par: Parameters, power: PowerTerms | None, restitution: float | None, tolerance: float
 ) -> None:
@@ -167,7 +167,7 @@ def advance_interval(state: Vector, base: Vector, tables: IntervalTables) -> int
     return impacts
 
 
-@compiled
+@lean
 def base_reaction(state: Vector, displacement: float, velocity: float, tables: IntervalTables) -> float:
     """Force that the specimen puts on its base, k0 (x - U) + c0 (vx - dU/dt) [N]."""
     par = tables.par

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ..compiled import compiled
+from ..compiled import compiled, lean
 from .base_force import Cubic, base_force, shifted
 from .clock import advance_clock, time_until
 from .parameters import Table, Vector
@@ -16,7 +16,7 @@ ALMOST = 1.0 - 1e-12
 """An interval is whole although its length, cut into pieces and joined, rounds differently."""
 
 
-@compiled
+@lean
 def advance_intervals(
     state: Vector,
     clock: Vector,
@@ -58,7 +58,7 @@ def advance_intervals(
     return REACHED_END
 
 
-@compiled
+@lean
 def _advance_step(
     state: Vector,
     clock: Vector,
@@ -85,7 +85,7 @@ def _advance_step(
     return REACHED_END
 
 
-@compiled
+@lean
 def _base_force(base: Vector, at: float, tables: IntervalTables) -> Cubic:
     """k0 U + c0 dU/dt as a cubic in the time since ``at``."""
     return shifted(base_force(base, tables.par), at)

@@ -35,6 +35,8 @@ CLOSED = 11
 """Under rigid stops: how far from one m1 counts as touching it [m], from the rounding of the last flight."""
 SCALES = 12
 """Under a power law, the first of seven: how large p, dp/dt, x, z, vx, vz have lately been, and time as 1."""
+LEVEL = 19
+"""Under a power law: one more than the level of the next long step; 0 where none was made yet."""
 STATE_SIZE = 20
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled import compiled
+from ..compiled import compiled, lean
 from .base_force import Cubic, shifted
 from .contact import HELD, LEFT, LOG_COLUMNS, contact_workspace
 from .contact_flow import FORCE_TERMS
@@ -41,7 +41,7 @@ class IntervalTables(NamedTuple):
     tolerance: float
 
 
-@compiled
+@lean
 def acceleration_bound(state: Vector, force: Cubic, tables: IntervalTables) -> float:
     """Bound of abs(d2p/dt2) over one piece in flight, from the energy at its start [m/s^2].
 
@@ -55,7 +55,7 @@ def acceleration_bound(state: Vector, force: Cubic, tables: IntervalTables) -> f
     return tables.bound_per_root_energy * (math.sqrt(kinetic + elastic) + h * push / math.sqrt(par.mass0))
 
 
-@compiled
+@lean
 def carry_if_clear(state: Vector, force: Cubic, tables: IntervalTables) -> bool:
     """Carry a flight across one piece, or leave ``state`` alone when a touch cannot be excluded."""
     if state[SIDE] != 0.0:
@@ -75,7 +75,7 @@ def carry_if_clear(state: Vector, force: Cubic, tables: IntervalTables) -> bool:
     return True
 
 
-@compiled
+@lean
 def _carried(step: Table, i: int, s: Vector, force: Cubic) -> float:
     """One row of the transition: a component of the state one piece later."""
     free: float = (step[i, 0] * s[0] + step[i, 1] * s[1] + step[i, 2] * s[2]) + (
@@ -144,7 +144,7 @@ def _stay_on_stop(
     )
 
 
-@compiled
+@lean
 def _fly_part(
     state: Vector,
     force: Cubic,

@@ -10,9 +10,10 @@ from typing import NamedTuple
 
 from numba.extending import overload
 
-from ..compiled import compiled, inlined
+from ..compiled import inlined
 from ..contact_law import MOST_TERMS
 from .contact_flow import base_force_at, motion_rates
+from .eight import Eight, add_times, all_eight, product
 from .parameters import Parameters, PowerTerms, Vector
 
 
@@ -23,7 +24,7 @@ class PowerSystem(NamedTuple):
     power: PowerTerms
 
 
-@compiled
+@inlined
 def whole_power(base: float, exponent: int) -> float:
     """Raise ``base`` to a whole power, zero or more, by squaring."""
     result = 1.0
@@ -35,7 +36,7 @@ def whole_power(base: float, exponent: int) -> float:
     return result
 
 
-@compiled
+@inlined
 def power_force(p: float, power: PowerTerms) -> float:
     """Sum the terms by Horner's scheme in q = (p/p_ref)^2; infinite or NaN where it overflows [N]."""
     u = p * power.inverse_reference
@@ -48,7 +49,26 @@ def power_force(p: float, power: PowerTerms) -> float:
     return result
 
 
-@compiled
+@inlined
+def power_forces(p: Eight, power: PowerTerms) -> Eight:
+    """Give the force at eight p at once [N]."""
+    u = product(p, all_eight(power.inverse_reference))
+    square, force = product(u, u), all_eight(0.0)
+    for place in range(MOST_TERMS - 1, -1, -1):
+        half = power.halves[place]
+        if half == 0:
+            continue
+        force = add_times(force, power.forces[place], all_eight(1.0))
+        base = square
+        while half > 0:
+            if half & 1:
+                force = product(force, base)
+            base = product(base, base)
+            half >>= 1
+    return product(force, u)
+
+
+@inlined
 def stiffest_rate(p: float, par: Parameters, power: PowerTerms) -> float:
     """Angular frequency that the law's steepest term would give the pair at ``p``, at least [rad/s]."""
     exponent = 1

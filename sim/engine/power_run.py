@@ -1,21 +1,28 @@
-"""A run under a power law, whose force acts at every p: one stretch after another. SI units."""
+"""A run under a power law, whose force acts at every p: one long step after another. SI units."""
 
 import math
 
-import numpy as np
-
-from ..compiled import compiled
-from ..growth.tangent_contact import carry_through_steps, tangent_workspace
+from ..compiled import compiled, inlined, lean
+from ..growth.tangent_power import carry_through_power, power_memory
 from .clock import advance_clock, time_until
-from .contact import HELD, LEFT, LOG_COLUMNS, NOT_FINITE, contact_workspace, log_for
-from .contact_flow import FORCE_TERMS
-from .flight import FlightTables, fill_base_force
-from .parameters import PowerTerms, Table, Vector, X, Y, Z
-from .power_flow import PowerSystem
+from .flight import FlightTables
+from .parameters import LEVEL, PowerTerms, Table, Vector, X, Y, Z
+from .power_numbers import fill_ends, fill_inner
+from .power_step import (
+    FIRST_LEVEL,
+    Stride,
+    accept_step,
+    begin_stride,
+    end_stride,
+    level_after,
+    level_that_sees,
+    new_stride,
+    set_drive,
+    try_step,
+)
+from .power_tables import LEVELS, PowerTables
+from .power_watch import Watcher, new_watcher, sample_step, tally_step
 from .record import LOST, NEXT_SAMPLE, REACHED_END, STUCK, Record
-from .row import copy_row
-from .smooth import advance_smooth, smooth_turn
-from .smooth_tally import tally_smooth
 from .tally import MODE, NOTHING
 
 
@@ -28,59 +35,79 @@ def advance_under_power(
     tolerance: float,
     record: Record,
     power: PowerTerms,
+    steps: PowerTables,
     tangent: Table | None,
 ) -> int:
     """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code."""
-    force, work, shadow = np.zeros(FORCE_TERMS), contact_workspace(), np.zeros(len(state))
-    log, memory = log_for(record.tally, tangent), tangent_workspace()
-    turn, system = smooth_turn(tolerance), PowerSystem(tables.par, power)
-    while True:
-        longest = time_until(clock, until)
-        if longest <= 0.0:
-            return REACHED_END
-        if not math.isfinite(state[X] + state[Y] + state[Z]):
-            return LOST
-        middle = min(0.5 * longest, 0.5 * turn / tables.omega)
-        limit = min(longest, 2.0 * middle)
-        fill_base_force(force, clock, middle, tables)
-        copy_row(shadow, state)
-        code, length = advance_smooth(state, 0.0, limit, force, middle, system, tolerance, work, log)
-        if code == NOT_FINITE:
-            return LOST
-        if code not in (LEFT, HELD):
-            return STUCK
-        if record.tally[MODE] != NOTHING:
-            tally_smooth(record.tally, log, clock, tables)
-        if tangent is not None and len(tangent) > 0:
-            carry_through_steps(tangent, log, tables.par, power, memory)
-        if record.counts[NEXT_SAMPLE] < len(record.samples):
-            _sample_stretch(shadow, clock, length, force, middle, system, tolerance, work, record)
-        if length >= longest:
-            clock[0], clock[1] = until, 0.0
-        else:
-            advance_clock(clock, length)
+    stride, watcher, memory = new_stride(), new_watcher(), power_memory()
+    return _advance(
+        state, clock, until, tables, tolerance, record, power, steps, tangent, stride, watcher, memory
+    )
 
 
-@compiled
-def _sample_stretch(
-    shadow: Vector,
+@lean
+def _advance(
+    state: Vector,
     clock: Vector,
-    length: float,
-    force: Vector,
-    middle: float,
-    system: PowerSystem,
+    until: float,
+    tables: FlightTables,
     tolerance: float,
-    work: Table,
     record: Record,
+    power: PowerTerms,
+    steps: PowerTables,
+    tangent: Table | None,
+    stride: Stride,
+    watcher: Watcher,
+    memory: Table,
+) -> int:
+    """Do so in the workspaces that are given."""
+    level = int(state[LEVEL]) - 1 if state[LEVEL] > 0.0 else FIRST_LEVEL
+    begin_stride(stride, state, power)
+    set_drive(stride.motion, clock, tables)
+    code, left = REACHED_END, time_until(clock, until)
+    while left > 0.0:
+        level = level_that_sees(level, stride.motion, tables.par, power, steps)
+        if level >= LEVELS:
+            code = STUCK if math.isfinite(state[X] + state[Y] + state[Z]) else LOST
+            break
+        length, numbers = steps.lengths[level], steps.levels[level]
+        if left <= length:
+            length, numbers = left, stride.other
+            fill_ends(numbers, length, steps.series)
+        misfit = try_step(stride, numbers, length, tolerance, tables.par, power)
+        if not misfit <= 1.0:
+            level = level_after(level, misfit)
+            continue
+        _watch(stride, numbers, length, clock, record, power, steps, watcher)
+        if tangent is not None and len(tangent) > 0:
+            carry_through_power(tangent, stride, numbers, power, memory)
+        accept_step(stride, length)
+        if length < left:
+            advance_clock(clock, length)
+            level = level_after(level, misfit)
+        else:
+            clock[0], clock[1] = until, 0.0
+        left = time_until(clock, until)
+        set_drive(stride.motion, clock, tables)
+    end_stride(stride, state, level)
+    return code
+
+
+@inlined
+def _watch(
+    stride: Stride,
+    numbers: Table,
+    length: float,
+    clock: Vector,
+    record: Record,
+    power: PowerTerms,
+    steps: PowerTables,
+    watcher: Watcher,
 ) -> None:
-    """Keep the samples that fall into a stretch, by a second run that lands on each of them."""
-    counts, reached = record.counts, 0.0
-    none = np.zeros((0, LOG_COLUMNS))
-    while counts[NEXT_SAMPLE] < len(record.samples):
-        later = time_until(clock, record.start + counts[NEXT_SAMPLE] / record.sample_rate)
-        if later > length:
-            return
-        if later > reached:
-            _, reached = advance_smooth(shadow, reached, later, force, middle, system, tolerance, work, none)
-        copy_row(record.samples[counts[NEXT_SAMPLE]], shadow)
-        counts[NEXT_SAMPLE] += 1
+    """Observe the step just tried, which begins at clock time."""
+    if record.tally[MODE] != NOTHING:
+        if numbers is stride.other:
+            fill_inner(numbers, length, steps.series)
+        tally_step(record.tally, stride, numbers, length, watcher)
+    if record.counts[NEXT_SAMPLE] < len(record.samples):
+        sample_step(stride, clock, length, power, steps, record, watcher)

@@ -9,7 +9,7 @@ rest, and the rest of the series is summed: m1 is then held.
 
 import math
 
-from ..compiled import compiled
+from ..compiled import lean
 from .contact import gap_of
 from .detection import ROUNDING, TOUCH
 from .parameters import CLOSED, SIDE, VX, VY, VZ, Parameters, Vector, X, Y, Z
@@ -21,20 +21,20 @@ LARGEST_PART = 1e-3
 """... and of the room between the stops that gap may be this part."""
 
 
-@compiled
+@lean
 def closed_gap(scale: float, par: Parameters) -> float:
     """How far from a stop m1 counts as touching it [m]; ``scale`` as in `sim.engine.detection`."""
     closed: float = TOUCH * min(par.lower, par.upper) + ROUNDING * scale
     return closed
 
 
-@compiled
+@lean
 def is_resolved(closed: float, par: Parameters) -> bool:
     """Whether m1 between its stops can be told from m1 on one of them: not where p is rounding."""
     return closed < LARGEST_PART * (par.lower + par.upper)
 
 
-@compiled
+@lean
 def press_on(side: float, state: Vector, par: Parameters) -> float:
     """Acceleration with which m1 is pressed on the stop at its side, d2|p|/dt2 if the stop were not [m/s^2].
 
@@ -46,7 +46,7 @@ def press_on(side: float, state: Vector, par: Parameters) -> float:
     return press
 
 
-@compiled
+@lean
 def place_on_stop(state: Vector, side: float, rate: float, par: Parameters) -> None:
     """Put m1 exactly on a stop, with ``rate`` = d|p|/dt [m/s]; the pair keeps its centre and its momentum."""
     gap = side * gap_of(side, par)
@@ -58,7 +58,7 @@ def place_on_stop(state: Vector, side: float, rate: float, par: Parameters) -> N
     state[VY] = state[VZ] + side * rate
 
 
-@compiled
+@lean
 def rebound(state: Vector, side: float, par: Parameters, restitution: float, tolerance: float) -> None:
     """Strike a rigid stop; ``state[SIDE]`` says whether m1 stays on it.
 
@@ -72,7 +72,7 @@ def rebound(state: Vector, side: float, par: Parameters, restitution: float, tol
     hold_if_pressed(state, side, par, restitution, tolerance)
 
 
-@compiled
+@lean
 def hold_if_pressed(
     state: Vector, side: float, par: Parameters, restitution: float, tolerance: float
 ) -> None:
@@ -91,7 +91,7 @@ def hold_if_pressed(
         state[SIDE] = side
 
 
-@compiled
+@lean
 def place_between_rigid_stops(state: Vector, par: Parameters, restitution: float, tolerance: float) -> None:
     """Decide whether a motion that is given starts held by a stop; one beyond a stop is put on it."""
     p = state[Y] - state[Z]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..compiled import compiled
+from ..compiled import compiled, lean
 from ..modes import Complex
 from .clock import time_until
 from .contact import LOG_COLUMNS, advance_contact
@@ -12,7 +12,7 @@ from .record import NEXT_SAMPLE, Record
 from .row import copy_row
 
 
-@compiled
+@lean
 def sample_flight(
     phasors: Complex, now: Complex, clock: Vector, length: float, tables: FlightTables, record: Record
 ) -> None:

@@ -1,4 +1,4 @@
-"""Motion under a power law, whose force acts at every p: no flight, no stops, one adaptive method. SI units.
+"""Motion under a power law while the drive is given piece by piece: one adaptive method. SI units.
 
 The unknowns are (p, dp/dt, x, z, vx, vz, t) in the places of a contact's; the step is the same Dormand and
 Prince 8(5,3) in time itself. Every unknown is held to the tolerance of its own recent size, because any one
@@ -10,26 +10,8 @@ step shrinks.
 
 import math
 
-from ..compiled import compiled
-from .contact import (
-    DEEPEST,
-    HELD,
-    LOG_AP,
-    LOG_AX,
-    LOG_P,
-    LOG_RATE,
-    LOG_STAGE_T,
-    LOG_STAGE_W,
-    LOG_STEP,
-    LOG_TIME,
-    LOG_VX,
-    LOG_X,
-    LOGGED,
-    NOT_FINITE,
-    STALLED,
-    WIDE_LOG_COLUMNS,
-    step_factor,
-)
+from ..compiled import lean
+from .contact import HELD, NOT_FINITE, STALLED, step_factor
 from .contact_flow import (
     BLEND,
     CVX,
@@ -80,24 +62,13 @@ FIRST_TURN = 0.01
 """First step, in radians of the fastest link without the power law."""
 MOST_STEPS = 1_000_000
 """Steps in one call, which is a fraction of a period."""
-FORCE_SHARE = 1e-3
-"""Part of the tolerance that the polynomial of the base force may use."""
-LARGEST_TURN = 1.0
 WALL_TURN = 1.5
 """See `_short_of_the_wall`: for p^47 the errors are ten times smaller than without, at no cost, for steps
 that would fail are not tried [rad]."""
 SHORTENING, MOST_SHORTENINGS = 0.75, 40
-FACTORIAL_8 = 40320.0
 
 
-@compiled
-def smooth_turn(tolerance: float) -> float:
-    """Longest stretch, as drive phase, on which a sine is its Taylor polynomial of degree 7 [rad]."""
-    turn: float = min(LARGEST_TURN, 2.0 * (FACTORIAL_8 * FORCE_SHARE * tolerance) ** 0.125)
-    return turn
-
-
-@compiled
+@lean
 def begin_smooth(state: Vector) -> None:
     """Set up from the displacements and velocities of ``state``."""
     state[SIDE] = 1.0
@@ -108,14 +79,14 @@ def begin_smooth(state: Vector) -> None:
     sizes[CZ], sizes[CVX], sizes[CVZ] = abs(state[Z]), abs(state[VX]), abs(state[VZ])
 
 
-@compiled
+@lean
 def _gather(work: Table, state: Vector, tau: float) -> None:
     at = work[POINT]
     at[W], at[R], at[CX], at[CZ] = state[ROOT], state[RATE], state[X], state[Z]
     at[CVX], at[CVZ], at[T], at[WIDTH - 1] = state[VX], state[VZ], tau, 0.0
 
 
-@compiled
+@lean
 def _scatter(work: Table, state: Vector) -> None:
     at = work[POINT]
     state[ROOT], state[RATE] = at[W], at[R]
@@ -123,7 +94,7 @@ def _scatter(work: Table, state: Vector) -> None:
     state[Y], state[VY] = at[CZ] + at[W], at[CVZ] + at[R]
 
 
-@compiled
+@lean
 def _widen_sizes(sizes: Vector, at: Vector, fading: float, push: float, par: Parameters) -> None:
     """Bring the recent sizes up to date with the point reached."""
     for i in range(MOTIONS):
@@ -136,7 +107,7 @@ def _widen_sizes(sizes: Vector, at: Vector, fading: float, push: float, par: Par
     sizes[R], sizes[CVX], sizes[CVZ] = max(sizes[R], fast), max(sizes[CVX], fast), max(sizes[CVZ], fast)
 
 
-@compiled
+@lean
 def smooth_error(work: Table, step: float, sizes: Vector, tolerance: float) -> float:
     """Error of the step just tried, over what is allowed: root mean square of all six motions.
 
@@ -161,7 +132,7 @@ def smooth_error(work: Table, step: float, sizes: Vector, tolerance: float) -> f
     return error
 
 
-@compiled
+@lean
 def _short_of_the_wall(step: float, at: Vector, par: Parameters, power: PowerTerms) -> float:
     """Shorten a step until it would turn the stiffest spring on its way by `WALL_TURN` at most.
 
@@ -177,28 +148,7 @@ def _short_of_the_wall(step: float, at: Vector, par: Parameters, power: PowerTer
     return step
 
 
-@compiled
-def _log_point(log: Table, work: Table) -> None:
-    """Add the accepted point, whose rates are in ``work[0]``, as the log's next row."""
-    at, rates = work[POINT], work[0]
-    log[0, LOGGED] += 1.0
-    row = int(log[0, LOGGED])
-    log[row, LOG_TIME], log[row, LOG_X], log[row, LOG_VX] = at[T], at[CX], at[CVX]
-    log[row, LOG_P], log[row, LOG_RATE] = at[W], at[R]
-    log[row, LOG_AX], log[row, LOG_AP] = rates[CVX], rates[R]
-
-
-@compiled
-def _log_stages(log: Table, work: Table, step: float) -> None:
-    """Add dt/ds = 1 and p at the stages of the step just taken, if the log is wide enough."""
-    if log.shape[1] == WIDE_LOG_COLUMNS:
-        row = log[int(log[0, LOGGED])]
-        row[LOG_STEP] = step
-        for stage in range(STAGES):
-            row[LOG_STAGE_T + stage], row[LOG_STAGE_W + stage] = 1.0, work[stage, WIDTH - 1]
-
-
-@compiled
+@lean
 def _largest_push(force: Vector, half: float) -> float:
     """Bound of the base force on a stretch of twice ``half`` about its middle."""
     push, power = 0.0, 1.0
@@ -208,7 +158,7 @@ def _largest_push(force: Vector, half: float) -> float:
     return push
 
 
-@compiled
+@lean
 def advance_smooth(
     state: Vector,
     tau: float,
@@ -218,9 +168,10 @@ def advance_smooth(
     system: PowerSystem,
     tolerance: float,
     work: Table,
-    log: Table,
 ) -> tuple[int, float]:
     """Advance to the time ``limit``; arguments and codes as in `sim.engine.contact.advance_contact`.
+
+    Pieces of a sampled drive are a hundred times shorter than the steps of `sim.engine.power_run`.
 
     Steps divide the time that is left evenly when it is short, so that none is cut to a stub.
     """
@@ -233,12 +184,13 @@ def advance_smooth(
     push = _largest_push(force, max(abs(limit - middle), abs(tau - middle)))
     lowest = FORGETTING * math.sqrt(par.k0 / (par.mass0 + par.mass1 + par.mass2))
     if step == 0.0:
-        step = FIRST_TURN / math.sqrt((par.k0 + par.k2) / par.mass0 + (par.k1 + par.k2) / par.reduced_mass)
+        fastest = math.sqrt((par.k0 + par.k2) / par.mass0 + (par.k1 + par.k2) / par.reduced_mass)
+        step = FIRST_TURN / fastest
+        # What is let go has no speed yet by which to tell an error of it.
+        sizes[R] = max(sizes[R], stiffest_rate(sizes[W], par, power) * sizes[W])
+        sizes[CVX], sizes[CVZ] = max(sizes[CVX], fastest * sizes[CX]), max(sizes[CVZ], fastest * sizes[CZ])
     _widen_sizes(sizes, at, 1.0, push, par)
     power_rates(at, work[0], force, middle, par, power)
-    if len(log) > 0:
-        log[0, LOGGED] = log[0, DEEPEST] = 0.0
-        _log_point(log, work)
     code = STALLED
     for _ in range(MOST_STEPS):
         step = _short_of_the_wall(step, at, par, power)
@@ -253,7 +205,6 @@ def advance_smooth(
             if at[T] + step == at[T]:
                 return NOT_FINITE, at[T]
             continue
-        _log_stages(log, work, taken)
         copy_row(work[POINT], work[TRIAL])
         if steps == 1:
             at[T] = limit
@@ -261,11 +212,7 @@ def advance_smooth(
         step = max(step, taken * factor) if taken < step and factor > 1.0 else taken * factor
         _widen_sizes(sizes, at, 1.0 / (1.0 + lowest * taken), push, par)
         power_rates(at, work[0], force, middle, par, power)
-        is_full = False
-        if len(log) > 0:
-            _log_point(log, work)
-            is_full = log[0, LOGGED] + 1 == len(log)
-        if at[T] >= limit or is_full:
+        if at[T] >= limit:
             code = HELD
             break
     state[STEP] = step

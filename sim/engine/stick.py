@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from ..compiled import compiled
+from ..compiled import compiled, lean
 from ..modes import Complex
 from .base_force import Cubic
 from .bound_modes import RATE, ROW, SHAPE
@@ -55,11 +55,12 @@ def held_tables(tables: FlightTables, bound: Complex) -> FlightTables:
         rows=bound[:-1, ROW].copy(),
         grid=grid,
         factors=np.exp(rates * grid),
+        steps=tables.steps,
         bound=bound,
     )
 
 
-@compiled
+@lean
 def hold(
     side: float,
     phasors: Complex,
@@ -100,7 +101,7 @@ def hold(
     return CLEAR, longest
 
 
-@compiled
+@lean
 def _march(terms: Complex, factors: Complex, steps: int, high: float) -> int:
     """Turn the terms in place, step by step, while their sum is below ``high``; gives the steps that were."""
     below = 0.0
@@ -117,14 +118,14 @@ def _march(terms: Complex, factors: Complex, steps: int, high: float) -> int:
     return made
 
 
-@compiled
+@lean
 def place_held(state: Vector, side: float, phasors: Complex, held: FlightTables) -> None:
     """Write the motion of the phasors to ``state``, m1 on its stop."""
     place_on_phasors(state, phasors, held)
     state[Y] = state[Z] + side * gap_of(side, held.par)
 
 
-@compiled
+@lean
 def tally_held(tally: Vector, side: float, clock: Vector, length: float, held: FlightTables) -> None:
     """Add what the constant p does to its peak and line; `sim.engine.tally.tally_flight` does the rest."""
     if tally[MODE] == NOTHING:
@@ -141,7 +142,7 @@ def tally_held(tally: Vector, side: float, clock: Vector, length: float, held: F
         tally[LINE_P_IM] += line.imag
 
 
-@compiled
+@lean
 def hold_on_series(
     series: Table, path: Vector, state: Vector, force: Cubic, length: float, par: Parameters
 ) -> float:
@@ -163,7 +164,7 @@ def hold_on_series(
     return free
 
 
-@compiled
+@lean
 def _fill_held_series(series: Table, path: Vector, state: Vector, force: Cubic, par: Parameters) -> None:
     """Taylor coefficients of the bound motion, and of minus the pull that presses m1 on its stop [m/s^2]."""
     for i in range(6):

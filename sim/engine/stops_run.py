@@ -1,10 +1,11 @@
 """A run between stops: flight, contact, flight, ... up to an instant. SI units."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled import compiled, inlined
+from ..compiled import compiled, inlined, lean
 from ..growth.tangent_contact import carry_through_steps, tangent_workspace
 from ..growth.tangent_flight import carry_through_flight
 from ..growth.tangent_impact import carry_through_impact
@@ -40,8 +41,22 @@ STRETCH_TURN = 0.3
 its middle, whose first term left out is 0.15^8/8! = 6e-12 of the force."""
 
 
+class Room(NamedTuple):
+    """Workspaces of a run."""
+
+    phasors: Complex
+    now: Complex
+    terms: Complex
+    series: Vector
+    force: Vector
+    work: Table
+    shadow: Vector
+    log: Table
+    memory: Table
+
+
 @compiled
-def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and their ends are one loop
+def advance_between_stops(
     state: Vector,
     clock: Vector,
     until: float,
@@ -56,11 +71,35 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
     ``bound`` is how m1 moves on a stop that holds it, None where stops yield.
     """
     terms = len(tables.rates)
-    phasors, now = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
-    workspace = np.zeros(terms, np.complex128)
-    series, force, work = np.zeros(SERIES_TERMS), np.zeros(FORCE_TERMS), contact_workspace()
-    shadow = np.zeros(len(state))
-    log, memory = log_for(record.tally, tangent), tangent_workspace()
+    room = Room(
+        np.zeros(terms, np.complex128),
+        np.zeros(terms, np.complex128),
+        np.zeros(terms, np.complex128),
+        np.zeros(SERIES_TERMS),
+        np.zeros(FORCE_TERMS),
+        contact_workspace(),
+        np.zeros(len(state)),
+        log_for(record.tally, tangent),
+        tangent_workspace(),
+    )
+    return _advance(state, clock, until, tables, tolerance, record, bound, tangent, room)
+
+
+@lean
+def _advance(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and their ends are one loop
+    state: Vector,
+    clock: Vector,
+    until: float,
+    tables: FlightTables,
+    tolerance: float,
+    record: Record,
+    bound: Complex | None,
+    tangent: Table | None,
+    room: Room,
+) -> int:
+    """Do so in the workspaces of ``room``."""
+    phasors, now, workspace, series = room.phasors, room.now, room.terms, room.series
+    force, work, shadow, log, memory = room.force, room.work, room.shadow, room.log, room.memory
     counts = record.counts
     while True:
         longest = time_until(clock, until)
@@ -119,7 +158,7 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
             if record.tally[MODE] != NOTHING:
                 tally_contact(record.tally, log, clock, tables)
             if tangent is not None and len(tangent) > 0:
-                carry_through_steps(tangent, log, tables.par, None, memory)
+                carry_through_steps(tangent, log, tables.par, memory)
             if counts[NEXT_SAMPLE] < len(record.samples):
                 sample_contact(shadow, clock, length, force, middle, tables, tolerance, work, record)
             if length >= longest:
@@ -149,7 +188,7 @@ def _fly_on(
     return fly(phasors, now, terms, series, clock, longest, tables)
 
 
-@compiled
+@lean
 def _carry_through_impact(
     tangent: Table | None, before: Vector, after: Vector, par: Parameters, restitution: float | None
 ) -> None:

@@ -7,7 +7,7 @@ closed form over flights, and by the corrected trapezoidal rule (error ~ step^4)
 
 import cmath
 
-from ..compiled import compiled
+from ..compiled import lean
 from ..modes import Complex
 from .contact import DEEPEST, LOG_P, LOG_RATE, LOG_TIME, LOG_VX, LOG_X, LOGGED, gap_of
 from .detection import polynomial_at
@@ -24,7 +24,7 @@ SMALL_EXPONENT = 1e-3
 """Below it (exp(q) - 1)/q is summed as a series, whose fifth term is rounding."""
 
 
-@compiled
+@lean
 def tally_flight(
     tally: Vector,
     phasors: Complex,
@@ -48,7 +48,7 @@ def tally_flight(
         _add_flight_lines(tally, phasors, length, tables)
 
 
-@compiled
+@lean
 def tally_contact(tally: Vector, log: Table, clock: Vector, tables: FlightTables) -> None:
     """Add the steps of a contact, whose log counts time from clock time."""
     rows = int(log[0, LOGGED])
@@ -69,7 +69,7 @@ def tally_contact(tally: Vector, log: Table, clock: Vector, tables: FlightTables
             at = then
 
 
-@compiled
+@lean
 def _add_step(
     tally: Vector,
     line: int,
@@ -92,7 +92,7 @@ def _add_step(
     tally[line + 1] += area.imag
 
 
-@compiled
+@lean
 def _hermite_peak(best: float, x0: float, v0: float, x1: float, v1: float, step: float) -> float:
     """Largest abs(x) over a step, x as the cubic through both ends with their velocities."""
     best = max(best, abs(x0), abs(x1))
@@ -113,7 +113,7 @@ def _hermite_peak(best: float, x0: float, v0: float, x1: float, v1: float, step:
     return best
 
 
-@compiled
+@lean
 def series_peak(best: float, series: Vector, low: float, high: float) -> float:
     """Largest magnitude of a polynomial on [low, high], which holds at most one extreme."""
     value_low, slope_low = polynomial_at(series, low)
@@ -134,7 +134,7 @@ def series_peak(best: float, series: Vector, low: float, high: float) -> float:
     return best
 
 
-@compiled
+@lean
 def _flight_peak(
     best: float,
     shape: Complex,
@@ -179,7 +179,7 @@ def _flight_peak(
         done += steps * h
 
 
-@compiled
+@lean
 def _add_flight_lines(tally: Vector, phasors: Complex, length: float, tables: FlightTables) -> None:
     """Add the integrals of x and p against the drive over a flight, term by term in closed form."""
     drive = complex(0.0, tables.omega)
@@ -199,7 +199,7 @@ def _add_flight_lines(tally: Vector, phasors: Complex, length: float, tables: Fl
     tally[LINE_P_IM] += line_p.imag
 
 
-@compiled
+@lean
 def _integral(rate: complex, length: float) -> complex:
     """Integral of exp(rate t) from 0 to ``length``."""
     exponent = rate * length

@@ -1,6 +1,6 @@
 """Where a law acts: what a touch does to the motion, and how it goes on while the force lasts. SI units."""
 
-from ..compiled import compiled
+from ..compiled import lean
 from .contact import advance_contact, begin_contact
 from .detection import touched_side
 from .parameters import VY, VZ, Parameters, PowerTerms, Table, Vector, Y, Z
@@ -9,7 +9,7 @@ from .rigid_stop import rebound
 from .smooth import advance_smooth
 
 
-@compiled
+@lean
 def strike(state: Vector, par: Parameters, restitution: float | None, tolerance: float) -> None:
     """Touch the stop that m1 has come to; the state is placed on it."""
     side = touched_side(state[Y] - state[Z], state[VY] - state[VZ], par.lower, par.upper)
@@ -19,7 +19,7 @@ def strike(state: Vector, par: Parameters, restitution: float | None, tolerance:
         begin_contact(state, side, par, tolerance)
 
 
-@compiled
+@lean
 def advance_touching(
     state: Vector,
     tau: float,
@@ -34,5 +34,5 @@ def advance_touching(
 ) -> tuple[int, float]:
     """Advance while a force acts that yields, to its end or ``limit``; see `sim.engine.contact`."""
     if power is not None:
-        return advance_smooth(state, tau, limit, force, middle, PowerSystem(par, power), tolerance, work, log)
+        return advance_smooth(state, tau, limit, force, middle, PowerSystem(par, power), tolerance, work)
     return advance_contact(state, tau, limit, force, middle, par, tolerance, work, log)

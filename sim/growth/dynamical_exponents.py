@@ -20,7 +20,7 @@ from numba import njit
 from numpy.typing import ArrayLike
 from scipy.integrate._ivp import dop853_coefficients as _dop
 
-from ..compiled import compiled
+from ..compiled import lean
 from ..engine.contact import step_factor
 from ..engine.contact_flow import BLEND, ERROR_3, ERROR_5, STAGES
 from ..engine.parameters import Table, Vector
@@ -224,7 +224,7 @@ def _fill_slopes(
                 slopes[stage, first + i] = slope
 
 
-@compiled
+@lean
 def _step_error(slopes: Table, state: Vector, step: float, tolerance: float) -> float:
     """Error of a step of the state, over what is allowed; NaN when a stage ran away."""
     largest, fifth, third = 1e-300, 0.0, 0.0

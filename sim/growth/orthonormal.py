@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from ..compiled import compiled
+from ..compiled import lean
 from ..engine.parameters import Table, Vector
 
 PASSES = 2
@@ -16,7 +16,7 @@ LOST = 1e-11
 """A row of which no more than this part is left has no direction of its own any more."""
 
 
-@compiled
+@lean
 def dot(first: Vector, second: Vector, metric: Table) -> float:
     """Inner product first' metric second."""
     total = 0.0
@@ -28,7 +28,7 @@ def dot(first: Vector, second: Vector, metric: Table) -> float:
     return total
 
 
-@compiled
+@lean
 def orthonormalise(rows: Table, metric: Table, logarithms: Vector) -> None:
     """Make ``rows`` orthonormal in place; add the logarithm of what each is divided by to ``logarithms``.
 
@@ -55,7 +55,7 @@ def orthonormalise(rows: Table, metric: Table, logarithms: Vector) -> None:
             row[k] /= length
 
 
-@compiled
+@lean
 def _left_of(rows: Table, i: int, metric: Table) -> float:
     """Take from row ``i`` its part along the rows before, and give the length of what is left."""
     row = rows[i]

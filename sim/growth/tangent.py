@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from ..compiled import compiled
+from ..compiled import lean
 from ..engine.parameters import Table, Vector
 
 GROWTH = 6
@@ -35,7 +35,7 @@ def derivative_of(tangent: Table) -> Table:
     return np.asarray((np.exp(tangent[:, GROWTH, None]) * tangent[:, :GROWTH]).T)
 
 
-@compiled
+@lean
 def keep_in_range(change: Vector) -> None:
     """Move a factor that has become very large or small into the logarithm."""
     size = 0.0

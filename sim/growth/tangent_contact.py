@@ -1,4 +1,4 @@
-"""What a contact, or a power law, makes of a small change of the state. SI units.
+"""What a contact makes of a small change of the state. SI units.
 
 The change obeys the linearised equations along the motion, dy/ds = (dt/ds) J(state) y, in physical time and
 physical coordinates (p, dp/dt, x, z, vx, vz). It is advanced by the step of the motion itself, from the
@@ -16,8 +16,7 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from ..compiled import compiled, inlined
-from ..contact_law import MOST_TERMS
+from ..compiled import compiled, inlined, lean
 from ..engine.contact import LOG_STAGE_T, LOG_STAGE_W, LOG_STEP, LOGGED
 from ..engine.contact_flow import (
     FORCE_TERMS,
@@ -29,8 +28,7 @@ from ..engine.contact_flow import (
     motion_rates,
     trial_step,
 )
-from ..engine.parameters import VX, VY, VZ, Parameters, PowerTerms, Table, Vector, X, Y, Z
-from ..engine.power_flow import whole_power
+from ..engine.parameters import VX, VY, VZ, Parameters, Table, Vector, X, Y, Z
 from .tangent import keep_in_range
 
 STEP_TIME, PRESS_P, PRESS_RATE = range(3)
@@ -100,36 +98,17 @@ def _choose_tangent_rates(
     return chosen
 
 
-@compiled
-def power_stiffness(p: float, power: PowerTerms) -> float:
-    """Slope of a power law, dF/dp [N/m]; infinite or NaN where it overflows."""
-    u = p * power.inverse_reference
-    square, grown, exponent, slope = u * u, 1.0, 1, 0.0
-    for place in range(MOST_TERMS):
-        if power.halves[place] > 0:
-            grown *= whole_power(square, power.halves[place])
-            exponent += 2 * power.halves[place]
-            slope += exponent * power.forces[place] * grown
-    result: float = slope * power.inverse_reference
-    return result
-
-
-@compiled
-def _fill_slopes(slopes: Table, row: Vector, par: Parameters, power: PowerTerms | None) -> None:
+@lean
+def _fill_slopes(slopes: Table, row: Vector, par: Parameters) -> None:
     """Linearise the force at the stages that a row of a log holds."""
     for stage in range(STAGES):
-        pace = row[LOG_STAGE_T + stage]
-        slopes[stage, STEP_TIME] = pace
-        if power is not None:
-            slopes[stage, PRESS_P] = par.k1 + power_stiffness(row[LOG_STAGE_W + stage], power)
-            slopes[stage, PRESS_RATE] = par.c1
-        else:
-            # dt/ds is w, dw/ds is r/2, and the force is w^2 (linear + contact w) (1 + loss r).
-            w, r = pace, 2.0 * row[LOG_STAGE_W + stage]
-            stiff = par.linear_stiffness + 1.5 * par.contact_stiffness * w
-            lossy = w * w * (par.linear_stiffness + par.contact_stiffness * w) * par.loss
-            slopes[stage, PRESS_P] = par.k1 + stiff * (1.0 + par.loss * r)
-            slopes[stage, PRESS_RATE] = par.c1 + lossy
+        # dt/ds is w, dw/ds is r/2, and the force is w^2 (linear + contact w) (1 + loss r).
+        w, r = row[LOG_STAGE_T + stage], 2.0 * row[LOG_STAGE_W + stage]
+        stiff = par.linear_stiffness + 1.5 * par.contact_stiffness * w
+        lossy = w * w * (par.linear_stiffness + par.contact_stiffness * w) * par.loss
+        slopes[stage, STEP_TIME] = w
+        slopes[stage, PRESS_P] = par.k1 + stiff * (1.0 + par.loss * r)
+        slopes[stage, PRESS_RATE] = par.c1 + lossy
 
 
 @compiled
@@ -139,9 +118,7 @@ def tangent_workspace() -> Table:
 
 
 @compiled
-def carry_through_steps(
-    tangent: Table, log: Table, par: Parameters, power: PowerTerms | None, memory: Table
-) -> None:
+def carry_through_steps(tangent: Table, log: Table, par: Parameters, memory: Table) -> None:
     """Carry every change over the steps of a wide log."""
     work, slopes, unforced = memory[:WORK_ROWS], memory[WORK_ROWS:], log[0, :FORCE_TERMS]
     stage = np.zeros(1, np.int64)
@@ -152,7 +129,7 @@ def carry_through_steps(
         change[Y] -= change[Z]
         change[VY] -= change[VZ]
     for logged in range(1, int(log[0, LOGGED])):
-        _fill_slopes(slopes, log[logged], par, power)
+        _fill_slopes(slopes, log[logged], par)
         for change in tangent:
             at[0], at[1], at[2], at[3] = change[Y], change[VY], change[X], change[Z]
             at[4], at[5] = change[VX], change[VZ]

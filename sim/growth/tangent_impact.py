@@ -13,27 +13,27 @@ dv+ = -rho dv- + (rho a- + a+) dx- / v-. At a grazing impact, v = 0, no derivati
 
 import math
 
-from ..compiled import compiled
+from ..compiled import lean
 from ..engine.contact import SLOWEST_TOUCH
 from ..engine.parameters import SIDE, VX, VY, VZ, Parameters, Table, Vector, X, Y, Z
 from .tangent import keep_in_range
 
 
-@compiled
+@lean
 def _free_pull(state: Vector, par: Parameters) -> float:
     """Force that m0 puts on m2 [N]."""
     pull: float = par.k2 * (state[Z] - state[X]) + par.c2 * (state[VZ] - state[VX])
     return pull
 
 
-@compiled
+@lean
 def _free_inner(state: Vector, par: Parameters) -> float:
     """Force of the spring and damper between m1 and m2 [N]."""
     inner: float = par.k1 * (state[Y] - state[Z]) + par.c1 * (state[VY] - state[VZ])
     return inner
 
 
-@compiled
+@lean
 def carry_through_impact(
     tangent: Table, before: Vector, after: Vector, par: Parameters, restitution: float
 ) -> None:
@@ -63,7 +63,7 @@ def carry_through_impact(
         keep_in_range(change)
 
 
-@compiled
+@lean
 def _hold(change: Vector, par: Parameters) -> None:
     """Join m1 and m2, whose centre goes on: on a stop that holds m1 no change of p is left."""
     share = par.reduced_mass / par.mass2

@@ -202,13 +202,12 @@ def _take_readings(
     readings: Readings,
 ) -> tuple[int, int]:
     """Advance from interval to interval; returns an `Outcome` code and the first that was not completed."""
+    laws = (tables.power, tables.steps, tables.bound)
     for k in range(first, last):
         before = record.counts[IMPACTS]
         for part in range(parts):
             until = (k + (part + 1.0) / parts) * interval
-            code = advance_by_law(
-                state, clock, until, tables, tolerance, record, tables.power, tables.bound, tangent
-            )
+            code = advance_by_law(state, clock, until, tables, tolerance, record, *laws, tangent)
             if code != REACHED_END:
                 return code, k
             readings.growth[k] += tangent[:, GROWTH]

@@ -100,12 +100,13 @@ def _part(
 ) -> int:
     """Advance two motions interval by interval, each time bringing the second back to its distance."""
     here, there, apart = clock_at(0.0), clock_at(0.0), np.zeros(HALF)
+    laws = (tables.power, tables.steps, tables.bound)
     for k in range(len(growth)):
         until = (k + 1.0) * interval
-        code = advance_by_law(first, here, until, tables, tolerance, record, tables.power, tables.bound, None)
+        code = advance_by_law(first, here, until, tables, tolerance, record, *laws, None)
         code = max(
             code,
-            advance_by_law(second, there, until, tables, tolerance, record, tables.power, tables.bound, None),
+            advance_by_law(second, there, until, tables, tolerance, record, *laws, None),
         )
         if code != REACHED_END:
             return code

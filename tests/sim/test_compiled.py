@@ -1,3 +1,4 @@
+import ast
 import shutil
 import subprocess
 import sys
@@ -32,3 +33,32 @@ def test_a_kernel_is_recompiled_when_a_kernel_that_it_calls_changes_in_another_f
         )
         answers.append(float(run.stdout))
     assert answers == [2.0, 3.0]
+
+
+ARRAYS = {"Vector", "Table", "Complex", "Stride", "Watcher", "Space", "FlightTables"}
+
+
+def kernels():
+    """Every kernel of the package: its name, its decorator, its syntax tree."""
+    for source in sorted((Path(sim.compiled.__file__).parent).rglob("*.py")):
+        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                decorators = {each.id for each in node.decorator_list if isinstance(each, ast.Name)}
+                for kind in decorators & {"compiled", "lean", "inlined"}:
+                    yield node.name, kind, node
+
+
+def test_no_kernel_without_memory_makes_an_array_or_is_handed_one():
+    # It would never be given back: a leak that no run shows.
+    found = list(kernels())
+    makers = {
+        name for name, _, node in found if ARRAYS & {getattr(n, "id", "") for n in ast.walk(node.returns)}
+    }
+    assert {"clock_at", "held_tables", "space_for"} <= makers
+    for name, kind, node in found:
+        if kind == "compiled":
+            continue
+        called = [call.func for call in ast.walk(node) if isinstance(call, ast.Call)]
+        assert not makers & {each.id for each in called if isinstance(each, ast.Name)}, name
+        made = {each.attr for each in called if isinstance(each, ast.Attribute)}
+        assert not made & {"zeros", "empty", "ones", "full", "eye", "array", "copy", "zeros_like"}, name

@@ -1,0 +1,101 @@
+"""What a step under a power law makes of a small change: the derivative of the step itself. SI units.
+
+With the law's slope D_k at Gauss's points a change of p there solves eight linear equations,
+(1 - gain D) dp = free du, and the rest follows from D dp as the motion does from F. Nothing is integrated
+anew, and what holds for the step, such as being symplectic without damping, holds for its derivative.
+"""
+
+import numpy as np
+
+from ..compiled import compiled, inlined, lean
+from ..contact_law import MOST_TERMS
+from ..engine.eight import add_rows, all_eight, load, store
+from ..engine.linear_series import AT_X, AT_Z, P_RATE, WIDE, X_RATE, Z_RATE, P
+from ..engine.parameters import VX, VY, VZ, PowerTerms, Table, Vector, X, Y, Z
+from ..engine.power_flow import whole_power
+from ..engine.power_numbers import FEED, FREE, GAIN, MOVE, POINTS
+from ..engine.power_step import Stride
+from .tangent import UNITS, keep_in_range
+
+SLOPES, BEFORE, AFTER, EQUATIONS = range(4)
+"""Rows of the memory: the law's slopes, a change at the step's start and at its end, and the equations."""
+
+
+@compiled
+def power_memory() -> Table:
+    """Memory that one run hands to every step."""
+    return np.zeros((EQUATIONS + POINTS, POINTS + UNITS))
+
+
+@inlined
+def power_stiffness(p: float, power: PowerTerms) -> float:
+    """Slope of a power law, dF/dp [N/m]; infinite or NaN where it overflows."""
+    u = p * power.inverse_reference
+    square, grown, exponent, slope = u * u, 1.0, 1, 0.0
+    for place in range(MOST_TERMS):
+        if power.halves[place] > 0:
+            grown *= whole_power(square, power.halves[place])
+            exponent += 2 * power.halves[place]
+            slope += exponent * power.forces[place] * grown
+    result: float = slope * power.inverse_reference
+    return result
+
+
+@lean
+def carry_through_power(
+    tangent: Table, stride: Stride, numbers: Table, power: PowerTerms, memory: Table
+) -> None:
+    """Carry every change over the step just tried and found good."""
+    slopes, before, after, equations = memory[SLOPES], memory[BEFORE], memory[AFTER], memory[EQUATIONS:]
+    for k in range(POINTS):
+        slopes[k] = power_stiffness(stride.place[k], power)
+        for i in range(POINTS):
+            equations[i, k] = (1.0 if i == k else 0.0) - numbers[GAIN + k, i] * slopes[k]
+    for column in range(len(tangent)):
+        _write_change(before, tangent[column])
+        store(after, add_rows(all_eight(0.0), load(before), numbers, FREE))
+        for i in range(POINTS):
+            equations[i, POINTS + column] = after[i]
+    _solve(equations, POINTS + len(tangent))
+    for column in range(len(tangent)):
+        change = tangent[column]
+        _write_change(before, change)
+        free = add_rows(load(before), load(before), numbers, MOVE)
+        for k in range(POINTS):
+            before[k] = slopes[k] * equations[k, POINTS + column]
+        store(after, add_rows(free, load(before), numbers, FEED))
+        change[X], change[Z], change[Y] = after[AT_X], after[AT_Z], after[AT_Z] + after[P]
+        change[VX], change[VZ], change[VY] = after[X_RATE], after[Z_RATE], after[Z_RATE] + after[P_RATE]
+        keep_in_range(change)
+
+
+@inlined
+def _write_change(out: Vector, change: Vector) -> None:
+    """Write a change as the numbers of the motion; the drive has none."""
+    for i in range(WIDE):
+        out[i] = 0.0
+    out[P], out[P_RATE] = change[Y] - change[Z], change[VY] - change[VZ]
+    out[AT_X], out[X_RATE] = change[X], change[VX]
+    out[AT_Z], out[Z_RATE] = change[Z], change[VZ]
+
+
+@lean
+def _solve(equations: Table, columns: int) -> None:
+    """Put the answers in the place of the right-hand sides, by elimination with row exchange."""
+    for k in range(POINTS):
+        best = k
+        for i in range(k + 1, POINTS):
+            if abs(equations[i, k]) > abs(equations[best, k]):
+                best = i
+        for j in range(k, columns):
+            equations[k, j], equations[best, j] = equations[best, j], equations[k, j]
+        for i in range(k + 1, POINTS):
+            part = equations[i, k] / equations[k, k]
+            for j in range(k + 1, columns):
+                equations[i, j] -= part * equations[k, j]
+    for k in range(POINTS - 1, -1, -1):
+        for j in range(POINTS, columns):
+            total = equations[k, j]
+            for i in range(k + 1, POINTS):
+                total -= equations[k, i] * equations[i, j]
+            equations[k, j] = total / equations[k, k]
