@@ -25,6 +25,13 @@ class Spectrogram:
     """Peak amplitude of a sine that would give this power, shape (rows, columns)."""
     resolution_hz: float
     """Width of the window's main lobe at half power."""
+    noise_bandwidth_hz: float
+    """Width of a rectangle that lets as much noise through."""
+
+    @property
+    def density(self) -> Reals:
+        """One-sided spectral density [unit²/Hz], shape (rows, columns)."""
+        return np.asarray(0.5 * self.amplitude**2 / self.noise_bandwidth_hz)
 
 
 class SpectrogramSums:
@@ -93,4 +100,5 @@ class SpectrogramSums:
             frequency_hz=np.arange(self._rows, dtype=np.float64) * (self._rate_hz / self._length),
             amplitude=2 * np.sqrt(mean) / self._window.sum(),
             resolution_hz=1.44 * self._rate_hz / self._length,
+            noise_bandwidth_hz=float(self._rate_hz * np.sum(self._window**2) / np.sum(self._window) ** 2),
         )

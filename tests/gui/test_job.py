@@ -1,4 +1,4 @@
-"""The job on the virtual rig: by keyboard from the open window to a recording, and every way to stop."""
+"""The job on the virtual rig: by keyboard from the open window to an export, and every way to stop."""
 
 import os
 import signal
@@ -6,8 +6,8 @@ import time
 from functools import partial
 
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QMenu, QVBoxLayout
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QLineEdit, QMenu, QVBoxLayout
 
 from acquisition.engine.start import start_engine
 from acquisition.engine.state import Attendance, EngineState
@@ -15,7 +15,7 @@ from acquisition.plan.measurement import Measurement
 from acquisition.recording import open_recording
 from gui.desk import Desk
 from gui.orders import ABORT_KEY
-from gui.page_names import RUN, TEST
+from gui.page_names import COMPARE, FILES, RUN, TEST
 from gui.pages.catalogue import PAGES
 from gui.pages.rig.rig_choice import PACES
 from gui.settings import Settings
@@ -106,6 +106,61 @@ def test_a_newcomer_measures_with_five_keys(bench, qtbot):
     assert row.state == "recorded", row.reason
     with open_recording(row.file) as recording:
         assert recording.samples > 51_200
+
+
+def tab_to(qtbot, window, widget):
+    """Press Tab until a widget has the focus; how often, a person would count as well."""
+    for presses in range(1, 10):
+        press(qtbot, window, Qt.Key.Key_Tab)
+        if QApplication.focusWidget() is widget:
+            return presses
+    raise AssertionError(f"Tab does not reach {widget.accessibleName()}")
+
+
+def type_into_dialog(qtbot, text):
+    """Type into the dialog that the next key opens, and press Return there."""
+    timer = QTimer(interval=10)
+
+    def type_it():
+        field = QApplication.focusWidget()
+        if isinstance(field, QLineEdit) and isinstance(field.window(), QFileDialog):
+            timer.stop()
+            qtbot.keyClicks(field, text)
+            qtbot.keyClick(field, Qt.Key.Key_Return)
+
+    timer.timeout.connect(type_it)
+    timer.start()
+    return timer
+
+
+def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path):
+    """A second measurement is made, looked at, compared with the first one, and exported."""
+    key = partial(press, qtbot, bench)
+    files, compare = bench.pages[FILES], bench.pages[COMPARE]
+    key(Qt.Key.Key_Return, CONTROL)
+    reach(qtbot, bench, EngineState.ARMED)
+    key(Qt.Key.Key_F5)
+    reach(qtbot, bench, EngineState.RUNNING)
+    reach(qtbot, bench, EngineState.READY)
+    key(Qt.Key.Key_4, CONTROL)
+    qtbot.waitUntil(lambda: len(files.table.recordings.entries) == 2, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: bool(files.lanes.plots), timeout=PATIENCE_MS)
+    assert tab_to(qtbot, bench, files.lanes) <= 3
+    whole_s = files.lanes.view_s[1]
+    key(Qt.Key.Key_Plus)
+    assert files.lanes.view_s[1] - files.lanes.view_s[0] < 0.7 * whole_s
+    key(Qt.Key.Key_Home)
+    while QApplication.focusWidget() is not files.table:
+        key(Qt.Key.Key_Backtab, Qt.KeyboardModifier.ShiftModifier)
+    key(Qt.Key.Key_A, CONTROL)
+    key(Qt.Key.Key_M, ALT)
+    qtbot.waitUntil(lambda: bench.page is compare)
+    qtbot.waitUntil(lambda: len(compare.curves.shown()) == 2, timeout=PATIENCE_MS)
+    timer = type_into_dialog(qtbot, str(tmp_path / "overlay.svg"))
+    key(Qt.Key.Key_X, ALT)
+    qtbot.waitUntil((tmp_path / "overlay.svg").exists, timeout=PATIENCE_MS)
+    assert not timer.isActive()
+    qtbot.waitUntil(lambda: bench.strip.notices[-1].what.startswith("Written"), timeout=PATIENCE_MS)
 
 
 def start_dwell(bench, qtbot, name):

@@ -29,8 +29,8 @@ from ...settings import Remembered
 from ...theme import Theme
 from .campaign_choice import CampaignChoice
 from .file_words import facts_text
-from .lanes import RecordingLanes
 from .listing import Levels, Listing, listed, made_levels, thumbnails
+from .pictures import Pictures
 from .recording_table import RecordingTable
 
 
@@ -40,7 +40,8 @@ class FilesPage(Page):
     def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
         super().__init__(desk, parent)
         self.table = RecordingTable(desk.theme)
-        self.lanes = RecordingLanes(desk.theme)
+        self.pictures = Pictures(desk.theme, desk.background)
+        self.lanes = self.pictures.lanes
         self.campaigns = CampaignChoice()
         self.campaigns.chosen.connect(self.table.show_only)
         self._opened: Recording | None = None
@@ -58,8 +59,9 @@ class FilesPage(Page):
         return self._opened is not None
 
     def entered(self) -> None:
-        """List the folder anew: files may have come."""
+        """List the folder anew, for files may have come; arrows choose among them."""
         self.list_folder()
+        self.table.setFocus()
 
     def left(self) -> None:
         """Keep how the page is divided."""
@@ -67,7 +69,7 @@ class FilesPage(Page):
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
-        self.lanes.retheme(theme)
+        self.pictures.retheme(theme)
         self.table.recordings.retheme(theme)
 
     def list_folder(self) -> None:
@@ -160,11 +162,11 @@ class FilesPage(Page):
         if self._opened is None:
             return
         self._facts.setText(facts_text(self._opened))
-        self.lanes.show_recording(RecordingOverview(self._opened, levels))
+        self.pictures.show_recording(RecordingOverview(self._opened, levels))
         self._say_view()
 
     def _close(self) -> None:
-        self.lanes.show_recording(None)
+        self.pictures.show_recording(None)
         if self._opened is not None:
             self._opened.close()
             self._opened = None
@@ -287,6 +289,6 @@ class FilesPage(Page):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._title)
         layout.addWidget(self._facts)
-        layout.addWidget(self.lanes, 1)
+        layout.addWidget(self.pictures, 1)
         layout.addLayout(bar)
         return viewer

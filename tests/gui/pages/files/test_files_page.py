@@ -215,6 +215,25 @@ def test_a_recording_from_another_folder_is_opened_when_somebody_wants_it(page, 
     qtbot.waitUntil(lambda: page.table.chosen_paths() == (path,), timeout=20_000)
 
 
+def test_the_spectrogram_of_what_is_in_sight_shows_the_drive_and_the_impact(opened, waited):
+    page = opened("whole.h5")
+    view = page.pictures.spectrogram
+    page.pictures.setCurrentWidget(view)
+    for spacing in range(view.spacing.count()):
+        view.spacing.setCurrentIndex(spacing)
+        waited(lambda: not view.is_busy and view.image.item.image is not None)
+        shown = view.image.item
+        box = shown.mapRectToParent(shown.boundingRect())
+        loudest = int(np.argmax(np.median(shown.image, axis=1)))
+        place = box.top() + (loudest + 0.5) / shown.image.shape[0] * box.height()
+        assert (10**place if spacing else place) == pytest.approx(260.0, abs=25)  # lines are 25 Hz apart
+        struck = int(np.argmax(np.sum(shown.image, axis=0)))
+        at_s = box.left() + (struck + 0.5) / shown.image.shape[1] * box.width()
+        assert at_s == pytest.approx(IMPACT_S, abs=0.1)
+    assert "dB re 1 (m/s)²/Hz" in view.image.bar.axis.labelText
+    page.pictures.setCurrentWidget(page.lanes)
+
+
 def test_a_recording_that_is_finished_while_it_is_looked_at_is_no_fault(
     page, begin_recording, tmp_path, waited
 ):
