@@ -3,6 +3,8 @@
 import os
 import tempfile
 
+import pytest
+
 import cli.blas_threads  # noqa: F401 - it is the import that counts, before any test imports numpy
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -33,3 +35,27 @@ def pytest_report_header() -> str:
             f"the window's tests were NOT RUN: Qt cannot be loaded ({QT_MISSING}); docs/gui.md names packages"
         )
     return "the window is tested offscreen"
+
+
+LONGEST = (
+    "tests/cli/test_demo.py",
+    "tests/sim/chain/test_integrate.py",
+    "tests/sim/growth/test_lyapunov_spectrum.py",
+    "tests/sim/growth/test_tangent.py",
+    "tests/cli/test_killed_campaign.py",
+    "tests/gui/pages/compare/test_compare_page.py",
+)
+"""Files of few and long tests: begun last, one would run while the other process has nothing to do."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Let files be handed out in the order below, not by their number of tests."""
+    if hasattr(config.option, "loadscopereorder"):
+        config.option.loadscopereorder = False
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the longest."""
+    place = {name: number for number, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(place)))

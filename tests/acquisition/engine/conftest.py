@@ -14,6 +14,7 @@ from acquisition.engine.state import Attendance, EngineState
 from acquisition.engine.status import EngineStatus
 from acquisition.plan.campaign import Campaign
 from acquisition.rig.configuration import Rig, load_rig
+from acquisition.run.stop import StopLevel
 
 ROOT = Path(__file__).parent.parent.parent.parent
 PATIENCE_S = 60.0
@@ -37,6 +38,25 @@ def engine() -> Iterator[Callable[..., EngineProcess]]:
     """Start engines; they are ended with the test."""
     with ExitStack() as running:
         yield lambda attendance=Attendance.ATTENDED: running.enter_context(start_engine(attendance))
+
+
+@pytest.fixture(scope="module")
+def shared_engine() -> Iterator[EngineProcess]:
+    """One engine for all tests that leave it as they have found it: to start one takes two seconds."""
+    with start_engine() as engine:
+        yield engine
+
+
+@pytest.fixture
+def client(shared_engine: EngineProcess) -> Iterator[EngineClient]:
+    """The attending viewer of an engine without a bench."""
+    client = shared_engine.client
+    yield client
+    client.stop(StopLevel.OFF)
+    at_rest = (EngineState.READY, EngineState.ARMED, EngineState.FAULT, EngineState.CLOSED)
+    until_state(client, *at_rest)
+    client.close_bench()
+    until_state(client, EngineState.CLOSED)
 
 
 def until(client: EngineClient, is_there: Callable[[EngineStatus], bool]) -> EngineStatus:

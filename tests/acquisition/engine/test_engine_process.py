@@ -53,8 +53,7 @@ def kept(path, reason):
 
 
 class TestTheJob:
-    def test_a_bench_is_opened_checked_armed_run_and_closed(self, engine, shipped_rig, tmp_path):
-        client = engine().client
+    def test_a_bench_is_opened_checked_armed_run_and_closed(self, client, shipped_rig, tmp_path):
         assert client.status().state is EngineState.CLOSED
         client.open(shipped_rig)
         bench = until_state(client, EngineState.READY).bench
@@ -81,8 +80,7 @@ class TestTheJob:
         client.close_bench()
         until_state(client, EngineState.CLOSED)
 
-    def test_the_newest_samples_are_those_of_the_recording(self, engine, shipped_rig, tmp_path):
-        client = engine().client
+    def test_the_newest_samples_are_those_of_the_recording(self, client, shipped_rig, tmp_path):
         running(client, shipped_rig, tmp_path)
         glance = client.look(0, 10_000)
         client.stop(StopLevel.ABORT)
@@ -96,8 +94,7 @@ class TestTheJob:
             ).physical_per_volt
         np.testing.assert_allclose(glance.volts[3] * per_volt, recorded, rtol=1e-5, atol=1e-8)
 
-    def test_a_mark_stands_at_its_sample(self, engine, shipped_rig, tmp_path):
-        client = engine().client
+    def test_a_mark_stands_at_its_sample(self, client, shipped_rig, tmp_path):
         before = running(client, shipped_rig, tmp_path).samples
         client.mark("the sphere was heard")
         client.stop(StopLevel.ABORT)
@@ -107,16 +104,14 @@ class TestTheJob:
             assert [mark.text for mark in marks] == ["the sphere was heard"]
             assert before <= marks[0].sample <= recording.samples
 
-    def test_a_held_run_goes_on(self, engine, shipped_rig, tmp_path):
-        client = engine().client
+    def test_a_held_run_goes_on(self, client, shipped_rig, tmp_path):
         running(client, shipped_rig, tmp_path)
         client.stop(StopLevel.HOLD)
         until_state(client, EngineState.HELD)
         client.resume()
         until_state(client, EngineState.RUNNING)
 
-    def test_a_stop_ends_the_campaign_and_not_only_its_measurement(self, engine, shipped_rig, tmp_path):
-        client = engine().client
+    def test_a_stop_ends_the_campaign_and_not_only_its_measurement(self, client, shipped_rig, tmp_path):
         running(client, shipped_rig, tmp_path, "first", "second")
         client.stop(StopLevel.RAMP, "enough for today")
         rows = until_state(client, EngineState.READY).rows
@@ -126,8 +121,7 @@ class TestTheJob:
 
 
 class TestACheckIsStopped:
-    def test_by_whoever_asks_for_it(self, engine, shipped_rig, tmp_path):
-        client = engine().client
+    def test_by_whoever_asks_for_it(self, client, shipped_rig, tmp_path):
         client.open(shipped_rig)
         until_state(client, EngineState.READY)
         client.check(tmp_path)
@@ -136,13 +130,12 @@ class TestACheckIsStopped:
         assert status.check is None
         assert "the bench check was stopped: smoke in the laboratory" in status.messages[-1].what
 
-    def test_when_nobody_looks(self, engine, shipped_rig, tmp_path):
-        process = engine()
+    def test_when_nobody_looks(self, client, shared_engine, shipped_rig, tmp_path):
         as_slow_as_real = shipped_rig.virtual.model_copy(update={"pace": "wall"})
-        process.client.open(shipped_rig.model_copy(update={"virtual": as_slow_as_real}))
-        until_state(process.client, EngineState.READY)
-        process.client.check(tmp_path)
-        with EngineClient.attach(process.address) as visitor:
+        client.open(shipped_rig.model_copy(update={"virtual": as_slow_as_real}))
+        until_state(client, EngineState.READY)
+        client.check(tmp_path)
+        with EngineClient.attach(shared_engine.address) as visitor:
             status = until_state(visitor, EngineState.READY)
         assert status.check is None
         assert [message.what.partition(":")[0] for message in status.messages][-2:] == [
@@ -150,8 +143,7 @@ class TestACheckIsStopped:
             "the bench check was stopped",
         ]
 
-    def test_and_the_campaign_that_asked_for_it_begins_nothing(self, engine, shipped_rig, tmp_path):
-        client = engine().client
+    def test_and_the_campaign_that_asked_for_it_begins_nothing(self, client, shipped_rig, tmp_path):
         client.open(shipped_rig)
         until_state(client, EngineState.READY)
         orders = Orders(campaign=campaign("run"), folder=tmp_path, check=CheckRule.NOW)
@@ -165,8 +157,7 @@ class TestACheckIsStopped:
 
 
 class TestRefusals:
-    def test_what_the_state_does_not_allow_is_refused_with_a_sentence(self, engine, tmp_path):
-        client = engine().client
+    def test_what_the_state_does_not_allow_is_refused_with_a_sentence(self, client, tmp_path):
         with pytest.raises(EngineError, match=r"is closed and cannot start now; it can when it is armed"):
             client.start()
         with pytest.raises(EngineError, match="nothing is being recorded"):
@@ -174,8 +165,7 @@ class TestRefusals:
         client.stop(StopLevel.OFF)
         client.disarm()
 
-    def test_a_plan_past_a_limit_is_refused_when_it_is_armed(self, engine, shipped_rig, tmp_path):
-        client = engine().client
+    def test_a_plan_past_a_limit_is_refused_when_it_is_armed(self, client, shipped_rig, tmp_path):
         client.open(shipped_rig)
         until_state(client, EngineState.READY)
         low = campaign("low").measurements[0]
@@ -187,21 +177,20 @@ class TestRefusals:
             client.arm(plan, tmp_path)
         assert client.status().state is EngineState.READY
 
-    def test_nothing_is_overwritten(self, engine, shipped_rig, tmp_path):
+    def test_nothing_is_overwritten(self, client, shipped_rig, tmp_path):
         (tmp_path / "run.h5").write_bytes(b"precious")
-        client = engine().client
         client.open(shipped_rig)
         until_state(client, EngineState.READY)
         with pytest.raises(RecordingError, match="nothing is ever overwritten"):
             client.arm(campaign("run"), tmp_path)
 
-    def test_nobody_is_let_in_without_the_token(self, engine):
-        address = engine().address
+    def test_nobody_is_let_in_without_the_token(self, shared_engine):
+        address = shared_engine.address
         with pytest.raises(EngineError, match="nobody was let in"):
             EngineClient.attach(address.model_copy(update={"token": "guessed"}))
 
-    def test_it_listens_on_loopback_only(self, engine):
-        address = engine().address
+    def test_it_listens_on_loopback_only(self, shared_engine):
+        address = shared_engine.address
         assert address.host == "127.0.0.1"
         others = [info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)]
         for host in {other for other in others if not other.startswith("127.")}:
@@ -211,13 +200,13 @@ class TestRefusals:
     @pytest.mark.parametrize(
         "said", [b"GET / HTTP/1.1\r\n\r\n", b"VBE1\xff\xff\xff\xff\xff\xff\xff\xff", b"\0" * 64]
     )
-    def test_what_is_no_message_closes_the_connection_and_harms_nobody(self, engine, said):
-        process = engine()
-        with socket.create_connection((process.address.host, process.address.port), 5.0) as stranger:
+    def test_what_is_no_message_closes_the_connection_and_harms_nobody(self, client, shared_engine, said):
+        at = shared_engine.address
+        with socket.create_connection((at.host, at.port), 5.0) as stranger:
             stranger.sendall(said)
             with suppress(ConnectionResetError):
                 assert stranger.recv(1) == b""
-        assert process.client.status().state is EngineState.CLOSED
+        assert client.status().state is EngineState.CLOSED
 
     def test_two_engines_cannot_open_one_bench(self, engine, shipped_rig):
         virtual = VirtualRig(shipped_rig)
@@ -242,24 +231,24 @@ class TestRefusals:
 
 
 class TestNobodyLooks:
-    def test_an_attended_run_is_aborted_when_nobody_asks(self, engine, shipped_rig, tmp_path):
-        process = engine()
-        running(process.client, shipped_rig, tmp_path)
+    def test_an_attended_run_is_aborted_when_nobody_asks(self, client, shipped_rig, tmp_path):
+        running(client, shipped_rig, tmp_path)
         events = kept(tmp_path / "run.h5", r"nobody has looked for \d+\.\d s")  # asks nothing meanwhile
         assert any(kind == "silence" and text.startswith("abort: 0.0") for kind, text in events)
-        messages = until_state(process.client, EngineState.READY).messages
+        messages = until_state(client, EngineState.READY).messages
         assert any(message.what.startswith("The viewer is gone") for message in messages)
 
     @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
-    def test_an_engine_that_was_frozen_itself_does_not_blame_its_viewer(self, engine, shipped_rig, tmp_path):
-        process = engine()
-        before = running(process.client, shipped_rig, tmp_path).samples
-        os.kill(process.pid, signal.SIGSTOP)
+    def test_an_engine_that_was_frozen_itself_does_not_blame_its_viewer(
+        self, client, shared_engine, shipped_rig, tmp_path
+    ):
+        before = running(client, shipped_rig, tmp_path).samples
+        os.kill(shared_engine.pid, signal.SIGSTOP)
         try:
             Event().wait(1.2)
         finally:
-            os.kill(process.pid, signal.SIGCONT)
-        until(process.client, lambda status: status.samples > before + 100_000)
+            os.kill(shared_engine.pid, signal.SIGCONT)
+        until(client, lambda status: status.samples > before + 100_000)
 
     def test_a_frozen_viewer_does_not_hold_the_engine_up(self, engine, shipped_rig, tmp_path):
         process = engine(Attendance.UNATTENDED)
@@ -284,14 +273,14 @@ class TestNobodyLooks:
         with open_recording(path) as recording:
             assert recording.state is RecordingState.COMPLETE
 
-    def test_an_armed_engine_disarms_itself_when_nobody_asks(self, engine, shipped_rig, tmp_path):
-        process = engine()
-        client = process.client
+    def test_an_armed_engine_disarms_itself_when_nobody_asks(
+        self, client, shared_engine, shipped_rig, tmp_path
+    ):
         client.open(shipped_rig)
         until_state(client, EngineState.READY)
         client.arm(campaign("run"), tmp_path)
         # Visitors may look, come and go: they attend to nothing.
-        with EngineClient.attach(process.address) as visitor:
+        with EngineClient.attach(shared_engine.address) as visitor:
             until_state(visitor, EngineState.READY)
 
     @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
