@@ -12,6 +12,7 @@ from acquisition.excitation.odd_multisine import OddMultisine
 from acquisition.excitation.resonance_tracking import ResonanceTracking
 from acquisition.excitation.settled_sine import SettledSine
 from acquisition.excitation.sine_sweep import SineSweep
+from acquisition.excitation.stepped_level import SteppedLevel
 from acquisition.excitation.stepped_sine import SteppedSine
 from acquisition.excitation.streamed_noise import StreamedNoise
 from acquisition.recording import Recording
@@ -92,7 +93,7 @@ class DwellAnalysis:
 
 @dataclass(frozen=True, eq=False)
 class SteppedSineAnalysis:
-    """A stepped sine: responses at every frequency."""
+    """A stepped sine: responses at every frequency, or at every level."""
 
     facts: RecordingFacts
     checks: tuple[Check, ...]
@@ -152,7 +153,7 @@ def _analysed(facts: RecordingFacts, channels: Channels, request: NoiseRequest) 
             terminal = terminal_levels(found, towards_hz)
             motion = dwell_motion(channels, found)
             return DwellAnalysis(facts, checks, dwell, found, settled_envelope(found), terminal, motion)
-        case SteppedSine() | SettledSine() | ResonanceTracking() as stepped:
+        case SteppedSine() | SteppedLevel() | SettledSine() | ResonanceTracking() as stepped:
             return SteppedSineAnalysis(facts, checks, stepped, stepped_response(channels, stepped))
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from acquisition.excitation.resonance_tracking import RESONANCE_LABEL, ResonanceTracking
 from acquisition.excitation.settled_sine import STEP_LABEL, SettledSine
+from acquisition.excitation.stepped_level import SteppedLevel
 from acquisition.excitation.stepped_sine import SteppedSine
 
 from .arrays import Reals
@@ -13,8 +14,8 @@ from .dwell import DwellResponse, dwell_response
 from .errors import NotEnoughData
 from .recorded_channels import Channels, Stretch
 
-Steps = SteppedSine | SettledSine | ResonanceTracking
-"""What is recorded frequency by frequency."""
+Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking
+"""What is recorded frequency by frequency, or level by level."""
 _EDGE_PERIODS = 60.0
 """Drive periods that integration disturbs at each end; read beyond the step, where there is more."""
 
@@ -27,6 +28,8 @@ class SteppedResponse:
     """As measured on the drive."""
     direction: tuple[str, ...]
     """``"up"`` or ``"down"``."""
+    amplitude_vpp: Reals
+    """Setting of the generator [V]; NaN where it was not a plan's but feedback's."""
     drive_amplitude_m: Reals
     response_i: Reals
     noise_bias_i: Reals
@@ -58,6 +61,7 @@ def stepped_response(channels: Channels, plan: Steps) -> SteppedResponse:
     return SteppedResponse(
         frequency_hz=np.array([each.drive.frequency_hz for each in steps]),
         direction=tuple(str(stretch.numbers.get("direction", "up")) for stretch, _ in pairs),
+        amplitude_vpp=np.array([_setting_vpp(stretch, plan) for stretch, _ in pairs]),
         drive_amplitude_m=np.array([each.drive.amplitude_m for each in steps]),
         response_i=np.array([each.response_i for each in steps]),
         noise_bias_i=np.array([each.noise_bias_i for each in steps]),
@@ -71,6 +75,16 @@ def stepped_response(channels: Channels, plan: Steps) -> SteppedResponse:
 def step_label(plan: Steps) -> str:
     """Say what the segments of a plan's steps are called."""
     return RESONANCE_LABEL if isinstance(plan, ResonanceTracking) else STEP_LABEL
+
+
+def _setting_vpp(stretch: Stretch, plan: Steps) -> float:
+    match plan:
+        case SteppedLevel():
+            return float(stretch.numbers["amplitude_vpp"])
+        case SteppedSine():
+            return plan.amplitude_vpp
+        case SettledSine() | ResonanceTracking():
+            return float("nan")
 
 
 def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | None:

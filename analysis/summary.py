@@ -18,6 +18,7 @@ from .chaos.verdict import MotionVerdict
 from .collision_region import CollisionRegion, Collisions, Edge
 from .difference import Difference
 from .distortion import distortion
+from .level_jumps import level_summary
 from .measurement_analysis import NoiseAnalysis
 from .overlay import SimulatedRun
 from .periodic_transmission import PeriodicTransmission
@@ -274,6 +275,7 @@ def _stepped(result: SteppedSineResult) -> Json:
         "response_ii": found.response_ii,
         "sd_response_ii": found.sd_response_ii,
         "left_out": found.left_out,
+        **level_summary(result.analysis.excitation, found),
     }
 
 

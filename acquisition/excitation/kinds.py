@@ -13,6 +13,7 @@ from .plan import AbstractExcitation
 from .resonance_tracking import ResonanceTracking
 from .settled_sine import SettledSine
 from .sine_sweep import SineSweep
+from .stepped_level import SteppedLevel
 from .stepped_sine import SteppedSine
 from .streamed_noise import StreamedNoise
 
@@ -22,6 +23,7 @@ Excitation: TypeAlias = Annotated[
     | SineSweep
     | Dwell
     | SteppedSine
+    | SteppedLevel
     | OddMultisine
     | SettledSine
     | HeldSweep
@@ -36,6 +38,7 @@ _PLANS: tuple[type[AbstractExcitation], ...] = (
     SineSweep,
     Dwell,
     SteppedSine,
+    SteppedLevel,
     OddMultisine,
     SettledSine,
     HeldSweep,

@@ -78,6 +78,10 @@ class Sweep(FrozenModel):
     lead_s: PositiveFloat = 0.5
     """Time at each earlier point of a chain on the way to a point [s]."""
 
+    lead_points: PositiveInt | None = Field(default=None, le=MOST_LEAD_INS)
+    """So many earlier points at most on the way to a point, the nearest ones; absent: all of its chain. A
+    shorter way takes less time, and leads to the wrong branch where it begins behind the jump."""
+
     @model_validator(mode="after")
     def _order_names_every_axis(self) -> Self:
         if len(set(self.order)) != len(self.order):
@@ -103,7 +107,8 @@ class Sweep(FrozenModel):
                 f"continue_from_previous = {axis.value!r} must be the innermost axis that is given; "
                 f"the order is {_words(given)}"
             )
-        longest = len(self._axes()[axis]) * (2 if _TURNING & set(self.direction) else 1)
+        passed = len(self._axes()[axis]) * (2 if _TURNING & set(self.direction) else 1)
+        longest = passed if self.lead_points is None else min(passed, self.lead_points)
         if longest > MOST_LEAD_INS:
             raise ValueError(
                 f"a chain of {longest} points was given, allowed are {MOST_LEAD_INS}; split the sweep"
@@ -181,7 +186,8 @@ class Sweep(FrozenModel):
                 name = f"{there.name(self.name)}-{self._word(along, value)}"
                 content = self._content(name, {**chain.values, along: value})
                 dwell = _dwell(content, name)
-                led = dwell.model_copy(update={"lead_in": tuple(way), "lead_s": self.lead_s})
+                passed = way if self.lead_points is None else way[-self.lead_points :]
+                led = dwell.model_copy(update={"lead_in": tuple(passed), "lead_s": self.lead_s})
                 yield Point(name, _measurement({**content, "excitation": led}, name), chain.name(self.name))
                 way.append(LeadIn(frequency_hz=led.frequency_hz, amplitude_vpp=led.amplitude_vpp))
 

@@ -16,19 +16,21 @@ Heal = Callable[[], None]
 class DiskTrouble:
     """What is wrong with the disk at the moment; any thread may change it.
 
-    ``on_refusal`` is called whenever something was refused, before whoever asked is told.
+    The first refusal comes at once: whoever records must be told before anything else happens. With every
+    further one ``on_refusal`` is called before whoever asked is told.
     """
 
     def __init__(self, on_refusal: Callable[[], None] = lambda: None) -> None:
         self._on_refusal = on_refusal
         self._changed = threading.Condition()
         self._refusals = 0.0
+        self._has_refused = False
         self._delay_s = 0.0
 
     def fill(self, refusals: float = inf) -> Heal:
         """Refuse everything as a full disk does, until healed or as often as ``refusals`` says."""
         with self._changed:
-            self._refusals = refusals
+            self._refusals, self._has_refused = refusals, False
         return self._make_room
 
     def slow_down(self, delay_s: float) -> Heal:
@@ -44,8 +46,11 @@ class DiskTrouble:
             self._changed.wait_for(lambda: self._delay_s == 0.0, timeout=self._delay_s)
             is_refused = self._refusals > 0
             self._refusals -= is_refused
-        if is_refused:
+            is_asked_again = is_refused and self._has_refused
+            self._has_refused |= is_refused
+        if is_asked_again:
             self._on_refusal()
+        if is_refused:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def _make_room(self) -> None:

@@ -30,7 +30,7 @@ from .world.world import World, virtual_section
 
 _USB_RESOURCE_FIELDS = 5
 REFUSED_S = 1.0
-"""Rig time that a refusal of the disk takes, so that a full disk is emptied for who tries again."""
+"""Rig time that every refusal of the disk but the first takes: it is emptied in time for who tries again."""
 
 
 class DiskFaults(Enum):

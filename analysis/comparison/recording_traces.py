@@ -28,6 +28,9 @@ from ..stepped_response import SteppedResponse
 from ..sweep import SweepResponse
 from .trace import Origin, Response, Trace, sorted_trace
 
+SAME_HZ = 0.01
+"""Frequencies that lie within this are one [Hz]."""
+
 
 @dataclass(frozen=True, eq=False)
 class ComparedRecording:
@@ -131,6 +134,8 @@ def _sweep(name: str, origin: Origin, found: SweepResponse) -> Iterator[Trace]:
 
 def _stepped(name: str, origin: Origin, found: SteppedResponse) -> Iterator[Trace]:
     """Give steps up and steps down as curves of their own: between jumps they differ."""
+    if found.frequency_hz.size > 1 and np.ptp(found.frequency_hz) < SAME_HZ:
+        return  # levels at one frequency are no curve over it
     directions = np.array(found.direction)
     for direction in dict.fromkeys(found.direction):
         at = directions == direction

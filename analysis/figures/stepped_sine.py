@@ -1,9 +1,13 @@
-"""Responses I and II at every frequency of a stepped sine, up and down apart."""
+"""Responses I and II at every frequency, or every level, of a stepped sine, up and down apart."""
 
 import numpy as np
 from matplotlib.axes import Axes
 
+from acquisition.excitation.stepped_level import SteppedLevel
+
+from ..arrays import Reals
 from ..feedback_words import feedback_sentences, noted_jumps
+from ..level_jumps import hysteresis_vpp, level_jumps
 from ..measurement_analysis import SteppedSineAnalysis
 from ..overlay import SteppedSineOverlay
 from ..tables import table
@@ -15,7 +19,7 @@ _MARKERS = {"up": "^", "down": "v"}
 
 
 def stepped_sine_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None = None) -> DrawnFigure:
-    """Draw Response I and II against frequency, one marker a direction."""
+    """Draw Response I and II against frequency or level, one marker a direction."""
     with styled():
         figure = new_figure(_HEIGHT_IN)
         first, second = figure.subplots(2, 1, sharex=True)
@@ -23,12 +27,13 @@ def stepped_sine_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay 
         _responses(second, analysis, laid, "response_ii")
         first.set_ylabel("Response I\nmax |x| / A0")
         second.set_ylabel("Response II\n|x at f| / A0")
-        second.set_xlabel("drive frequency [Hz]")
+        second.set_xlabel(_along(analysis)[1])
         legend_above(figure, [first])
     found = analysis.response
     columns = {
         "frequency_hz": found.frequency_hz,
         "direction": np.asarray(found.direction),
+        "amplitude_vpp": found.amplitude_vpp,
         "drive_amplitude_m": found.drive_amplitude_m,
         "response_i": found.response_i,
         "response_ii": found.response_ii,
@@ -41,27 +46,45 @@ def stepped_sine_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay 
     name = f"stepped_sine_{analysis.facts.name}"
     return DrawnFigure(
         name=name,
-        title=f"Stepped sine, {analysis.excitation.amplitude_vpp:g} Vpp",
+        title=_title(analysis),
         caption=stepped_sine_caption(analysis, laid),
         figure=figure,
         tables=(table(name, **columns),),
     )
 
 
+def _along(analysis: SteppedSineAnalysis) -> tuple[Reals, str]:
+    """Give what was stepped, and what its axis is called."""
+    match analysis.excitation:
+        case SteppedLevel():
+            return analysis.response.amplitude_vpp, "level at the generator [Vpp]"
+        case _:
+            return analysis.response.frequency_hz, "drive frequency [Hz]"
+
+
+def _title(analysis: SteppedSineAnalysis) -> str:
+    match analysis.excitation:
+        case SteppedLevel(frequency_hz=frequency_hz):
+            return f"Stepped level, {frequency_hz:g} Hz"
+        case plan:
+            return f"Stepped sine, {plan.amplitude_vpp:g} Vpp"
+
+
 def _responses(axes: Axes, analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, what: str) -> None:
     found = analysis.response
-    rising = np.argsort(found.frequency_hz)
+    along, _ = _along(analysis)
+    rising = np.argsort(along)
     if laid is not None:
         sines = laid.prediction
         axes.plot(
-            sines.frequency_hz[rising],
+            along[rising],
             sines.linear[rising],
             color=LINEAR,
             linestyle="--",
             label="without contact",
         )
         axes.plot(
-            sines.frequency_hz[rising],
+            along[rising],
             getattr(sines, what)[rising],
             color=PREDICTED,
             linewidth=0.8,
@@ -71,7 +94,7 @@ def _responses(axes: Axes, analysis: SteppedSineAnalysis, laid: SteppedSineOverl
         chosen = np.array([each == direction for each in found.direction])
         marker = _MARKERS.get(direction, "o")
         axes.plot(
-            found.frequency_hz[chosen],
+            along[chosen],
             getattr(found, what)[chosen],
             color=MEASURED,
             label=f"measured, {direction}",
@@ -81,7 +104,7 @@ def _responses(axes: Axes, analysis: SteppedSineAnalysis, laid: SteppedSineOverl
         )
         if laid is not None:
             axes.plot(
-                found.frequency_hz[chosen],
+                along[chosen],
                 getattr(laid.response, what)[chosen],
                 color=SIMULATED,
                 markerfacecolor="none",
@@ -105,6 +128,8 @@ def stepped_sine_caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay
         f"at {found.frequency_hz[top]:.4g} Hz: {found.response_ii[top]:.3g} ± "
         f"{2 * found.sd_response_ii[top]:.2g}."
     )
+    if isinstance(analysis.excitation, SteppedLevel):
+        text = stepped_level_caption(analysis)
     text = " ".join([text, *feedback_sentences(analysis.facts.feedback)])
     if laid is None:
         return text
@@ -113,3 +138,22 @@ def stepped_sine_caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay
         f"{laid.difference.median_abs_db:.2g} dB, {laid.difference.share_within_two:.0%} of the steps "
         f"within two standard errors, {laid.run.impacts} impacts within the steps."
     )
+
+
+def stepped_level_caption(analysis: SteppedSineAnalysis) -> str:
+    """Say between which levels the motion jumps, and how far apart the two ways lie."""
+    found = analysis.response
+    text = (
+        f"Level stepped at {np.median(found.frequency_hz):.4g} Hz, {found.frequency_hz.size} levels from "
+        f"{np.min(found.amplitude_vpp):.4g} to {np.max(found.amplitude_vpp):.4g} Vpp."
+    )
+    jumps = level_jumps(found)
+    told = [
+        f"Going {each.direction}, Response II changes by a factor of {each.factor:.3g} between "
+        f"{each.before_vpp:.4g} and {each.after_vpp:.4g} Vpp."
+        for each in jumps
+    ]
+    apart = hysteresis_vpp(jumps)
+    if apart is not None:
+        told.append(f"The jump up lies {max(apart[0], 0.0):.3g} to {apart[1]:.3g} V above the fall back.")
+    return " ".join([text, *(told or ["No jump by more than a factor of two."])])

@@ -120,6 +120,22 @@ class TestChains:
         assert [point.chain for point in plan.points()] == ["line-0p5vpp-up"] * 3 + ["line-0p5vpp-down"] * 3
         assert {point.measurement.excitation.lead_s for point in plan.points()} == {0.25}
 
+    def test_a_bounded_way_keeps_the_nearest_points_and_makes_a_long_chain_grow_with_its_length(self):
+        def made(points, **bound):
+            return campaign(
+                amplitude_vpp=[0.5],
+                frequency_hz={"start": 200, "step": 1, "stop": 199 + points},
+                continue_from_previous="frequency_hz",
+                **bound,
+            )
+
+        last = made(40, lead_points=3).points()[-1].measurement.excitation
+        assert [tone.frequency_hz for tone in last.lead_in] == [236, 237, 238]
+        whole_s, bounded_s = ([made(n, **b).duration_s for n in (20, 40)] for b in ({}, {"lead_points": 3}))
+        assert bounded_s[1] - 2 * bounded_s[0] == pytest.approx(0.5 * 6)
+        assert whole_s[1] - 2 * whole_s[0] == pytest.approx(0.5 * 20 * 20)
+        assert len(made(1200, lead_points=2).points()) == 1200
+
     def test_there_and_back_is_one_chain(self):
         plan = campaign(
             amplitude_vpp=[0.5],

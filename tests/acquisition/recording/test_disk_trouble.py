@@ -17,6 +17,20 @@ def trouble():
         yield trouble
 
 
+def test_the_first_refusal_comes_at_once_and_every_further_one_tells_the_rig_first():
+    told = []
+    trouble = DiskTrouble(lambda: told.append(len(told)))
+    for _ in range(2):
+        heal = trouble.fill()
+        before = len(told)
+        for refusals in range(3):
+            with pytest.raises(OSError, match="No space left"):
+                trouble.meet()
+            assert len(told) - before == refusals
+        heal()
+        trouble.meet()
+
+
 def append_until_committed(writer, make_block, first, samples):
     for begin in range(first, first + samples, 100):
         writer.append(make_block(begin, 100)[1])

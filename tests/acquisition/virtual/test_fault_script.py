@@ -177,7 +177,7 @@ class TestEffects:
                     claim_room(tmp_path / f"{attempt}", 10, 10)
                 except OSError:
                     refusals += 1
-            assert refusals == 3
+            assert refusals == 4  # the first at once, a second each after it
 
     def test_a_device_taken_by_another_program_is_named_as_such_until_it_is_given_back(self, scripted):
         with KeptBench(scripted(fault("reserve_device", 0.2, for_s=1.5))) as kept:

@@ -1,0 +1,78 @@
+"""Levels at one frequency: which ones, how long, how loud, and what is refused."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from acquisition.errors import LimitExceeded
+from acquisition.excitation.stepped_level import SteppedLevel
+from acquisition.plan.limits import require_within_limits
+from acquisition.plan.measurement import Measurement
+from acquisition.rig.configuration import load_rig
+from acquisition.run.schedule import phases
+from acquisition.run.state import RunState
+
+ROOT = Path(__file__).parents[3]
+
+
+def plan(**changed):
+    given = {"frequency_hz": 195, "amplitude_vpp": 0.9, "lowest_vpp": 0.2, "step_vpp": 0.1}
+    return SteppedLevel.model_validate({**given, "settle_s": 0.5, "record_s": 0.25, **changed})
+
+
+def levels(excitation):
+    return [
+        (step.segment.numbers["direction"], step.segment.numbers["amplitude_vpp"])
+        for step in excitation.steps()
+    ]
+
+
+def test_levels_rise_to_the_amplitude_and_come_back_each_with_its_direction():
+    rising = [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]
+    told = levels(plan())
+    assert [way for way, _ in told] == ["up"] * 8 + ["down"] * 8
+    assert [vpp for _, vpp in told] == pytest.approx(rising + rising[::-1])
+    assert [vpp for _, vpp in levels(plan(lowest_vpp=0.25, direction="down"))] == pytest.approx(rising[:0:-1])
+
+
+def test_the_level_changes_without_a_ramp_and_without_a_break_in_phase():
+    laid_out = list(phases(Measurement(name="level", excitation=plan(), ramp_s=0.5)))
+    states = [phase.state for phase in laid_out]
+    assert states.count(RunState.RAMPING_UP) == states.count(RunState.RAMPING_DOWN) == 1
+    assert sum(phase.duration_s for phase in laid_out) == pytest.approx(plan().playing_s + 1.0)
+    preview = plan(frequency_hz=20.3).preview(5000)
+    envelope = 0.45 * np.repeat([step.play.level for step in plan().steps()], 3750)
+    expected = envelope * np.sin(2 * np.pi * 20.3 * preview.time_s)
+    assert preview.volts == pytest.approx(expected, abs=1e-9)
+    assert preview.duration_s == plan().playing_s == 16 * 0.75
+
+
+def test_limits_know_the_highest_level_before_anything_moves():
+    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    loud = plan(amplitude_vpp=10.0, frequency_hz=20.0)
+    with pytest.raises(LimitExceeded):
+        require_within_limits(Measurement(name="level", excitation=loud), rig)
+    used = [
+        max(each.use for each in require_within_limits(Measurement(name="l", excitation=each), rig))
+        for each in (plan(), plan(amplitude_vpp=1.8), plan(amplitude_vpp=3.6))
+    ]
+    for low, high in pairwise(used):
+        assert high == pytest.approx(2 * low, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"lowest_vpp": 0.85}, "leave no two levels"),
+        ({"lowest_vpp": 1.0}, "leave no two levels"),
+        ({"step_vpp": 1e-4}, "holds at most 4000"),
+        ({"step_vpp": 0}, "greater than 0"),
+        ({"lowest_vpp": 1e-4}, "greater than or equal to 0.002"),
+    ],
+)
+def test_what_makes_no_levels_is_refused_with_what_is_allowed(changed, said):
+    with pytest.raises(ValidationError, match=said):
+        plan(**changed)

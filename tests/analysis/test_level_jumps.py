@@ -1,0 +1,94 @@
+"""Jumps of a stepped level: found on the virtual rig at two levels, and none where there is none."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.bench import open_bench
+from acquisition.excitation.stepped_level import SteppedLevel
+from acquisition.plan.measurement import Measurement
+from acquisition.recording import open_recording
+from acquisition.rig.configuration import load_rig
+from acquisition.run.run_measurement import run_measurement
+from analysis.campaign_results import SteppedSineResult
+from analysis.figures.stepped_sine import stepped_sine_figure
+from analysis.level_jumps import hysteresis_vpp, level_jumps
+from analysis.measurement_analysis import analyse_recording
+from analysis.stepped_response import SteppedResponse
+from analysis.summary import summary
+
+RIG = load_rig(Path(__file__).parents[2] / "hardware_configs" / "virtual_rig.toml")
+
+
+@pytest.fixture(scope="module")
+def analysis(tmp_path_factory):
+    """195 Hz from 0.2 to 0.8 Vpp and back."""
+    rig = RIG.model_copy(
+        update={
+            "daq": RIG.daq.model_copy(update={"sample_rate_hz": 5120.0}),
+            "virtual": RIG.virtual.model_copy(update={"grid_rate_hz": 25_600.0}),
+        }
+    )
+    plan = SteppedLevel(
+        frequency_hz=195, amplitude_vpp=0.8, lowest_vpp=0.2, step_vpp=0.1, settle_s=0.5, record_s=0.7
+    )
+    path = tmp_path_factory.mktemp("level") / "level.h5"
+    with open_bench(rig) as bench:
+        run_measurement(bench, Measurement(name="level", excitation=plan, ramp_s=0.3), path)
+    with open_recording(path) as recording:
+        return analyse_recording(recording)
+
+
+def test_the_specimen_jumps_up_at_a_higher_level_than_it_falls_back_at(analysis):
+    rise, fall = level_jumps(analysis.response)
+    assert (rise.direction, rise.before_vpp, rise.after_vpp) == ("up", 0.6, 0.7)
+    assert rise.factor > 5
+    assert (fall.direction, fall.before_vpp, fall.after_vpp) == ("down", 0.3, 0.2)
+    assert fall.factor < 0.3
+    assert hysteresis_vpp((rise, fall)) == pytest.approx((0.3, 0.5))
+
+
+def test_between_the_jumps_the_way_decides_which_motion_there_is(analysis):
+    found = analysis.response
+    up, down = (
+        {
+            level: response
+            for way, level, response in zip(
+                found.direction, found.amplitude_vpp, found.response_ii, strict=True
+            )
+            if way == each
+        }
+        for each in ("up", "down")
+    )
+    for level in (0.3, 0.4, 0.5, 0.6):
+        assert down[level] > 4 * up[level]
+    assert up[0.2] == pytest.approx(down[0.2], rel=0.01)
+
+
+def test_figure_and_summary_tell_both_jumps(analysis):
+    figure = stepped_sine_figure(analysis)
+    assert "between 0.6 and 0.7 Vpp" in figure.caption
+    assert "between 0.3 and 0.2 Vpp" in figure.caption
+    assert "0.3 to 0.5 V above the fall back" in figure.caption
+    assert figure.figure.axes[-1].get_xlabel() == "level at the generator [Vpp]"
+    measured = summary(SteppedSineResult(analysis, None))["measured"]
+    assert [each["direction"] for each in measured["jumps"]] == ["up", "down"]
+
+
+def test_a_response_that_stays_has_no_jump_and_none_is_seen_across_the_turning_point():
+    steps = 6
+    response = SteppedResponse(
+        frequency_hz=np.full(steps, 195.0),
+        direction=("up",) * 3 + ("down",) * 3,
+        amplitude_vpp=np.array([0.1, 0.2, 0.3, 0.3, 0.2, 0.1]),
+        drive_amplitude_m=np.ones(steps),
+        response_i=np.ones(steps),
+        noise_bias_i=np.zeros(steps),
+        response_ii=np.array([1.0, 1.1, 1.2, 5.0, 5.1, 4.9]),
+        sd_response_ii=np.zeros(steps),
+        phase_rad=np.zeros(steps),
+        left_out=0,
+    )
+    assert level_jumps(response) == ()
+    assert hysteresis_vpp(()) is None
