@@ -1,6 +1,5 @@
 """Levels at one frequency: which ones, how long, how loud, and what is refused."""
 
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from acquisition.errors import LimitExceeded
+from acquisition.excitation.dwell import Dwell
 from acquisition.excitation.stepped_level import SteppedLevel
 from acquisition.plan.limits import require_within_limits
 from acquisition.plan.measurement import Measurement
@@ -55,12 +55,14 @@ def test_limits_know_the_highest_level_before_anything_moves():
     loud = plan(amplitude_vpp=10.0, frequency_hz=20.0)
     with pytest.raises(LimitExceeded):
         require_within_limits(Measurement(name="level", excitation=loud), rig)
-    used = [
-        max(each.use for each in require_within_limits(Measurement(name="l", excitation=each), rig))
-        for each in (plan(), plan(amplitude_vpp=1.8), plan(amplitude_vpp=3.6))
-    ]
-    for low, high in pairwise(used):
-        assert high == pytest.approx(2 * low, rel=1e-6)
+    highest = Dwell(frequency_hz=195, amplitude_vpp=0.9, duration_s=1)
+    used, expected = (
+        {each.what: each.use for each in require_within_limits(Measurement(name="l", excitation=one), rig)}
+        for one in (plan(), highest)
+    )
+    assert used.keys() == expected.keys()
+    for what, use in used.items():
+        assert use == pytest.approx(expected[what], rel=1e-6), what
 
 
 @pytest.mark.parametrize(
