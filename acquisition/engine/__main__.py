@@ -4,7 +4,7 @@ import argparse
 import os
 import signal
 import sys
-from threading import Thread
+from threading import Event, Thread
 from types import FrameType
 
 from ..run.stop import Cause
@@ -14,6 +14,9 @@ from .hosted import hosted
 from .server import LOOPBACK, spoken
 from .state import Attendance
 from .work import Work
+
+FORGOTTEN_S = 60.0
+"""An unattended engine that was never used waits this long for somebody to ask [s]."""
 
 
 def main() -> None:
@@ -27,6 +30,8 @@ def main() -> None:
         print(spoken(server.address), flush=True)  # noqa: T201 - this line is the handshake
         if options.attendance is Attendance.ATTENDED:
             Thread(target=_follow_parent, args=(desk,), name="engine parent", daemon=True).start()
+        else:
+            _end_when_forgotten(desk, options.forgotten_s)
         work.run()
 
 
@@ -35,6 +40,12 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--attendance", type=Attendance, default=Attendance.ATTENDED)
     parser.add_argument("--what", default="engine", help="what it is started for, shown to others")
     parser.add_argument("--host", default=LOOPBACK, help="loopback unless told otherwise; there is a token")
+    parser.add_argument(
+        "--forgotten-s",
+        type=float,
+        default=FORGOTTEN_S,
+        help="unattended: ends when nobody has asked for so long and nothing was ever carried out [s]",
+    )
     return parser.parse_args()
 
 
@@ -44,6 +55,18 @@ def _heed_signals(desk: Desk) -> None:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
+
+
+def _end_when_forgotten(desk: Desk, after_s: float) -> None:
+    """End an engine that does nothing when whoever started it has gone away: it may hold a bench."""
+
+    def look() -> None:
+        pause = Event()
+        while not desk.is_forgotten(after_s):
+            pause.wait(after_s / 10)
+        desk.shutdown(Cause.PARENT_GONE, f"nobody has asked for {after_s:g} s, and nothing was to be done")
+
+    Thread(target=look, name="engine forgotten", daemon=True).start()
 
 
 def _follow_parent(desk: Desk) -> None:

@@ -133,6 +133,16 @@ class Desk:
         if engine.attendance is Attendance.ATTENDED and alone_s > VIEWER_PATIENCE_S:
             self._act_alone(f"nobody has looked for {alone_s:.1f} s")
 
+    def is_forgotten(self, after_s: float) -> bool:
+        """Whether nobody has asked for so long, and nothing was carried out that they may come back to."""
+        status = self.status()
+        is_idle = status.state in (EngineState.CLOSED, EngineState.READY)
+        return (
+            is_idle
+            and all(row.state == "queued" for row in status.rows)
+            and monotonic() - self._heard_s > after_s
+        )
+
     def _act_alone(self, reason: str) -> None:
         engine = self._engine
         if engine.shown.state is EngineState.ARMED:

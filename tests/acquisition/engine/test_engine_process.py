@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from contextlib import suppress
 from pathlib import Path
 from threading import Event
@@ -19,8 +20,9 @@ from acquisition.engine.errors import EngineError, EngineGone
 from acquisition.engine.lock import BenchLock
 from acquisition.engine.orders import Orders
 from acquisition.engine.requests import Look
+from acquisition.engine.server import EngineAddress
 from acquisition.engine.start import start_engine
-from acquisition.engine.state import Attendance, EngineState
+from acquisition.engine.state import Attendance, EngineState, Visit
 from acquisition.engine.status import MessageKind
 from acquisition.engine.wire import Message, send
 from acquisition.errors import InstrumentBusy, LimitExceeded, RecordingError
@@ -308,6 +310,17 @@ class TestNobodyLooks:
 
 
 class TestItsEnd:
+    def test_an_unattended_engine_that_was_never_used_ends_when_it_is_forgotten(self):
+        arguments = ["--attendance", "unattended", "--forgotten-s", "1"]
+        with subprocess.Popen(
+            [sys.executable, "-m", "acquisition.engine", *arguments], stdout=subprocess.PIPE, text=True
+        ) as engine:
+            address = EngineAddress.model_validate_json(engine.stdout.readline())
+            with EngineClient.attach(address, Visit.ATTENDING) as viewer:
+                asked_until_s = time.monotonic() + 2.0
+                until(viewer, lambda status: time.monotonic() > asked_until_s)
+            assert engine.wait(20) == 0
+
     @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
     def test_a_signal_ramps_down_and_ends_the_process(self, shipped_rig, tmp_path, number):
         with start_engine() as process:
