@@ -9,7 +9,7 @@ import typer
 
 from acquisition.campaign.estimate import estimate
 from acquisition.campaign.item import AfterFailure, ChangedBench, Existing, Item
-from acquisition.check.admission import CheckRule
+from acquisition.check.rule import CheckRule
 from acquisition.engine.desk import Desk
 from acquisition.engine.engine import Engine
 from acquisition.engine.hosted import hosted

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from datetime import UTC, datetime
-from enum import StrEnum
 from pathlib import Path
 from typing import assert_never
 
@@ -15,19 +14,9 @@ from .bench_report import check_bench
 from .drift import drift
 from .finding import BenchReport, Verdict
 from .result import CheckResult, rig_digest
+from .rule import CheckRule
 
 Clock = Callable[[], datetime]
-
-
-class CheckRule(StrEnum):
-    """What is asked of the check of a bench before anything on it is armed."""
-
-    FRESH = "fresh"
-    """One that passed within the last ``check_valid_h`` hours, on this very configuration."""
-    NOW = "now"
-    """One made now."""
-    WAIVED = "waived"
-    """None; the recordings say what the last one found, if there was one."""
 
 
 def utc_now() -> datetime:

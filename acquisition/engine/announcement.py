@@ -11,9 +11,9 @@ from pydantic import ValidationError
 
 from ..state_folder import state_folder
 from ..toml_file import FrozenModel
+from .address import EngineAddress
 from .client import EngineClient
 from .errors import EngineError, EngineGone
-from .server import EngineAddress
 
 
 class Announcement(FrozenModel):

@@ -4,7 +4,8 @@ from datetime import timedelta
 
 from ..bench import Bench
 from ..campaign.opening import planned_recordings
-from ..check.admission import CheckRule, require_on_record
+from ..check.admission import require_on_record
+from ..check.rule import CheckRule
 from ..plan.limits import LimitCheck, require_within_limits
 from ..run.drive import drive_for
 from .orders import Orders

@@ -18,10 +18,10 @@ from ..rig.configuration import Rig
 from ..rig.knobs import KnobSheet
 from ..run.stop import StopLevel
 from . import requests as ask
+from .address import EngineAddress
 from .errors import EngineError, EngineGone
 from .orders import Orders
 from .recent import Glance
-from .server import EngineAddress
 from .state import Visit
 from .status import ArmedPlan, EngineStatus, RowStatus
 from .wire import Message, receive, send

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ..campaign.item import AfterFailure, ChangedBench, Existing
-from ..check.admission import CheckRule
+from ..check.rule import CheckRule
 from ..plan.campaign import Campaign
 from ..toml_file import FrozenModel
 

@@ -4,9 +4,9 @@ import socket
 from contextlib import suppress
 
 from . import requests as ask
+from .address import EngineAddress
 from .client import PATIENCE_S
 from .errors import EngineGone
-from .server import EngineAddress
 from .state import Visit
 from .wire import Message, receive, send
 

@@ -9,8 +9,8 @@ from threading import Thread
 
 from pydantic import ValidationError
 
-from ..toml_file import FrozenModel
 from . import requests as ask
+from .address import EngineAddress
 from .answers import DONE, answered, refused
 from .desk import Desk
 from .errors import EngineError
@@ -20,14 +20,6 @@ from .wire import WireError, receive, send
 LOOPBACK = "127.0.0.1"
 GREETING_S = 5.0
 """How long a connection may take to say who it is [s]."""
-
-
-class EngineAddress(FrozenModel):
-    """Where an engine can be asked, and the word that lets one in."""
-
-    host: str
-    port: int
-    token: str
 
 
 class Server:

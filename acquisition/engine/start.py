@@ -5,9 +5,9 @@ import sys
 from types import TracebackType
 from typing import Self
 
+from .address import EngineAddress
 from .client import EngineClient
 from .errors import EngineGone
-from .server import EngineAddress
 from .state import Attendance, Visit
 
 LEAVING_S = 10.0

@@ -7,7 +7,6 @@ from typing import Literal, Self
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
-from scipy.signal import firwin, oaconvolve
 
 from .plan import AbstractExcitation, FrequencyHz
 from .preview import Preview, preview_of
@@ -42,6 +41,8 @@ class GaussianBand:
 
     def samples(self, first: int, count: int, sample_rate_hz: float) -> Samples:
         """Make samples ``first`` to ``first + count - 1``, -1 to 1: the same however they are asked for."""
+        from scipy.signal import oaconvolve  # noqa: PLC0415 - half a second, which `vibench stop` need not wait
+
         taps = _taps(self.band_start_hz, self.band_stop_hz, sample_rate_hz)
         # White noise runs ahead of the first sample by the length of the filter, so that the signal
         # is stationary from its first sample on.
@@ -64,6 +65,8 @@ class GaussianBand:
 def _taps(band_start_hz: float, band_stop_hz: float, sample_rate_hz: float) -> Samples:
     half = int(np.ceil(HAMMING_WIDTH * sample_rate_hz / (TRANSITION_WIDTH * band_start_hz) / 2))
     band = [band_start_hz, band_stop_hz]
+    from scipy.signal import firwin  # noqa: PLC0415 - as above
+
     taps = firwin(2 * half + 1, band, pass_zero=False, fs=sample_rate_hz, window="hamming")
     # White noise of variance 1 comes out with the sum of squares of the taps: make that 1.
     return np.asarray(taps / np.sqrt(np.sum(taps**2)))

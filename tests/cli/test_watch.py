@@ -10,8 +10,8 @@ from threading import Event
 
 import pytest
 
+from acquisition.engine.address import EngineAddress
 from acquisition.engine.announcement import announced, announced_engines
-from acquisition.engine.server import EngineAddress
 from acquisition.engine.start import start_engine
 from acquisition.engine.state import Attendance, EngineState
 from acquisition.plan.campaign import Campaign

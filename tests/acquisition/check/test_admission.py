@@ -6,10 +6,11 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from acquisition.bench import open_bench
-from acquisition.check.admission import CheckRule, check_and_keep, require_fresh, why_not
+from acquisition.check.admission import check_and_keep, require_fresh, why_not
 from acquisition.check.archive import archive_path, keep, last_result
 from acquisition.check.finding import BenchReport, Finding, Verdict
 from acquisition.check.result import CheckResult, rig_digest
+from acquisition.check.rule import CheckRule
 from acquisition.errors import CheckFailed, RecordingError
 from acquisition.excitation.dwell import Dwell
 from acquisition.plan.measurement import Measurement

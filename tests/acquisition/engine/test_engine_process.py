@@ -14,13 +14,13 @@ from threading import Event
 import numpy as np
 import pytest
 
-from acquisition.check.admission import CheckRule
+from acquisition.check.rule import CheckRule
+from acquisition.engine.address import EngineAddress
 from acquisition.engine.client import EngineClient
 from acquisition.engine.errors import EngineError, EngineGone
 from acquisition.engine.lock import BenchLock
 from acquisition.engine.orders import Orders
 from acquisition.engine.requests import Look
-from acquisition.engine.server import EngineAddress
 from acquisition.engine.start import start_engine
 from acquisition.engine.state import Attendance, EngineState, Visit
 from acquisition.engine.status import MessageKind
