@@ -32,11 +32,8 @@ class Harmonic:
 
 
 @dataclass(frozen=True)
-class LinearSweep:
-    """A sine of constant displacement whose frequency changes by equal hertz in every second.
-
-    Starts at phase zero; up or down. The drive exists from 0 to ``duration_s``.
-    """
+class _Sweep:
+    """A sine of constant displacement whose frequency moves; from phase zero, up or down."""
 
     __pydantic_config__: ClassVar[ConfigDict] = _STRICT
 
@@ -52,6 +49,14 @@ class LinearSweep:
     def highest_hz(self) -> float:
         """The higher end of the sweep."""
         return max(self.start_hz, self.stop_hz)
+
+
+@dataclass(frozen=True)
+class LinearSweep(_Sweep):
+    """A sine of constant displacement whose frequency changes by equal hertz in every second.
+
+    Starts at phase zero; up or down. The drive exists from 0 to ``duration_s``.
+    """
 
     def turns(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Phase in turns: start t + (stop - start) t^2 / (2 duration)."""
@@ -63,26 +68,11 @@ class LinearSweep:
 
 
 @dataclass(frozen=True)
-class LogarithmicSweep:
+class LogarithmicSweep(_Sweep):
     """A sine of constant displacement that spends equal times in every octave.
 
     Starts at phase zero; up or down. The drive exists from 0 to ``duration_s``.
     """
-
-    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
-
-    start_hz: float
-    stop_hz: float
-    duration_s: float
-    amplitude_m: float
-
-    def __post_init__(self) -> None:
-        _require_sweep(self.start_hz, self.stop_hz, self.duration_s, self.amplitude_m)
-
-    @property
-    def highest_hz(self) -> float:
-        """The higher end of the sweep."""
-        return max(self.start_hz, self.stop_hz)
 
     def turns(self, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Phase in turns: start (exp(g t) - 1) / g, with g = ln(stop/start) / duration."""

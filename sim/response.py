@@ -100,7 +100,7 @@ def steady_response(
     Raises ValueError when the drive has no amplitude, or the window is longer than the run or shorter
     than one drive period.
     """
-    periods = _check(drive, duration_s, window_s)
+    periods = whole_periods(drive, duration_s, window_s)
     state = new_state(specimen, start_motion(initial_state), accuracy)
     clock = clock_at(0.0)
     tables = flight_tables(specimen, drive)
@@ -132,7 +132,7 @@ def steady_response(
     )
 
 
-def _check(drive: Harmonic, duration_s: float, window_s: float) -> int:
+def whole_periods(drive: Harmonic, duration_s: float, window_s: float) -> int:
     """Refuse what cannot be observed; count the whole periods in the window."""
     if drive.amplitude_m == 0.0:
         msg = "A drive of amplitude 0 m has no response over the drive: give a positive amplitude."

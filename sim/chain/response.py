@@ -12,7 +12,7 @@ from ..engine.clock import clock_at
 from ..integrate import MAX_IMPACT_RATE_HZ
 from ..modes import Complex
 from ..outcome import Outcome
-from ..response import WHOLE
+from ..response import whole_periods
 from ..trajectory import Floats
 from .chain import MASSES_PER_CELL, Chain
 from .integrate import impacts_of, new_chain_record, new_tally, start_chain, state_of_phasors
@@ -86,7 +86,7 @@ def chain_response(
         When the drive has no amplitude, or the window is longer than the run or shorter than one period.
 
     """
-    periods = _whole_periods(drive, duration_s, window_s)
+    periods = whole_periods(drive, duration_s, window_s)
     tables = chain_tables(chain, drive, accuracy)
     cells, phasors = start_chain(chain, initial_state, 0.0, tables, accuracy)
     clock, line_s = clock_at(0.0), periods / drive.frequency_hz
@@ -156,24 +156,3 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
     moved = np.linalg.solve(balanced, right / units / omega) * units * (2.0 / line_s)
     by_cell = moved[: MASSES_PER_CELL * chain.size].reshape(chain.size, MASSES_PER_CELL)
     return np.column_stack([by_cell, by_cell[:, 1] - by_cell[:, 2]])
-
-
-def _whole_periods(drive: Harmonic, duration_s: float, window_s: float) -> int:
-    """Refuse what cannot be observed; count the whole periods in the window."""
-    if drive.amplitude_m == 0.0:
-        msg = "A drive of amplitude 0 m has no response over the drive: give a positive amplitude."
-        raise ValueError(msg)
-    if not 0.0 < duration_s < math.inf:
-        msg = f"Duration {duration_s} s is not allowed: it must be positive and finite."
-        raise ValueError(msg)
-    if not 0.0 < window_s <= duration_s:
-        msg = f"Window {window_s} s is not allowed: it must be positive and within the run of {duration_s} s."
-        raise ValueError(msg)
-    periods = math.floor(window_s * drive.frequency_hz * (1.0 + WHOLE))
-    if periods < 1:
-        msg = (
-            f"Window {window_s} s is not allowed at {drive.frequency_hz} Hz: "
-            f"it must hold one drive period, {1.0 / drive.frequency_hz} s."
-        )
-        raise ValueError(msg)
-    return periods
