@@ -3,7 +3,7 @@
     python benchmarks/rehearsed_night.py [HOURS]
 
 A campaign of dwells along branches runs in this process as `vibench measure` runs it, on the virtual rig
-with four channels at 5.12 kS/s and 25.6 thousand steps a second, with the faults of
+with four channels at 6.4 kS/s and 12.8 thousand steps a second, with the faults of
 hardware_configs/faults/night.toml (their times scaled to the length of the night), three attempts a point,
 going on after failures, and resumed when the disk was full. Printed are memory and open files at every
 tenth of the night, how every point came out, and how much faster than the wall clock it went; `--say` prints
@@ -32,8 +32,8 @@ from acquisition.virtual.fault_script import load_fault_script
 ROOT = Path(__file__).resolve().parent.parent
 HOUR_S = 3600.0
 NIGHT_S = 8 * HOUR_S
-RATE_HZ = 5120.0
-GRID_RATE_HZ = 25_600.0
+RATE_HZ = 6400.0
+GRID_RATE_HZ = 12_800.0
 POINT_S = 120.0
 TENTHS = 10
 MORNINGS = 3

@@ -11,6 +11,7 @@ from ..rig.channel import channels_of
 from ..rig.configuration import Rig, Role
 from ..rig.model import Quantity, suspended_mass_kg
 from ..rig.output import OutputConfig
+from ..rig.virtual import LARGEST_LEVEL_ERROR, highest_carried_hz
 from .loads import predicted_loads
 from .measurement import Measurement, OnOverload
 from .needed_setting import needed_vpp
@@ -146,6 +147,16 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
         f"{USABLE_BANDWIDTH:g} of the sample rate",
         "lower the frequency or raise sample_rate_hz",
     )
+    carried_hz = None if rig.virtual is None else highest_carried_hz(rig.virtual.grid_rate_hz)
+    if carried_hz is not None:
+        yield LimitCheck(
+            "the highest frequency on the virtual rig's coarse grid",
+            excitation.highest_frequency_hz,
+            carried_hz,
+            "Hz",
+            f"levels there are {LARGEST_LEVEL_ERROR:.0%} off",
+            "lower the frequency or raise virtual.grid_rate_hz",
+        )
     if rig.daq.output is not None and player_of(measurement, rig) is Player.OUTPUT:
         yield from _streaming(measurement, rig, rig.daq.output)
     yield LimitCheck(

@@ -1,6 +1,6 @@
 """What a hardware configuration says of simulated instruments, where real ones just are as they are."""
 
-from math import pi
+from math import pi, sqrt
 from typing import Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
@@ -9,10 +9,14 @@ from ..toml_file import FrozenModel
 
 USUAL_GRID_RATE_HZ = 102_400.0
 """Steps per second on which the analogue world is computed, unless the configuration says otherwise."""
-COARSEST_GRID_RATE_HZ = 25_600.0
+COARSEST_GRID_RATE_HZ = 12_800.0
 """Coarser, the base would move by 0.8 % less than it should at `WATCHED_HZ`: see `level_error`."""
-WATCHED_HZ = 1e3
-"""Above every resonance of the specimen, the bound ones included, and above every drive of the paper."""
+WATCHED_HZ = 500.0
+"""The highest resonance of the specimen, and the top of the paper's sines."""
+_MEASURED = 0.55
+"""Of `level_error`: against 409.6 thousand steps a second, at 60 Hz to 1 kHz."""
+LARGEST_LEVEL_ERROR = 0.01
+"""Of a plan that is played on a coarser grid than the usual one."""
 STEPS_PER_SAMPLE = 2
 """The least on a coarser grid than the usual one: room for the transition band of the converter's filter."""
 
@@ -25,7 +29,7 @@ class VirtualConfig(FrozenModel):
     """``"free"``: as fast as it goes. ``"wall"``: ``speed`` times the clock on the wall."""
     speed: PositiveFloat = 1.0
     grid_rate_hz: float = USUAL_GRID_RATE_HZ
-    """Steps per second that are computed: 25.6 to 102.4 kHz, and at least twice the sample rate. A coarser
+    """Steps per second that are computed: 12.8 to 102.4 kHz, and at least twice the sample rate. A coarser
     grid is faster; see docs/decisions/0006-virtual-rig.md for what it costs."""
     generator_clock_ppm: float = Field(ge=-200, le=200)
     converter_clock_ppm: float = Field(ge=-200, le=200)
@@ -61,7 +65,14 @@ def level_error(frequency_hz: float, grid_rate_hz: float) -> float:
     The drive is averaged over a step and held, (pi f h)^2 / 3; the rest is the specimen's force on the
     table, which is extrapolated to the middle of the step. How the specimen answers to the base is exact.
     """
-    return 0.55 * (pi * frequency_hz / grid_rate_hz) ** 2
+    return _MEASURED * (pi * frequency_hz / grid_rate_hz) ** 2
+
+
+def highest_carried_hz(grid_rate_hz: float) -> float | None:
+    """Give the frequency up to which levels are right on a grid; None on the usual one, which takes all."""
+    if grid_rate_hz >= USUAL_GRID_RATE_HZ:
+        return None
+    return grid_rate_hz / pi * sqrt(LARGEST_LEVEL_ERROR / _MEASURED)
 
 
 def fastest_sample_rate_hz(grid_rate_hz: float) -> float | None:
