@@ -25,6 +25,7 @@ from .generator.terminal_voltage import Terminal
 from .usb import usb_bus
 from .usb.usb_remote import usb_service
 from .usb.usbtmc import UsbTmcInstrument
+from .world.first_use import compile_beforehand
 from .world.time_grid import FULL_BAND_HZ, relative_clock_ppm
 from .world.world import World, virtual_section
 
@@ -127,6 +128,7 @@ class VirtualRig:
 
     def __enter__(self) -> Self:
         """Switch everything on, or nothing."""
+        compile_beforehand(self.rig)
         with ExitStack() as starting:
             usb_bus.plug_in(self._usb)
             starting.callback(usb_bus.unplug, self._usb)
