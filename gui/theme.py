@@ -145,6 +145,8 @@ QPushButton[rank="first"] {{ background: {theme.accent}; color: {theme.base};
 QPushButton[rank="first"]:disabled {{ background: {theme.raised}; color: {theme.muted};
     border-color: {theme.line}; }}
 QPushButton[rank="first"]:focus {{ border-color: {theme.text}; }}
+QCheckBox::indicator:unchecked, QListView::indicator:unchecked {{ border: 1px solid {theme.muted};
+    border-radius: 2px; background: {theme.base}; }}
 QHeaderView::section {{ background: {theme.raised}; color: {theme.text}; border: none;
     border-right: 1px solid {theme.line}; padding: 0.3em 0.5em; }}
 {tones}"""

@@ -90,13 +90,21 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
             self.picture = None
             self.update()
 
+    def showLabel(self, show: bool = True) -> None:  # noqa: FBT001, FBT002 - pyqtgraph's own
+        """Show the label or not; to write another text, which shows it, does not count."""
+        if not getattr(self, "_is_fitting", False):
+            self._is_labelled = show
+        super().showLabel(show and self._is_labelled)
+
     def _fit_label(self) -> None:
         room = self.size().height() if self._is_upright else self.size().width()
         metrics = QFontMetricsF(self.label.font())
         texts = (self._axis.text, self._axis.short or self._axis.unit, "")
         text = next(each for each in texts if metrics.horizontalAdvance(each) <= room or not each)
         if text != self.labelText:
+            self._is_fitting = True
             self.setLabel(text)
+            self._is_fitting = False
 
     @property
     def _is_upright(self) -> bool:

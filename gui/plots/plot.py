@@ -77,6 +77,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._legend_entries: list[tuple[Ink, str, str]] = []
         self._curves: list[pg.PlotDataItem] = []
         self._hint = ""
+        self._blanked: tuple[AxisItem, ...] = (self.across, self.up)
         self._theme = theme
         self._follows = False
         self.getViewBox().sigRangeChangedManually.connect(self._let_be)
@@ -91,6 +92,11 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def with_hint(self, text: str) -> "Plot":
         """Say this while no curve has a point."""
         self._hint = text
+        return self
+
+    def always_numbered(self) -> "Plot":
+        """Keep the numbers across where there is no curve: another plot, above, has the same axis."""
+        self._blanked = (self.up,)
         return self
 
     def curve(self, ink: Ink, name: str = "") -> pg.PlotDataItem:
@@ -189,7 +195,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """Say the hint where there is nothing else to see."""
         super().drawForeground(painter, rect)
         is_empty = bool(self._hint) and not any(_has_points(each) for each in self._curves)
-        for axis in (self.across, self.up):
+        for axis in self._blanked:
             axis.blank(Blankness.BLANK if is_empty else Blankness.WRITTEN)
         if is_empty:
             painter.resetTransform()
@@ -233,6 +239,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             item.setPen(_pen(ink, theme))
             if label:
                 item.label.setColor(ink.colour(theme))
+                item.label.fill = pg.mkBrush(theme.base)
 
         self._ink(ink, paint)
         return item

@@ -36,7 +36,7 @@ class CurvePlots(QWidget):
         self.differences = Plot("Difference over frequency", LOG_FREQUENCY, DIFFERENCE, theme).with_hint(
             "Choose a curve and what it is compared with, at the left."
         )
-        self.differences.setXLink(self.magnitudes)
+        self.differences.always_numbered().setXLink(self.magnitudes)
         # One frequency axis for both: the lower one's.
         self.magnitudes.across.show_nothing()
         left = _LEFT_EM * self.fontMetrics().height()

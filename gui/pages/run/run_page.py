@@ -148,7 +148,7 @@ class RunPage(Page):
         status = self.desk.bridge.status
         rows = () if status is None else status.rows
         told = next((f"{row.state}: {row.reason}" for row in rows if row.file == str(path)), "")
-        self.summary.setText(f"{path.name}  {told}")
+        self.summary.setText(f"Last run: {path.name}, {told}")
         self.look_button.show()
 
     def _show_channels(self) -> None:

@@ -7,12 +7,12 @@ RATE = 51_200.0
 
 
 def kinked(times_s, duration_s, noise=3e-6, seed=1):
-    """A 260 Hz motion whose acceleration changes slope at given times, returning within a millisecond."""
+    """A 260 Hz motion whose acceleration steps and changes slope at given times, as if by a spring."""
     time_s = np.arange(int(duration_s * RATE)) / RATE
     velocity = 0.02 * np.sin(2 * np.pi * 260 * time_s)
     for number, at in enumerate(times_s):
         since = np.clip(time_s - at, 0, None)
-        velocity += (-1) ** number * 2.5e5 * since**2 * np.exp(-since / 4e-4)
+        velocity += (-1) ** number * 5e5 * (0.5 * since**2 + 2e-5 * since) * np.exp(-since / 1.5e-3)
     return velocity + noise * np.random.default_rng(seed).standard_normal(time_s.size)
 
 
