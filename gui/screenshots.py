@@ -15,6 +15,7 @@ from acquisition.engine.start import start_engine
 from acquisition.engine.state import Attendance, EngineState
 from acquisition.plan.measurement import Measurement
 from acquisition.shipped import shipped
+from analysis.recording_spectrogram import RowSpacing
 
 from .app import application
 from .desk import Desk
@@ -148,11 +149,13 @@ def _picture(window: Window, pages: tuple[str, ...], folder: Path) -> None:
 
 
 def _picture_spectrogram(window: Window, folder: Path) -> None:
-    """Save the other picture of the Files page."""
+    """Save the other picture of the Files page, small: noise makes large files."""
     files = window.pages[FILES]
     assert isinstance(files, FilesPage)
+    window.resize(*OTHER_SIZES[0])
     window.show_page(FILES)
     files.pictures.setCurrentWidget(files.pictures.spectrogram)
+    files.pictures.spectrogram.spacing.setCurrentText(RowSpacing.LOGARITHMIC.value)
     _pass_ms(STILL_MS)
     _wait(lambda: not files.pictures.spectrogram.is_busy)
     _save(window, folder, "files_spectrogram")

@@ -30,6 +30,8 @@ _WAIT_MS = 250
 """How long a view stands still before it is worked out."""
 _HIGHEST_HZ = (500.0, 1000.0, 2000.0, 5000.0, 20_000.0)
 _USUAL = 2
+_BAR_EM = 4
+"""Room for the numbers and the label of the scale of colours."""
 _SHOWN_DB = 80.0
 """From the strongest line down: the range of colours."""
 
@@ -177,6 +179,7 @@ class _Image:
         plot.setMouseEnabled(x=False, y=False)
         self.bar = pg.ColorBarItem(colorMap=pg.colormap.get("viridis"), interactive=False, width=14)
         self.bar.setImageItem(self.item, insert_in=plot.getPlotItem())
+        self.bar.axis.setWidth(_BAR_EM * plot.fontMetrics().height())
         self.clear("Choose a recording in the list above.")
 
     def clear(self, hint: str) -> None:
