@@ -187,8 +187,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Give the legend the lines it needs for the new width."""
         super().resizeEvent(event)
-        # pyqtgraph calls this before the widget is whole.
-        if getattr(self, "_legend", None) is not None:
+        # pyqtgraph calls this before the widget is whole, and when it is no more.
+        if getattr(self, "_legend", None) is not None and self.plotItem is not None:
             self._place_legend()
 
     def drawForeground(self, painter: QPainter, rect: QRectF) -> None:

@@ -1,0 +1,90 @@
+"""A plot says what will be in it while it is empty, and names its curves above the axes."""
+
+import pytest
+
+from gui.plots.axis import LOG_FREQUENCY, TIME, Axis, thinned
+from gui.plots.plot import Plot, trace
+from gui.theme import LIGHT
+
+
+@pytest.fixture
+def plot(qapp, qtbot):
+    made = Plot("a plot", TIME, Axis("Velocity of the mass", "mm/s", 1e3, short="v (mm/s)"), LIGHT)
+    qtbot.addWidget(made)
+    made.resize(400, 300)
+    return made
+
+
+def dark_pixels(plot):
+    """Pixels of letters in the middle of the plot, where nothing else is drawn."""
+    picture = plot.grab().toImage()
+    middle = range(picture.height() * 2 // 5, picture.height() * 3 // 5)
+    return sum(
+        picture.pixelColor(x, y).lightness() < 140
+        for y in middle
+        for x in range(picture.width() // 4, picture.width() * 3 // 4)
+    )
+
+
+def test_the_hint_is_there_until_a_curve_has_points_and_again_without_them(plot, qapp):
+    plot.with_hint("What was measured appears here")
+    curve = plot.curve(trace(0))
+    plot.show()
+    qapp.processEvents()
+    assert dark_pixels(plot) > 50
+    assert plot.up.tickStrings([0.0, 1.0], 1.0, 1.0) == ["", ""]
+    curve.setData([0.0, 1.0], [0.0, 0.001])
+    plot.setYRange(-0.01, 0.001)
+    qapp.processEvents()
+    assert dark_pixels(plot) == 0
+    assert plot.up.tickStrings([0.0, 0.001], 1.0, 0.001) == ["0", "1"]
+    curve.clear()
+    qapp.processEvents()
+    assert dark_pixels(plot) > 50
+
+
+def test_the_legend_stands_above_the_axes_in_as_many_lines_as_it_needs(plot, qapp):
+    plot.with_legend()
+    for number in range(4):
+        plot.curve(trace(number), f"a curve with a long name, number {number}")
+    plot.resize(900, 300)
+    plot.show()
+    qapp.processEvents()
+
+    def legend_and_axes():
+        legend = plot.findChild(type(plot._legend))
+        top = plot.mapFromScene(plot.getViewBox().sceneBoundingRect()).boundingRect().top()
+        return legend.geometry().bottom(), top
+
+    bottom, top = legend_and_axes()
+    assert bottom <= top
+    plot.resize(300, 300)
+    qapp.processEvents()
+    lower, lower_top = legend_and_axes()
+    assert bottom < lower <= lower_top
+
+
+def test_a_label_without_room_gives_way_to_a_shorter_one(plot, qapp):
+    plot.show()
+    qapp.processEvents()
+    assert plot.up.labelText == "Velocity of the mass (mm/s)"
+    plot.resize(400, 150)
+    qapp.processEvents()
+    assert plot.up.labelText == "v (mm/s)"
+
+
+@pytest.mark.parametrize("most", [2, 3, 5])
+def test_ticks_are_thinned_to_round_steps(most):
+    step, values = thinned(0.1, [0.1 * n for n in range(11)], most)
+    assert len(values) <= most
+    assert all(abs(value / step - round(value / step)) < 1e-6 for value in values)
+
+
+def test_an_axis_that_leaves_its_numbers_to_another_stays_bare(plot, qapp):
+    bare = Plot("bare", LOG_FREQUENCY, Axis("x"), LIGHT)
+    bare.across.show_nothing()
+    bare.resize(600, 200)
+    bare.show()
+    qapp.processEvents()
+    assert not bare.across.label.isVisible()
+    bare.close()
