@@ -167,6 +167,11 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             paint(theme)
         self._relegend()
 
+    @property
+    def pixels_across(self) -> int:
+        """How many pixels of the screen lie between the ends of the axis across."""
+        return int(self.getViewBox().width() * self.devicePixelRatioF())
+
     def show_everything(self) -> None:
         """Let the axes follow the data."""
         self.getPlotItem().enableAutoRange()

@@ -7,7 +7,7 @@ from analysis.live.envelope import envelope, zigzag
 
 from .plot import Ink, Plot
 
-MOST_COLUMNS = 1500
+MOST_COLUMNS = 3000
 
 
 class SignalCurve:
@@ -39,7 +39,7 @@ class SignalCurve:
         self._draw(min(max(first, 0), count), min(max(last, 0), count))
 
     def _draw(self, first: int, last: int) -> None:
-        columns = min(max(int(self._plot.width()), 200), MOST_COLUMNS)
+        columns = min(max(self._plot.pixels_across, 200), MOST_COLUMNS)
         if (first, last, columns) == self._drawn:
             return
         self._drawn = (first, last, columns)
