@@ -5,7 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from acquisition.excitation.kinds import Excitation
 from acquisition.excitation.sine_sweep import SineSweep
+from acquisition.excitation.stepped_sine import Direction, FrequencySteps
 from acquisition.plan.band import excited_band_hz
 from acquisition.plan.loads import predicted_loads
 from acquisition.plan.measurement import Measurement
@@ -14,13 +16,16 @@ from acquisition.rig.model import Quantity, RigModel
 
 from .arrays import Flags, Reals
 from .overlay import prediction_grid
-from .prediction import Prediction, predicted
+from .prediction import Lead, Prediction, predicted
 from .recording_facts import specimen_of
 
 MOST_POINTS = 60
 """Frequencies that are simulated: some seconds of work."""
 FORESEEN_S = 6.0
 """Simulated from rest at each frequency; all but a thousandth of the transient has died out by half of it."""
+LED_POINTS = 200
+LED_S = 2.0
+"""Where a sweep is followed: steps so small that they disturb little, and the time spent at each [s]."""
 _TONES = frozenset({"dwell", "sine_sweep", "stepped_sine"})
 
 
@@ -32,6 +37,8 @@ class Foresight:
     prediction: Prediction
     basis: str
     """Where the base amplitude comes from."""
+    lead: Lead
+    """Where each simulated point begins."""
 
     @property
     def collision_bands_hz(self) -> tuple[tuple[float, float], ...]:
@@ -49,9 +56,27 @@ def foresee(measurement: Measurement, rig: Rig) -> Foresight:
     """Simulate the specimen of a rig over the band that a measurement excites."""
     specimen = specimen_of({"specimen": rig.specimen.model_dump()})
     low_hz, high_hz = excited_band_hz(measurement.excitation)
-    grid = _thinned(prediction_grid(specimen, low_hz, high_hz))
+    lead = lead_of(measurement.excitation)
+    match lead:
+        case Lead.REST:
+            grid, each_s = _thinned(prediction_grid(specimen, low_hz, high_hz)), FORESEEN_S
+        case Lead.UP | Lead.DOWN:
+            grid, each_s = np.linspace(low_hz, high_hz, LED_POINTS, dtype=np.float64), LED_S
     amplitude_m, basis = base_amplitude_m(measurement, rig, grid)
-    return Foresight(measurement, predicted(specimen, grid, amplitude_m, duration_s=FORESEEN_S), basis)
+    prediction = predicted(specimen, grid, amplitude_m, duration_s=each_s, lead=lead)
+    return Foresight(measurement, prediction, basis, lead)
+
+
+def lead_of(excitation: Excitation) -> Lead:
+    """Tell how a measurement comes to each of its frequencies: a sweep keeps to its branch."""
+    match excitation:
+        case SineSweep(start_hz=start, stop_hz=stop):
+            return Lead.UP if start < stop else Lead.DOWN
+        case FrequencySteps():
+            first, _ = next(excitation.passes())
+            return Lead.UP if first == Direction.UP.value else Lead.DOWN
+        case _:
+            return Lead.REST
 
 
 def base_amplitude_m(measurement: Measurement, rig: Rig, frequency_hz: Reals) -> tuple[Reals, str]:

@@ -1,9 +1,10 @@
 """What the model says a sine does: Responses I and II and the linear transmission, over frequency."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 
@@ -26,6 +27,16 @@ PREDICTION_S = 8.0
 WINDOW_S = 5.0
 """The last 5 s are observed, as in the paper; 3 s before them leave 3e-5 of the slowest transient, so that
 the paper's 30 s would say nothing else. In chaos each value is one draw, whatever the duration."""
+
+
+class Lead(StrEnum):
+    """Where the simulation of each point begins; with several motions at one frequency it decides which."""
+
+    REST = "from rest"
+    UP = "led upwards"
+    """From the state and the phase in which the next lower frequency ended."""
+    DOWN = "led downwards"
+
 
 Progress = Callable[[int, int], None]
 """Told (points done, points in all), in the calling thread."""
@@ -67,14 +78,15 @@ def predicted(
     accuracy: Accuracy = Accuracy.QUICK,
     *,
     duration_s: float = PREDICTION_S,
+    lead: Lead = Lead.REST,
     progress: Progress = ignore_points,
 ) -> Prediction:
-    """Simulate a sine at each frequency, from rest, on all cores.
+    """Simulate a sine at each frequency: from rest on all cores, or one after the other as a sweep comes by.
 
     Parameters
     ----------
     frequency_hz
-        Shape (points,).
+        Shape (points,), rising.
     amplitude_m
         A0, one for all points or one each [m].
     accuracy
@@ -84,15 +96,22 @@ def predicted(
     """
     amplitudes = np.broadcast_to(np.asarray(amplitude_m, dtype=np.float64), frequency_hz.shape)
     drives = [Harmonic(float(f), float(a)) for f, a in zip(frequency_hz, amplitudes, strict=True)]
+    window_s = min(WINDOW_S, duration_s)
 
-    def point(drive: Harmonic) -> Response:
-        return steady_response(specimen, drive, accuracy, duration_s, min(WINDOW_S, duration_s))
+    def point(drive: Harmonic, state: Reals | None = None) -> Response:
+        return steady_response(specimen, drive, accuracy, duration_s, window_s, state)
 
     points: list[Response] = []
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        for found in pool.map(point, drives):
-            points.append(found)
-            progress(len(points), len(drives))
+    match lead:
+        case Lead.REST:
+            with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+                for found in pool.map(point, drives):
+                    points.append(found)
+                    progress(len(points), len(drives))
+        case Lead.UP:
+            points = list(_led(point, drives, duration_s, progress))
+        case Lead.DOWN:
+            points = list(_led(point, drives[::-1], duration_s, progress))[::-1]
     ended = np.array([each.outcome is Outcome.REACHED_END for each in points])
     return Prediction(
         specimen=specimen,
@@ -104,8 +123,24 @@ def predicted(
         impacts=np.array([each.impacts for each in points], dtype=np.int64),
         accuracy=accuracy,
         duration_s=duration_s,
-        window_s=min(WINDOW_S, duration_s),
+        window_s=window_s,
     )
+
+
+def _led(
+    point: Callable[[Harmonic, Reals | None], Response],
+    drives: Sequence[Harmonic],
+    duration_s: float,
+    progress: Progress,
+) -> Iterator[Response]:
+    """Let each point begin in the state in which the last one ended, the drive's phase going on."""
+    state, turns = None, 0.0
+    for number, drive in enumerate(drives, start=1):
+        found = point(replace(drive, phase_rad=2 * np.pi * turns), state)
+        yield found
+        turns = (turns + drive.frequency_hz * duration_s) % 1.0
+        state = found.final_state if found.outcome is Outcome.REACHED_END else None
+        progress(number, len(drives))
 
 
 def linear_transmission(specimen: Specimen, frequency_hz: Reals) -> Reals:

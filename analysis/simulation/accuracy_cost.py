@@ -29,9 +29,9 @@ class MeasuredLevel:
 
 
 MEASURED = {
-    Accuracy.QUICK: MeasuredLevel(27567.0, 933.0, 760.0, 490.0, 7.8e-7, 3.8e-7),
-    Accuracy.STANDARD: MeasuredLevel(28110.0, 833.0, 680.0, 354.0, 5.7e-8, 2.8e-8),
-    Accuracy.REFERENCE: MeasuredLevel(29074.0, 471.0, 397.0, 160.0, 5.8e-12, 0.0),
+    Accuracy.QUICK: MeasuredLevel(24037.0, 1154.0, 910.0, 1825.0, 7.8e-7, 3.8e-7),
+    Accuracy.STANDARD: MeasuredLevel(19235.0, 1040.0, 813.0, 1669.0, 5.7e-8, 2.8e-8),
+    Accuracy.REFERENCE: MeasuredLevel(21496.0, 589.0, 463.0, 965.0, 5.8e-12, 0.0),
 }
 CHAOS_SCATTER = 0.03
 """Response I in chaos scatters by so much from start to start, at every level."""

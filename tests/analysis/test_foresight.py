@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from acquisition.excitation.sine_sweep import SineSweep
 from acquisition.plan.campaign import load_campaign
 from acquisition.plan.loads import predicted_loads
+from acquisition.plan.measurement import Measurement
 from acquisition.rig.configuration import load_rig
 from acquisition.rig.model import Quantity
 from analysis.foresight import bands_of, base_amplitude_m, foresee
@@ -37,6 +39,20 @@ def test_noise_is_stood_for_by_a_sine_of_the_same_rms():
     rms_m = predicted_loads(QUICK["noise"].excitation, RIG)[Quantity.STROKE].rms
     assert amplitude_m == pytest.approx(np.sqrt(2) * rms_m)
     assert "rms" in basis
+
+
+@pytest.mark.parametrize(
+    ("start_hz", "stop_hz", "begins_hz"), [(150.0, 350.0, (216.0, 225.0)), (350.0, 150.0, (149.0, 214.0))]
+)
+def test_a_sweep_is_predicted_on_the_branch_that_it_comes_along(start_hz, stop_hz, begins_hz):
+    """Upwards the specimen stays clear of the stops until its linear motion reaches them; downwards it
+    goes on striking far below."""
+    sweep = SineSweep(
+        amplitude_vpp=1.5, start_hz=start_hz, stop_hz=stop_hz, duration_s=60, hold="displacement"
+    )
+    seen = foresee(Measurement(name="sweep", excitation=sweep), RIG)
+    low, _ = seen.collision_bands_hz[0]
+    assert begins_hz[0] < low < begins_hz[1]
 
 
 @pytest.mark.slow

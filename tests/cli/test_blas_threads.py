@@ -8,7 +8,7 @@ import pytest
 
 SCRIPT = """
 import os, sys
-import cli.__main__
+import cli.__main__, cli.measure
 order = list(sys.modules)
 print(os.environ["OPENBLAS_NUM_THREADS"], order.index("cli.blas_threads") < order.index("numpy"))
 """

@@ -129,7 +129,7 @@ class TestPage(Page):
         bands = ", ".join(f"{low:.0f}–{high:.0f} Hz" for low, high in seen.collision_bands_hz)
         collides = f"Collides at {bands}." if bands else "No collision is predicted."
         self.prediction_note.setText(
-            f"Simulated ({seen.model}), base amplitude from {seen.basis}. {collides}"
+            f"Simulated ({seen.model}), {seen.lead.value}, base amplitude from {seen.basis}. {collides}"
         )
 
     def _foresight_failed(self, error: BaseException) -> None:

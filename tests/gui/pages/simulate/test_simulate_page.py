@@ -89,8 +89,8 @@ def test_cost_and_error_stand_beside_the_accuracy(page):
     quick = page._cost.text()
     page.form.show_value(SimulationRequest(accuracy="reference"))
     strict = page._cost.text()
-    assert "760 s of chaos" in quick
-    assert "397 s of chaos" in strict
+    assert "910 s of chaos" in quick
+    assert "463 s of chaos" in strict
     assert "6e-12" in strict
 
 
