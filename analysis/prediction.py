@@ -96,10 +96,11 @@ def predicted(
     """
     amplitudes = np.broadcast_to(np.asarray(amplitude_m, dtype=np.float64), frequency_hz.shape)
     drives = [Harmonic(float(f), float(a)) for f, a in zip(frequency_hz, amplitudes, strict=True)]
-    window_s = min(WINDOW_S, duration_s)
+    # Led, half of the time is for the step from the last frequency to die away in.
+    window_s = min(WINDOW_S, duration_s if lead is Lead.REST else duration_s / 2)
 
-    def point(drive: Harmonic, state: Reals | None = None) -> Response:
-        return steady_response(specimen, drive, accuracy, duration_s, window_s, state)
+    def point(drive: Harmonic, state: Reals | None = None, for_s: float = duration_s) -> Response:
+        return steady_response(specimen, drive, accuracy, for_s, window_s, state)
 
     points: list[Response] = []
     match lead:
@@ -128,17 +129,21 @@ def predicted(
 
 
 def _led(
-    point: Callable[[Harmonic, Reals | None], Response],
+    point: Callable[[Harmonic, Reals | None, float], Response],
     drives: Sequence[Harmonic],
     duration_s: float,
     progress: Progress,
 ) -> Iterator[Response]:
-    """Let each point begin in the state in which the last one ended, the drive's phase going on."""
+    """Let each point begin in the state in which the last one ended, the drive's phase going on.
+
+    The first begins at rest, and has the time that takes.
+    """
     state, turns = None, 0.0
     for number, drive in enumerate(drives, start=1):
-        found = point(replace(drive, phase_rad=2 * np.pi * turns), state)
+        for_s = duration_s if state is not None else max(duration_s, PREDICTION_S)
+        found = point(replace(drive, phase_rad=2 * np.pi * turns), state, for_s)
         yield found
-        turns = (turns + drive.frequency_hz * duration_s) % 1.0
+        turns = (turns + drive.frequency_hz * for_s) % 1.0
         state = found.final_state if found.outcome is Outcome.REACHED_END else None
         progress(number, len(drives))
 
