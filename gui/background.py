@@ -131,7 +131,8 @@ class Background(QObject):
 
     def _poll(self) -> None:
         over = [job for job in self._jobs if job.is_over]
-        self._jobs = [job for job in self._jobs if not job.is_over]
+        # Not asked again: one may have ended since.
+        self._jobs = [job for job in self._jobs if job not in over]
         self._begin()
         if not self._jobs:
             self._timer.stop()

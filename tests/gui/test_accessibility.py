@@ -1,7 +1,11 @@
 """Everything that takes the focus has a name; mnemonics are unique; nothing is cut off."""
 
+import os
 import re
+import subprocess
+import sys
 from collections import Counter
+from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
@@ -115,3 +119,12 @@ def test_no_text_is_cut_off(window, qapp, qtbot, theme, size):
         qapp.processEvents()
         assert (window.width(), window.height()) == size, f"{name} page needs more room"
         assert list(cut_off(window)) == [], name
+
+
+def test_no_text_is_cut_off_at_twice_the_scale():
+    """On a fine screen, as Qt scales it for a whole process."""
+    this = f"{Path(__file__)}::test_no_text_is_cut_off"
+    environment = {**os.environ, "QT_SCALE_FACTOR": "2"}
+    asked = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", this]
+    told = subprocess.run(asked, env=environment, capture_output=True, text=True, check=False, timeout=110)
+    assert told.returncode == 0, told.stdout

@@ -92,7 +92,8 @@ class FilesPage(Page):
     def _listed(self, found: Listing) -> None:
         entries = found.recordings
         self.campaigns.offer(found.campaigns)
-        chosen = self._wanted or next(iter(self.table.chosen_paths()), None)
+        # A list that comes late must not take back what somebody has chosen meanwhile.
+        chosen = self.table.chosen_paths() if self._wanted is None else (self._wanted,)
         self._wanted = None
         self.table.recordings.show_entries(entries)
         count = f"{len(entries)} recording{'s' if len(entries) != 1 else ''}"
@@ -100,9 +101,9 @@ class FilesPage(Page):
         missing = self.table.recordings.missing_pictures()
         if missing:
             self.desk.background.ask(thumbnails, self._pictured, self._failed, missing)
-        if chosen is not None:
+        if chosen:
             # What grew when it was chosen may have got its final name since.
-            self.table.choose(name_now(chosen))
+            self.table.choose(*map(name_now, chosen))
         elif entries and self._opened is None:
             self.table.selectRow(0)
 

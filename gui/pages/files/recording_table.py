@@ -31,6 +31,7 @@ HEADINGS = ("Response", "Name", "State", "Verdict", "Began", "Excitation", "Leve
 PICTURE, NAME = 0, 1
 _NUMBERS = tuple(HEADINGS.index(each) for each in ("Level", "Length", "Size"))
 _THIS_ROW_ALONE = QItemSelectionModel.SelectionFlag.ClearAndSelect | QItemSelectionModel.SelectionFlag.Rows
+_THIS_ROW_TOO = QItemSelectionModel.SelectionFlag.Select | QItemSelectionModel.SelectionFlag.Rows
 _WIDE = HEADINGS.index("Excitation")
 PATH_ROLE = Qt.ItemDataRole.UserRole
 SORT_ROLE = Qt.ItemDataRole.UserRole + 1
@@ -195,15 +196,17 @@ class RecordingTable(QTableView):
         rows = sorted(self.selectionModel().selectedRows(NAME), key=lambda index: index.row())
         return tuple(index.data(PATH_ROLE) for index in rows)
 
-    def choose(self, path: Path) -> None:
-        """Choose the row of a file, if it is there."""
-        for row in range(self._sorted.rowCount()):
-            index = self._sorted.index(row, NAME)
-            if index.data(PATH_ROLE) == path:
-                # Not selectRow: that one adds the row to others while somebody holds Ctrl.
-                self.selectionModel().setCurrentIndex(index, _THIS_ROW_ALONE)
-                self.scrollTo(index)
-                return
+    def choose(self, *paths: Path) -> None:
+        """Choose the rows of these files and no others; none of them there changes nothing."""
+        indices = [self._sorted.index(row, NAME) for row in range(self._sorted.rowCount())]
+        wanted = [index for index in indices if index.data(PATH_ROLE) in paths]
+        if not wanted:
+            return
+        # Not selectRow: that one adds the row to others while somebody holds Ctrl.
+        self.selectionModel().setCurrentIndex(wanted[0], _THIS_ROW_ALONE)
+        for index in wanted[1:]:
+            self.selectionModel().select(index, _THIS_ROW_TOO)
+        self.scrollTo(wanted[0])
 
 
 def _texts(entry: ListedRecording) -> tuple[str, ...]:

@@ -263,3 +263,12 @@ def test_lanes_follow_the_theme_and_name_their_channels_and_units(opened):
     ]
     assert [plot.up.labelText for plot in page.lanes.plots] == ["V", "m/s²", "m/s"]
     assert page.lanes.plots[0].backgroundBrush().color().name() == DARK.base
+
+
+def test_a_list_that_comes_late_keeps_what_was_chosen_meanwhile(page, shared_desk, waited):
+    page.table.selectAll()
+    chosen = page.table.chosen_paths()
+    assert len(chosen) > 1
+    page.list_folder()
+    waited(lambda: not shared_desk.background.is_busy)
+    assert page.table.chosen_paths() == chosen
