@@ -39,7 +39,7 @@ class SteppedLevel(AbstractExcitation):
                 f"lowest_vpp = {self.lowest_vpp:g} and step_vpp = {self.step_vpp:g} leave no two levels up "
                 f"to amplitude_vpp = {self.amplitude_vpp:g}; give a lower level or a smaller step"
             )
-        count = self._passes() * self._count()
+        count = self._steps()
         if count > MOST_STEPS:
             raise ValueError(
                 f"the plan has {count} steps; one recording holds at most {MOST_STEPS}: widen step_vpp or "
@@ -62,21 +62,11 @@ class SteppedLevel(AbstractExcitation):
     @property
     def playing_s(self) -> float:
         """Settling and recording of all levels [s]."""
-        return self._passes() * self._count() * (self.settle_s + self.record_s)
+        return self._steps() * (self.settle_s + self.record_s)
 
     def passes(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Give each way through the levels: its direction, and its levels in the order played [V]."""
-        up = (Direction.UP.value, self.rising_vpp)
-        down = (Direction.DOWN.value, self.rising_vpp[::-1])
-        match self.direction:
-            case Direction.UP:
-                yield up
-            case Direction.DOWN:
-                yield down
-            case Direction.UP_THEN_DOWN:
-                yield from (up, down)
-            case Direction.DOWN_THEN_UP:
-                yield from (down, up)
+        return self.direction.ways(self.rising_vpp)
 
     def steps(self) -> Iterator[Step]:
         """One step for every level, in the order of time."""
@@ -94,8 +84,10 @@ class SteppedLevel(AbstractExcitation):
         """All levels, waits included."""
         return preview_of(self.steps(), self.amplitude_vpp, sample_rate_hz, self.frequency_hz, self.playing_s)
 
-    def _passes(self) -> int:
-        return 1 if self.direction in (Direction.UP, Direction.DOWN) else 2
+    def _steps(self) -> int:
+        # Counted before any list of them is made: a wrong step could ask for millions.
+        ways = sum(1 for _ in self.direction.ways(()))
+        return ways * self._count()
 
     def _count(self) -> int:
         # 1e-9: a lowest level that the steps reach but for rounding belongs to them.

@@ -18,12 +18,26 @@ MOST_STEPS = 4000
 
 
 class Direction(StrEnum):
-    """Which way through the frequencies: an impacting specimen may answer differently on the way back."""
+    """Which way through the steps: an impacting specimen may answer differently on the way back."""
 
     UP = "up"
     DOWN = "down"
     UP_THEN_DOWN = "up_then_down"
     DOWN_THEN_UP = "down_then_up"
+
+    def ways(self, rising: tuple[float, ...]) -> Iterator[tuple[str, tuple[float, ...]]]:
+        """Give each way through what rises: ``"up"`` or ``"down"``, and its values in the order played."""
+        up = (Direction.UP.value, rising)
+        down = (Direction.DOWN.value, rising[::-1])
+        match self:
+            case Direction.UP:
+                yield up
+            case Direction.DOWN:
+                yield down
+            case Direction.UP_THEN_DOWN:
+                yield from (up, down)
+            case Direction.DOWN_THEN_UP:
+                yield from (down, up)
 
 
 class FrequencyGrid(FrozenModel):
@@ -92,17 +106,7 @@ class FrequencySteps(AbstractExcitation):
 
     def passes(self) -> Iterator[tuple[str, tuple[float, ...]]]:
         """Give each way through the list: its direction, and its frequencies in the order played [Hz]."""
-        up = (Direction.UP.value, self.rising_hz)
-        down = (Direction.DOWN.value, self.rising_hz[::-1])
-        match self.direction:
-            case Direction.UP:
-                yield up
-            case Direction.DOWN:
-                yield down
-            case Direction.UP_THEN_DOWN:
-                yield from (up, down)
-            case Direction.DOWN_THEN_UP:
-                yield from (down, up)
+        return self.direction.ways(self.rising_hz)
 
 
 class SteppedSine(FrequencySteps):
