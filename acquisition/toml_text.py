@@ -2,8 +2,11 @@
 
 import json
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 from pydantic import BaseModel
+
+from .errors import ConfigurationError
 
 Scalar = str | bool | int | float
 Value = Scalar | list["Value"] | dict[str, "Value"]
@@ -17,6 +20,24 @@ def toml_text(model: BaseModel) -> str:
     """
     content: dict[str, Value] = model.model_dump(mode="json", exclude_none=True)
     return "\n".join(_table(content, ())).lstrip("\n") + "\n"
+
+
+def save_toml(model: BaseModel, path: Path) -> None:
+    """Write ``model`` to a file, in folders that are made where they are missing.
+
+    Raises
+    ------
+    ConfigurationError
+        When the file cannot be written.
+
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(toml_text(model), encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(
+            f"{path}: cannot be written ({error.strerror}); save it elsewhere"
+        ) from error
 
 
 def _table(content: Table, path: tuple[str, ...]) -> Iterator[str]:

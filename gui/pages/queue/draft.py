@@ -1,17 +1,14 @@
 """A campaign as it is being put together: each change gives a whole, valid campaign, or is refused."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from pydantic import BaseModel
 
-from acquisition.errors import ConfigurationError
 from acquisition.plan.axis import Range
 from acquisition.plan.campaign import Campaign
 from acquisition.plan.measurement import Measurement
 from acquisition.plan.sweep import Axis
 from acquisition.toml_file import validated
-from acquisition.toml_text import toml_text
 
 USUAL_NAME = "queue"
 
@@ -61,17 +58,6 @@ def moved_up(campaign: Campaign, number: int) -> Campaign:
         return campaign
     kind[place - 1], kind[place] = kind[place], kind[place - 1]
     return _changed(campaign, measurements=measurements, sweeps=sweeps)
-
-
-def save_campaign(campaign: Campaign, path: Path) -> None:
-    """Write a campaign so that it reads back as the same one; raises ConfigurationError."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(toml_text(campaign), encoding="utf-8")
-    except OSError as error:
-        raise ConfigurationError(
-            f"{path}: cannot be written ({error.strerror}); save the campaign elsewhere"
-        ) from error
 
 
 def _changed(campaign: Campaign, **parts: object) -> Campaign:

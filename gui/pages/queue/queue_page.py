@@ -25,7 +25,7 @@ from acquisition.plan.campaign import Campaign, load_campaign
 from acquisition.plan.sweep import Axis
 from acquisition.shipped import all_shipped
 from acquisition.toml_file import validated
-from acquisition.toml_text import toml_text
+from acquisition.toml_text import save_toml, toml_text
 
 from ...desk import Desk
 from ...faces import clock
@@ -37,7 +37,7 @@ from ...page import Page
 from ...read_table import ReadTable
 from ...settings import Remembered
 from .campaign_outlook import CampaignOutlook, campaign_outlook
-from .draft import moved_up, save_campaign, with_measurement, with_sweep, without
+from .draft import moved_up, with_measurement, with_sweep, without
 from .row_words import point_rows
 from .sweep_form import SweepForm
 
@@ -208,7 +208,7 @@ class QueuePage(Page):
         given, _ = QFileDialog.getSaveFileName(self, "Save the campaign", wish, "Campaigns (*.toml)")
         if given:
             try:
-                save_campaign(campaign, Path(given))
+                save_toml(campaign, Path(given))
             except ConfigurationError as error:
                 self.desk.say(notice_of(error))
 

@@ -8,7 +8,6 @@ from acquisition.plan.campaign import load_campaign
 from acquisition.plan.measurement import Measurement
 from acquisition.shipped import all_shipped
 from acquisition.toml_file import load_toml
-from acquisition.toml_text import toml_text
 
 MOST_OF_ONE = 12
 """Tests listed of one campaign; sweeps make hundreds."""
@@ -47,21 +46,3 @@ def own_tests(folder: Path) -> tuple[NamedTest, ...]:
 def load_test(path: Path) -> Measurement:
     """Read a test; raises ConfigurationError with file, key and what is allowed."""
     return load_toml(path, Measurement)
-
-
-def save_test(measurement: Measurement, path: Path) -> None:
-    """Write a test so that it reads back as the same one.
-
-    Raises
-    ------
-    ConfigurationError
-        When the file cannot be written.
-
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(toml_text(measurement), encoding="utf-8")
-    except OSError as error:
-        raise ConfigurationError(
-            f"{path}: cannot be written ({error.strerror}); save the test elsewhere"
-        ) from error

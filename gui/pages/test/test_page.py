@@ -21,7 +21,7 @@ from acquisition.plan.measurement import Measurement
 from acquisition.plan.outlook import Outlook
 from acquisition.rig.configuration import Rig
 from acquisition.toml_file import validated
-from acquisition.toml_text import toml_text
+from acquisition.toml_text import save_toml, toml_text
 from analysis.foresight import Foresight
 
 from ...desk import Desk
@@ -33,7 +33,7 @@ from ...page import Page
 from ...settings import Remembered
 from ...theme import Theme
 from .ahead import Ahead, foreseen, looked_ahead
-from .library import NamedTest, load_test, own_tests, save_test, shipped_tests
+from .library import NamedTest, load_test, own_tests, shipped_tests
 from .limit_table import LimitTable
 from .prediction_plot import PredictionPlot
 from .preview_plots import PreviewPlots
@@ -172,7 +172,7 @@ class TestPage(Page):
     def save_as(self, measurement: Measurement, path: Path) -> None:
         """Keep a test under a name; it is listed from now on if it lies in the folder of tests."""
         try:
-            save_test(measurement, path)
+            save_toml(measurement, path)
         except ConfigurationError as error:
             self.desk.say(notice_of(error))
         else:

@@ -7,7 +7,8 @@ from acquisition.plan.axis import Range
 from acquisition.plan.campaign import load_campaign
 from acquisition.plan.measurement import Measurement
 from acquisition.plan.sweep import Axis
-from gui.pages.queue.draft import moved_up, save_campaign, with_measurement, with_sweep, without
+from acquisition.toml_text import save_toml
+from gui.pages.queue.draft import moved_up, with_measurement, with_sweep, without
 
 DWELL = Measurement.model_validate(
     {
@@ -50,5 +51,5 @@ def test_a_saved_campaign_reads_back_as_the_same_one(tmp_path):
     campaign = with_sweep(
         with_measurement(None, DWELL), DWELL, Axis.FREQUENCY, Range(start=200, stop=300, step=50)
     )
-    save_campaign(campaign, tmp_path / "sub" / "queue.toml")
+    save_toml(campaign, tmp_path / "sub" / "queue.toml")
     assert load_campaign(tmp_path / "sub" / "queue.toml") == campaign
