@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QRectF, Signal
+from PySide6.QtCore import QRectF
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
@@ -38,9 +38,6 @@ _SHOWN_DB = 80.0
 
 class SpectrogramView(QWidget):
     """Frequency over time; colours are spectral densities in decibels."""
-
-    failed = Signal(object)
-    """The exception that came in place of a picture."""
 
     def __init__(self, theme: Theme, background: Background, parent: QWidget | None = None) -> None:
         super().__init__(parent)
