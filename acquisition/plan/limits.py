@@ -247,7 +247,7 @@ def _specimen(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
         limit.value,
         "m",
         limit.source,
-        "lower amplitude_vpp or keep away from that frequency",
+        "lower amplitude_vpp or keep away from the resonance",
     )
     flagged = measurement.limits.on_overload is OnOverload.FLAG
     for channel in channels_of(rig):
