@@ -10,7 +10,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogFormatter, NullLocator
 
 MEASURED = "#1b1b1b"
 SIMULATED = "#d55e00"
@@ -35,7 +35,10 @@ _EDGE = 1e-3
 _LINEAR_BELOW = 5.0
 _FEW_MARKS_ABOVE = 60.0
 """Ratios of the ends of a frequency axis, between which marks at 3 and 7 help and fit."""
+_FEW_DECADES = (1.5, 0.5)
+"""Decades of a magnitude axis below which some, and all, marks between the powers of ten have numbers."""
 _POWERS_BELOW = 1e-3
+_ROUNDING = 1e-9
 _PREFIXES = ((1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"))
 
 STYLE: Mapping[Any, Any] = MappingProxyType(
@@ -106,16 +109,25 @@ def frequency_axis(axes: Axes, low_hz: float, high_hz: float) -> None:
 
 
 def magnitude_axis(axes: Axes) -> None:
-    """Scale the vertical axis logarithmically, with marks that read 0.1, 1, 10."""
+    """Scale the vertical axis logarithmically, with marks that read 0.1, 1, 10; a narrow range has more."""
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(FuncFormatter(_plain))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_minor_formatter(_Between(minor_thresholds=_FEW_DECADES))
+
+
+class _Between(LogFormatter):
+    """Numbers the marks that matplotlib would number, in our digits: its own read 4e−01."""
+
+    def __call__(self, value: float, place: int | None = None) -> str:
+        return _plain(value) if super().__call__(value, place) else ""
 
 
 def _plain(value: float, _place: int | None = None) -> str:
-    if 0 < value < _POWERS_BELOW:
-        return f"$10^{{{round(math.log10(value))}}}$"
-    return f"{value:g}"
+    if not 0 < value < _POWERS_BELOW:
+        return f"{value:g}"
+    power = math.floor(math.log10(value) + _ROUNDING)
+    digits = f"{value / 10**power:.3g}"
+    return f"$10^{{{power}}}$" if digits == "1" else f"${digits}\\cdot10^{{{power}}}$"
 
 
 def prefixed(largest: float, unit: str) -> tuple[float, str]:
