@@ -28,7 +28,7 @@ def stepped_sine_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay 
         first.set_ylabel("Response I\nmax |x| / A0")
         second.set_ylabel("Response II\n|x at f| / A0")
         second.set_xlabel(_along(analysis)[1])
-        legend_above(figure, [first])
+        legend_above(figure, [first], columns=2)
     found = analysis.response
     columns = {
         "frequency_hz": found.frequency_hz,
@@ -84,10 +84,12 @@ def _responses(axes: Axes, analysis: SteppedSineAnalysis, laid: SteppedSineOverl
             label="without contact",
         )
         axes.plot(
-            along[rising],
-            getattr(sines, what)[rising],
+            along,
+            getattr(sines, what),
             color=PREDICTED,
-            linewidth=0.8,
+            linestyle="none",
+            marker=".",
+            markersize=4,
             label="steady sines from rest",
         )
     for direction in sorted(set(found.direction)):
@@ -144,7 +146,7 @@ def stepped_level_caption(analysis: SteppedSineAnalysis) -> str:
     """Say between which levels the motion jumps, and how far apart the two ways lie."""
     found = analysis.response
     text = (
-        f"Level stepped at {np.median(found.frequency_hz):.4g} Hz, {found.frequency_hz.size} levels from "
+        f"Level stepped at {np.median(found.frequency_hz):.4g} Hz, {found.frequency_hz.size} steps from "
         f"{np.min(found.amplitude_vpp):.4g} to {np.max(found.amplitude_vpp):.4g} Vpp."
     )
     jumps = level_jumps(found)

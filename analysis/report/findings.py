@@ -2,10 +2,14 @@
 
 from collections.abc import Iterator
 
+from acquisition.excitation.stepped_level import SteppedLevel
+
 from ..campaign_results import CampaignResults, DwellResult, NoiseResult, SweepResult
 from ..feedback_words import feedback_sentences
 from ..figures.portraits import verdict_text
+from ..figures.stepped_sine import stepped_level_caption
 from ..figures.sweep import regions_text
+from ..measurement_analysis import SteppedSineAnalysis
 
 
 def findings(results: CampaignResults) -> Iterator[str]:
@@ -18,11 +22,7 @@ def findings(results: CampaignResults) -> Iterator[str]:
     for dwell in results.dwells:
         yield _dwell(dwell)
     for stepped in results.stepped:
-        found = stepped.analysis.response
-        yield (
-            f"Stepped sine at {stepped.analysis.excitation.amplitude_vpp:g} Vpp: Response II up to "
-            f"{found.response_ii.max():.3g} in {found.frequency_hz.size} steps."
-        )
+        yield _stepped(stepped.analysis)
         yield from feedback_sentences(stepped.analysis.facts.feedback)
 
 
@@ -47,6 +47,16 @@ def _sweep(result: SweepResult) -> str:
     )
     return (
         f"{text}." if result.laid is None else f"{text}; simulated: {regions_text(result.laid.collisions)}."
+    )
+
+
+def _stepped(analysis: SteppedSineAnalysis) -> str:
+    if isinstance(analysis.excitation, SteppedLevel):
+        return stepped_level_caption(analysis)
+    found = analysis.response
+    return (
+        f"Stepped sine at {analysis.excitation.amplitude_vpp:g} Vpp: Response II up to "
+        f"{found.response_ii.max():.3g} in {found.frequency_hz.size} steps."
     )
 
 

@@ -11,10 +11,11 @@ from acquisition.plan.measurement import Measurement
 from acquisition.recording import open_recording
 from acquisition.rig.configuration import load_rig
 from acquisition.run.run_measurement import run_measurement
-from analysis.campaign_results import SteppedSineResult
+from analysis.campaign_results import CampaignResults, SteppedSineResult
 from analysis.figures.stepped_sine import stepped_sine_figure
 from analysis.level_jumps import hysteresis_vpp, level_jumps
 from analysis.measurement_analysis import analyse_recording
+from analysis.report.findings import findings
 from analysis.stepped_response import SteppedResponse
 from analysis.summary import summary
 
@@ -74,6 +75,13 @@ def test_figure_and_summary_tell_both_jumps(analysis):
     assert figure.figure.axes[-1].get_xlabel() == "level at the generator [Vpp]"
     measured = summary(SteppedSineResult(analysis, None))["measured"]
     assert [each["direction"] for each in measured["jumps"]] == ["up", "down"]
+
+
+def test_the_report_speaks_of_levels_and_jumps_in_short(analysis):
+    (said,) = findings(CampaignResults("levels", (SteppedSineResult(analysis, None),), ()))
+    assert said.startswith("Level stepped at 195 Hz, 14 steps from 0.2 to 0.8 Vpp.")
+    assert "between 0.6 and 0.7 Vpp" in said
+    assert "0.3 to 0.5 V above the fall back" in said
 
 
 def test_a_response_that_stays_has_no_jump_and_none_is_seen_across_the_turning_point():
