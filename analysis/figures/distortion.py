@@ -124,14 +124,19 @@ def distortion_caption(periodic: PeriodicTransmission) -> str:
     said = [
         (
             f"From {periodic.realisations} realisations: noise gives one of them a standard deviation of "
-            f"{100 * found.noise_share:.2g} % of the transmission (median)"
+            f"{_percent(found.noise_share)} of the transmission (median)"
         )
     ]
     if found.distortion_share is None:
         said.append("; one realisation cannot show distortion.")
     else:
-        said.append(f", distortion {100 * found.distortion_share:.2g} %.")
+        said.append(f", distortion {_percent(found.distortion_share)}.")
     return "".join(said) + _quiet_text(found)
+
+
+def _percent(share: float) -> str:
+    """Two digits, and never a power of ten: noise of more than the transmission itself is usual in chaos."""
+    return f"{100 * share:.0f} %" if share >= 1 else f"{100 * share:.2g} %"
 
 
 def _quiet_text(found: Distortion) -> str:

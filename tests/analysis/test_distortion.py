@@ -2,6 +2,7 @@
 
 import importlib.util
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -102,3 +103,11 @@ def test_one_realisation_says_that_it_cannot_show_distortion(analysed):
     periodic = analysed(np.zeros_like, realisations=1).response.periodic
     assert distortion(periodic).distortion_share is None
     assert "one realisation cannot show distortion" in distortion_caption(periodic)
+
+
+def test_noise_larger_than_the_transmission_is_told_in_whole_percent(analysed):
+    periodic = analysed(np.zeros_like, realisations=1).response.periodic
+    noisy = replace(periodic, noise_variance=np.full_like(periodic.noise_variance, 1e3))
+    share = 100 * distortion(noisy).noise_share
+    assert share > 1000
+    assert f"standard deviation of {share:.0f} % of the transmission" in distortion_caption(noisy)
