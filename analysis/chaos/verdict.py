@@ -9,6 +9,7 @@ from ..arrays import Reals
 from ..errors import NotEnoughData
 from .divergence import Divergence, divergence
 from .embedding import embedded
+from .last_motion import begin_of_last_motion
 from .period import Points, is_settled, shortest_period
 from .surrogates import SurrogateTest, surrogate_test
 from .torus import Rotation, is_torus, rotation
@@ -77,7 +78,8 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     A motion is *periodic* when its points repeat within their noise, *quasi-periodic* when they run round
     a closed curve, and *chaotic* only when all witnesses agree: settled, far above the noise, on no curve,
     the 0-1 test near one on points that are not oversampled, and more than linear noise by surrogates. Each
-    of these alone passes noise for chaos; anything less is undecided.
+    of these alone passes noise for chaos; anything less is undecided. Of a motion that changes once, as when
+    a chaotic transient ends, the last part is judged if it is the longer one.
 
     Parameters
     ----------
@@ -96,7 +98,22 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
             f"{count} drive periods were recorded clear of the ends, and {FEWEST} are needed; dwell longer",
             Evidence(drive_hz, count, np.nan, last.noise_level, is_settled=False),
         )
-    evidence = Evidence(drive_hz, count, last.spread, last.noise_level, is_settled=is_settled(last))
+    before = begin_of_last_motion(last)
+    if before == 0:
+        return _of_one_motion(last, drive_hz, seed)
+    rest = Points(last.value[before:], last.noise)
+    found = _of_one_motion(rest, drive_hz, seed)
+    if len(rest.value) < max(before, FEWEST):
+        return _undecided(
+            f"the motion changed {len(rest.value)} drive periods before the end, too late to judge what it "
+            "became; dwell longer",
+            found.evidence,
+        )
+    return replace(found, why=f"{found.why}; so for {len(rest.value)} drive periods, otherwise before")
+
+
+def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
+    evidence = Evidence(drive_hz, len(last.value), last.spread, last.noise_level, is_settled=is_settled(last))
     if not evidence.is_settled:
         return _undecided(
             "the motion still changes: its mean or its scatter drifts; let it settle for longer",

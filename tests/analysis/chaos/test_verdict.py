@@ -65,6 +65,44 @@ def test_a_motion_that_still_dies_out_is_undecided():
     assert "settle" in found.why
 
 
+@pytest.fixture(scope="module")
+def chaos():
+    """Give 3000 points of the Hénon map: chaotic, over the size of the orbit."""
+    points = np.empty((3000, 2))
+    x, y = 0.1, 0.3
+    for each in points:
+        x, y = 1 - 1.4 * x * x + y, 0.3 * x
+        each[:] = x, y
+    return points
+
+
+def test_chaos_that_ends_is_judged_by_what_it_became(chaos):
+    points = np.vstack((chaos[:900], np.full((2100, 2), 0.2)))
+    found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
+    assert (found.kind, found.period, found.evidence.periods) == (MotionKind.PERIODIC, 1, 2100)
+    assert "2100 drive periods, otherwise before" in found.why
+
+
+def test_a_periodic_motion_that_is_lost_for_good_is_judged_by_the_chaos_after_it(chaos):
+    points = np.vstack((np.full((750, 2), 0.2), chaos[:2250]))
+    found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
+    assert found.kind is MotionKind.CHAOTIC
+    assert found.evidence.periods == 2100, "the block in which it was lost is not judged"
+
+
+def test_a_motion_that_changes_late_is_undecided(chaos):
+    points = np.vstack((chaos[:2100], np.full((900, 2), 0.2)))
+    found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
+    assert found.kind is MotionKind.UNDECIDED
+    assert "changed 900 drive periods before the end" in found.why
+
+
+def test_chaos_with_calm_stretches_is_one_motion(chaos):
+    points = chaos.copy()
+    points[600:900] = points[1800:2400] = 0.2
+    assert motion_verdict(Points(points, QUIET), DRIVE_HZ).evidence.periods == 3000
+
+
 def test_a_short_record_carries_no_verdict():
     found = motion_verdict(Points(np.ones((150, 2)), QUIET), DRIVE_HZ)
     assert found.kind is MotionKind.UNDECIDED
