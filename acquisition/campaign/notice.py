@@ -2,6 +2,7 @@
 
 import json
 import shlex
+import shutil
 import subprocess  # the command is the user's own, given on the command line
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -37,7 +38,7 @@ class CommandMessenger:
         Raises
         ------
         ConfigurationError
-            When it is empty, or a quotation mark is missing.
+            When it is empty, a quotation mark is missing, or there is no such program.
 
         """
         try:
@@ -48,6 +49,10 @@ class CommandMessenger:
             ) from error
         if not arguments:
             raise ConfigurationError("the command is empty; give a program and its arguments")
+        if shutil.which(arguments[0]) is None:
+            raise ConfigurationError(
+                f"the command {arguments[0]!r} is no program that can be run here; give the path of one"
+            )
         return cls(arguments)
 
     def send(self, notice: Mapping[str, str | int | float]) -> str:

@@ -167,8 +167,9 @@ def require_new(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> 
         shown = ", ".join(present[:MOST_DIFFERENCES]) + (
             " and more" if len(present) > MOST_DIFFERENCES else ""
         )
+        verb = "exists" if len(present) == 1 else "exist"
         raise RecordingError(
-            f"{shown} exist already, and nothing is ever overwritten. "
+            f"{shown} {verb} already, and nothing is ever overwritten. "
             "Nothing was recorded; give another folder, or resume the campaign"
         )
 

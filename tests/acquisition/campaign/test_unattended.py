@@ -269,7 +269,7 @@ class TestWatching:
         keep = "import sys; open(sys.argv[1], 'a').write(sys.stdin.read() + chr(10))"
         messengers = (
             CommandMessenger((sys.executable, "-c", keep, str(told))),
-            CommandMessenger.of("/no/such/program --now"),
+            CommandMessenger(("/no/such/program", "--now")),
         )
         run_campaign(
             bench,
