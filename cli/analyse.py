@@ -17,8 +17,8 @@ from analysis.transmission_view import MagnitudeScale, quantities_named
 from analysis.watcher import Watcher
 from analysis.window import Window
 
-from .output import console, print_json
-from .paths import AsJson, unused
+from .output import bold, console, print_json
+from .paths import AsJson, room_for_folder, unused
 from .reading_bar import reading_bar
 
 NOISE = "Transmission of noise"
@@ -53,7 +53,7 @@ def analyse(
         float | None,
         typer.Option(
             metavar="R",
-            help="For hv: noise density of m0's velocity over that of the base's acceleration [s2].",
+            help="For hv: noise density of m0's velocity over that of the base's acceleration, in s2.",
             rich_help_panel=NOISE,
         ),
     ] = None,
@@ -113,7 +113,13 @@ def analyse(
         view=quantities_named(quantity, scale),
     )
     paths = recordings_in(recording) if recording.is_dir() else (recording,)
-    name = recording.name.removesuffix(".part").removesuffix(".h5")
+    # "." has no name of its own.
+    place = recording if recording.name.strip(".") else recording.resolve()
+    name = place.name.removesuffix(".part").removesuffix(".h5")
+    folder = unused(place.parent / f"{name}_analysis") if out is None else out
+    has_report = out is not None or not as_json
+    if has_report:
+        room_for_folder(folder)
     with reading_bar() as watcher:
         simulation = Simulation.LAID_OVER if simulate else Simulation.LEFT_OUT
         shaken = fitted_to(paths, name, watcher) if fit else None
@@ -126,11 +132,10 @@ def analyse(
         print_json({**campaign_summary(results), **fitted})
     for sentence in () if as_json else results.model_said:
         console.print(sentence)
-    if results.results and (out is not None or not as_json):
-        folder = unused(recording.parent / f"{name}_analysis") if out is None else out
+    if results.results and has_report:
         report = write_report(results, unused(folder / "report.html"), folder / "figures")
         if not as_json:
-            console.print(f"The report: [bold]{report.resolve()}[/]")
+            console.print("The report:", bold(report.resolve()))
     complain_about(results)
 
 

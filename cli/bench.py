@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.markup import escape
 
 from acquisition.bench import open_bench
 from acquisition.bench_list import list_instruments, list_rig_instruments
@@ -19,7 +18,7 @@ from acquisition.rig.configuration import Rig, load_rig
 from acquisition.run.stop import StopSwitch
 from acquisition.run.stop_on_signal import stop_on_signal
 
-from .output import console, print_json
+from .output import bold, console, print_json
 from .paths import AsJson, BenchPath, bench_path
 
 bench = typer.Typer(help="Look at the instruments.", no_args_is_help=True, add_completion=False)
@@ -42,9 +41,9 @@ def list_bench(
         print_json({"visa": list(found.visa_resources), "daq": devices, "remarks": list(found.remarks)})
         return
     for title, lines in (("VISA", found.visa_resources), ("DAQ", devices), ("Remarks", found.remarks)):
-        console.print(f"[bold]{title}[/]")
+        console.print(bold(title))
         for line in lines or ("none",):
-            console.print(f"  {escape(line)}")
+            console.print(f"  {line}")
 
 
 @bench.command("check")

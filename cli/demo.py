@@ -16,7 +16,7 @@ from analysis.summary import campaign_summary
 from .analysis_bar import analysis_bar
 from .analyst import second_process
 from .measure import STOPPED_EXIT_CODE, the_bench
-from .output import console, write_json
+from .output import bold, console, write_json
 from .paths import unused
 
 
@@ -50,4 +50,4 @@ def demo(
         results = analyst.together()
     report = write_report(results, folder / "report.html", folder / "figures")
     write_json(campaign_summary(results), folder / "results.json")
-    console.print(f"\nThe report: [bold]{report.resolve()}[/]")
+    console.print("\nThe report:", bold(report.resolve()))

@@ -16,7 +16,8 @@ from sim.accuracy import Accuracy
 
 from .analyse import complain_about
 from .kept_study import kept_study
-from .output import console
+from .output import bold, console
+from .paths import room_for_folder
 
 ALL = "all"
 EXPERIMENT = (12, 13, 14)
@@ -54,12 +55,13 @@ def figure(
     """Draw a figure of the paper; studies are kept in DIR/studies and go on where they were stopped."""
     options = FigureOptions(damping_time_s=damping_time, gap_m=gap, accuracy=accuracy, grid=grid)
     numbers = _numbers(number)
+    room_for_folder(out)
     experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])
     for each in numbers:
         drawn = experiment(each) if each in EXPERIMENT else _simulated(each, options, out, workers)
         for one in drawn:
             paths = one.save(out, kinds)
-            console.print(f"figure {each}: [bold]{paths[0]}[/] ({one.title})")
+            console.print(f"figure {each}:", bold(paths[0]), f"({one.title})")
 
 
 def _numbers(asked: str) -> tuple[int, ...]:

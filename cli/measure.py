@@ -16,6 +16,7 @@ from acquisition.engine.hosted import hosted
 from acquisition.engine.orders import Orders
 from acquisition.engine.state import Attendance
 from acquisition.engine.work import Work
+from acquisition.errors import ConfigurationError
 from acquisition.plan.campaign import load_campaign
 from acquisition.rig.configuration import Rig
 
@@ -55,9 +56,14 @@ def measure(
     mail: MailPath = None,
 ) -> None:
     """Measure: check the bench, ramp up, record and ramp down, for each measurement of a campaign."""
+    if as_json and not only_estimate:
+        raise ConfigurationError(
+            "--json prints an estimate, and none was asked for. Nothing was played; add --estimate, or leave "
+            "--json out"
+        )
     plan, rig = load_campaign(campaign), rig_at(bench, faults)
     existing = Existing.RESUME if resume else Existing.REFUSE
-    tell_estimate(estimate(plan, rig, out, existing), Form.JSON if only_estimate and as_json else Form.TEXT)
+    tell_estimate(estimate(plan, rig, out, existing), Form.JSON if as_json else Form.TEXT)
     if only_estimate:
         return
     messengers = messengers_of(notify, mail)

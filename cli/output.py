@@ -6,8 +6,15 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from rich.console import Console
+from rich.text import Text
 
-console = Console(highlight=False, soft_wrap=True)
+# No markup: a path may hold what looks like some.
+console = Console(highlight=False, soft_wrap=True, markup=False)
+
+
+def bold(text: object) -> Text:
+    """Make something stand out on a terminal, whatever brackets it has."""
+    return Text(str(text), style="bold")
 
 
 def print_json(document: Mapping[str, object]) -> None:

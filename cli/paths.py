@@ -1,10 +1,12 @@
 """Options that several commands share."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from acquisition.errors import ConfigurationError
 from acquisition.rig.configuration import Rig, load_rig, with_faults
 from acquisition.shipped import shipped
 
@@ -28,6 +30,25 @@ def rig_at(bench: Path | None, faults: Path | None) -> Rig:
     """Read the hardware configuration that was given, or the virtual rig's, with faults if any are given."""
     rig = load_rig(bench_path(bench))
     return rig if faults is None else with_faults(rig, faults)
+
+
+def room_for_folder(path: Path) -> None:
+    """Refuse a folder that cannot be written to, before anything is computed for it; makes none.
+
+    Raises
+    ------
+    ConfigurationError
+        When it, or what it would lie in, is a file or may not be written to.
+
+    """
+    standing = next(each for each in (path, *path.resolve().parents) if each.exists())
+    if standing.is_dir() and os.access(standing, os.W_OK):
+        return
+    why = "may not be written to" if standing.is_dir() else "is a file"
+    raise ConfigurationError(
+        f"{path} cannot be made a folder: {standing} {why}. Nothing was computed; give a folder that exists, "
+        "or the name of a new one"
+    )
 
 
 def unused(path: Path) -> Path:

@@ -21,7 +21,8 @@ from analysis.reproduction.studies import levels_asked
 from sim.accuracy import Accuracy
 
 from .kept_study import kept_study
-from .output import console
+from .output import bold, console
+from .paths import room_for_folder
 from .study import Workers
 
 PAGE = "reproduction.md"
@@ -47,6 +48,8 @@ def reproduce(
 ) -> None:
     """Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped."""
     options = FigureOptions(damping_time_s=damping_time, accuracy=accuracy, grid=grid)
+    for folder in (out, *([] if markdown is None else [markdown.parent])):
+        room_for_folder(folder)
     evidence = Evidence(lambda study: kept_study(study, out / "studies", workers))
     found = reproduction(SECTIONS, evidence, options, lambda step: console.print(f"measuring {step}"))
     page = out / PAGE if markdown is None else markdown
@@ -54,7 +57,7 @@ def reproduce(
     pictures = tuple(_pictures(found, evidence, options, page))
     page.write_text(reproduction_document(found, pictures), encoding="utf-8")
     _tell(found)
-    console.print(f"The page: [bold]{page.resolve()}[/]")
+    console.print("The page:", bold(page.resolve()))
 
 
 def _pictures(

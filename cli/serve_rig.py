@@ -10,13 +10,13 @@ import typer
 from acquisition.rig.server_token import METADATA_KEY, VARIABLE
 from acquisition.virtual.rig import DiskFaults, VirtualRig
 
-from .output import console
+from .output import bold, console
 from .paths import FaultsPath, rig_at
 
 
 def serve_rig(
     bench: Annotated[
-        Path | None, typer.Option("--bench", metavar="BENCH.toml", help="A rig with a [virtual] table.")
+        Path | None, typer.Option("--bench", metavar="BENCH.toml", help="A rig with a table 'virtual'.")
     ] = None,
     address: Annotated[
         str,
@@ -31,7 +31,7 @@ def serve_rig(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     with VirtualRig(rig_at(bench, faults), address, disk=DiskFaults.REFUSED) as rig:
-        console.print(f"[bold]{rig.rig.name}[/] is on. Stop it with Ctrl-C.\n")
+        console.print(bold(rig.rig.name), "is on. Stop it with Ctrl-C.\n")
         console.print("The converter, for nidaqmx:")
         console.print(f'  grpc.insecure_channel("{rig.daq_address}")  # GrpcSessionOptions(channel, "")')
         console.print("The generator, for pyvisa in Python (one line before the resource manager):")

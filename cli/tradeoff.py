@@ -19,7 +19,7 @@ from sim.trade.measuring import Thoroughness, measured_trade
 from sim.trade.regimes import MOTIONS
 
 from .output import console, print_json
-from .paths import AsJson
+from .paths import AsJson, room_for_folder
 
 _SHORTEST_S = 0.05
 _LONGEST_S = 60.0
@@ -41,6 +41,9 @@ def tradeoff(
     """Measure what each accuracy costs and what error it makes, with and without impacts and in chaos."""
     if not _SHORTEST_S <= span <= _LONGEST_S:
         raise InvalidRequest(f"a span of {span} s was asked for; give {_SHORTEST_S:g} to {_LONGEST_S:g} s")
+    folder = _folder(out, markdown)
+    if folder is not None:
+        room_for_folder(folder)
     columns = (TextColumn("{task.description:<28}"), BarColumn(bar_width=30), MofNCompleteColumn())
     with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True)) as bars:
         bar = bars.add_task("", total=len(MOTIONS))
@@ -55,13 +58,16 @@ def tradeoff(
     else:
         for each in trade.motions:
             _tell(each)
-    _save(trade, out, markdown)
+    if folder is not None:
+        _save(trade, folder, markdown)
 
 
-def _save(trade: Trade, out: Path | None, markdown: Path | None) -> None:
-    folder = out if out is not None else None if markdown is None else markdown.parent / "images"
-    if folder is None:
-        return
+def _folder(out: Path | None, markdown: Path | None) -> Path | None:
+    """Where the figure goes: beside the page, unless something else is asked for."""
+    return out if out is not None or markdown is None else markdown.parent / "images"
+
+
+def _save(trade: Trade, folder: Path, markdown: Path | None) -> None:
     paths = tradeoff_figure(trade).save(folder)
     if markdown is not None:
         picture = Path(os.path.relpath(paths[0], markdown.parent)).as_posix()

@@ -96,14 +96,18 @@ def test_a_growing_recording_is_analysed_as_far_as_it_is_written(vibench_here, n
 
 
 def test_a_bad_recording_in_a_folder_is_one_sentence_and_the_others_are_analysed(vibench, good, tmp_path):
-    shutil.copy(good, tmp_path / "good.h5")
-    (tmp_path / "cut.h5").write_bytes(good.read_bytes()[:5000])
-    done = vibench("analyse", ".", "--no-simulate", "--out", tmp_path / "out", cwd=tmp_path)
+    folder = tmp_path / "night[red]"
+    folder.mkdir()
+    shutil.copy(good, folder / "good.h5")
+    (folder / "cut.h5").write_bytes(good.read_bytes()[:5000])
+    done = vibench("analyse", ".", "--no-simulate", cwd=folder)
     assert done.returncode == 1
     assert done.stderr.strip().count("\n") == 0
     assert "cut.h5 is no readable HDF5 file" in done.stderr
     assert "Traceback" not in done.stderr
-    assert (tmp_path / "out" / "report.html").exists()
+    report = tmp_path / "night[red]_analysis" / "report.html"
+    assert str(report) in done.stdout, "brackets are no markup"
+    assert "<h1>night[red]</h1>" in report.read_text(encoding="utf-8")
 
 
 def test_a_single_bad_recording_leaves_no_report_behind(vibench_here, tmp_path):

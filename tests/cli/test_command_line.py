@@ -38,7 +38,7 @@ def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(vib
     before = (tmp_path / "recordings" / "dwell.h5").read_bytes()
     second = vibench("measure", plan, "--out", "recordings", cwd=tmp_path)
     assert second.returncode == 1
-    assert "dwell.h5 exist already, and nothing is ever overwritten" in second.stderr
+    assert "dwell.h5 exists already, and nothing is ever overwritten" in second.stderr
     resumed = vibench("measure", plan, "--out", "recordings", "--resume", cwd=tmp_path)
     assert resumed.returncode == 0
     assert "kept" in resumed.stdout
@@ -142,3 +142,28 @@ def test_faults_that_cannot_be_played_are_refused_before_anything_is_opened(vibe
     assert measured.returncode == 1
     assert "is a real one" in measured.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("analyse", "file.h5"), ("figure", "2"), ("reproduce",), ("tradeoff",)],
+    ids=lambda words: words[0],
+)
+def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_computed(vibench_here, tmp_path, words):
+    (tmp_path / "file.h5").write_text("no folder", encoding="utf-8")
+    result = vibench_here(*words, "--out", tmp_path / "file.h5" / "figures", cwd=tmp_path)
+    assert result.returncode == 1
+    assert result.stderr.startswith("error: ")
+    assert "file.h5 is a file. Nothing was computed" in result.stderr
+    assert result.stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(("--json",), "add --estimate"), (("--notify", "no-such-program --now"), "is no program")],
+)
+def test_options_that_make_no_sense_play_nothing(vibench_here, tmp_path, words, said):
+    result = vibench_here("measure", campaign(tmp_path), "--out", "recordings", *words, cwd=tmp_path)
+    assert result.returncode == 1
+    assert said in result.stderr
+    assert not (tmp_path / "recordings").exists()
