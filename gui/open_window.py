@@ -1,5 +1,6 @@
 """From nothing to a window on the screen, and from its end to the end of the process."""
 
+import gc
 import sys
 from pathlib import Path
 
@@ -19,6 +20,8 @@ def open_window(bench: Path | None, settings: Path | None) -> int:
     if bench is not None:
         kept.keep_text(Remembered.BENCH, str(bench.resolve()))
     window = Window(Desk(kept), PAGES)
+    # None of all this ever is garbage: a collector that looked through it would hold the window up.
+    gc.freeze()
     window.show()
     QTimer.singleShot(0, window.desk.background.prepare)
     return app.exec()

@@ -6,7 +6,7 @@ from enum import Enum, auto
 from math import ceil, floor, log10
 
 import pyqtgraph as pg
-from PySide6.QtGui import QFontMetricsF
+from PySide6.QtGui import QFontMetricsF, QPainter
 from PySide6.QtWidgets import QGraphicsItem, QGraphicsSceneResizeEvent
 
 
@@ -68,7 +68,6 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         """Change what the axis shows."""
         self._axis, self._factor = axis, axis.factor
         self._fit_label()
-        self.picture = None
         self.update()
 
     def resizeEvent(self, event: QGraphicsSceneResizeEvent | None = None) -> None:
@@ -77,6 +76,12 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         if getattr(self, "_axis", None) is not None and self.label is not None:
             self._fit_label()
         super().resizeEvent(event)
+
+    def paint(self, painter: QPainter, *_: object) -> None:
+        """Draw at once: pyqtgraph's way, by a QPicture, looks for the font again with every label."""
+        specs = self.generateDrawSpecs(painter)
+        if specs is not None:
+            self.drawPicture(painter, *specs)
 
     def show_nothing(self) -> None:
         """Leave numbers and label to the axis of the plot below."""
@@ -87,7 +92,6 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         """Write no numbers while there is nothing that they could be about."""
         if blankness is not self._blankness:
             self._blankness = blankness
-            self.picture = None
             self.update()
 
     def showLabel(self, show: bool = True) -> None:  # noqa: FBT001, FBT002 - pyqtgraph's own

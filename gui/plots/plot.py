@@ -1,8 +1,6 @@
 """A plot as all pages draw it: labelled axes, thin pens, a legend that follows the theme."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from enum import Enum
 from math import log10
 
 import pyqtgraph as pg
@@ -11,45 +9,21 @@ from PySide6.QtGui import QGuiApplication, QKeyEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from ..hint import paint_hint
-from ..theme import Colour, Theme
+from ..theme import Theme
 from .axis import Axis, AxisItem, Blankness, Scale
 from .band import Band
+from .ink import SIGNS, Ink, pen_of, shade_of
 from .legend import LegendEntry, LegendLine
 from .steady_range import steady_range
+from .upright_marks import Rules, Stripes
 
 # Antialiasing halves the frame rate, and OpenGL draws grey areas on machines without it.
 pg.setConfigOptions(antialias=False, useOpenGL=False)
 
 
-class Dash(Enum):
-    """How a line is drawn."""
-
-    SOLID = Qt.PenStyle.SolidLine
-    DASHED = Qt.PenStyle.DashLine
-    DOTTED = Qt.PenStyle.DotLine
-    DASH_DOTTED = Qt.PenStyle.DashDotLine
-
-
-@dataclass(frozen=True)
-class Ink:
-    """Which colour of a theme, and which dash: told anew at every change of theme."""
-
-    colour: Callable[[Theme], Colour]
-    dash: Dash = Dash.SOLID
-    filled: float = 0.0
-    """Opacity of an area, 0 to 1."""
-
-
-def trace(number: int, dash: Dash = Dash.SOLID) -> Ink:
-    """Ink of the trace with this number."""
-    return Ink(lambda theme: theme.traces[number % len(theme.traces)], dash)
-
-
-PREDICTED = Ink(lambda theme: theme.predicted, Dash.DASHED)
-LIMIT = Ink(lambda theme: "#b3261e" if theme.name == "light" else "#ff8a80", Dash.DASHED)
-GUIDE = Ink(lambda theme: theme.line, Dash.DOTTED)
-_SIGNS = {Dash.SOLID: "━━━", Dash.DASHED: "╍╍╍", Dash.DOTTED: "┉┉┉", Dash.DASH_DOTTED: "━╸╺"}
 _DOT = "●"
+_UP_EM = 5
+"""Room for the upright axis: the same in all plots, so that those above one another are aligned."""
 
 
 class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
@@ -68,6 +42,11 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         super().__init__(parent=parent, axisItems={"bottom": self.across, "left": self.up}, enableMenu=False)
         self.setAccessibleName(name)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        for unseen in ("top", "right"):
+            # They would write a label anew, that nobody sees, at every change of the range.
+            self.getPlotItem().getAxis(unseen).unlinkFromView()
+        # A width that followed the numbers would be known after painting, and everything painted again.
+        self.up.setWidth(_UP_EM * self.fontMetrics().height())
         self.getPlotItem().hideButtons()
         self.getPlotItem().showGrid(x=True, y=True, alpha=0.25)
         self.getPlotItem().setLogMode(across.scale is Scale.LOGARITHMIC, up.scale is Scale.LOGARITHMIC)
@@ -76,7 +55,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._legend: LegendLine | None = None
         self._legend_entries: list[tuple[Ink, str, str]] = []
         self._curves: list[pg.PlotDataItem] = []
-        self._hint = ""
+        self._hint, self._is_empty = "", False
         self._blanked: tuple[AxisItem, ...] = (self.across, self.up)
         self._theme = theme
         self._follows = False
@@ -92,11 +71,13 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def with_hint(self, text: str) -> "Plot":
         """Say this while no curve has a point."""
         self._hint = text
+        self._look_for_points()
         return self
 
     def always_numbered(self) -> "Plot":
         """Keep the numbers across where there is no curve: another plot, above, has the same axis."""
         self._blanked = (self.up,)
+        self.across.blank(Blankness.WRITTEN)
         return self
 
     def curve(self, ink: Ink, name: str = "") -> pg.PlotDataItem:
@@ -105,8 +86,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         item.setSkipFiniteCheck(False)
         self._add(item)
         if name:
-            self._legend_entries.append((ink, _SIGNS[ink.dash], name))
-        self._ink(ink, lambda theme: item.setPen(_pen(ink, theme)))
+            self._legend_entries.append((ink, SIGNS[ink.dash], name))
+        self._ink(ink, lambda theme: item.setPen(pen_of(ink, theme)))
         self._relegend()
         return item
 
@@ -122,22 +103,24 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
 
     def band(self, ink: Ink) -> Band:
         """Add an area between two lines, for uncertainties and envelopes."""
-        band = Band(self.addItem)
-        self._ink(ink, lambda theme: band.paint(_shade(ink, theme)))
+        band = Band()
+        self.addItem(band.item)
+        self._ink(ink, lambda theme: band.paint(shade_of(ink, theme)))
         return band
 
-    def region(self, ink: Ink) -> pg.LinearRegionItem:
-        """Add an upright stripe that nobody can move; `place` puts it."""
-        item = pg.LinearRegionItem(movable=False)
-        for line in item.lines:
-            line.setPen(pg.mkPen(None))
-        self.addItem(item)
-        self._ink(ink, lambda theme: item.setBrush(pg.mkBrush(_shade(ink, theme))))
+    def stripes(self, ink: Ink) -> Stripes:
+        """Add upright stripes: where something happens, or is predicted to."""
+        item = Stripes(self._across)
+        self.addItem(item, ignoreBounds=True)
+        self._ink(ink, lambda theme: item.dress(shade_of(ink, theme)))
         return item
 
-    def place(self, region: pg.LinearRegionItem, low: float, high: float) -> None:
-        """Put a stripe between two values of the axis across."""
-        region.setRegion((self._across(low), self._across(high)))
+    def rules(self, ink: Ink) -> Rules:
+        """Add upright lines without labels."""
+        item = Rules(self._across)
+        self.addItem(item, ignoreBounds=True)
+        self._ink(ink, lambda theme: item.dress(pen_of(ink, theme)))
+        return item
 
     def upright(self, ink: Ink, value: float, label: str = "", label_at: float = 0.92) -> pg.InfiniteLine:
         """Add an upright line at a value; its label stands at a share of the height."""
@@ -154,6 +137,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._inked.clear()
         self._legend_entries.clear()
         self._curves.clear()
+        self._look_for_points()
         self._relegend()
 
     def retheme(self, theme: Theme) -> None:
@@ -199,10 +183,9 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def drawForeground(self, painter: QPainter, rect: QRectF) -> None:
         """Say the hint where there is nothing else to see."""
         super().drawForeground(painter, rect)
-        is_empty = bool(self._hint) and not any(_has_points(each) for each in self._curves)
-        for axis in self._blanked:
-            axis.blank(Blankness.BLANK if is_empty else Blankness.WRITTEN)
-        if is_empty:
+        # A curve that is cleared says nothing.
+        self._look_for_points()
+        if self._is_empty:
             painter.resetTransform()
             inside = self.mapFromScene(self.getViewBox().sceneBoundingRect()).boundingRect()
             paint_hint(painter, inside, self._hint, self._theme.muted)
@@ -241,7 +224,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.addItem(item, ignoreBounds=True)
 
         def paint(theme: Theme) -> None:
-            item.setPen(_pen(ink, theme))
+            item.setPen(pen_of(ink, theme))
             if label:
                 item.label.setColor(ink.colour(theme))
                 item.label.fill = pg.mkBrush(theme.base)
@@ -256,6 +239,17 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def _add(self, item: pg.PlotDataItem) -> None:
         self._curves.append(item)
         self.addItem(item)
+        item.sigPlotChanged.connect(self._look_for_points)
+        self._look_for_points()
+
+    def _look_for_points(self, *_: object) -> None:
+        """Write the hint, and no numbers, where there is nothing that they could be about.
+
+        Best known before anything is painted: what is found out in painting has to be painted again.
+        """
+        self._is_empty = bool(self._hint) and not any(_has_points(each) for each in self._curves)
+        for axis in self._blanked:
+            axis.blank(Blankness.BLANK if self._is_empty else Blankness.WRITTEN)
 
     def _relegend(self) -> None:
         """Write the legend anew: its colours follow the theme."""
@@ -278,17 +272,6 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         height = self._legend.height_for(width)
         self._legend.setGeometry(left, 0, width, height)
         self.getPlotItem().layout.setRowFixedHeight(0, height)
-
-
-def _pen(ink: Ink, theme: Theme) -> object:
-    # One pixel: two cost five times the time of a frame.
-    return pg.mkPen(ink.colour(theme), width=1, style=ink.dash.value)
-
-
-def _shade(ink: Ink, theme: Theme) -> object:
-    colour = pg.mkColor(ink.colour(theme))
-    colour.setAlphaF(ink.filled or 0.25)
-    return colour
 
 
 def _has_points(item: pg.PlotDataItem) -> bool:

@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from analysis.live.envelope import envelope, zigzag
 
-from .plot import Ink, Plot
+from .ink import Ink
+from .plot import Plot
 
 MOST_COLUMNS = 3000
 

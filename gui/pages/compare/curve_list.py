@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 from analysis.comparison.trace import Origin, Response, Trace
 
 from ...hint import paint_hint
-from ...plots.plot import Dash, Ink, trace
+from ...plots.ink import Dash, Ink, trace
 from ...theme import Theme
 
 _DASHES = {Origin.MEASURED: Dash.SOLID, Origin.SIMULATED: Dash.DASHED, Origin.PREDICTED: Dash.DASH_DOTTED}

@@ -11,14 +11,14 @@ from analysis.comparison.trace import Origin, Trace
 from analysis.difference import Difference
 
 from ...plots.axis import LOG_FREQUENCY, Axis, Scale
-from ...plots.plot import GUIDE, Dash, Ink, Plot, trace
+from ...plots.ink import GUIDE, Dash, Ink, trace
+from ...plots.plot import Plot
 from ...theme import Theme
 
 MAGNITUDE = Axis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
 DIFFERENCE = Axis("Difference", "dB")
 _MARKER = Ink(lambda theme: theme.accent)
-_BAND, _BAND_COLUMNS = 0.16, 600
-_LEFT_EM = 5
+_BAND, _BAND_COLUMNS = 0.16, 300
 _DOTS = {Origin.MEASURED: 10, Origin.SIMULATED: 6, Origin.PREDICTED: 4}
 
 
@@ -39,9 +39,6 @@ class CurvePlots(QWidget):
         self.differences.always_numbered().setXLink(self.magnitudes)
         # One frequency axis for both: the lower one's.
         self.magnitudes.across.show_nothing()
-        left = _LEFT_EM * self.fontMetrics().height()
-        for plot in (self.magnitudes, self.differences):
-            plot.getPlotItem().getAxis("left").setWidth(left)
         splitter = QSplitter(Qt.Orientation.Vertical)
         splitter.setAccessibleName("Curves and their difference")
         splitter.addWidget(self.magnitudes)

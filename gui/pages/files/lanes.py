@@ -13,7 +13,8 @@ from analysis.live.envelope import zigzag
 from analysis.overview import RecordingOverview
 
 from ...plots.axis import Axis
-from ...plots.plot import LIMIT, Dash, Ink, Plot, trace
+from ...plots.ink import LIMIT, Dash, Ink, trace
+from ...plots.plot import Plot
 from ...theme import Theme
 from .file_words import role_text, unit_text
 
@@ -237,22 +238,24 @@ class RecordingLanes(QWidget):
         self.markers_moved.emit()
 
     def _mark_segments(self, overview: RecordingOverview) -> None:
-        rate_hz = overview.recording.sample_rate_hz
-        for segment in overview.recording.segments:
-            length = segment.stop - segment.start
-            for lane in self._lanes:
-                is_named = lane is self._lanes[0] and length > _NAMED_SHARE * overview.recording.samples
-                label = segment.label.replace("_", " ") if is_named else ""
-                lane.plot.upright(SEGMENT, segment.first_sample / rate_hz, label, _LABEL_AT)
+        """Draw a line where each segment begins; long ones are named in the first lane."""
+        recording = overview.recording
+        begun_s = [each.first_sample / recording.sample_rate_hz for each in recording.segments]
+        for lane in self._lanes:
+            lane.plot.rules(SEGMENT).show_at(begun_s)
+        for segment, at_s in zip(recording.segments, begun_s, strict=True):
+            if segment.stop - segment.start > _NAMED_SHARE * recording.samples:
+                label = segment.label.replace("_", " ")
+                self._lanes[0].plot.upright(SEGMENT, at_s, label, _LABEL_AT)
 
     def _mark_overloads(self, overview: RecordingOverview) -> None:
         rate_hz = overview.recording.sample_rate_hz
-        for overload in overview.recording.overloads:
-            for lane in self._lanes:
-                if lane.role == overload.channel:
-                    stripe = lane.plot.region(LIMIT)
-                    last = overload.last_sample + 1
-                    lane.plot.place(stripe, overload.first_sample / rate_hz, last / rate_hz)
+        for lane in self._lanes:
+            lane.plot.stripes(LIMIT).show_bands(
+                (each.first_sample / rate_hz, (each.last_sample + 1) / rate_hz)
+                for each in overview.recording.overloads
+                if each.channel == lane.role
+            )
 
     def _share_height(self) -> None:
         """Give all lanes the same height; the last has the time axis on top of it."""
@@ -260,6 +263,8 @@ class RecordingLanes(QWidget):
         lane = max(1, (self.height() - axis) // max(1, len(self._lanes)))
         for place in range(len(self._lanes)):
             self._layout.setStretch(place, lane + (axis if place == len(self._lanes) - 1 else 0))
+        # At once: a layout that comes after the first picture has everything painted twice.
+        self._layout.activate()
 
     def _ranged(self, view: pg.ViewBox, _range: object) -> None:
         if not self._lanes or view is not self._lanes[0].plot.getViewBox():

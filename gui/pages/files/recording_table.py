@@ -1,5 +1,6 @@
 """The list of recordings: one row a file, with its state in words and a small picture."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,17 @@ _THIS_ROW_TOO = QItemSelectionModel.SelectionFlag.Select | QItemSelectionModel.S
 _WIDE = HEADINGS.index("Excitation")
 PATH_ROLE = Qt.ItemDataRole.UserRole
 SORT_ROLE = Qt.ItemDataRole.UserRole + 1
+_MEASURED_ROWS = 60
+"""Rows whose cells say how wide their columns are: a thousand would take a tenth of a second."""
 THUMBNAIL_SIZE = QSize(THUMBNAIL_COLUMNS, 30)
+
+
+@dataclass(frozen=True)
+class _Row:
+    """What the cells of a row say, and what they are sorted by."""
+
+    texts: tuple[str, ...]
+    sorting: tuple[str | float, ...]
 
 
 class RecordingModel(QAbstractTableModel):
@@ -45,6 +56,7 @@ class RecordingModel(QAbstractTableModel):
         super().__init__()
         self._theme = theme
         self._entries: tuple[ListedRecording, ...] = ()
+        self._rows: tuple[_Row, ...] = ()
         self._thumbnails: dict[Path, Thumbnail | None] = {}
         self._pictures: dict[Path, QPixmap] = {}
 
@@ -54,12 +66,15 @@ class RecordingModel(QAbstractTableModel):
         return self._entries
 
     def show_entries(self, entries: tuple[ListedRecording, ...]) -> None:
-        """List other files; pictures of those that stay are kept."""
+        """List other files; pictures of those that stay are kept. The same list anew changes nothing."""
+        if entries == self._entries:
+            return
         self.beginResetModel()
         self._entries = entries
+        self._rows = tuple(_Row(_texts(entry), _sorting(entry)) for entry in entries)
         kept = {entry.path for entry in entries}
         self._thumbnails = {path: each for path, each in self._thumbnails.items() if path in kept}
-        self._draw_all()
+        self._pictures = {path: each for path, each in self._pictures.items() if path in kept}
         self.endResetModel()
 
     def missing_pictures(self) -> tuple[Path, ...]:
@@ -69,13 +84,13 @@ class RecordingModel(QAbstractTableModel):
     def show_thumbnails(self, found: dict[Path, Thumbnail | None]) -> None:
         """Put pictures into the rows."""
         self._thumbnails |= found
-        self._draw_all()
         if self._entries:
             self.dataChanged.emit(self.index(0, PICTURE), self.index(len(self._entries) - 1, PICTURE))
 
     def retheme(self, theme: Theme) -> None:
         """Draw the pictures in other colours."""
         self._theme = theme
+        self._pictures.clear()
         self.show_thumbnails({})
 
     def rowCount(self, parent: Index = _NOWHERE) -> int:
@@ -96,29 +111,31 @@ class RecordingModel(QAbstractTableModel):
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         """Text, picture, tooltip and sorting value of a cell."""
-        entry, column = self._entries[index.row()], index.column()
+        entry, row, column = self._entries[index.row()], self._rows[index.row()], index.column()
         content: Any = None
         match role:
             case Qt.ItemDataRole.DisplayRole:
-                content = _texts(entry)[column]
+                content = row.texts[column]
             case Qt.ItemDataRole.DecorationRole if column == PICTURE:
-                content = self._pictures.get(entry.path)
+                content = self._picture(entry.path)
             case Qt.ItemDataRole.ToolTipRole:
                 content = f"{entry.path}\n{entry.said.reason}\n{entry.said.notes}".strip()
             case Qt.ItemDataRole.TextAlignmentRole if column in _NUMBERS:
                 content = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
             case Qt.ItemDataRole.AccessibleTextRole:
-                content = f"{HEADINGS[column]}: {_texts(entry)[column] or 'picture'}"
+                content = f"{HEADINGS[column]}: {row.texts[column] or 'picture'}"
             case Qt.ItemDataRole.UserRole:
                 content = entry.path
             case _ if role == SORT_ROLE:
-                content = _sorting(entry)[column]
+                content = row.sorting[column]
         return content
 
-    def _draw_all(self) -> None:
-        self._pictures = {
-            path: _drawn(each, self._theme) for path, each in self._thumbnails.items() if each is not None
-        }
+    def _picture(self, path: Path) -> QPixmap | None:
+        """Draw the picture of a row when it comes into sight: those of a whole night take a while."""
+        found = self._thumbnails.get(path)
+        if found is not None and path not in self._pictures:
+            self._pictures[path] = _drawn(found, self._theme)
+        return self._pictures.get(path)
 
 
 class _ChosenRows(QSortFilterProxyModel):
@@ -164,6 +181,7 @@ class RecordingTable(QTableView):
         self.verticalHeader().hide()
         self.verticalHeader().setDefaultSectionSize(THUMBNAIL_SIZE.height() + 6)
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.horizontalHeader().setResizeContentsPrecision(_MEASURED_ROWS)
         self.horizontalHeader().setHighlightSections(False)
         self.horizontalHeader().setSectionResizeMode(_WIDE, QHeaderView.ResizeMode.Stretch)
         self.horizontalHeader().setDefaultAlignment(

@@ -6,8 +6,8 @@ from analysis.foresight import Foresight
 from analysis.live.view import LiveView
 
 from ...plots.axis import FREQUENCY, Axis, Scale
-from ...plots.plot import PREDICTED, Dash, Ink, Plot, trace
-from ...plots.stripes import Stripes
+from ...plots.ink import PREDICTED, Dash, Ink, trace
+from ...plots.plot import Plot
 from ...theme import Theme
 
 
@@ -22,7 +22,7 @@ class CoursePlot(QWidget):
         up = Axis("Response I, II", "x / A0", scale=Scale.LOGARITHMIC)
         self.plot = Plot("Response over frequency", FREQUENCY, up, theme).with_legend()
         self.plot.with_hint("A point every tenth of a second of a dwell or a sweep; the prediction beneath.")
-        self._stripes = Stripes(self.plot, Ink(lambda theme: theme.traces[3], filled=0.15))
+        self._stripes = self.plot.stripes(Ink(lambda theme: theme.traces[3], filled=0.15))
         self._predicted = self.plot.curve(PREDICTED, "I, simulated")
         self._linear = self.plot.curve(trace(2, Dash.DOTTED), "linear, simulated")
         self._first = self.plot.dots(trace(3), "I, measured", 3)
@@ -73,7 +73,7 @@ class SweepEnvelopePlot(QWidget):
         super().__init__(parent)
         self.plot = Plot("Sweep envelope", FREQUENCY, Axis("m0 velocity", "mm/s", 1e3), theme).with_legend()
         self.plot.with_hint("Largest and smallest velocity of m0 while a sweep passes by.")
-        self._stripes = Stripes(self.plot, Ink(lambda theme: theme.traces[3], filled=0.15))
+        self._stripes = self.plot.stripes(Ink(lambda theme: theme.traces[3], filled=0.15))
         self._upper = self.plot.curve(trace(3), "largest")
         self._lower = self.plot.curve(trace(0), "smallest")
         self._shown = 0

@@ -9,7 +9,8 @@ from analysis.live.envelope import zigzag
 from analysis.live.view import LiveView
 
 from ...plots.axis import Axis
-from ...plots.plot import Plot, trace
+from ...plots.ink import trace
+from ...plots.plot import Plot
 from ...theme import Theme
 from .channel_words import channel_axis, channel_word
 
@@ -97,3 +98,5 @@ class Lanes(QWidget):
         lane = max(1, (self.height() - axis) // max(1, len(self.plots)))
         for place in range(len(self.plots)):
             self._layout.setStretch(place, lane + (axis if place == len(self.plots) - 1 else 0))
+        # At once: a layout that comes after the first picture has everything painted twice.
+        self._layout.activate()

@@ -8,7 +8,8 @@ from analysis.live.portrait import Portrait
 from analysis.live.view import LiveView
 
 from ...plots.axis import Axis
-from ...plots.plot import Plot, trace
+from ...plots.ink import trace
+from ...plots.plot import Plot
 from ...theme import Theme
 
 _ACROSS = Axis("m0 displacement", "µm", 1e6, short="x (µm)")

@@ -7,7 +7,8 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from analysis.live.view import LiveView
 
 from ...plots.axis import LOG_FREQUENCY, Axis, Scale
-from ...plots.plot import Plot, trace
+from ...plots.ink import trace
+from ...plots.plot import Plot
 from ...theme import Theme
 from .channel_words import channel_word
 

@@ -6,7 +6,8 @@ from analysis.foresight import Foresight
 from analysis.live.view import LiveView
 
 from ...plots.axis import FREQUENCY, Axis, Scale
-from ...plots.plot import PREDICTED, Dash, Ink, Plot, trace
+from ...plots.ink import PREDICTED, Dash, Ink, trace
+from ...plots.plot import Plot
 from ...theme import Theme
 
 

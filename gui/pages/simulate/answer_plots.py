@@ -10,7 +10,8 @@ from analysis.similarity import THRESHOLD, Similarity
 from analysis.simulation.course import SimulationCourse
 
 from ...plots.axis import LOG_FREQUENCY, Axis, Scale
-from ...plots.plot import GUIDE, LIMIT, Dash, Ink, Plot, trace
+from ...plots.ink import GUIDE, LIMIT, Dash, Ink, trace
+from ...plots.plot import Plot
 from ...theme import Theme
 
 RESPONSE = Axis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
@@ -76,9 +77,11 @@ class AnswerPlots(QWidget):
 
     def _responses(self, course: SimulationCourse, model: str, number: int) -> None:
         if number == 0:
-            for place, (low_hz, high_hz) in enumerate(course.collision_bands_hz(model)):
-                self.responses.place(self.responses.region(_COLLIDING), low_hz, high_hz)
-                self.responses.upright(_EDGE, low_hz, "" if place else f"impacts, {model}")
+            bands_hz = course.collision_bands_hz(model)
+            self.responses.stripes(_COLLIDING).show_bands(bands_hz)
+            self.responses.rules(_EDGE).show_at(low_hz for low_hz, _ in bands_hz[1:])
+            if bands_hz:
+                self.responses.upright(_EDGE, bands_hz[0][0], f"impacts, {model}")
         for name, label, dash in (
             ("response_i", "Response I", Dash.SOLID),
             ("response_ii", "Response II", Dash.DOTTED),

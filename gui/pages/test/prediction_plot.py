@@ -5,8 +5,8 @@ import numpy as np
 from analysis.foresight import Foresight
 
 from ...plots.axis import FREQUENCY, Axis, Scale
-from ...plots.plot import Dash, Ink, Plot, trace
-from ...plots.stripes import Stripes
+from ...plots.ink import Dash, Ink, trace
+from ...plots.plot import Plot
 from ...theme import Theme
 
 COLLISION = Ink(lambda theme: theme.traces[3], filled=0.18)
@@ -23,7 +23,7 @@ class PredictionPlot(Plot):
         self._first = self.curve(Ink(lambda theme: theme.predicted, Dash.DASHED), "Response I, simulated")
         self._second = self.curve(Ink(lambda theme: theme.traces[0], Dash.DOTTED), "Response II, simulated")
         self._linear = self.curve(trace(2, Dash.DOTTED), "without contact")
-        self._stripes = Stripes(self, COLLISION)
+        self._stripes = self.stripes(COLLISION)
 
     def show_foresight(self, seen: Foresight | None) -> None:
         """Draw a prediction; None clears the plot."""

@@ -6,7 +6,8 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 from acquisition.plan.outlook import Outlook
 
 from ...plots.axis import LOG_FREQUENCY, TIME, Axis, Scale
-from ...plots.plot import Plot, trace
+from ...plots.ink import trace
+from ...plots.plot import Plot
 from ...plots.signal_curve import SignalCurve
 from ...theme import Theme
 

@@ -3,7 +3,8 @@
 import pytest
 
 from gui.plots.axis import LOG_FREQUENCY, TIME, Axis, thinned
-from gui.plots.plot import Plot, trace
+from gui.plots.ink import trace
+from gui.plots.plot import Plot
 from gui.theme import LIGHT
 
 

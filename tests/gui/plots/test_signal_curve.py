@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gui.plots.axis import TIME, Axis
-from gui.plots.plot import Plot, trace
+from gui.plots.ink import trace
+from gui.plots.plot import Plot
 from gui.plots.signal_curve import SignalCurve
 from gui.theme import LIGHT
 
