@@ -58,6 +58,8 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
     def __init__(self, orientation: str, axis: Axis) -> None:
         super().__init__(orientation)
         self._blankness = Blankness.WRITTEN
+        self.levels: tuple[list[float], ...] = ()
+        """Places of the ticks that were painted last, major ones first."""
         self.enableAutoSIPrefix(False)
         self.setLabel(axis.text)
         self._axis, self._factor = axis, axis.factor
@@ -79,6 +81,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 
     def paint(self, painter: QPainter, *_: object) -> None:
         """Draw at once: pyqtgraph's way, by a QPicture, looks for the font again with every label."""
+        self.levels = ()
         specs = self.generateDrawSpecs(painter)
         if specs is not None:
             self.drawPicture(painter, *specs)
@@ -116,6 +119,11 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 
     def tickValues(self, low: float, high: float, size: float) -> list[tuple[float, list[float]]]:
         """Choose the places of ticks: major ones carry a label, minor ones do not."""
+        found = self._ticks(low, high, size)
+        self.levels = tuple([each for each in places if low <= each <= high] for _, places in found)
+        return found
+
+    def _ticks(self, low: float, high: float, size: float) -> list[tuple[float, list[float]]]:
         if not self.logMode:
             factor = self._factor
             # The labelled level alone: each line of a grid costs time in every frame.

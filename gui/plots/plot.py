@@ -12,6 +12,7 @@ from ..hint import paint_hint
 from ..theme import Theme
 from .axis import Axis, AxisItem, Blankness, Scale
 from .band import Band
+from .grid import Grid
 from .ink import SIGNS, Ink, pen_of, shade_of
 from .legend import LegendEntry, LegendLine
 from .steady_range import steady_range
@@ -48,7 +49,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         # A width that followed the numbers would be known after painting, and everything painted again.
         self.up.setWidth(_UP_EM * self.fontMetrics().height())
         self.getPlotItem().hideButtons()
-        self.getPlotItem().showGrid(x=True, y=True, alpha=0.25)
+        self._grid = Grid(self.across, self.up)
+        self.addItem(self._grid, ignoreBounds=True)
         self.getPlotItem().setLogMode(across.scale is Scale.LOGARITHMIC, up.scale is Scale.LOGARITHMIC)
         self._scales = [across.scale, up.scale]
         self._inked: list[tuple[Ink, Callable[[Theme], None]]] = []
@@ -134,6 +136,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def wipe(self) -> None:
         """Take every curve, band and line away, for others."""
         self.getPlotItem().clear()
+        self.addItem(self._grid, ignoreBounds=True)
         self._inked.clear()
         self._legend_entries.clear()
         self._curves.clear()
@@ -144,6 +147,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """Draw in other colours."""
         self._theme = theme
         self.setBackground(theme.base)
+        self._grid.dress(theme)
         for axis in (self.across, self.up):
             axis.setPen(pg.mkPen(theme.line))
             axis.setTextPen(pg.mkPen(theme.text))

@@ -9,6 +9,8 @@ from time import thread_time
 
 import numpy as np
 import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QImage, QPainter
 
 from acquisition.excitation.stepped_sine import SteppedSine
 from acquisition.instruments import Block, Overload
@@ -27,8 +29,8 @@ from gui.pages.queue.draft import with_sweep
 from gui.screenshots import SHOWN, SHOWN_TOO
 from gui.theme import DARK, LIGHT
 
-YARDSTICK_S = 0.0097
-"""What `yardstick` takes where the bound was measured; a slower processor is given as much more."""
+YARDSTICK_S = 0.0054
+"""What `yardstick` takes where the bound was set; a slower processor is given as much more."""
 RATE_HZ, LONG_S, STEPS = 51_200.0, 20.0, 200
 LONG_CHANNELS = (
     ("drive_voltage", "voltage", "V"),
@@ -36,21 +38,29 @@ LONG_CHANNELS = (
     ("base_acceleration", "acceleration", "m s-2"),
     ("m0_velocity", "velocity", "m s-1"),
 )
-MANY = 240
-"""Recordings of a night: rows of a queue, and files of a folder."""
+MANY, LISTED = 240, 120
+"""Recordings of a night: rows of a queue; and files of a folder, fewer, for to read them takes its time."""
 SIMULATED = 500
 """Frequencies of a simulation, for each of two models."""
 
 
 def yardstick():
+    """Processor time of a piece of work of a window's kinds: Python, text, lines, a picture's memory."""
     begun_s = thread_time()
-    sum(number * number for number in range(300_000))
+    picture = QImage(1200, 600, QImage.Format.Format_ARGB32_Premultiplied)
+    picture.fill(Qt.GlobalColor.white)
+    painter = QPainter(picture)
+    for number in range(100):
+        painter.drawText(10, 6 * number, f"a label of a plot, {number}")
+        painter.drawLine(0, 6 * number, 1200, 6 * number)
+    painter.end()
+    sum(number * number for number in range(150_000))
     return thread_time() - begun_s
 
 
-def bound_s():
-    """The bound on this processor at the speed that it has now."""
-    return BOUND_S * max(1.0, yardstick() / YARDSTICK_S)
+def bound_s(before_s):
+    """The bound on this processor at the speed that it has had since the yardstick took so long."""
+    return BOUND_S * max(1.0, 0.5 * (before_s + yardstick()) / YARDSTICK_S)
 
 
 def curve(number):
@@ -119,12 +129,12 @@ def first_looks(window):
 def of_files(window, recording, long_recording):
     files, lanes = window.pages[FILES], window.pages[FILES].lanes
     spectrogram = files.pictures.spectrogram
-    for place in range(MANY):
+    for place in range(LISTED):
         os.link(recording, recording.with_name(f"night-{place}.h5"))
     table = files.table.recordings
 
     def is_listed():
-        return table.rowCount() > MANY and not table.missing_pictures()
+        return table.rowCount() > LISTED and not table.missing_pictures()
 
     yield Action("list the files of a night", files.list_folder, is_listed)
     yield Action("open a recording", lambda: files.open_path(recording), lambda: bool(lanes.plots))
@@ -224,11 +234,12 @@ def test_nothing_that_is_done_on_a_page_keeps_the_loop_over_the_bound(
     qtbot.waitUntil(lambda: window.pages[TEST].is_done, timeout=120_000)
     slow = {}
     for action in actions(window, recording, long_recording, tmp_path):
+        before_s = yardstick()
         window.loop_watch.begin()
         action.act()
         qtbot.waitUntil(action.is_done, timeout=120_000)
         # The loop has been round, whatever the act left to it.
         qtbot.waitUntil(lambda: window.loop_watch.rounds >= 5)
-        if window.loop_watch.busiest_s > bound_s():
-            slow[action.name] = window.loop_watch.busiest_s
+        if (busiest_s := window.loop_watch.busiest_s) > bound_s(before_s):
+            slow[action.name] = busiest_s
     assert slow == {}
