@@ -7,10 +7,11 @@ from time import monotonic
 
 import numpy as np
 
-from ..campaign.item import CampaignItem, CampaignProgress
+from ..campaign.item import CampaignItem, CampaignProgress, Item
 from ..check.finding import BenchReport
 from ..instruments import Block
 from ..plan.campaign import Campaign
+from ..run.schedule import measured_s
 from ..run.state import RunState
 from .messages import Messages
 from .recent import Recent
@@ -36,6 +37,7 @@ class Shown:
         self._file = Path()
         self._done_s = 0.0
         self._campaign_s = 0.0
+        self._planned_s: dict[str, float] = {}
         self._overloads = 0
 
     @property
@@ -85,6 +87,7 @@ class Shown:
         """Show that a campaign is being carried out."""
         self._folder = folder
         self._campaign_s, self._done_s, self._file = campaign.duration_s, 0.0, Path()
+        self._planned_s = {name: measured_s(each) + campaign.rest_s for name, each in campaign.recordings()}
         self._put_rows(_queued(campaign))
         self._put(state=EngineState.RUNNING, armed=None)
 
@@ -109,8 +112,10 @@ class Shown:
         self.messages.info(text)
 
     def item(self, item: CampaignItem) -> None:
-        """Show how a recording came out."""
-        if self._status.run is not None and item.name == self._status.run.name:
+        """Show how a recording came out; what an earlier run has made is done already."""
+        if item.result is Item.KEPT:
+            self._done_s += self._planned_s.get(item.name, 0.0)
+        elif self._status.run is not None and item.name == self._status.run.name:
             self._done_s += self._status.run.total_s
         self._row(item.name, item.result.value, item.reason, str(item.path))
 

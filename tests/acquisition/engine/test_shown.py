@@ -59,3 +59,12 @@ def test_a_folder_that_went_away_is_a_disk_without_room_and_ends_no_run(shown, t
     shown.begin(campaign("point"), gone)
     shown.tell(progress(gone / "point.h5", 0, 1.0), BENCH)
     assert shown.status().disk_free_bytes == 0
+
+
+def test_what_an_earlier_run_has_made_counts_as_done(shown, tmp_path):
+    twice = campaign("made", "point")
+    shown.begin(twice, tmp_path)
+    shown.item(CampaignItem("made", Item.KEPT, tmp_path / "made.h5", "", next(iter(Why))))
+    shown.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
+    run = shown.status().run
+    assert run.campaign_elapsed_s == pytest.approx(twice.duration_s / 2 + run.elapsed_s)
