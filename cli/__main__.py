@@ -35,6 +35,9 @@ COMMANDS = {
         "stop",
         "Stop what an engine drives, and the campaign with it; the recording is kept and says why.",
     ),
+    "release": Place(
+        "watch", "release", "Let a run go on that was held with vibench stop --level hold, or in the window."
+    ),
     "analyse": Place(
         "analyse",
         "analyse",

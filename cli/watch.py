@@ -1,4 +1,4 @@
-"""`vibench watch` and `vibench stop`: look at an engine that runs on this computer, or end its run."""
+"""`vibench watch`, `stop` and `release`: look at an engine on this computer, end its run, or let it go on."""
 
 import time
 from typing import Annotated
@@ -45,7 +45,10 @@ def stop(
     pid: Pid = None,
     level: Annotated[
         StopLevel,
-        typer.Option("--level", help="How hard: the plan's ramp, the shortest ramp, or off at once."),
+        typer.Option(
+            "--level",
+            help="How hard: held until vibench release, the plan's ramp, the shortest ramp, or off at once.",
+        ),
     ] = StopLevel.RAMP,
     reason: Annotated[str, typer.Option("--reason", help="Stands in the recording.")] = "vibench stop",
 ) -> None:
@@ -53,7 +56,19 @@ def stop(
     engine = the_engine(pid)
     with EngineClient.attach(engine.address) as client:
         client.stop(level, reason)
-    console.print(f"{engine.what}, process {engine.pid}: told to stop ({level.value}).")
+    told = (
+        "to hold; 'vibench release' lets it go on" if level is StopLevel.HOLD else f"to stop ({level.value})"
+    )
+    console.print(f"{engine.what}, process {engine.pid}: told {told}.")
+
+
+def release(pid: Pid = None) -> None:
+    """Let a run go on that was held with vibench stop --level hold, or in the window."""
+    engine = the_engine(pid)
+    with EngineClient.attach(engine.address) as client:
+        # A hold may be asked for before there is anything to hold, as in a rest: it is taken back as well.
+        client.resume()
+    console.print(f"{engine.what}, process {engine.pid}: told to go on.")
 
 
 def _facts(engine: Announcement) -> dict[str, object]:

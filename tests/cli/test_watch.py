@@ -59,10 +59,14 @@ def vibench(*arguments):
     )
 
 
-def test_a_stop_from_another_terminal_ends_the_run_and_stands_in_the_recording(running, tmp_path):
+def test_a_run_is_held_released_and_ended_from_another_terminal(running, vibench_here, tmp_path):
     seen = json.loads(vibench("watch", "--json").stdout)["engines"]
     assert [each["pid"] for each in seen] == [running.pid]
     assert seen[0]["status"]["run"]["name"] == "dwell"
+    assert "vibench release" in vibench_here("stop", "--level", "hold", cwd=tmp_path).stdout
+    wait(running, EngineState.HELD)
+    assert "told to go on" in vibench_here("release", cwd=tmp_path).stdout
+    wait(running, EngineState.RUNNING)
     told = vibench("stop", "--level", "abort", "--reason", "smoke in the laboratory")
     assert told.returncode == 0, told.stderr
     wait(running, EngineState.READY)
