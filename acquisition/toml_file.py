@@ -1,6 +1,7 @@
 """TOML files in: parsed, validated, or refused with the file, the key, what was given, what is allowed."""
 
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -51,20 +52,37 @@ def validated(content: dict[str, Any], model: type[Model], origin: str) -> Model
 
 
 def complaints(error: ValidationError) -> str:
-    """Say in one clause each what a model did not allow."""
-    return "; ".join(_complaint(detail) for detail in error.errors())
+    """Say in a clause each what a model did not allow; keys of one fault share theirs."""
+    details = error.errors()
+    missing = _key_clause(details, "missing", "is missing: it is required", "are missing: they are required")
+    unknown = _key_clause(
+        details,
+        "extra_forbidden",
+        "is not a known key: check its spelling and unit suffix, or remove it",
+        "are no known keys: check their spelling and unit suffixes, or give another file",
+    )
+    other = (_complaint(each) for each in details if each["type"] not in {"missing", "extra_forbidden"})
+    return "; ".join([*other, *missing, *unknown])
+
+
+def _key_clause(details: Sequence[Any], kind: str, of_one: str, of_many: str) -> tuple[str, ...]:
+    keys = [_key(each) for each in details if each["type"] == kind]
+    match keys:
+        case []:
+            return ()
+        case [key]:
+            return (f"{key} {of_one}",)
+        case _:
+            return (f"{', '.join(keys)} {of_many}",)
+
+
+def _key(detail: Any) -> str:
+    return ".".join(str(part) for part in detail["loc"]) or "the whole file"
 
 
 def _complaint(detail: Any) -> str:
-    key = ".".join(str(part) for part in detail["loc"]) or "the whole file"
-    match detail["type"]:
-        case "missing":
-            return f"{key} is missing: it is required"
-        case "extra_forbidden":
-            return f"{key} is not a known key: check its spelling and unit suffix, or remove it"
-        case _:
-            reason = str(detail["msg"]).removeprefix("Value error, ")
-            return f"{key} = {_shown(detail['input'])}: {reason[0].lower()}{reason[1:]}"
+    reason = str(detail["msg"]).removeprefix("Value error, ")
+    return f"{_key(detail)} = {_shown(detail['input'])}: {reason[0].lower()}{reason[1:]}"
 
 
 def _shown(value: object) -> str:
