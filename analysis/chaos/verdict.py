@@ -136,7 +136,9 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
     evidence = replace(so_far, rotation=found)
     if evidence.spread < ABOVE_NOISE * evidence.noise:
         if evidence.spread <= SMALL:
-            why = f"the points stay within {evidence.spread:.1%} of the orbit, hardly above their noise"
+            why = (
+                f"the points stay within {100 * evidence.spread:.1f} % of the orbit, hardly above their noise"
+            )
             return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)
         return _undecided(
             f"the points scatter by {evidence.spread / evidence.noise:.1f} times their noise, and below "
@@ -157,8 +159,8 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
 def _judged(evidence: Evidence, test: ZeroOne, noise_test: SurrogateTest) -> MotionVerdict:
     if not noise_test.is_valid:
         return _undecided(
-            f"surrogates missed the spectrum by {noise_test.spectrum_error:.0%}, so linear noise cannot be "
-            "excluded; record longer",
+            f"surrogates missed the spectrum by {100 * noise_test.spectrum_error:.0f} %, so linear noise "
+            "cannot be excluded; record longer",
             evidence,
         )
     if not noise_test.rejects_linear_noise:
@@ -184,7 +186,7 @@ def _noisy(evidence: Evidence, noise_test: SurrogateTest) -> MotionVerdict:
     if evidence.spread > SMALL:
         return _undecided(f"linear noise explains the points as well (p = {noise_test.p:.2f})", evidence)
     why = (
-        f"the points scatter about one point by {evidence.spread:.1%} of the orbit like linear noise "
+        f"the points scatter about one point by {100 * evidence.spread:.1f} % of the orbit like linear noise "
         f"(p = {noise_test.p:.2f}), though by more than the vibrometer's own"
     )
     return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)

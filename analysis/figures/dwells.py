@@ -138,7 +138,8 @@ def dwells_caption(rising: Sequence[Pair]) -> str:
     return (
         f"Displacement of m0 and its spectrum over the last {window_s:.3g} s (largest line in each "
         f"{_COLUMN_HZ:g} Hz). {'. '.join(said)}. Where the motion is chaotic, measured and simulated signals "
-        "agree in their statistics, not instant by instant."
+        "agree in their statistics, not instant by instant; the simulated one is somewhat larger, since the "
+        "recorded base does not yield to its blows."
     )
 
 

@@ -77,5 +77,5 @@ def _caption(up: SweepAnalysis, down: SweepAnalysis, found: Hysteresis) -> str:
     return (
         f"Response II of sweeps up and down at {up.excitation.amplitude_vpp:g} Vpp. "
         f"Up: {jumps_text(up.jumps)}. Down: {jumps_text(down.jumps)}. {widths + '. ' if widths else ''}"
-        f"Grey: more than 1.5 dB apart, {share:.0%} of the band."
+        f"Grey: more than 1.5 dB apart, {100 * share:.0f} % of the band."
     )

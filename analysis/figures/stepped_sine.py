@@ -137,8 +137,8 @@ def stepped_sine_caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay
         return text
     return (
         f"{text} Simulated under the recorded base motion: median difference "
-        f"{laid.difference.median_abs_db:.2g} dB, {laid.difference.share_within_two:.0%} of the steps "
-        f"within two standard errors, {laid.run.impacts} impacts within the steps."
+        f"{laid.difference.median_abs_db:.2g} dB, {100 * laid.difference.share_within_two:.0f} % of the "
+        f"steps within two standard errors, {laid.run.impacts} impacts within the steps."
     )
 
 

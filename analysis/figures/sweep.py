@@ -156,7 +156,7 @@ def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
         apart = laid.difference.where(outside)
         smooth = (
             f"; outside of it {apart.median_abs_db:.2g} dB median difference, "
-            f"{apart.share_within_two:.0%} of the intervals within two standard errors"
+            f"{100 * apart.share_within_two:.0f} % of the intervals within two standard errors"
             if outside.any()
             else ""
         )
