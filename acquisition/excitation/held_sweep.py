@@ -49,8 +49,9 @@ class HeldSweep(MovingSine, AbstractFeedback):
 
     def steps(self) -> Iterator[Step]:
         """One step for every ``step_s``, all of one segment, at the largest setting."""
+        segment = self.segment
         for mean_hz, duration_s in self.mean_steps():
-            yield Step(Tone(mean_hz), 0.0, duration_s, self.segment)
+            yield Step(Tone(mean_hz), 0.0, duration_s, segment)
 
     def held_accelerations(self) -> Iterator[tuple[float, float]]:
         """Give the level at every step."""

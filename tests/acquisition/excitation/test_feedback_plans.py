@@ -58,6 +58,7 @@ def test_a_held_sweep_passes_the_frequencies_of_an_open_one():
     played = [step.play.frequency_hz for step in held.steps()]
     np.testing.assert_array_equal(played, [step.play.frequency_hz for step in SineSweep(**shape).steps()])
     assert held.segment.numbers["hold"] == "measured displacement"
+    assert len({id(step.segment) for step in held.steps()}) == 1, "one segment is recorded, not one a step"
 
 
 def test_a_displacement_s_acceleration_grows_with_the_square_of_frequency():
