@@ -27,7 +27,7 @@ def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
     """Say what feedback found; nothing for a measurement without it."""
     jumps = noted_jumps(notes)
     if jumps:
-        said = ", ".join(f"{each.low_hz:.5g} to {each.high_hz:.5g} Hz ({each.direction})" for each in jumps)
+        said = ", ".join(f"{each.low_hz:.5g} and {each.high_hz:.5g} Hz ({each.direction})" for each in jumps)
         yield f"Jumps between {said}."
     steps = [each.numbers for each in notes if each.kind == "achieved" and "motion" in each.numbers]
     periods = sorted({_whole(each, "period") for each in steps if each["motion"] == "periodic"})

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..arrays import Reals
+from ..chaos.verdict import MotionKind
 from ..dwell import DwellResponse
 from ..measurement_analysis import DwellAnalysis
 from ..overlay import DwellOverlay
@@ -135,11 +136,16 @@ def dwells_caption(rising: Sequence[Pair]) -> str:
         )
         said.append(f"{text}; {bands} re the drive's line" if bands else text)
     window_s = rising[0][0].response.window_s
-    return (
+    text = (
         f"Displacement of m0 and its spectrum over the last {window_s:.3g} s (largest line in each "
-        f"{_COLUMN_HZ:g} Hz). {'. '.join(said)}. Where the motion is chaotic, measured and simulated signals "
-        "agree in their statistics, not instant by instant; the simulated one is somewhat larger, since the "
-        "recorded base does not yield to its blows."
+        f"{_COLUMN_HZ:g} Hz). {'. '.join(said)}."
+    )
+    if all(analysis.motion.verdict.kind is MotionKind.PERIODIC for analysis, _ in rising):
+        return text
+    return (
+        f"{text} Where the motion is chaotic, measured and simulated signals agree in their statistics, not "
+        "instant by instant; the simulated one is somewhat larger, since the recorded base does not yield to "
+        "its blows."
     )
 
 

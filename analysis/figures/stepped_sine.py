@@ -3,6 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 
+from acquisition.excitation.resonance_tracking import ResonanceTracking
 from acquisition.excitation.stepped_level import SteppedLevel
 
 from ..arrays import Reals
@@ -66,6 +67,8 @@ def _title(analysis: SteppedSineAnalysis) -> str:
     match analysis.excitation:
         case SteppedLevel(frequency_hz=frequency_hz):
             return f"Stepped level, {frequency_hz:g} Hz"
+        case ResonanceTracking():
+            return f"Tracked resonance, around {np.median(analysis.response.frequency_hz):.4g} Hz"
         case plan:
             return f"Stepped sine, {plan.amplitude_vpp:g} Vpp"
 
@@ -130,8 +133,13 @@ def stepped_sine_caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay
         f"at {found.frequency_hz[top]:.4g} Hz: {found.response_ii[top]:.3g} ± "
         f"{2 * found.sd_response_ii[top]:.2g}."
     )
-    if isinstance(analysis.excitation, SteppedLevel):
-        text = stepped_level_caption(analysis)
+    match analysis.excitation:
+        case SteppedLevel():
+            text = stepped_level_caption(analysis)
+        case ResonanceTracking():
+            text = f"Resonance tracked, levels of the base: {found.frequency_hz.size}."
+        case _:
+            pass
     text = " ".join([text, *feedback_sentences(analysis.facts.feedback)])
     if laid is None:
         return text

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from acquisition.excitation.resonance_tracking import ResonanceTracking
 from acquisition.excitation.stepped_level import SteppedLevel
 
 from ..campaign_results import CampaignResults, DwellResult, NoiseResult, SweepResult
@@ -22,8 +23,7 @@ def findings(results: CampaignResults) -> Iterator[str]:
     for dwell in results.dwells:
         yield _dwell(dwell)
     for stepped in results.stepped:
-        yield _stepped(stepped.analysis)
-        yield from feedback_sentences(stepped.analysis.facts.feedback)
+        yield from _stepped(stepped.analysis)
 
 
 def _noise(result: NoiseResult) -> str:
@@ -50,14 +50,20 @@ def _sweep(result: SweepResult) -> str:
     )
 
 
-def _stepped(analysis: SteppedSineAnalysis) -> str:
-    if isinstance(analysis.excitation, SteppedLevel):
-        return stepped_level_caption(analysis)
-    found = analysis.response
-    return (
-        f"Stepped sine at {analysis.excitation.amplitude_vpp:g} Vpp: Response II up to "
-        f"{found.response_ii.max():.3g} in {found.frequency_hz.size} steps."
-    )
+def _stepped(analysis: SteppedSineAnalysis) -> Iterator[str]:
+    heard = tuple(feedback_sentences(analysis.facts.feedback))
+    match analysis.excitation:
+        case SteppedLevel():
+            yield stepped_level_caption(analysis)
+        case ResonanceTracking():
+            yield from heard
+        case plan:
+            found = analysis.response.response_ii
+            text = (
+                f"Stepped sine at {plan.amplitude_vpp:g} Vpp: Response II up to {found.max():.3g} in "
+                f"{found.size} steps."
+            )
+            yield " ".join([text, *heard])
 
 
 def _dwell(result: DwellResult) -> str:

@@ -12,11 +12,12 @@ from acquisition.plan.measurement import Measurement
 from acquisition.recording.reader import open_recording
 from acquisition.rig.configuration import load_rig
 from acquisition.run.run_measurement import run_measurement
-from analysis.campaign_results import SteppedSineResult
+from analysis.campaign_results import CampaignResults, SteppedSineResult
 from analysis.feedback_notes import FeedbackNote
 from analysis.feedback_words import feedback_sentences, noted_jumps
 from analysis.figures.stepped_sine import stepped_sine_figure
 from analysis.measurement_analysis import analyse_recording
+from analysis.report.findings import findings
 from analysis.summary import summary
 
 ROOT = Path(__file__).parent.parent.parent
@@ -32,6 +33,9 @@ def test_only_bracketed_jumps_count():
     steep = {**JUMP, "how": "steep, but no jump"}
     (jump,) = noted_jumps(notes(JUMP, steep, kind="jump"))
     assert (jump.low_hz, jump.high_hz, jump.direction) == (100.9375, 101.25, "down")
+    assert list(feedback_sentences(notes(JUMP, kind="jump"))) == [
+        "Jumps between 100.94 and 101.25 Hz (down)."
+    ]
 
 
 def test_steps_are_counted_by_what_they_do():
@@ -83,6 +87,11 @@ def test_a_tracked_resonance_is_analysed_and_said(analysed):
     (sentence,) = feedback_sentences(analysis.facts.feedback)
     assert sentence.startswith("Phase resonance at 266.")
     assert "natural frequency 266.1" in sentence
+    said = findings(CampaignResults("run", (SteppedSineResult(analysis, None),), ()))
+    assert list(said) == [sentence], "it is no stepped sine"
+    drawn = stepped_sine_figure(analysis)
+    assert drawn.title == "Tracked resonance, around 266.4 Hz"
+    assert drawn.caption == f"Resonance tracked, levels of the base: 1. {sentence}"
     document = json.loads(json.dumps(summary(SteppedSineResult(analysis, None))))
     kinds = [each["kind"] for each in document["recording"]["feedback"]]
     assert kinds.count("resonance") == 1
