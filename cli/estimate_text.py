@@ -30,7 +30,8 @@ def estimate_text(expected: Estimate) -> str:
     length = timedelta(seconds=round(expected.duration_s))
     kept = f" ({expected.kept} kept)" if expected.kept else ""
     room = f"about {expected.total_bytes / 1e6:.0f} MB; {expected.free_bytes / 1e6:.0f} MB are free"
-    lines = [f"{expected.recordings} recordings{kept}, {length} (h:min:s) of rig time, {room}"]
+    count = "1 recording" if expected.recordings == 1 else f"{expected.recordings} recordings"
+    lines = [f"{count}{kept}, {length} (h:min:s) of rig time, {room}"]
     if expected.rest_s:
         lines.append(f"{timedelta(seconds=round(expected.rest_s))} of it are silence between recordings")
     if expected.lead_in_s:
