@@ -17,6 +17,7 @@ from acquisition.recording.overview import BIN_SAMPLES, CountOverview, OverviewS
 from .arrays import Reals
 from .errors import InvalidRequest
 from .live.envelope import Samples, column_starts, envelope
+from .live.outline import outline
 
 _COARSER = 16
 """Bins of one level in one bin of the next."""
@@ -86,7 +87,7 @@ class RecordingOverview:
 
     def _from_samples(self, roles: Sequence[str], begin: int, end: int, columns: int) -> Picture:
         values = np.stack([self.recording.read(role, begin, end) for role in roles])
-        low, high = envelope(values, columns)
+        low, high = outline(values, columns)
         starts = column_starts(end - begin, columns)
         time_s = (begin + starts) / self.recording.sample_rate_hz
         return Picture(time_s, low, high, (end - begin) / starts.size)

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from ..arrays import Reals
 from ..recorded_channels import BASE, DRIVE, RESPONSE
 from ..results import Transmission
-from .envelope import Samples, column_starts, envelope
+from .envelope import Samples, column_starts
 from .impacts import ImpactCounter
 from .levels import Level, LevelMeters
+from .outline import outline
 from .portrait import PoincareSection, Portrait, portrait, portrait_samples
 from .ring import Ring
 from .sine_response import look_samples, sine_point, stretch_samples
@@ -114,7 +115,7 @@ class LiveView:
     def lanes(self, span_s: float, columns: int) -> Lanes:
         """Give the newest seconds as columns of a picture."""
         window = self._ring.newest(round(span_s * self._rate_hz))
-        low, high = envelope(window.values, columns)
+        low, high = outline(window.values, columns)
         starts = column_starts(window.values.shape[1], columns)
         return Lanes((window.first_sample + starts) / self._rate_hz, low, high)
 

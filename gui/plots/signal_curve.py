@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.live.envelope import envelope, zigzag
+from analysis.live.envelope import zigzag
+from analysis.live.outline import outline
 
 from .ink import Ink
 from .plot import Plot
@@ -49,7 +50,7 @@ class SignalCurve:
             time_s = self._start_s + np.arange(first, last) / self._rate_hz
             self._curve.setData(time_s, seen)
             return
-        low, high = envelope(seen, columns)
+        low, high = outline(seen, columns)
         edges = np.arange(columns) * len(seen) // columns
         time_s = self._start_s + (first + np.repeat(edges, 2)) / self._rate_hz
         self._curve.setData(time_s, zigzag(np.asarray(low, float), np.asarray(high, float)))

@@ -1,0 +1,70 @@
+"""A steady sine has straight edges at any width of a column; a wave that can be seen is left a wave."""
+
+import numpy as np
+import pytest
+
+from analysis.live.envelope import envelope
+from analysis.live.outline import outline
+
+RATE_HZ, COLUMNS = 51_200.0, 1000
+
+
+def sine(frequency_hz, span_s, noise=0.0):
+    time_s = np.arange(round(span_s * RATE_HZ)) / RATE_HZ
+    wobble = noise * np.random.default_rng(1).standard_normal(time_s.size)
+    return (0.3 + np.sin(2 * np.pi * frequency_hz * time_s) + wobble).astype(np.float32)
+
+
+@pytest.mark.parametrize("frequency_hz", [95.0, 130.0, 260.0, 331.0, 470.0, 700.0, 2000.0])
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_the_edges_of_a_steady_sine_are_straight(frequency_hz, noise):
+    low, high = outline(sine(frequency_hz, 2.0, noise), COLUMNS)
+    room = 0.03 + 5 * noise
+    assert high[4:-4] == pytest.approx(1.3, abs=room)
+    assert low[4:-4] == pytest.approx(-0.7, abs=room)
+
+
+def test_the_plain_extremes_of_that_sine_are_a_comb():
+    low, high = envelope(sine(260.0, 2.0), COLUMNS)
+    assert high.min() < 0.8
+    assert low.max() > -0.2
+
+
+def test_a_wave_of_many_columns_is_left_a_wave():
+    wave = sine(260.0, 0.2)
+    for drawn, plain in zip(outline(wave, COLUMNS), envelope(wave, COLUMNS), strict=True):
+        assert np.array_equal(drawn, plain)
+
+
+def test_noise_is_left_as_it_is():
+    noise = np.random.default_rng(2).standard_normal(102_400).astype(np.float32)
+    assert np.array_equal(outline(noise, COLUMNS)[1], envelope(noise, COLUMNS)[1])
+
+
+def test_an_impact_of_three_samples_is_in_the_outline_and_near_its_place():
+    wave = sine(260.0, 2.0)
+    wave[51_200:51_203] = 5.0
+    _, high = outline(wave, COLUMNS)
+    struck = np.flatnonzero(high > 4.9)
+    assert 1 <= struck.size <= 4
+    assert abs(struck.mean() - 500) <= 3
+
+
+def test_every_channel_is_outlined_by_its_own_period():
+    both = np.stack((sine(260.0, 2.0), sine(20.0, 2.0)))
+    low, high = outline(both, COLUMNS)
+    assert np.array_equal(high[1], envelope(both[1], COLUMNS)[1])
+    assert high[0, 4:-4].min() > 1.2
+    assert low.shape == high.shape == (2, COLUMNS)
+
+
+def test_lost_samples_and_silence_are_drawn_as_they_are():
+    lost = np.full(102_400, np.nan, dtype=np.float32)
+    silent = np.zeros(102_400, dtype=np.float32)
+    assert np.isnan(outline(lost, COLUMNS)[0]).all()
+    assert (outline(silent, COLUMNS)[1] == 0).all()
+    half = sine(260.0, 2.0)
+    half[:51_200] = np.nan
+    low, high = outline(half, COLUMNS)
+    assert np.isnan(low[:490]).all()
+    assert high[510:-4] == pytest.approx(1.3, abs=0.03)
