@@ -38,7 +38,9 @@ class Theme:
     raised: Colour
     """Ground of buttons and headers."""
     line: Colour
-    """Borders and grids."""
+    """Borders of groups and grids."""
+    edge: Colour
+    """Borders of fields, which tell where something can be typed: a contrast of at least 3."""
     text: Colour
     muted: Colour
     """Text of second rank."""
@@ -56,6 +58,7 @@ LIGHT = Theme(
     base="#ffffff",
     raised="#e6e9ee",
     line="#b9c0ca",
+    edge="#7a838f",
     text="#14181f",
     muted="#4a5361",
     accent="#005a94",
@@ -75,6 +78,7 @@ DARK = Theme(
     base="#12151a",
     raised="#2a303a",
     line="#4b5563",
+    edge="#77828f",
     text="#eceff4",
     muted="#aeb8c6",
     accent="#6cbcf0",
@@ -109,7 +113,7 @@ def palette(theme: Theme) -> QPalette:
         (role.Highlight, theme.accent),
         (role.HighlightedText, theme.base),
         (role.Link, theme.accent),
-        (role.Mid, theme.line),
+        (role.Mid, theme.edge),
     ):
         colours.setColor(where, QColor(colour))
     for where in (role.WindowText, role.Text, role.ButtonText):

@@ -57,9 +57,8 @@ def _periods(samples: Samples, low: Samples, high: Samples) -> float:
 
 def _widened(edge: Samples, reach: int, extreme: np.ufunc) -> Samples:
     """Give every column the extreme of so many columns around it."""
-    before = (reach - 1) // 2
+    before, found = (reach - 1) // 2, edge.copy()
     padded = np.pad(edge, (before, reach - 1 - before), mode="edge")
-    found = padded[: edge.size].copy()
-    for shift in range(1, reach):
+    for shift in range(reach):
         extreme(found, padded[shift : shift + edge.size], out=found)
     return found

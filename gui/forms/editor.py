@@ -7,9 +7,10 @@ from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Protocol, Union, get_args, get_origin
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QWheelEvent
-from PySide6.QtWidgets import QComboBox, QLineEdit, QWidget
+from PySide6.QtGui import QPaintEvent, QWheelEvent
+from PySide6.QtWidgets import QComboBox, QWidget
 
+from .field_edge import LineField, draw_edge
 from .field_facts import FieldFacts
 from .quantity_edit import QuantityEdit
 
@@ -68,6 +69,11 @@ class QuantityEditor:
 class Choice(QComboBox):
     """A choice that a turning wheel changes only while it has the focus."""
 
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the box, then its edge."""
+        super().paintEvent(event)
+        draw_edge(self)
+
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Scrolling a form must change nothing."""
         if self.hasFocus():
@@ -111,7 +117,7 @@ class TextEditor:
     """A word or a sentence."""
 
     def __init__(self, changed: Callable[..., None]) -> None:
-        self._line = QLineEdit()
+        self._line = LineField()
         self._line.editingFinished.connect(changed)
 
     @property
@@ -137,7 +143,7 @@ class ListEditor:
     """Numbers or anything else that a file would hold, as a line of text: ``95, 266, 500``."""
 
     def __init__(self, changed: Callable[..., None]) -> None:
-        self._line = QLineEdit()
+        self._line = LineField()
         self._line.setPlaceholderText("none; or for example 95, 266, 500")
         self._line.editingFinished.connect(changed)
         self._complaint = ""

@@ -1,11 +1,12 @@
 """A field for one quantity: its unit stands in the field, its limits in the tooltip."""
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QFocusEvent, QValidator, QWheelEvent
+from PySide6.QtGui import QFocusEvent, QPaintEvent, QValidator, QWheelEvent
 from PySide6.QtWidgets import QAbstractSpinBox, QWidget
 
 from acquisition.errors import ConfigurationError
 
+from .field_edge import draw_edge
 from .quantity_text import parsed_quantity, quantity_text
 
 STEP = 0.05
@@ -66,6 +67,11 @@ class QuantityEdit(QAbstractSpinBox):
     def validate(self, text: str, position: int) -> tuple[QValidator.State, str, int]:
         """Let everything be typed; it is read when the typing is finished."""
         return QValidator.State.Acceptable, text, position
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the field, then its edge."""
+        super().paintEvent(event)
+        draw_edge(self)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Turn only in the field that has the focus: scrolling a form must change nothing."""

@@ -41,9 +41,12 @@ GUIDE = Ink(lambda theme: theme.line, Dash.DOTTED)
 SIGNS = {Dash.SOLID: "━━━", Dash.DASHED: "╍╍╍", Dash.DOTTED: "┉┉┉", Dash.DASH_DOTTED: "━╸╺"}
 
 
-def pen_of(ink: Ink, theme: Theme) -> QPen:
-    """Give the pen of a line. One pixel: two cost five times the time of a frame."""
-    pen: QPen = pg.mkPen(ink.colour(theme), width=1, style=ink.dash.value)
+def pen_of(ink: Ink, theme: Theme, width: float = 1.0) -> QPen:
+    """Give the pen of a line, so many pixels of the screen wide; only straight lines may be wider than one.
+
+    Two pixels would take a curve three times as long as two curves: see `logical_line`.
+    """
+    pen: QPen = pg.mkPen(ink.colour(theme), width=width, style=ink.dash.value)
     return pen
 
 

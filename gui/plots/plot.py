@@ -4,7 +4,7 @@ from collections.abc import Callable
 from math import log10
 
 import pyqtgraph as pg
-from PySide6.QtCore import QRectF, Qt
+from PySide6.QtCore import QEvent, QRectF, Qt
 from PySide6.QtGui import QGuiApplication, QKeyEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import QWidget
 
@@ -15,6 +15,7 @@ from .band import Band
 from .grid import Grid
 from .ink import SIGNS, Ink, pen_of, shade_of
 from .legend import LegendEntry, LegendLine
+from .logical_line import LogicalLine
 from .steady_range import steady_range
 from .upright_marks import Rules, Stripes
 
@@ -84,7 +85,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
 
     def curve(self, ink: Ink, name: str = "") -> pg.PlotDataItem:
         """Add a line; ``setData(x, y)`` draws it."""
-        item = pg.PlotDataItem()
+        item = LogicalLine()
         item.setSkipFiniteCheck(False)
         self._add(item)
         if name:
@@ -121,7 +122,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """Add upright lines without labels."""
         item = Rules(self._across)
         self.addItem(item, ignoreBounds=True)
-        self._ink(ink, lambda theme: item.dress(pen_of(ink, theme)))
+        self._ink(ink, lambda theme: item.dress(pen_of(ink, theme, self.devicePixelRatioF())))
         return item
 
     def upright(self, ink: Ink, value: float, label: str = "", label_at: float = 0.92) -> pg.InfiniteLine:
@@ -149,16 +150,16 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.setBackground(theme.base)
         self._grid.dress(theme)
         for axis in (self.across, self.up):
-            axis.setPen(pg.mkPen(theme.line))
+            axis.setPen(pg.mkPen(theme.line, width=self.devicePixelRatioF()))
             axis.setTextPen(pg.mkPen(theme.text))
         for _, paint in self._inked:
             paint(theme)
         self._relegend()
 
     @property
-    def pixels_across(self) -> int:
-        """How many pixels of the screen lie between the ends of the axis across."""
-        return int(self.getViewBox().width() * self.devicePixelRatioF())
+    def lines_across(self) -> int:
+        """How many upright lines fill the picture; on a fine screen each is some of its pixels wide."""
+        return int(self.getViewBox().width())
 
     def show_everything(self) -> None:
         """Let the axes follow the data."""
@@ -176,6 +177,12 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             self.setXRange(*wanted, padding=0)
         if up is not None and (wanted := steady_range(tuple(shown[1]), up)) is not None:
             self.setYRange(*wanted, padding=0)
+
+    def event(self, event: QEvent) -> bool:
+        """Come to a screen with other pixels: straight lines are given its width."""
+        if event.type() == QEvent.Type.DevicePixelRatioChange and getattr(self, "_theme", None) is not None:
+            self.retheme(self._theme)
+        return bool(super().event(event))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Give the legend the lines it needs for the new width."""
@@ -228,7 +235,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.addItem(item, ignoreBounds=True)
 
         def paint(theme: Theme) -> None:
-            item.setPen(pen_of(ink, theme))
+            item.setPen(pen_of(ink, theme, self.devicePixelRatioF()))
             if label:
                 item.label.setColor(ink.colour(theme))
                 item.label.fill = pg.mkBrush(theme.base)

@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 
 from gui.theme import DARK, LIGHT
 
+FIELDS = (QLineEdit, QAbstractSpinBox, QComboBox)
 NAMED_BY_TEXT = (QAbstractButton, QLabel)
 
 
@@ -106,6 +107,29 @@ def cut_off(window):
             or widget.height() < widget.minimumSizeHint().height()
         ):
             yield widget.text(), widget.size(), widget.minimumSizeHint()
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
+def test_every_field_has_an_edge_that_is_seen(window, qapp, qtbot, contrast, theme):
+    """WCAG 2.1, section 1.4.11: at least 3, against what is inside and what is outside."""
+    window.desk.choose_theme(theme)
+    qtbot.waitUntil(lambda: window.is_themed)
+    faint, looked_at = [], 0
+    for name in window.pages:
+        window.show_page(name)
+        qapp.processEvents()
+        for field in window.page.findChildren(QWidget):
+            is_field = isinstance(field, FIELDS) and not inside(field, FIELDS)
+            if not is_field or not field.isVisible() or not field.isEnabled():
+                continue
+            picture = field.grab().toImage()
+            sides = [(0, picture.height() // 2), (picture.width() // 2, picture.height() - 1)]
+            edges = [picture.pixelColor(*side).name() for side in sides]
+            looked_at += 1
+            if min(contrast(edge, ground) for edge in edges for ground in (theme.base, theme.window)) < 3:
+                faint.append((name, field.accessibleName(), edges))
+    assert faint == []
+    assert looked_at > 20
 
 
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)

@@ -7,7 +7,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
     QLabel,
-    QLineEdit,
     QSplitter,
     QVBoxLayout,
     QWidget,
@@ -21,6 +20,7 @@ from analysis.thumbnail import Thumbnail
 
 from ...background import Job
 from ...desk import Desk
+from ...forms.field_edge import LineField
 from ...notice import Notice, NoticeKind, notice_of
 from ...page import Page
 from ...page_names import COMPARE, FILES
@@ -237,12 +237,12 @@ class FilesPage(Page):
         browser.setAccessibleName("Browser")
         bar = QHBoxLayout()
         label = QLabel("F&older")
-        self._folder_line = QLineEdit(str(self.desk.folder))
+        self._folder_line = LineField(str(self.desk.folder))
         self._folder_line.setAccessibleName("Folder of the recordings")
         self._folder_line.editingFinished.connect(self._typed_folder)
         label.setBuddy(self._folder_line)
         search_label = QLabel("Sea&rch")
-        search = QLineEdit()
+        search = LineField()
         search.setAccessibleName("Search in the list")
         search.setPlaceholderText("name, state, excitation…")
         search.setClearButtonEnabled(True)

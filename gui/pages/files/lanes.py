@@ -279,7 +279,7 @@ class RecordingLanes(QWidget):
         low_s, high_s = self.view_s
         start, stop = int(low_s * rate_hz), int(np.ceil(high_s * rate_hz)) + 1
         # A few more columns than pixels: with fewer, a pixel between two columns would stay empty.
-        columns = max(100, int(1.02 * self._lanes[0].plot.pixels_across) + 2)
+        columns = max(100, int(1.02 * self._lanes[0].plot.lines_across) + 2)
         picture = self._overview.picture([lane.role for lane in self._lanes], start, stop, columns)
         for row, lane in enumerate(self._lanes):
             low, high = picture.low[row], picture.high[row]

@@ -3,10 +3,12 @@
 from datetime import UTC, datetime
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QCheckBox, QFormLayout, QGroupBox, QLabel, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QFormLayout, QGroupBox, QLabel, QVBoxLayout, QWidget
 
 from acquisition.rig.configuration import Knob, Rig
 from acquisition.rig.knobs import KnobSheet
+
+from ...forms.field_edge import LineField
 
 
 class KnobSheetForm(QGroupBox):
@@ -19,7 +21,7 @@ class KnobSheetForm(QGroupBox):
         self._note = QLabel("Look at each knob, then tick it. No instrument can report these.")
         self._note.setWordWrap(True)
         self._note.setProperty("rank", "second")
-        self._operator = QLineEdit()
+        self._operator = LineField()
         self._operator.setAccessibleName("Who has looked")
         self._operator.setToolTip("Your name; it goes into every recording")
         self._operator.textChanged.connect(self.changed)
@@ -38,7 +40,7 @@ class KnobSheetForm(QGroupBox):
         return tuple(self._ticks.values())
 
     @property
-    def operator_field(self) -> QLineEdit:
+    def operator_field(self) -> LineField:
         """Where the name is typed."""
         return self._operator
 

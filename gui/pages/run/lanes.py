@@ -17,7 +17,7 @@ from .channel_words import channel_axis, channel_word
 AGO = Axis("Time before now", "s")
 """An axis that stands still: one that scrolls would be painted anew in every frame."""
 LEAST_COLUMNS, MOST_COLUMNS = 500, 3000
-"""Of a lane: as many as there are pixels; with fewer, the pixels between them would stay empty."""
+"""Of a lane: as many as there are lines side by side; between fewer, room would stay empty."""
 AXIS_LETTERS = 9
 TIME_AXIS_EM = 3
 USUAL_SPAN_S = 2.0
@@ -49,7 +49,7 @@ class Lanes(QWidget):
         self.show_channels(tuple((channel.role, channel.unit) for channel in view.channels))
         if not self.plots:
             return
-        seen = view.lanes(span_s, min(max(LEAST_COLUMNS, self.plots[0].pixels_across), MOST_COLUMNS))
+        seen = view.lanes(span_s, min(max(LEAST_COLUMNS, self.plots[0].lines_across), MOST_COLUMNS))
         if len(seen.time_s) == 0:
             return
         time_s = np.repeat(seen.time_s - seen.time_s[-1], 2)

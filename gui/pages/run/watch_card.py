@@ -7,7 +7,6 @@ from PySide6.QtWidgets import (
     QGroupBox,
     QHBoxLayout,
     QLabel,
-    QLineEdit,
     QProgressBar,
     QPushButton,
     QVBoxLayout,
@@ -20,6 +19,7 @@ from analysis.live.view import LiveView
 
 from ...faces import clock
 from ...forms.editor import Choice
+from ...forms.field_edge import LineField
 from ...theme import Theme
 from .lanes import USUAL_SPAN_S
 from .level_meters import LevelMeters
@@ -52,7 +52,7 @@ class WatchCard(QGroupBox):
         self.span.setToolTip("Seconds in a lane")
         self.freeze = QCheckBox("Freeze the picture  (Space)")
         self.freeze.setToolTip("Only the picture stands still; the recording goes on")
-        self.mark = QLineEdit("event")
+        self.mark = LineField("event")
         self.mark.setToolTip("What the mark in the recording says")
         self.mark_button = QPushButton("Mark  (M)")
         self.mark_button.setToolTip("Put the mark at the next sample of the recording")
