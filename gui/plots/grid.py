@@ -7,9 +7,12 @@ from PySide6.QtGui import QColor, QPainter
 from ..theme import Theme
 from .axis import AxisItem
 
-_BEHIND = -100
+_ABOVE = 100
+"""Over the curves: an area that they fill is read by it."""
 _OPACITY = 0.25
 """Of the lines that are labelled; each level after them has a part of it."""
+_APART = 20.0
+"""Pixels from line to line; lines that are closer are fainter."""
 
 
 class Grid(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
@@ -23,7 +26,7 @@ class Grid(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
         super().__init__()
         self._across, self._up = across, up
         self._colour = QColor()
-        self.setZValue(_BEHIND)
+        self.setZValue(_ABOVE)
 
     def dress(self, theme: Theme) -> None:
         """Draw in other colours."""
@@ -36,15 +39,15 @@ class Grid(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
         seen = to_pixels.mapRect(self.boundingRect())
         painter.resetTransform()
         for level, places in enumerate(self._across.levels):
-            painter.setPen(self._shade(level))
+            painter.setPen(self._shade(level, seen.width() / (len(places) + 1)))
             columns = (place * to_pixels.m11() + to_pixels.m31() for place in places)
             painter.drawLines([QLineF(at, seen.top(), at, seen.bottom()) for at in columns])
         for level, places in enumerate(self._up.levels):
-            painter.setPen(self._shade(level))
+            painter.setPen(self._shade(level, seen.height() / (len(places) + 1)))
             rows = (place * to_pixels.m22() + to_pixels.m32() for place in places)
             painter.drawLines([QLineF(seen.left(), at, seen.right(), at) for at in rows])
 
-    def _shade(self, level: int) -> QColor:
+    def _shade(self, level: int, apart: float) -> QColor:
         shade = QColor(self._colour)
-        shade.setAlphaF(_OPACITY / (level + 1))
+        shade.setAlphaF(_OPACITY / (level + 1) * min(1.0, apart / _APART))
         return shade

@@ -24,6 +24,9 @@ pg.setConfigOptions(antialias=False, useOpenGL=False)
 
 
 _DOT = "●"
+_FIRST = -1000
+_RIGHT_EM = 0.6
+"""Room for half of the last number across."""
 _UP_EM = 5
 """Room for the upright axis: the same in all plots, so that those above one another are aligned."""
 
@@ -47,6 +50,12 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         for unseen in ("top", "right"):
             # They would write a label anew, that nobody sees, at every change of the range.
             self.getPlotItem().getAxis(unseen).unlinkFromView()
+        for axis in (self.across, self.up):
+            # Before the grid, which is drawn at their ticks.
+            axis.setZValue(_FIRST)
+        # A number that does not fit below the upper end of its axis would be cut in two.
+        self.up.setStyle(hideOverlappingLabels=True)
+        self.getPlotItem().layout.setContentsMargins(1, 1, round(_RIGHT_EM * self.fontMetrics().height()), 1)
         # A width that followed the numbers would be known after painting, and everything painted again.
         self.up.setWidth(_UP_EM * self.fontMetrics().height())
         self.getPlotItem().hideButtons()

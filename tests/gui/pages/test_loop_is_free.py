@@ -1,16 +1,12 @@
 """Nothing that a person does on a page holds the window up for long."""
 
-import gc
 import json
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from time import thread_time
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QImage, QPainter
 
 from acquisition.excitation.stepped_sine import SteppedSine
 from acquisition.instruments import Block, Overload
@@ -23,14 +19,11 @@ from acquisition.shipped import shipped
 from analysis.comparison.trace import Origin, Response, Trace
 from analysis.simulation.answers import SimulatedPoint, SimulatedSignal
 from analysis.simulation.course import SimulationCourse
-from gui.loop_watch import BOUND_S
 from gui.page_names import COMPARE, FILES, QUEUE, RUN, SIMULATE, TEST
 from gui.pages.queue.draft import with_sweep
 from gui.screenshots import SHOWN, SHOWN_TOO
 from gui.theme import DARK, LIGHT
 
-YARDSTICK_S = 0.0054
-"""What `yardstick` takes where the bound was set; a slower processor is given as much more."""
 RATE_HZ, LONG_S, STEPS = 51_200.0, 20.0, 200
 LONG_CHANNELS = (
     ("drive_voltage", "voltage", "V"),
@@ -42,25 +35,6 @@ MANY, LISTED = 240, 120
 """Recordings of a night: rows of a queue; and files of a folder, fewer, for to read them takes its time."""
 SIMULATED = 500
 """Frequencies of a simulation, for each of two models."""
-
-
-def yardstick():
-    """Processor time of a piece of work of a window's kinds: Python, text, lines, a picture's memory."""
-    begun_s = thread_time()
-    picture = QImage(1200, 600, QImage.Format.Format_ARGB32_Premultiplied)
-    picture.fill(Qt.GlobalColor.white)
-    painter = QPainter(picture)
-    for number in range(100):
-        painter.drawText(10, 6 * number, f"a label of a plot, {number}")
-        painter.drawLine(0, 6 * number, 1200, 6 * number)
-    painter.end()
-    sum(number * number for number in range(150_000))
-    return thread_time() - begun_s
-
-
-def bound_s(before_s):
-    """The bound on this processor at the speed that it has had since the yardstick took so long."""
-    return BOUND_S * max(1.0, 0.5 * (before_s + yardstick()) / YARDSTICK_S)
 
 
 def curve(number):
@@ -216,30 +190,16 @@ def actions(window, recording, long_recording, folder):
     yield from of_frame(window)
 
 
-@pytest.fixture
-def _without_leftovers():
-    """Keep the collector of garbage from walking through what hundreds of other tests have left."""
-    gc.collect()
-    gc.freeze()
-    yield
-    gc.unfreeze()
-
-
 @pytest.mark.usefixtures("_without_leftovers")
 def test_nothing_that_is_done_on_a_page_keeps_the_loop_over_the_bound(
-    window, record, long_recording, tmp_path, qtbot
+    window, record, long_recording, tmp_path, qtbot, held_up
 ):
     window.desk.folder.mkdir()
     recording = record(window.desk.folder, "whole")
     qtbot.waitUntil(lambda: window.pages[TEST].is_done, timeout=120_000)
     slow = {}
     for action in actions(window, recording, long_recording, tmp_path):
-        before_s = yardstick()
-        window.loop_watch.begin()
-        action.act()
-        qtbot.waitUntil(action.is_done, timeout=120_000)
-        # The loop has been round, whatever the act left to it.
-        qtbot.waitUntil(lambda: window.loop_watch.rounds >= 5)
-        if (busiest_s := window.loop_watch.busiest_s) > bound_s(before_s):
+        busiest_s, bound_s = held_up(window, action.act, action.is_done)
+        if busiest_s > bound_s:
             slow[action.name] = busiest_s
     assert slow == {}

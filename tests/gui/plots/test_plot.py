@@ -1,6 +1,7 @@
 """A plot says what will be in it while it is empty, and names its curves above the axes."""
 
 import pytest
+from PySide6.QtGui import QColor
 
 from gui.plots.axis import LOG_FREQUENCY, TIME, Axis, thinned
 from gui.plots.ink import trace
@@ -89,3 +90,21 @@ def test_an_axis_that_leaves_its_numbers_to_another_stays_bare(plot, qapp):
     qapp.processEvents()
     assert not bare.across.label.isVisible()
     bare.close()
+
+
+def test_the_grid_lies_at_the_ticks_at_once(plot, qapp):
+    for top in (1.0, 7.0):
+        plot.setXRange(0.0, top, padding=0)
+        plot.setYRange(0.0, top, padding=0)
+        picture = plot.grab().toImage()
+        box = plot.mapFromScene(plot.getViewBox().sceneBoundingRect()).boundingRect()
+        row = box.top() + 20
+        ground = max(
+            (picture.pixelColor(x, row) for x in range(box.left(), box.right())), key=QColor.lightness
+        )
+        seen = [x for x in range(box.left() + 2, box.right() - 2) if picture.pixelColor(x, row) != ground]
+        ticks = plot.across.levels[0][1:-1]
+        assert len(ticks) >= 2
+        for tick in ticks:
+            place = box.left() + box.width() * tick / top
+            assert min(abs(place - x) for x in seen) < 3
