@@ -5,7 +5,9 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from PySide6.QtCore import QObject, Signal
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from acquisition.campaign.item import Existing
 from acquisition.engine.client import EngineClient
@@ -13,7 +15,7 @@ from acquisition.engine.errors import EngineGone
 from acquisition.engine.recent import Glance
 from acquisition.engine.start import start_engine
 from acquisition.engine.state import DRIVING, EngineState
-from acquisition.engine.status import ArmedPlan, EngineMessage, EngineStatus
+from acquisition.engine.status import ArmedPlan, BenchFacts, EngineMessage, EngineStatus
 from acquisition.errors import AcquisitionError
 from acquisition.plan.campaign import Campaign
 from acquisition.rig.configuration import Rig
@@ -27,6 +29,9 @@ from .notice import Notice, NoticeKind, notice_of
 
 CATCH_UP_S = 2.0
 """Older samples than this are not asked for after a pause: the picture shows now, the file holds all."""
+
+PIECE_S = 0.2
+"""Samples that are taken in at once; a frame of a real instrument's brings a quarter of that."""
 
 BEAT_S = 0.04
 """The engine is not told more often than this that the window lives; it waits for half a second."""
@@ -196,20 +201,30 @@ class Bridge(QObject):
         return look
 
     def _looked(self, glimpse: Glimpse) -> None:
-        self._is_looking = False
         self._status, glance = glimpse
-        if glance is not None and glance.volts.shape[1] > 0:
-            self._take(self._status, glance)
+        if glance is None or self._status.bench is None or glance.volts.shape[1] == 0:
+            self._is_looking = False
+        else:
+            self._begin_taking(self._status, self._status.bench, glance)
         self._tell(self._status)
 
-    def _take(self, status: EngineStatus, glance: Glance) -> None:
-        if status.bench is None:
-            return
+    def _begin_taking(self, status: EngineStatus, bench: BenchFacts, glance: Glance) -> None:
         if self._view is None or glance.run_id != self._view_run:
             name = "" if status.run is None else status.run.name
-            self._view = live_view(status.bench, self._rig, self._campaign, name)
+            self._view = live_view(bench, self._rig, self._campaign, name)
             self._view_run = glance.run_id
-        self._view.add(glance.first_sample, glance.volts)
+        size = max(1, round(PIECE_S * bench.sample_rate_hz))
+        self._take(self._view, glance.first_sample, glance.volts, size)
+
+    def _take(self, view: LiveView, first_sample: int, volts: NDArray[np.float32], size: int) -> None:
+        """Take in a piece: all that comes after a pause, or from a fast simulation, is too much at once."""
+        view.add(first_sample, volts[:, :size])
+        rest = volts[:, size:]
+        if rest.shape[1] == 0:
+            self._is_looking = False
+        else:
+            self.beat()
+            QTimer.singleShot(0, self, lambda: self._take(view, first_sample + size, rest, size))
 
     def _tell(self, status: EngineStatus) -> None:
         for message in status.messages:

@@ -26,6 +26,8 @@ _APART_S = 100e-6
 """Kinks closer than this are counted as one."""
 _LEAST_FRESH_S = 20e-3
 """Fewer samples than this say too little about the noise; they wait for more."""
+_MOST_FRESH_S = 0.1
+"""More samples are looked at piece by piece: each kink is looked for in the whole piece."""
 _NOISE_FACTOR = 5.2
 """Over the standard deviation: noise alone is taken for an impact once in two minutes."""
 _SMOOTH_FACTOR = 3.0
@@ -54,6 +56,7 @@ class ImpactCounter:
         self._beam = np.correlate(kink, kink, mode="full") / power
         self._reach = kink.size - 1
         self._apart = max(1, round(_APART_S * sample_rate_hz))
+        self._most = max(1, round(_MOST_FRESH_S * sample_rate_hz))
         self._least_fresh = round(_LEAST_FRESH_S * sample_rate_hz)
         self._carry = np.empty(0)
         self._count = 0
@@ -65,6 +68,10 @@ class ImpactCounter:
 
     def add(self, velocity: Values | Reals) -> int:
         """Take the next samples, shape (samples,), lost ones NaN; gives how many impacts were found."""
+        starts = range(0, max(1, len(velocity)), self._most)
+        return sum(self._add_piece(velocity[first : first + self._most]) for first in starts)
+
+    def _add_piece(self, velocity: Values | Reals) -> int:
         data = np.concatenate((self._carry, np.asarray(velocity, dtype=np.float64)))
         # A kink is told from its neighbours' rests, so what surrounds it must be there.
         fresh = data.size - (self._finder.size - 1) - 2 * self._reach
