@@ -1,12 +1,14 @@
 """Four pictures of a simulation: responses, exponents, similarity, and the motion itself."""
 
+from collections.abc import Callable
+from functools import partial
 from math import log10
 
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtWidgets import QGridLayout, QWidget
 
-from analysis.similarity import THRESHOLD, Similarity
+from analysis.similarity import THRESHOLD
 from analysis.simulation.course import SimulationCourse
 
 from ...plots.axis import LOG_FREQUENCY, Axis, Scale
@@ -55,27 +57,27 @@ class AnswerPlots(QWidget):
 
     def show_course(self, course: SimulationCourse | None) -> None:
         """Draw what is there."""
-        for plot in self.plots:
-            plot.wipe()
-        if course is None:
-            return
-        for number, model in enumerate(course.models):
-            self._responses(course, model, number)
-            self._exponents(course, model, number)
-        low, high = course.smallest_and_largest_response
-        if high > 0.0:
-            self.responses.setYRange(log10(low) - 0.1, log10(high) + 0.1, padding=0.0)
-        self._motion(course)
-        found = course.similarity()
-        if found is not None:
-            self._likeness(found)
+        for step in self.steps(course):
+            step()
+
+    def steps(self, course: SimulationCourse | None) -> list[Callable[[], None]]:
+        """Draw what is there picture by picture: together they take longer than a frame has."""
+        draws = (self._responses, self._motion, self._exponents, self._likeness)
+        return [partial(_draw_anew, plot, draw, course) for plot, draw in zip(self.plots, draws, strict=True)]
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
         for plot in self.plots:
             plot.retheme(theme)
 
-    def _responses(self, course: SimulationCourse, model: str, number: int) -> None:
+    def _responses(self, course: SimulationCourse) -> None:
+        for number, model in enumerate(course.models):
+            self._responses_of(course, model, number)
+        low, high = course.smallest_and_largest_response
+        if high > 0.0:
+            self.responses.setYRange(log10(low) - 0.1, log10(high) + 0.1, padding=0.0)
+
+    def _responses_of(self, course: SimulationCourse, model: str, number: int) -> None:
         if number == 0:
             bands_hz = course.collision_bands_hz(model)
             self.responses.stripes(_COLLIDING).show_bands(bands_hz)
@@ -91,12 +93,13 @@ class AnswerPlots(QWidget):
                 line = self.responses.curve(trace(number, dash), f"{label}, {model}")
                 _draw(line, frequency_hz, values)
 
-    def _exponents(self, course: SimulationCourse, model: str, number: int) -> None:
-        frequency_hz, values = course.column(model, "lyapunov_per_s")
-        if np.isfinite(values).any():
-            _draw(self.exponents.curve(trace(number), model), frequency_hz, values)
-            if number == 0:
-                self.exponents.level(GUIDE, 0.0)
+    def _exponents(self, course: SimulationCourse) -> None:
+        for number, model in enumerate(course.models):
+            frequency_hz, values = course.column(model, "lyapunov_per_s")
+            if np.isfinite(values).any():
+                _draw(self.exponents.curve(trace(number), model), frequency_hz, values)
+                if number == 0:
+                    self.exponents.level(GUIDE, 0.0)
 
     def _motion(self, course: SimulationCourse) -> None:
         for number, signal in enumerate(course.signals):
@@ -112,11 +115,20 @@ class AnswerPlots(QWidget):
             reach_m = max(gap_m, course.largest_signal_m)
             self.motion.setYRange(-1.1 * reach_m, 1.1 * reach_m, padding=0.0)
 
-    def _likeness(self, found: Similarity) -> None:
+    def _likeness(self, course: SimulationCourse) -> None:
+        found = course.similarity()
+        if found is None:
+            return
         name = f"{100 * found.rate:.0f} % similar ({100 * found.low:.0f} to {100 * found.high:.0f} %)"
         shown = np.maximum(found.difference, _SMALLEST)
         _draw(self.likeness.curve(trace(2), name), found.frequency_hz, shown)
         self.likeness.level(LIMIT, THRESHOLD, "limit")
+
+
+def _draw_anew(plot: Plot, draw: Callable[[SimulationCourse], None], course: SimulationCourse | None) -> None:
+    plot.wipe()
+    if course is not None:
+        draw(course)
 
 
 def _draw(

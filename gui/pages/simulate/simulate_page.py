@@ -1,7 +1,7 @@
 """Simulate: a scene as a form, its cost beside it, and curves that grow while they are computed."""
 
 import os
-from time import monotonic
+from collections.abc import Callable
 
 from PySide6.QtWidgets import (
     QGroupBox,
@@ -28,9 +28,6 @@ from ..side_and_picture import SideAndPicture
 from .answer_plots import AnswerPlots
 from .simulator import Simulator
 
-DRAW_EVERY_S = 0.25
-"""While points arrive: to draw a thousand of them takes as long as a frame has."""
-
 
 class SimulatePage(Page):
     """The form on the left; the answer on the right, as far as it has come."""
@@ -41,7 +38,8 @@ class SimulatePage(Page):
         self.plots = AnswerPlots(desk.theme)
         self.simulator = Simulator(self)
         self._course: SimulationCourse | None = None
-        self._is_stale, self._drawn_s = False, 0.0
+        self._is_stale = False
+        self._undrawn: list[Callable[[], None]] = []
         self._build()
         self.form.changed.connect(self._say_cost)
         self.simulator.grown.connect(self._grow)
@@ -62,10 +60,12 @@ class SimulatePage(Page):
         return self._course is not None and not self.simulator.is_busy and self._course.done > 0
 
     def refresh(self) -> None:
-        """Draw what has come since the last picture, all at once."""
-        if self._is_stale and (not self.simulator.is_busy or monotonic() - self._drawn_s > DRAW_EVERY_S):
-            self._is_stale, self._drawn_s = False, monotonic()
-            self.plots.show_course(self._course)
+        """Draw what has come since the last time, a picture a tick."""
+        if self._is_stale and not self._undrawn:
+            self._is_stale = False
+            self._undrawn = self.plots.steps(self._course)
+        if self._undrawn:
+            self._undrawn.pop(0)()
 
     def left(self) -> None:
         """Keep how the page is divided."""

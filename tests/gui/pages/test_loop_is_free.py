@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from PySide6.QtCore import QTimer
 
 from acquisition.excitation.stepped_sine import SteppedSine
 from acquisition.instruments import Block, Overload
@@ -17,8 +18,10 @@ from acquisition.recording import ChannelHeader, RecordingHeader, RecordingState
 from acquisition.recording import Origin as RecordingOrigin
 from acquisition.shipped import shipped
 from analysis.comparison.trace import Origin, Response, Trace
+from analysis.live.view import LiveChannel, LiveView
 from analysis.simulation.answers import SimulatedPoint, SimulatedSignal
 from analysis.simulation.course import SimulationCourse
+from gui.live_run import warm_up
 from gui.page_names import COMPARE, FILES, QUEUE, RUN, SIMULATE, TEST
 from gui.pages.queue.draft import with_sweep
 from gui.screenshots import SHOWN, SHOWN_TOO
@@ -143,8 +146,9 @@ def of_compare(window, recording, folder):
 def of_simulate(window):
     course, simulate = simulated(), window.pages[SIMULATE]
     yield Action("look at Simulate", lambda: window.show_page(SIMULATE))
-    yield Action("points arrive", lambda: simulate.plots.show_course(course))
-    yield Action("more points arrive", lambda: simulate.plots.show_course(course))
+    for points in ("points", "more points"):
+        for step, plot in zip(simulate.plots.steps(course), simulate.plots.plots, strict=True):
+            yield Action(f"{points} arrive, {plot.accessibleName()}", step)
 
 
 def of_queue(window):
@@ -169,6 +173,32 @@ def of_test(window):
     )
 
 
+def of_run(window):
+    """Watch a sine on four channels, at twenty frames a second."""
+    run, desk = window.pages[RUN], window.desk
+    view = LiveView(
+        [LiveChannel(role, "V", 1.0, 10.0) for role, *_ in LONG_CHANNELS], RATE_HZ, band_hz=(150.0, 350.0)
+    )
+
+    def draw():
+        first, size = view.next_sample, round(RATE_HZ / 20)
+        sine = np.sin(2 * np.pi * 260.0 * np.arange(first, first + size) / RATE_HZ)
+        view.add(first, np.tile(sine.astype(np.float32), (len(LONG_CHANNELS), 1)))
+        run.lanes.show_view(view, 2.0)
+        for picture in (run.watch_card, run.transmission, run.spectrum):
+            picture.show_view(view)
+
+    # As the bridge does when a bench is opened.
+    warm_up()
+    timer = QTimer(window, interval=50)
+    timer.timeout.connect(draw)
+    yield Action("go to Run", lambda: window.show_page(RUN))
+    yield Action("begin to watch", timer.start, lambda: view.next_sample > RATE_HZ)
+    yield Action("dark, in a run", lambda: desk.choose_theme(DARK), lambda: window.is_themed)
+    yield Action("light, in a run", lambda: desk.choose_theme(LIGHT), lambda: window.is_themed)
+    timer.stop()
+
+
 def of_frame(window):
     desk = window.desk
     for page in (RUN, FILES, SIMULATE):
@@ -187,6 +217,7 @@ def actions(window, recording, long_recording, folder):
     yield from of_simulate(window)
     yield from of_queue(window)
     yield from of_test(window)
+    yield from of_run(window)
     yield from of_frame(window)
 
 
