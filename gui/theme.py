@@ -122,7 +122,10 @@ def palette(theme: Theme) -> QPalette:
 
 
 def style_sheet(theme: Theme) -> str:
-    """Say what the palette cannot: panels, rail, banner; sizes follow the font."""
+    """Say what the palette cannot: panels, rail, banner; sizes follow the font.
+
+    A table shows its focus by its frame: the style's own veil over a cell would dim the letters in it.
+    """
     tones = "".join(
         f'*[tone="{tone.value}"] {{ background: {paint.ground}; color: {paint.letters}; }}\n'
         for tone, paint in theme.tones.items()
@@ -151,6 +154,8 @@ QPushButton[rank="first"]:disabled {{ background: {theme.raised}; color: {theme.
 QPushButton[rank="first"]:focus {{ border-color: {theme.text}; }}
 QCheckBox::indicator:unchecked, QListView::indicator:unchecked {{ border: 1px solid {theme.muted};
     border-radius: 2px; background: {theme.base}; }}
+QTableView {{ outline: none; border: 1px solid {theme.line}; }}
+QTableView:focus {{ border-color: {theme.accent}; }}
 QHeaderView::section {{ background: {theme.raised}; color: {theme.text}; border: none;
     border-right: 1px solid {theme.line}; padding: 0.3em 0.5em; }}
 {tones}"""

@@ -41,12 +41,20 @@ GUIDE = Ink(lambda theme: theme.line, Dash.DOTTED)
 SIGNS = {Dash.SOLID: "━━━", Dash.DASHED: "╍╍╍", Dash.DOTTED: "┉┉┉", Dash.DASH_DOTTED: "━╸╺"}
 
 
-def pen_of(ink: Ink, theme: Theme, width: float = 1.0) -> QPen:
-    """Give the pen of a line, so many pixels of the screen wide; only straight lines may be wider than one.
+def straight_pen(ink: Ink, theme: Theme, ratio: float) -> QPen:
+    """Give the pen of a straight line, as wide as a pixel of the layout: so many of the screen."""
+    pen: QPen = pg.mkPen(ink.colour(theme), width=ratio, style=ink.dash.value)
+    return pen
 
-    Two pixels would take a curve three times as long as two curves: see `logical_line`.
+
+def curve_pen(ink: Ink, theme: Theme, ratio: float) -> QPen:
+    """Give the pen of a curve, one pixel of the screen wide; `logical_line` draws it wider.
+
+    Its dashes are as long on a fine screen as on a coarse one.
     """
-    pen: QPen = pg.mkPen(ink.colour(theme), width=width, style=ink.dash.value)
+    pen: QPen = pg.mkPen(ink.colour(theme), width=1, style=ink.dash.value)
+    if ink.dash is not Dash.SOLID and ratio > 1.0:
+        pen.setDashPattern([ratio * part for part in pen.dashPattern()])
     return pen
 
 

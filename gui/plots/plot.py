@@ -13,7 +13,7 @@ from ..theme import Theme
 from .axis import Axis, AxisItem, Blankness, Scale
 from .band import Band
 from .grid import Grid
-from .ink import SIGNS, Ink, pen_of, shade_of
+from .ink import SIGNS, Ink, curve_pen, shade_of, straight_pen
 from .legend import LegendEntry, LegendLine
 from .logical_line import LogicalLine
 from .steady_range import steady_range
@@ -99,7 +99,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._add(item)
         if name:
             self._legend_entries.append((ink, SIGNS[ink.dash], name))
-        self._ink(ink, lambda theme: item.setPen(pen_of(ink, theme)))
+        self._ink(ink, lambda theme: item.setPen(curve_pen(ink, theme, self.devicePixelRatioF())))
         self._relegend()
         return item
 
@@ -131,7 +131,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """Add upright lines without labels."""
         item = Rules(self._across)
         self.addItem(item, ignoreBounds=True)
-        self._ink(ink, lambda theme: item.dress(pen_of(ink, theme, self.devicePixelRatioF())))
+        self._ink(ink, lambda theme: item.dress(straight_pen(ink, theme, self.devicePixelRatioF())))
         return item
 
     def upright(self, ink: Ink, value: float, label: str = "", label_at: float = 0.92) -> pg.InfiniteLine:
@@ -244,7 +244,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.addItem(item, ignoreBounds=True)
 
         def paint(theme: Theme) -> None:
-            item.setPen(pen_of(ink, theme, self.devicePixelRatioF()))
+            item.setPen(straight_pen(ink, theme, self.devicePixelRatioF()))
             if label:
                 item.label.setColor(ink.colour(theme))
                 item.label.fill = pg.mkBrush(theme.base)

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
 from analysis.comparison.trace import Origin, Response, Trace
@@ -115,7 +115,9 @@ def _is_first(each: Trace) -> bool:
 
 
 def _swatch(ink: Ink, theme: Theme) -> QPixmap:
-    picture = QPixmap(*_SWATCH)
+    ratio = QGuiApplication.primaryScreen().devicePixelRatio()
+    picture = QPixmap(QSize(*_SWATCH) * ratio)
+    picture.setDevicePixelRatio(ratio)
     picture.fill(QColor(theme.base))
     painter = QPainter(picture)
     painter.setPen(QPen(QColor(ink.colour(theme)), 2, ink.dash.value))

@@ -15,7 +15,7 @@ from PySide6.QtCore import (
     QSortFilterProxyModel,
     Qt,
 )
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap
+from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
 from analysis.thumbnail import THUMBNAIL_COLUMNS, Thumbnail
@@ -259,7 +259,9 @@ def _sorting(entry: ListedRecording) -> tuple[str | float, ...]:
 
 def _drawn(found: Thumbnail, theme: Theme) -> QPixmap:
     """Paint each column from its lowest to its highest value."""
-    picture = QPixmap(THUMBNAIL_SIZE)
+    ratio = QGuiApplication.primaryScreen().devicePixelRatio()
+    picture = QPixmap(THUMBNAIL_SIZE * ratio)
+    picture.setDevicePixelRatio(ratio)
     picture.fill(QColor(theme.base))
     painter = QPainter(picture)
     painter.setPen(QPen(QColor(theme.traces[0]), 1))

@@ -70,21 +70,27 @@ class Lanes(QWidget):
             plot.retheme(theme)
 
     def _build(self, channels: tuple[tuple[str, str], ...]) -> None:
-        for plot in self.plots:
+        """Have as many lanes as channels; those that are there are used again, for a plot is slow to make."""
+        for plot in self.plots[len(channels) :]:
             self._layout.removeWidget(plot)
             plot.deleteLater()
-        self.plots, self._curves, self._span_s = [], [], 0.0
-        last = len(channels) - 1
-        for row, (role, unit) in enumerate(channels):
-            plot = Plot(f"Lane of {channel_word(role)}", AGO, channel_axis(role, unit), self._theme)
-            plot.with_hint(f"The newest seconds of {channel_word(role)}, while a test runs.")
+        del self.plots[len(channels) :], self._curves[len(channels) :]
+        for row in range(len(self.plots), len(channels)):
+            plot = Plot("Lane", AGO, Axis(""), self._theme)
             plot.setXRange(-USUAL_SPAN_S, 0, padding=0)
-            plot.across.setStyle(showValues=row == last)
-            plot.across.showLabel(row == last)
             plot.up.setWidth(AXIS_LETTERS * self.fontMetrics().averageCharWidth())
             self._curves.append(plot.curve(trace(row)))
             self._layout.addWidget(plot, 1)
             self.plots.append(plot)
+        for (role, unit), plot, curve in zip(channels, self.plots, self._curves, strict=True):
+            curve.clear()
+            plot.setAccessibleName(f"Lane of {channel_word(role)}")
+            plot.with_hint(f"The newest seconds of {channel_word(role)}, while a test runs.")
+            plot.up.show_unit(channel_axis(role, unit))
+            is_last = plot is self.plots[-1]
+            plot.across.setStyle(showValues=is_last)
+            plot.across.showLabel(is_last)
+        self._span_s = 0.0
         self._share_height()
 
     def resizeEvent(self, event: QResizeEvent) -> None:

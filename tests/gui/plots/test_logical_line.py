@@ -1,0 +1,42 @@
+"""A curve is as wide on a fine screen as on a coarse one."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+WIDTHS = """
+from gui.app import application
+application([])
+from gui.plots.axis import TIME, Axis
+from gui.plots.ink import Ink
+from gui.plots.plot import Plot
+from gui.theme import LIGHT
+plot = Plot("a plot", TIME, Axis("Height", "m"), LIGHT)
+plot.resize(400, 300)
+plot.setXRange(0, 10, padding=0)
+plot.setYRange(0, 10, padding=0)
+line = plot.curve(Ink(lambda theme: "#ff0000"))
+for x, y in (([0.0, 10.0], [4.3, 4.3]), ([4.3, 4.3], [0.0, 10.0])):
+    line.setData(x, y)
+    picture = plot.grab().toImage()
+    across, down = picture.width() * 3 // 4, picture.height() // 4
+    places = [(across, each) for each in range(picture.height())] if y[0] == y[1] else (
+        [(each, down) for each in range(picture.width())])
+    print(sum(picture.pixelColor(*place).name() == "#ff0000" for place in places))
+"""
+
+
+@pytest.mark.parametrize(("scale", "pixels"), [("1", "1"), ("2", "2")])
+def test_level_and_upright_lines_have_the_width_of_a_pixel_of_the_layout(scale, pixels):
+    environment = {**os.environ, "QT_SCALE_FACTOR": scale}
+    told = subprocess.run(
+        [sys.executable, "-c", WIDTHS],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
+    assert told.stdout.split() == [pixels, pixels]
