@@ -76,7 +76,7 @@ class Lanes(QWidget):
             plot.deleteLater()
         del self.plots[len(channels) :], self._curves[len(channels) :]
         for row in range(len(self.plots), len(channels)):
-            plot = Plot("Lane", AGO, Axis(""), self._theme)
+            plot = Plot("Lane", AGO, channel_axis(*channels[row]), self._theme)
             plot.setXRange(-USUAL_SPAN_S, 0, padding=0)
             plot.up.setWidth(AXIS_LETTERS * self.fontMetrics().averageCharWidth())
             self._curves.append(plot.curve(trace(row)))

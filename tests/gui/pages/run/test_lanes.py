@@ -1,0 +1,42 @@
+"""The lanes of a run say which channel they show, in its unit, also when the channels change."""
+
+import pytest
+
+from gui.pages.run.channel_words import channel_axis
+from gui.pages.run.lanes import Lanes
+from gui.theme import LIGHT
+
+FOUR = (
+    ("drive_voltage", "V"),
+    ("amplifier_voltage", "V"),
+    ("base_acceleration", "m/s²"),
+    ("m0_velocity", "m/s"),
+)
+OTHERS = (("base_acceleration", "m/s²"), ("m0_velocity", "V"))
+
+
+@pytest.fixture
+def lanes(qapp, qtbot):
+    made = Lanes(LIGHT)
+    qtbot.addWidget(made)
+    made.resize(1000, 700)
+    made.show()
+    return made
+
+
+@pytest.mark.parametrize("channels", [(FOUR,), (FOUR, OTHERS), (OTHERS, FOUR)])
+def test_each_lane_is_labelled_with_its_channel(lanes, qapp, channels):
+    for shown in channels:
+        lanes.show_channels(shown)
+        qapp.processEvents()
+    wanted = [channel_axis(*channel).text for channel in channels[-1]]
+    assert [plot.up.labelText for plot in lanes.plots] == wanted
+    assert all(plot.up.label.isVisible() for plot in lanes.plots)
+
+
+def test_the_last_lane_alone_has_the_time(lanes, qapp):
+    for channels in (OTHERS, FOUR, OTHERS):
+        lanes.show_channels(channels)
+        qapp.processEvents()
+        labelled = [plot.across.label.isVisible() for plot in lanes.plots]
+        assert labelled == [False] * (len(channels) - 1) + [True]
