@@ -19,6 +19,7 @@ from sim.study.software import software
 from sim.study.solve import Existing, solve_study
 from sim.study.study import Start, Study
 
+from .frequency_option import frequencies
 from .interruption import told_to_stop
 from .output import console, print_json
 from .paths import AsJson
@@ -28,17 +29,21 @@ from .study_bar import study_bar
 AUTO: Literal["auto"] = "auto"
 _SHOWN = 24
 """Rows of a table on the terminal; all of them are in the JSON and in the file."""
-_RANGE_PARTS = 3
 _OPTIONS = {
     "models": "--model",
     "amplitudes_m": "--amplitude",
     "gaps_m": "--gap",
     "damping_times_s": "--damping-time",
-    "frequencies_hz": "--frequency",
     "duration_s": "--duration",
     "window_s": "--window",
 }
 """What the user typed, by the name that the study has for it."""
+_ALLOWED = {
+    "greater_than": "it must be above 0",
+    "greater_than_equal": "it must not be negative",
+    "finite_number": "it must be a finite number",
+}
+"""What an option must be, by the name that the validator has for what it is not."""
 
 
 def predict(
@@ -82,7 +87,7 @@ def predict(
             "amplitudes_m": (amplitude,),
             "gaps_m": (gap,),
             "damping_times_s": (damping_time,),
-            "frequencies_hz": _frequencies(frequency),
+            "frequencies_hz": frequencies(frequency),
             "observe": _observables(observe),
             "starts": (start,),
             "accuracy": accuracy,
@@ -111,26 +116,10 @@ def _study(options: dict[str, object]) -> Study:
         return Study.model_validate(options)
     except ValidationError as error:
         first = error.errors()[0]
-        said = first["msg"].removeprefix("Value error, ")
+        said = _ALLOWED.get(first["type"], first["msg"].removeprefix("Value error, "))
         place = str(first["loc"][0]) if first["loc"] else ""
         given = f"{_OPTIONS.get(place, place)} was given as {first['input']!r}: " if place else ""
         raise InvalidRequest(given + said) from error
-
-
-def _frequencies(text: str) -> object:
-    """Read ``260`` or ``10:600:1``; the study judges the numbers."""
-    parts = text.split(":")
-    try:
-        numbers = [float(part) for part in parts]
-    except ValueError as error:
-        raise InvalidRequest(
-            f"a frequency of {text!r} was given; give one number or START:STOP:STEP [Hz]"
-        ) from error
-    if len(numbers) == 1:
-        return numbers
-    if len(numbers) != _RANGE_PARTS:
-        raise InvalidRequest(f"a frequency range of {text!r} was given; give START:STOP:STEP [Hz]")
-    return dict(zip(("start", "stop", "step"), numbers, strict=True))
 
 
 def _observables(text: str) -> tuple[Observable, ...]:

@@ -91,10 +91,10 @@ def test_points_that_are_answered_alike_are_explained_once(vibench_here, tmp_pat
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--amplitude", -1, "--frequency", 100), "--amplitude"),
+        (("--amplitude", -1, "--frequency", 100), "--amplitude was given as -1.0: it must be above 0"),
         (("--amplitude", 1e-6, "--frequency", "x"), "START:STOP:STEP"),
         (("--amplitude", 1e-6, "--frequency", "1:2"), "START:STOP:STEP"),
-        (("--amplitude", 1e-6, "--frequency", "300:200:1"), "--frequency"),
+        (("--amplitude", 1e-6, "--frequency", "300:200:1"), "give 200:300:1"),
         (("--amplitude", 1e-6, "--frequency", 100, "--model", "jelly"), "jelly"),
         (("--amplitude", 1e-6, "--frequency", 100, "--observe", "cats"), "cats"),
         (("--amplitude", 1e-6, "--frequency", 100, "--window", 40), "Window 40"),
