@@ -16,8 +16,8 @@ import numpy as np
 from sim.accuracy import Accuracy
 from sim.drive import Harmonic
 from sim.engine.clock import clock_at
-from sim.engine.flight import flight_tables
 from sim.engine.harmonic_run import advance_harmonic
+from sim.engine.harmonic_tables import harmonic_tables
 from sim.engine.interval import new_state
 from sim.growth.tangent import unit_tangent
 from sim.integrate import new_record
@@ -41,7 +41,7 @@ AMPLITUDES_M = (1e-6, 5e-6, 10e-6, 50e-6)
 
 def run(specimen, drive, changes):
     """Follow ``changes`` small changes for a while; gives processor seconds and impacts."""
-    tables = flight_tables(specimen, drive)
+    tables = harmonic_tables(specimen, drive)
     state = new_state(specimen)
     record = new_record(0.0, COST_S, None, 1e4)._replace(tangent=unit_tangent()[:changes].copy())
     start = time.process_time()

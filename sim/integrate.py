@@ -9,8 +9,8 @@ from .accuracy import Accuracy
 from .base_motion import BaseMotion, sampled_motion, sweep_interval_s, sweep_motion
 from .drive import Drive, Harmonic, LinearSweep, LogarithmicSweep, Sampled, Sweep
 from .engine.clock import clock_at
-from .engine.flight import flight_tables
 from .engine.harmonic_run import advance_harmonic
+from .engine.harmonic_tables import harmonic_tables
 from .engine.interval import interval_tables, new_state
 from .engine.interval_run import advance_intervals
 from .engine.parameters import Vector
@@ -85,7 +85,7 @@ def integrate(
     match drive:
         case Harmonic():
             code = advance_harmonic(
-                state, clock, end, flight_tables(specimen, drive), accuracy.tolerance, record
+                state, clock, end, harmonic_tables(specimen, drive), accuracy.tolerance, record
             )
         case Sampled():
             _check_within(drive.duration_s, end)

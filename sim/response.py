@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 from .accuracy import Accuracy
 from .drive import Harmonic
 from .engine.clock import clock_at
-from .engine.flight import flight_tables
 from .engine.harmonic_run import advance_harmonic
+from .engine.harmonic_tables import harmonic_tables
 from .engine.interval import new_state
 from .engine.record import IMPACTS
 from .engine.tally import (
@@ -103,7 +103,7 @@ def steady_response(
     periods = whole_periods(drive, duration_s, window_s)
     state = new_state(specimen, start_motion(initial_state), accuracy)
     clock = clock_at(0.0)
-    tables = flight_tables(specimen, drive)
+    tables = harmonic_tables(specimen, drive)
     record = new_record(0.0, duration_s, None, max_impact_rate_hz)
     line_s = periods / drive.frequency_hz
     code = advance_harmonic(state, clock, float(duration_s - window_s), tables, accuracy.tolerance, record)

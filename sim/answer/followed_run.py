@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from ..accuracy import Accuracy
 from ..drive import Harmonic
 from ..engine.clock import clock_at
-from ..engine.flight import flight_tables
 from ..engine.harmonic_run import advance_harmonic
+from ..engine.harmonic_tables import harmonic_tables
 from ..engine.interval import new_state
 from ..engine.record import IMPACTS, NEXT_SAMPLE
 from ..engine.tally import (
@@ -97,7 +97,7 @@ class FollowedRun:
         self._tolerance = tolerance
         self._state = new_state(specimen, start_motion(start), Accuracy.REFERENCE)
         self._clock = clock_at(time_s)
-        self._tables = flight_tables(specimen, drive)
+        self._tables = harmonic_tables(specimen, drive)
         self._scales = state_scales(specimen, drive)
         self._tangent = no_tangent()
 

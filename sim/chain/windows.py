@@ -10,7 +10,6 @@ from ..compiled import compiled, inlined, lean
 from ..contact_law import MOST_TERMS
 from ..engine.clock import advance_clock, angle_at
 from ..engine.detection import LARGEST_BOUND, SERIES_TERMS
-from ..engine.flight import fill_series
 from ..engine.parameters import PowerTerms, Table, Vector
 from ..modes import Complex
 from .cell_contact import cell_workspace
@@ -29,6 +28,9 @@ from .tables import (
     UPPER,
     ChainTables,
 )
+
+_INVERSES: NDArray[np.float64] = 1.0 / np.arange(1.0, SERIES_TERMS + 1.0)
+"""1 / (k + 1)."""
 
 
 class Space(NamedTuple):
@@ -261,7 +263,23 @@ def fill_observed(
     for what in range(observed):
         for j in range(len(phasors)):
             terms[j] = phasors[j] * tables.observed[cell, what, j]
-        fill_series(series[what], terms, tables.rates)
+        _fill_series(series[what], terms, tables.rates)
+
+
+@inlined
+def _fill_series(series: Vector, terms: Complex, rates: Complex) -> None:
+    """Taylor coefficients of Re sum terms_j exp(rates_j t), shape (SERIES_TERMS,)."""
+    # In real numbers, and without a division: the products of one term wait for each other, those of
+    # different terms need not.
+    for k in range(SERIES_TERMS):
+        series[k] = 0.0
+    for j in range(len(terms)):
+        real, imag = terms[j].real, terms[j].imag
+        grow, turn = rates[j].real, rates[j].imag
+        for k in range(SERIES_TERMS):
+            series[k] += real
+            part = _INVERSES[k]
+            real, imag = (real * grow - imag * turn) * part, (real * turn + imag * grow) * part
 
 
 @inlined

@@ -93,7 +93,6 @@ def contact_workspace() -> Table:
     return np.zeros((WORK_ROWS, WIDTH))
 
 
-@compiled
 def log_for(tally: Vector, tangent: Table | None) -> Table:
     """Make the log of contacts that a tally (as `sim.engine.tally` says) or a tangent needs."""
     if tangent is not None and len(tangent) > 0:

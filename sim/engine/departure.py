@@ -14,9 +14,10 @@ import math
 from ..compiled import lean
 from ..modes import Complex
 from .detection import derivative_bound
-from .flight import FlightTables, fill_series
+from .flight import FlightTables
 from .parameters import Parameters, Vector
 from .rigid_stop import RESOLVED, closed_gap
+from .turning import fill_series
 
 SHORTEST_PART = 1e-3
 """A departure takes at least this part of a stretch: so little that m1 cannot get farther than rounding
@@ -71,5 +72,5 @@ def departure(phasors: Complex, terms: Complex, series: Vector, tables: FlightTa
     """Find how long a flight from these phasors surely leaves a stop [s]; see `time_to_depart`."""
     for j in range(len(phasors)):
         terms[j] = phasors[j] * tables.path[j]
-    fill_series(series, terms, tables.rates)
+    fill_series(series, terms, tables.series)
     return time_to_depart(series, tables.grid, closed_for(phasors, tables), tables.par)

@@ -13,22 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import inlined
-from ..contact_law import PowerLaw, RigidStops
 from ..drive import Harmonic
 from ..modes import Complex, harmonic_motion, modal_form
 from ..specimen import Specimen
-from .bound_modes import bound_motion
 from .clock import angle_at
 from .contact_flow import FORCE_TERMS
-from .detection import LARGEST_BOUND, LONGEST_TURN, NEVER, SERIES_TERMS, first_contact
-from .parameters import VX, VY, VZ, Parameters, PowerTerms, Vector, X, Y, Z, parameters, power_terms
-from .power_tables import PowerTables, power_tables
+from .detection import LARGEST_BOUND, LONGEST_TURN, NEVER, first_contact
+from .parameters import VX, VY, VZ, Parameters, Table, Vector, X, Y, Z, parameters
 from .row import copy_row
+from .turning import fill_series, march, series_rows, steps_ahead, sum_now, turn_by
 
 GRID_TURN = LONGEST_TURN
 """Grid step as the fastest rate times its length [rad]: half as long is slower by a seventh."""
-INVERSES: NDArray[np.float64] = 1.0 / np.arange(1.0, SERIES_TERMS + 1.0)
-"""1 / (k + 1)."""
 RUN_OF_STEPS = 512
 """Grid steps between two fresh exponentials: keeps the products' rounding below 1e-13."""
 
@@ -41,8 +37,6 @@ class FlightTables(NamedTuple):
     """Specimen and drive, diagonalised. Terms 0..n-1 are modes, term n is the drive."""
 
     par: Parameters
-    power: PowerTerms | None
-    """Of a power law; None, by its type, keeps all that concerns one out of a kernel."""
     frequency: float
     omega: float
     phase: complex
@@ -63,12 +57,10 @@ class FlightTables(NamedTuple):
     """Left rows, shape (n, 6), with the weight 2 of a pair: a state's phasors."""
     grid: float
     """Grid step [s]."""
-    factors: Complex
-    """exp(l_j grid), shape (n+1,)."""
-    steps: PowerTables | None
-    """Of long steps under a power law; None, as above, for other laws."""
-    bound: Complex | None
-    """The motion with m1 held by a rigid stop (`sim.engine.bound_modes`); None, as above, for other laws."""
+    ahead: Table
+    """exp(l_j grid) and its powers (`sim.engine.turning`), shape (n+1, 2, AHEAD)."""
+    series: Table
+    """Taylor coefficients of exp(l_j t), likewise."""
 
 
 def flight_tables(specimen: Specimen, drive: Harmonic) -> FlightTables:
@@ -79,11 +71,8 @@ def flight_tables(specimen: Specimen, drive: Harmonic) -> FlightTables:
     rates = np.append(modes.rates, 1j * omega)
     shapes = np.vstack([modes.shapes, motion])
     grid = GRID_TURN / float(np.max(np.abs(rates)))
-    is_rigid = isinstance(specimen.contact, RigidStops)
-    is_power = isinstance(specimen.contact, PowerLaw)
     return FlightTables(
         par=parameters(specimen),
-        power=power_terms(specimen),
         frequency=float(drive.frequency_hz),
         omega=omega,
         phase=cmath.exp(1j * drive.phase_rad),
@@ -95,9 +84,8 @@ def flight_tables(specimen: Specimen, drive: Harmonic) -> FlightTables:
         across=np.ascontiguousarray(shapes[:, X]),
         rows=modes.rows,
         grid=grid,
-        factors=np.exp(rates * grid),
-        steps=power_tables(specimen, omega, force, np.abs(modes.rates)) if is_power else None,
-        bound=bound_motion(specimen, omega, drive.amplitude_m) if is_rigid else None,
+        ahead=steps_ahead(rates, grid),
+        series=series_rows(rates),
     )
 
 
@@ -163,35 +151,6 @@ def place_on_phasors(motion: Vector, phasors: Complex, tables: FlightTables) -> 
 
 
 @inlined
-def fill_series(series: Vector, terms: Complex, rates: Complex) -> None:
-    """Taylor coefficients of Re sum terms_j exp(rates_j t), shape (SERIES_TERMS,)."""
-    # In real numbers, and without a division: the products of one term wait for each other, those of
-    # different terms need not.
-    for k in range(SERIES_TERMS):
-        series[k] = 0.0
-    for j in range(len(terms)):
-        real, imag = terms[j].real, terms[j].imag
-        grow, turn = rates[j].real, rates[j].imag
-        for k in range(SERIES_TERMS):
-            series[k] += real
-            part = INVERSES[k]
-            real, imag = (real * grow - imag * turn) * part, (real * turn + imag * grow) * part
-
-
-@inlined
-def _march(terms: Complex, factors: Complex, steps: int, low: float, high: float) -> int:
-    """Turn the terms of p in place, step by step, while low < p < high; gives the steps that were."""
-    for made in range(steps):
-        p = 0.0
-        for j in range(len(terms)):
-            terms[j] *= factors[j]
-            p += terms[j].real
-        if not low < p < high:
-            return made
-    return steps
-
-
-@inlined
 def fly(
     phasors: Complex,
     now: Complex,
@@ -208,7 +167,7 @@ def fly(
     phasors
         At take-off, which is clock time.
     now, terms, series
-        Workspaces of shapes (n+1,), (n+1,), (SERIES_TERMS,).
+        Workspaces of shapes (n+1,), (n+1,), (AHEAD,).
     clock, longest, tables
         As elsewhere.
 
@@ -218,37 +177,48 @@ def fly(
 
     """
     par, h = tables.par, tables.grid
-    elapsed, nearer = 0.0, min(par.lower, par.upper)
+    elapsed = 0.0
     while elapsed < longest:
         if elapsed > 0.0:
             turn_phasors(now, phasors, elapsed, clock, tables)
         else:
             copy_row(now, phasors)
-        p, reach, bound = 0.0, 0.0, 0.0
-        for j in range(len(now)):
-            terms[j] = now[j] * tables.path[j]
-            size = abs(terms[j])
-            p += terms[j].real
-            reach += size
-            bound += size * tables.squares[j]
-        if reach < nearer:
+        reach, bound = begin_terms(terms, now, tables.path, tables)
+        if reach < min(par.lower, par.upper):
             # The free phasors can only shrink: no touch, ever.
             return CLEAR, longest
         if not bound < LARGEST_BOUND:
             return OUT_OF_RANGE, elapsed
-        margin = bound * h * h / 8.0
-        steps = min(RUN_OF_STEPS, int((longest - elapsed) / h))
-        if margin - par.lower < p < par.upper - margin and steps > 0:
-            made = _march(terms, tables.factors, steps, margin - par.lower, par.upper - margin)
-            if made > 0:
-                elapsed += made * h
-                continue
-            for j in range(len(now)):
-                terms[j] = now[j] * tables.path[j]
-        length = min(h, longest - elapsed)
-        fill_series(series, terms, tables.rates)
-        touch = first_contact(series, length, par.lower, par.upper, bound, reach)
-        if touch != NEVER:
-            return TOUCHES, elapsed + touch
-        elapsed = longest if length < h else elapsed + length
+        margin, begun, made = bound * h * h / 8.0, elapsed, 0
+        low, high = margin - par.lower, par.upper - margin
+        while made < RUN_OF_STEPS and elapsed < longest:
+            if low < sum_now(terms) < high:
+                steps = min(RUN_OF_STEPS - made, int((longest - elapsed) / h))
+                ran = march(terms, tables.ahead, steps, low, high)
+                made += ran
+                elapsed = begun + made * h
+                if ran == steps > 0:
+                    continue
+            length = min(h, longest - elapsed)
+            fill_series(series, terms, tables.series)
+            touch = first_contact(series, length, par.lower, par.upper, bound, reach)
+            if touch != NEVER:
+                return TOUCHES, elapsed + touch
+            if length < h:
+                return CLEAR, longest
+            turn_by(terms, tables.ahead, 1)
+            made += 1
+            elapsed = begun + made * h
     return CLEAR, longest
+
+
+@inlined
+def begin_terms(terms: Complex, now: Complex, shape: Complex, tables: FlightTables) -> tuple[float, float]:
+    """Write what phasors are of a displacement; gives bounds of it and of its acceleration, from now on."""
+    reach, bound = 0.0, 0.0
+    for j in range(len(now)):
+        terms[j] = now[j] * shape[j]
+        size = math.sqrt(terms[j].real * terms[j].real + terms[j].imag * terms[j].imag)
+        reach += size
+        bound += size * tables.squares[j]
+    return reach, bound

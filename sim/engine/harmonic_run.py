@@ -3,29 +3,36 @@
 A state and a clock are advanced in place, and on the way what is given is filled: samples, impact times, a
 tally. None of them changes a single step, so what is observed never changes the motion.
 
-What a run needs is chosen by types, before anything is compiled: `FlightTables.power` and ``bound`` and
-`Record.tangent` are None where there is nothing of the kind, and a kernel for Hertz's stops then holds no
+What a run needs is chosen by types, before anything is compiled: most of `HarmonicTables`, and
+`Record.tangent`, are None where there is nothing of the kind, and a kernel for Hertz's stops then holds no
 power law, no rigid stop and no tangent. To compile all of them took twice as long as a first run may.
 """
 
 from ..compiled import lean
-from ..modes import Complex
+from .collision_tables import CollisionTables
 from .flight import FlightTables
+from .harmonic_tables import HarmonicTables
 from .parameters import PowerTerms, Table, Vector
 from .power_run import advance_under_power
 from .power_tables import PowerTables
 from .record import Record
+from .room import Room, room_for
+from .stick import HeldTables
 from .stops_run import advance_between_stops
 
 
 def advance_harmonic(
-    state: Vector, clock: Vector, until: float, tables: FlightTables, tolerance: float, record: Record
+    state: Vector, clock: Vector, until: float, tables: HarmonicTables, tolerance: float, record: Record
 ) -> int:
     """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code."""
-    power, steps, bound, tangent = tables.power, tables.steps, tables.bound, record.tangent
+    flight, power, steps, held, collisions = tables
+    tangent = record.tangent
     if power is not None and steps is not None:
-        return advance_under_power(state, clock, until, tables, tolerance, record, power, steps, tangent)
-    return advance_between_stops(state, clock, until, tables, tolerance, record, bound, tangent)
+        return advance_under_power(state, clock, until, flight, tolerance, record, power, steps, tangent)
+    room = room_for(len(flight.rates), record.tally, tangent)
+    return advance_between_stops(
+        state, clock, until, flight, tolerance, record, held, collisions, tangent, room
+    )
 
 
 @lean
@@ -38,8 +45,10 @@ def advance_by_law(
     record: Record,
     power: PowerTerms | None,
     steps: PowerTables | None,
-    bound: Complex | None,
+    held: HeldTables | None,
+    collisions: CollisionTables | None,
     tangent: Table | None,
+    room: Room,
 ) -> int:
     """Do the same within a kernel; what may be None is given once more.
 
@@ -47,4 +56,6 @@ def advance_by_law(
     """
     if power is not None and steps is not None:
         return advance_under_power(state, clock, until, tables, tolerance, record, power, steps, tangent)
-    return advance_between_stops(state, clock, until, tables, tolerance, record, bound, tangent)
+    return advance_between_stops(
+        state, clock, until, tables, tolerance, record, held, collisions, tangent, room
+    )

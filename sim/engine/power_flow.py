@@ -13,7 +13,7 @@ from numba.extending import overload
 from ..compiled import inlined
 from ..contact_law import MOST_TERMS
 from .contact_flow import base_force_at, motion_rates
-from .eight import Eight, add_times, all_eight, product
+from .lanes import Lanes
 from .parameters import Parameters, PowerTerms, Vector
 
 
@@ -50,22 +50,23 @@ def power_force(p: float, power: PowerTerms) -> float:
 
 
 @inlined
-def power_forces(p: Eight, power: PowerTerms) -> Eight:
+def power_forces(p: Lanes, power: PowerTerms) -> Lanes:
     """Give the force at eight p at once [N]."""
-    u = product(p, all_eight(power.inverse_reference))
-    square, force = product(u, u), all_eight(0.0)
+    u = power.inverse_reference * p
+    square = u * u
+    force = 0.0 * u
     for place in range(MOST_TERMS - 1, -1, -1):
         half = power.halves[place]
         if half == 0:
             continue
-        force = add_times(force, power.forces[place], all_eight(1.0))
+        force += power.forces[place]
         base = square
         while half > 0:
             if half & 1:
-                force = product(force, base)
-            base = product(base, base)
+                force *= base
+            base *= base
             half >>= 1
-    return product(force, u)
+    return force * u
 
 
 @inlined

@@ -14,7 +14,7 @@ rounding for the lengths that are used, needs no modes, and loses nothing where 
 from typing import NamedTuple
 
 from ..compiled import inlined, lean
-from .eight import add_times, load_row, store
+from .lanes import eight, store
 from .linear_series import WIDE, P
 from .parameters import Table, Vector
 
@@ -36,15 +36,16 @@ class StepSeries(NamedTuple):
     struck: Table
     """Shape (order, i): the same of a unit of F [1/N]."""
     shares: Table
-    """Shape (order, k, i): integral up to c_i of (c_i - s)^m times the polynomial that is 1 at point k alone;
-    the ninth c is 1, the step's end."""
+    """Shape (order, k, i): integral up to c_i of (c_i - s)^m times what is 1 at point k alone."""
+    ends: Table
+    """Shape (order, k): the same up to the step's end."""
     heights: Table
     """Shape (order, i): c_i^m."""
 
 
 @inlined
 def _add_row(numbers: Table, row: int, factor: float, table: Table, term: int) -> None:
-    store(numbers[row], add_times(load_row(numbers, row), factor, load_row(table, term)))
+    store(numbers, row, eight(numbers, row) + factor * eight(table, term))
 
 
 @inlined
@@ -65,7 +66,7 @@ def fill_ends(numbers: Table, length: float, series: StepSeries) -> None:
             _add_row(numbers, FREE + j, powers[j, P] * factor, series.heights, term)
             if term > 0:
                 _add_row(numbers, MOVE + j, factor, powers, j)
-            _add_row(numbers, FEED + j, factor * length * shares[j, POINTS], struck, term)
+            _add_row(numbers, FEED + j, factor * length * series.ends[term, j], struck, term)
             _add_row(numbers, GAIN + j, struck[term, P] * factor * length, shares, j)
         factor *= series.fastest * length
 

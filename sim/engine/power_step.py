@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiled import compiled, inlined
-from .eight import add_rows, add_times, all_eight, largest_gap, load, load_row, product, store, total
 from .flight import FlightTables, drive_phasor
+from .lanes import eight, eight_of_eight, eights, largest, store, total
 from .linear_series import AT_X, AT_Z, COSINE, P_RATE, SINE, WIDE, X_RATE, Z_RATE, P
 from .parameters import (
     LEVEL,
@@ -159,20 +159,20 @@ def _guess_force(stride: Stride, length: float) -> None:
     """Guess F in a step of ``length`` [s]: its course in the last one goes on."""
     course, last = stride.course, stride.push[LAST_LENGTH]
     if last == NO_COURSE:
-        store(stride.force, all_eight(stride.push[PUSH_NOW]))
+        store(stride.force, 0, eights(stride.push[PUSH_NOW]))
         return
-    s, one = product(load(POINTS_AT), all_eight(length / last)), all_eight(1.0)
-    value = product(one, all_eight(course[COURSE_DEGREE]))
+    s = (length / last) * eight(POINTS_AT, 0)
+    value = eights(course[COURSE_DEGREE])
     for degree in range(COURSE_DEGREE - 1, -1, -1):
-        value = add_times(product(value, s), course[degree], one)
-    store(stride.force, value)
+        value = value * s + course[degree]
+    store(stride.force, 0, value)
 
 
 @inlined
 def _keep_course(stride: Stride, length: float) -> None:
     """Remember how F went in the step just made."""
-    end = product(load_row(COURSE, POINTS), all_eight(stride.push[PUSH_AHEAD]))
-    store(stride.course, add_rows(end, load(stride.force), COURSE, 0))
+    end = stride.push[PUSH_AHEAD] * eight(COURSE, POINTS)
+    store(stride.course, 0, end + eight_of_eight(COURSE, 0, stride.force))
     stride.push[LAST_LENGTH] = length
 
 
@@ -182,18 +182,18 @@ def substitute(stride: Stride, numbers: Table, weight: float, close: float, powe
 
     ``weight`` says how far a newton moves p over the step [m/N], ``close`` how far is nothing.
     """
-    free = add_rows(all_eight(0.0), load(stride.motion), numbers, FREE)
-    force, place, settled = load(stride.force), free, False
+    free = eight_of_eight(numbers, FREE, stride.motion)
+    force, place, settled = eight(stride.force, 0), free, False
     for _ in range(MOST_SUBSTITUTIONS):
-        place = add_rows(free, force, numbers, GAIN)
+        place = free + eight_of_eight(numbers, GAIN, force)
         push = power_forces(place, power)
-        change = weight * largest_gap(push, force)
+        change = weight * largest(push - force)
         force = push
         if not change > close:
             settled = change <= close
             break
-    store(stride.force, force)
-    store(stride.place, place)
+    store(stride.force, 0, force)
+    store(stride.place, 0, place)
     return settled
 
 
@@ -215,17 +215,17 @@ def try_step(
     """Try a step and write where it leads to ``stride.ahead``; gives its misfit over what is allowed."""
     motion, ahead, force = stride.motion, stride.ahead, stride.force
     weight = length * length * par.inverse_pair
-    free = add_rows(load(motion), load(motion), numbers, MOVE)
-    store(ahead, free)
+    free = eight(motion, 0) + eight_of_eight(numbers, MOVE, motion)
+    store(ahead, 0, free)
     close = largest_unseen(stride) * max(CLOSE * tolerance, CLOSEST)
     _guess_force(stride, length)
     if not substitute(stride, numbers, weight, close, power):
         return math.inf
-    push = load(force)
-    store(ahead, add_rows(free, push, numbers, FEED))
+    push = eight(force, 0)
+    store(ahead, 0, free + eight_of_eight(numbers, FEED, push))
     end = power_force(ahead[P], power)
-    before = total(product(load(AT_START), push)) - stride.push[PUSH_NOW]
-    after = total(product(load(AT_END), push)) - end
+    before = total(eight(AT_START, 0) * push) - stride.push[PUSH_NOW]
+    after = total(eight(AT_END, 0) * push) - end
     stride.push[PUSH_AHEAD] = end
     misfit: float = weight * max(abs(before), abs(after)) / (FIT * tolerance * largest_unseen(stride))
     return misfit
@@ -240,7 +240,7 @@ def accept_step(stride: Stride, length: float) -> None:
     sizes[2] = _widen(sizes[2], motion[AT_Z], ahead[AT_Z])
     _keep_course(stride, length)
     stride.push[PUSH_NOW] = stride.push[PUSH_AHEAD]
-    store(motion, load(ahead))
+    store(motion, 0, eight(ahead, 0))
 
 
 @inlined

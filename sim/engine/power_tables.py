@@ -101,7 +101,14 @@ def power_tables(specimen: Specimen, omega: float, force: complex, rates: Vector
     """Make the tables for a drive of base force Re(force exp(i omega t)) on modes of ``rates`` (absolute)."""
     linear = linear_series(specimen, omega, force, rates, ORDER)
     heights = np.ascontiguousarray(POINTS_AT ** np.arange(ORDER)[:, None])
-    series = StepSeries(linear.fastest, linear.powers, linear.struck, SHARES, heights)
+    series = StepSeries(
+        linear.fastest,
+        linear.powers,
+        linear.struck,
+        np.ascontiguousarray(SHARES[:, :, :POINTS]),
+        np.ascontiguousarray(SHARES[:, :, POINTS]),
+        heights,
+    )
     lengths = np.asarray(LONGEST_TURN / linear.fastest * SHORTER ** np.arange(LEVELS), dtype=np.float64)
     levels = np.zeros((LEVELS, ALL_ROWS, WIDE))
     fill_levels(levels, lengths, series)

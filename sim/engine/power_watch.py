@@ -10,7 +10,7 @@ import numpy as np
 
 from ..compiled import compiled, lean
 from .clock import time_until
-from .eight import add_rows, all_eight, load, store
+from .lanes import eight, eight_of_eight, store
 from .linear_series import AT_X, COSINE, P_RATE, SINE, WIDE, X_RATE, P
 from .parameters import PowerTerms, Table, Vector
 from .power_flow import power_forces
@@ -51,13 +51,13 @@ def new_watcher() -> Watcher:
 def tally_step(tally: Vector, stride: Stride, numbers: Table, length: float, watcher: Watcher) -> None:
     """Add a step that was tried and found good: its peaks, and its lines by Gauss's sums."""
     course = watcher.course
-    motion, force = load(stride.motion), load(stride.force)
-    store(course[0], motion)
-    store(course[POINTS + 1], load(stride.ahead))
+    motion, force = eight(stride.motion, 0), eight(stride.force, 0)
+    store(course, 0, motion)
+    store(course, POINTS + 1, eight(stride.ahead, 0))
     for i in range(POINTS):
         first = INNER + 2 * WIDE * i
-        free = add_rows(all_eight(0.0), motion, numbers, first)
-        store(course[i + 1], add_rows(free, force, numbers, first + WIDE))
+        free = eight_of_eight(numbers, first, motion)
+        store(course, i + 1, free + eight_of_eight(numbers, first + WIDE, force))
     tally[PEAK_X] = _peak(tally[PEAK_X], course, AT_X, X_RATE, length)
     tally[PEAK_P] = _peak(tally[PEAK_P], course, P, P_RATE, length)
     if tally[MODE] != PEAKS_AND_LINES:
@@ -159,7 +159,7 @@ def sample_step(
 @lean
 def _move_within(stride: Stride, ratio: float, power: PowerTerms, watcher: Watcher) -> None:
     """Make the part of a step that the watcher has numbers for; the force is known but for one refinement."""
-    guess, motion, numbers = watcher.force, load(stride.motion), watcher.numbers
+    guess, motion, numbers = watcher.force, eight(stride.motion, 0), watcher.numbers
     for i in range(POINTS):
         at, value, norm = ratio * INSTANTS[i + 1], 0.0, 0.0
         for k in range(POINTS):
@@ -171,6 +171,7 @@ def _move_within(stride: Stride, ratio: float, power: PowerTerms, watcher: Watch
             norm += part
             value += part * stride.force[k]
         guess[i] = value / norm
-    free = add_rows(all_eight(0.0), motion, numbers, FREE)
-    force = power_forces(add_rows(free, load(guess), numbers, GAIN), power)
-    store(watcher.motion, add_rows(add_rows(motion, motion, numbers, MOVE), force, numbers, FEED))
+    free = eight_of_eight(numbers, FREE, motion)
+    force = power_forces(free + eight_of_eight(numbers, GAIN, guess), power)
+    moved = motion + eight_of_eight(numbers, MOVE, motion)
+    store(watcher.motion, 0, moved + eight_of_eight(numbers, FEED, force))

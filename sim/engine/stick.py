@@ -6,13 +6,14 @@ gap's place.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled import compiled, lean
+from ..compiled import lean
 from ..modes import Complex
 from .base_force import Cubic
-from .bound_modes import RATE, ROW, SHAPE
+from .bound_modes import PULL, RATE, ROW, SHAPE
 from .contact import gap_of
 from .detection import LARGEST_BOUND, NEVER, SERIES_TERMS, derivative_bound, first_contact
 from .flight import (
@@ -23,30 +24,32 @@ from .flight import (
     TOUCHES,
     FlightTables,
     drive_phasor,
-    fill_series,
     place_on_phasors,
     turn_phasors,
 )
 from .flight_series import place_on_series
 from .parameters import SIDE, VX, VY, VZ, Parameters, Table, Vector, X, Y, Z
 from .tally import LINE_P_IM, LINE_P_RE, MODE, NOTHING, PEAK_P, PEAKS_AND_LINES
+from .turning import fill_series, march, series_rows, steps_ahead, sum_now
 
 LETS_GO = TOUCHES
 """How a hold ends when it does not last: the place of a touch in a flight."""
 
 
-@compiled
-def held_tables(tables: FlightTables, bound: Complex) -> FlightTables:
-    """Put the bound modes in the place of the free ones; p, being constant, is left out."""
+class HeldTables(NamedTuple):
+    """How m1 and m2 move while a rigid stop holds m1."""
+
+    flight: FlightTables
+    """The bound modes in the place of the free ones; p, being constant, is left out."""
+    pulls: Complex
+    """What unit phasors add to the force by which m2 pulls at m0 [N]."""
+
+
+def held_tables(tables: FlightTables, bound: Complex) -> HeldTables:
+    """Make them of a specimen's free motion and its `sim.engine.bound_modes`."""
     rates = bound[:, RATE].copy()
-    grid = GRID_TURN / np.abs(rates).max()
-    return FlightTables(
-        par=tables.par,
-        power=tables.power,
-        frequency=tables.frequency,
-        omega=tables.omega,
-        phase=tables.phase,
-        force=tables.force,
+    grid = GRID_TURN / float(np.abs(rates).max())
+    flight = tables._replace(
         rates=rates,
         squares=np.abs(rates) ** 2,
         shapes=bound[:, SHAPE].copy(),
@@ -54,10 +57,10 @@ def held_tables(tables: FlightTables, bound: Complex) -> FlightTables:
         across=bound[:, SHAPE][:, X].copy(),
         rows=bound[:-1, ROW].copy(),
         grid=grid,
-        factors=np.exp(rates * grid),
-        steps=tables.steps,
-        bound=bound,
+        ahead=steps_ahead(rates, grid),
+        series=series_rows(rates),
     )
+    return HeldTables(flight, bound[:, PULL].copy())
 
 
 @lean
@@ -85,37 +88,19 @@ def hold(
         if not bound < LARGEST_BOUND:
             return OUT_OF_RANGE, elapsed
         steps = min(RUN_OF_STEPS, int((longest - elapsed) / held.grid))
-        made = _march(terms, held.factors, steps, -spring - bound * held.grid**2 / 8.0)
+        high = -spring - bound * held.grid**2 / 8.0
+        made = march(terms, held.ahead, steps, -math.inf, high) if sum_now(terms) < high else 0
         if made > 0:
             elapsed += made * held.grid
             continue
-        for j in range(len(now)):
-            terms[j] = weight * now[j] * pulls[j]
         length = min(held.grid, longest - elapsed)
-        fill_series(series, terms, held.rates)
+        fill_series(series, terms, held.series)
         series[0] += spring
         free = first_contact(series, length, math.inf, 0.0, bound, reach)
         if free != NEVER:
             return LETS_GO, elapsed + free
         elapsed = longest if length < held.grid else elapsed + length
     return CLEAR, longest
-
-
-@lean
-def _march(terms: Complex, factors: Complex, steps: int, high: float) -> int:
-    """Turn the terms in place, step by step, while their sum is below ``high``; gives the steps that were."""
-    below = 0.0
-    for j in range(len(terms)):
-        below += terms[j].real
-    made = 0
-    while made < steps and below < high:
-        below = 0.0
-        for j in range(len(terms)):
-            terms[j] *= factors[j]
-            below += terms[j].real
-        if below < high:
-            made += 1
-    return made
 
 
 @lean

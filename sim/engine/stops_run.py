@@ -1,21 +1,21 @@
 """A run between stops: flight, contact, flight, ... up to an instant. SI units."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from ..compiled import compiled, inlined, lean
-from ..growth.tangent_contact import carry_through_steps, tangent_workspace
+from ..growth.tangent_collision import carry_through_collision
+from ..growth.tangent_contact import carry_through_steps
 from ..growth.tangent_flight import carry_through_flight
 from ..growth.tangent_impact import carry_through_impact
 from ..modes import Complex
-from .bound_modes import PULL
 from .clock import advance_clock, time_until
-from .contact import HELD, LEFT, NOT_FINITE, advance_contact, contact_workspace, gap_of, log_for
-from .contact_flow import FORCE_TERMS
+from .collision import collide
+from .collision_tables import CollisionTables
+from .collision_watch import tally_collision
+from .contact import HELD, LEFT, NOT_FINITE, advance_contact, gap_of
 from .departure import closed_for, departure
-from .detection import SERIES_TERMS
 from .flight import (
     CLEAR,
     DEPARTS,
@@ -30,9 +30,10 @@ from .flight import (
 from .parameters import CLOSED, SIDE, Parameters, Table, Vector, X, Y, Z
 from .record import IMPACTS, LOST, NEXT_SAMPLE, REACHED_END, STUCK, TOO_MANY_IMPACTS, Record
 from .rigid_stop import is_resolved
+from .room import Room
 from .row import copy_row
 from .sampling import sample_contact, sample_flight
-from .stick import held_tables, hold, place_held, tally_held
+from .stick import HeldTables, hold, place_held, tally_held
 from .tally import MODE, NOTHING, tally_contact, tally_flight
 from .touch import strike
 
@@ -41,64 +42,26 @@ STRETCH_TURN = 0.3
 its middle, whose first term left out is 0.15^8/8! = 6e-12 of the force."""
 
 
-class Room(NamedTuple):
-    """Workspaces of a run."""
-
-    phasors: Complex
-    now: Complex
-    terms: Complex
-    series: Vector
-    force: Vector
-    work: Table
-    shadow: Vector
-    log: Table
-    memory: Table
-
-
-@compiled
-def advance_between_stops(
-    state: Vector,
-    clock: Vector,
-    until: float,
-    tables: FlightTables,
-    tolerance: float,
-    record: Record,
-    bound: Complex | None,
-    tangent: Table | None,
-) -> int:
-    """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code.
-
-    ``bound`` is how m1 moves on a stop that holds it, None where stops yield.
-    """
-    terms = len(tables.rates)
-    room = Room(
-        np.zeros(terms, np.complex128),
-        np.zeros(terms, np.complex128),
-        np.zeros(terms, np.complex128),
-        np.zeros(SERIES_TERMS),
-        np.zeros(FORCE_TERMS),
-        contact_workspace(),
-        np.zeros(len(state)),
-        log_for(record.tally, tangent),
-        tangent_workspace(),
-    )
-    return _advance(state, clock, until, tables, tolerance, record, bound, tangent, room)
-
-
 @lean
-def _advance(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and their ends are one loop
+def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and their ends are one loop
     state: Vector,
     clock: Vector,
     until: float,
     tables: FlightTables,
     tolerance: float,
     record: Record,
-    bound: Complex | None,
+    held: HeldTables | None,
+    collisions: CollisionTables | None,
     tangent: Table | None,
     room: Room,
 ) -> int:
-    """Do so in the workspaces of ``room``."""
-    phasors, now, workspace, series = room.phasors, room.now, room.terms, room.series
+    """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code.
+
+    ``held`` is how m1 moves on a stop that holds it, None where stops yield; ``collisions`` are known of
+    Hertz's stops alone.
+    """
+    phasors, landed, now = room.phasors, room.landed, room.now
+    workspace, series = room.terms, room.series
     force, work, shadow, log, memory = room.force, room.work, room.shadow, room.log, room.memory
     counts = record.counts
     while True:
@@ -109,17 +72,17 @@ def _advance(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and their en
             return LOST
         if state[SIDE] == 0.0:
             take_off(phasors, state, clock, tables)
-            ends, length = _fly_on(phasors, now, workspace, series, clock, longest, tables, bound)
+            ends, length = _fly_on(phasors, now, workspace, series, clock, longest, tables, held)
             if ends == OUT_OF_RANGE:
                 return LOST
+            turn_phasors(landed, phasors, length, clock, tables)
             if record.tally[MODE] != NOTHING:
-                tally_flight(record.tally, phasors, now, workspace, series, clock, length, tables)
+                tally_flight(record.tally, phasors, landed, now, workspace, series, clock, length, tables)
             if tangent is not None and len(tangent) > 0:
                 carry_through_flight(tangent, length, tables)
             if counts[NEXT_SAMPLE] < len(record.samples):
                 sample_flight(phasors, now, clock, length, tables, record)
-            turn_phasors(now, phasors, length, clock, tables)
-            place_on_phasors(state, now, tables)
+            place_on_phasors(state, landed, tables)
             if ends == CLEAR:
                 clock[0], clock[1] = until, 0.0
                 continue
@@ -131,13 +94,13 @@ def _advance(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and their en
             record.impact_times[counts[IMPACTS]] = clock[0]
             counts[IMPACTS] += 1
             copy_row(shadow, state)
-            if bound is not None:
-                state[CLOSED] = closed_for(now, tables)
+            if held is not None:
+                state[CLOSED] = closed_for(landed, tables)
             strike(state, tables.par, tables.par.restitution, tolerance)
-            if bound is not None:
+            if held is not None:
                 _carry_through_impact(tangent, shadow, state, tables.par, tables.par.restitution)
-        elif bound is not None:
-            ends, length = _stay_held(state, clock, longest, series, tables, record, bound, tangent)
+        elif held is not None:
+            ends, length = _stay_held(state, clock, longest, series, record, held, tangent)
             if ends == OUT_OF_RANGE:
                 return LOST
             if ends == CLEAR:
@@ -146,10 +109,18 @@ def _advance(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and their en
                 advance_clock(clock, length)
                 state[SIDE] = 0.0
         else:
+            copy_row(shadow, state)
+            if collisions is not None:
+                length = collide(state, clock, longest, tolerance, tables, collisions, room.collision)
+                if length > 0.0:
+                    _watch_collision(
+                        shadow, clock, length, tables, tolerance, record, collisions, tangent, room
+                    )
+                    advance_clock(clock, length)
+                    continue
             middle = min(0.5 * longest, 0.5 * STRETCH_TURN / tables.omega)
             limit = min(longest, 2.0 * middle)
             fill_base_force(force, clock, middle, tables)
-            copy_row(shadow, state)
             code, length = advance_contact(state, 0.0, limit, force, middle, tables.par, tolerance, work, log)
             if code == NOT_FINITE:
                 return LOST
@@ -176,16 +147,40 @@ def _fly_on(
     clock: Vector,
     longest: float,
     tables: FlightTables,
-    bound: Complex | None,
+    held: HeldTables | None,
 ) -> tuple[int, float]:
     """Find how long a flight lasts, as `sim.engine.flight.fly`; off a rigid stop it first departs."""
-    if bound is not None:
+    if held is not None:
         if not is_resolved(closed_for(phasors, tables), tables.par):
             return OUT_OF_RANGE, 0.0
         leaves = departure(phasors, terms, series, tables)
         if leaves > 0.0:
             return (DEPARTS, leaves) if leaves < longest else (CLEAR, longest)
     return fly(phasors, now, terms, series, clock, longest, tables)
+
+
+@inlined
+def _watch_collision(
+    shadow: Vector,
+    clock: Vector,
+    length: float,
+    tables: FlightTables,
+    tolerance: float,
+    record: Record,
+    collisions: CollisionTables,
+    tangent: Table | None,
+    room: Room,
+) -> None:
+    """Observe a collision that began in the state ``shadow`` at clock time."""
+    par, collision = tables.par, room.collision
+    if record.tally[MODE] != NOTHING:
+        gap = gap_of(shadow[SIDE], par)
+        tally_collision(record.tally, collision, length, gap, tables.omega, collisions)
+    if tangent is not None and len(tangent) > 0:
+        carry_through_collision(tangent, collision, length, par, collisions, room.equations)
+    if record.counts[NEXT_SAMPLE] < len(record.samples):
+        fill_base_force(room.force, clock, 0.5 * length, tables)
+        sample_contact(shadow, clock, length, room.force, 0.5 * length, tables, tolerance, room.work, record)
 
 
 @lean
@@ -202,27 +197,26 @@ def _stay_held(
     clock: Vector,
     longest: float,
     series: Vector,
-    tables: FlightTables,
     record: Record,
-    bound: Complex,
+    held: HeldTables,
     tangent: Table | None,
 ) -> tuple[int, float]:
     """Advance while a rigid stop holds m1, to where it lets go or by ``longest``."""
-    held = held_tables(tables, bound)
-    terms, side, first = len(held.rates), state[SIDE], record.counts[NEXT_SAMPLE]
+    flight = held.flight
+    terms, side, first = len(flight.rates), state[SIDE], record.counts[NEXT_SAMPLE]
     phasors, now = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
-    workspace = np.zeros(terms, np.complex128)
-    take_off(phasors, state, clock, held)
-    ends, length = hold(side, phasors, now, workspace, series, clock, longest, held, bound[:, PULL])
+    landed, workspace = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
+    take_off(phasors, state, clock, flight)
+    ends, length = hold(side, phasors, now, workspace, series, clock, longest, flight, held.pulls)
     if ends == OUT_OF_RANGE:
         return ends, length
-    tally_flight(record.tally, phasors, now, workspace, series, clock, length, held)
-    tally_held(record.tally, side, clock, length, held)
+    turn_phasors(landed, phasors, length, clock, flight)
+    tally_flight(record.tally, phasors, landed, now, workspace, series, clock, length, flight)
+    tally_held(record.tally, side, clock, length, flight)
     if tangent is not None and len(tangent) > 0:
-        carry_through_flight(tangent, length, held)
-    sample_flight(phasors, now, clock, length, held, record)
+        carry_through_flight(tangent, length, flight)
+    sample_flight(phasors, now, clock, length, flight, record)
     for row in range(first, record.counts[NEXT_SAMPLE]):
-        record.samples[row, Y] += side * gap_of(side, held.par)
-    turn_phasors(now, phasors, length, clock, held)
-    place_held(state, side, now, held)
+        record.samples[row, Y] += side * gap_of(side, flight.par)
+    place_held(state, side, landed, flight)
     return ends, length

@@ -5,14 +5,14 @@ exp(-i (omega t + phase)). The peaks are extremes of the motion itself, not of s
 closed form over flights, and by the corrected trapezoidal rule (error ~ step^4) over the steps of contacts.
 """
 
-import cmath
-
-from ..compiled import lean
+from ..compiled import inlined, lean
 from ..modes import Complex
 from .contact import DEEPEST, LOG_P, LOG_RATE, LOG_TIME, LOG_VX, LOG_X, LOGGED, gap_of
 from .detection import polynomial_at
-from .flight import RUN_OF_STEPS, FlightTables, drive_phasor, fill_series, turn_phasors
+from .flight import RUN_OF_STEPS, FlightTables, begin_terms, drive_phasor, turn_phasors
 from .parameters import Table, Vector
+from .row import copy_row
+from .turning import fill_series, march, sum_now, turn_by
 
 MODE, PEAK_X, PEAK_P, LINE_X_RE, LINE_X_IM, LINE_P_RE, LINE_P_IM = range(7)
 TALLY_SIZE = 7
@@ -24,10 +24,11 @@ SMALL_EXPONENT = 1e-3
 """Below it (exp(q) - 1)/q is summed as a series, whose fifth term is rounding."""
 
 
-@lean
+@inlined
 def tally_flight(
     tally: Vector,
     phasors: Complex,
+    landed: Complex,
     now: Complex,
     terms: Complex,
     series: Vector,
@@ -35,17 +36,14 @@ def tally_flight(
     length: float,
     tables: FlightTables,
 ) -> None:
-    """Add a flight of ``length`` seconds, which took off at clock time with ``phasors``."""
+    """Add a flight of ``length`` seconds from clock time, from ``phasors`` to ``landed``."""
     if tally[MODE] == NOTHING:
         return
-    tally[PEAK_X] = _flight_peak(
-        tally[PEAK_X], tables.across, phasors, now, terms, series, clock, length, tables
-    )
-    tally[PEAK_P] = _flight_peak(
-        tally[PEAK_P], tables.path, phasors, now, terms, series, clock, length, tables
-    )
+    for place in (PEAK_X, PEAK_P):
+        shape = tables.across if place == PEAK_X else tables.path
+        tally[place] = _flight_peak(tally[place], shape, phasors, now, terms, series, clock, length, tables)
     if tally[MODE] == PEAKS_AND_LINES:
-        _add_flight_lines(tally, phasors, length, tables)
+        _add_flight_lines(tally, phasors, landed, length, tables)
 
 
 @lean
@@ -59,7 +57,7 @@ def tally_contact(tally: Vector, log: Table, clock: Vector, tables: FlightTables
     for row in range(1, rows):
         start, end = log[row, LOG_TIME], log[row + 1, LOG_TIME]
         step = end - start
-        tally[PEAK_X] = _hermite_peak(
+        tally[PEAK_X] = hermite_peak(
             tally[PEAK_X], log[row, LOG_X], log[row, LOG_VX], log[row + 1, LOG_X], log[row + 1, LOG_VX], step
         )
         if tally[MODE] == PEAKS_AND_LINES:
@@ -93,7 +91,7 @@ def _add_step(
 
 
 @lean
-def _hermite_peak(best: float, x0: float, v0: float, x1: float, v1: float, step: float) -> float:
+def hermite_peak(best: float, x0: float, v0: float, x1: float, v1: float, step: float) -> float:
     """Largest abs(x) over a step, x as the cubic through both ends with their velocities."""
     best = max(best, abs(x0), abs(x1))
     if v0 * v1 >= 0.0:
@@ -134,7 +132,7 @@ def series_peak(best: float, series: Vector, low: float, high: float) -> float:
     return best
 
 
-@lean
+@inlined
 def _flight_peak(
     best: float,
     shape: Complex,
@@ -152,58 +150,58 @@ def _flight_peak(
     """
     h, done = tables.grid, 0.0
     while True:
-        turn_phasors(now, phasors, done, clock, tables)
-        before, reach, bound = 0.0, 0.0, 0.0
-        for j in range(len(now)):
-            terms[j] = now[j] * shape[j]
-            size = abs(terms[j])
-            before += terms[j].real
-            reach += size
-            bound += size * tables.squares[j]
+        if done > 0.0:
+            turn_phasors(now, phasors, done, clock, tables)
+        else:
+            copy_row(now, phasors)
+        reach, bound = begin_terms(terms, now, shape, tables)
         if reach <= best:
             return best
         excess = bound * h * h / 8.0
-        steps = min(RUN_OF_STEPS, int((length - done) / h))
+        steps, made = min(RUN_OF_STEPS, int((length - done) / h)), 0
         if steps == 0:
-            fill_series(series, terms, tables.rates)
+            fill_series(series, terms, tables.series)
             return series_peak(best, series, 0.0, length - done)
-        for _ in range(steps):
-            after = 0.0
-            for j in range(len(terms)):
-                terms[j] *= tables.factors[j]
-                after += terms[j].real
-            if max(abs(before), abs(after)) + excess > best:
-                fill_series(series, terms, tables.rates)
-                best = series_peak(best, series, -h, 0.0)
-            before = after
+        while True:
+            if abs(sum_now(terms)) + excess <= best:
+                made += march(terms, tables.ahead, steps - made, excess - best, best - excess)
+            if made == steps:
+                break
+            fill_series(series, terms, tables.series)
+            best = series_peak(best, series, 0.0, h)
+            turn_by(terms, tables.ahead, 1)
+            made += 1
         done += steps * h
 
 
-@lean
-def _add_flight_lines(tally: Vector, phasors: Complex, length: float, tables: FlightTables) -> None:
+@inlined
+def _add_flight_lines(
+    tally: Vector, phasors: Complex, landed: Complex, length: float, tables: FlightTables
+) -> None:
     """Add the integrals of x and p against the drive over a flight, term by term in closed form."""
-    drive = complex(0.0, tables.omega)
+    drive, terms = complex(0.0, tables.omega), len(phasors)
+    before, after = 0.5 * phasors[terms - 1].conjugate(), 0.5 * landed[terms - 1].conjugate()
     line_x, line_p = complex(0.0, 0.0), complex(0.0, 0.0)
-    for j in range(len(phasors)):
-        along = _integral(tables.rates[j] - drive, length)
-        against = _integral(tables.rates[j].conjugate() - drive, length)
-        x, p = phasors[j] * tables.across[j], phasors[j] * tables.path[j]
-        line_x += x * along + x.conjugate() * against
-        line_p += p * along + p.conjugate() * against
-    start = 0.5 * phasors[len(phasors) - 1].conjugate()
-    line_x *= start
-    line_p *= start
+    for j in range(terms):
+        rate, first, last = tables.rates[j], phasors[j], landed[j]
+        along = _integral(rate - drive, length, first * before, last * after)
+        against = _integral(
+            rate.conjugate() - drive, length, first.conjugate() * before, last.conjugate() * after
+        )
+        line_x += tables.across[j] * along + tables.across[j].conjugate() * against
+        line_p += tables.path[j] * along + tables.path[j].conjugate() * against
     tally[LINE_X_RE] += line_x.real
     tally[LINE_X_IM] += line_x.imag
     tally[LINE_P_RE] += line_p.real
     tally[LINE_P_IM] += line_p.imag
 
 
-@lean
-def _integral(rate: complex, length: float) -> complex:
-    """Integral of exp(rate t) from 0 to ``length``."""
-    exponent = rate * length
-    if abs(exponent) < SMALL_EXPONENT:
+@inlined
+def _integral(rate: complex, length: float, first: complex, last: complex) -> complex:
+    """Integral over ``length`` of what grows as exp(rate t) from ``first`` to ``last``."""
+    real, imag = rate.real * length, rate.imag * length
+    if real * real + imag * imag < SMALL_EXPONENT * SMALL_EXPONENT:
+        exponent = complex(real, imag)
         tail = exponent / 24.0 * (1.0 + exponent / 5.0)
-        return length * (1.0 + exponent * (0.5 + exponent * (1.0 / 6.0 + tail)))
-    return (cmath.exp(exponent) - 1.0) / rate
+        return first * (length * (1.0 + exponent * (0.5 + exponent * (1.0 / 6.0 + tail))))
+    return (last - first) / rate

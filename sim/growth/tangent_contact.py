@@ -111,7 +111,6 @@ def _fill_slopes(slopes: Table, row: Vector, par: Parameters) -> None:
         slopes[stage, PRESS_RATE] = par.c1 + lossy
 
 
-@compiled
 def tangent_workspace() -> Table:
     """Memory that one run hands to every contact."""
     return np.zeros((WORK_ROWS + STAGES, WIDTH))

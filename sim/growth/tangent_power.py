@@ -9,12 +9,13 @@ import numpy as np
 
 from ..compiled import compiled, inlined, lean
 from ..contact_law import MOST_TERMS
-from ..engine.eight import add_rows, all_eight, load, store
+from ..engine.lanes import eight, eight_of_eight, store
 from ..engine.linear_series import AT_X, AT_Z, P_RATE, WIDE, X_RATE, Z_RATE, P
 from ..engine.parameters import VX, VY, VZ, PowerTerms, Table, Vector, X, Y, Z
 from ..engine.power_flow import whole_power
 from ..engine.power_numbers import FEED, FREE, GAIN, MOVE, POINTS
 from ..engine.power_step import Stride
+from .elimination import solve_in_place
 from .tangent import UNITS, keep_in_range
 
 SLOPES, BEFORE, AFTER, EQUATIONS = range(4)
@@ -52,25 +53,24 @@ def carry_through_power(
         for i in range(POINTS):
             equations[i, k] = (1.0 if i == k else 0.0) - numbers[GAIN + k, i] * slopes[k]
     for column in range(len(tangent)):
-        _write_change(before, tangent[column])
-        store(after, add_rows(all_eight(0.0), load(before), numbers, FREE))
+        write_change(before, tangent[column])
+        store(after, 0, eight_of_eight(numbers, FREE, before))
         for i in range(POINTS):
             equations[i, POINTS + column] = after[i]
-    _solve(equations, POINTS + len(tangent))
+    solve_in_place(equations, POINTS, POINTS + len(tangent))
     for column in range(len(tangent)):
         change = tangent[column]
-        _write_change(before, change)
-        free = add_rows(load(before), load(before), numbers, MOVE)
+        write_change(before, change)
+        free = eight(before, 0) + eight_of_eight(numbers, MOVE, before)
         for k in range(POINTS):
             before[k] = slopes[k] * equations[k, POINTS + column]
-        store(after, add_rows(free, load(before), numbers, FEED))
-        change[X], change[Z], change[Y] = after[AT_X], after[AT_Z], after[AT_Z] + after[P]
-        change[VX], change[VZ], change[VY] = after[X_RATE], after[Z_RATE], after[Z_RATE] + after[P_RATE]
+        store(after, 0, free + eight_of_eight(numbers, FEED, before))
+        read_change(change, after)
         keep_in_range(change)
 
 
 @inlined
-def _write_change(out: Vector, change: Vector) -> None:
+def write_change(out: Vector, change: Vector) -> None:
     """Write a change as the numbers of the motion; the drive has none."""
     for i in range(WIDE):
         out[i] = 0.0
@@ -79,23 +79,8 @@ def _write_change(out: Vector, change: Vector) -> None:
     out[AT_Z], out[Z_RATE] = change[Z], change[VZ]
 
 
-@lean
-def _solve(equations: Table, columns: int) -> None:
-    """Put the answers in the place of the right-hand sides, by elimination with row exchange."""
-    for k in range(POINTS):
-        best = k
-        for i in range(k + 1, POINTS):
-            if abs(equations[i, k]) > abs(equations[best, k]):
-                best = i
-        for j in range(k, columns):
-            equations[k, j], equations[best, j] = equations[best, j], equations[k, j]
-        for i in range(k + 1, POINTS):
-            part = equations[i, k] / equations[k, k]
-            for j in range(k + 1, columns):
-                equations[i, j] -= part * equations[k, j]
-    for k in range(POINTS - 1, -1, -1):
-        for j in range(POINTS, columns):
-            total = equations[k, j]
-            for i in range(k + 1, POINTS):
-                total -= equations[k, i] * equations[i, j]
-            equations[k, j] = total / equations[k, k]
+@inlined
+def read_change(change: Vector, motion: Vector) -> None:
+    """Write a change from the numbers of the motion."""
+    change[X], change[Z], change[Y] = motion[AT_X], motion[AT_Z], motion[AT_Z] + motion[P]
+    change[VX], change[VZ], change[VY] = motion[X_RATE], motion[Z_RATE], motion[Z_RATE] + motion[P_RATE]

@@ -18,11 +18,13 @@ from ..accuracy import Accuracy
 from ..compiled import compiled
 from ..drive import Harmonic
 from ..engine.clock import clock_at
-from ..engine.flight import FlightTables, flight_tables, take_off
+from ..engine.flight import FlightTables, take_off
 from ..engine.harmonic_run import advance_by_law
+from ..engine.harmonic_tables import HarmonicTables, harmonic_tables
 from ..engine.interval import new_state
-from ..engine.parameters import SIDE, Table, Vector
+from ..engine.parameters import SIDE, PowerTerms, Table, Vector
 from ..engine.record import IMPACTS, REACHED_END, Record
+from ..engine.room import Room, room_for
 from ..integrate import MAX_IMPACT_RATE_HZ, new_record, start_motion
 from ..outcome import Outcome
 from ..specimen import Specimen
@@ -121,7 +123,7 @@ def run_with_tangent(
 
     The run ends with the last interval that fits, or where ``enough`` says so.
     """
-    tables = flight_tables(specimen, drive)
+    tables = harmonic_tables(specimen, drive)
     count = interval.count_in(duration_s)
     state = new_state(specimen, start_motion(initial_state), accuracy)
     metric = energy_metric(specimen)
@@ -130,7 +132,8 @@ def run_with_tangent(
     record = record._replace(tangent=tangent)
     readings = Readings(np.zeros((count, changes)), np.zeros(count, np.int64), np.zeros((count, 6)))
     clock = clock_at(0.0)
-    parts = _parts(tables, interval.length_s) if changes > 1 else 1
+    room = room_for(len(tables.flight.rates), record.tally, tangent)
+    parts = _parts(tables.flight, interval.length_s) if changes > 1 else 1
     made, code = 0, REACHED_END
     stride = count if enough is None else math.ceil(count / CHECKS)
     while made < count and code == REACHED_END:
@@ -148,6 +151,7 @@ def run_with_tangent(
             tangent,
             metric,
             readings,
+            room,
         )
         if enough is not None and enough(readings.growth[:made]):
             break
@@ -157,7 +161,7 @@ def run_with_tangent(
         impacts=readings.impacts[:made],
         section=readings.section[:made],
         impact_times_s=record.impact_times[: record.counts[IMPACTS]].copy(),
-        is_quiet=bool(_is_quiet(state, clock, tables)),
+        is_quiet=bool(_is_quiet(state, clock, tables.flight, tables.power)),
         final_state=state[:6].copy(),
         end_time_s=float(clock[0]),
         outcome=Outcome(code),
@@ -194,20 +198,21 @@ def _take_readings(
     parts: int,
     first: int,
     last: int,
-    tables: FlightTables,
+    tables: HarmonicTables,
     tolerance: float,
     record: Record,
     tangent: Table,
     metric: Table,
     readings: Readings,
+    room: Room,
 ) -> tuple[int, int]:
     """Advance from interval to interval; returns an `Outcome` code and the first that was not completed."""
-    laws = (tables.power, tables.steps, tables.bound)
+    laws = (tables.power, tables.steps, tables.held, tables.collisions)
     for k in range(first, last):
         before = record.counts[IMPACTS]
         for part in range(parts):
             until = (k + (part + 1.0) / parts) * interval
-            code = advance_by_law(state, clock, until, tables, tolerance, record, *laws, tangent)
+            code = advance_by_law(state, clock, until, tables.flight, tolerance, record, *laws, tangent, room)
             if code != REACHED_END:
                 return code, k
             readings.growth[k] += tangent[:, GROWTH]
@@ -219,9 +224,9 @@ def _take_readings(
 
 
 @compiled
-def _is_quiet(state: Vector, clock: Vector, tables: FlightTables) -> int:
+def _is_quiet(state: Vector, clock: Vector, tables: FlightTables, power: PowerTerms | None) -> int:
     """Say (1 or 0) whether it is certain that m1 will never touch a stop: free phasors only shrink."""
-    if tables.power is not None or state[SIDE] != 0.0:
+    if power is not None or state[SIDE] != 0.0:
         return 0
     phasors, reach = np.empty(len(tables.rates), np.complex128), 0.0
     take_off(phasors, state, clock, tables)

@@ -16,11 +16,12 @@ from ..accuracy import Accuracy
 from ..compiled import compiled
 from ..drive import Harmonic
 from ..engine.clock import clock_at
-from ..engine.flight import FlightTables, flight_tables
 from ..engine.harmonic_run import advance_by_law
+from ..engine.harmonic_tables import HarmonicTables, harmonic_tables
 from ..engine.interval import new_state, place_on_its_side
 from ..engine.parameters import Table, Vector
 from ..engine.record import REACHED_END, Record
+from ..engine.room import Room, room_for
 from ..integrate import MAX_IMPACT_RATE_HZ, new_record, start_motion
 from ..lyapunov import intervals_to_skip
 from ..outcome import Outcome
@@ -77,8 +78,11 @@ def two_trajectory_exponent(
     first, second = (new_state(specimen, motion, accuracy) for motion in (start, start + apart))
     growth = np.zeros(count)
     record = new_record(0.0, 2.0 * (settle_s + duration_s), None, max_impact_rate_hz)
-    tables = flight_tables(specimen, drive)
-    code = _part(first, second, interval.length_s, tables, accuracy.tolerance, record, metric, size, growth)
+    tables = harmonic_tables(specimen, drive)
+    room = room_for(len(tables.flight.rates), record.tally, None)
+    code = _part(
+        first, second, interval.length_s, tables, accuracy.tolerance, record, metric, size, growth, room
+    )
     rates = growth / interval.length_s
     if code != Outcome.REACHED_END:
         return TwoTrajectoryExponent(math.nan, math.nan, None, rates, Outcome(code))
@@ -91,22 +95,24 @@ def _part(
     first: Vector,
     second: Vector,
     interval: float,
-    tables: FlightTables,
+    tables: HarmonicTables,
     tolerance: float,
     record: Record,
     metric: Table,
     size: float,
     growth: Vector,
+    room: Room,
 ) -> int:
     """Advance two motions interval by interval, each time bringing the second back to its distance."""
     here, there, apart = clock_at(0.0), clock_at(0.0), np.zeros(HALF)
-    laws = (tables.power, tables.steps, tables.bound)
+    flight, par, power = tables.flight, tables.flight.par, tables.power
+    laws = (power, tables.steps, tables.held, tables.collisions)
     for k in range(len(growth)):
         until = (k + 1.0) * interval
-        code = advance_by_law(first, here, until, tables, tolerance, record, *laws, None)
+        code = advance_by_law(first, here, until, flight, tolerance, record, *laws, None, room)
         code = max(
             code,
-            advance_by_law(second, there, until, tables, tolerance, record, *laws, None),
+            advance_by_law(second, there, until, flight, tolerance, record, *laws, None, room),
         )
         if code != REACHED_END:
             return code
@@ -117,6 +123,6 @@ def _part(
         for i in range(HALF):
             second[i] = first[i] + apart[i] * size / distance
         # Both begin the interval in the same manner, or the step control's memory would be a difference.
-        place_on_its_side(first, tables.par, tables.power, tables.par.restitution, tolerance)
-        place_on_its_side(second, tables.par, tables.power, tables.par.restitution, tolerance)
+        place_on_its_side(first, par, power, par.restitution, tolerance)
+        place_on_its_side(second, par, power, par.restitution, tolerance)
     return REACHED_END

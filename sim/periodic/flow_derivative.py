@@ -6,8 +6,8 @@ from numpy.typing import ArrayLike
 from ..accuracy import Accuracy
 from ..drive import Harmonic
 from ..engine.clock import clock_at
-from ..engine.flight import flight_tables
 from ..engine.harmonic_run import advance_harmonic
+from ..engine.harmonic_tables import harmonic_tables
 from ..engine.interval import new_state
 from ..growth.tangent import derivative_of, unit_tangent
 from ..integrate import MAX_IMPACT_RATE_HZ, new_record, start_motion
@@ -47,7 +47,7 @@ def flow_derivative(
     moving = new_state(specimen, start_motion(state), accuracy)
     changes = unit_tangent()
     record = new_record(0.0, duration_s, None, MAX_IMPACT_RATE_HZ)._replace(tangent=changes)
-    tables = flight_tables(specimen, drive)
+    tables = harmonic_tables(specimen, drive)
     code = advance_harmonic(moving, clock_at(0.0), duration_s, tables, accuracy.tolerance, record)
     if code != Outcome.REACHED_END:
         return np.full(6, np.nan), np.full((6, 6), np.nan)

@@ -54,7 +54,7 @@ def test_no_kernel_without_memory_makes_an_array_or_is_handed_one():
     makers = {
         name for name, _, node in found if ARRAYS & {getattr(n, "id", "") for n in ast.walk(node.returns)}
     }
-    assert {"clock_at", "held_tables", "space_for"} <= makers
+    assert {"clock_at", "contact_workspace", "space_for"} <= makers
     for name, kind, node in found:
         if kind == "compiled":
             continue

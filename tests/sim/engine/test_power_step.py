@@ -10,7 +10,7 @@ from sim.accuracy import Accuracy
 from sim.answer.followed_run import FollowedRun, Watch
 from sim.contact_law import PowerLaw
 from sim.drive import Harmonic
-from sim.engine.flight import flight_tables
+from sim.engine.harmonic_tables import harmonic_tables
 from sim.engine.linear_series import WIDE, P
 from sim.engine.power_numbers import FEED, FREE, GAIN, INNER, MOVE
 from sim.engine.power_tables import POINTS_AT
@@ -30,7 +30,7 @@ def linear_part(tables):
 
 def test_the_linear_part_is_the_specimens_own_and_turns_the_drives_phase():
     specimen = gong2025(contact=LAW)
-    matrix, struck = linear_part(flight_tables(specimen, DRIVE))
+    matrix, struck = linear_part(harmonic_tables(specimen, DRIVE))
     system, _ = state_matrix(specimen)
     to_own = np.array([[0, 1, -1], [1, 0, 0], [0, 0, 1]])
     turn = np.kron(np.eye(2), to_own)
@@ -45,7 +45,7 @@ def test_the_linear_part_is_the_specimens_own_and_turns_the_drives_phase():
 
 @pytest.mark.parametrize("level", [0, 3, 20])
 def test_the_numbers_of_a_step_are_those_of_the_matrix_exponential(level):
-    tables = flight_tables(gong2025(contact=LAW), DRIVE)
+    tables = harmonic_tables(gong2025(contact=LAW), DRIVE)
     matrix, struck = linear_part(tables)
     numbers, length = tables.steps.levels[level], tables.steps.lengths[level]
     scales = np.ones(WIDE)

@@ -1,0 +1,76 @@
+"""Eight and sixteen numbers at once, against the same sums by numpy."""
+
+import numpy as np
+import pytest
+
+from sim.compiled import compiled
+from sim.engine.lanes import (
+    eight,
+    eight_of_eight,
+    eight_of_sixteen,
+    first_outside,
+    largest,
+    root,
+    sixteen,
+    sixteen_of_sixteen,
+    store,
+    total,
+)
+
+RANDOM = np.random.default_rng(7)
+
+
+@compiled
+def reckoned(table, weights, out):
+    """A bit of everything: 1 + 2 w + w sqrt(w) - rows 0 and 1, and what is drawn from it."""
+    w = sixteen_of_sixteen(table, 0, weights)
+    value = 1.0 + 2.0 * w + w * root(w)
+    value -= sixteen(table, 0) + sixteen(table, 1)
+    store(out, 1, value)
+    return total(value), largest(value)
+
+
+@compiled
+def outside(row, low, high):
+    return first_outside(sixteen(row, 0), low, high)
+
+
+@compiled
+def sums_of_eight(table, weights, out):
+    store(out, 0, eight_of_eight(table, 0, weights))
+    store(out, 1, eight_of_sixteen(table, 0, weights))
+    store(out, 2, eight(table, 3) * 0.5)
+
+
+def test_sixteen_numbers_are_reckoned_with_as_numpy_does():
+    table, weights, out = RANDOM.normal(size=(16, 16)), RANDOM.normal(size=16), np.zeros((2, 16))
+    of_all, most = reckoned(table, weights, out)
+    w = weights @ table
+    expected = 1.0 + 2.0 * w + w * np.sqrt(np.maximum(w, 0.0)) - table[0] - table[1]
+    np.testing.assert_allclose(out[1], expected, rtol=1e-13, atol=1e-13)
+    np.testing.assert_array_equal(out[0], 0.0)
+    assert of_all == pytest.approx(expected.sum(), rel=1e-13)
+    assert most == out[1].max()
+
+
+def test_sums_of_eight_take_as_many_rows_as_they_say():
+    table, weights, out = RANDOM.normal(size=(16, 8)), RANDOM.normal(size=16), np.zeros((3, 8))
+    sums_of_eight(table, weights, out)
+    np.testing.assert_allclose(out[0], weights[:8] @ table[:8], rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(out[1], weights @ table, rtol=1e-12, atol=1e-14)
+    np.testing.assert_array_equal(out[2], 0.5 * table[3])
+
+
+@pytest.mark.parametrize("place", [0, 1, 7, 15, 16])
+@pytest.mark.parametrize("stray", [-1.0, 1.0, np.nan, np.inf, 3.0])
+def test_the_first_number_that_strays_is_found(place, stray):
+    row = np.zeros(17)
+    row[place:] = stray
+    assert outside(row[:16].copy(), -1.0, 1.0) == place
+
+
+def test_what_is_not_a_number_shows_in_a_sum():
+    table = np.zeros((16, 16))
+    table[5, 3] = np.nan
+    of_all, _ = reckoned(table, np.ones(16), np.zeros((2, 16)))
+    assert np.isnan(of_all)
