@@ -2,9 +2,10 @@
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+import typer
 from rich.console import Console
 from rich.text import Text
 
@@ -15,6 +16,12 @@ console = Console(highlight=False, soft_wrap=True, markup=False)
 def bold(text: object) -> Text:
     """Make something stand out on a terminal, whatever brackets it has."""
     return Text(str(text), style="bold")
+
+
+def print_warnings(sentences: Iterable[str]) -> None:
+    """Print what should be looked at on standard error, so that standard output holds only answers."""
+    for sentence in sentences:
+        typer.echo(f"warning: {sentence}", err=True)
 
 
 def print_json(document: Mapping[str, object]) -> None:

@@ -14,6 +14,7 @@ from analysis.errors import InvalidRequest
 from sim.accuracy import Accuracy
 from sim.answer.plan import ScenePlan, plan_scene
 from sim.scene import Observable, Rest
+from sim.study.doubts import doubts
 from sim.study.results import StudyResults
 from sim.study.software import software
 from sim.study.solve import Existing, solve_study
@@ -21,7 +22,7 @@ from sim.study.study import Start, Study
 
 from .frequency_option import frequencies
 from .interruption import told_to_stop
-from .output import console, print_json
+from .output import console, print_json, print_warnings
 from .paths import AsJson
 from .study import STOPPED_EXIT_CODE, Cluster, Workers
 from .study_bar import study_bar
@@ -95,6 +96,7 @@ def predict(
             "window_s": window,
         }
     )
+    print_warnings(doubts(asked))
     began = time.monotonic()
     existing = Existing.RESUME if resume else Existing.REFUSE
     with told_to_stop() as is_stopped, study_bar(asked.grid.size) as watcher:

@@ -6,12 +6,13 @@ from typing import Annotated
 import typer
 
 from acquisition.toml_file import load_toml
+from sim.study.doubts import doubts
 from sim.study.results import StudyResults
 from sim.study.solve import Existing, solve_study
 from sim.study.study import Study
 
 from .interruption import told_to_stop
-from .output import console, print_json
+from .output import console, print_json, print_warnings
 from .paths import AsJson
 from .study_bar import study_bar
 
@@ -40,6 +41,7 @@ def study(
 ) -> None:
     """Predict responses over every combination of what a file lists, longest first."""
     asked = load_toml(plan, Study)
+    print_warnings(doubts(asked))
     existing = Existing.RESUME if resume else Existing.REFUSE
     with told_to_stop() as is_stopped, study_bar(asked.grid.size) as watcher:
         results = solve_study(asked, out, existing, workers, cluster, watcher, is_stopped)

@@ -22,6 +22,7 @@ def test_a_prediction_is_the_answer_of_the_engine_for_every_frequency(vibench, t
         timeout_s=COMPILING_S,
     )
     assert ran.returncode == 0, ran.stderr
+    assert "warning:" not in ran.stderr
     said = json.loads(ran.stdout)
     assert [point["frequency_hz"] for point in said["points"]] == [129, 130, 131]
     for point in said["points"]:
@@ -86,6 +87,21 @@ def test_points_that_are_answered_alike_are_explained_once(vibench_here, tmp_pat
     told = [line for line in ran.stdout.splitlines() if " points, " in line]
     assert [line.split(":")[0] for line in told] == ["11 points, 200 to 220 Hz", "12 points, 222 to 244 Hz"]
     assert "At 220 Hz: No stop is ever touched: abs(p) stays below 43.8 um" in told[0]
+
+
+@pytest.mark.timeout(COMPILING_S)
+def test_metres_for_micrometres_are_computed_with_a_warning_beside_the_answer(vibench_here, tmp_path):
+    ran = vibench_here(
+        "predict",
+        *("--amplitude", 5, "--frequency", 30, "--json", "--duration", 0.05, "--window", 0.04),
+        *("--model", "linear"),
+        cwd=tmp_path,
+    )
+    assert ran.returncode == 0, ran.stderr
+    assert json.loads(ran.stdout)["is_complete"]
+    (warning,) = [line for line in ran.stderr.splitlines() if line.startswith("warning:")]
+    assert "5 m" in warning
+    assert warning.endswith("give 5e-06")
 
 
 @pytest.mark.parametrize(
