@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from sim.accuracy import Accuracy
-from sim.trade.figures import LevelFigures, MotionTrade, SolverFigures, Trade
+from sim.trade.figures import LEAST_GAIN, LevelFigures, MotionTrade, SolverFigures, Trade
 
 _HEAD = (
     "| level or solver | simulated s per s | error of the state "
@@ -87,6 +87,7 @@ def _promises(trade: Trade) -> Iterator[str]:
         worst = worst_error(trade, accuracy)
         kept = "yes" if worst <= accuracy.promise else "**no**"
         yield f"| {accuracy.value} | {accuracy.promise:.0e} | {worst:.1e} | {kept} |"
+    yield from _without_gain(trade)
     yield from (
         "",
         "## Times of scipy's DOP853 over the standard level",
@@ -96,6 +97,17 @@ def _promises(trade: Trade) -> Iterator[str]:
     )
     for name, ratio in trade.solver_ratio("DOP853", Accuracy.STANDARD).items():
         yield f"| {name} | {ratio:.0f} |"
+
+
+def _without_gain(trade: Trade) -> Iterator[str]:
+    """Name the motions on which a level buys nothing."""
+    lines = [
+        f"- {level.accuracy.value} is no better than {before.accuracy.value}: {each.motion.name}"
+        for each in trade.motions
+        for level, before in each.without_gain
+    ]
+    if lines:
+        yield from ("", f"Errors that a level does not lessen by a factor of {LEAST_GAIN:g}:", "", *lines)
 
 
 def worst_error(trade: Trade, accuracy: Accuracy) -> float:

@@ -1,9 +1,13 @@
 """What a measurement of the trade says: cost and error of each level, and of general solvers beside them."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 from ..accuracy import Accuracy
 from .regimes import Motion, Regime
+
+LEAST_GAIN = 2.0
+"""A level whose error is not smaller than the one before it by this factor buys nothing."""
 
 
 @dataclass(frozen=True)
@@ -51,21 +55,46 @@ class MotionTrade:
     @property
     def advice(self) -> str:
         """Say in a sentence which level to take."""
-        quick, standard, reference = self.levels
         match self.motion.regime:
             case Regime.FREE:
                 return "Flight is exact: all levels are the same."
             case Regime.PERIODIC:
-                return (
-                    f"Each level buys digits: {quick.state_error:.0e}, {standard.state_error:.0e} and "
-                    f"{reference.state_error:.0e} of the state; the last costs "
-                    f"{reference.cost / quick.cost:.1f} times the first."
-                )
+                return self._periodic_advice()
             case Regime.CHAOTIC:
                 return (
                     "Quick is as good as any: with the start of the motion Response I scatters by "
-                    f"{quick.response_i_scatter:.1%}, which no accuracy lessens."
+                    f"{self.levels[0].response_i_scatter:.1%}, which no accuracy lessens."
                 )
+
+    @property
+    def without_gain(self) -> tuple[tuple[LevelFigures, LevelFigures], ...]:
+        """Levels whose state is no better than that of the level before, each with that one."""
+        return tuple(
+            (level, before)
+            for before, level in pairwise(self.levels)
+            if self.motion.regime is Regime.PERIODIC and not _is_better(level, before)
+        )
+
+    def _periodic_advice(self) -> str:
+        quick, standard, reference = self.levels
+        steps = f"{quick.state_error:.0e}, {standard.state_error:.0e} and {reference.state_error:.0e}"
+        errors = f"{steps} of the state"
+        price = f"costs {reference.cost / quick.cost:.1f} times the first"
+        match [level.accuracy for level, _ in self.without_gain]:
+            case []:
+                return f"Each level buys digits: {errors}; the last {price}."
+            case [Accuracy.STANDARD]:
+                return f"Standard is no better than quick, reference is: {errors}; the last {price}."
+            case [Accuracy.REFERENCE]:
+                return f"Standard buys digits, reference no more: {errors}; the last {price}."
+            case _:
+                return f"No level buys digits: {errors}; the last {price}."
+
+
+def _is_better(level: LevelFigures, before: LevelFigures) -> bool:
+    if level.state_error is None or before.state_error is None:
+        return False
+    return LEAST_GAIN * level.state_error < before.state_error
 
 
 @dataclass(frozen=True)

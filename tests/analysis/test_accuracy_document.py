@@ -1,5 +1,6 @@
 """The page on accuracy is made from a measurement, and the page in docs was made by this code."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,17 @@ def test_the_page_holds_every_level_and_solver_of_every_motion(trade):
 def test_the_page_says_when_a_promise_is_not_kept(trade):
     assert worst_error(trade, Accuracy.QUICK) <= Accuracy.QUICK.promise
     assert "**no**" not in accuracy_document(trade, "x.png")
+
+
+def test_the_page_names_the_motions_on_which_a_level_buys_nothing(trade):
+    motion = trade.motions[0]
+    quick, standard, reference = motion.levels
+    stuck = replace(motion, levels=(quick, replace(standard, state_error=quick.state_error), reference))
+    named = f"- standard is no better than quick: {motion.motion.name}"
+    assert named in accuracy_document(replace(trade, motions=(stuck,)), "x.png")
+    better = replace(standard, state_error=0.1 * quick.state_error)
+    gained = replace(motion, levels=(quick, better, replace(reference, state_error=0.0)))
+    assert "is no better" not in accuracy_document(replace(trade, motions=(gained,)), "x.png")
 
 
 def test_the_page_in_docs_has_the_motions_and_columns_that_this_code_writes(trade):

@@ -1,0 +1,38 @@
+"""The sentence on each motion says what its table shows, whichever level buys something."""
+
+import pytest
+
+from sim.accuracy import Accuracy
+from sim.trade.figures import LevelFigures, MotionTrade
+from sim.trade.regimes import Motion, Regime
+
+
+def trade(*state_errors, regime=Regime.PERIODIC):
+    levels = tuple(
+        LevelFigures(accuracy, cost, error, 0.0, 0.0, 1.0, 0.032, -2.0, 0.0)
+        for accuracy, cost, error in zip(Accuracy, (1e-3, 1.1e-3, 2e-3), state_errors, strict=True)
+    )
+    return MotionTrade(Motion(regime, "power:3", 150.0, 10e-6), 2.0, 0.05, levels, ())
+
+
+@pytest.mark.parametrize(
+    ("state_errors", "said", "without"),
+    [
+        ((7.8e-7, 5.7e-8, 5.8e-12), "Each level buys digits: 8e-07, 6e-08 and 6e-12", []),
+        ((1.3e-8, 1.8e-8, 2.4e-13), "Standard is no better than quick, reference is: 1e-08,", ["standard"]),
+        ((1.3e-8, 1.3e-8, 2.4e-13), "Standard is no better than quick, reference is", ["standard"]),
+        ((1.3e-6, 1.3e-11, 1.2e-11), "Standard buys digits, reference no more", ["reference"]),
+        ((1.3e-8, 1.0e-8, 0.9e-8), "No level buys digits", ["standard", "reference"]),
+    ],
+)
+def test_a_level_that_is_no_better_than_the_one_before_is_not_said_to_buy_digits(state_errors, said, without):
+    found = trade(*state_errors)
+    assert found.advice.startswith(said)
+    assert found.advice.endswith("the last costs 2.0 times the first.")
+    assert [level.accuracy.value for level, _ in found.without_gain] == without
+
+
+def test_where_levels_cannot_differ_none_is_reproached_for_it():
+    assert trade(9.9e-14, 9.9e-14, 9.9e-14, regime=Regime.FREE).without_gain == ()
+    assert trade(None, None, None, regime=Regime.CHAOTIC).without_gain == ()
+    assert "scatters by 3.2%" in trade(None, None, None, regime=Regime.CHAOTIC).advice
