@@ -7,6 +7,7 @@ from acquisition.plan.band import excited_band_hz
 from acquisition.plan.campaign import Campaign
 from acquisition.plan.measurement import Measurement
 from acquisition.rig.configuration import Rig
+from acquisition.run.schedule import lead_in_s
 from analysis.live.view import LiveChannel, LiveView
 
 WHOLE_BAND_HZ = (20.0, 2000.0)
@@ -22,7 +23,8 @@ def live_view(bench: BenchFacts, rig: Rig | None, campaign: Campaign | None, nam
         LiveChannel(each.role, each.unit, each.units_per_volt, each.full_scale_v) for each in bench.channels
     ]
     delay_s = 0.0 if rig is None else rig.vibrometer.delay_s
-    return LiveView(channels, bench.sample_rate_hz, band_hz=band_hz, delay_s=delay_s)
+    begins_s = 0.0 if measurement is None else lead_in_s(measurement)
+    return LiveView(channels, bench.sample_rate_hz, band_hz=band_hz, delay_s=delay_s, lead_in_s=begins_s)
 
 
 def warm_up() -> None:

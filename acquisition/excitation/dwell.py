@@ -12,6 +12,8 @@ from .steps import Segment, Step, Tone
 
 MOST_LEAD_INS = 1000
 """Tones that may be passed on the way to one dwell."""
+LEAD_IN_LABEL = "lead_in"
+"""Segment recorded on that way; no result is taken from it."""
 
 
 class LeadIn(FrozenModel):
@@ -67,7 +69,7 @@ class Dwell(AbstractExcitation):
 
     def steps(self) -> Iterator[Step]:
         """List the tones of the lead-in, as one segment, then the dwell."""
-        way = Segment("lead_in", {"tones": len(self.lead_in)})
+        way = Segment(LEAD_IN_LABEL, {"tones": len(self.lead_in)})
         for tone in self.lead_in:
             level = tone.amplitude_vpp / self.amplitude_vpp
             yield Step(Tone(tone.frequency_hz, level), 0.0, self.lead_s, way)

@@ -2,8 +2,10 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import takewhile
 from math import ceil, cos, pi
 
+from ..excitation.dwell import LEAD_IN_LABEL
 from ..excitation.plan import AbstractFeedback
 from ..excitation.steps import Play, Segment, Step, Tone
 from ..plan.measurement import Measurement
@@ -104,6 +106,21 @@ def duration_s(measurement: Measurement) -> float:
     if isinstance(measurement.excitation, AbstractFeedback):
         return HUSH_S + 2 * measurement.ramp_s + measurement.excitation.playing_s
     return sum(phase.duration_s for phase in phases(measurement))
+
+
+def lead_in_s(measurement: Measurement) -> float:
+    """Time from the first sample until what is to be measured begins: bench check, ramp and settling [s].
+
+    With feedback it ends with the ramp: what settles then is part of what is watched.
+    """
+    if isinstance(measurement.excitation, AbstractFeedback):
+        return CHECK_S + HUSH_S + measurement.ramp_s
+    before = takewhile(_leads_in, phases(measurement))
+    return CHECK_S + sum(phase.duration_s for phase in before)
+
+
+def _leads_in(phase: Phase) -> bool:
+    return phase.segment is None or phase.segment.label in (LEAD_IN_LABEL, *_RAMP_LABELS.values())
 
 
 def measured_s(measurement: Measurement) -> float:

@@ -58,6 +58,8 @@ class LiveView:
         What the measurement excites: the transmission is shown in it, and no drive is looked for below.
     delay_s
         By how much the response channel lags the base channel.
+    lead_in_s
+        Until then the motion comes up and settles: it makes no point of a course, and no Poincaré point.
 
     """
 
@@ -68,12 +70,14 @@ class LiveView:
         *,
         band_hz: tuple[float, float],
         delay_s: float = 0.0,
+        lead_in_s: float = 0.0,
         settings: SpectrumSettings = DEFAULT_SETTINGS,
     ) -> None:
         self._channels = tuple(channels)
         self._rate_hz = sample_rate_hz
         self._band_hz = band_hz
         self._delay_s = delay_s
+        self._lead_in = round(lead_in_s * sample_rate_hz)
         self._units_per_volt = np.array([[each.units_per_volt] for each in channels], dtype=np.float32)
         self._rows = {each.role: row for row, each in enumerate(channels)}
         self._ring = Ring(len(channels), round(HELD_S * sample_rate_hz))
@@ -151,7 +155,7 @@ class LiveView:
             self._rate_hz,
             delay_s=self._delay_s,
         )
-        if found is not None:
+        if found is not None and np.all(found.strobe_sample >= self._lead_in):
             self._section.add(found)
         self._portrait = (self._ring.next_sample, found)
         return found
@@ -178,6 +182,10 @@ class LiveView:
     def _has(self, *roles: str) -> bool:
         return all(role in self._rows for role in roles)
 
+    def _settled(self) -> int:
+        """Count the samples since the lead-in was over."""
+        return max(0, self._ring.next_sample - self._lead_in)
+
     def _is_point_due(self) -> bool:
         return self._ring.next_sample - self._pointed >= _POINT_EVERY_S * self._rate_hz
 
@@ -186,6 +194,7 @@ class LiveView:
         lowest_hz = max(_LOWEST_DRIVE_HZ, 0.9 * self._band_hz[0])
         wanted = max(stretch_samples(lowest_hz, self._rate_hz), look_samples(self._rate_hz))
         rows = (self._rows[DRIVE], self._rows[BASE], self._rows[RESPONSE])
-        point = sine_point(self._ring.newest(wanted), rows, self._rate_hz)
+        newest = self._ring.newest(min(wanted, self._settled()))
+        point = sine_point(newest, rows, self._rate_hz)
         if point is not None:
             self._trace.add(point)

@@ -78,3 +78,45 @@ def test_a_run_without_a_base_channel_is_still_watched():
     assert found.portrait() is None
     assert found.course().time_s.size == 0
     assert found.lanes(0.5, 100).low.shape == (2, 100)
+
+
+LEAD_IN_S = 3.2
+
+
+def swept(first, count):
+    """Play a sine that comes up in 1 s, lets m0 ring down, and then moves up by 2 Hz/s."""
+    time_s = (first + np.arange(count)) / RATE
+    moving_s = np.maximum(time_s - LEAD_IN_S, 0.0)
+    omega = 2 * np.pi * (200.0 + 2.0 * moving_s)
+    phase = 2 * np.pi * (200.0 * time_s + 1.0 * moving_s**2)
+    level = np.sin(0.5 * np.pi * np.minimum(time_s, 1.0)) ** 2
+    ringing = 4 * A0 * np.exp(-time_s / 0.5) * np.sin(2 * np.pi * 94.0 * time_s) * 2 * np.pi * 94.0
+    drive = level * np.cos(phase)
+    velocity = -1.3 * A0 * omega * level * np.sin(phase) + ringing
+    units = np.stack((drive, drive, -A0 * omega**2 * drive, velocity))
+    return (units / np.array([[each.units_per_volt] for each in CHANNELS])).astype(np.float32)
+
+
+def watched_sweep(lead_in_s):
+    view = LiveView(CHANNELS, RATE, band_hz=(200.0, 206.0), lead_in_s=lead_in_s)
+    for first in range(0, round(6 * RATE), 2560):
+        view.add(first, swept(first, 2560))
+        view.portrait()
+    return view
+
+
+def test_what_comes_up_and_rings_before_a_sweep_begins_is_no_point_of_its_course():
+    course = watched_sweep(LEAD_IN_S).course()
+    assert course.frequency_hz[0] == pytest.approx(200.4, abs=0.5)
+    assert course.frequency_hz[-1] == pytest.approx(205.2, abs=0.3)
+    assert course.time_s.size >= 20
+    assert np.all(course.time_s > LEAD_IN_S)
+    assert np.allclose(course.response_i, 1.3, rtol=0.02)
+    everything = watched_sweep(0.0).course()
+    assert everything.response_i.max() > 2.5
+
+
+def test_a_section_holds_no_points_of_the_lead_in():
+    settled = watched_sweep(LEAD_IN_S).section.displacement_m
+    assert 0 < settled.size < watched_sweep(0.0).section.displacement_m.size
+    assert np.ptp(settled) < 0.1 * A0

@@ -1,0 +1,31 @@
+"""How a measurement is laid out in time, before anything plays."""
+
+import pytest
+
+from acquisition.excitation.dwell import Dwell, LeadIn
+from acquisition.excitation.resonance_tracking import ResonanceTracking
+from acquisition.excitation.sine_sweep import SineSweep
+from acquisition.plan.measurement import Measurement
+from acquisition.run.schedule import CHECK_S, HUSH_S, lead_in_s
+
+
+def measurement(excitation):
+    return Measurement(name="one", excitation=excitation, ramp_s=0.5)
+
+
+def test_a_sweep_is_led_in_by_check_ramp_and_settling():
+    sweep = SineSweep(amplitude_vpp=1.0, start_hz=100, stop_hz=200, duration_s=10, settle_s=2.0)
+    assert lead_in_s(measurement(sweep)) == pytest.approx(CHECK_S + 0.5 + 2.0)
+
+
+def test_the_tones_that_lead_to_a_dwell_are_part_of_its_lead_in():
+    tones = tuple(LeadIn(frequency_hz=hz, amplitude_vpp=1.0) for hz in (90, 95))
+    dwell = Dwell(amplitude_vpp=1.0, frequency_hz=100, duration_s=5, settle_s=1.0, lead_in=tones, lead_s=0.25)
+    assert lead_in_s(measurement(dwell)) == pytest.approx(CHECK_S + 0.5 + 2 * 0.25 + 1.0)
+
+
+def test_what_feedback_lets_settle_is_no_lead_in():
+    tracking = ResonanceTracking(
+        amplitude_vpp=1.0, start_hz=94, low_hz=90, high_hz=98, accelerations_m_per_s2=(0.1,)
+    )
+    assert lead_in_s(measurement(tracking)) == pytest.approx(CHECK_S + HUSH_S + 0.5)
