@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from itertools import groupby
 
-from ..campaign_results import CampaignResults, DwellResult, Result, SweepResult
+from ..campaign_results import CampaignResults, DwellResult, Result, SteppedSineResult, SweepResult
+from ..figures.backbone import backbone_figure
 from ..figures.bench_levels import bench_levels_figure
 from ..figures.distortion import distortion_figure
 from ..figures.drawn import DrawnFigure
@@ -16,6 +17,7 @@ from ..figures.sweep import sweep_figure
 from ..figures.sweep_orders import sweep_orders_figure
 from ..figures.transmission import transmission_figure
 from ..figures.transmission_levels import transmission_levels_figure
+from ..tracked_resonance import tracked_resonances
 
 
 def result_figures(results: CampaignResults) -> Iterator[DrawnFigure]:
@@ -37,7 +39,14 @@ def result_figures(results: CampaignResults) -> Iterator[DrawnFigure]:
         yield dwells_figure([(each.analysis, each.laid) for each in dwells])
         yield portraits_figure([each.analysis for each in dwells])
     for stepped in results.stepped:
-        yield stepped_sine_figure(stepped.analysis, stepped.laid)
+        yield _stepped_figure(stepped)
+
+
+def _stepped_figure(stepped: SteppedSineResult) -> DrawnFigure:
+    """Draw a tracked resonance over level, everything else over what was stepped."""
+    if tracked_resonances(stepped.analysis.facts.feedback):
+        return backbone_figure(stepped.analysis, stepped.laid)
+    return stepped_sine_figure(stepped.analysis, stepped.laid)
 
 
 def _there_and_back(sweeps: tuple[SweepResult, ...]) -> Iterator[tuple[SweepResult, SweepResult]]:

@@ -17,6 +17,7 @@ from analysis.feedback_notes import FeedbackNote
 from analysis.feedback_words import feedback_sentences, noted_jumps
 from analysis.figures.stepped_sine import stepped_sine_figure
 from analysis.measurement_analysis import analyse_recording
+from analysis.report.figure_choice import result_figures
 from analysis.report.findings import findings
 from analysis.summary import summary
 
@@ -92,6 +93,13 @@ def test_a_tracked_resonance_is_analysed_and_said(analysed):
     drawn = stepped_sine_figure(analysis)
     assert drawn.title == "Tracked resonance, around 266.4 Hz"
     assert drawn.caption == f"Resonance tracked, levels of the base: 1. {sentence}"
+    (figure,) = result_figures(CampaignResults("run", (SteppedSineResult(analysis, None),), ()))
+    assert figure.name == "backbone_run", "what is stepped is the level"
+    numbers = dict(figure.tables[0].columns)
+    found = analysis.response
+    assert numbers["amplitude_m"] == pytest.approx(found.response_ii * found.drive_amplitude_m, rel=0.01)
+    assert numbers["base_m_per_s2"] == pytest.approx([0.5], rel=0.05)
+    assert numbers["frequency_hz"] == pytest.approx(found.frequency_hz, abs=0.1)
     document = json.loads(json.dumps(summary(SteppedSineResult(analysis, None))))
     kinds = [each["kind"] for each in document["recording"]["feedback"]]
     assert kinds.count("resonance") == 1

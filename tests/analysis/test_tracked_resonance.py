@@ -1,0 +1,59 @@
+"""A backbone is read from the notes of its levels, and what it says of stiffness follows from them."""
+
+import math
+
+import pytest
+
+from analysis.feedback_notes import FeedbackNote
+from analysis.tracked_resonance import backbone_sentence, lost_levels, tracked_resonances
+
+
+def note(number, base, frequency_hz, **more):
+    numbers = {
+        "level": number,
+        "asked_m_per_s2": base,
+        "frequency_hz": frequency_hz,
+        "frequency_u_hz": 0.03,
+        "at_hz": 100.0,
+        "response_ii": 20.0,
+        "base_m_per_s2": base,
+        "lock": "locked",
+    }
+    return FeedbackNote("resonance", float(number), numbers | more)
+
+
+def lost(number, base):
+    return note(number, base, None, frequency_u_hz=None, lock="outside the range")
+
+
+def test_levels_are_in_the_order_of_the_base_and_m0_moves_by_the_response_times_the_base():
+    found = tracked_resonances([note(0, 2.0, 99.0), note(1, 1.0, 100.0, mode_hz=100.5, mode_u_hz=0.1)])
+    assert [each.number for each in found] == [1, 0]
+    assert [each.frequency_hz for each in found] == [100.0, 99.0]
+    assert found[0].amplitude_m == pytest.approx(20.0 * 1.0 / (2 * math.pi * 100.0) ** 2)
+    assert (found[0].mode_hz, found[1].mode_hz) == (100.5, None)
+
+
+def test_a_level_at_which_the_resonance_was_lost_is_no_point_of_the_backbone():
+    notes = [note(0, 1.0, 100.0), lost(1, 3.0), lost(2, 2.0), FeedbackNote("achieved", 0.0, {})]
+    assert [each.number for each in tracked_resonances(notes)] == [0]
+    assert lost_levels(notes) == (2.0, 3.0)
+    assert tracked_resonances([lost(0, 1.0)]) == ()
+
+
+@pytest.mark.parametrize(
+    ("strong_hz", "said"),
+    [
+        (101.0, "by +1 ± 0.085 Hz: the mode hardens."),
+        (99.0, "by -1 ± 0.085 Hz: the mode softens."),
+        (100.05, "neither softening nor hardening is seen."),
+    ],
+)
+def test_a_mode_is_said_to_soften_or_harden_only_past_the_uncertainty(strong_hz, said):
+    sentence = backbone_sentence(tracked_resonances([note(0, 0.5, 100.0), note(1, 2.0, strong_hz)]))
+    assert sentence.startswith("From 0.5 to 2 m/s² the phase resonance moves by ")
+    assert sentence.endswith(said)
+
+
+def test_one_level_tells_no_backbone():
+    assert backbone_sentence(tracked_resonances([note(0, 0.5, 100.0)])) == ""
