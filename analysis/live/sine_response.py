@@ -19,6 +19,10 @@ _STRETCH_PERIODS = 25
 """... and at least 0.1 s of motion, without the ends that integration disturbs."""
 _STRETCH_S = 0.1
 _EDGE_PERIODS = 6 / _BAND_BELOW
+_LEAST_KEPT = 0.9
+"""Part of its amplitude that the drive keeps along a stretch, unless it is ramped down."""
+_STEEPEST_POWER = 2
+"""A sweep's setting follows at most the square of its frequency: constant displacement."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,10 @@ def look_samples(sample_rate_hz: float) -> int:
 
 
 def sine_point(window: Window, rows: tuple[int, int, int], sample_rate_hz: float) -> SinePoint | None:
-    """Make a point of the newest samples; None when they hold no sine, are too few, or some were lost.
+    """Make a point of the newest samples.
+
+    None when they hold no sine, are too few, some were lost, or the drive is ramped down: m0 then rings
+    on over a base that is hardly there.
 
     Parameters
     ----------
@@ -72,9 +79,21 @@ def sine_point(window: Window, rows: tuple[int, int, int], sample_rate_hz: float
     stretch = np.asarray(window.values[list(rows), -count:], dtype=np.float64)
     if stretch.shape[1] < count or not np.isfinite(stretch).all():
         return None
+    if _is_ramped_down(stretch[0], sample_rate_hz):
+        return None
     middle_s = (window.stop_sample - 0.5 * count) / sample_rate_hz
     point = _point(stretch, sample_rate_hz, tone.frequency_hz)
     return None if point is None else replace(point, time_s=middle_s)
+
+
+def _is_ramped_down(drive: Reals, sample_rate_hz: float) -> bool:
+    """Tell whether the drive falls along a stretch, by more than a sweep downwards lets it."""
+    quarter = drive.size // 4
+    first, last = (drive_tone(each, sample_rate_hz) for each in (drive[:quarter], drive[-quarter:]))
+    if first is None or last is None:
+        return first is not None
+    swept = min(1.0, last.frequency_hz / first.frequency_hz) ** _STEEPEST_POWER
+    return last.amplitude < _LEAST_KEPT * swept * first.amplitude
 
 
 def _point(stretch: Reals, sample_rate_hz: float, near_hz: float) -> SinePoint | None:

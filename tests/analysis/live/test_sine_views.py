@@ -61,6 +61,32 @@ def test_a_point_of_a_sweep_stands_at_the_frequency_of_its_own_time():
     assert point.response_ii == pytest.approx(5.0, rel=0.01)
 
 
+def held_displacement(start_hz, rate_hz_per_s, level=1.0):
+    """Two seconds of a sweep whose drive follows the square of its frequency."""
+    time_s = np.arange(int(2 * RATE)) / RATE
+    frequency_hz = start_hz + rate_hz_per_s * time_s
+    values = motion(
+        2 * np.pi * (start_hz * time_s + 0.5 * rate_hz_per_s * time_s**2), 2 * np.pi * frequency_hz
+    )
+    values[0] *= (frequency_hz / start_hz) ** 2
+    return Window(0, (level * values).astype(np.float32))
+
+
+def test_no_point_is_made_while_the_drive_is_ramped_down():
+    time_s = np.arange(int(2 * RATE)) / RATE
+    ramp = np.cos(0.5 * np.pi * np.clip(time_s - 1.7, 0.0, 1.0)) ** 2
+    assert sine_point(held_displacement(260.0, 0.0), (0, 1, 2), RATE) is not None
+    assert sine_point(held_displacement(260.0, 0.0, ramp), (0, 1, 2), RATE) is None
+    silence = np.where(time_s < 1.9, 1.0, 0.0)
+    assert sine_point(held_displacement(260.0, 0.0, silence), (0, 1, 2), RATE) is None
+
+
+@pytest.mark.parametrize(("start_hz", "rate_hz_per_s"), [(110.0, -20.0), (260.0, -3.0), (260.0, 30.0)])
+def test_a_sweep_of_constant_displacement_is_not_taken_for_a_ramp(start_hz, rate_hz_per_s):
+    point = sine_point(held_displacement(start_hz, rate_hz_per_s), (0, 1, 2), RATE)
+    assert point.frequency_hz == pytest.approx(start_hz + rate_hz_per_s * point.time_s, rel=0.01)
+
+
 def test_no_point_is_made_of_lost_samples_or_too_few():
     window = sine(260.0, 60_000)
     assert sine_point(Window(0, window.values[:, :1000]), (0, 1, 2), RATE) is None
