@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from ..arrays import Reals
 from ..feedback_words import feedback_sentences
@@ -17,6 +18,8 @@ from .style import BOUNDS, MEASURED, PREDICTED, SIMULATED, legend_above, new_fig
 _HEIGHT_IN = 4.2
 _MARGIN = 0.15
 """Room around the points, in parts of their range: few points must not lie on the frame."""
+_MOST_MARKS = 5
+"""Intervals of the backbone's frequency axis: numbers such as 266.385 are wide."""
 _LEVEL = "base acceleration [m/s²]"
 _PHASE = "phase resonance, ± two standard uncertainties"
 _MODE = "natural frequency of the mode"
@@ -104,6 +107,7 @@ def _backbone(axes: Axes, levels: Sequence[TrackedResonance], amplitude_m: Reals
         xerr=[2 * each.u_frequency_hz for each in levels],
         color=MEASURED, marker="o", markersize=4, capsize=2, linewidth=0.8,
     )  # fmt: skip
+    axes.xaxis.set_major_locator(MaxNLocator(_MOST_MARKS))
     axes.set_xlabel("phase resonance [Hz]")
     axes.set_ylabel(f"m0 at resonance [{unit}]")
     axes.margins(_MARGIN)
