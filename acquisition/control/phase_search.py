@@ -8,6 +8,8 @@ import numpy as np
 _NEAR_DEG = 35.0
 """Errors up to this are on the straight part of the phase: its slope is taken from them."""
 _FEWEST = 2
+_STEEPEST_DEG = 85.0
+"""Errors beyond are taken for this: the tangent of a right angle has no end."""
 _BEND = 0.15
 """How far the slope over that part is off the one at the resonance, at most."""
 
@@ -79,9 +81,13 @@ class PhaseSearch:
         spread = float(np.var(frequency_hz))
         if spread == 0.0:
             return PhaseResonance(best.frequency_hz, float("inf"), 0.0)
-        away_hz = frequency_hz - frequency_hz.mean()
-        slope = float(away_hz @ error_deg / (away_hz @ away_hz))
-        # From the best try, not from the line's own crossing: the phase bends away from it further out.
+        # The tangent of the error is a straight line through a mode, whose phase itself bends away from it.
+        error = np.degrees(np.tan(np.radians(np.clip(error_deg, -_STEEPEST_DEG, _STEEPEST_DEG))))
+        # A given phase moves the tangent the more, the further out it is.
+        weight = np.cos(np.radians(error_deg)) ** 4
+        away_hz = frequency_hz - float(weight @ frequency_hz / weight.sum())
+        slope = float((weight * away_hz) @ error / ((weight * away_hz) @ away_hz))
+        # From the best try, not from the line's own crossing: other modes bend it further out.
         crossing_hz = best.frequency_hz - best.error_deg / slope
         uncertainty_deg = hypot(best.uncertainty_deg, sensor_phase_deg, _BEND * best.error_deg)
         return PhaseResonance(crossing_hz, uncertainty_deg / abs(slope), slope)
