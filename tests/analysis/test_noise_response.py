@@ -22,7 +22,7 @@ from sim.specimen import gong2025
 STREAMING = Path(__file__).parents[2] / "hardware_configs" / "virtual_rig_streaming.toml"
 WEAK_VPP, STRONG_VPP = 0.067, 7.0
 # The weak one long enough for its lines to be finer than the narrowest resonance, of 1.1 Hz.
-DURATION_S = {WEAK_VPP: 18.0, STRONG_VPP: 20.0}
+DURATION_S = {WEAK_VPP: 18.0, STRONG_VPP: 30.0}
 
 
 def noise(amplitude_vpp, duration_s):
