@@ -204,9 +204,7 @@ def with_numbalsoda(motion, method, tolerance, start, span_s):
 
     solve, address, constants = getattr(numbalsoda, method), plain_function(), constants_of(motion)
     times = np.array([0.0, span_s])
-    options = {"rtol": tolerance, "atol": tolerance * LOWEST_M}
-    if method == "lsoda":
-        options["mxstep"] = 10_000_000
+    options = {"rtol": tolerance, "atol": tolerance * LOWEST_M, "mxstep": 10_000_000}
 
     def job():
         found, success = solve(address, start, times, constants, **options)
