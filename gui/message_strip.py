@@ -71,6 +71,11 @@ class MessageStrip(QFrame):
             widget.style().polish(widget)
         self.show()
 
+    def give_way(self) -> None:
+        """Take away what is only information and about what was before; it stays in Details."""
+        if self._notices and self._notices[-1].kind is NoticeKind.INFO:
+            self.dismiss()
+
     def dismiss(self) -> None:
         """Take the strip away; the messages stay in Details."""
         self._more.setChecked(False)

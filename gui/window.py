@@ -150,6 +150,7 @@ class Window(QMainWindow):
         self.abort_key.pressed.connect(self.orders.abort)
         self.banner.stop_wanted.connect(self.orders.stop)
         self.desk.bridge.armed.connect(lambda _plan: self.show_page(RUN))
+        self.desk.bridge.armed.connect(lambda _plan: self.strip.give_way())
 
     def _restore(self) -> None:
         self.resize(1280, 800)

@@ -29,9 +29,9 @@ class MeasuredLevel:
 
 
 MEASURED = {
-    Accuracy.QUICK: MeasuredLevel(24037.0, 1154.0, 910.0, 1825.0, 7.8e-7, 3.8e-7),
-    Accuracy.STANDARD: MeasuredLevel(19235.0, 1040.0, 813.0, 1669.0, 5.7e-8, 2.8e-8),
-    Accuracy.REFERENCE: MeasuredLevel(21496.0, 589.0, 463.0, 965.0, 5.8e-12, 0.0),
+    Accuracy.QUICK: MeasuredLevel(21015.0, 3603.0, 3084.0, 3368.0, 4.9e-10, 2.9e-10),
+    Accuracy.STANDARD: MeasuredLevel(21501.0, 4182.0, 3077.0, 2902.0, 4.9e-10, 2.9e-10),
+    Accuracy.REFERENCE: MeasuredLevel(22280.0, 675.0, 542.0, 1650.0, 6.3e-12, 0.0),
 }
 CHAOS_SCATTER = 0.03
 """Response I in chaos scatters by so much from start to start, at every level."""

@@ -46,3 +46,13 @@ def test_dismissed_messages_can_still_be_read_in_details(qtbot):
     details = strip.findChild(QPlainTextEdit)
     assert not details.isHidden()
     assert details.toPlainText() == "INFO: second\n\nINFO: first"
+
+
+def test_information_gives_way_to_what_begins_and_a_warning_does_not(qtbot):
+    strip = MessageStrip()
+    qtbot.addWidget(strip)
+    for kind, stays in ((NoticeKind.INFO, False), (NoticeKind.WARNING, True), (NoticeKind.FAULT, True)):
+        strip.say(Notice(kind, "The campaign before this one ended."))
+        strip.give_way()
+        assert strip.isVisibleTo(None) is stays
+    assert len(strip.notices) == 3

@@ -108,8 +108,8 @@ def test_costs_and_errors_are_about_those_of_the_page_on_accuracy():
 def test_a_stricter_accuracy_is_said_to_cost_more():
     levels = (Accuracy.QUICK, Accuracy.REFERENCE)
     quick, strict = (cost_sentences(SimulationRequest(accuracy=each), 2) for each in levels)
-    assert "910 s of chaos" in quick[1]
-    assert "463 s of chaos" in strict[1]
+    assert "3084 s of chaos" in quick[1]
+    assert "542 s of chaos" in strict[1]
     assert "8e-07" in quick[2]
 
 
