@@ -110,7 +110,7 @@ def test_a_stricter_accuracy_is_said_to_cost_more():
     quick, strict = (cost_sentences(SimulationRequest(accuracy=each), 2) for each in levels)
     assert "3084 s of chaos" in quick[1]
     assert "542 s of chaos" in strict[1]
-    assert "8e-07" in quick[2]
+    assert "5e-10" in quick[2]
 
 
 def test_the_process_that_simulates_drops_what_is_no_longer_wanted():
