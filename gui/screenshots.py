@@ -1,5 +1,6 @@
 """Pictures of every page, light and dark, in several sizes, made by the window while it measures."""
 
+import gc
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -77,6 +78,8 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
         desk = Desk(settings, partial(start_engine, Attendance.UNATTENDED))
         desk.choose_folder(Path(scratch) / "recordings")
         window = Window(desk, PAGES)
+        # As in `gui.open_window`: pictures are to show what a person would see.
+        gc.freeze()
         window.resize(*SIZE)
         window.show()
         try:
