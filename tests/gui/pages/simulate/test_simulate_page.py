@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from analysis.simulation.accuracy_cost import MEASURED
 from analysis.simulation.answers import SimulatedPoint, SimulatedSignal, Trouble
 from analysis.simulation.request import SimulationRequest
 from gui.pages.simulate.simulate_page import SimulatePage
 from gui.theme import DARK
+from sim.accuracy import Accuracy
 
 LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "start_hz": 50.0, "step_hz": 10.0}
 
@@ -90,9 +92,10 @@ def test_cost_and_error_stand_beside_the_accuracy(page):
     quick = page._cost.text()
     page.form.show_value(SimulationRequest(accuracy="reference"))
     strict = page._cost.text()
-    assert "910 s of chaos" in quick
-    assert "463 s of chaos" in strict
-    assert "6e-12" in strict
+    for accuracy, text in ((Accuracy.QUICK, quick), (Accuracy.REFERENCE, strict)):
+        assert f"{MEASURED[accuracy].chaos:.0f} s of chaos" in text
+        assert f"{MEASURED[accuracy].state_error:.0e}" in text
+    assert quick != strict
 
 
 def test_exponents_similarity_impacts_and_motion_are_drawn_as_they_come(page):
