@@ -10,15 +10,15 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from sim.accuracy import Accuracy
-from sim.chain.chain import chain_of
-from sim.chain.integrate import integrate_chain
-from sim.chain.lyapunov import largest_chain_exponent
-from sim.chain.response import chain_response
-from sim.chain.tables import chain_tables
-from sim.drive import Harmonic
-from sim.integrate import integrate
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.chain.chain import chain_of
+from vibench.sim.chain.integrate import integrate_chain
+from vibench.sim.chain.lyapunov import largest_chain_exponent
+from vibench.sim.chain.response import chain_response
+from vibench.sim.chain.tables import chain_tables
+from vibench.sim.drive import Harmonic
+from vibench.sim.integrate import integrate
+from vibench.sim.specimen import gong2025
 
 REPEATS = 5
 LENGTHS = (1, 2, 4, 8, 16, 32, 64)

@@ -16,14 +16,14 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from acquisition.engine.client import EngineClient
-from acquisition.engine.requests import Look
-from acquisition.engine.start import start_engine
-from acquisition.engine.state import Attendance, EngineState
-from acquisition.engine.wire import Message, send
-from acquisition.plan.campaign import Campaign
-from acquisition.recording import open_recording
-from acquisition.rig.configuration import load_rig
+from vibench.acquisition.engine.client import EngineClient
+from vibench.acquisition.engine.requests import Look
+from vibench.acquisition.engine.start import start_engine
+from vibench.acquisition.engine.state import Attendance, EngineState
+from vibench.acquisition.engine.wire import Message, send
+from vibench.acquisition.plan.campaign import Campaign
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.rig.configuration import load_rig
 
 RIG = Path(__file__).parent.parent / "hardware_configs" / "virtual_rig.toml"
 BUSY = "while True: sum(i * i for i in range(100_000))"

@@ -4,12 +4,12 @@ import time
 
 import numpy as np
 
-from sim.accuracy import Accuracy
-from sim.compiled import compiled
-from sim.drive import Harmonic, LinearSweep, Sampled
-from sim.engine.interval import advance_interval, interval_tables, new_state
-from sim.integrate import integrate
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.compiled import compiled
+from vibench.sim.drive import Harmonic, LinearSweep, Sampled
+from vibench.sim.engine.interval import advance_interval, interval_tables, new_state
+from vibench.sim.integrate import integrate
+from vibench.sim.specimen import gong2025
 
 REPEATS = 3
 UNITS = np.repeat([1e-4, 0.1], 3)

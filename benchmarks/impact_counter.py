@@ -8,10 +8,10 @@ goes to the counter in blocks of 50 ms, as it does in a run. The simulation know
 
 import numpy as np
 
-from analysis.live.impacts import ImpactCounter
-from sim.drive import Harmonic
-from sim.integrate import integrate
-from sim.specimen import gong2025
+from vibench.analysis.live.impacts import ImpactCounter
+from vibench.sim.drive import Harmonic
+from vibench.sim.integrate import integrate
+from vibench.sim.specimen import gong2025
 
 RATE_HZ = 51_200.0
 BLOCK = 2560

@@ -2,9 +2,9 @@
 
     python benchmarks/live_view.py
 
-Processor time per frame of everything that `analysis.live` computes; painting is not in it. Beside it the
-same lanes by pyqtgraph's way, every n-th sample and the peak of every n samples, and the share of frames
-in which an impact of three samples is seen.
+Processor time per frame of everything that `vibench.analysis.live` computes; painting is not in it. Beside
+it the same lanes by pyqtgraph's way, every n-th sample and the peak of every n samples, and the share of
+frames in which an impact of three samples is seen.
 """
 
 import time
@@ -13,8 +13,8 @@ from functools import partial
 
 import numpy as np
 
-from analysis.live.envelope import envelope
-from analysis.live.view import LiveChannel, LiveView
+from vibench.analysis.live.envelope import envelope
+from vibench.analysis.live.view import LiveChannel, LiveView
 
 RATE_HZ, BLOCK, COLUMNS, SPAN_S = 51_200.0, 2560, 1000, 2.0
 FRAMES = 200

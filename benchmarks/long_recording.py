@@ -16,19 +16,15 @@ from pathlib import Path
 import numpy as np
 from scipy import signal
 
-from acquisition.excitation.streamed_noise import StreamedNoise
-from acquisition.instruments import Block
-from acquisition.plan.measurement import Measurement
-from acquisition.recording import (
-    ChannelHeader,
-    Origin,
-    RecordingHeader,
-    RecordingState,
-    create_recording,
-    open_recording,
-)
-from analysis.measurement_analysis import analyse_recording
-from analysis.recorded_channels import BASE, DRIVE, RESPONSE
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.instruments import Block
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
+from vibench.acquisition.recording.layout import Origin, RecordingState
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.recording.writer import create_recording
+from vibench.analysis.measurement_analysis import analyse_recording
+from vibench.analysis.recorded_channels import BASE, DRIVE, RESPONSE
 
 RATE_HZ = 51_200
 BLOCK = 1 << 19

@@ -13,16 +13,16 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from sim.accuracy import Accuracy
-from sim.drive import Harmonic
-from sim.engine.clock import clock_at
-from sim.engine.harmonic_run import advance_harmonic
-from sim.engine.harmonic_tables import harmonic_tables
-from sim.engine.interval import new_state
-from sim.growth.tangent import unit_tangent
-from sim.integrate import new_record
-from sim.lyapunov import Precision, largest_exponent
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.drive import Harmonic
+from vibench.sim.engine.clock import clock_at
+from vibench.sim.engine.harmonic_run import advance_harmonic
+from vibench.sim.engine.harmonic_tables import harmonic_tables
+from vibench.sim.engine.interval import new_state
+from vibench.sim.growth.tangent import unit_tangent
+from vibench.sim.integrate import new_record
+from vibench.sim.lyapunov import Precision, largest_exponent
+from vibench.sim.specimen import gong2025
 
 REPEATS = 5
 COST_S = 10.0

@@ -15,13 +15,16 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.excitation.streamed_noise import StreamedNoise
-from acquisition.instruments import Block
-from acquisition.plan.measurement import Measurement
-from acquisition.recording import ChannelHeader, Origin, RecordingHeader, create_recording, open_recording
-from acquisition.recording.overview import OverviewSums
-from analysis.live.envelope import envelope
-from analysis.overview import overview_of
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.instruments import Block
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
+from vibench.acquisition.recording.layout import Origin
+from vibench.acquisition.recording.overview import OverviewSums
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.recording.writer import create_recording
+from vibench.analysis.live.envelope import envelope
+from vibench.analysis.overview import overview_of
 
 RATE_HZ = 51_200
 COLUMNS = 1000

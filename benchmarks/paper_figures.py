@@ -8,12 +8,12 @@ import argparse
 import os
 import time
 
-from sim.answer.solve import solve_scene
-from sim.drive import Harmonic
-from sim.scene import Observable, Scene
-from sim.specimen import gong2025
-from sim.study.solve import solve_study
-from sim.study.study import Study
+from vibench.sim.answer.solve import solve_scene
+from vibench.sim.drive import Harmonic
+from vibench.sim.scene import Observable, Scene
+from vibench.sim.specimen import gong2025
+from vibench.sim.study.solve import solve_study
+from vibench.sim.study.study import Study
 
 AMPLITUDES_M = (1e-6, 5e-6, 10e-6, 50e-6)
 FREQUENCIES = {"start": 10, "stop": 600, "step": 1}

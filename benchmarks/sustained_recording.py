@@ -12,12 +12,12 @@ import tempfile
 import time
 from pathlib import Path
 
-from acquisition.bench import open_bench
-from acquisition.excitation.dwell import Dwell
-from acquisition.plan.measurement import Measurement
-from acquisition.recording import open_recording
-from acquisition.run.progress import Progress
-from acquisition.run.run_measurement import run_measurement
+from vibench.acquisition.bench import open_bench
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.run.progress import Progress
+from vibench.acquisition.run.run_measurement import run_measurement
 
 ROOT = Path(__file__).resolve().parent.parent
 MINUTE_S = 60.0

@@ -16,13 +16,13 @@ import pyvisa
 from nidaqmx.constants import AcquisitionType
 from nidaqmx.stream_readers import AnalogMultiChannelReader
 
-from acquisition.rig.configuration import Rig, load_rig
-from acquisition.virtual.analogue import Coupling, Input
-from acquisition.virtual.generator.afg1022 import AFG1022
-from acquisition.virtual.generator.terminal_voltage import Terminal
-from acquisition.virtual.rig import VirtualRig
-from acquisition.virtual.world.time_grid import USUAL_GRID
-from acquisition.virtual.world.world import World
+from vibench.acquisition.rig.configuration import Rig, load_rig
+from vibench.virtual_rig.analogue import Coupling, Input
+from vibench.virtual_rig.generator.afg1022 import AFG1022
+from vibench.virtual_rig.generator.terminal_voltage import Terminal
+from vibench.virtual_rig.rig import VirtualRig
+from vibench.virtual_rig.world.time_grid import USUAL_GRID
+from vibench.virtual_rig.world.world import World
 
 RATE_HZ = 51_200
 BLOCK = 5120

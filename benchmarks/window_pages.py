@@ -21,16 +21,16 @@ import numpy as np
 from PySide6.QtCore import QEventLoop, QTimer
 from PySide6.QtWidgets import QApplication
 
-from analysis.comparison.trace import Origin, Response, Trace
-from analysis.simulation.answers import SimulatedPoint
-from analysis.simulation.course import SimulationCourse
-from gui.app import application
-from gui.desk import Desk
-from gui.loop_watch import LoopWatch
-from gui.pages.compare.compare_page import ComparePage
-from gui.pages.files.files_page import FilesPage
-from gui.pages.simulate.simulate_page import SimulatePage
-from gui.settings import Settings
+from vibench.analysis.comparison.trace import Origin, Response, Trace
+from vibench.analysis.simulation.answers import SimulatedPoint
+from vibench.analysis.simulation.course import SimulationCourse
+from vibench.gui.app import application
+from vibench.gui.desk import Desk
+from vibench.gui.loop_watch import LoopWatch
+from vibench.gui.pages.compare.compare_page import ComparePage
+from vibench.gui.pages.files.files_page import FilesPage
+from vibench.gui.pages.simulate.simulate_page import SimulatePage
+from vibench.gui.settings import Settings
 
 SIZE = (1400, 900)
 SPANS_S = (600.0, 60.0, 6.0, 2.4, 0.6, 0.06)

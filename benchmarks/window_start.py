@@ -18,11 +18,11 @@ ROOT = Path(__file__).resolve().parent.parent
 STARTED = """
 import sys, time
 from pathlib import Path
-from gui.app import application
-from gui.desk import Desk
-from gui.pages.catalogue import PAGES
-from gui.settings import Settings
-from gui.window import Window
+from vibench.gui.app import application
+from vibench.gui.desk import Desk
+from vibench.gui.pages.catalogue import PAGES
+from vibench.gui.settings import Settings
+from vibench.gui.window import Window
 app = application(["vibench"])
 window = Window(Desk(Settings(Path(sys.argv[1]))), PAGES)
 window.show()

@@ -5,7 +5,7 @@ import tempfile
 
 import pytest
 
-import cli.blas_threads  # noqa: F401 - it is the import that counts, before any test imports numpy
+import vibench.cli.blas_threads  # noqa: F401 - it is the import that counts, before any test imports numpy
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("QT_SCALE_FACTOR", "1")

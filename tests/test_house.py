@@ -1,5 +1,6 @@
 """The house rules, checked as tests so that one command is the whole check."""
 
+import importlib
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +9,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
+PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 
 
 @pytest.mark.parametrize(
@@ -26,12 +28,9 @@ def test_the_house_rules_hold(command):
     assert result.returncode == 0, f"{' '.join(command)}\n{result.stdout}{result.stderr}"
 
 
-def test_the_five_packages_lie_in_one_folder():
-    import acquisition
-    import analysis
-    import cli
-    import gui
-    import sim
-
-    homes = {Path(package.__file__).parent.parent for package in (cli, gui, analysis, acquisition, sim)}
-    assert len(homes) == 1
+@pytest.mark.parametrize("portion", PORTIONS)
+def test_each_portion_of_the_namespace_comes_from_its_own_folder(portion):
+    package = importlib.import_module(f"vibench.{portion}")
+    assert Path(package.__file__).parent == ROOT / portion / "vibench" / portion
+    assert (Path(package.__file__).parent / "py.typed").is_file()
+    assert not (ROOT / portion / "vibench" / "__init__.py").exists()  # it would hide the other portions

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.bench import Reality, open_bench
-from acquisition.drivers.afg1022x import AFG1022X
-from acquisition.drivers.daqmx import DaqmxDigitizer
-from acquisition.errors import (
+from vibench.acquisition.bench import Reality, open_bench
+from vibench.acquisition.drivers.afg1022x import AFG1022X
+from vibench.acquisition.drivers.daqmx import DaqmxDigitizer
+from vibench.acquisition.errors import (
     CheckFailed,
     ConfigurationError,
     DataLost,
@@ -19,13 +19,18 @@ from acquisition.errors import (
     InstrumentError,
     InstrumentLost,
 )
-from acquisition.instruments import Digitizer, FunctionGenerator
-from acquisition.rig.calibration import CalibrationRule, calibrations, check_calibrations
-from acquisition.rig.configuration import load_rig
-from acquisition.rig.knobs import confirm_by_asking, confirm_by_sheet, confirm_simulated, save_knob_sheet
-from acquisition.virtual.generator.output_signal import Panel
-from acquisition.virtual.generator.scpi_command import Quirks
-from acquisition.virtual.rig import VirtualRig
+from vibench.acquisition.instruments import Digitizer, FunctionGenerator
+from vibench.acquisition.rig.calibration import CalibrationRule, calibrations, check_calibrations
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.rig.knobs import (
+    confirm_by_asking,
+    confirm_by_sheet,
+    confirm_simulated,
+    save_knob_sheet,
+)
+from vibench.virtual_rig.generator.output_signal import Panel
+from vibench.virtual_rig.generator.scpi_command import Quirks
+from vibench.virtual_rig.rig import VirtualRig
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = ROOT / "hardware_configs"

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.bench_list import list_instruments
-from acquisition.rig.configuration import load_rig
-from acquisition.virtual.rig import VirtualRig
+from vibench.acquisition.bench_list import list_instruments
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.virtual_rig.rig import VirtualRig
 
 ROOT = Path(__file__).parents[2]
 

@@ -1,16 +1,14 @@
 """Workers of a program that was killed do not stay behind."""
 
-import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 PROGRAM = """
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from acquisition.follow_parent import follow_parent
+from vibench.acquisition.follow_parent import follow_parent
 import os, signal
 
 if __name__ == "__main__":
@@ -24,9 +22,6 @@ if __name__ == "__main__":
 def test_workers_end_when_their_program_is_killed(tmp_path):
     script = tmp_path / "program.py"
     script.write_text(PROGRAM)
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
-    with subprocess.Popen(
-        [sys.executable, str(script)], env=environment, stdout=subprocess.PIPE, text=True
-    ) as killed:
+    with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True) as killed:
         # The end comes when nobody holds the other side of the pipe any more, no worker either.
         assert killed.stdout.read() == "True\n"

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.excitation.dwell import Dwell
-from acquisition.excitation.multisine_noise import MultisineNoise
-from acquisition.excitation.sine_sweep import SineSweep
-from acquisition.excitation.stepped_sine import SteppedSine
-from acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.excitation.multisine_noise import MultisineNoise
+from vibench.acquisition.excitation.sine_sweep import SineSweep
+from vibench.acquisition.excitation.stepped_sine import SteppedSine
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
 
 
 def _load(name):

@@ -6,13 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.instruments import Block, Identity
-from acquisition.plan.measurement import Measurement
-from acquisition.recording import ChannelHeader, Origin, RecordingHeader, RecordingState, create_recording
-from acquisition.recording.provenance import Provenance
-from sim.drive import Sampled
-from sim.integrate import integrate
-from sim.specimen import gong2025
+from vibench.acquisition.instruments import Block, Identity
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
+from vibench.acquisition.recording.layout import Origin, RecordingState
+from vibench.acquisition.recording.provenance import Provenance
+from vibench.acquisition.recording.writer import create_recording
+from vibench.sim.drive import Sampled
+from vibench.sim.integrate import integrate
+from vibench.sim.specimen import gong2025
 
 RATE = 6400.0
 RAMP_S = 0.5

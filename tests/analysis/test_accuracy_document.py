@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from analysis.accuracy_document import accuracy_document, worst_error
-from analysis.figures.tradeoff import tradeoff_figure
-from sim.accuracy import Accuracy
-from sim.trade.measuring import Thoroughness, measured_trade
-from sim.trade.regimes import MOTIONS
+from vibench.analysis.accuracy_document import accuracy_document, worst_error
+from vibench.analysis.figures.tradeoff import tradeoff_figure
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.trade.measuring import Thoroughness, measured_trade
+from vibench.sim.trade.regimes import MOTIONS
 
 PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
 

@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from acquisition.excitation.dwell import Dwell
-from acquisition.excitation.multisine_noise import MultisineNoise
-from acquisition.excitation.sine_sweep import SineSweep
-from acquisition.excitation.stepped_sine import FrequencyGrid, SteppedSine
-from acquisition.plan.measurement import Measurement
-from acquisition.recording import open_recording
-from analysis.base_motion import advanced, lowest_frequency_hz, recorded_base_motion
-from analysis.errors import UnusableData
-from analysis.recording_facts import plan_of
-from analysis.simulated_channels import shaken
-from sim.accuracy import Accuracy
-from sim.drive import Sampled
-from sim.integrate import integrate
-from sim.specimen import gong2025
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.excitation.multisine_noise import MultisineNoise
+from vibench.acquisition.excitation.sine_sweep import SineSweep
+from vibench.acquisition.excitation.stepped_sine import FrequencyGrid, SteppedSine
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.reader import open_recording
+from vibench.analysis.base_motion import advanced, lowest_frequency_hz, recorded_base_motion
+from vibench.analysis.errors import UnusableData
+from vibench.analysis.recording_facts import plan_of
+from vibench.analysis.simulated_channels import shaken
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.drive import Sampled
+from vibench.sim.integrate import integrate
+from vibench.sim.specimen import gong2025
 
 RATE = 6400.0
 

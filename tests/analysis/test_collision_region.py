@@ -5,11 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from analysis.collision_region import collisions
-from analysis.sweep import sweep_response
-from sim.drive import LinearSweep
-from sim.integrate import integrate
-from sim.specimen import gong2025
+from vibench.analysis.collision_region import collisions
+from vibench.analysis.sweep import sweep_response
+from vibench.sim.drive import LinearSweep
+from vibench.sim.integrate import integrate
+from vibench.sim.specimen import gong2025
 
 RATE = 12_800.0
 NOISE_DENSITY = 2e-7  # m/s per root hertz, a vibrometer's

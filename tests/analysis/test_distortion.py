@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.excitation.odd_multisine import OddMultisine
-from acquisition.recording import open_recording
-from analysis.distortion import distortion
-from analysis.figures.distortion import distortion_caption, distortion_figure
-from analysis.measurement_analysis import analyse_recording
+from vibench.acquisition.excitation.odd_multisine import OddMultisine
+from vibench.acquisition.recording.reader import open_recording
+from vibench.analysis.distortion import distortion
+from vibench.analysis.figures.distortion import distortion_caption, distortion_figure
+from vibench.analysis.measurement_analysis import analyse_recording
 
 REPETITION_HZ, PERIODS, REALISATIONS, SETTLE_S = 4.0, 4, 4, 0.5
 NOISE_M_PER_S = 2e-5

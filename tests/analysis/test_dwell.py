@@ -5,14 +5,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from analysis.drive_level import drive_level, noise_drive_level
-from analysis.dwell import dwell_response
-from analysis.errors import InvalidRequest, NotEnoughData, UnusableData
-from analysis.spectra import spectral_density
-from analysis.stroboscope import stroboscope
-from sim.drive import Harmonic
-from sim.integrate import integrate
-from sim.specimen import gong2025
+from vibench.analysis.drive_level import drive_level, noise_drive_level
+from vibench.analysis.dwell import dwell_response
+from vibench.analysis.errors import InvalidRequest, NotEnoughData, UnusableData
+from vibench.analysis.spectra import spectral_density
+from vibench.analysis.stroboscope import stroboscope
+from vibench.sim.drive import Harmonic
+from vibench.sim.integrate import integrate
+from vibench.sim.specimen import gong2025
 
 RATE = 12_800.0
 DRIVE_HZ = 260.0031  # the generator's 260 Hz by the converter's clock

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from acquisition.recording import open_recording
-from analysis.chaos.verdict import MotionKind
-from analysis.figures.portraits import portraits_figure
-from analysis.measurement_analysis import analyse_recording
+from vibench.acquisition.recording.reader import open_recording
+from vibench.analysis.chaos.verdict import MotionKind
+from vibench.analysis.figures.portraits import portraits_figure
+from vibench.analysis.measurement_analysis import analyse_recording
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from analysis.envelope import envelope
+from vibench.analysis.envelope import envelope
 
 
 @given(

@@ -5,21 +5,21 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.bench import open_bench
-from acquisition.excitation.resonance_tracking import ResonanceTracking
-from acquisition.excitation.settled_sine import SettledSine
-from acquisition.plan.measurement import Measurement
-from acquisition.recording.reader import open_recording
-from acquisition.rig.configuration import load_rig
-from acquisition.run.run_measurement import run_measurement
-from analysis.campaign_results import CampaignResults, SteppedSineResult
-from analysis.feedback_notes import FeedbackNote
-from analysis.feedback_words import feedback_sentences, noted_jumps
-from analysis.figures.stepped_sine import stepped_sine_figure
-from analysis.measurement_analysis import analyse_recording
-from analysis.report.figure_choice import result_figures
-from analysis.report.findings import findings
-from analysis.summary import summary
+from vibench.acquisition.bench import open_bench
+from vibench.acquisition.excitation.resonance_tracking import ResonanceTracking
+from vibench.acquisition.excitation.settled_sine import SettledSine
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.analysis.campaign_results import CampaignResults, SteppedSineResult
+from vibench.analysis.feedback_notes import FeedbackNote
+from vibench.analysis.feedback_words import feedback_sentences, noted_jumps
+from vibench.analysis.figures.stepped_sine import stepped_sine_figure
+from vibench.analysis.measurement_analysis import analyse_recording
+from vibench.analysis.report.figure_choice import result_figures
+from vibench.analysis.report.findings import findings
+from vibench.analysis.summary import summary
 
 ROOT = Path(__file__).parent.parent.parent
 JUMP = {"direction": "down", "before_hz": 101.25, "after_hz": 100.9375, "how": "localised"}

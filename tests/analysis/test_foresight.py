@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.excitation.sine_sweep import SineSweep
-from acquisition.plan.campaign import load_campaign
-from acquisition.plan.loads import predicted_loads
-from acquisition.plan.measurement import Measurement
-from acquisition.rig.configuration import load_rig
-from acquisition.rig.model import Quantity
-from analysis.foresight import bands_of, base_amplitude_m, foresee
+from vibench.acquisition.excitation.sine_sweep import SineSweep
+from vibench.acquisition.plan.campaign import load_campaign
+from vibench.acquisition.plan.loads import predicted_loads
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.rig.model import Quantity
+from vibench.analysis.foresight import bands_of, base_amplitude_m, foresee
 
 ROOT = Path(__file__).resolve().parents[2]
 QUICK = {each.name: each for each in load_campaign(ROOT / "campaigns" / "quick.toml").measurements}

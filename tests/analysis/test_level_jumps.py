@@ -5,19 +5,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.bench import open_bench
-from acquisition.excitation.stepped_level import SteppedLevel
-from acquisition.plan.measurement import Measurement
-from acquisition.recording import open_recording
-from acquisition.rig.configuration import load_rig
-from acquisition.run.run_measurement import run_measurement
-from analysis.campaign_results import CampaignResults, SteppedSineResult
-from analysis.figures.stepped_sine import stepped_sine_figure
-from analysis.level_jumps import hysteresis_vpp, level_jumps
-from analysis.measurement_analysis import analyse_recording
-from analysis.report.findings import findings
-from analysis.stepped_response import SteppedResponse
-from analysis.summary import summary
+from vibench.acquisition.bench import open_bench
+from vibench.acquisition.excitation.stepped_level import SteppedLevel
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.analysis.campaign_results import CampaignResults, SteppedSineResult
+from vibench.analysis.figures.stepped_sine import stepped_sine_figure
+from vibench.analysis.level_jumps import hysteresis_vpp, level_jumps
+from vibench.analysis.measurement_analysis import analyse_recording
+from vibench.analysis.report.findings import findings
+from vibench.analysis.stepped_response import SteppedResponse
+from vibench.analysis.summary import summary
 
 RIG = load_rig(Path(__file__).parents[2] / "hardware_configs" / "virtual_rig.toml")
 

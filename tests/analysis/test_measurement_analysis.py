@@ -3,18 +3,19 @@
 import numpy as np
 import pytest
 
-from acquisition.recording import RecordingState, open_recording
-from analysis.errors import NotEnoughData, UnusableData
-from analysis.measurement_analysis import (
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.reader import open_recording
+from vibench.analysis.errors import NotEnoughData, UnusableData
+from vibench.analysis.measurement_analysis import (
     DwellAnalysis,
     NoiseAnalysis,
     SteppedSineAnalysis,
     SweepAnalysis,
     analyse_recording,
 )
-from analysis.measurement_checks import Verdict
-from sim.modes import base_transmissibility
-from sim.specimen import gong2025
+from vibench.analysis.measurement_checks import Verdict
+from vibench.sim.modes import base_transmissibility
+from vibench.sim.specimen import gong2025
 
 RATE = 6400.0
 

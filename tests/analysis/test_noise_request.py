@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.instruments import Overload
-from acquisition.recording import open_recording
-from analysis.errors import InvalidRequest, NotEnoughData
-from analysis.measurement_analysis import analyse_recording
-from analysis.noise_request import NoiseRequest, longest_segment
-from analysis.results import Estimator
-from analysis.transmission_view import MagnitudeScale, quantities_named
-from analysis.window import Window, effective_averages, hop_samples, taper
+from vibench.acquisition.instruments import Overload
+from vibench.acquisition.recording.reader import open_recording
+from vibench.analysis.errors import InvalidRequest, NotEnoughData
+from vibench.analysis.measurement_analysis import analyse_recording
+from vibench.analysis.noise_request import NoiseRequest, longest_segment
+from vibench.analysis.results import Estimator
+from vibench.analysis.transmission_view import MagnitudeScale, quantities_named
+from vibench.analysis.window import Window, effective_averages, hop_samples, taper
 
 RATE = 6400.0
 

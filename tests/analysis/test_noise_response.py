@@ -5,19 +5,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.bench import open_bench
-from acquisition.check.low_level import BenchCheck
-from acquisition.excitation.streamed_noise import StreamedNoise
-from acquisition.plan.measurement import Measurement
-from acquisition.recording import open_recording
-from acquisition.run.run_measurement import run_measurement
-from acquisition.virtual.world.input_stage import AC_CUT_HZ
-from analysis.confidence import phase_half_width
-from analysis.errors import NotEnoughData
-from analysis.noise_response import noise_response
-from analysis.prediction import base_transmissibility
-from analysis.recorded_channels import RecordedChannels
-from sim.specimen import gong2025
+from vibench.acquisition.bench import open_bench
+from vibench.acquisition.check.low_level import BenchCheck
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.analysis.confidence import phase_half_width
+from vibench.analysis.errors import NotEnoughData
+from vibench.analysis.noise_response import noise_response
+from vibench.analysis.recorded_channels import RecordedChannels
+from vibench.sim.modes import base_transmissibility
+from vibench.sim.specimen import gong2025
+from vibench.virtual_rig.world.input_stage import AC_CUT_HZ
 
 STREAMING = Path(__file__).parents[2] / "hardware_configs" / "virtual_rig_streaming.toml"
 WEAK_VPP, STRONG_VPP = 0.067, 7.0
@@ -120,7 +120,7 @@ class Short:
     response_delay_s = 0.0
 
     def stretches(self, label):
-        from analysis.recorded_channels import Stretch
+        from vibench.analysis.recorded_channels import Stretch
 
         return (Stretch(0, self.samples, {}, False),)
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from acquisition.recording import open_recording
-from analysis.difference import logarithmic_difference
-from analysis.measurement_analysis import analyse_recording
-from analysis.overlay import DwellOverlay, NoiseOverlay, SweepOverlay, equivalent_amplitude, overlay
-from analysis.prediction import paper_amplitude_m, predicted
-from sim.modes import base_transmissibility
-from sim.specimen import gong2025
+from vibench.acquisition.recording.reader import open_recording
+from vibench.analysis.difference import logarithmic_difference
+from vibench.analysis.measurement_analysis import analyse_recording
+from vibench.analysis.overlay import DwellOverlay, NoiseOverlay, SweepOverlay, equivalent_amplitude, overlay
+from vibench.analysis.prediction import paper_amplitude_m, predicted
+from vibench.sim.modes import base_transmissibility
+from vibench.sim.specimen import gong2025
 
 
 def laid_over(path, **how):

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from acquisition.excitation.dwell import Dwell
-from acquisition.recording import open_recording
-from acquisition.recording.overview import BIN_SAMPLES
-from analysis.errors import InvalidRequest
-from analysis.overview import has_overview, overview_of
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.recording.overview import BIN_SAMPLES
+from vibench.acquisition.recording.reader import open_recording
+from vibench.analysis.errors import InvalidRequest
+from vibench.analysis.overview import has_overview, overview_of
 
 RATE = 6400.0
 SAMPLES = 200_000

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.best_linear_approximation import Scatter
-from analysis.errors import InvalidRequest, NotEnoughData, UnusableData
-from analysis.periodic_transmission import PeriodicSums, periodic_transmission
+from vibench.analysis.best_linear_approximation import Scatter
+from vibench.analysis.errors import InvalidRequest, NotEnoughData, UnusableData
+from vibench.analysis.periodic_transmission import PeriodicSums, periodic_transmission
 
 RATE = 5120.0
 
@@ -55,7 +55,7 @@ def test_lines_are_exact_whatever_the_clocks_and_however_fractional_the_period(o
 
 def test_taking_the_nominal_rate_instead_would_leak():
     """The guard of the test above: with 50 ppm ignored, the same lines are wrong by far more."""
-    from analysis.repetition import period_spectra
+    from vibench.analysis.repetition import period_spectra
 
     orders = np.arange(3, 300)
     drive = multisine(orders, np.zeros(orders.size), 1000.05, 5000)
@@ -64,7 +64,7 @@ def test_taking_the_nominal_rate_instead_would_leak():
 
 
 def test_the_measured_period_scatters_as_stated():
-    from analysis.repetition import measured_repetition
+    from vibench.analysis.repetition import measured_repetition
 
     rng = np.random.default_rng(2)
     orders = np.arange(10, 60)

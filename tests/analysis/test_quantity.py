@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.errors import InvalidRequest
-from analysis.quantity import Quantity, converted_signal, converted_transmission, derivative_factor
-from analysis.transmission import transmission
+from vibench.analysis.errors import InvalidRequest
+from vibench.analysis.quantity import Quantity, converted_signal, converted_transmission, derivative_factor
+from vibench.analysis.transmission import transmission
 
 RATE = 5120.0
 

@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from analysis.confidence import student_half_width
-from analysis.errors import InvalidRequest
-from analysis.resonance import resonances
-from analysis.results import Estimator, Transmission, TransmissionSettings
-from analysis.transmission import transmission
+from vibench.analysis.confidence import student_half_width
+from vibench.analysis.errors import InvalidRequest
+from vibench.analysis.resonance import resonances
+from vibench.analysis.results import Estimator, Transmission, TransmissionSettings
+from vibench.analysis.transmission import transmission
 
 
 def curve(frequency_hz, value, relative=1e-4, resolution_hz=0.0, coherence=0.99):

@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 import synthetic_recordings as synthetic
 
-from acquisition.excitation.multisine_noise import MultisineNoise
-from acquisition.excitation.sine_sweep import SineSweep
-from analysis.campaign_results import CampaignResults, Simulation, analyse_files
-from analysis.dwell_bracket import bracketed_gap, brackets
-from analysis.errors import NotEnoughData
-from analysis.gap_fit import fit_gap, onsets, swept_relative
-from analysis.report.findings import findings
-from analysis.shaken_specimen import shaken_specimen
-from analysis.specimen_parameters import LINEAR, Parameter, parameter_value, with_values
-from sim.drive import Sampled
-from sim.integrate import integrate
-from sim.modes import base_transmissibility
-from sim.specimen import gong2025
+from vibench.acquisition.excitation.multisine_noise import MultisineNoise
+from vibench.acquisition.excitation.sine_sweep import SineSweep
+from vibench.analysis.campaign_results import CampaignResults, Simulation, analyse_files
+from vibench.analysis.dwell_bracket import bracketed_gap, brackets
+from vibench.analysis.errors import NotEnoughData
+from vibench.analysis.gap_fit import fit_gap, onsets, swept_relative
+from vibench.analysis.report.findings import findings
+from vibench.analysis.shaken_specimen import shaken_specimen
+from vibench.analysis.specimen_parameters import LINEAR, Parameter, parameter_value, with_values
+from vibench.sim.drive import Sampled
+from vibench.sim.integrate import integrate
+from vibench.sim.modes import base_transmissibility
+from vibench.sim.specimen import gong2025
 
 TRUE = with_values(
     gong2025(),

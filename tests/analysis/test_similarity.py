@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.errors import InvalidRequest, NotEnoughData
-from analysis.similarity import Curve, LogarithmOf, similarity
+from vibench.analysis.errors import InvalidRequest, NotEnoughData
+from vibench.analysis.similarity import Curve, LogarithmOf, similarity
 
 FREQUENCY_HZ = np.arange(10.0, 510.0, 5.0)
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.errors import UnusableData
-from analysis.sine_fit import fitted_sine
+from vibench.analysis.errors import UnusableData
+from vibench.analysis.sine_fit import fitted_sine
 
 RATE = 4096.0
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.confidence import student_half_width
-from analysis.errors import InvalidRequest, NotEnoughData
-from analysis.results import Estimator, Transmission, TransmissionSettings
-from analysis.specimen_fit import fit_specimen
-from analysis.specimen_parameters import LINEAR, Parameter, parameter_value, with_values
-from sim.modes import base_transmissibility
-from sim.specimen import gong2025
+from vibench.analysis.confidence import student_half_width
+from vibench.analysis.errors import InvalidRequest, NotEnoughData
+from vibench.analysis.results import Estimator, Transmission, TransmissionSettings
+from vibench.analysis.specimen_fit import fit_specimen
+from vibench.analysis.specimen_parameters import LINEAR, Parameter, parameter_value, with_values
+from vibench.sim.modes import base_transmissibility
+from vibench.sim.specimen import gong2025
 
 NOMINAL = gong2025()
 TRUE = {

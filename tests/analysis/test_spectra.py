@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from analysis.errors import InvalidRequest, NotEnoughData
-from analysis.peaks import peaks
-from analysis.quantity import Quantity
-from analysis.spectra import amplitude_spectrum, spectral_density
+from vibench.analysis.errors import InvalidRequest, NotEnoughData
+from vibench.analysis.peaks import peaks
+from vibench.analysis.quantity import Quantity
+from vibench.analysis.spectra import amplitude_spectrum, spectral_density
 
 RATE = 2048.0
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from analysis.errors import InvalidRequest, NotEnoughData
-from analysis.spectrogram import MOST_COLUMNS, SpectrogramSums
+from vibench.analysis.errors import InvalidRequest, NotEnoughData
+from vibench.analysis.spectrogram import MOST_COLUMNS, SpectrogramSums
 
 RATE = 4000.0
 

@@ -5,12 +5,12 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from acquisition.excitation.streamed_noise import StreamedNoise
-from acquisition.recording import open_recording
-from analysis.measurement_analysis import analyse_recording
-from analysis.noise_request import NoiseRequest
-from analysis.noise_response import noise_response
-from analysis.recorded_channels import Stretch
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.recording.reader import open_recording
+from vibench.analysis.measurement_analysis import analyse_recording
+from vibench.analysis.noise_request import NoiseRequest
+from vibench.analysis.noise_response import noise_response
+from vibench.analysis.recorded_channels import Stretch
 
 RATE = 51_200.0
 

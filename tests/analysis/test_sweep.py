@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from analysis.decimation import Decimator
-from analysis.drive_phase import drive_phase
-from analysis.errors import InvalidRequest, NotEnoughData, UnusableData
-from analysis.order_tracking import tracked_orders
-from analysis.sweep import SweepSums, sweep_response
+from vibench.analysis.decimation import Decimator
+from vibench.analysis.drive_phase import drive_phase
+from vibench.analysis.errors import InvalidRequest, NotEnoughData, UnusableData
+from vibench.analysis.order_tracking import tracked_orders
+from vibench.analysis.sweep import SweepSums, sweep_response
 
 RATE = 8192.0
 

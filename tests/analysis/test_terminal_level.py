@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.recording import open_recording
-from analysis.measurement_analysis import analyse_recording
-from analysis.terminal_level import terminal_levels
+from vibench.acquisition.recording.reader import open_recording
+from vibench.analysis.measurement_analysis import analyse_recording
+from vibench.analysis.terminal_level import terminal_levels
 
 
 def test_a_line_in_the_band_reads_its_own_level_re_the_drives_line(dwell_file):

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from analysis.errors import InvalidRequest, NotEnoughData, UnusableData
-from analysis.results import Estimator
-from analysis.transmission import TransmissionSums, transmission
+from vibench.analysis.errors import InvalidRequest, NotEnoughData, UnusableData
+from vibench.analysis.results import Estimator
+from vibench.analysis.transmission import TransmissionSums, transmission
 
 RATE = 1024.0
 

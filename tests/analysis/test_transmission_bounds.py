@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from analysis.results import Estimator
-from analysis.transmission import transmission
+from vibench.analysis.results import Estimator
+from vibench.analysis.transmission import transmission
 
 RATE = 1024.0
 SEGMENT = 64

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from analysis.periodic_transmission import PeriodicSums
-from analysis.quantity import Quantity, converted_transmission
-from analysis.resonance import resonances
-from sim.drive import Sampled
-from sim.integrate import integrate
-from sim.specimen import gong2025
+from vibench.analysis.periodic_transmission import PeriodicSums
+from vibench.analysis.quantity import Quantity, converted_transmission
+from vibench.analysis.resonance import resonances
+from vibench.sim.drive import Sampled
+from vibench.sim.integrate import integrate
+from vibench.sim.specimen import gong2025
 
 RATE = 12_800.0
 REPETITION_HZ = 4.0

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from analysis.results import Estimator
-from analysis.transmission import transmission
+from vibench.analysis.results import Estimator
+from vibench.analysis.transmission import transmission
 
 RATE = 2048
 SEGMENT = 512

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.__main__ import main
+from vibench.cli.__main__ import main
 
 ROOT = Path(__file__).resolve().parents[2]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
@@ -23,7 +23,7 @@ def vibench() -> Vibench:
 
     def run(*arguments, cwd, timeout_s=110, environment=None):
         return subprocess.run(
-            [sys.executable, "-m", "cli", *map(str, arguments)],
+            [sys.executable, "-m", "vibench.cli", *map(str, arguments)],
             cwd=cwd,
             env={**ENVIRONMENT, **(environment or {})},
             capture_output=True,

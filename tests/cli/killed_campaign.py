@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.campaign.journal import journal_path
-from acquisition.campaign.journal_point import PointState, read_journal
-from acquisition.recording import RecordingState, open_recording
+from vibench.acquisition.campaign.journal import journal_path
+from vibench.acquisition.campaign.journal_point import PointState, read_journal
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.reader import open_recording
 
 from .conftest import ENVIRONMENT, ROOT
 
@@ -80,7 +81,7 @@ measurement = { excitation = { kind = "dwell" } }
 def command(plan: Path, bench: Path, out: Path, *options: str) -> list[str]:
     """``vibench measure`` as a process of its own."""
     paths = [str(plan), "--bench", str(bench), "--out", str(out)]
-    return [sys.executable, "-m", "cli", "measure", *paths, *options]
+    return [sys.executable, "-m", "vibench.cli", "measure", *paths, *options]
 
 
 def killed(arguments: list[str], out: Path, points: int, chance: random.Random) -> int:

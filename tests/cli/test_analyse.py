@@ -11,10 +11,10 @@ import h5py
 import numpy as np
 import pytest
 
-from acquisition.excitation.dwell import Dwell
-from acquisition.excitation.streamed_noise import StreamedNoise
-from acquisition.recording import RecordingState
-from analysis.campaign_results import Simulation, analyse_files
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.analysis.campaign_results import Simulation, analyse_files
 
 PLACE = Path(__file__).parents[1] / "analysis" / "synthetic_recordings.py"
 SECONDS = 8.0

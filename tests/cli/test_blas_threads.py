@@ -8,9 +8,9 @@ import pytest
 
 SCRIPT = """
 import os, sys
-import cli.__main__, cli.measure
+import vibench.cli.__main__, vibench.cli.measure
 order = list(sys.modules)
-print(os.environ["OPENBLAS_NUM_THREADS"], order.index("cli.blas_threads") < order.index("numpy"))
+print(os.environ["OPENBLAS_NUM_THREADS"], order.index("vibench.cli.blas_threads") < order.index("numpy"))
 """
 
 

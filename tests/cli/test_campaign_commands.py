@@ -3,8 +3,8 @@
 import json
 import sys
 
-from acquisition.campaign.estimate import Estimate
-from cli.estimate_text import estimate_text
+from vibench.acquisition.campaign.estimate import Estimate
+from vibench.cli.estimate_text import estimate_text
 
 from .killed_campaign import short_points, slow_rig
 

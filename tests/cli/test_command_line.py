@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.recording import RecordingState, open_recording
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.reader import open_recording
 
 ROOT = Path(__file__).resolve().parents[2]
 QUICK = """
@@ -98,7 +99,7 @@ def test_the_instruments_of_the_virtual_rig_are_listed_by_name(vibench_here, tmp
 def test_a_recording_that_was_cut_off_is_recovered(vibench, tmp_path):
     plan = campaign(tmp_path, QUICK.replace("duration_s = 1.5", "duration_s = 3000"))
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    arguments = [sys.executable, "-m", "cli", "measure", str(plan), "--out", "recordings"]
+    arguments = [sys.executable, "-m", "vibench.cli", "measure", str(plan), "--out", "recordings"]
     part = tmp_path / "recordings" / "dwell.h5.part"
     with subprocess.Popen(arguments, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL) as running:
         while running.poll() is None:

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from acquisition.instruments import Block
-from acquisition.recording import ChannelHeader, Origin, RecordingHeader, create_recording, open_recording
-from cli.__main__ import app
+from vibench.acquisition.instruments import Block
+from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
+from vibench.acquisition.recording.layout import Origin
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.recording.writer import create_recording
+from vibench.cli.__main__ import app
 
 MAPPING = """
 started_utc = 2026-03-01T12:00:00Z

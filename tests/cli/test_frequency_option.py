@@ -2,8 +2,8 @@
 
 import pytest
 
-from analysis.errors import InvalidRequest
-from cli.frequency_option import frequencies
+from vibench.analysis.errors import InvalidRequest
+from vibench.cli.frequency_option import frequencies
 
 
 def test_a_number_is_one_frequency_and_a_range_holds_both_its_ends():

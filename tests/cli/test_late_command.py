@@ -7,7 +7,7 @@ from inspect import getdoc
 import pytest
 import typer
 
-from cli.__main__ import COMMANDS
+from vibench.cli.__main__ import COMMANDS
 
 HEAVY = {"numpy", "scipy", "numba", "matplotlib", "h5py", "pyvisa", "nidaqmx", "grpc", "PySide6"}
 
@@ -24,7 +24,7 @@ def test_the_line_of_a_command_is_the_first_of_its_help(name):
 
 
 def test_the_list_of_commands_needs_none_of_the_large_libraries():
-    loaded = "import cli.__main__, sys; print(*sys.modules)"
+    loaded = "import vibench.cli.__main__, sys; print(*sys.modules)"
     process = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True)
     assert HEAVY.isdisjoint(process.stdout.split())
 

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from sim.drive import Harmonic
-from sim.response import steady_response
-from sim.specimen import gong2025
+from vibench.sim.drive import Harmonic
+from vibench.sim.response import steady_response
+from vibench.sim.specimen import gong2025
 
 COMPILING_S = 300
 """For whoever runs the first of these tests after a change of the simulation."""

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """
 import sys, warnings
 warnings.simplefilter("ignore")
-from acquisition.virtual.usb import usb_bus; usb_bus.plug_in_remote(sys.argv[1])
+from vibench.virtual_rig.usb import usb_bus; usb_bus.plug_in_remote(sys.argv[1])
 import pyvisa
 manager = pyvisa.ResourceManager("@py")
 generator = manager.open_resource("USB0::0x0699::0x0353::C019999::INSTR")
@@ -32,7 +32,7 @@ manager.close()
 @pytest.fixture
 def served():
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    arguments = [sys.executable, "-u", "-m", "cli", "serve-rig", "--address", "127.0.0.1:0"]
+    arguments = [sys.executable, "-u", "-m", "vibench.cli", "serve-rig", "--address", "127.0.0.1:0"]
     with subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, text=True) as server:
         said = ""
         while "SOCKET" not in said:

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.study.layout import PointState
-from sim.study.results import open_study
-from sim.study.study import Study
+from vibench.sim.study.layout import PointState
+from vibench.sim.study.results import open_study
+from vibench.sim.study.study import Study
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = """
@@ -67,7 +67,7 @@ def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(vi
 def test_ctrl_c_keeps_what_is_computed_and_resume_goes_on(vibench, tmp_path):
     asked = plan(tmp_path, LONG)
     running = subprocess.Popen(
-        [sys.executable, "-m", "cli", "study", str(asked), "--out", "a.h5"],
+        [sys.executable, "-m", "vibench.cli", "study", str(asked), "--out", "a.h5"],
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         stdout=subprocess.PIPE,

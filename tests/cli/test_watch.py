@@ -10,13 +10,13 @@ from threading import Event
 
 import pytest
 
-from acquisition.engine.address import EngineAddress
-from acquisition.engine.announcement import announced, announced_engines
-from acquisition.engine.start import start_engine
-from acquisition.engine.state import Attendance, EngineState
-from acquisition.plan.campaign import Campaign
-from acquisition.recording import open_recording
-from acquisition.rig.configuration import load_rig
+from vibench.acquisition.engine.address import EngineAddress
+from vibench.acquisition.engine.announcement import announced, announced_engines
+from vibench.acquisition.engine.start import start_engine
+from vibench.acquisition.engine.state import Attendance, EngineState
+from vibench.acquisition.plan.campaign import Campaign
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.rig.configuration import load_rig
 
 ROOT = Path(__file__).resolve().parents[2]
 PAUSE, LOOK_S = Event(), 0.01
@@ -50,7 +50,7 @@ def wait(engine, state):
 
 def vibench(*arguments):
     return subprocess.run(
-        [sys.executable, "-m", "cli", *arguments],
+        [sys.executable, "-m", "vibench.cli", *arguments],
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,
@@ -75,7 +75,7 @@ def test_a_run_is_held_released_and_ended_from_another_terminal(running, vibench
 
 
 def test_watching_shows_the_run_and_its_end(running):
-    arguments = [sys.executable, "-m", "cli", "watch"]
+    arguments = [sys.executable, "-m", "vibench.cli", "watch"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
     with subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, text=True) as watcher:
         assert f"process {running.pid}" in watcher.stdout.readline()

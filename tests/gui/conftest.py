@@ -8,12 +8,12 @@ import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QColor, QImage, QPainter
 
-from gui.app import application
-from gui.desk import Desk
-from gui.loop_watch import BOUND_S
-from gui.pages.catalogue import PAGES
-from gui.settings import Settings
-from gui.window import Window
+from vibench.gui.app import application
+from vibench.gui.desk import Desk
+from vibench.gui.loop_watch import BOUND_S
+from vibench.gui.pages.catalogue import PAGES
+from vibench.gui.settings import Settings
+from vibench.gui.window import Window
 
 YARDSTICK_S = 0.0054
 """What `yardstick` takes where the bound was set; a slower processor is given as much more."""

@@ -8,7 +8,7 @@ from math import factorial
 
 import pytest
 
-from gui.background import Background
+from vibench.gui.background import Background
 
 
 def test_an_answer_comes_from_another_process(desk, qtbot):

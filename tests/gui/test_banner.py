@@ -3,8 +3,8 @@
 import pytest
 from PySide6.QtWidgets import QLabel, QPushButton
 
-from gui.banner import Banner, Face
-from gui.theme import DARK, LIGHT, Tone
+from vibench.gui.banner import Banner, Face
+from vibench.gui.theme import DARK, LIGHT, Tone
 
 READABLE = 4.5
 

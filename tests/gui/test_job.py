@@ -9,17 +9,17 @@ import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QLineEdit, QMenu, QVBoxLayout
 
-from acquisition.engine.start import start_engine
-from acquisition.engine.state import Attendance, EngineState
-from acquisition.plan.measurement import Measurement
-from acquisition.recording import open_recording
-from gui.desk import Desk
-from gui.orders import ABORT_KEY
-from gui.page_names import COMPARE, FILES, RUN, TEST
-from gui.pages.catalogue import PAGES
-from gui.pages.rig.rig_choice import PACES
-from gui.settings import Settings
-from gui.window import Window
+from vibench.acquisition.engine.start import start_engine
+from vibench.acquisition.engine.state import Attendance, EngineState
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.reader import open_recording
+from vibench.gui.desk import Desk
+from vibench.gui.orders import ABORT_KEY
+from vibench.gui.page_names import COMPARE, FILES, RUN, TEST
+from vibench.gui.pages.catalogue import PAGES
+from vibench.gui.pages.rig.rig_choice import PACES
+from vibench.gui.settings import Settings
+from vibench.gui.window import Window
 
 CONTROL = Qt.KeyboardModifier.ControlModifier
 ALT = Qt.KeyboardModifier.AltModifier

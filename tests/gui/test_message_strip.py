@@ -3,9 +3,9 @@
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QLabel, QPlainTextEdit, QPushButton
 
-from acquisition.errors import LimitExceeded
-from gui.message_strip import MessageStrip
-from gui.notice import Notice, NoticeKind, notice_of
+from vibench.acquisition.errors import LimitExceeded
+from vibench.gui.message_strip import MessageStrip
+from vibench.gui.notice import Notice, NoticeKind, notice_of
 
 
 def shown(strip):

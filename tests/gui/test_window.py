@@ -3,12 +3,12 @@
 import pytest
 from PySide6.QtCore import Qt
 
-from gui.desk import Desk
-from gui.page_names import RIG, TEST
-from gui.pages.catalogue import PAGES
-from gui.settings import Settings
-from gui.theme import DARK
-from gui.window import Window
+from vibench.gui.desk import Desk
+from vibench.gui.page_names import RIG, TEST
+from vibench.gui.pages.catalogue import PAGES
+from vibench.gui.settings import Settings
+from vibench.gui.theme import DARK
+from vibench.gui.window import Window
 
 
 def test_every_page_can_be_shown_by_its_key(window, qtbot):

@@ -10,7 +10,8 @@ from threading import Event
 
 import pytest
 
-from acquisition.recording import RecordingState, open_recording
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.reader import open_recording
 
 ROOT = Path(__file__).resolve().parents[2]
 SILENT_WITHIN_S = 1.0

@@ -5,14 +5,14 @@ from pathlib import Path
 
 from PySide6.QtCore import QTimer
 
-from acquisition.engine.state import EngineState
-from acquisition.plan.campaign import Campaign
-from acquisition.rig.configuration import load_rig
-from gui.app import application
-from gui.desk import Desk
-from gui.pages.catalogue import PAGES
-from gui.settings import Settings
-from gui.window import Window
+from vibench.acquisition.engine.state import EngineState
+from vibench.acquisition.plan.campaign import Campaign
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.gui.app import application
+from vibench.gui.desk import Desk
+from vibench.gui.pages.catalogue import PAGES
+from vibench.gui.settings import Settings
+from vibench.gui.window import Window
 
 DWELL = {"kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "settle_s": 0.2, "duration_s": 600}
 PLAN = {

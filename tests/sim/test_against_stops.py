@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from sim.against_stops import base_answer
-from sim.drive import Harmonic
-from sim.modes import base_transmissibility
-from sim.response import steady_response
-from sim.specimen import Specimen, gong2025
+from vibench.sim.against_stops import base_answer
+from vibench.sim.drive import Harmonic
+from vibench.sim.modes import base_transmissibility
+from vibench.sim.response import steady_response
+from vibench.sim.specimen import Specimen, gong2025
 
 FREQUENCY_HZ = np.array([20.0, 94.0, 201.0, 266.0, 350.0, 436.0, 500.0])
 

@@ -4,7 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import sim.compiled
+import vibench.sim.compiled
 
 INNER = "from .compiled import compiled\n\n@compiled\ndef inner(x):\n    return {factor} * x\n"
 
@@ -12,7 +12,7 @@ INNER = "from .compiled import compiled\n\n@compiled\ndef inner(x):\n    return 
 def test_a_kernel_is_recompiled_when_a_kernel_that_it_calls_changes_in_another_file(tmp_path):
     package = tmp_path / "sim"
     package.mkdir()
-    shutil.copy(Path(sim.compiled.__file__), package / "compiled.py")
+    shutil.copy(Path(vibench.sim.compiled.__file__), package / "compiled.py")
     (package / "__init__.py").write_text("")
     inner = package / "inner.py"
     (package / "outer.py").write_text(
@@ -40,7 +40,7 @@ ARRAYS = {"Vector", "Table", "Complex", "Stride", "Watcher", "Space", "FlightTab
 
 def kernels():
     """Every kernel of the package: its name, its decorator, its syntax tree."""
-    for source in sorted((Path(sim.compiled.__file__).parent).rglob("*.py")):
+    for source in sorted((Path(vibench.sim.compiled.__file__).parent).rglob("*.py")):
         for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef):
                 decorators = {each.id for each in node.decorator_list if isinstance(each, ast.Name)}

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from sim.contact_law import (
+from vibench.sim.contact_law import (
     ContactLaw,
     Hertz,
     HuntCrossley,
@@ -19,11 +19,11 @@ from sim.contact_law import (
     fitted_linear_gap,
     fitted_power_law,
 )
-from sim.engine.parameters import power_terms
-from sim.engine.power_flow import power_force
-from sim.model_name import model_named
-from sim.periodic.restoring_force import spring_of
-from sim.specimen import gong2025
+from vibench.sim.engine.parameters import power_terms
+from vibench.sim.engine.power_flow import power_force
+from vibench.sim.model_name import model_named
+from vibench.sim.periodic.restoring_force import spring_of
+from vibench.sim.specimen import gong2025
 
 HERTZ = Hertz(4.9e9)
 GAP = 45e-6

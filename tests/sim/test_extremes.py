@@ -9,19 +9,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from sim.accuracy import Accuracy
-from sim.contact_law import Hertz, HuntCrossley, LinearGap, RigidStops
-from sim.drive import Harmonic, LinearSweep, Sampled
-from sim.engine.contact import step_factor
-from sim.engine.contact_flow import CVX, STAGES, WIDTH, WORK_ROWS, R, W, contact_error
-from sim.engine.smooth import MOTIONS, smooth_error
-from sim.integrate import integrate
-from sim.modes import base_transmissibility
-from sim.outcome import Outcome
-from sim.periodic.restoring_force import spring_of
-from sim.response import steady_response
-from sim.response_curve import response_curve
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.contact_law import Hertz, HuntCrossley, LinearGap, RigidStops
+from vibench.sim.drive import Harmonic, LinearSweep, Sampled
+from vibench.sim.engine.contact import step_factor
+from vibench.sim.engine.contact_flow import CVX, STAGES, WIDTH, WORK_ROWS, R, W, contact_error
+from vibench.sim.engine.smooth import MOTIONS, smooth_error
+from vibench.sim.integrate import integrate
+from vibench.sim.modes import base_transmissibility
+from vibench.sim.outcome import Outcome
+from vibench.sim.periodic.restoring_force import spring_of
+from vibench.sim.response import steady_response
+from vibench.sim.response_curve import response_curve
+from vibench.sim.specimen import gong2025
 
 pytestmark = pytest.mark.timeout(300)
 """A hang is a failure: the first test compiles, the others take milliseconds."""

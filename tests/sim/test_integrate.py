@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import simpson, solve_ivp
 
-from sim.accuracy import Accuracy
-from sim.base_motion import sweep_error_m
-from sim.drive import Harmonic, LinearSweep, LogarithmicSweep, Sampled
-from sim.integrate import integrate
-from sim.modes import base_transmissibility
-from sim.outcome import Outcome
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.base_motion import sweep_error_m
+from vibench.sim.drive import Harmonic, LinearSweep, LogarithmicSweep, Sampled
+from vibench.sim.integrate import integrate
+from vibench.sim.modes import base_transmissibility
+from vibench.sim.outcome import Outcome
+from vibench.sim.specimen import gong2025
 
 PERIODIC = Harmonic(130.0, 20e-6)
 """Strikes about 260 times a second and settles on a stable period."""

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from sim.accuracy import Accuracy
-from sim.contact_law import LinearGap
-from sim.drive import Harmonic
-from sim.growth.settling import FinalMotion
-from sim.lyapunov import FEWEST_INTERVALS, Precision, Source, Tendency, largest_exponent
-from sim.outcome import Outcome
-from sim.specimen import Specimen, gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.contact_law import LinearGap
+from vibench.sim.drive import Harmonic
+from vibench.sim.growth.settling import FinalMotion
+from vibench.sim.lyapunov import FEWEST_INTERVALS, Precision, Source, Tendency, largest_exponent
+from vibench.sim.outcome import Outcome
+from vibench.sim.specimen import Specimen, gong2025
 
 CHAOS = Harmonic(260.0, 5e-6)
 

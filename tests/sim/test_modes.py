@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.modes import base_transmissibility, modal_form, state_matrix
-from sim.specimen import gong2025
+from vibench.sim.modes import base_transmissibility, modal_form, state_matrix
+from vibench.sim.specimen import gong2025
 
 DAMPINGS = st.floats(0.0, 1e-2)
 

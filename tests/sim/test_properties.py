@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.accuracy import Accuracy
-from sim.contact_law import Hertz, HuntCrossley, LinearGap, PowerLaw
-from sim.drive import Harmonic, LinearSweep, Sampled
-from sim.integrate import integrate
-from sim.outcome import Outcome
-from sim.response_curve import response_curve
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.contact_law import Hertz, HuntCrossley, LinearGap, PowerLaw
+from vibench.sim.drive import Harmonic, LinearSweep, Sampled
+from vibench.sim.integrate import integrate
+from vibench.sim.outcome import Outcome
+from vibench.sim.response_curve import response_curve
+from vibench.sim.specimen import gong2025
 
 LAWS = ["hertz", "linear_gap", "hunt_crossley:0.5", "power:5", "power:29", "rigid:0", "rigid:0.7", "rigid:1"]
 DRIVE = Harmonic(170.0, 20e-6)

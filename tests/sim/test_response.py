@@ -2,14 +2,14 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
-from sim.accuracy import Accuracy
-from sim.drive import Harmonic
-from sim.integrate import integrate
-from sim.modes import base_transmissibility
-from sim.outcome import Outcome
-from sim.response import steady_response
-from sim.response_curve import response_curve
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.drive import Harmonic
+from vibench.sim.integrate import integrate
+from vibench.sim.modes import base_transmissibility
+from vibench.sim.outcome import Outcome
+from vibench.sim.response import steady_response
+from vibench.sim.response_curve import response_curve
+from vibench.sim.specimen import gong2025
 
 
 @pytest.mark.parametrize("frequency_hz", [7.3, 60.0, 266.2, 601.7])

@@ -10,16 +10,16 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from sim.accuracy import Accuracy
-from sim.contact_law import Hertz, HuntCrossley, RigidStops
-from sim.drive import Harmonic, LinearSweep, Sampled
-from sim.engine.interval import new_state
-from sim.engine.parameters import parameters
-from sim.engine.rigid_stop import rebound
-from sim.integrate import integrate
-from sim.outcome import Outcome
-from sim.response import steady_response
-from sim.specimen import Specimen, gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.contact_law import Hertz, HuntCrossley, RigidStops
+from vibench.sim.drive import Harmonic, LinearSweep, Sampled
+from vibench.sim.engine.interval import new_state
+from vibench.sim.engine.parameters import parameters
+from vibench.sim.engine.rigid_stop import rebound
+from vibench.sim.integrate import integrate
+from vibench.sim.outcome import Outcome
+from vibench.sim.response import steady_response
+from vibench.sim.specimen import Specimen, gong2025
 
 STILL = Harmonic(100.0, 0.0)
 STICKING = Harmonic(200.0, 50e-6)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from sim.contact_law import Elasticity, Hertz, hertz_stiffness
-from sim.specimen import Specimen, gong2025
+from vibench.sim.contact_law import Elasticity, Hertz, hertz_stiffness
+from vibench.sim.specimen import Specimen, gong2025
 
 
 def test_the_papers_materials_give_the_stiffness_of_its_contact():

@@ -5,17 +5,17 @@ from dataclasses import replace
 
 import pytest
 
-from acquisition.campaign import catalogue as catalogue_module
-from acquisition.campaign.catalogue import CATALOGUE_NAME, Refresh, catalogue
-from acquisition.campaign.run_campaign import run_campaign
-from acquisition.errors import RecordingError
-from acquisition.excitation.dwell import Dwell
-from acquisition.excitation.sine_sweep import SineSweep
-from acquisition.instruments import Overload
-from acquisition.plan.campaign import Campaign
-from acquisition.plan.measurement import Measurement
-from acquisition.run.run import Run
-from acquisition.run.state import RunState
+from vibench.acquisition.campaign import catalogue as catalogue_module
+from vibench.acquisition.campaign.catalogue import CATALOGUE_NAME, Refresh, catalogue
+from vibench.acquisition.campaign.run_campaign import run_campaign
+from vibench.acquisition.errors import RecordingError
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.excitation.sine_sweep import SineSweep
+from vibench.acquisition.instruments import Overload
+from vibench.acquisition.plan.campaign import Campaign
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.run.run import Run
+from vibench.acquisition.run.state import RunState
 
 DWELL = Measurement(
     name="dwell",

@@ -2,13 +2,13 @@
 
 import pytest
 
-from acquisition.campaign.estimate import estimate
-from acquisition.campaign.item import Existing
-from acquisition.campaign.run_campaign import run_campaign
-from acquisition.errors import RecordingError
-from acquisition.plan.campaign import Campaign
-from acquisition.recording import open_recording
-from acquisition.toml_file import validated
+from vibench.acquisition.campaign.estimate import estimate
+from vibench.acquisition.campaign.item import Existing
+from vibench.acquisition.campaign.run_campaign import run_campaign
+from vibench.acquisition.errors import RecordingError
+from vibench.acquisition.plan.campaign import Campaign
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.toml_file import validated
 
 CAMPAIGN = validated(
     {

@@ -6,16 +6,16 @@ import sqlite3
 
 import pytest
 
-from acquisition.campaign.bench_identity import BenchIdentity
-from acquisition.campaign.journal import Journal, journal_path
-from acquisition.campaign.journal_database import is_begun
-from acquisition.campaign.journal_point import PointState, read_journal
-from acquisition.campaign.why import Why
-from acquisition.errors import RecordingError
-from acquisition.excitation.dwell import Dwell
-from acquisition.plan.campaign import Campaign
-from acquisition.plan.measurement import Measurement
-from acquisition.plan.point import Point
+from vibench.acquisition.campaign.bench_identity import BenchIdentity
+from vibench.acquisition.campaign.journal import Journal, journal_path
+from vibench.acquisition.campaign.journal_database import is_begun
+from vibench.acquisition.campaign.journal_point import PointState, read_journal
+from vibench.acquisition.campaign.why import Why
+from vibench.acquisition.errors import RecordingError
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.plan.campaign import Campaign
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.plan.point import Point
 
 
 def dwell(name):

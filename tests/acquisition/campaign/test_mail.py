@@ -5,9 +5,9 @@ import threading
 
 import pytest
 
-from acquisition.campaign.mail import MailMessenger, MailSettings
-from acquisition.errors import ConfigurationError
-from acquisition.toml_file import load_toml
+from vibench.acquisition.campaign.mail import MailMessenger, MailSettings
+from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition.toml_file import load_toml
 
 NOTICE = {"campaign": "c", "event": "ended", "reason": "c is through", "recorded": 3}
 

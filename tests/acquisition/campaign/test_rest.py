@@ -6,22 +6,22 @@ from time import monotonic
 
 import pytest
 
-from acquisition.campaign.attempts import LOOK_EVERY_S
-from acquisition.campaign.estimate import estimate
-from acquisition.campaign.happening import Event
-from acquisition.campaign.item import Existing, Item
-from acquisition.campaign.journal import journal_path
-from acquisition.campaign.journal_point import PointState, read_journal
-from acquisition.campaign.kept_bench import KeptBench
-from acquisition.campaign.run_campaign import run_campaign
-from acquisition.errors import ConfigurationError, DataLost
-from acquisition.excitation.dwell import Dwell
-from acquisition.plan.campaign import Campaign
-from acquisition.plan.measurement import Measurement
-from acquisition.plan.retry import RetryPolicy
-from acquisition.run.state import RunState
-from acquisition.run.stop import Cause, StopRequest, StopSwitch
-from acquisition.toml_file import validated
+from vibench.acquisition.campaign.attempts import LOOK_EVERY_S
+from vibench.acquisition.campaign.estimate import estimate
+from vibench.acquisition.campaign.happening import Event
+from vibench.acquisition.campaign.item import Existing, Item
+from vibench.acquisition.campaign.journal import journal_path
+from vibench.acquisition.campaign.journal_point import PointState, read_journal
+from vibench.acquisition.campaign.kept_bench import KeptBench
+from vibench.acquisition.campaign.run_campaign import run_campaign
+from vibench.acquisition.errors import ConfigurationError, DataLost
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.plan.campaign import Campaign
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.plan.retry import RetryPolicy
+from vibench.acquisition.run.state import RunState
+from vibench.acquisition.run.stop import Cause, StopRequest, StopSwitch
+from vibench.acquisition.toml_file import validated
 
 REST_S = 12.0
 

@@ -4,16 +4,16 @@ import signal
 
 import pytest
 
-from acquisition.campaign.item import AfterFailure, Existing, Item
-from acquisition.campaign.run_campaign import run_campaign
-from acquisition.errors import DataLost, InstrumentLost, LimitExceeded, RecordingError
-from acquisition.excitation.dwell import Dwell
-from acquisition.plan.campaign import Campaign
-from acquisition.plan.measurement import Measurement
-from acquisition.recording.layout import RecordingState
-from acquisition.recording.reader import open_recording
-from acquisition.run.run_measurement import run_measurement
-from acquisition.run.state import RunState
+from vibench.acquisition.campaign.item import AfterFailure, Existing, Item
+from vibench.acquisition.campaign.run_campaign import run_campaign
+from vibench.acquisition.errors import DataLost, InstrumentLost, LimitExceeded, RecordingError
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.plan.campaign import Campaign
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.acquisition.run.state import RunState
 
 
 def dwell(name, amplitude_vpp=1.0, frequency_hz=260.0):

@@ -3,15 +3,16 @@
 import json
 from pathlib import Path
 
-from acquisition.campaign.item import AfterFailure, Item
-from acquisition.campaign.kept_bench import KeptBench
-from acquisition.campaign.run_campaign import run_campaign
-from acquisition.excitation.dwell import Dwell
-from acquisition.plan.campaign import Campaign
-from acquisition.plan.measurement import Measurement
-from acquisition.plan.retry import Retryable, RetryPolicy
-from acquisition.recording import RecordingState, open_recording
-from acquisition.rig.configuration import with_faults
+from vibench.acquisition.campaign.item import AfterFailure, Item
+from vibench.acquisition.campaign.kept_bench import KeptBench
+from vibench.acquisition.campaign.run_campaign import run_campaign
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.plan.campaign import Campaign
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.plan.retry import Retryable, RetryPolicy
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.rig.configuration import with_faults
 
 SCRIPT = [
     {"at_s": 1.9, "fault": "pull_usb_cable", "for_s": 1.5},

@@ -5,20 +5,20 @@ import sys
 
 import pytest
 
-from acquisition.campaign.item import AfterFailure, ChangedBench, Existing, Item
-from acquisition.campaign.journal import journal_path
-from acquisition.campaign.journal_point import PointState, read_journal
-from acquisition.campaign.notice import CommandMessenger
-from acquisition.campaign.run_campaign import run_campaign
-from acquisition.campaign.why import Why
-from acquisition.errors import CheckFailed, DataLost, InstrumentLost, RecordingError
-from acquisition.excitation.dwell import Dwell
-from acquisition.instruments import Identity
-from acquisition.plan.campaign import Campaign
-from acquisition.plan.measurement import Measurement
-from acquisition.plan.retry import Retryable, RetryPolicy
-from acquisition.run.state import RunState
-from acquisition.run.stop import Cause, StopRequest, StopSwitch
+from vibench.acquisition.campaign.item import AfterFailure, ChangedBench, Existing, Item
+from vibench.acquisition.campaign.journal import journal_path
+from vibench.acquisition.campaign.journal_point import PointState, read_journal
+from vibench.acquisition.campaign.notice import CommandMessenger
+from vibench.acquisition.campaign.run_campaign import run_campaign
+from vibench.acquisition.campaign.why import Why
+from vibench.acquisition.errors import CheckFailed, DataLost, InstrumentLost, RecordingError
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.instruments import Identity
+from vibench.acquisition.plan.campaign import Campaign
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.plan.retry import Retryable, RetryPolicy
+from vibench.acquisition.run.state import RunState
+from vibench.acquisition.run.stop import Cause, StopRequest, StopSwitch
 
 
 def dwell(name, frequency_hz=260.0):

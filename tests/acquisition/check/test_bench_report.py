@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.bench import open_bench
-from acquisition.check.bench_report import check_bench
-from acquisition.check.finding import BenchReport, Bounds, Verdict
-from acquisition.check.sine_fit import clock_ratio, fit_sine
-from acquisition.errors import CheckStopped, InstrumentLost
-from acquisition.rig.configuration import load_rig
-from acquisition.run.stop import Cause, StopRequest, StopSwitch
-from acquisition.virtual.generator.output_signal import Panel
-from acquisition.virtual.generator.scpi_command import Quirks
+from vibench.acquisition.bench import open_bench
+from vibench.acquisition.check.bench_report import check_bench
+from vibench.acquisition.check.finding import BenchReport, Bounds, Verdict
+from vibench.acquisition.check.sine_fit import clock_ratio, fit_sine
+from vibench.acquisition.errors import CheckStopped, InstrumentLost
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.run.stop import Cause, StopRequest, StopSwitch
+from vibench.virtual_rig.generator.output_signal import Panel
+from vibench.virtual_rig.generator.scpi_command import Quirks
 
 ROOT = Path(__file__).parents[3]
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from acquisition.check.low_level import judged
-from acquisition.errors import CheckFailed
-from acquisition.rig.channel import channels_of
-from acquisition.rig.configuration import Role
-from acquisition.rig.model import Quantity, RigModel
+from vibench.acquisition.check.low_level import judged
+from vibench.acquisition.errors import CheckFailed
+from vibench.acquisition.rig.channel import channels_of
+from vibench.acquisition.rig.configuration import Role
+from vibench.acquisition.rig.model import Quantity, RigModel
 
 RATE_HZ = 51_200.0
 AMPLITUDE_VPP = 0.02

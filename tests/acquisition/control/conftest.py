@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from acquisition.control.conduct import conduct
-from acquisition.control.move import Heard, Move
-from acquisition.excitation.steps import Tone
-from acquisition.plan.measurement import Measurement
-from acquisition.plan.needed_setting import needed_vpp
-from acquisition.rig.channel import channels_of
-from acquisition.rig.configuration import Rig, Role
-from acquisition.run.state import RunState
+from vibench.acquisition.control.conduct import conduct
+from vibench.acquisition.control.move import Heard, Move
+from vibench.acquisition.excitation.steps import Tone
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.plan.needed_setting import needed_vpp
+from vibench.acquisition.rig.channel import channels_of
+from vibench.acquisition.rig.configuration import Rig, Role
+from vibench.acquisition.run.state import RunState
 
 RATE_HZ = 5120.0
 SLOW_STEP_S = 1e-3

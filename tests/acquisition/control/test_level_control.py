@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.control.level_control import Held, LevelControl, MeasuredLevel, measured_level
-from acquisition.excitation.feedback import BaseLevel
+from vibench.acquisition.control.level_control import Held, LevelControl, MeasuredLevel, measured_level
+from vibench.acquisition.excitation.feedback import BaseLevel
 
 CONTROL = LevelControl(BaseLevel(acceleration_m_per_s2=10.0), most_vpp=5.0)
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from acquisition.control.mode_fit import fitted_mode
-from sim.specimen import gong2025
+from vibench.acquisition.control.mode_fit import fitted_mode
+from vibench.sim.specimen import gong2025
 
 SPECIMEN = gong2025()
 MODES = list(zip(SPECIMEN.natural_frequencies_hz, SPECIMEN.damping_ratios, strict=True))

@@ -5,20 +5,20 @@ import json
 import numpy as np
 import pytest
 
-from acquisition.bench import open_bench
-from acquisition.check.low_level import sine_amplitude
-from acquisition.excitation.feedback import BaseLevel, JumpSearch, Settling
-from acquisition.excitation.held_dwell import HeldDwell
-from acquisition.excitation.resonance_tracking import ResonanceTracking
-from acquisition.excitation.settled_sine import SettledSine
-from acquisition.excitation.stepped_sine import Direction
-from acquisition.plan.measurement import Measurement
-from acquisition.recording.reader import open_recording
-from acquisition.run.run_measurement import run_measurement
-from acquisition.run.state import RunState
-from sim.drive import Harmonic
-from sim.integrate import integrate
-from sim.specimen import gong2025
+from vibench.acquisition.bench import open_bench
+from vibench.acquisition.check.low_level import sine_amplitude
+from vibench.acquisition.excitation.feedback import BaseLevel, JumpSearch, Settling
+from vibench.acquisition.excitation.held_dwell import HeldDwell
+from vibench.acquisition.excitation.resonance_tracking import ResonanceTracking
+from vibench.acquisition.excitation.settled_sine import SettledSine
+from vibench.acquisition.excitation.stepped_sine import Direction
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.acquisition.run.state import RunState
+from vibench.sim.drive import Harmonic
+from vibench.sim.integrate import integrate
+from vibench.sim.specimen import gong2025
 
 SAMPLE_RATE_HZ = 10240.0
 HEAVY_KG = 0.6

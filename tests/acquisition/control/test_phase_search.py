@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acquisition.control.phase_search import PhaseError, PhaseSearch
+from vibench.acquisition.control.phase_search import PhaseError, PhaseSearch
 
 
 def error_deg(frequency_hz, natural_hz, damping):

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acquisition.control.steadiness import Steadiness, judged
-from acquisition.excitation.feedback import Settling
+from vibench.acquisition.control.steadiness import Steadiness, judged
+from vibench.acquisition.excitation.feedback import Settling
 
 RULE = Settling()
 

@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from acquisition.rig.configuration import GeneratorConfig
-from acquisition.virtual.generator.afg1022 import AFG1022, Reply
-from acquisition.virtual.generator.afg1022_settings import ChannelSettings
-from acquisition.virtual.generator.output_signal import Panel
-from acquisition.virtual.generator.scpi_command import Quirks
-from acquisition.virtual.generator.scpi_status import ErrorCode, StatusByte
-from acquisition.virtual.usb import usb_bus
-from acquisition.virtual.usb.usbtmc import UsbTmcInstrument
+from vibench.acquisition.rig.configuration import GeneratorConfig
+from vibench.virtual_rig.generator.afg1022 import AFG1022, Reply
+from vibench.virtual_rig.generator.afg1022_settings import ChannelSettings
+from vibench.virtual_rig.generator.output_signal import Panel
+from vibench.virtual_rig.generator.scpi_command import Quirks
+from vibench.virtual_rig.generator.scpi_status import ErrorCode, StatusByte
+from vibench.virtual_rig.usb import usb_bus
+from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
 
 _SERIALS = (f"C02{number:04d}" for number in itertools.count(1))
 

@@ -5,14 +5,20 @@ import math
 import numpy as np
 import pytest
 
-from acquisition.drivers.afg1022_limits import Shape
-from acquisition.drivers.afg1022_modes import SweepSupport, Unsupported
-from acquisition.drivers.afg1022x import AFG1022X
-from acquisition.errors import InstrumentBusy, InstrumentError, InstrumentLost, LimitExceeded, SettingRefused
-from acquisition.rig.configuration import Knob
-from acquisition.virtual.generator.afg1022_settings import OPEN_AMPLITUDE_RANGE_VPP
-from acquisition.virtual.generator.output_signal import Panel
-from acquisition.virtual.generator.scpi_command import Quirks
+from vibench.acquisition.drivers.afg1022_limits import Shape
+from vibench.acquisition.drivers.afg1022_modes import SweepSupport, Unsupported
+from vibench.acquisition.drivers.afg1022x import AFG1022X
+from vibench.acquisition.errors import (
+    InstrumentBusy,
+    InstrumentError,
+    InstrumentLost,
+    LimitExceeded,
+    SettingRefused,
+)
+from vibench.acquisition.rig.configuration import Knob
+from vibench.virtual_rig.generator.afg1022_settings import OPEN_AMPLITUDE_RANGE_VPP
+from vibench.virtual_rig.generator.output_signal import Panel
+from vibench.virtual_rig.generator.scpi_command import Quirks
 
 SINE = np.sin(2 * np.pi * np.arange(1024) / 1024)
 

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from acquisition.drivers.arbitrary_codes import HIGHEST_CODE, arbitrary_codes
-from acquisition.errors import LimitExceeded
+from vibench.acquisition.drivers.arbitrary_codes import HIGHEST_CODE, arbitrary_codes
+from vibench.acquisition.errors import LimitExceeded
 
 waveforms = arrays(np.float64, st.integers(2, 300), elements=st.floats(-1, 1, allow_subnormal=False)).filter(
     lambda values: np.ptp(values) > 1e-6

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError
 
-from acquisition.drivers.daqmx import DaqmxDigitizer
-from acquisition.drivers.daqmx_errors import MEANINGS, from_code
-from acquisition.drivers.daqmx_inputs import InputScaling
-from acquisition.errors import (
+from vibench.acquisition.drivers.daqmx import DaqmxDigitizer
+from vibench.acquisition.drivers.daqmx_errors import MEANINGS, from_code
+from vibench.acquisition.drivers.daqmx_inputs import InputScaling
+from vibench.acquisition.errors import (
     AcquisitionError,
     ConfigurationError,
     DataLost,
@@ -21,8 +21,8 @@ from acquisition.errors import (
     InstrumentError,
     InstrumentLost,
 )
-from acquisition.rig.configuration import load_rig
-from acquisition.virtual.rig import VirtualRig
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.virtual_rig.rig import VirtualRig
 
 ROOT = Path(__file__).parents[3]
 RATE_HZ = 5120.0

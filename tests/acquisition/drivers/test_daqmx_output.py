@@ -7,10 +7,10 @@ import nidaqmx
 import numpy as np
 import pytest
 
-from acquisition.drivers.daqmx import DaqmxDigitizer
-from acquisition.drivers.daqmx_output import DaqmxOutput, _told_to_idle_at_zero
-from acquisition.drivers.daqmx_session import daqmx_session
-from acquisition.errors import (
+from vibench.acquisition.drivers.daqmx import DaqmxDigitizer
+from vibench.acquisition.drivers.daqmx_output import DaqmxOutput, _told_to_idle_at_zero
+from vibench.acquisition.drivers.daqmx_session import daqmx_session
+from vibench.acquisition.errors import (
     ConfigurationError,
     DataLost,
     InstrumentBusy,
@@ -19,10 +19,10 @@ from acquisition.errors import (
     LimitExceeded,
     SettingRefused,
 )
-from acquisition.instruments import AnalogOutput, IdleOutput
-from acquisition.rig.configuration import load_rig
-from acquisition.rig.output import OutputConfig
-from acquisition.virtual.rig import VirtualRig
+from vibench.acquisition.instruments import AnalogOutput, IdleOutput
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.rig.output import OutputConfig
+from vibench.virtual_rig.rig import VirtualRig
 
 ROOT = Path(__file__).parents[3]
 RATE_HZ = 12_800.0

@@ -14,21 +14,22 @@ from threading import Event
 import numpy as np
 import pytest
 
-from acquisition.check.rule import CheckRule
-from acquisition.engine.address import EngineAddress
-from acquisition.engine.client import EngineClient
-from acquisition.engine.errors import EngineError, EngineGone
-from acquisition.engine.lock import BenchLock
-from acquisition.engine.orders import Orders
-from acquisition.engine.requests import Look
-from acquisition.engine.start import start_engine
-from acquisition.engine.state import Attendance, EngineState, Visit
-from acquisition.engine.status import MessageKind
-from acquisition.engine.wire import Message, send
-from acquisition.errors import InstrumentBusy, LimitExceeded, RecordingError
-from acquisition.recording import RecordingState, open_recording
-from acquisition.run.stop import StopLevel
-from acquisition.virtual.rig import VirtualRig
+from vibench.acquisition.check.rule import CheckRule
+from vibench.acquisition.engine.address import EngineAddress
+from vibench.acquisition.engine.client import EngineClient
+from vibench.acquisition.engine.errors import EngineError, EngineGone
+from vibench.acquisition.engine.lock import BenchLock
+from vibench.acquisition.engine.orders import Orders
+from vibench.acquisition.engine.requests import Look
+from vibench.acquisition.engine.start import start_engine
+from vibench.acquisition.engine.state import Attendance, EngineState, Visit
+from vibench.acquisition.engine.status import MessageKind
+from vibench.acquisition.engine.wire import Message, send
+from vibench.acquisition.errors import InstrumentBusy, LimitExceeded, RecordingError
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.run.stop import StopLevel
+from vibench.virtual_rig.rig import VirtualRig
 
 from .conftest import campaign, until, until_state, until_there
 
@@ -313,7 +314,9 @@ class TestItsEnd:
     def test_an_unattended_engine_that_was_never_used_ends_when_it_is_forgotten(self):
         arguments = ["--attendance", "unattended", "--forgotten-s", "1"]
         with subprocess.Popen(
-            [sys.executable, "-m", "acquisition.engine", *arguments], stdout=subprocess.PIPE, text=True
+            [sys.executable, "-m", "vibench.acquisition.engine", *arguments],
+            stdout=subprocess.PIPE,
+            text=True,
         ) as engine:
             address = EngineAddress.model_validate_json(engine.stdout.readline())
             with EngineClient.attach(address, Visit.ATTENDING) as viewer:

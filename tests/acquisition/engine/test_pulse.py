@@ -2,8 +2,8 @@
 
 from threading import Event
 
-from acquisition.engine.pulse import Pulse
-from acquisition.engine.state import DRIVING, EngineState
+from vibench.acquisition.engine.pulse import Pulse
+from vibench.acquisition.engine.state import DRIVING, EngineState
 
 from .conftest import campaign, until, until_state
 

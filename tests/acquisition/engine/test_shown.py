@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from acquisition.campaign.item import CampaignItem, CampaignProgress, Item, Why
-from acquisition.engine.shown import Shown
-from acquisition.engine.state import Attendance
-from acquisition.engine.status import BenchFacts, ChannelFacts
-from acquisition.instruments import Block
-from acquisition.run.progress import Progress
-from acquisition.run.state import RunState
+from vibench.acquisition.campaign.item import CampaignItem, CampaignProgress, Item
+from vibench.acquisition.campaign.why import Why
+from vibench.acquisition.engine.shown import Shown
+from vibench.acquisition.engine.state import Attendance
+from vibench.acquisition.engine.status import BenchFacts, ChannelFacts
+from vibench.acquisition.instruments import Block
+from vibench.acquisition.run.progress import Progress
+from vibench.acquisition.run.state import RunState
 
 from .conftest import campaign
 

@@ -4,10 +4,10 @@ import sys
 from pathlib import Path
 from threading import Event
 
-from acquisition.engine.start import start_engine
-from acquisition.engine.state import EngineState
-from acquisition.plan.campaign import Campaign
-from acquisition.rig.configuration import Rig
+from vibench.acquisition.engine.start import start_engine
+from vibench.acquisition.engine.state import EngineState
+from vibench.acquisition.plan.campaign import Campaign
+from vibench.acquisition.rig.configuration import Rig
 
 PLAN = {
     "name": "trial",

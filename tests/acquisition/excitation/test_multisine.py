@@ -5,7 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acquisition.excitation.multisine import MEMORY_POINTS, band_lines, flat_periods, held_lines, hold_droop
+from vibench.acquisition.excitation.multisine import (
+    MEMORY_POINTS,
+    band_lines,
+    flat_periods,
+    held_lines,
+    hold_droop,
+)
 
 BAND = np.arange(20, 801)
 OVERSAMPLING = 16

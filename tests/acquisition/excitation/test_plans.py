@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from acquisition.excitation.dwell import Dwell
-from acquisition.excitation.kinds import Excitation
-from acquisition.excitation.multisine_noise import MultisineNoise
-from acquisition.excitation.odd_multisine import OddMultisine
-from acquisition.excitation.sine_sweep import SineSweep, Spacing
-from acquisition.excitation.stepped_sine import Direction, FrequencyGrid, SteppedSine
-from acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.excitation.kinds import Excitation
+from vibench.acquisition.excitation.multisine_noise import MultisineNoise
+from vibench.acquisition.excitation.odd_multisine import OddMultisine
+from vibench.acquisition.excitation.sine_sweep import SineSweep, Spacing
+from vibench.acquisition.excitation.stepped_sine import Direction, FrequencyGrid, SteppedSine
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
 
 PLANS = [
     MultisineNoise(amplitude_vpp=1.5, band_start_hz=20, band_stop_hz=800, realisations=3),

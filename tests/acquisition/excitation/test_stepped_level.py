@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from acquisition.errors import LimitExceeded
-from acquisition.excitation.dwell import Dwell
-from acquisition.excitation.stepped_level import SteppedLevel
-from acquisition.plan.limits import require_within_limits
-from acquisition.plan.measurement import Measurement
-from acquisition.rig.configuration import load_rig
-from acquisition.run.schedule import phases
-from acquisition.run.state import RunState
+from vibench.acquisition.errors import LimitExceeded
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.excitation.stepped_level import SteppedLevel
+from vibench.acquisition.plan.limits import require_within_limits
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.run.schedule import phases
+from vibench.acquisition.run.state import RunState
 
 ROOT = Path(__file__).parents[3]
 

@@ -6,18 +6,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.errors import ConfigurationError
-from acquisition.excitation.dwell import Dwell
-from acquisition.excitation.multisine_noise import MultisineNoise
-from acquisition.excitation.odd_multisine import OddMultisine
-from acquisition.excitation.sine_sweep import SineSweep
-from acquisition.excitation.stepped_sine import FrequencyGrid, SteppedSine
-from acquisition.excitation.streamed_noise import StreamedNoise
-from acquisition.plan.campaign import Campaign, load_campaign
-from acquisition.plan.limits import require_within_limits
-from acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
-from acquisition.rig.configuration import load_rig
-from acquisition.toml_text import toml_text
+from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.excitation.multisine_noise import MultisineNoise
+from vibench.acquisition.excitation.odd_multisine import OddMultisine
+from vibench.acquisition.excitation.sine_sweep import SineSweep
+from vibench.acquisition.excitation.stepped_sine import FrequencyGrid, SteppedSine
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.plan.campaign import Campaign, load_campaign
+from vibench.acquisition.plan.limits import require_within_limits
+from vibench.acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.toml_text import toml_text
 
 ROOT = Path(__file__).parent.parent.parent.parent
 SHIPPED = sorted((ROOT / "campaigns").glob("*.toml"))

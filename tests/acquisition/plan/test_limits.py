@@ -6,16 +6,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lsim
 
-from acquisition.errors import LimitExceeded
-from acquisition.excitation.dwell import Dwell
-from acquisition.excitation.multisine_noise import MultisineNoise
-from acquisition.excitation.sine_sweep import SineSweep
-from acquisition.excitation.steps import Waveform
-from acquisition.excitation.streamed_noise import StreamedNoise
-from acquisition.plan.limits import limit_checks, limit_table, require_within_limits, shortest_ramp_s
-from acquisition.plan.loads import predicted_loads
-from acquisition.plan.measurement import Measurement
-from acquisition.rig.model import Quantity, RigModel
+from vibench.acquisition.errors import LimitExceeded
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.excitation.multisine_noise import MultisineNoise
+from vibench.acquisition.excitation.sine_sweep import SineSweep
+from vibench.acquisition.excitation.steps import Waveform
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.plan.limits import limit_checks, limit_table, require_within_limits, shortest_ramp_s
+from vibench.acquisition.plan.loads import predicted_loads
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.rig.model import Quantity, RigModel
 
 
 def plan(excitation, **fields):
@@ -79,7 +79,7 @@ def test_streamed_noise_reaches_the_terminal_s_range_and_no_more(rig):
 def test_loads_grow_with_the_setting(factor):
     from pathlib import Path
 
-    from acquisition.rig.configuration import load_rig
+    from vibench.acquisition.rig.configuration import load_rig
 
     rig = load_rig(Path(__file__).parent.parent.parent.parent / "hardware_configs" / "virtual_rig.toml")
     one = predicted_loads(Dwell(amplitude_vpp=1.0, frequency_hz=50, duration_s=1), rig)

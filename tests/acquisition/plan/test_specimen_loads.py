@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from acquisition.errors import LimitExceeded
-from acquisition.excitation.dwell import Dwell
-from acquisition.excitation.multisine_noise import MultisineNoise
-from acquisition.excitation.sine_sweep import SineSweep
-from acquisition.excitation.streamed_noise import StreamedNoise
-from acquisition.plan.limits import limit_checks, require_within_limits
-from acquisition.plan.measurement import Measurement
-from acquisition.plan.specimen_loads import predicted_specimen_loads
-from acquisition.rig.model import Quantity, RigModel
-from acquisition.rig.specimen import specimen_of
-from sim.against_stops import base_answer
-from sim.drive import Harmonic
-from sim.modes import base_transmissibility
-from sim.response import steady_response
+from vibench.acquisition.errors import LimitExceeded
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.excitation.multisine_noise import MultisineNoise
+from vibench.acquisition.excitation.sine_sweep import SineSweep
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.plan.limits import limit_checks, require_within_limits
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.plan.specimen_loads import predicted_specimen_loads
+from vibench.acquisition.rig.model import Quantity, RigModel
+from vibench.acquisition.rig.specimen import specimen_of
+from vibench.sim.against_stops import base_answer
+from vibench.sim.drive import Harmonic
+from vibench.sim.modes import base_transmissibility
+from vibench.sim.response import steady_response
 
 
 def base_m(rig, amplitude_vpp, frequency_hz):

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from acquisition.instruments import Block
-from acquisition.recording import ChannelHeader, Origin, RecordingHeader
+from vibench.acquisition.instruments import Block
+from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
+from vibench.acquisition.recording.layout import Origin
 
 RANGE_V = 5.0
 STEP_V = RANGE_V / 2**23

@@ -14,8 +14,10 @@ import time
 
 import numpy as np
 
-from acquisition.instruments import Block
-from acquisition.recording import ChannelHeader, Origin, RecordingHeader, RecordingState, create_recording
+from vibench.acquisition.instruments import Block
+from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
+from vibench.acquisition.recording.layout import Origin, RecordingState
+from vibench.acquisition.recording.writer import create_recording
 
 RATE_HZ = 51_200.0
 BLOCK = 512

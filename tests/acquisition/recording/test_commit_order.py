@@ -12,12 +12,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from acquisition.instruments import Overload
-from acquisition.recording import RecordingState, open_recording
-from acquisition.recording.disk import PositionedFile
-from acquisition.recording.layout import part_of
-from acquisition.recording.preallocate import ITEM_BYTES, preallocate
-from acquisition.recording.writer import RecordingWriter
+from vibench.acquisition.instruments import Overload
+from vibench.acquisition.recording.disk import PositionedFile
+from vibench.acquisition.recording.layout import RecordingState, part_of
+from vibench.acquisition.recording.preallocate import ITEM_BYTES, preallocate
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.recording.writer import RecordingWriter
 
 BLOCKS, BLOCK = 40, 7
 PAGE = 4096

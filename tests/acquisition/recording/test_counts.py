@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.errors import RecordingError
-from acquisition.recording.counts import CountScale
-from acquisition.recording.header import ChannelHeader
+from vibench.acquisition.errors import RecordingError
+from vibench.acquisition.recording.counts import CountScale
+from vibench.acquisition.recording.header import ChannelHeader
 
 
 def scale(step, zero=0.0, range_v=5.0):

@@ -5,9 +5,12 @@ import time
 
 import pytest
 
-from acquisition.errors import RecordingError
-from acquisition.recording import RecordingState, create_recording, open_recording, recover
-from acquisition.recording.disk_trouble import DiskTrouble, troubled_disks
+from vibench.acquisition.errors import RecordingError
+from vibench.acquisition.recording.disk_trouble import DiskTrouble, troubled_disks
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.recording.recover import recover
+from vibench.acquisition.recording.writer import create_recording
 
 
 @pytest.fixture

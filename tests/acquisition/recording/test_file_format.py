@@ -6,9 +6,11 @@ import h5py
 import numpy as np
 import pytest
 
-from acquisition.instruments import Overload
-from acquisition.recording import ResultArray, create_recording, open_recording
-from acquisition.recording.chunks import create_counts, write_chunks
+from vibench.acquisition.instruments import Overload
+from vibench.acquisition.recording.chunks import create_counts, write_chunks
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.recording.results import ResultArray
+from vibench.acquisition.recording.writer import create_recording
 
 SAMPLES = 120_000
 

@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.recording.fixed_text import decoded, encoded
+from vibench.acquisition.recording.fixed_text import decoded, encoded
 
 UTF8 = st.text(st.characters(codec="utf-8", exclude_characters="\0"))
 

@@ -2,9 +2,10 @@ import h5py
 import numpy as np
 import pytest
 
-from acquisition.recording import create_recording, open_recording
-from acquisition.recording.layout import CHUNK_SAMPLES, MISSING_COUNT
-from acquisition.recording.overview import BIN_SAMPLES, OverviewSums, extremes
+from vibench.acquisition.recording.layout import CHUNK_SAMPLES, MISSING_COUNT
+from vibench.acquisition.recording.overview import BIN_SAMPLES, OverviewSums, extremes
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.recording.writer import create_recording
 
 SAMPLES = 2 * CHUNK_SAMPLES + 1000
 

@@ -5,8 +5,10 @@ import os
 
 import h5py
 
-from acquisition.recording import RecordingState, create_recording, open_recording
-from acquisition.recording import preallocate as preallocate_module
+from vibench.acquisition.recording import preallocate as preallocate_module
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.recording.writer import create_recording
 
 
 def _die_before(step, path, header):

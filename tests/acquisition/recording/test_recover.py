@@ -4,12 +4,13 @@ import h5py
 import numpy as np
 import pytest
 
-from acquisition.errors import RecordingError
-from acquisition.recording import RecordingState, create_recording, open_recording, recover
-from acquisition.recording.disk import PositionedFile
-from acquisition.recording.layout import part_of
-from acquisition.recording.preallocate import preallocate
-from acquisition.recording.writer import RecordingWriter
+from vibench.acquisition.errors import RecordingError
+from vibench.acquisition.recording.disk import PositionedFile
+from vibench.acquisition.recording.layout import RecordingState, part_of
+from vibench.acquisition.recording.preallocate import preallocate
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.recording.recover import recover
+from vibench.acquisition.recording.writer import RecordingWriter, create_recording
 
 
 @pytest.fixture

@@ -3,9 +3,11 @@ from threading import Event
 import numpy as np
 import pytest
 
-from acquisition.errors import RecordingError
-from acquisition.instruments import Overload
-from acquisition.recording import RecordingState, create_recording, open_recording
+from vibench.acquisition.errors import RecordingError
+from vibench.acquisition.instruments import Overload
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.recording.writer import create_recording
 
 BLOCK = 250
 

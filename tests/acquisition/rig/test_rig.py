@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.errors import ConfigurationError
-from acquisition.rig.channel import channels_of
-from acquisition.rig.configuration import Rig, Role, load_rig
+from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition.rig.channel import channels_of
+from vibench.acquisition.rig.configuration import Rig, Role, load_rig
 
 CONFIGS = Path(__file__).resolve().parents[3] / "hardware_configs"
 VIRTUAL = CONFIGS / "virtual_rig.toml"

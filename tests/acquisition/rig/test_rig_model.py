@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.rig.configuration import load_rig
-from acquisition.rig.model import Quantity, RigModel, suspended_mass_kg
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.rig.model import Quantity, RigModel, suspended_mass_kg
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 MODEL = RigModel(RIG)

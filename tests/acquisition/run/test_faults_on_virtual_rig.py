@@ -8,8 +8,8 @@ import re
 import numpy as np
 import pytest
 
-from acquisition.bench import open_bench
-from acquisition.errors import (
+from vibench.acquisition.bench import open_bench
+from vibench.acquisition.errors import (
     AcquisitionError,
     CheckFailed,
     DataLost,
@@ -18,16 +18,17 @@ from acquisition.errors import (
     InstrumentLost,
     SettingRefused,
 )
-from acquisition.excitation.dwell import Dwell
-from acquisition.excitation.sine_sweep import SineSweep
-from acquisition.plan.measurement import Measurement
-from acquisition.recording import RecordingState, open_recording
-from acquisition.rig.calibration import CalibrationRule
-from acquisition.rig.knobs import confirm_simulated
-from acquisition.run.run_measurement import run_measurement
-from acquisition.run.state import RunState
-from acquisition.virtual.generator.output_signal import Panel
-from acquisition.virtual.generator.scpi_command import Quirks
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.excitation.sine_sweep import SineSweep
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.rig.calibration import CalibrationRule
+from vibench.acquisition.rig.knobs import confirm_simulated
+from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.acquisition.run.state import RunState
+from vibench.virtual_rig.generator.output_signal import Panel
+from vibench.virtual_rig.generator.scpi_command import Quirks
 
 DWELL = Measurement(
     name="run",
@@ -180,8 +181,8 @@ def test_a_laser_dropout_and_an_over_range_are_flagged_and_the_run_goes_on(labor
 
 
 def test_an_output_relay_that_sticks_is_seen_by_the_bench_check(laboratory, tmp_path):
-    from acquisition.check.bench_report import check_bench
-    from acquisition.check.finding import Verdict
+    from vibench.acquisition.check.bench_report import check_bench
+    from vibench.acquisition.check.finding import Verdict
 
     virtual, connected = laboratory()
     with bench_on(connected) as bench:

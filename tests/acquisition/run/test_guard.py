@@ -7,14 +7,14 @@ from collections import deque
 import numpy as np
 import pytest
 
-from acquisition.errors import LimitExceeded
-from acquisition.excitation.dwell import Dwell
-from acquisition.instruments import Block, Overload
-from acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
-from acquisition.rig.channel import channels_of
-from acquisition.rig.configuration import Role
-from acquisition.run.guard import Guard
-from acquisition.run.run import Run
+from vibench.acquisition.errors import LimitExceeded
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.instruments import Block, Overload
+from vibench.acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
+from vibench.acquisition.rig.channel import channels_of
+from vibench.acquisition.rig.configuration import Role
+from vibench.acquisition.run.guard import Guard
+from vibench.acquisition.run.run import Run
 
 RATE_HZ = 51_200.0
 BLOCK = 5120

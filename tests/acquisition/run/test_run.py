@@ -7,8 +7,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from acquisition.check.low_level import BenchCheck, sine_amplitude
-from acquisition.errors import (
+from vibench.acquisition.check.low_level import BenchCheck, sine_amplitude
+from vibench.acquisition.errors import (
     CheckFailed,
     ConfigurationError,
     DataLost,
@@ -16,20 +16,20 @@ from acquisition.errors import (
     LimitExceeded,
     RecordingError,
 )
-from acquisition.excitation.dwell import Dwell
-from acquisition.excitation.multisine_noise import MultisineNoise
-from acquisition.excitation.sine_sweep import SineSweep
-from acquisition.excitation.stepped_sine import SteppedSine
-from acquisition.excitation.streamed_noise import StreamedNoise
-from acquisition.instruments import Overload
-from acquisition.plan.limits import shortest_ramp_s
-from acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
-from acquisition.recording.layout import RecordingState
-from acquisition.run.performance import HOLD_LONGEST_S
-from acquisition.run.run import Run
-from acquisition.run.schedule import CHECK_S
-from acquisition.run.state import RunState
-from acquisition.run.stop import Cause, StopLevel, StopRequest, StopSwitch
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.excitation.multisine_noise import MultisineNoise
+from vibench.acquisition.excitation.sine_sweep import SineSweep
+from vibench.acquisition.excitation.stepped_sine import SteppedSine
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.instruments import Overload
+from vibench.acquisition.plan.limits import shortest_ramp_s
+from vibench.acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.run.performance import HOLD_LONGEST_S
+from vibench.acquisition.run.run import Run
+from vibench.acquisition.run.schedule import CHECK_S
+from vibench.acquisition.run.state import RunState
+from vibench.acquisition.run.stop import Cause, StopLevel, StopRequest, StopSwitch
 
 RATE = 5120.0
 AMPLITUDE_VPP = 1.0

@@ -8,23 +8,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.bench import open_bench
-from acquisition.campaign.item import Item
-from acquisition.campaign.run_campaign import run_campaign
-from acquisition.check.low_level import sine_amplitude
-from acquisition.errors import CheckFailed
-from acquisition.excitation.dwell import Dwell
-from acquisition.excitation.multisine_noise import MultisineNoise
-from acquisition.excitation.sine_sweep import SineSweep
-from acquisition.plan.campaign import load_campaign
-from acquisition.plan.measurement import Measurement
-from acquisition.plan.specimen_loads import predicted_specimen_loads
-from acquisition.recording.layout import RecordingState
-from acquisition.recording.reader import open_recording
-from acquisition.rig.configuration import load_rig
-from acquisition.run.run import Run
-from acquisition.run.run_measurement import run_measurement
-from acquisition.run.state import RunState
+from vibench.acquisition.bench import open_bench
+from vibench.acquisition.campaign.item import Item
+from vibench.acquisition.campaign.run_campaign import run_campaign
+from vibench.acquisition.check.low_level import sine_amplitude
+from vibench.acquisition.errors import CheckFailed
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.excitation.multisine_noise import MultisineNoise
+from vibench.acquisition.excitation.sine_sweep import SineSweep
+from vibench.acquisition.plan.campaign import load_campaign
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.plan.specimen_loads import predicted_specimen_loads
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.run.run import Run
+from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.acquisition.run.state import RunState
 
 ROOT = Path(__file__).parent.parent.parent.parent
 VIRTUAL = ROOT / "hardware_configs" / "virtual_rig.toml"
@@ -157,11 +157,11 @@ CHILD = """
 import signal
 import sys
 from pathlib import Path
-from acquisition.bench import open_bench
-from acquisition.excitation.dwell import Dwell
-from acquisition.plan.measurement import Measurement
-from acquisition.run.run_measurement import run_measurement
-from acquisition.run.state import RunState
+from vibench.acquisition.bench import open_bench
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.acquisition.run.state import RunState
 
 told = []
 

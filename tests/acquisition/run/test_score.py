@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.errors import ConfigurationError
-from acquisition.excitation.steps import Stream, Tone, Waveform
-from acquisition.excitation.streamed_noise import GaussianBand
-from acquisition.run.schedule import Phase
-from acquisition.run.score import RELEASE_S, Score
-from acquisition.run.state import RunState
+from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition.excitation.steps import Stream, Tone, Waveform
+from vibench.acquisition.excitation.streamed_noise import GaussianBand
+from vibench.acquisition.run.schedule import Phase
+from vibench.acquisition.run.score import RELEASE_S, Score
+from vibench.acquisition.run.state import RunState
 
 RATE_HZ = 5120.0
 NOISE = Stream(GaussianBand(50.0, 600.0, seed=3))

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from acquisition.check.low_level import BenchCheck
-from acquisition.errors import DataLost, InstrumentLost, LimitExceeded, RecordingError
-from acquisition.excitation.streamed_noise import StreamedNoise
-from acquisition.instruments import Overload
-from acquisition.plan.limits import shortest_ramp_s
-from acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
-from acquisition.recording.layout import RecordingState
-from acquisition.run.run import Run
-from acquisition.run.schedule import CHECK_S
-from acquisition.run.state import RunState
-from acquisition.run.stop import Cause, StopLevel, StopRequest
+from vibench.acquisition.check.low_level import BenchCheck
+from vibench.acquisition.errors import DataLost, InstrumentLost, LimitExceeded, RecordingError
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.instruments import Overload
+from vibench.acquisition.plan.limits import shortest_ramp_s
+from vibench.acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.run.run import Run
+from vibench.acquisition.run.schedule import CHECK_S
+from vibench.acquisition.run.state import RunState
+from vibench.acquisition.run.stop import Cause, StopLevel, StopRequest
 
 RATE = 5120.0
 AHEAD = 2560

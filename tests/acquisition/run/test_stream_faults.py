@@ -11,17 +11,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.bench import open_bench
-from acquisition.errors import DataLost, InstrumentError, InstrumentLost, LimitExceeded, RecordingError
-from acquisition.excitation.streamed_noise import StreamedNoise
-from acquisition.plan.measurement import InRunLimits, Measurement
-from acquisition.recording import RecordingState, create_recording, open_recording
-from acquisition.rig.calibration import CalibrationRule
-from acquisition.rig.configuration import load_rig
-from acquisition.rig.knobs import confirm_simulated
-from acquisition.run.run_measurement import run_measurement
-from acquisition.run.state import RunState
-from acquisition.virtual.analogue import Coupling, Input
+from vibench.acquisition.bench import open_bench
+from vibench.acquisition.errors import (
+    DataLost,
+    InstrumentError,
+    InstrumentLost,
+    LimitExceeded,
+    RecordingError,
+)
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.plan.measurement import InRunLimits, Measurement
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition.rig.calibration import CalibrationRule
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.rig.knobs import confirm_simulated
+from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.acquisition.run.state import RunState
+from vibench.virtual_rig.analogue import Coupling, Input
 
 try:
     import resource

@@ -7,18 +7,19 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from acquisition.bench import open_bench
-from acquisition.check.low_level import BenchCheck
-from acquisition.errors import CheckFailed
-from acquisition.excitation.sine_sweep import Hold, SineSweep
-from acquisition.excitation.streamed_noise import StreamedNoise
-from acquisition.plan.measurement import Measurement
-from acquisition.recording import RecordingState, open_recording
-from acquisition.rig.configuration import load_rig
-from acquisition.rig.output import OutputUse
-from acquisition.run.run_measurement import run_measurement
-from acquisition.run.state import RunState
-from acquisition.virtual.world.decimation import GROUP_DELAY_SAMPLES
+from vibench.acquisition.bench import open_bench
+from vibench.acquisition.check.low_level import BenchCheck
+from vibench.acquisition.errors import CheckFailed
+from vibench.acquisition.excitation.sine_sweep import Hold, SineSweep
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.rig.output import OutputUse
+from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.acquisition.run.state import RunState
+from vibench.virtual_rig.world.decimation import GROUP_DELAY_SAMPLES
 
 STREAMING = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig_streaming.toml"
 RIG = load_rig(STREAMING)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from analysis.chaos.period import Points, shortest_period
-from analysis.chaos.verdict import MotionKind, motion_verdict
-from sim.drive import Harmonic
-from sim.periodic.poincare import stroboscopic_section
-from sim.specimen import gong2025
+from vibench.analysis.chaos.period import Points, shortest_period
+from vibench.analysis.chaos.verdict import MotionKind, motion_verdict
+from vibench.sim.drive import Harmonic
+from vibench.sim.periodic.poincare import stroboscopic_section
+from vibench.sim.specimen import gong2025
 
 DRIVE_HZ = 260.0
 QUIET = np.array([1e-5, 1e-5])

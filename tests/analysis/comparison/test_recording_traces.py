@@ -3,12 +3,12 @@ import pickle
 import numpy as np
 import pytest
 
-from analysis.campaign_results import Simulation
-from analysis.comparison.recording_traces import compared_recording, kept_result
-from analysis.comparison.trace import Origin, Response
-from analysis.errors import NotEnoughData
-from analysis.noise_request import NoiseRequest
-from analysis.results import Estimator
+from vibench.analysis.campaign_results import Simulation
+from vibench.analysis.comparison.recording_traces import compared_recording, kept_result
+from vibench.analysis.comparison.trace import Origin, Response
+from vibench.analysis.errors import NotEnoughData
+from vibench.analysis.noise_request import NoiseRequest
+from vibench.analysis.results import Estimator
 
 
 @pytest.fixture(scope="module")

@@ -5,11 +5,11 @@ import re
 import numpy as np
 import pytest
 
-from analysis.comparison.trace import Origin, Response, Trace, sorted_trace, trace_difference
-from analysis.comparison.trace_peaks import trace_peaks
-from analysis.errors import NotEnoughData
-from analysis.figures.comparison import comparison_figure
-from analysis.figures.drawn import ImageKind
+from vibench.analysis.comparison.trace import Origin, Response, Trace, sorted_trace, trace_difference
+from vibench.analysis.comparison.trace_peaks import trace_peaks
+from vibench.analysis.errors import NotEnoughData
+from vibench.analysis.figures.comparison import comparison_figure
+from vibench.analysis.figures.drawn import ImageKind
 
 MODE_HZ, DAMPING = 266.0, 0.01
 

@@ -9,19 +9,16 @@ import numpy as np
 import pytest
 from scipy.io import loadmat, wavfile
 
-from acquisition.errors import RecordingError
-from acquisition.instruments import Block
-from acquisition.recording import (
-    ChannelHeader,
-    Origin,
-    RecordingHeader,
-    ResultArray,
-    create_recording,
-    open_recording,
-)
-from analysis.errors import InvalidRequest, NotEnoughData
-from analysis.exchange.excerpt import excerpt
-from analysis.exchange.export import Format, Results, export_samples
+from vibench.acquisition.errors import RecordingError
+from vibench.acquisition.instruments import Block
+from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
+from vibench.acquisition.recording.layout import Origin
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.recording.results import ResultArray
+from vibench.acquisition.recording.writer import create_recording
+from vibench.analysis.errors import InvalidRequest, NotEnoughData
+from vibench.analysis.exchange.excerpt import excerpt
+from vibench.analysis.exchange.export import Format, Results, export_samples
 
 RATE_HZ = 51_200.0
 ROLES = ("drive_voltage", "m0_velocity")

@@ -12,16 +12,17 @@ import numpy as np
 import pytest
 from scipy.io import savemat, wavfile
 
-from acquisition.errors import ConfigurationError, RecordingError
-from acquisition.recording import RecordingState, open_recording
-from acquisition.toml_file import load_toml
-from analysis.errors import AnalysisError, InvalidRequest, UnusableData
-from analysis.exchange.excerpt import excerpt
-from analysis.exchange.export import Format, export_samples
-from analysis.exchange.import_recording import import_recording
-from analysis.exchange.mapping import ImportMapping
-from analysis.exchange.source import opened_source
-from analysis.measurement_analysis import analyse_recording
+from vibench.acquisition.errors import ConfigurationError, RecordingError
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.toml_file import load_toml
+from vibench.analysis.errors import AnalysisError, InvalidRequest, UnusableData
+from vibench.analysis.exchange.excerpt import excerpt
+from vibench.analysis.exchange.export import Format, export_samples
+from vibench.analysis.exchange.import_recording import import_recording
+from vibench.analysis.exchange.mapping import ImportMapping
+from vibench.analysis.exchange.source import opened_source
+from vibench.analysis.measurement_analysis import analyse_recording
 
 RATE_HZ = 8000.0
 SAMPLES = 60_000

@@ -9,7 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
-from acquisition.recording import ResultArray, open_recording
+from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition.recording.results import ResultArray
 
 RATE_HZ = 51_200.0
 ROLES = ("drive_voltage", "m0_velocity")
@@ -94,7 +95,7 @@ def test_h5py_alone_reads_it_in_a_program_without_vibench(with_result, known_val
         "    scale, offset = velocity.attrs['scale_factor'], velocity.attrs['add_offset']\n"
         "    time = velocity.dims[0][0]\n"
         "    print(repr(float(velocity[5] * scale + offset)), velocity.attrs['units'].decode())\n"
-        "    print(repr(float(time[5] * time.attrs['scale_factor'])), 'acquisition' in sys.modules)\n"
+        "    print(repr(float(time[5] * time.attrs['scale_factor'])), 'vibench.acquisition' in sys.modules)\n"
     )
     command = [sys.executable, "-I", str(script), str(with_result)]
     value, unit, *rest = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split(

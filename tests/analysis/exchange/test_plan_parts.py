@@ -2,10 +2,10 @@
 
 import pytest
 
-from acquisition.toml_file import validated
-from analysis.errors import InvalidRequest
-from analysis.exchange.mapping import ImportMapping
-from analysis.exchange.plan_parts import laid_parts
+from vibench.acquisition.toml_file import validated
+from vibench.analysis.errors import InvalidRequest
+from vibench.analysis.exchange.mapping import ImportMapping
+from vibench.analysis.exchange.plan_parts import laid_parts
 
 NOISE = {
     "kind": "multisine_noise",

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from acquisition.recording import open_recording
-from analysis.errors import InvalidRequest
-from analysis.exchange.xarray_dataset import xarray_dataset
+from vibench.acquisition.recording.reader import open_recording
+from vibench.analysis.errors import InvalidRequest
+from vibench.analysis.exchange.xarray_dataset import xarray_dataset
 
 xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
 

@@ -6,22 +6,22 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from acquisition.excitation.dwell import Dwell
-from acquisition.excitation.multisine_noise import MultisineNoise
-from acquisition.excitation.sine_sweep import SineSweep
-from acquisition.excitation.stepped_sine import SteppedSine
-from acquisition.excitation.streamed_noise import StreamedNoise
-from acquisition.plan.measurement import Measurement
-from acquisition.recording import open_recording
-from analysis.campaign_results import Simulation, result_of
-from analysis.figures.bench_levels import bench_levels_figure
-from analysis.figures.dwells import dwells_figure, spectrum_columns
-from analysis.figures.excitation import excitation_figure
-from analysis.figures.stepped_sine import stepped_sine_figure
-from analysis.figures.style import SIMULATED, prefixed
-from analysis.figures.sweep import sweep_figure
-from analysis.figures.transmission import transmission_figure
-from analysis.figures.transmission_levels import transmission_levels_figure
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.excitation.multisine_noise import MultisineNoise
+from vibench.acquisition.excitation.sine_sweep import SineSweep
+from vibench.acquisition.excitation.stepped_sine import SteppedSine
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.reader import open_recording
+from vibench.analysis.campaign_results import Simulation, result_of
+from vibench.analysis.figures.bench_levels import bench_levels_figure
+from vibench.analysis.figures.dwells import dwells_figure, spectrum_columns
+from vibench.analysis.figures.excitation import excitation_figure
+from vibench.analysis.figures.stepped_sine import stepped_sine_figure
+from vibench.analysis.figures.style import SIMULATED, prefixed
+from vibench.analysis.figures.sweep import sweep_figure
+from vibench.analysis.figures.transmission import transmission_figure
+from vibench.analysis.figures.transmission_levels import transmission_levels_figure
 
 PNG_HEAD = b"\x89PNG\r\n\x1a\n"
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from analysis.errors import InvalidRequest
-from analysis.figures.drawn import ImageKind
-from analysis.figures.paper.catalogue import PAPER_FIGURES
-from analysis.figures.paper.options import AMPLITUDES_M, FigureOptions
-from analysis.figures.paper.responses import responses, shade
-from analysis.similarity import LogarithmOf
-from sim.accuracy import Accuracy
-from sim.study.solve import solve_study
+from vibench.analysis.errors import InvalidRequest
+from vibench.analysis.figures.drawn import ImageKind
+from vibench.analysis.figures.paper.catalogue import PAPER_FIGURES
+from vibench.analysis.figures.paper.options import AMPLITUDES_M, FigureOptions
+from vibench.analysis.figures.paper.responses import responses, shade
+from vibench.analysis.similarity import LogarithmOf
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.study.solve import solve_study
 
 SHORT = FigureOptions(accuracy=Accuracy.QUICK, duration_s=1.5, window_s=0.5)
 """Long enough for the paper's peaks, far too short for its chaos."""

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.live.levels import HOLD_S, LevelMeters, LevelVerdict
+from vibench.analysis.live.levels import HOLD_S, LevelMeters, LevelVerdict
 
 RATE = 1000.0
 

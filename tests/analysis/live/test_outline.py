@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from analysis.live.envelope import envelope
-from analysis.live.outline import outline
+from vibench.analysis.live.envelope import envelope
+from vibench.analysis.live.outline import outline
 
 RATE_HZ, COLUMNS = 51_200.0, 1000
 

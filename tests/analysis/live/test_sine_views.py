@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from analysis.live.drive_tone import drive_tone, drive_turns
-from analysis.live.portrait import PoincareSection, portrait, portrait_samples
-from analysis.live.ring import Window
-from analysis.live.sine_response import SinePoint, look_samples, sine_point, stretch_samples
-from analysis.live.sweep_trace import SweepTrace
+from vibench.analysis.live.drive_tone import drive_tone, drive_turns
+from vibench.analysis.live.portrait import PoincareSection, portrait, portrait_samples
+from vibench.analysis.live.ring import Window
+from vibench.analysis.live.sine_response import SinePoint, look_samples, sine_point, stretch_samples
+from vibench.analysis.live.sweep_trace import SweepTrace
 
 RATE = 51_200.0
 A0 = 4e-6

@@ -7,11 +7,11 @@ from html.parser import HTMLParser
 
 import pytest
 
-from acquisition.recording import RecordingState
-from analysis.campaign_results import Simulation, analyse_files, recordings_in
-from analysis.errors import NotEnoughData
-from analysis.report.report import write_report
-from analysis.summary import campaign_summary, summary
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.analysis.campaign_results import Simulation, analyse_files, recordings_in
+from vibench.analysis.errors import NotEnoughData
+from vibench.analysis.report.report import write_report
+from vibench.analysis.summary import campaign_summary, summary
 
 VOID = {"meta", "img", "br", "link", "hr"}
 RATE = 6400.0

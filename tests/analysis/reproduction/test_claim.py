@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.errors import InvalidRequest
-from analysis.figures.paper.options import FigureOptions
-from analysis.reproduction.case import AS_CHOSEN, Case, compared_up_to, damping, logarithm, swept_at
-from analysis.reproduction.claim import Claim, Verdict, judged
-from analysis.reproduction.evidence import Evidence
-from analysis.reproduction.expectation import Expectation, about, at_least, at_most
-from analysis.similarity import LogarithmOf
+from vibench.analysis.errors import InvalidRequest
+from vibench.analysis.figures.paper.options import FigureOptions
+from vibench.analysis.reproduction.case import AS_CHOSEN, Case, compared_up_to, damping, logarithm, swept_at
+from vibench.analysis.reproduction.claim import Claim, Verdict, judged
+from vibench.analysis.reproduction.evidence import Evidence
+from vibench.analysis.reproduction.expectation import Expectation, about, at_least, at_most
+from vibench.analysis.similarity import LogarithmOf
 
 CASE = Case(AS_CHOSEN, FigureOptions())
 DAMPED, VERY_DAMPED = damping(3e-5), damping(5e-5)

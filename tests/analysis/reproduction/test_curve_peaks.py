@@ -3,8 +3,14 @@
 import numpy as np
 import pytest
 
-from analysis.reproduction.curve_peaks import bound_peaks, curve_peaks, linear_peaks, nearest, two_highest
-from sim.specimen import gong2025
+from vibench.analysis.reproduction.curve_peaks import (
+    bound_peaks,
+    curve_peaks,
+    linear_peaks,
+    nearest,
+    two_highest,
+)
+from vibench.sim.specimen import gong2025
 
 GRID = np.arange(5.0, 605.0, 5.0)
 

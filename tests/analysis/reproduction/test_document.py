@@ -5,16 +5,22 @@ from pathlib import Path
 
 import pytest
 
-from analysis.figures.paper.options import FigureOptions
-from analysis.reproduction.case import AS_CHOSEN, Case, damping
-from analysis.reproduction.catalogue import CLAIMS, SECTIONS
-from analysis.reproduction.claim import Claim, Verdict, judged
-from analysis.reproduction.dampings import SCORED_S
-from analysis.reproduction.document import HEAD, Picture, Reproduction, reproduction_document, wanted_text
-from analysis.reproduction.evidence import Evidence
-from analysis.reproduction.expectation import at_least
-from analysis.reproduction.page_tables import PageTable
-from analysis.reproduction.score import DampingScore
+from vibench.analysis.figures.paper.options import FigureOptions
+from vibench.analysis.reproduction.case import AS_CHOSEN, Case, damping
+from vibench.analysis.reproduction.catalogue import CLAIMS, SECTIONS
+from vibench.analysis.reproduction.claim import Claim, Verdict, judged
+from vibench.analysis.reproduction.dampings import SCORED_S
+from vibench.analysis.reproduction.document import (
+    HEAD,
+    Picture,
+    Reproduction,
+    reproduction_document,
+    wanted_text,
+)
+from vibench.analysis.reproduction.evidence import Evidence
+from vibench.analysis.reproduction.expectation import at_least
+from vibench.analysis.reproduction.page_tables import PageTable
+from vibench.analysis.reproduction.score import DampingScore
 
 PAGE = Path(__file__).parents[3] / "docs" / "reproduction.md"
 CASE = Case(AS_CHOSEN, FigureOptions())

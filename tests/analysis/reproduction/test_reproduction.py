@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.figures.damping_score import damping_score_figure
-from analysis.figures.paper.options import FigureOptions
-from analysis.reproduction.case import AS_CHOSEN, Case
-from analysis.reproduction.catalogue import CLAIMS, SECTIONS
-from analysis.reproduction.claim import found
-from analysis.reproduction.dampings import SCORED_S
-from analysis.reproduction.document import reproduction_document
-from analysis.reproduction.evidence import Evidence
-from analysis.reproduction.page_tables import regions, regions_table
-from analysis.reproduction.reproduce import reproduction
-from analysis.reproduction.score import scores
-from sim.accuracy import Accuracy
-from sim.study.solve import solve_study
+from vibench.analysis.figures.damping_score import damping_score_figure
+from vibench.analysis.figures.paper.options import FigureOptions
+from vibench.analysis.reproduction.case import AS_CHOSEN, Case
+from vibench.analysis.reproduction.catalogue import CLAIMS, SECTIONS
+from vibench.analysis.reproduction.claim import found
+from vibench.analysis.reproduction.dampings import SCORED_S
+from vibench.analysis.reproduction.document import reproduction_document
+from vibench.analysis.reproduction.evidence import Evidence
+from vibench.analysis.reproduction.page_tables import regions, regions_table
+from vibench.analysis.reproduction.reproduce import reproduction
+from vibench.analysis.reproduction.score import scores
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.study.solve import solve_study
 
 SHORT = FigureOptions(accuracy=Accuracy.QUICK, duration_s=0.6, window_s=0.25, highest_hz=355.0)
 LINEAR_KEYS = ("linear-resonances", "bound-resonances", "fits")

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from analysis.simulation.accuracy_cost import MEASURED, cost_sentences
-from analysis.simulation.answers import SimulatedPoint, Trouble
-from analysis.simulation.course import SimulationCourse
-from analysis.simulation.growing import simulate
-from analysis.simulation.request import SimulationRequest
-from analysis.simulation.worker import Begin, Cancel, Ended, Grown, serve
-from sim.accuracy import Accuracy
-from sim.modes import base_transmissibility
-from sim.specimen import gong2025
+from vibench.analysis.simulation.accuracy_cost import MEASURED, cost_sentences
+from vibench.analysis.simulation.answers import SimulatedPoint, Trouble
+from vibench.analysis.simulation.course import SimulationCourse
+from vibench.analysis.simulation.growing import simulate
+from vibench.analysis.simulation.request import SimulationRequest
+from vibench.analysis.simulation.worker import Begin, Cancel, Ended, Grown, serve
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.modes import base_transmissibility
+from vibench.sim.specimen import gong2025
 
 LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "step_hz": 50.0, "start_hz": 50.0}
 

@@ -6,10 +6,10 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel
 
-from acquisition.excitation.kinds import KINDS
-from acquisition.plan.campaign import load_campaign
-from acquisition.plan.measurement import Measurement
-from gui.forms.model_form import ModelForm
+from vibench.acquisition.excitation.kinds import KINDS
+from vibench.acquisition.plan.campaign import load_campaign
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.gui.forms.model_form import ModelForm
 
 CAMPAIGNS = Path(__file__).resolve().parents[3] / "campaigns"
 MEASUREMENTS = {

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.errors import ConfigurationError
-from gui.forms.quantity_text import parsed_quantity, quantity_text
+from vibench.acquisition.errors import ConfigurationError
+from vibench.gui.forms.quantity_text import parsed_quantity, quantity_text
 
 
 @pytest.mark.parametrize(

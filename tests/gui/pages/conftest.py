@@ -6,19 +6,15 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QEventLoop, QTimer
 
-from acquisition.excitation.dwell import Dwell
-from acquisition.excitation.streamed_noise import StreamedNoise
-from acquisition.instruments import Block, Overload
-from acquisition.plan.measurement import Measurement
-from acquisition.recording import (
-    ChannelHeader,
-    Origin,
-    RecordingHeader,
-    RecordingState,
-    create_recording,
-)
-from gui.desk import Desk
-from gui.settings import Settings
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.instruments import Block, Overload
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
+from vibench.acquisition.recording.layout import Origin, RecordingState
+from vibench.acquisition.recording.writer import create_recording
+from vibench.gui.desk import Desk
+from vibench.gui.settings import Settings
 
 RATE_HZ = 6400.0
 SAMPLES = 64_000

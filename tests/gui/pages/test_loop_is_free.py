@@ -9,23 +9,25 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QTimer
 
-from acquisition.excitation.stepped_sine import SteppedSine
-from acquisition.instruments import Block, Overload
-from acquisition.plan.axis import Range
-from acquisition.plan.measurement import Measurement
-from acquisition.plan.sweep import Axis
-from acquisition.recording import ChannelHeader, RecordingHeader, RecordingState, create_recording
-from acquisition.recording import Origin as RecordingOrigin
-from acquisition.shipped import shipped
-from analysis.comparison.trace import Origin, Response, Trace
-from analysis.live.view import LiveChannel, LiveView
-from analysis.simulation.answers import SimulatedPoint, SimulatedSignal
-from analysis.simulation.course import SimulationCourse
-from gui.live_run import warm_up
-from gui.page_names import COMPARE, FILES, QUEUE, RUN, SIMULATE, TEST
-from gui.pages.queue.draft import with_sweep
-from gui.screenshots import SHOWN, SHOWN_TOO
-from gui.theme import DARK, LIGHT
+from vibench.acquisition.excitation.stepped_sine import SteppedSine
+from vibench.acquisition.instruments import Block, Overload
+from vibench.acquisition.plan.axis import Range
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.plan.sweep import Axis
+from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
+from vibench.acquisition.recording.layout import Origin as RecordingOrigin
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition.shipped import shipped
+from vibench.analysis.comparison.trace import Origin, Response, Trace
+from vibench.analysis.live.view import LiveChannel, LiveView
+from vibench.analysis.simulation.answers import SimulatedPoint, SimulatedSignal
+from vibench.analysis.simulation.course import SimulationCourse
+from vibench.gui.live_run import warm_up
+from vibench.gui.page_names import COMPARE, FILES, QUEUE, RUN, SIMULATE, TEST
+from vibench.gui.pages.queue.draft import with_sweep
+from vibench.gui.screenshots import SHOWN, SHOWN_TOO
+from vibench.gui.theme import DARK, LIGHT
 
 RATE_HZ, LONG_S, STEPS = 51_200.0, 20.0, 200
 LONG_CHANNELS = (

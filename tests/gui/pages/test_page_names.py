@@ -13,9 +13,9 @@ from PySide6.QtWidgets import (
     QTabWidget,
 )
 
-from gui.pages.compare.compare_page import ComparePage
-from gui.pages.files.files_page import FilesPage
-from gui.pages.simulate.simulate_page import SimulatePage
+from vibench.gui.pages.compare.compare_page import ComparePage
+from vibench.gui.pages.files.files_page import FilesPage
+from vibench.gui.pages.simulate.simulate_page import SimulatePage
 
 PAGES = (FilesPage, ComparePage, SimulatePage)
 MENU_KEYS = "ftvh"

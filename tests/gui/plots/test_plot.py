@@ -3,10 +3,10 @@
 import pytest
 from PySide6.QtGui import QColor
 
-from gui.plots.axis import LOG_FREQUENCY, TIME, Axis, thinned
-from gui.plots.ink import trace
-from gui.plots.plot import Plot
-from gui.theme import LIGHT
+from vibench.gui.plots.axis import LOG_FREQUENCY, TIME, Axis, thinned
+from vibench.gui.plots.ink import trace
+from vibench.gui.plots.plot import Plot
+from vibench.gui.theme import LIGHT
 
 
 @pytest.fixture

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from gui.plots.axis import TIME, Axis
-from gui.plots.ink import trace
-from gui.plots.plot import Plot
-from gui.plots.signal_curve import SignalCurve
-from gui.theme import LIGHT
+from vibench.gui.plots.axis import TIME, Axis
+from vibench.gui.plots.ink import trace
+from vibench.gui.plots.plot import Plot
+from vibench.gui.plots.signal_curve import SignalCurve
+from vibench.gui.theme import LIGHT
 
 RATE_HZ = 51200.0
 

@@ -1,10 +1,10 @@
 import pytest
 
-from sim.answer.plan import plan_scene
-from sim.drive import Harmonic
-from sim.prediction import Method
-from sim.scene import AutomaticDuration, FixedDuration, Given, Observable, Scene
-from sim.specimen import gong2025
+from vibench.sim.answer.plan import plan_scene
+from vibench.sim.drive import Harmonic
+from vibench.sim.prediction import Method
+from vibench.sim.scene import AutomaticDuration, FixedDuration, Given, Observable, Scene
+from vibench.sim.specimen import gong2025
 
 QUIET, LOUD = Harmonic(200.0, 1e-6), Harmonic(260.0, 5e-6)
 

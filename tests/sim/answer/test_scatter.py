@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from sim.answer.scatter import bootstrap_of_largest, response_ensemble, window_scatter
-from sim.drive import Harmonic
-from sim.specimen import gong2025
+from vibench.sim.answer.scatter import bootstrap_of_largest, response_ensemble, window_scatter
+from vibench.sim.drive import Harmonic
+from vibench.sim.specimen import gong2025
 
 
 def test_it_is_the_bootstrap_of_the_largest_in_closed_form():

@@ -3,15 +3,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.accuracy import Accuracy
-from sim.answer.solve import solve_scene
-from sim.drive import Harmonic
-from sim.modes import base_transmissibility, modal_form
-from sim.outcome import Outcome
-from sim.prediction import Method, MotionKind
-from sim.response import steady_response
-from sim.scene import AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.answer.solve import solve_scene
+from vibench.sim.drive import Harmonic
+from vibench.sim.modes import base_transmissibility, modal_form
+from vibench.sim.outcome import Outcome
+from vibench.sim.prediction import Method, MotionKind
+from vibench.sim.response import steady_response
+from vibench.sim.scene import AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
+from vibench.sim.specimen import gong2025
 
 RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
 PERIODIC = [

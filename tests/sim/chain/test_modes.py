@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.chain.chain import Chain, chain_of
-from sim.chain.dispersion import band_frequencies_hz, band_gaps, bloch_factor
-from sim.chain.modes import chain_modal_form, chain_state_matrix, chain_transmissibility
-from sim.modes import base_transmissibility
-from sim.specimen import gong2025
+from vibench.sim.chain.chain import Chain, chain_of
+from vibench.sim.chain.dispersion import band_frequencies_hz, band_gaps, bloch_factor
+from vibench.sim.chain.modes import chain_modal_form, chain_state_matrix, chain_transmissibility
+from vibench.sim.modes import base_transmissibility
+from vibench.sim.specimen import gong2025
 
 OVERDAMPED = gong2025(damping_time_s=1e-2)
 UNEVEN = replace(gong2025(), dampings=(0.5, 0.0, 0.9))

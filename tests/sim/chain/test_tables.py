@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from sim.accuracy import Accuracy
-from sim.chain.chain import chain_of
-from sim.chain.modes import chain_impulses, chain_state_matrix
-from sim.chain.tables import CROSS_SHARE, chain_tables, cross_answers, markov_between
-from sim.drive import Harmonic
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.chain.chain import chain_of
+from vibench.sim.chain.modes import chain_impulses, chain_state_matrix
+from vibench.sim.chain.tables import CROSS_SHARE, chain_tables, cross_answers, markov_between
+from vibench.sim.drive import Harmonic
+from vibench.sim.specimen import gong2025
 
 DRIVE = Harmonic(220.0, 40e-6)
 

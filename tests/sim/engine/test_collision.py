@@ -5,16 +5,23 @@ import math
 import numpy as np
 import pytest
 
-from sim.accuracy import Accuracy
-from sim.answer.followed_run import FollowedRun, Samples, Watch
-from sim.drive import Harmonic
-from sim.engine.clock import clock_at
-from sim.engine.collision import collide, new_collision
-from sim.engine.collision_tables import DEPTHS, DURATION, HALF_FORCE, SOFTEST, SPACING, collision_tables
-from sim.engine.contact import begin_contact
-from sim.engine.harmonic_tables import harmonic_tables
-from sim.engine.interval import new_state
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.answer.followed_run import FollowedRun, Samples, Watch
+from vibench.sim.drive import Harmonic
+from vibench.sim.engine.clock import clock_at
+from vibench.sim.engine.collision import collide, new_collision
+from vibench.sim.engine.collision_tables import (
+    DEPTHS,
+    DURATION,
+    HALF_FORCE,
+    SOFTEST,
+    SPACING,
+    collision_tables,
+)
+from vibench.sim.engine.contact import begin_contact
+from vibench.sim.engine.harmonic_tables import harmonic_tables
+from vibench.sim.engine.interval import new_state
+from vibench.sim.specimen import gong2025
 
 DRIVE = Harmonic(130.0, 20e-6)
 GAP = 45e-6

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.engine.detection import NEVER, SERIES_TERMS, first_contact
+from vibench.sim.engine.detection import NEVER, SERIES_TERMS, first_contact
 
 GAP = 45e-6
 LENGTH = 4e-5

@@ -7,11 +7,12 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
-from sim.accuracy import Accuracy
-from sim.compiled import compiled
-from sim.engine.interval import FAILED, advance_interval, base_reaction, interval_tables, new_state
-from sim.modes import state_matrix
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.compiled import compiled
+from vibench.sim.engine.interval import advance_interval, base_reaction, interval_tables, new_state
+from vibench.sim.engine.piece import FAILED
+from vibench.sim.modes import state_matrix
+from vibench.sim.specimen import gong2025
 
 
 @compiled

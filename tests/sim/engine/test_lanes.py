@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sim.compiled import compiled
-from sim.engine.lanes import (
+from vibench.sim.compiled import compiled
+from vibench.sim.engine.lanes import (
     eight,
     eight_of_eight,
     eight_of_sixteen,

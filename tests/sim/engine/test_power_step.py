@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from sim.accuracy import Accuracy
-from sim.answer.followed_run import FollowedRun, Watch
-from sim.contact_law import PowerLaw
-from sim.drive import Harmonic
-from sim.engine.harmonic_tables import harmonic_tables
-from sim.engine.linear_series import WIDE, P
-from sim.engine.power_numbers import FEED, FREE, GAIN, INNER, MOVE
-from sim.engine.power_tables import POINTS_AT
-from sim.integrate import integrate
-from sim.modes import state_matrix
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.answer.followed_run import FollowedRun, Watch
+from vibench.sim.contact_law import PowerLaw
+from vibench.sim.drive import Harmonic
+from vibench.sim.engine.harmonic_tables import harmonic_tables
+from vibench.sim.engine.linear_series import WIDE, P
+from vibench.sim.engine.power_numbers import FEED, FREE, GAIN, INNER, MOVE
+from vibench.sim.engine.power_tables import POINTS_AT
+from vibench.sim.integrate import integrate
+from vibench.sim.modes import state_matrix
+from vibench.sim.specimen import gong2025
 
 DRIVE = Harmonic(130.0, 20e-6)
 LAW = "power:3+5+7"

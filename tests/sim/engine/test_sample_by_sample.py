@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from sim.accuracy import Accuracy
-from sim.drive import Sampled
-from sim.engine.sample_by_sample import follow_samples
-from sim.integrate import integrate
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.drive import Sampled
+from vibench.sim.engine.sample_by_sample import follow_samples
+from vibench.sim.integrate import integrate
+from vibench.sim.specimen import gong2025
 
 RATE_HZ = 51_200.0
 

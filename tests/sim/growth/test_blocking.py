@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.growth.blocking import blocked_mean
+from vibench.sim.growth.blocking import blocked_mean
 
 
 def autoregression(memory, count, seed):

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.accuracy import Accuracy
-from sim.drive import Harmonic
-from sim.growth.lyapunov_spectrum import kaplan_yorke, lyapunov_spectrum
-from sim.growth.tangent_run import interval_for, run_with_tangent
-from sim.lyapunov import Source, Tendency, largest_exponent
-from sim.modes import state_matrix
-from sim.outcome import Outcome
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.drive import Harmonic
+from vibench.sim.growth.lyapunov_spectrum import kaplan_yorke, lyapunov_spectrum
+from vibench.sim.growth.tangent_run import interval_for, run_with_tangent
+from vibench.sim.lyapunov import Source, Tendency, largest_exponent
+from vibench.sim.modes import state_matrix
+from vibench.sim.outcome import Outcome
+from vibench.sim.specimen import gong2025
 
 CHAOS = Harmonic(260.0, 5e-6)
 LARGE = Harmonic(430.0, 50e-6)

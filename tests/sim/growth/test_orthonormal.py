@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.growth.orthonormal import orthonormal_rows, orthonormalise
+from vibench.sim.growth.orthonormal import orthonormal_rows, orthonormalise
 
 METRIC = np.array([[4.0, 1.0, 0.0], [1.0, 3.0, 0.5], [0.0, 0.5, 100.0]])
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from sim.accuracy import Accuracy
-from sim.drive import Harmonic
-from sim.growth.settling import FinalMotion, settling
-from sim.growth.tangent_run import Interval, TangentRun
-from sim.lyapunov import Source, Tendency, largest_exponent
-from sim.outcome import Outcome
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.drive import Harmonic
+from vibench.sim.growth.settling import FinalMotion, settling
+from vibench.sim.growth.tangent_run import Interval, TangentRun
+from vibench.sim.lyapunov import Source, Tendency, largest_exponent
+from vibench.sim.outcome import Outcome
+from vibench.sim.specimen import gong2025
 
 COUNT = 400
 CHAOTIC_SECTION = np.random.default_rng(5).standard_normal((COUNT, 6))

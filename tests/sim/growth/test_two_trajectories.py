@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from sim.accuracy import Accuracy
-from sim.drive import Harmonic
-from sim.growth.tangent_run import interval_for, run_with_tangent
-from sim.growth.two_trajectories import two_trajectory_exponent
-from sim.lyapunov import largest_exponent
-from sim.outcome import Outcome
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.drive import Harmonic
+from vibench.sim.growth.tangent_run import interval_for, run_with_tangent
+from vibench.sim.growth.two_trajectories import two_trajectory_exponent
+from vibench.sim.lyapunov import largest_exponent
+from vibench.sim.outcome import Outcome
+from vibench.sim.specimen import gong2025
 
 CHAOS = Harmonic(260.0, 5e-6)
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sim.periodic.balance_branch import balance_branch, raised_balance
-from sim.periodic.balance_solver import BalanceOptions, balance
-from sim.periodic.branch import Happening, Parameter
-from sim.periodic.condensation import Structure, structure_of
-from sim.periodic.continuation import ArcEnd, ArcSteps
-from sim.periodic.first_order_balance import jump_frequencies
-from sim.periodic.harmonic_balance import BalanceEnd, HarmonicSet
-from sim.periodic.restoring_force import GapSpring, NoForce, PowerSpring, spring_of
-from sim.specimen import gong2025
+from vibench.sim.periodic.balance_branch import balance_branch, raised_balance
+from vibench.sim.periodic.balance_solver import BalanceOptions, balance
+from vibench.sim.periodic.branch import Happening, Parameter
+from vibench.sim.periodic.condensation import Structure, structure_of
+from vibench.sim.periodic.continuation import ArcEnd, ArcSteps
+from vibench.sim.periodic.first_order_balance import jump_frequencies
+from vibench.sim.periodic.harmonic_balance import BalanceEnd, HarmonicSet
+from vibench.sim.periodic.restoring_force import GapSpring, NoForce, PowerSpring, spring_of
+from vibench.sim.specimen import gong2025
 
 ONE = np.array([[1.0]])
 

@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sim.accuracy import Accuracy
-from sim.drive import Harmonic
-from sim.integrate import integrate
-from sim.periodic.balance_solver import BalanceOptions, Guess, balance
-from sim.periodic.condensation import Structure, structure_of
-from sim.periodic.floquet import Motion, crossings, multipliers, transition
-from sim.periodic.frequency_time import phasors_of
-from sim.periodic.restoring_force import GapSpring, NoForce, PowerSpring, spring_of
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.drive import Harmonic
+from vibench.sim.integrate import integrate
+from vibench.sim.periodic.balance_solver import BalanceOptions, Guess, balance
+from vibench.sim.periodic.condensation import Structure, structure_of
+from vibench.sim.periodic.floquet import Motion, crossings, multipliers, transition
+from vibench.sim.periodic.frequency_time import phasors_of
+from vibench.sim.periodic.restoring_force import GapSpring, NoForce, PowerSpring, spring_of
+from vibench.sim.specimen import gong2025
 
 ONE = np.array([[1.0]])
 

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from sim.drive import Harmonic
-from sim.integrate import integrate
-from sim.modes import base_transmissibility
-from sim.periodic.period_map import OrbitShape, PeriodMap
-from sim.periodic.poincare import state_scales
-from sim.specimen import gong2025
+from vibench.sim.drive import Harmonic
+from vibench.sim.integrate import integrate
+from vibench.sim.modes import base_transmissibility
+from vibench.sim.periodic.period_map import OrbitShape, PeriodMap
+from vibench.sim.periodic.poincare import state_scales
+from vibench.sim.specimen import gong2025
 
 DRIVE = Harmonic(130.0, 20e-6)
 OFFSETS, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, -1.0 / 12.0)

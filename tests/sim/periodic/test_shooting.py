@@ -3,14 +3,14 @@ import math
 import numpy as np
 import pytest
 
-from sim.accuracy import Accuracy
-from sim.drive import Harmonic
-from sim.integrate import integrate
-from sim.modes import base_transmissibility
-from sim.periodic.period_map import OrbitShape, PeriodMap
-from sim.periodic.poincare import smallest_period, state_scales, stroboscopic_section
-from sim.periodic.shooting import ShootingEnd, periodic_orbit
-from sim.specimen import gong2025
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.drive import Harmonic
+from vibench.sim.integrate import integrate
+from vibench.sim.modes import base_transmissibility
+from vibench.sim.periodic.period_map import OrbitShape, PeriodMap
+from vibench.sim.periodic.poincare import smallest_period, state_scales, stroboscopic_section
+from vibench.sim.periodic.shooting import ShootingEnd, periodic_orbit
+from vibench.sim.specimen import gong2025
 
 SPECIMEN = gong2025(damping_time_s=3e-5)
 TRACE = 390.081

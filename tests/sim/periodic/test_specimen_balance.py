@@ -1,11 +1,11 @@
 import pytest
 
-from sim.drive import Harmonic
-from sim.periodic.balance_solver import BalanceOptions
-from sim.periodic.harmonic_balance import BalanceEnd
-from sim.periodic.specimen_balance import balance_specimen
-from sim.response import steady_response
-from sim.specimen import gong2025
+from vibench.sim.drive import Harmonic
+from vibench.sim.periodic.balance_solver import BalanceOptions
+from vibench.sim.periodic.harmonic_balance import BalanceEnd
+from vibench.sim.periodic.specimen_balance import balance_specimen
+from vibench.sim.response import steady_response
+from vibench.sim.specimen import gong2025
 
 SPECIMEN = gong2025(damping_time_s=3e-5)
 

@@ -4,9 +4,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.study.agenda import NOBODY, Agenda
-from sim.study.costs import Costs
-from sim.study.grid import Grid
+from vibench.sim.study.agenda import NOBODY, Agenda
+from vibench.sim.study.costs import Costs
+from vibench.sim.study.grid import Grid
 
 
 def agenda_of(planned_s, after=None, is_done=None):

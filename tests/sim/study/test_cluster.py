@@ -13,19 +13,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import sim
-from sim.study.columns import SESSION
-from sim.study.errors import ClusterLost
-from sim.study.layout import STATE, PointState
-from sim.study.results import open_study, results_of
-from sim.study.run import StudyEnd, run_study
-from sim.study.solve import Existing, solve_study
-from sim.study.store import FileStore, MemoryStore
-from sim.study.study import Study
+import vibench.sim
+from vibench.sim.study.columns import SESSION
+from vibench.sim.study.errors import ClusterLost
+from vibench.sim.study.layout import STATE, PointState
+from vibench.sim.study.results import open_study, results_of
+from vibench.sim.study.run import StudyEnd, run_study
+from vibench.sim.study.solve import Existing, solve_study
+from vibench.sim.study.store import FileStore, MemoryStore
+from vibench.sim.study.study import Study
 
 pytest.importorskip("distributed", reason="a cluster needs the extra 'cluster'")
 
-from sim.study.cluster import ClusterExecutor
+from vibench.sim.study.cluster import ClusterExecutor
 
 START_PATIENCE_S = 60.0
 SHORT_S = 3.0
@@ -150,11 +150,11 @@ def test_errors_on_workers_and_cancelling_are_as_with_threads(cluster, longer):
 
 
 def test_a_worker_with_other_software_is_refused_before_it_computes(tmp_path):
-    package = tmp_path / "other" / "sim"
-    shutil.copytree(Path(sim.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+    package = tmp_path / "other" / "vibench" / "sim"
+    shutil.copytree(Path(vibench.sim.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
     with (package / "contact.py").open("a") as source:
         source.write("\n# a better contact\n")
-    environment = {**os.environ, "PYTHONPATH": str(package.parent)}
+    environment = {**os.environ, "PYTHONPATH": str(package.parents[1])}
     with (
         scheduler(tmp_path) as (_, address),
         worker(address, tmp_path, environment),

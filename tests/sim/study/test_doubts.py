@@ -2,8 +2,8 @@
 
 import pytest
 
-from sim.study.doubts import doubts
-from sim.study.study import Study
+from vibench.sim.study.doubts import doubts
+from vibench.sim.study.study import Study
 
 
 def study(amplitudes_m, gaps_m=(45e-6,)):

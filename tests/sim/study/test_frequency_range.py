@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.study.frequency_range import frequency_range, listed
+from vibench.sim.study.frequency_range import frequency_range, listed
 
 
 def test_a_range_includes_its_stop_when_it_is_hit():

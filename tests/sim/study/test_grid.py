@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.study.grid import Grid
+from vibench.sim.study.grid import Grid
 
 axes = st.lists(st.tuples(st.integers(1, 4), st.booleans()), min_size=1, max_size=4)
 

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.answer.solve import solve_scene
-from sim.study.columns import SESSION
-from sim.study.layout import STATE, PointState
-from sim.study.results import open_study
-from sim.study.run import StudyEnd, run_study
-from sim.study.solve import solve_study
-from sim.study.store import FileStore
-from sim.study.threads import ThreadExecutor
+from vibench.sim.answer.solve import solve_scene
+from vibench.sim.study.columns import SESSION
+from vibench.sim.study.layout import STATE, PointState
+from vibench.sim.study.results import open_study
+from vibench.sim.study.run import StudyEnd, run_study
+from vibench.sim.study.solve import solve_study
+from vibench.sim.study.store import FileStore
+from vibench.sim.study.threads import ThreadExecutor
 
 CHILD = Path(__file__).with_name("study_child.py")
 SPEC = importlib.util.spec_from_file_location("study_child", CHILD)

@@ -8,22 +8,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.answer.solve import solve_scene
-from sim.drive import Harmonic
-from sim.outcome import Outcome
-from sim.scene import FixedDuration, Given, Rest, Scene
-from sim.specimen import gong2025
-from sim.study.columns import CONTINUES, PHASE
-from sim.study.errors import InvalidStudy
-from sim.study.executor import Reply
-from sim.study.layout import PointState
-from sim.study.results import results_of
-from sim.study.run import StudyEnd, run_study
-from sim.study.solve import solve_study
-from sim.study.store import MemoryStore
-from sim.study.study import GivenStart, Study
-from sim.study.threads import ThreadExecutor
-from sim.study.timing import solve_timed
+from vibench.sim.answer.solve import solve_scene
+from vibench.sim.drive import Harmonic
+from vibench.sim.outcome import Outcome
+from vibench.sim.scene import FixedDuration, Given, Rest, Scene
+from vibench.sim.specimen import gong2025
+from vibench.sim.study.columns import CONTINUES, PHASE
+from vibench.sim.study.errors import InvalidStudy
+from vibench.sim.study.executor import Reply
+from vibench.sim.study.layout import PointState
+from vibench.sim.study.results import results_of
+from vibench.sim.study.run import StudyEnd, run_study
+from vibench.sim.study.solve import solve_study
+from vibench.sim.study.store import MemoryStore
+from vibench.sim.study.study import GivenStart, Study
+from vibench.sim.study.threads import ThreadExecutor
+from vibench.sim.study.timing import solve_timed
 
 
 class UnreliableExecutor:

@@ -1,10 +1,10 @@
 from dataclasses import replace
 
-from sim.accuracy import Accuracy
-from sim.drive import Harmonic
-from sim.scene import AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
-from sim.specimen import gong2025
-from sim.study.scene_identity import scene_identity
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.drive import Harmonic
+from vibench.sim.scene import AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
+from vibench.sim.specimen import gong2025
+from vibench.sim.study.scene_identity import scene_identity
 
 SCENE = Scene(
     gong2025(), Harmonic(260.0, 5e-6), (Observable.RESPONSE,), Accuracy.STANDARD, FixedDuration(), Rest()

@@ -8,21 +8,21 @@ import h5py
 import numpy as np
 import pytest
 
-from sim.answer.solve import solve_scene
-from sim.prediction import Prediction
-from sim.scene import Rest
-from sim.study.columns import COLUMNS, IDENTITY, NUMBERS, SESSION
-from sim.study.disk import SoleWriter
-from sim.study.errors import StudyError
-from sim.study.file_making import make_file
-from sim.study.layout import STATE, PointState
-from sim.study.results import open_study, results_of
-from sim.study.run import StudyEnd, run_study
-from sim.study.scene_identity import scene_identity
-from sim.study.solve import Existing, solve_study
-from sim.study.store import FileStore, MemoryStore
-from sim.study.study import Study
-from sim.study.threads import ThreadExecutor
+from vibench.sim.answer.solve import solve_scene
+from vibench.sim.prediction import Prediction
+from vibench.sim.scene import Rest
+from vibench.sim.study.columns import COLUMNS, IDENTITY, NUMBERS, SESSION
+from vibench.sim.study.disk import SoleWriter
+from vibench.sim.study.errors import StudyError
+from vibench.sim.study.file_making import make_file
+from vibench.sim.study.layout import STATE, PointState
+from vibench.sim.study.results import open_study, results_of
+from vibench.sim.study.run import StudyEnd, run_study
+from vibench.sim.study.scene_identity import scene_identity
+from vibench.sim.study.solve import Existing, solve_study
+from vibench.sim.study.store import FileStore, MemoryStore
+from vibench.sim.study.study import Study
+from vibench.sim.study.threads import ThreadExecutor
 
 
 @pytest.fixture(scope="module")

@@ -1,9 +1,9 @@
 import pytest
 from pydantic import ValidationError
 
-from sim.specimen import gong2025
-from sim.study.axes import FREQUENCY
-from sim.study.study import GivenStart, Start, Study
+from vibench.sim.specimen import gong2025
+from vibench.sim.study.axes import FREQUENCY
+from vibench.sim.study.study import GivenStart, Start, Study
 
 LEAST = {"frequencies_hz": [100.0, 200.0], "amplitudes_m": [1e-6]}
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from sim.accuracy import Accuracy
-from sim.trade.figures import LevelFigures, MotionTrade
-from sim.trade.regimes import Motion, Regime
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.trade.figures import LevelFigures, MotionTrade
+from vibench.sim.trade.regimes import Motion, Regime
 
 
 def trade(*state_errors, regime=Regime.PERIODIC):

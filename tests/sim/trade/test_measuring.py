@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from sim.accuracy import Accuracy
-from sim.independent_solution import independent_state
-from sim.integrate import integrate
-from sim.modes import modal_form
-from sim.trade.measuring import SOLVERS, Thoroughness, measured_motion, settled_state, state_error
-from sim.trade.regimes import MOTIONS, Motion, Regime
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.independent_solution import independent_state, state_error
+from vibench.sim.integrate import integrate
+from vibench.sim.modes import modal_form
+from vibench.sim.trade.measuring import SOLVERS, Thoroughness, measured_motion, settled_state
+from vibench.sim.trade.regimes import MOTIONS, Motion, Regime
 
 SHORT = Thoroughness(span_s=0.05, solver_span_s=0.01)
 

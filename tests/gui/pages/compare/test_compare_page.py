@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
-from analysis.comparison.trace import Origin, Response, Trace
-from gui.pages.compare.compare_page import ComparePage
-from gui.theme import DARK
+from vibench.analysis.comparison.trace import Origin, Response, Trace
+from vibench.gui.pages.compare.compare_page import ComparePage
+from vibench.gui.theme import DARK
 
 
 def mode(source, scale=1.0, low_hz=50.0, high_hz=600.0):

@@ -7,22 +7,22 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
-from acquisition.campaign.bench_identity import BenchIdentity
-from acquisition.campaign.journal import Journal, journal_path
-from acquisition.campaign.journal_point import PointState
-from acquisition.campaign.why import Why
-from acquisition.excitation.dwell import Dwell
-from acquisition.plan.campaign import Campaign
-from acquisition.plan.measurement import Measurement
-from acquisition.recording import RecordingState
-from acquisition.rig.configuration import Rig
-from acquisition.shipped import shipped
-from acquisition.toml_file import load_toml
-from analysis.thumbnail import thumbnail
-from gui.pages.files.files_page import FilesPage
-from gui.pages.files.listing import made_levels
-from gui.pages.files.recording_table import HEADINGS
-from gui.theme import DARK
+from vibench.acquisition.campaign.bench_identity import BenchIdentity
+from vibench.acquisition.campaign.journal import Journal, journal_path
+from vibench.acquisition.campaign.journal_point import PointState
+from vibench.acquisition.campaign.why import Why
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.plan.campaign import Campaign
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.rig.configuration import Rig
+from vibench.acquisition.shipped import shipped
+from vibench.acquisition.toml_file import load_toml
+from vibench.analysis.thumbnail import thumbnail
+from vibench.gui.pages.files.files_page import FilesPage
+from vibench.gui.pages.files.listing import made_levels
+from vibench.gui.pages.files.recording_table import HEADINGS
+from vibench.gui.theme import DARK
 
 IMPACT_S = 40_002 / 6400.0
 

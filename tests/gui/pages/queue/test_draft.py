@@ -2,13 +2,13 @@
 
 import pytest
 
-from acquisition.errors import ConfigurationError
-from acquisition.plan.axis import Range
-from acquisition.plan.campaign import load_campaign
-from acquisition.plan.measurement import Measurement
-from acquisition.plan.sweep import Axis
-from acquisition.toml_text import save_toml
-from gui.pages.queue.draft import moved_up, with_measurement, with_sweep, without
+from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition.plan.axis import Range
+from vibench.acquisition.plan.campaign import load_campaign
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.plan.sweep import Axis
+from vibench.acquisition.toml_text import save_toml
+from vibench.gui.pages.queue.draft import moved_up, with_measurement, with_sweep, without
 
 DWELL = Measurement.model_validate(
     {

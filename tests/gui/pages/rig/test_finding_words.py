@@ -2,8 +2,8 @@
 
 import pytest
 
-from acquisition.check.finding import Finding, Verdict
-from gui.pages.rig.finding_words import expected_text, finding_name, measured_text
+from vibench.acquisition.check.finding import Finding, Verdict
+from vibench.gui.pages.rig.finding_words import expected_text, finding_name, measured_text
 
 
 def finding(number, unit, value="as the check says", uncertainty=None, advice=""):

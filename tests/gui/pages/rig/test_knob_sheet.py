@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from acquisition.rig.configuration import load_rig
-from gui.pages.rig.knob_sheet import KnobSheetForm
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.gui.pages.rig.knob_sheet import KnobSheetForm
 
 CONFIGS = Path(__file__).resolve().parents[4] / "hardware_configs"
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from analysis.simulation.accuracy_cost import MEASURED
-from analysis.simulation.answers import SimulatedPoint, SimulatedSignal, Trouble
-from analysis.simulation.request import SimulationRequest
-from gui.pages.simulate.simulate_page import SimulatePage
-from gui.theme import DARK
-from sim.accuracy import Accuracy
+from vibench.analysis.simulation.accuracy_cost import MEASURED
+from vibench.analysis.simulation.answers import SimulatedPoint, SimulatedSignal, Trouble
+from vibench.analysis.simulation.request import SimulationRequest
+from vibench.gui.pages.simulate.simulate_page import SimulatePage
+from vibench.gui.theme import DARK
+from vibench.sim.accuracy import Accuracy
 
 LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "start_hz": 50.0, "step_hz": 10.0}
 

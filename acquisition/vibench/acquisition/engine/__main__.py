@@ -1,0 +1,83 @@
+"""``python -m vibench.acquisition.engine``: an engine's process. Its first line of output says where to ask
+it.
+"""
+
+import argparse
+import os
+import signal
+import sys
+from threading import Event, Thread
+from types import FrameType
+
+from ..run.stop import Cause
+from .desk import Desk
+from .engine import Engine
+from .hosted import hosted
+from .server import LOOPBACK, spoken
+from .state import Attendance
+from .work import Work
+
+FORGOTTEN_S = 60.0
+"""An unattended engine that was never used waits this long for somebody to ask [s]."""
+
+
+def main() -> None:
+    """Serve until told to end, by a request, a signal, or the end of the one that started it."""
+    options = _options()
+    engine = Engine(options.attendance)
+    work = Work(engine)
+    desk = Desk(engine, work)
+    _heed_signals(desk)
+    with hosted(desk, options.what, options.host) as server:
+        print(spoken(server.address), flush=True)  # noqa: T201 - this line is the handshake
+        if options.attendance is Attendance.ATTENDED:
+            Thread(target=_follow_parent, args=(desk,), name="engine parent", daemon=True).start()
+        else:
+            _end_when_forgotten(desk, options.forgotten_s)
+        work.run()
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m vibench.acquisition.engine", description=__doc__)
+    parser.add_argument("--attendance", type=Attendance, default=Attendance.ATTENDED)
+    parser.add_argument("--what", default="engine", help="what it is started for, shown to others")
+    parser.add_argument("--host", default=LOOPBACK, help="loopback unless told otherwise; there is a token")
+    parser.add_argument(
+        "--forgotten-s",
+        type=float,
+        default=FORGOTTEN_S,
+        help="unattended: ends when nobody has asked for so long and nothing was ever carried out [s]",
+    )
+    return parser.parse_args()
+
+
+def _heed_signals(desk: Desk) -> None:
+    def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
+        desk.shutdown(Cause.TERMINATED, f"{signal.Signals(number).name}: ended by the system")
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+
+
+def _end_when_forgotten(desk: Desk, after_s: float) -> None:
+    """End an engine that does nothing when whoever started it has gone away: it may hold a bench."""
+
+    def look() -> None:
+        pause = Event()
+        while not desk.is_forgotten(after_s):
+            pause.wait(after_s / 10)
+        desk.shutdown(Cause.PARENT_GONE, f"nobody has asked for {after_s:g} s, and nothing was to be done")
+
+    Thread(target=look, name="engine forgotten", daemon=True).start()
+
+
+def _follow_parent(desk: Desk) -> None:
+    """End with whoever started the engine: standard input is a pipe from there."""
+    # Not through sys.stdin: a buffer that a thread waits in cannot be torn down at the process's end.
+    while os.read(sys.stdin.fileno(), 4096):
+        pass
+    desk.shutdown(Cause.PARENT_GONE, "the program that started the engine has ended")
+
+
+if __name__ == "__main__":
+    main()

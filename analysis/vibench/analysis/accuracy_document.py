@@ -1,0 +1,123 @@
+"""The trade of speed for accuracy as a Markdown page, made from one measurement of it."""
+
+from collections.abc import Iterator
+
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.trade.figures import LEAST_GAIN, LevelFigures, MotionTrade, SolverFigures, Trade
+
+_HEAD = (
+    "| level or solver | simulated s per s | error of the state "
+    "| of Response I | of Response II | exponent [1/s] |"
+)
+_RULE = "|---|---|---|---|---|---|"
+ABSENT = "–"
+
+
+def accuracy_document(trade: Trade, picture: str) -> str:
+    """Write the page.
+
+    Parameters
+    ----------
+    trade
+        What was measured.
+    picture
+        Path of the figure, relative to the page.
+
+    """
+    return "\n".join(_lines(trade, picture)) + "\n"
+
+
+def _lines(trade: Trade, picture: str) -> Iterator[str]:
+    yield from (
+        "# Speed and accuracy, measured",
+        "",
+        "Made by `vibench tradeoff --markdown docs/accuracy.md`; not edited by hand.",
+        f"Machine: {trade.machine}. {trade.software}.",
+        "",
+        "Errors of the state are the largest of six parts, in units of 100 µm and 0.1 m/s, against an",
+        "independent solution of the plain equations (scipy's DOP853 at 1e-12, begun anew at every touch).",
+        "Errors of the responses are relative to the reference level. scipy's solvers run at a relative",
+        "tolerance of 1e-6 on the plain equations, over a shorter stretch. Times are of one core.",
+        "",
+        f"![Error of the state over cost, for every level and solver]({picture})",
+    )
+    for each in trade.motions:
+        yield from _motion(each)
+    yield from _promises(trade)
+
+
+def _motion(found: MotionTrade) -> Iterator[str]:
+    yield from (
+        "",
+        f"## {found.motion.regime.value.capitalize()}: {found.motion.name}",
+        "",
+        f"State compared after {found.span_s:.3g} s, scipy's after {found.solver_span_s:.3g} s.",
+        found.advice,
+        "",
+        _HEAD,
+        _RULE,
+    )
+    for level in found.levels:
+        yield _level(level)
+    for solver in found.solvers:
+        yield _solver(solver)
+
+
+def _level(level: LevelFigures) -> str:
+    first = _number(level.response_i_error)
+    if level.response_i_scatter > 0.0:
+        first = f"scatter {level.response_i_scatter:.1%}"
+    exponent = f"{level.exponent_per_s:.4g} ± {level.exponent_error_per_s:.1g}"
+    cells = (_number(level.state_error), first, _number(level.response_ii_error), exponent)
+    return f"| **{level.accuracy.value}** | {1 / level.cost:.0f} | {' | '.join(cells)} |"
+
+
+def _solver(solver: SolverFigures) -> str:
+    cells = (_number(solver.state_error), ABSENT, ABSENT, ABSENT)
+    return f"| scipy {solver.name} | {1 / solver.cost:.2g} | {' | '.join(cells)} |"
+
+
+def _number(value: float | None) -> str:
+    return ABSENT if value is None else f"{value:.1e}"
+
+
+def _promises(trade: Trade) -> Iterator[str]:
+    yield from ("", "## Promises", "", "| level | promised | worst above | kept |", "|---|---|---|---|")
+    for accuracy in Accuracy:
+        worst = worst_error(trade, accuracy)
+        kept = "yes" if worst <= accuracy.promise else "**no**"
+        yield f"| {accuracy.value} | {accuracy.promise:.0e} | {worst:.1e} | {kept} |"
+    yield from _without_gain(trade)
+    yield from (
+        "",
+        "## Times of scipy's DOP853 over the standard level",
+        "",
+        "| motion | ratio |",
+        "|---|---|",
+    )
+    for name, ratio in trade.solver_ratio("DOP853", Accuracy.STANDARD).items():
+        yield f"| {name} | {ratio:.0f} |"
+
+
+def _without_gain(trade: Trade) -> Iterator[str]:
+    """Name the motions on which a level buys nothing."""
+    lines = [
+        f"- {level.accuracy.value} is no better than {before.accuracy.value}: {each.motion.name}"
+        for each in trade.motions
+        for level, before in each.without_gain
+    ]
+    if lines:
+        yield from ("", f"Errors that a level does not lessen by a factor of {LEAST_GAIN:g}:", "", *lines)
+
+
+def worst_error(trade: Trade, accuracy: Accuracy) -> float:
+    """Give the largest error of the state that a level made on any motion that is not chaotic."""
+    return max(
+        (
+            level.state_error
+            for each in trade.motions
+            for level in each.levels
+            if level.accuracy is accuracy and level.state_error is not None
+        ),
+        default=0.0,
+    )

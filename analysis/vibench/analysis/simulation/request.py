@@ -1,0 +1,97 @@
+"""What a person asks of the simulation: one specimen, one drive over frequency, up to two models."""
+
+from enum import StrEnum
+from typing import Annotated, Self
+
+from pydantic import Field, PositiveFloat, model_validator
+
+from vibench.acquisition.toml_file import FrozenModel
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.scene import Observable
+from vibench.sim.study.frequency_range import frequency_range
+from vibench.sim.study.study import Study
+
+MOST_POINTS = 20_000
+"""Of both models together: a picture shows no more, and an afternoon computes no more."""
+
+
+class Exponent(StrEnum):
+    """Whether the largest Lyapunov exponent is computed."""
+
+    LEFT_OUT = "left out"
+    COMPUTED = "computed"
+
+
+class SimulationRequest(FrozenModel):
+    """A scene at every frequency of a range."""
+
+    model: str = "hertz"
+    """Contact: hertz, linear, linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, power:3+5+7, ..."""
+    compared_with: str = "linear"
+    """A second model, for similarity with the first; empty for none."""
+    damping_time_s: Annotated[float, Field(ge=0.0)] = 2e-5
+    """Damping over stiffness of every link: c = damping time times k."""
+    gap_m: PositiveFloat = 45e-6
+    """Clearance at both stops."""
+    amplitude_m: PositiveFloat = 5e-6
+    """Of the base displacement."""
+    start_hz: PositiveFloat = 50.0
+    """Lowest drive frequency."""
+    stop_hz: PositiveFloat = 600.0
+    """Highest drive frequency."""
+    step_hz: PositiveFloat = 5.0
+    """Between neighbouring frequencies."""
+    accuracy: Accuracy = Accuracy.STANDARD
+    """Of contacts; flight is exact at every level. Below stands what each level costs and errs."""
+    duration_s: PositiveFloat = 8.0
+    """Length of each run, from rest."""
+    window_s: PositiveFloat = 5.0
+    """Length of its end that is observed."""
+    exponent: Exponent = Exponent.LEFT_OUT
+    """Largest Lyapunov exponent; it about doubles the work."""
+    signal_hz: PositiveFloat | None = 260.0
+    """Frequency whose time signal is shown; empty for none."""
+
+    @model_validator(mode="after")
+    def _is_a_study(self) -> Self:
+        """Refuse here what a study would refuse, in its own words, and what would take for ever."""
+        points = len(self.models) * len(frequency_range(self.start_hz, self.stop_hz, self.step_hz))
+        if points > MOST_POINTS:
+            raise ValueError(
+                f"{points} points are asked for; at most {MOST_POINTS} are simulated here: "
+                "take a larger step, or a study file"
+            )
+        self.study  # noqa: B018 - making it is the check
+        return self
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """The first is the reference of the similarity."""
+        second = self.compared_with.strip()
+        return (self.model,) if second in ("", self.model) else (self.model, second)
+
+    @property
+    def study(self) -> Study:
+        """The same as every program of the house computes it."""
+        exponents = (Observable.LYAPUNOV,) if self.exponent is Exponent.COMPUTED else ()
+        return Study(
+            models=self.models,
+            damping_times_s=(self.damping_time_s,),
+            gaps_m=(self.gap_m,),
+            amplitudes_m=(self.amplitude_m,),
+            frequencies_hz=frequency_range(self.start_hz, self.stop_hz, self.step_hz),
+            observe=(Observable.RESPONSE, *exponents),
+            accuracy=self.accuracy,
+            duration_s=self.duration_s,
+            window_s=self.window_s,
+        )
+
+    @property
+    def points(self) -> int:
+        """Scenes that are computed."""
+        return self.study.grid.size
+
+    @property
+    def simulated_s(self) -> float:
+        """Time that all scenes together last."""
+        return self.points * self.duration_s

@@ -1,0 +1,127 @@
+"""The `vibench` command: its list of commands, and the one place where an error becomes a sentence."""
+
+import sys
+
+from . import blas_threads  # noqa: F401 - numpy reads its setting, so it comes first
+
+# isort: split
+import typer
+from rich.console import Console
+
+from vibench.acquisition.errors import AcquisitionError
+from vibench.analysis.errors import AnalysisError
+from vibench.sim.study.errors import StudyError
+
+from .late_command import Place, late_commands
+
+COMMANDS = {
+    "demo": Place(
+        "demo",
+        "demo",
+        "Run the paper's experiment on the virtual rig: measure, analyse, simulate, and write a report.",
+    ),
+    "measure": Place(
+        "measure",
+        "measure",
+        "Measure: check the bench, ramp up, record and ramp down, for each measurement of a campaign.",
+    ),
+    "watch": Place(
+        "watch",
+        "watch",
+        "Watch what an engine carries out, from any terminal of the same user; Ctrl-C leaves it be.",
+    ),
+    "stop": Place(
+        "watch",
+        "stop",
+        "Stop what an engine drives, and the campaign with it; the recording is kept and says why.",
+    ),
+    "release": Place(
+        "watch", "release", "Let a run go on that was held with vibench stop --level hold, or in the window."
+    ),
+    "analyse": Place(
+        "analyse",
+        "analyse",
+        "Analyse recordings, complete, interrupted or still growing, and write one HTML report.",
+    ),
+    "catalogue": Place(
+        "catalogue",
+        "show_catalogue",
+        "List the recordings of a folder and the folders in it: what, when, how they ended, how large.",
+    ),
+    "predict": Place("predict", "predict", "Predict the responses of m0 and of p over frequency."),
+    "study": Place(
+        "study", "study", "Predict responses over every combination of what a file lists, longest first."
+    ),
+    "figure": Place(
+        "figure",
+        "figure",
+        "Draw a figure of the paper; studies are kept in DIR/studies and go on where they were stopped.",
+    ),
+    "gui": Place("gui", "gui", "Open the window: connect, check, choose, preview, run, watch, compare."),
+    "reproduce": Place(
+        "reproduce",
+        "reproduce",
+        "Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped.",
+    ),
+    "tradeoff": Place(
+        "tradeoff",
+        "tradeoff",
+        "Measure what each accuracy costs and what error it makes, with and without impacts and in chaos.",
+    ),
+    "export": Place(
+        "export",
+        "export",
+        "Write a recording's samples, with units and times, as CSV, UFF 58, MATLAB or WAV.",
+    ),
+    "import": Place(
+        "import_recording", "import_file", "Make a recording of another program's file, or say what is in it."
+    ),
+    "recover": Place(
+        "recover",
+        "recover_recording",
+        "Finish a recording that was cut off: all that was committed becomes NAME.h5.",
+    ),
+    "serve-rig": Place(
+        "serve_rig", "serve_rig", "Serve the virtual rig to any pyvisa and nidaqmx program until Ctrl-C."
+    ),
+    "bench": Place("bench", "bench", "Look at the instruments."),
+}
+
+app = typer.Typer(
+    name="vibench",
+    help="Vibro-impact shaker experiments: run them, record them, and say what they mean.",
+    cls=late_commands(COMMANDS),
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+@app.callback()
+def vibench() -> None:
+    """Hold the commands; there is no option that all of them share."""
+
+
+def main() -> None:
+    """Run the command line. An error that a user can mend is one sentence and a non-zero exit."""
+    try:
+        app()
+    except (AcquisitionError, AnalysisError, StudyError) as error:
+        complain(error)
+        sys.exit(1)
+
+
+def complain(error: BaseException) -> None:
+    """Show an error on standard error: its sentence, then what else went wrong on the way out."""
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    console.print(f"[bold red]error:[/] {_plain(str(error))}")
+    for note in getattr(error, "__notes__", ()):
+        console.print(f"  {_plain(note)}")
+
+
+def _plain(text: str) -> str:
+    return text.replace("[", r"\[")
+
+
+if __name__ == "__main__":
+    main()

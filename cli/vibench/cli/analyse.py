@@ -1,0 +1,163 @@
+"""`vibench analyse`: a recording, or a folder of them, becomes figures, tables and a report."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.analysis.campaign_results import (
+    CampaignResults,
+    Failure,
+    Simulation,
+    analyse_files,
+    recordings_in,
+)
+from vibench.analysis.noise_request import NoiseRequest
+from vibench.analysis.report.report import write_report
+from vibench.analysis.results import Estimator
+from vibench.analysis.shaken_specimen import ShakenSpecimen, shaken_specimen
+from vibench.analysis.summary import campaign_summary
+from vibench.analysis.transmission_view import MagnitudeScale, quantities_named
+from vibench.analysis.watcher import Watcher
+from vibench.analysis.window import Window
+
+from .output import bold, console, print_json
+from .paths import AsJson, room_for_folder, unused
+from .reading_bar import reading_bar
+
+NOISE = "Transmission of noise"
+"""Heading of the options that no other excitation takes notice of."""
+
+
+def analyse(
+    recording: Annotated[
+        Path, typer.Argument(metavar="RECORDING.h5", help="A recording, or a folder of recordings.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Folder for the report; beside the recording if absent."),
+    ] = None,
+    simulate: Annotated[
+        bool, typer.Option(help="Lay the simulation over the measurement; takes some seconds more.")
+    ] = True,
+    fit: Annotated[
+        bool,
+        typer.Option(
+            "--fit",
+            help="Fit damping, frequencies and gap to the recordings first, and lay that specimen over them.",
+        ),
+    ] = False,
+    estimator: Annotated[
+        Estimator,
+        typer.Option(
+            help="drive: referenced to the drive voltage, free of any channel's noise.", rich_help_panel=NOISE
+        ),
+    ] = NoiseRequest.estimator,
+    noise_ratio: Annotated[
+        float | None,
+        typer.Option(
+            metavar="R",
+            help="For hv: noise density of m0's velocity over that of the base's acceleration, in s2.",
+            rich_help_panel=NOISE,
+        ),
+    ] = None,
+    quantity: Annotated[
+        str,
+        typer.Option(
+            metavar="Q[/Q]",
+            help="Motion of m0 over motion of the base, such as velocity/acceleration; one word for both.",
+            rich_help_panel=NOISE,
+        ),
+    ] = "displacement",
+    scale: Annotated[
+        MagnitudeScale, typer.Option(help="Of the magnitudes in figures.", rich_help_panel=NOISE)
+    ] = MagnitudeScale.LOG,
+    resolution: Annotated[
+        float | None,
+        typer.Option(
+            metavar="HZ",
+            help="Width of a line; streamed noise only, like the next four.",
+            rich_help_panel=NOISE,
+        ),
+    ] = None,
+    segment: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S", help="Length of a segment, instead of a resolution.", rich_help_panel=NOISE
+        ),
+    ] = None,
+    averages: Annotated[
+        float | None,
+        typer.Option(
+            metavar="N", help="Independent averages, instead of a resolution.", rich_help_panel=NOISE
+        ),
+    ] = None,
+    window: Annotated[
+        Window, typer.Option(help="Taper of a segment.", rich_help_panel=NOISE)
+    ] = NoiseRequest.window,
+    overlap: Annotated[
+        float, typer.Option(metavar="SHARE", help="Of neighbouring segments, 0 to 1.", rich_help_panel=NOISE)
+    ] = NoiseRequest.overlap,
+    confidence: Annotated[
+        float,
+        typer.Option(metavar="P", help="That the bounds of a line hold the truth.", rich_help_panel=NOISE),
+    ] = NoiseRequest.confidence,
+    as_json: AsJson = False,
+) -> None:
+    """Analyse recordings, complete, interrupted or still growing, and write one HTML report."""
+    request = NoiseRequest(
+        estimator=estimator,
+        noise_ratio=noise_ratio,
+        resolution_hz=resolution,
+        segment_s=segment,
+        averages=averages,
+        window=window,
+        overlap=overlap,
+        confidence=confidence,
+        view=quantities_named(quantity, scale),
+    )
+    paths = recordings_in(recording) if recording.is_dir() else (recording,)
+    # "." has no name of its own.
+    place = recording if recording.name.strip(".") else recording.resolve()
+    name = place.name.removesuffix(".part").removesuffix(".h5")
+    folder = unused(place.parent / f"{name}_analysis") if out is None else out
+    has_report = out is not None or not as_json
+    if has_report:
+        room_for_folder(folder)
+    with reading_bar() as watcher:
+        simulation = Simulation.LAID_OVER if simulate else Simulation.LEFT_OUT
+        shaken = fitted_to(paths, name, watcher) if fit else None
+        specimen = None if shaken is None else shaken.specimen
+        results = analyse_files(paths, name, simulation, request, watcher, specimen)
+    if shaken is not None:
+        results = replace(results, model_said=shaken.sentences)
+    if as_json:
+        fitted = {} if shaken is None else {"specimen_fit": shaken.to_dict()}
+        print_json({**campaign_summary(results), **fitted})
+    for sentence in () if as_json else results.model_said:
+        console.print(sentence)
+    if results.results and has_report:
+        report = write_report(results, unused(folder / "report.html"), folder / "figures")
+        if not as_json:
+            console.print("The report:", bold(report.resolve()))
+    complain_about(results)
+
+
+def fitted_to(paths: Sequence[Path], name: str, watcher: Watcher) -> ShakenSpecimen:
+    """Fit the specimen to recordings, whatever the report is to show of them."""
+    return shaken_specimen(analyse_files(paths, name, Simulation.LEFT_OUT, watcher=watcher))
+
+
+def complain_about(results: CampaignResults) -> None:
+    """End with a sentence for each recording without a result."""
+    for failure in results.failures:
+        typer.echo(f"error: {_named(failure)}", err=True)
+    if any(failure.what == "analysis" for failure in results.failures):
+        raise typer.Exit(1)
+
+
+def _named(failure: Failure) -> str:
+    """Give the sentence, with the recording's name where it does not say it itself."""
+    return failure.sentence if failure.name in failure.sentence else f"{failure.name}: {failure.sentence}"

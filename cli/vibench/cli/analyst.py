@@ -1,0 +1,70 @@
+"""A second process that analyses each recording while the next one is measured."""
+
+import signal
+from collections.abc import Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from vibench.acquisition.follow_parent import follow_parent
+from vibench.analysis.campaign_results import CampaignResults, analyse_files, assembled
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.drive import Harmonic, Sampled
+from vibench.sim.engine.sample_by_sample import follow_samples
+from vibench.sim.response import steady_response
+from vibench.sim.specimen import gong2025
+
+
+class Analyst:
+    """Takes recordings as they are finished, and gives their results in the same order."""
+
+    def __init__(self, pool: ProcessPoolExecutor, name: str) -> None:
+        self._pool = pool
+        self._name = name
+        self._parts: list[Future[CampaignResults]] = []
+
+    def take(self, recording: Path) -> None:
+        """Analyse this one next."""
+        self._parts.append(self._pool.submit(analyse_files, [recording], self._name))
+
+    @property
+    def asked(self) -> int:
+        """Recordings taken so far."""
+        return len(self._parts)
+
+    def results(self) -> Iterator[CampaignResults]:
+        """Give the results one by one; waits for those that are not ready."""
+        for part in self._parts:
+            yield part.result()
+
+    def together(self) -> CampaignResults:
+        """Give the results as one campaign's."""
+        return assembled(self._name, tuple(self.results()))
+
+
+@contextmanager
+def second_process(name: str) -> Iterator[Analyst]:
+    """Keep an analyst at work while inside; what it has not begun when an error leaves is dropped."""
+    # A fresh interpreter: a fork would copy the threads' locks of the instrument libraries.
+    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_follow)
+    pool.submit(_compile)
+    try:
+        yield Analyst(pool, name)
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _compile() -> None:
+    """Have the simulation compiled while the first measurement runs."""
+    specimen = gong2025()
+    steady_response(specimen, Harmonic(260.0, 5e-6), Accuracy.QUICK, duration_s=0.2, window_s=0.1)
+    follow_samples(specimen, Sampled(np.zeros(100), 51_200.0))
+
+
+def _follow() -> None:
+    """Leave Ctrl-C to the command, and end with it."""
+    follow_parent()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

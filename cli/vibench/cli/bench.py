@@ -1,0 +1,89 @@
+"""`vibench bench`: what is there, and is it well."""
+
+from contextlib import closing
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.acquisition.bench import open_bench
+from vibench.acquisition.bench_list import list_instruments, list_rig_instruments
+from vibench.acquisition.check.admission import check_and_keep
+from vibench.acquisition.check.archive import last_result
+from vibench.acquisition.check.finding import Verdict
+from vibench.acquisition.check.result import CheckResult
+from vibench.acquisition.engine.lock import BenchLock
+from vibench.acquisition.errors import CheckFailed
+from vibench.acquisition.rig.configuration import Rig, load_rig
+from vibench.acquisition.run.stop import StopSwitch
+from vibench.acquisition.run.stop_on_signal import stop_on_signal
+
+from .output import bold, console, print_json
+from .paths import AsJson, BenchPath, bench_path
+
+bench = typer.Typer(help="Look at the instruments.", no_args_is_help=True, add_completion=False)
+
+
+@bench.command("list")
+def list_bench(
+    bench: Annotated[
+        Path | None,
+        typer.Option(
+            "--bench", metavar="BENCH.toml", help="Search where this rig's are; this computer if absent."
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """List every instrument that can be seen, by name."""
+    found = list_instruments() if bench is None else list_rig_instruments(load_rig(bench))
+    devices = [f"{device.name}: {device.product}, serial {device.serial}" for device in found.daq_devices]
+    if as_json:
+        print_json({"visa": list(found.visa_resources), "daq": devices, "remarks": list(found.remarks)})
+        return
+    for title, lines in (("VISA", found.visa_resources), ("DAQ", devices), ("Remarks", found.remarks)):
+        console.print(bold(title))
+        for line in lines or ("none",):
+            console.print(f"  {line}")
+
+
+@bench.command("check")
+def check(
+    bench: BenchPath = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder that recordings would go to.")
+    ] = Path(),
+    last: Annotated[
+        bool, typer.Option("--last", help="Show what the last check found; touch nothing.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Check the bench with a small sine: identities, noise, gains, signs, clocks, disk, and what has changed.
+
+    The result is kept: a real bench is armed only on a check that passed lately. Exit code 1 if it fails.
+    """
+    result = _last(load_rig(bench_path(bench))) if last else _now(bench_path(bench), out)
+    if as_json:
+        print_json(result.model_dump(mode="json"))
+    else:
+        console.print(
+            f"{result.rig}: {result.verdict.value}, {result.checked:%Y-%m-%d %H:%M %Z}", markup=False
+        )
+        console.print(result.report.text(), markup=False, soft_wrap=True)
+    if result.verdict is Verdict.FAIL:
+        raise typer.Exit(1)
+
+
+def _now(path: Path, out: Path) -> CheckResult:
+    rig, switch = load_rig(path), StopSwitch()
+    with closing(BenchLock.of(rig)), open_bench(rig) as opened, stop_on_signal(switch):
+        return check_and_keep(opened, out, switch=switch)
+
+
+def _last(rig: Rig) -> CheckResult:
+    result = last_result(rig.name)
+    if result is None:
+        raise CheckFailed(
+            f"the bench {rig.name!r} was never checked on this account, so nothing can be shown; leave out "
+            "--last to check it"
+        )
+    return result

@@ -1,0 +1,54 @@
+"""`vibench catalogue`: what lies in a folder of recordings."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.acquisition.campaign.catalogue import Refresh, catalogue
+from vibench.acquisition.campaign.catalogue_entry import CatalogueEntry
+
+from .output import console, print_json
+from .paths import AsJson
+
+COLUMNS = ("recording", "started (UTC)", "excitation", "level", "frequency", "length", "size", "verdict")
+
+
+def show_catalogue(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of recordings.")],
+    rebuild: Annotated[
+        bool, typer.Option("--rebuild", help="Read every file again, not only what has changed.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """List the recordings of a folder and the folders in it: what, when, how they ended, how large."""
+    entries = catalogue(folder, Refresh.ALL if rebuild else Refresh.CHANGED)
+    if as_json:
+        print_json({"folder": str(folder.resolve()), "recordings": [asdict(each) for each in entries]})
+        return
+    rows = [COLUMNS, *(_row(each) for each in entries)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(COLUMNS))]
+    for row in rows:
+        line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        console.print(line.rstrip(), markup=False)
+
+
+def _row(entry: CatalogueEntry) -> tuple[str, ...]:
+    return (
+        entry.path,
+        entry.started_utc[:19].replace("T", " "),
+        entry.kind.replace("_", " "),
+        "" if entry.amplitude_vpp is None else f"{entry.amplitude_vpp:g} Vpp",
+        _band(entry),
+        "" if entry.duration_s is None else f"{entry.duration_s:.1f} s",
+        f"{entry.size_bytes / 1e6:.1f} MB",
+        entry.verdict,
+    )
+
+
+def _band(entry: CatalogueEntry) -> str:
+    low_hz, high_hz = entry.frequency_low_hz, entry.frequency_high_hz
+    if low_hz is None:
+        return ""
+    return f"{low_hz:g} Hz" if low_hz == high_hz else f"{low_hz:g} to {high_hz:g} Hz"

@@ -1,0 +1,53 @@
+"""`vibench demo`: the paper's experiment on the virtual rig, from the first volt to the report."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.acquisition.campaign.item import CampaignItem, Item
+from vibench.acquisition.engine.orders import Orders
+from vibench.acquisition.plan.campaign import load_campaign
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.shipped import shipped
+from vibench.analysis.report.report import write_report
+from vibench.analysis.summary import campaign_summary
+
+from .analysis_bar import analysis_bar
+from .analyst import second_process
+from .measure import STOPPED_EXIT_CODE, the_bench
+from .output import bold, console, write_json
+from .paths import unused
+
+
+def demo(
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="New folder for everything; vibench_demo if absent."),
+    ] = None,
+) -> None:
+    """Run the paper's experiment on the virtual rig: measure, analyse, simulate, and write a report."""
+    folder = unused(Path("vibench_demo")) if out is None else out
+    campaign = load_campaign(shipped("campaigns/paper.toml"))
+    console.print(
+        "The experiment of Gong et al. (2025), section 5, on a virtual rig. The first time, the simulation\n"
+        "is compiled: it starts slowly and then runs many times faster than real time.\n"
+    )
+    with second_process(campaign.name) as analyst:
+
+        def recorded(item: CampaignItem) -> None:
+            if item.result is Item.RECORDED:
+                analyst.take(item.path)
+
+        rig = shipped("hardware_configs/virtual_rig.toml")
+        with the_bench(load_rig(rig), "demo") as engine:
+            items = engine.measure(Orders(campaign=campaign, folder=folder / "recordings"), recorded)
+        if {item.name for item in items if item.result is Item.RECORDED} != set(campaign.recording_names()):
+            raise typer.Exit(STOPPED_EXIT_CODE)
+        with analysis_bar(analyst.asked) as step:
+            for _ in analyst.results():
+                step()
+        results = analyst.together()
+    report = write_report(results, folder / "report.html", folder / "figures")
+    write_json(campaign_summary(results), folder / "results.json")
+    console.print("\nThe report:", bold(report.resolve()))

@@ -1,0 +1,122 @@
+"""Progress bars drawn from what an engine tells: one for the measurement that runs, one for the campaign."""
+
+from collections.abc import Callable
+from threading import Event, Thread
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from vibench.acquisition.engine.state import DRIVING
+from vibench.acquisition.engine.status import EngineMessage, EngineStatus, MessageKind, RowStatus, RunStatus
+
+from .output import console
+
+INTERVAL_S = 0.1
+"""How often the terminal is drawn [s]."""
+COLUMNS = (
+    TextColumn("{task.description:<24}"),
+    BarColumn(bar_width=30),
+    TextColumn("{task.completed:6.0f} of {task.total:.0f} s"),
+    TimeElapsedColumn(),
+    TimeRemainingColumn(),
+    TextColumn("{task.fields[state]}"),
+)
+
+
+class EngineBars:
+    """Draws one status after the other: a bar for each recording, lines for what ended and what happened."""
+
+    def __init__(self, on: Console = console) -> None:
+        self._bars = Progress(*COLUMNS, console=on, speed_estimate_period=10)
+        self._whole: TaskID | None = None
+        self._one: TaskID | None = None
+        self._name = ""
+        self._told: set[str] = set()
+        self._messages = 0
+
+    def __enter__(self) -> Self:
+        self._bars.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._bars.stop()
+
+    def draw(self, status: EngineStatus) -> None:
+        """Draw what is new."""
+        for row in status.rows:
+            self._row(row)
+        for message in status.messages:
+            self._warning(message)
+        if status.run is not None and status.state in DRIVING:
+            self._run(status, status.run)
+
+    def _run(self, status: EngineStatus, run: RunStatus) -> None:
+        if self._whole is None:
+            self._whole = self._bars.add_task("campaign", total=run.campaign_total_s, state="of rig time")
+        if run.name != self._name:
+            self._drop()
+            self._name = run.name
+            label = f"{run.number}/{run.count} {run.name}"
+            self._one = self._bars.add_task(label, total=run.total_s, state="")
+        self._bars.update(self._whole, completed=run.campaign_elapsed_s, total=run.campaign_total_s)
+        if self._one is not None:
+            state = status.state if status.state != "running" else run.run_state
+            self._bars.update(
+                self._one, completed=run.elapsed_s, total=run.total_s, state=state.value.replace("_", " ")
+            )
+
+    def _row(self, row: RowStatus) -> None:
+        if row.state in {"queued", "running"} or row.name in self._told:
+            return
+        self._told.add(row.name)
+        if row.name == self._name:
+            self._drop()
+        self._bars.console.print(f"{row.state:11} {row.file or row.name}  ({row.reason})", markup=False)
+
+    def _drop(self) -> None:
+        if self._one is not None:
+            self._bars.remove_task(self._one)
+            self._one = None
+
+    def _warning(self, message: EngineMessage) -> None:
+        if message.number > self._messages:
+            self._messages = message.number
+            if message.kind is MessageKind.WARNING:
+                self._bars.console.print(sentence(message), markup=False)
+
+
+def sentence(message: EngineMessage) -> str:
+    """Put what happened, what was done and what to do next into one line."""
+    text = " ".join(part for part in (message.what, message.done, message.next_step) if part)
+    return f"{message.kind.value:11} {text}"
+
+
+class Watching:
+    """Draws in a thread of its own, the newest only: a terminal that is held up holds nothing else up."""
+
+    def __init__(self, ask: Callable[[], EngineStatus], on: Console = console) -> None:
+        self._ask = ask
+        self._on = on
+        self._ending = Event()
+        self._thread = Thread(target=self._draw, name="progress", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ending.set()
+        # A terminal that takes nothing must not keep the command from ending.
+        self._thread.join(timeout=2.0)
+
+    def _draw(self) -> None:
+        with EngineBars(self._on) as bars:
+            while not self._ending.wait(INTERVAL_S):
+                bars.draw(self._ask())
+            bars.draw(self._ask())

@@ -1,0 +1,45 @@
+"""`vibench export`: a recording, or a part of it, as a file of another program."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.acquisition.recording.reader import open_recording
+from vibench.analysis.exchange.excerpt import excerpt
+from vibench.analysis.exchange.export import Format, Results, export_samples
+
+from .output import console
+from .transfer_bar import transfer_bar
+
+
+def export(
+    recording: Annotated[Path, typer.Argument(metavar="RECORDING.h5", help="Finished or still growing.")],
+    to: Annotated[Format, typer.Option("--to", help="What to make of it.")],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="PATH", help="The new file; beside the recording if absent."),
+    ] = None,
+    channels: Annotated[
+        str,
+        typer.Option("--channels", metavar="NAMES", help="Some of its channels, with commas; all if absent."),
+    ] = "",
+    from_s: Annotated[
+        float | None, typer.Option("--from", metavar="S", help="Seconds since the first sample.")
+    ] = None,
+    to_s: Annotated[
+        float | None, typer.Option("--until", metavar="S", help="Seconds since the first sample.")
+    ] = None,
+    results: Annotated[
+        bool, typer.Option("--results", help="Results that were saved in the recording, too.")
+    ] = False,
+) -> None:
+    """Write a recording's samples, with units and times, as CSV, UFF 58, MATLAB or WAV."""
+    with open_recording(recording) as opened:
+        chosen = excerpt(opened, tuple(channels.split(",")) if channels else (), from_s, to_s)
+        path = recording.with_name(f"{chosen.name}.{to.value}") if out is None else out
+        included = Results.INCLUDED if results else Results.LEFT_OUT
+        with transfer_bar(f"export as {to.value}", chosen.values) as watcher:
+            written = export_samples(chosen, to, path, included, watcher)
+    for each in written:
+        console.print(f"wrote {each}")

@@ -1,0 +1,105 @@
+"""`vibench figure`: a figure of the paper, from our own studies or from recordings."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.analysis.campaign_results import CampaignResults, analyse_files, recordings_in
+from vibench.analysis.errors import InvalidRequest
+from vibench.analysis.figures.drawn import DrawnFigure, ImageKind
+from vibench.analysis.figures.paper.catalogue import PAPER_FIGURES
+from vibench.analysis.figures.paper.options import FigureOptions, FrequencyGrid
+from vibench.analysis.report.figure_choice import recording_figures, result_figures
+from vibench.sim.accuracy import Accuracy
+
+from .analyse import complain_about
+from .kept_study import kept_study
+from .output import bold, console
+from .paths import room_for_folder
+
+ALL = "all"
+EXPERIMENT = (12, 13, 14)
+"""Figures of the experiment: they need recordings."""
+
+
+def figure(
+    number: Annotated[str, typer.Argument(metavar="N", help="1 to 14, or all.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the figures.")],
+    recordings: Annotated[
+        Path | None,
+        typer.Option(
+            "--recordings", metavar="DIR", help="Recordings for figures 12 to 14; see vibench demo."
+        ),
+    ] = None,
+    damping_time: Annotated[
+        float, typer.Option("--damping-time", metavar="S", help="c_i = damping time * k_i.")
+    ] = FigureOptions.damping_time_s,
+    gap: Annotated[
+        float, typer.Option("--gap", metavar="M", help="Clearance at both stops.")
+    ] = FigureOptions.gap_m,
+    accuracy: Annotated[
+        Accuracy, typer.Option("--accuracy", help="Of every point.")
+    ] = FigureOptions.accuracy,
+    grid: Annotated[
+        FrequencyGrid, typer.Option("--grid", help="Every 5 Hz (coarse) or every 1 Hz (fine).")
+    ] = FigureOptions.grid,
+    workers: Annotated[
+        int | None, typer.Option("--workers", metavar="N", help="Threads; one for each processor if absent.")
+    ] = None,
+    kinds: Annotated[
+        list[ImageKind], typer.Option("--format", help="Image formats; give it several times for several.")
+    ] = [ImageKind.PNG, ImageKind.SVG],  # noqa: B006 - typer copies it
+) -> None:
+    """Draw a figure of the paper; studies are kept in DIR/studies and go on where they were stopped."""
+    options = FigureOptions(damping_time_s=damping_time, gap_m=gap, accuracy=accuracy, grid=grid)
+    numbers = _numbers(number)
+    room_for_folder(out)
+    experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])
+    for each in numbers:
+        drawn = experiment(each) if each in EXPERIMENT else _simulated(each, options, out, workers)
+        for one in drawn:
+            paths = one.save(out, kinds)
+            console.print(f"figure {each}:", bold(paths[0]), f"({one.title})")
+
+
+def _numbers(asked: str) -> tuple[int, ...]:
+    known = (*PAPER_FIGURES, *EXPERIMENT)
+    if asked == ALL:
+        return tuple(PAPER_FIGURES)
+    if asked.isdigit() and int(asked) in known:
+        return (int(asked),)
+    raise InvalidRequest(f"figure {asked!r} was asked for; the paper has 1 to {known[-1]}, or say all")
+
+
+def _simulated(number: int, options: FigureOptions, out: Path, workers: int | None) -> Iterator[DrawnFigure]:
+    chosen = PAPER_FIGURES[number]
+    answers = tuple(kept_study(each, out / "studies", workers) for each in chosen.studies(options))
+    yield chosen.draw(options, answers)
+
+
+def _experiment(folder: Path | None, wanted: list[int]) -> Callable[[int], Iterator[DrawnFigure]]:
+    """Give what draws the figures of the experiment; the recordings are analysed once."""
+    if not wanted:
+        return lambda _: iter(())
+    if folder is None:
+        raise InvalidRequest(
+            f"figure {wanted[0]} shows the experiment; give its recordings with --recordings DIR, such as "
+            "vibench demo makes"
+        )
+    results = analyse_files(recordings_in(folder), folder.name)
+    complain_about(results)
+    return lambda number: _measured(number, results)
+
+
+def _measured(number: int, results: CampaignResults) -> Iterator[DrawnFigure]:
+    match number:
+        case 12:
+            for each in results.results[:1]:
+                yield from recording_figures(each)
+        case 13:
+            chosen = CampaignResults(results.name, (*results.noise, *results.sweeps), ())
+            yield from result_figures(chosen)
+        case _:
+            yield from result_figures(CampaignResults(results.name, results.dwells, ()))

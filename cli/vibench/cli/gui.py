@@ -1,0 +1,30 @@
+"""`vibench gui`: the window, in a process of its own."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .paths import BenchPath
+
+WINDOW = "vibench.gui"
+"""The package that is run; it is never imported here: commands must work where there is no Qt."""
+
+
+def gui(
+    bench: BenchPath = None,
+    screenshots: Annotated[
+        Path | None,
+        typer.Option("--screenshots", metavar="DIR", help="Make a picture of every page there, and end."),
+    ] = None,
+) -> None:
+    """Open the window: connect, check, choose, preview, run, watch, compare."""
+    command = [sys.executable, "-m", WINDOW]
+    if bench is not None:
+        command += ["--bench", str(bench)]
+    if screenshots is not None:
+        command += ["--screenshots", str(screenshots)]
+    ended = subprocess.run(command, check=False)  # noqa: S603 - this interpreter, and our own package
+    raise typer.Exit(ended.returncode)

@@ -1,0 +1,66 @@
+"""`vibench import`: somebody else's file as a recording."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.acquisition.toml_file import load_toml
+from vibench.analysis.errors import InvalidRequest
+from vibench.analysis.exchange.import_recording import import_recording
+from vibench.analysis.exchange.mapping import ImportMapping
+from vibench.analysis.exchange.source import opened_source
+from vibench.analysis.exchange.source_channel import SourceChannel
+
+from .output import console, print_json
+from .paths import AsJson
+from .transfer_bar import transfer_bar
+
+
+def import_file(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="UFF, HDF5, MATLAB, TDMS, WAV or CSV.")],
+    mapping: Annotated[
+        Path | None,
+        typer.Option("--mapping", metavar="MAP.toml", help="What its channels are; lists them if absent."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="NAME.h5", help="The new recording; beside FILE if absent."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Make a recording of another program's file, or say what is in it."""
+    if mapping is None:
+        if out is not None:
+            raise InvalidRequest(f"{out} cannot be made without a mapping; give --mapping MAP.toml")
+        _tell(file, as_json)
+        return
+    meaning = load_toml(mapping, ImportMapping)
+    target = file.with_suffix(".h5") if out is None else out
+    with opened_source(file) as source:
+        longest = max(each.samples for each in source.channels)
+    with transfer_bar("import", longest * len(meaning.channels)) as watcher:
+        made = import_recording(file, meaning, target, watcher)
+    if as_json:
+        print_json({"recording": str(made)})
+    else:
+        console.print(f"wrote {made}; next: vibench analyse {made}")
+
+
+def _tell(file: Path, as_json: bool) -> None:
+    with opened_source(file) as source:
+        channels = source.channels
+    if as_json:
+        print_json({"file": str(file), "channels": [asdict(each) for each in channels]})
+        return
+    for each in channels:
+        console.print(_line(each), markup=False)
+    console.print("Say in a mapping what they are (docs/exchange.md), and give it with --mapping.")
+
+
+def _line(channel: SourceChannel) -> str:
+    rate = "" if channel.sample_rate_hz is None else f", {channel.sample_rate_hz:.9g} samples/s"
+    unit = f", {channel.unit}" if channel.unit else ""
+    label = f" ({channel.label})" if channel.label else ""
+    return f"{channel.name!r}{label}: {channel.samples} samples{rate}{unit}"

@@ -1,0 +1,60 @@
+"""Options that several commands share."""
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition.rig.configuration import Rig, load_rig, with_faults
+from vibench.acquisition.shipped import shipped
+
+BenchPath = Annotated[
+    Path | None,
+    typer.Option("--bench", metavar="BENCH.toml", help="Hardware configuration; the virtual rig if absent."),
+]
+FaultsPath = Annotated[
+    Path | None,
+    typer.Option("--faults", metavar="FAULTS.toml", help="What goes wrong with a virtual rig, and when."),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+
+
+def bench_path(given: Path | None) -> Path:
+    """Path of the hardware configuration: what was given, or the virtual rig."""
+    return shipped("hardware_configs/virtual_rig.toml") if given is None else given
+
+
+def rig_at(bench: Path | None, faults: Path | None) -> Rig:
+    """Read the hardware configuration that was given, or the virtual rig's, with faults if any are given."""
+    rig = load_rig(bench_path(bench))
+    return rig if faults is None else with_faults(rig, faults)
+
+
+def room_for_folder(path: Path) -> None:
+    """Refuse a folder that cannot be written to, before anything is computed for it; makes none.
+
+    Raises
+    ------
+    ConfigurationError
+        When it, or what it would lie in, is a file or may not be written to.
+
+    """
+    standing = next(each for each in (path, *path.resolve().parents) if each.exists())
+    if standing.is_dir() and os.access(standing, os.W_OK):
+        return
+    why = "may not be written to" if standing.is_dir() else "is a file"
+    raise ConfigurationError(
+        f"{path} cannot be made a folder: {standing} {why}. Nothing was computed; give a folder that exists, "
+        "or the name of a new one"
+    )
+
+
+def unused(path: Path) -> Path:
+    """Give a path that is not taken: the wish itself, or with -2, -3, ... before its suffix."""
+    candidate, number = path, 1
+    while candidate.exists():
+        number += 1
+        candidate = path.with_name(f"{path.stem}-{number}{path.suffix}")
+    return candidate

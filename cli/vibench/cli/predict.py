@@ -1,0 +1,206 @@
+"""`vibench predict`: Responses I and II, and exponents, over frequency."""
+
+import time
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from pydantic import ValidationError
+from rich.table import Table
+
+from vibench.analysis.errors import InvalidRequest
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.answer.plan import ScenePlan, plan_scene
+from vibench.sim.scene import Observable, Rest
+from vibench.sim.study.doubts import doubts
+from vibench.sim.study.results import StudyResults
+from vibench.sim.study.software import software
+from vibench.sim.study.solve import Existing, solve_study
+from vibench.sim.study.study import Start, Study
+
+from .frequency_option import frequencies
+from .interruption import told_to_stop
+from .output import console, print_json, print_warnings
+from .paths import AsJson
+from .study import STOPPED_EXIT_CODE, Cluster, Workers
+from .study_bar import study_bar
+
+AUTO: Literal["auto"] = "auto"
+_SHOWN = 24
+"""Rows of a table on the terminal; all of them are in the JSON and in the file."""
+_OPTIONS = {
+    "models": "--model",
+    "amplitudes_m": "--amplitude",
+    "gaps_m": "--gap",
+    "damping_times_s": "--damping-time",
+    "duration_s": "--duration",
+    "window_s": "--window",
+}
+"""What the user typed, by the name that the study has for it."""
+_ALLOWED = {
+    "greater_than": "it must be above 0",
+    "greater_than_equal": "it must not be negative",
+    "finite_number": "it must be a finite number",
+}
+"""What an option must be, by the name that the validator has for what it is not."""
+
+
+def predict(
+    amplitude: Annotated[float, typer.Option("--amplitude", metavar="M", help="Of the base displacement.")],
+    frequency: Annotated[
+        str, typer.Option("--frequency", metavar="F|START:STOP:STEP", help="One frequency or a range [Hz].")
+    ],
+    model: Annotated[
+        str, typer.Option("--model", help="hertz, linear, linear_gap, rigid:0.8, power:5, power:3+5+7, ...")
+    ] = "hertz",
+    damping_time: Annotated[
+        float, typer.Option("--damping-time", metavar="S", help="c_i = damping time * k_i.")
+    ] = 2e-5,
+    gap: Annotated[float, typer.Option("--gap", metavar="M", help="Clearance at both stops.")] = 45e-6,
+    duration: Annotated[
+        str, typer.Option("--duration", metavar="S|auto", help="Length of each run, or until it settles.")
+    ] = "30",
+    window: Annotated[float, typer.Option("--window", metavar="S", help="Observed at its end.")] = 5.0,
+    accuracy: Annotated[
+        Accuracy, typer.Option("--accuracy", help="See docs/accuracy.md.")
+    ] = Accuracy.STANDARD,
+    observe: Annotated[
+        str, typer.Option("--observe", help="response; with it lyapunov, scatter.")
+    ] = Observable.RESPONSE.value,
+    start: Annotated[
+        Start, typer.Option("--start", help="rest, or continued from the next lower (up) or higher (down).")
+    ] = Start.REST,
+    workers: Workers = None,
+    cluster: Cluster = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE.h5", help="Keep the answers in a file.")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with what FILE.h5 lacks.")] = False,
+    explain: Annotated[bool, typer.Option("--explain", help="Say what is computed and why.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Predict the responses of m0 and of p over frequency."""
+    asked = _study(
+        {
+            "models": (model,),
+            "amplitudes_m": (amplitude,),
+            "gaps_m": (gap,),
+            "damping_times_s": (damping_time,),
+            "frequencies_hz": frequencies(frequency),
+            "observe": _observables(observe),
+            "starts": (start,),
+            "accuracy": accuracy,
+            "duration_s": _duration(duration),
+            "window_s": window,
+        }
+    )
+    print_warnings(doubts(asked))
+    began = time.monotonic()
+    existing = Existing.RESUME if resume else Existing.REFUSE
+    with told_to_stop() as is_stopped, study_bar(asked.grid.size) as watcher:
+        results = solve_study(asked, out, existing, workers, cluster, watcher, is_stopped)
+    if as_json:
+        print_json(document(results, time.monotonic() - began))
+    else:
+        _tell(results)
+    if explain:
+        typer.echo(explanation(results), err=as_json)
+    for where, why in results.failures():
+        typer.echo(f"error: {where['frequency']} Hz: {why}", err=True)
+    if not results.is_complete:
+        raise typer.Exit(STOPPED_EXIT_CODE)
+
+
+def _study(options: dict[str, object]) -> Study:
+    try:
+        return Study.model_validate(options)
+    except ValidationError as error:
+        first = error.errors()[0]
+        said = _ALLOWED.get(first["type"], first["msg"].removeprefix("Value error, "))
+        place = str(first["loc"][0]) if first["loc"] else ""
+        given = f"{_OPTIONS.get(place, place)} was given as {first['input']!r}: " if place else ""
+        raise InvalidRequest(given + said) from error
+
+
+def _observables(text: str) -> tuple[Observable, ...]:
+    names = [part.strip() for part in text.split(",")]
+    known = (Observable.RESPONSE, Observable.LYAPUNOV, Observable.SCATTER)
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise InvalidRequest(f"--observe was given as {text!r}; a point has response, lyapunov and scatter")
+    return tuple(Observable(name) for name in names)
+
+
+def _duration(text: str) -> float | str:
+    if text == AUTO:
+        return AUTO
+    try:
+        return float(text)
+    except ValueError as error:
+        raise InvalidRequest(f"a duration of {text!r} was given; give seconds, or auto") from error
+
+
+def document(results: StudyResults, elapsed_s: float) -> dict[str, object]:
+    """Say every point with its options, for other programs; what is not known is null."""
+    return {
+        "points": [each.to_dict() for each in results.predictions()],
+        "failures": [{**where, "message": why} for where, why in results.failures()],
+        "is_complete": results.is_complete,
+        "options": results.study.model_dump(mode="json"),
+        "software": software(),
+        "elapsed_s": elapsed_s,
+    }
+
+
+def explanation(results: StudyResults) -> str:
+    """Say how the points are answered: one passage for each run of points that are answered alike."""
+    study = results.study
+    plans = [
+        (frequency_hz, plan_scene(study.scene((0, 0, 0, 0, 0, index), Rest())))
+        for index, frequency_hz in enumerate(study.frequencies_hz)
+    ]
+    return "\n".join(_passage(list(run)) for _, run in groupby(plans, lambda each: each[1].alike))
+
+
+def _passage(plans: Sequence[tuple[float, ScenePlan]]) -> str:
+    """Explain points that follow one another and are answered alike, by the one nearest to its stops."""
+    first_hz, last_hz = plans[0][0], plans[-1][0]
+    worst_hz, worst = max(plans, key=lambda each: each[1].largest_p_m)
+    said = " ".join(worst.sentences)
+    if len(plans) == 1:
+        return f"{first_hz:g} Hz: {worst.method.value}. {said}"
+    return (
+        f"{len(plans)} points, {first_hz:g} to {last_hz:g} Hz: {worst.method.value}. "
+        f"At {worst_hz:g} Hz: {said}"
+    )
+
+
+def _tell(results: StudyResults) -> None:
+    rows = Table(title="Responses I and II of m0 and of p = y - z, over the base amplitude")
+    has_exponents = Observable.LYAPUNOV in results.study.observe
+    headings = ["f [Hz]", "I", "II", "p: I", "p: II", "impacts", "motion", "error"]
+    for heading in headings + ["exponent [1/s]"] * has_exponents:
+        rows.add_column(heading, justify="right")
+    points = list(results.predictions())
+    step = max(1, -(-len(points) // _SHOWN))
+    for each in points[::step]:
+        rows.add_row(
+            f"{each.frequency_hz:g}",
+            *(
+                _number(value)
+                for value in (each.response_i, each.response_ii, each.relative_i, each.relative_ii)
+            ),
+            str(each.impacts),
+            str(each.motion),
+            "" if each.error_estimate is None else f"{each.error_estimate:.1g}",
+            *([_number(each.lyapunov_per_s)] if has_exponents else []),
+        )
+    console.print(rows)
+    if step > 1:
+        console.print(f"every {step}th of {len(points)} points; --json or --out gives all")
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"

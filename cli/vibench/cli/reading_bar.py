@@ -1,0 +1,39 @@
+"""Progress bar of an analysis, on standard error, so that standard output stays what was asked for."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+from vibench.analysis.watcher import Watcher
+
+
+class ReadingBar:
+    """Shows which recording is looked at, what is computed, and how much of it was read."""
+
+    def __init__(self, bars: Progress, bar: TaskID) -> None:
+        self._bars = bars
+        self._bar = bar
+
+    def begin(self, recording: str, stage: str) -> None:
+        """Begin a stage; until samples are read nobody knows how long it will take."""
+        self._bars.reset(self._bar, total=None, description=f"{recording}: {stage}")
+
+    def read(self, samples: int, of: int) -> None:
+        """Draw how far it is."""
+        self._bars.update(self._bar, completed=samples, total=of)
+
+
+@contextmanager
+def reading_bar() -> Iterator[Watcher]:
+    """Show the bar while inside, on a terminal only; it leaves nothing behind."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=30),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+    )
+    screen = Console(stderr=True)
+    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bars:
+        yield ReadingBar(bars, bars.add_task("opening", total=None))

@@ -1,0 +1,17 @@
+"""`vibench recover`: finish a recording that was cut off."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.acquisition.recording.recover import recover
+
+from .output import console
+
+
+def recover_recording(
+    recording: Annotated[Path, typer.Argument(metavar="NAME.h5.part", help="What was left of it.")],
+) -> None:
+    """Finish a recording that was cut off: all that was committed becomes NAME.h5."""
+    console.print(f"recovered {recover(recording)}")

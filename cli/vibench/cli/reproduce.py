@@ -1,0 +1,79 @@
+"""`vibench reproduce`: every claim of the paper that can be measured, with a verdict."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from vibench.analysis.figures.damping_score import damping_score_figure
+from vibench.analysis.figures.drawn import ImageKind
+from vibench.analysis.figures.paper.fig03_levels import levels_figure
+from vibench.analysis.figures.paper.options import FigureOptions, FrequencyGrid
+from vibench.analysis.reproduction.case import AS_CHOSEN, Case
+from vibench.analysis.reproduction.catalogue import SECTIONS
+from vibench.analysis.reproduction.document import Picture, Reproduction, reproduction_document, verdict_text
+from vibench.analysis.reproduction.evidence import Evidence
+from vibench.analysis.reproduction.reproduce import reproduction
+from vibench.analysis.reproduction.studies import levels_asked
+from vibench.sim.accuracy import Accuracy
+
+from .kept_study import kept_study
+from .output import bold, console
+from .paths import room_for_folder
+from .study import Workers
+
+PAGE = "reproduction.md"
+IMAGES = "images"
+
+
+def reproduce(
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder for the page and the studies it rests on.")
+    ],
+    markdown: Annotated[
+        Path | None,
+        typer.Option("--markdown", metavar="FILE.md", help="Write the page here; in DIR if absent."),
+    ] = None,
+    damping_time: Annotated[
+        float, typer.Option("--damping-time", metavar="S", help="c_i = damping time * k_i.")
+    ] = FigureOptions.damping_time_s,
+    accuracy: Annotated[Accuracy, typer.Option("--accuracy", help="Of every point.")] = Accuracy.QUICK,
+    grid: Annotated[
+        FrequencyGrid, typer.Option("--grid", help="Every 5 Hz (coarse) or every 1 Hz (fine).")
+    ] = FigureOptions.grid,
+    workers: Workers = None,
+) -> None:
+    """Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped."""
+    options = FigureOptions(damping_time_s=damping_time, accuracy=accuracy, grid=grid)
+    for folder in (out, *([] if markdown is None else [markdown.parent])):
+        room_for_folder(folder)
+    evidence = Evidence(lambda study: kept_study(study, out / "studies", workers))
+    found = reproduction(SECTIONS, evidence, options, lambda step: console.print(f"measuring {step}"))
+    page = out / PAGE if markdown is None else markdown
+    page.parent.mkdir(parents=True, exist_ok=True)
+    pictures = tuple(_pictures(found, evidence, options, page))
+    page.write_text(reproduction_document(found, pictures), encoding="utf-8")
+    _tell(found)
+    console.print("The page:", bold(page.resolve()))
+
+
+def _pictures(
+    found: Reproduction, evidence: Evidence, options: FigureOptions, page: Path
+) -> Iterator[Picture]:
+    """Draw what the page shows into a folder beside it."""
+    curves = evidence.study(levels_asked(Case(AS_CHOSEN, options)))
+    for drawn in (damping_score_figure(found.scores), levels_figure(options, curves)):
+        image = drawn.save(page.parent / IMAGES, (ImageKind.PNG,))[0]
+        yield Picture(drawn.title, Path(os.path.relpath(image, page.parent)).as_posix())
+
+
+def _tell(found: Reproduction) -> None:
+    rows = Table(title="What of the paper holds", title_justify="left")
+    rows.add_column("claim")
+    rows.add_column("verdict")
+    for each in found.judgements:
+        rows.add_row(each.claim.says, verdict_text(each).strip("*"))
+    console.print(rows)

@@ -1,0 +1,49 @@
+"""`vibench serve-rig`: the virtual instruments alone, for other programs."""
+
+import signal
+import threading
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.acquisition.rig.server_token import METADATA_KEY, VARIABLE
+from vibench.virtual_rig.rig import DiskFaults, VirtualRig
+
+from .output import bold, console
+from .paths import FaultsPath, rig_at
+
+
+def serve_rig(
+    bench: Annotated[
+        Path | None, typer.Option("--bench", metavar="BENCH.toml", help="A rig with a table 'virtual'.")
+    ] = None,
+    address: Annotated[
+        str,
+        typer.Option(
+            "--address", metavar="HOST:PORT", help="Where to listen; beyond this computer, with a token."
+        ),
+    ] = "127.0.0.1:31763",
+    faults: FaultsPath = None,
+) -> None:
+    """Serve the virtual rig to any pyvisa and nidaqmx program until Ctrl-C."""
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    with VirtualRig(rig_at(bench, faults), address, disk=DiskFaults.REFUSED) as rig:
+        console.print(bold(rig.rig.name), "is on. Stop it with Ctrl-C.\n")
+        console.print("The converter, for nidaqmx:")
+        console.print(f'  grpc.insecure_channel("{rig.daq_address}")  # GrpcSessionOptions(channel, "")')
+        console.print("The generator, for pyvisa in Python (one line before the resource manager):")
+        console.print(
+            f'  from acquisition.virtual.usb import usb_bus; usb_bus.plug_in_remote("{rig.daq_address}")'
+        )
+        console.print(f'  ResourceManager("@py").open_resource("{rig.visa_resource}")')
+        console.print("The generator, for any other VISA program:")
+        console.print(f"  {rig.socket_resource}")
+        if rig.token is not None:
+            console.print("\nIt is heard by other computers, and lets in whoever has the token:")
+            console.print(f"  export {VARIABLE}={rig.token}  # our own programs; others send it as metadata")
+            console.print(f"  {METADATA_KEY}: {rig.token}")
+        stop.wait()
+    console.print("The virtual rig is off.")

@@ -1,0 +1,109 @@
+"""`vibench tradeoff`: speed against accuracy, measured on this machine."""
+
+import os
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from vibench.analysis.accuracy_document import accuracy_document, worst_error
+from vibench.analysis.errors import InvalidRequest
+from vibench.analysis.figures.tradeoff import tradeoff_figure
+from vibench.sim.accuracy import Accuracy
+from vibench.sim.trade.figures import MotionTrade, Trade
+from vibench.sim.trade.measuring import Thoroughness, measured_trade
+from vibench.sim.trade.regimes import MOTIONS
+
+from .output import console, print_json
+from .paths import AsJson, room_for_folder
+
+_SHORTEST_S = 0.05
+_LONGEST_S = 60.0
+
+
+def tradeoff(
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the figure and its numbers.")
+    ] = None,
+    markdown: Annotated[
+        Path | None, typer.Option("--markdown", metavar="FILE.md", help="Write the page of docs/accuracy.md.")
+    ] = None,
+    span: Annotated[
+        float,
+        typer.Option("--span", metavar="S", help="Length of the motion compared; the paper's test is 2."),
+    ] = 2.0,
+    as_json: AsJson = False,
+) -> None:
+    """Measure what each accuracy costs and what error it makes, with and without impacts and in chaos."""
+    if not _SHORTEST_S <= span <= _LONGEST_S:
+        raise InvalidRequest(f"a span of {span} s was asked for; give {_SHORTEST_S:g} to {_LONGEST_S:g} s")
+    folder = _folder(out, markdown)
+    if folder is not None:
+        room_for_folder(folder)
+    columns = (TextColumn("{task.description:<28}"), BarColumn(bar_width=30), MofNCompleteColumn())
+    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True)) as bars:
+        bar = bars.add_task("", total=len(MOTIONS))
+
+        def step(name: str) -> None:
+            bars.update(bar, description=name, advance=0 if bars.tasks[0].description == "" else 1)
+
+        trade = measured_trade(Thoroughness(span_s=span), step)
+        bars.update(bar, completed=len(MOTIONS))
+    if as_json:
+        print_json(_document(trade))
+    else:
+        for each in trade.motions:
+            _tell(each)
+    if folder is not None:
+        _save(trade, folder, markdown)
+
+
+def _folder(out: Path | None, markdown: Path | None) -> Path | None:
+    """Where the figure goes: beside the page, unless something else is asked for."""
+    return out if out is not None or markdown is None else markdown.parent / "images"
+
+
+def _save(trade: Trade, folder: Path, markdown: Path | None) -> None:
+    paths = tradeoff_figure(trade).save(folder)
+    if markdown is not None:
+        picture = Path(os.path.relpath(paths[0], markdown.parent)).as_posix()
+        markdown.write_text(accuracy_document(trade, picture), encoding="utf-8")
+
+
+def _tell(found: MotionTrade) -> None:
+    rows = Table(title=f"{found.motion.regime.value}: {found.motion.name}", title_justify="left")
+    for heading in ("", "simulated s per s", "error of the state", "of Response I"):
+        rows.add_column(heading)
+    for level in found.levels:
+        first = (
+            f"scatter {level.response_i_scatter:.1%}"
+            if level.response_i_scatter > 0.0
+            else _number(level.response_i_error)
+        )
+        rows.add_row(level.accuracy.value, f"{1 / level.cost:.0f}", _number(level.state_error), first)
+    for solver in found.solvers:
+        rows.add_row(f"scipy {solver.name}", f"{1 / solver.cost:.2g}", _number(solver.state_error), "")
+    console.print(rows)
+    console.print(f"{found.advice}\n")
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.1e}"
+
+
+def _document(trade: Trade) -> dict[str, object]:
+    return {
+        "machine": trade.machine,
+        "software": trade.software,
+        "motions": [
+            {**asdict(each), "name": each.motion.name, "advice": each.advice} for each in trade.motions
+        ],
+        "promises": [
+            {"level": level.value, "promised": level.promise, "worst": worst_error(trade, level)}
+            for level in Accuracy
+        ],
+    }

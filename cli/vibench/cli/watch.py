@@ -1,0 +1,77 @@
+"""`vibench watch`, `stop` and `release`: look at an engine on this computer, end its run, or let it go on."""
+
+import time
+from typing import Annotated
+
+import typer
+
+from vibench.acquisition.engine.announcement import Announcement, announced_engines, the_engine
+from vibench.acquisition.engine.client import EngineClient
+from vibench.acquisition.engine.errors import EngineGone
+from vibench.acquisition.engine.state import DRIVING
+from vibench.acquisition.run.stop import StopLevel
+
+from .engine_bars import INTERVAL_S, EngineBars
+from .output import console, print_json
+from .paths import AsJson
+
+Pid = Annotated[
+    int | None, typer.Option("--pid", metavar="N", help="Process of the engine; the only one if absent.")
+]
+
+
+def watch(pid: Pid = None, as_json: AsJson = False) -> None:
+    """Watch what an engine carries out, from any terminal of the same user; Ctrl-C leaves it be."""
+    if as_json:
+        print_json({"engines": [_facts(each) for each in announced_engines() if pid in (None, each.pid)]})
+        return
+    engine = the_engine(pid)
+    console.print(
+        f"{engine.what}, process {engine.pid}, since {engine.started_utc}; Ctrl-C ends the watching."
+    )
+    try:
+        with EngineClient.attach(engine.address) as client, EngineBars() as bars:
+            while (status := client.status()).state in DRIVING:
+                bars.draw(status)
+                time.sleep(INTERVAL_S)
+            bars.draw(status)
+    except EngineGone:
+        console.print("The engine has ended.")
+    except KeyboardInterrupt:
+        console.print("The engine goes on.")
+
+
+def stop(
+    pid: Pid = None,
+    level: Annotated[
+        StopLevel,
+        typer.Option(
+            "--level",
+            help="How hard: held until vibench release, the plan's ramp, the shortest ramp, or off at once.",
+        ),
+    ] = StopLevel.RAMP,
+    reason: Annotated[str, typer.Option("--reason", help="Stands in the recording.")] = "vibench stop",
+) -> None:
+    """Stop what an engine drives, and the campaign with it; the recording is kept and says why."""
+    engine = the_engine(pid)
+    with EngineClient.attach(engine.address) as client:
+        client.stop(level, reason)
+    told = (
+        "to hold; 'vibench release' lets it go on" if level is StopLevel.HOLD else f"to stop ({level.value})"
+    )
+    console.print(f"{engine.what}, process {engine.pid}: told {told}.")
+
+
+def release(pid: Pid = None) -> None:
+    """Let a run go on that was held with vibench stop --level hold, or in the window."""
+    engine = the_engine(pid)
+    with EngineClient.attach(engine.address) as client:
+        # A hold may be asked for before there is anything to hold, as in a rest: it is taken back as well.
+        client.resume()
+    console.print(f"{engine.what}, process {engine.pid}: told to go on.")
+
+
+def _facts(engine: Announcement) -> dict[str, object]:
+    with EngineClient.attach(engine.address) as client:
+        status = client.status().model_dump(mode="json")
+    return {"pid": engine.pid, "what": engine.what, "started_utc": engine.started_utc, "status": status}

@@ -1,0 +1,146 @@
+"""Work that takes longer than a frame: done in another process, asked after by a timer."""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+from typing import Any, ParamSpec, TypeVar
+
+from PySide6.QtCore import QObject, QTimer
+
+from vibench.acquisition.follow_parent import follow_parent
+
+POLL_MS = 50
+NICE = 10
+BEGUN_EACH = 2
+"""Jobs handed to each process: the one that it does, and the next, so that it need not wait for a poll."""
+
+Asked = ParamSpec("Asked")
+Answer = TypeVar("Answer")
+
+
+@dataclass(eq=False)
+class Job:
+    """One piece of work; an answer that nobody wants any more is dropped."""
+
+    work: Callable[[], Any]
+    on_answer: Callable[[Any], None]
+    on_error: Callable[[BaseException], None]
+    is_wanted: bool = True
+    future: Future[Any] | None = None
+    """None until it is begun; never cancelled, since a process that dies chokes on that."""
+
+    @property
+    def is_over(self) -> bool:
+        """Whether there is nothing to come: it was done, or dropped before it was begun."""
+        return not self.is_wanted if self.future is None else self.future.done()
+
+    def drop(self) -> None:
+        """Want the answer no more; work that has not begun is not done."""
+        self.is_wanted = False
+
+
+def give_way() -> None:
+    """Let a measurement, and the window, have the processor first; end with the window, however it ends."""
+    follow_parent()
+    if hasattr(os, "nice"):
+        os.nice(NICE)
+
+
+class Background(QObject):
+    """Spawned processes without Qt; answers come in the thread of the window.
+
+    Functions and what they take and give must be importable and picklable: they cross processes.
+    """
+
+    def __init__(self, workers: int, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._workers = workers
+        self._pool: ProcessPoolExecutor | None = None
+        self._jobs: list[Job] = []
+        self._is_closed = False
+        self._timer = QTimer(self)
+        self._timer.setInterval(POLL_MS)
+        self._timer.timeout.connect(self._poll)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether an answer is still to come."""
+        return bool(self._jobs)
+
+    def prepare(self) -> None:
+        """Start the processes now: to start one costs a moment that no frame of a run has."""
+        pool = self._started()
+        for _ in range(self._workers):
+            pool.submit(os.getpid)
+
+    def ask(
+        self,
+        function: Callable[Asked, Answer],
+        on_answer: Callable[[Answer], None],
+        on_error: Callable[[BaseException], None],
+        *args: Asked.args,
+        **kwargs: Asked.kwargs,
+    ) -> Job:
+        """Call ``function`` elsewhere; then ``on_answer`` or ``on_error`` here."""
+        if self._is_closed:
+            # Asked by a timer that outlived the window: nobody is left to be told.
+            return Job(os.getpid, on_answer, on_error, is_wanted=False)
+        job = Job(partial(function, *args, **kwargs), on_answer, on_error)
+        self._jobs.append(job)
+        self._begin()
+        self._timer.start()
+        return job
+
+    def _begin(self) -> None:
+        """Hand over as many jobs as keep the processes busy."""
+        begun = sum(job.future is not None for job in self._jobs)
+        waiting = [job for job in self._jobs if job.future is None and job.is_wanted]
+        for job in waiting[: max(0, BEGUN_EACH * self._workers - begun)]:
+            try:
+                job.future = self._started().submit(job.work)
+            except BrokenProcessPool:  # a process was killed; its jobs are told so, and others do the rest
+                self._pool = None
+                job.future = self._started().submit(job.work)
+
+    def _started(self) -> ProcessPoolExecutor:
+        if self._pool is None:
+            self._pool = ProcessPoolExecutor(
+                self._workers, mp_context=get_context("spawn"), initializer=give_way
+            )
+        return self._pool
+
+    def close(self) -> None:
+        """End the processes; what has not been answered is dropped."""
+        self._is_closed = True
+        self._timer.stop()
+        self._jobs.clear()
+        pool, self._pool = self._pool, None
+        if pool is not None:
+            # It offers no kill; and its thread, left alone, would outlive the pool that it works for.
+            processes = list((pool._processes or {}).values())  # noqa: SLF001
+            thread: Any = pool._executor_manager_thread  # noqa: SLF001
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in processes:
+                process.kill()
+            if thread is not None:
+                thread.join()
+
+    def _poll(self) -> None:
+        over = [job for job in self._jobs if job.is_over]
+        # Not asked again: one may have ended since.
+        self._jobs = [job for job in self._jobs if job not in over]
+        self._begin()
+        if not self._jobs:
+            self._timer.stop()
+        for job in over:
+            if job.future is None or not job.is_wanted:
+                continue
+            error = job.future.exception()
+            if error is None:
+                job.on_answer(job.future.result())
+            else:
+                job.on_error(error)

@@ -1,0 +1,84 @@
+"""Arming in plain words: what is going to happen, then a second, explicit act to start it."""
+
+from PySide6.QtCore import Signal, SignalInstance
+from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+
+from vibench.acquisition.engine.state import DRIVING, EngineState
+from vibench.acquisition.engine.status import EngineStatus
+
+_HINTS = {
+    EngineState.CLOSED: "No bench is open. Open one on the Rig page (Ctrl+1).",
+    EngineState.OPENING: "The bench is being opened.",
+    EngineState.CHECKING: "The bench is being checked.",
+    EngineState.FAULT: "The bench is not usable. Open it again on the Rig page (Ctrl+1).",
+}
+
+
+class ArmCard(QGroupBox):
+    """Arm, then Start or Cancel; while something runs: hold, go on."""
+
+    arm_wanted = Signal()
+    start_wanted = Signal()
+    cancel_wanted = Signal()
+    hold_wanted = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__("What will happen", parent)
+        self._words = QLabel()
+        self._words.setWordWrap(True)
+        self._words.setAccessibleName("What will happen")
+        self.arm_button = self._button(
+            "A&rm…  (Ctrl+Return)", "Say in words what will happen", self.arm_wanted
+        )
+        self.arm_button.setProperty("rank", "first")
+        self.cancel_button = self._button("Cancel", "Disarm; nothing was played", self.cancel_wanted)
+        self.start_button = self._button("▶ Start  (F5)", "Start the drive", self.start_wanted)
+        self.start_button.setProperty("rank", "first")
+        self.hold_button = self._button("Hold", "Stay where the run is; the drive stays on", self.hold_wanted)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.cancel_button)
+        buttons.addWidget(self.start_button)
+        layout = QVBoxLayout(self)
+        layout.addWidget(self._words)
+        layout.addWidget(self.arm_button)
+        layout.addLayout(buttons)
+        layout.addWidget(self.hold_button)
+        self._was_armed = False
+
+    @property
+    def words(self) -> str:
+        """What is said."""
+        return self._words.text()
+
+    def show_status(self, status: EngineStatus | None, test: str, reason: str) -> None:
+        """Show what can be done now; ``reason`` says why the test cannot be armed, empty when it can."""
+        state = EngineState.CLOSED if status is None else status.state
+        armed = None if status is None else status.armed
+        is_armed = state is EngineState.ARMED and armed is not None
+        if is_armed and armed is not None:
+            left = f"Disarms itself in {armed.expires_in_s:.0f} s."
+            self._say("\n".join((f"Campaign {armed.campaign}", *armed.lines, left)))
+        elif state in DRIVING:
+            self._say("Plan and limits are fixed while it runs. Stop ramps down; Esc aborts.")
+        else:
+            self._say(_HINTS.get(state) or reason or f"Ready to arm: {test}")
+        self.arm_button.setVisible(not is_armed and state not in DRIVING)
+        self.arm_button.setEnabled(state is EngineState.READY and not reason)
+        self.cancel_button.setVisible(is_armed)
+        self.start_button.setVisible(is_armed)
+        self.hold_button.setVisible(state in (EngineState.RUNNING, EngineState.HELD))
+        self.hold_button.setText("Go on" if state is EngineState.HELD else "Hold")
+        if is_armed and not self._was_armed:
+            # To start needs another key than the one that armed.
+            self.cancel_button.setFocus()
+        self._was_armed = is_armed
+
+    def _say(self, text: str) -> None:
+        if self._words.text() != text:
+            self._words.setText(text)
+
+    def _button(self, text: str, tip: str, wanted: SignalInstance) -> QPushButton:
+        button = QPushButton(text)
+        button.setToolTip(tip)
+        button.clicked.connect(lambda _checked=False: wanted.emit())
+        return button

@@ -1,0 +1,48 @@
+"""Tests by name: those of the campaigns that come with vibench, and one's own, as TOML files."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition.plan.campaign import load_campaign
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.shipped import all_shipped
+from vibench.acquisition.toml_file import load_toml
+
+MOST_OF_ONE = 12
+"""Tests listed of one campaign; sweeps make hundreds."""
+
+
+@dataclass(frozen=True)
+class NamedTest:
+    """A test and where it is from."""
+
+    label: str
+    measurement: Measurement
+
+
+def shipped_tests() -> tuple[NamedTest, ...]:
+    """Every measurement of the campaigns that come with vibench."""
+    found: list[NamedTest] = []
+    for path in all_shipped("campaigns"):
+        campaign = load_campaign(path)
+        found += [
+            NamedTest(f"{campaign.name} / {each.name}", each) for each in campaign.measurements[:MOST_OF_ONE]
+        ]
+    return tuple(sorted(found, key=lambda test: (not test.label.startswith("quick"), test.label)))
+
+
+def own_tests(folder: Path) -> tuple[NamedTest, ...]:
+    """Every test that was saved in a folder; a file that cannot be read is left out."""
+    found: list[NamedTest] = []
+    for path in sorted(folder.glob("*.toml")):
+        try:
+            found.append(NamedTest(f"own / {path.stem}", load_test(path)))
+        except ConfigurationError:
+            continue
+    return tuple(found)
+
+
+def load_test(path: Path) -> Measurement:
+    """Read a test; raises ConfigurationError with file, key and what is allowed."""
+    return load_toml(path, Measurement)

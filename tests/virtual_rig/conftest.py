@@ -1,0 +1,159 @@
+"""A small analogue world that behaves, and programs connected to a simulated DAQ that samples it."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+
+import grpc
+import numpy as np
+import pytest
+from nidaqmx import GrpcSessionOptions, Task
+
+from vibench.acquisition.errors import ConfigurationError
+from vibench.virtual_rig.analogue import Coupling, Input
+from vibench.virtual_rig.daqmx.pace import Pace
+from vibench.virtual_rig.daqmx.server import DaqServer, serve
+
+OFFSET_V = 0.5
+LOOPED_BACK = {"Dev1/ai0": "Dev1/ao0", "Dev2/ai0": "Dev2/ao0"}
+
+
+def signal(physical_channel: str, time_s):
+    """What a channel without a cable to an output sees: a sine of its own, on 0.5 V."""
+    number = int(physical_channel.rpartition("ai")[2])
+    return OFFSET_V + (number + 1) * np.sin(2 * np.pi * 40 * (number + 1) * time_s)
+
+
+@dataclass
+class Played:
+    """Samples an output holds for one period each, from a moment on."""
+
+    start_s: float
+    rate_hz: float
+    volts: np.ndarray
+
+    @property
+    def end_s(self) -> float:
+        return self.start_s + self.volts.size / self.rate_hz
+
+
+@dataclass
+class Sampling:
+    """Ideal conversion: no noise, no delay; clips at the range, AC coupling takes the offset away."""
+
+    world: "LoopbackWorld"
+    inputs: tuple[Input, ...]
+    rate_hz: float
+    start_s: float
+    count: int = 0
+    clipped: np.ndarray | None = None
+
+    def read(self, count: int) -> np.ndarray:
+        time_s = self.start_s + (self.count + np.arange(count)) / self.rate_hz
+        self.count += count
+        self.world.time_s = max(self.world.time_s, self.start_s + self.count / self.rate_hz)
+        volts = np.stack([self.world.voltage(each, time_s) for each in self.inputs])
+        limits = np.array([[each.range_v] for each in self.inputs])
+        clipped = np.any(np.abs(volts) > limits, axis=1)
+        self.clipped = clipped if self.clipped is None else self.clipped | clipped
+        return np.clip(volts, -limits, limits)
+
+    def overloaded(self) -> np.ndarray:
+        clipped, self.clipped = self.clipped, None
+        return np.zeros(len(self.inputs), bool) if clipped is None else clipped
+
+    def close(self) -> None:
+        self.world.conversions.remove(self)
+
+
+@dataclass
+class LoopbackWorld:
+    """Every input sees its own sine, except those with a cable to an output."""
+
+    time_s: float = 0.0
+    gain: float = 1.0
+    slowest_hz: float = 0.0
+    played: dict[str, list[Played]] = field(default_factory=dict)
+    conversions: list[Sampling] = field(default_factory=list)
+    wirings: list[tuple[Input, ...]] = field(default_factory=list)
+
+    def advance(self, duration_s: float) -> None:
+        self.time_s += duration_s
+
+    def sample(self, inputs: tuple[Input, ...], sample_rate_hz: float) -> Sampling:
+        if sample_rate_hz < self.slowest_hz:
+            raise ConfigurationError(f"{sample_rate_hz:g} Hz; {self.slowest_hz:g} Hz is possible")
+        conversion = Sampling(self, inputs, sample_rate_hz, self.time_s)
+        self.conversions.append(conversion)
+        self.wirings.append(inputs)
+        return conversion
+
+    def voltage(self, wired: Input, time_s: np.ndarray) -> np.ndarray:
+        if wired.physical_channel in LOOPED_BACK:
+            return self.output(LOOPED_BACK[wired.physical_channel], time_s)
+        offset = OFFSET_V if wired.coupling is Coupling.AC else 0.0
+        return self.gain * signal(wired.physical_channel, time_s) - offset
+
+    def output(self, channel: str, time_s: np.ndarray) -> np.ndarray:
+        volts = np.zeros_like(time_s)
+        for stretch in self.played.get(channel, []):
+            index = np.floor((time_s - stretch.start_s) * stretch.rate_hz + 1e-6).astype(int)
+            inside = (index >= 0) & (index < stretch.volts.size)
+            volts[inside] = stretch.volts[index[inside]]
+        return volts
+
+    def play(self, channel: str, volts: np.ndarray, sample_rate_hz: float) -> None:
+        stretches = self.played.setdefault(channel, [])
+        end_s = stretches[-1].end_s if stretches else 0.0
+        start_s = end_s if end_s > self.time_s - 1e-9 else self.time_s
+        stretches.append(Played(start_s, sample_rate_hz, np.array(volts)))
+
+    def unplayed(self, channel: str) -> int:
+        return sum(
+            int(min(stretch.volts.size, max(0, (stretch.end_s - self.time_s) * stretch.rate_hz)))
+            for stretch in self.played.get(channel, [])
+        )
+
+    def silence(self, channel: str) -> None:
+        kept = []
+        for stretch in self.played.get(channel, []):
+            count = int(np.ceil((self.time_s - stretch.start_s) * stretch.rate_hz - 1e-6))
+            if count > 0:
+                kept.append(Played(stretch.start_s, stretch.rate_hz, stretch.volts[:count]))
+        self.played[channel] = kept
+
+
+@dataclass
+class Daq:
+    """A running server, the world behind it, and a client's way to it."""
+
+    server: DaqServer
+    world: LoopbackWorld
+    options: GrpcSessionOptions
+    resources: ExitStack
+
+    def task(self, name: str = "") -> Task:
+        """A task that is closed with the test."""
+        return self.resources.enter_context(Task(name, grpc_options=self.options))
+
+
+@pytest.fixture
+def connect() -> Iterator:
+    """Serve a fresh world at the given pace and connect to it."""
+    with ExitStack() as resources:
+
+        def open_daq(pace: Pace | None = None, **options) -> Daq:
+            world = LoopbackWorld()
+            server = resources.enter_context(serve(world, pace, **options))
+            unlimited = [("grpc.max_receive_message_length", -1), ("grpc.max_send_message_length", -1)]
+            channel = resources.enter_context(grpc.insecure_channel(server.address, options=unlimited))
+            tasks = resources.enter_context(ExitStack())
+            return Daq(server, world, GrpcSessionOptions(channel, ""), tasks)
+
+        yield open_daq
+
+
+@pytest.fixture
+def daq(connect) -> Daq:
+    """A simulated DAQ whose samples exist when asked for."""
+    return connect()

@@ -1,0 +1,148 @@
+"""What a program finds when it looks at the simulated DAQmx system."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from nidaqmx import DaqError
+from nidaqmx.constants import AcquisitionType, Coupling, ProductCategory, TerminalConfiguration, UsageTypeAI
+from nidaqmx.error_codes import DAQmxErrors
+from nidaqmx.scale import Scale
+from nidaqmx.system import System
+
+from vibench.acquisition.errors import ConfigurationError
+from vibench.virtual_rig.daqmx.devices import NI_9234, USB_6211, catalogue_with
+from vibench.virtual_rig.daqmx.names import assigned_names, expand
+
+
+@pytest.fixture
+def system(daq):
+    return System.remote(daq.options)
+
+
+def test_the_driver_is_new_enough_for_the_single_call_read_of_everything(system):
+    assert system.driver_version >= (24, 5)
+
+
+def test_every_device_is_listed_with_product_and_serial_number(system):
+    products = {device.name: device.product_type for device in system.devices}
+    assert products == {
+        "cDAQ1": "cDAQ-9174",
+        "cDAQ1Mod1": "NI 9234",
+        "Dev1": "USB-4431",
+        "Dev2": "USB-6211",
+    }
+    serials = [device.serial_num for device in system.devices]
+    assert len(set(serials)) == 4
+    assert all(serials)
+
+
+def test_a_module_knows_its_chassis_and_the_chassis_its_modules(system):
+    module = system.devices["cDAQ1Mod1"]
+    assert module.compact_daq_chassis_device.name == "cDAQ1"
+    assert module.compact_daq_slot_num == 1
+    assert [each.name for each in system.devices["cDAQ1"].chassis_module_devices] == ["cDAQ1Mod1"]
+    with pytest.raises(DaqError, match="chassis"):
+        _ = system.devices["Dev1"].compact_daq_chassis_device
+
+
+def test_the_ni_9234_shows_what_its_manual_says(system):
+    module = system.devices["cDAQ1Mod1"]
+    assert module.ai_voltage_rngs == [-5.0, 5.0]
+    assert module.ai_max_single_chan_rate == 51200.0
+    assert module.ai_max_multi_chan_rate == 51200.0
+    assert module.ai_min_rate == pytest.approx(51200 / 31)
+    assert module.ai_simultaneous_sampling_supported
+    assert set(module.ai_couplings) == {Coupling.AC, Coupling.DC}
+    assert module.ai_current_int_excit_discrete_vals == [0.0, 0.002]
+    assert module.product_category is ProductCategory.C_SERIES_MODULE
+    assert UsageTypeAI.ACCELERATION_ACCELEROMETER_CURRENT_INPUT in module.ai_meas_types
+    assert [channel.name for channel in module.ai_physical_chans] == [f"cDAQ1Mod1/ai{n}" for n in range(4)]
+    assert not list(module.ao_physical_chans)
+    assert module.ai_physical_chans["ai0"].ai_term_cfgs == [TerminalConfiguration.PSEUDO_DIFF]
+
+
+def test_the_usb_4431_has_one_output_and_triggers(system):
+    device = system.devices["Dev1"]
+    assert device.ao_voltage_rngs == [-3.5, 3.5]
+    assert device.ao_max_rate == 96e3
+    assert device.ai_max_multi_chan_rate == 102.4e3
+    assert device.dig_trig_supported
+    assert "/Dev1/PFI7" in device.terminals
+    assert set(device.ai_samp_modes) == {AcquisitionType.FINITE, AcquisitionType.CONTINUOUS}
+
+
+def test_what_a_device_does_not_have_is_refused_by_name_and_not_made_up(system):
+    with pytest.raises(DaqError, match=r"(?s)analogue output.*cDAQ1Mod1") as caught:
+        _ = system.devices["cDAQ1Mod1"].ao_max_rate
+    assert caught.value.error_code == DAQmxErrors.ATTR_NOT_SUPPORTED
+    with pytest.raises(DaqError, match=r"Device\.PCI_BUS_NUM"):
+        _ = system.devices["Dev1"].pci_bus_num
+
+
+def test_an_unknown_device_is_refused_with_the_devices_there_are(system):
+    with pytest.raises(DaqError, match="Dev1") as caught:
+        _ = system.devices["Dev9"].product_type
+    assert caught.value.error_code == DAQmxErrors.INVALID_DEVICE_ID
+
+
+def test_device_services_answer(system):
+    device = system.devices["Dev1"]
+    device.self_test_device()
+    device.reset_device()
+
+
+def test_a_scale_keeps_its_parameters(daq):
+    scale = Scale.create_lin_scale("twice", 2.0, 1.0, scaled_units="m/s", grpc_options=daq.options)
+    assert (scale.lin_slope, scale.lin_y_intercept, scale.scaled_units) == (2.0, 1.0, "m/s")
+    with pytest.raises(DaqError, match=r"Scale\.POLY"):
+        _ = scale.poly_forward_coeff
+
+
+def test_a_device_can_bear_the_name_a_configuration_gives_it(connect):
+    daq = connect(catalogue=catalogue_with("NI 9234", "cDAQ2Mod5"))
+    system = System.remote(daq.options)
+    assert system.devices["cDAQ2Mod5"].product_type == "NI 9234"
+    assert [each.name for each in system.devices["cDAQ1"].chassis_module_devices] == ["cDAQ2Mod5"]
+
+
+@pytest.mark.parametrize(("product", "name"), [("NI 9999", "Dev1"), ("NI 9234", "dev1")])
+def test_an_impossible_system_is_refused(product, name):
+    with pytest.raises(ConfigurationError, match="nothing was started"):
+        catalogue_with(product, name)
+
+
+@given(st.floats(NI_9234.inputs.rates.minimum_hz, NI_9234.inputs.rates.maximum_hz))
+def test_a_9234_rate_is_the_next_one_up_and_stays_when_asked_for_again(rate_hz):
+    rates = NI_9234.inputs.rates
+    actual = rates.next_up(rate_hz)
+    available = 51200 / np.arange(1, 32)
+    assert np.min(np.abs(available / actual - 1)) < 1e-12
+    assert actual >= rate_hz * (1 - 1e-12)
+    assert not np.any((available > rate_hz * (1 + 1e-9)) & (available < actual * (1 - 1e-9)))
+    assert rates.next_up(actual) == actual
+
+
+def test_the_6211_divides_its_timebase():
+    assert USB_6211.inputs.rates.next_up(3000.0) == 20e6 / 6666
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("Dev1/ai0", ("Dev1/ai0",)),
+        ("Dev1/ai0:2", ("Dev1/ai0", "Dev1/ai1", "Dev1/ai2")),
+        ("Dev1/ai0:Dev1/ai1", ("Dev1/ai0", "Dev1/ai1")),
+        ("Dev1/ai2:0", ("Dev1/ai2", "Dev1/ai1", "Dev1/ai0")),
+        (" Dev1/ai0 , Dev2/ai3:4", ("Dev1/ai0", "Dev2/ai3", "Dev2/ai4")),
+        ("", ()),
+    ],
+)
+def test_lists_and_ranges_of_names_are_understood(text, names):
+    assert expand(text) == names
+
+
+def test_one_name_for_many_channels_is_numbered():
+    assert assigned_names("force", ("a", "b")) == ("force0", "force1")
+    assert assigned_names("x, y", ("a", "b")) == ("x", "y")
+    assert assigned_names("", ("a", "b")) == ("a", "b")

@@ -1,0 +1,213 @@
+"""Errors of the simulated driver: natural ones in the states that cause them, and injected ones."""
+
+import grpc
+import numpy as np
+import pytest
+from nidaqmx import DaqError, GrpcSessionOptions, SessionInitializationBehavior, Task
+from nidaqmx._stubs import nidaqmx_pb2, nidaqmx_pb2_grpc
+from nidaqmx.constants import AcquisitionType, TaskMode
+from nidaqmx.error_codes import DAQmxErrors
+from nidaqmx.errors import DaqReadError, RpcError
+from nidaqmx.system import System
+from session_pb2 import Session
+
+from vibench.virtual_rig.daqmx.faults import Fault, ServerGone
+
+
+def code_of(action):
+    with pytest.raises(DaqError) as caught:
+        action()
+    return caught.value.error_code
+
+
+@pytest.fixture
+def task(daq):
+    task = daq.task("measure")
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai0:1")
+    task.timing.cfg_samp_clk_timing(1000, sample_mode=AcquisitionType.CONTINUOUS)
+    return task
+
+
+def test_a_device_in_use_is_refused_and_the_holder_named(daq, task):
+    task.start()
+    rival = daq.task("rival")
+    rival.ai_channels.add_ai_voltage_chan("Dev1/ai3")
+    with pytest.raises(DaqError, match=r"(?s)measure.*rival") as caught:
+        rival.start()
+    assert caught.value.error_code == DAQmxErrors.PAL_RESOURCE_RESERVED
+    task.stop()
+    rival.start()
+
+
+def test_inputs_and_outputs_of_one_device_do_not_disturb_each_other(daq, task):
+    task.start()
+    output = daq.task()
+    output.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-1, max_val=1)
+    output.timing.cfg_samp_clk_timing(1000)
+    output.write(np.zeros(1000), auto_start=True)
+
+
+def test_a_task_without_channels_can_do_nothing(daq):
+    empty = daq.task()
+    assert code_of(empty.start) == DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK
+    assert code_of(lambda: empty.timing.cfg_samp_clk_timing(1000)) == (
+        DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK
+    )
+
+
+def test_a_running_task_cannot_be_changed(task):
+    task.start()
+    for change in (
+        task.start,
+        lambda: task.timing.cfg_samp_clk_timing(2000),
+        lambda: task.ai_channels.add_ai_voltage_chan("Dev1/ai3"),
+        lambda: setattr(task.timing, "samp_clk_rate", 2000.0),
+    ):
+        assert code_of(change) == DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING
+
+
+def test_a_cleared_task_is_gone(daq):
+    task = Task("short", grpc_options=daq.options)
+    interpreter, handle = task._interpreter, task._handle
+    task.close()
+    assert code_of(lambda: interpreter.start_task(handle)) == DAQmxErrors.INVALID_TASK
+
+
+def test_a_second_task_of_a_name_is_refused_or_joined_as_the_program_wishes(daq, task):
+    def options(behavior):
+        return GrpcSessionOptions(daq.options.grpc_channel, "", initialization_behavior=behavior)
+
+    new = options(SessionInitializationBehavior.INITIALIZE_SERVER_SESSION)
+    assert code_of(lambda: Task("measure", grpc_options=new)) == DAQmxErrors.DUPLICATE_TASK
+    join = options(SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION)
+    with Task("measure", grpc_options=join) as joined:
+        assert joined.channel_names == task.channel_names
+    assert task.channel_names  # leaving the second one has not cleared the first
+    assert code_of(lambda: Task("nothing", grpc_options=join)) == DAQmxErrors.INVALID_TASK
+
+
+def test_waiting_for_a_task_that_does_not_end_says_so(task):
+    task.start()
+    assert code_of(lambda: task.wait_until_done(timeout=0.01)) == (
+        DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE
+    )
+
+
+def test_a_missing_trigger_times_out_without_samples(daq, task):
+    task.triggers.start_trigger.cfg_dig_edge_start_trig("/Dev1/PFI0")
+    with pytest.raises(DaqReadError) as caught:
+        task.read(10, timeout=0.01)
+    assert caught.value.error_code == DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE
+    assert caught.value.samps_per_chan_read == 0
+    daq.server.edge("/Dev1/PFI0")
+    assert np.shape(task.read(10)) == (2, 10)
+
+
+def test_a_task_on_another_ones_clock_begins_with_it(daq, task):
+    output = daq.task()
+    output.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-1, max_val=1)
+    output.timing.cfg_samp_clk_timing(1000, source="/Dev1/ai/SampleClock")
+    output.write(np.ones(1000), auto_start=True)
+    daq.world.advance(0.25)
+    task.start()
+    assert daq.world.played["Dev1/ao0"][0].start_s == 0.25
+
+
+def test_a_read_past_the_end_brings_what_there_is_and_says_so(daq):
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai1")
+    task.timing.cfg_samp_clk_timing(1000, samps_per_chan=30)
+    with pytest.raises(DaqReadError) as caught:
+        task.read(50)
+    assert caught.value.error_code == DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE
+    assert caught.value.samps_per_chan_read == 30
+
+
+def test_a_chassis_tells_its_trigger_terminal_once_it_is_reserved(daq):
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0")
+    assert code_of(lambda: task.triggers.start_trigger.term) == (
+        DAQmxErrors.CANNOT_GET_PROPERTY_WHEN_TASK_NOT_RESERVED_COMMITTED_OR_RUNNING
+    )
+    task.control(TaskMode.TASK_RESERVE)
+    assert task.triggers.start_trigger.term == "/cDAQ1/ai/StartTrigger"
+
+
+def test_resetting_a_device_stops_its_tasks_and_frees_it(daq, task):
+    task.start()
+    System.remote(daq.options).devices["Dev1"].reset_device()
+    assert not daq.world.conversions
+    rival = daq.task()
+    rival.ai_channels.add_ai_voltage_chan("Dev1/ai0")
+    rival.start()
+
+
+def test_a_world_that_cannot_begin_leaves_the_device_free(daq):
+    daq.world.slowest_hz = 2000.0
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai0")
+    task.timing.cfg_samp_clk_timing(1000)
+    with pytest.raises(DaqError, match="2000 Hz") as caught:
+        task.start()
+    assert caught.value.error_code == DAQmxErrors.INVALID_ATTRIBUTE_VALUE
+    rival = daq.task()
+    rival.ai_channels.add_ai_voltage_chan("Dev1/ai0")
+    rival.timing.cfg_samp_clk_timing(4000)
+    rival.start()
+
+
+def test_an_unknown_attribute_is_refused_by_name_or_number(daq, task):
+    channel = task.ai_channels.all
+    with pytest.raises(DaqError, match=r"Channel\.AI_LOWPASS_CUTOFF_FREQ") as caught:
+        _ = channel.ai_lowpass_cutoff_freq
+    assert caught.value.error_code == DAQmxErrors.ATTR_NOT_SUPPORTED
+    with pytest.raises(DaqError, match=r"Read\.0x7FFF"):
+        task._interpreter.get_read_attribute_uint32(task._handle, 0x7FFF)
+    with pytest.raises(DaqError, match="only be read"):
+        task._interpreter.set_chan_attribute_double(task._handle, "Dev1/ai0", 0x1815, 3.0)  # AI_RNG_HIGH
+
+
+def test_every_call_of_the_protocol_is_answered_and_what_is_not_simulated_is_named(daq):
+    stub = nidaqmx_pb2_grpc.NiDAQmxStub(daq.options.grpc_channel)
+    for name, request in [
+        ("CreateDIChan", nidaqmx_pb2.CreateDIChanRequest()),
+        ("ReadCounterF64", nidaqmx_pb2.ReadCounterF64Request()),
+        ("CfgAnlgEdgeRefTrig", nidaqmx_pb2.CfgAnlgEdgeRefTrigRequest(task=Session(name="x"))),
+    ]:
+        with pytest.raises(grpc.RpcError, match=name) as caught:
+            getattr(stub, name)(request)
+        assert caught.value.code() is grpc.StatusCode.UNIMPLEMENTED
+
+
+def test_error_texts_are_looked_up(daq, task):
+    text = task._interpreter.get_error_string(-200361)
+    assert "memory overflowed" in text
+    assert task._interpreter.get_error_string(-200018) == "Dac underflow."
+
+
+@pytest.mark.parametrize("code", [-200361, -201003, -200279, -88710])
+def test_an_injected_fault_reaches_the_reader_with_its_code(daq, task, code):
+    daq.server.faults.add(Fault("ReadAnalogF64", code, from_call=3, calls=1))
+    task.read(10)
+    task.read(10)
+    with pytest.raises(DaqReadError) as caught:
+        task.read(10)
+    assert caught.value.error_code == code
+    task.read(10)
+
+
+def test_a_fault_can_begin_at_a_rig_time(daq, task):
+    daq.server.faults.add(Fault("ReadAnalogF64", -200714, from_s=0.5))
+    for _ in range(5):
+        task.read(100)  # 0.1 s each
+    with pytest.raises(DaqReadError):
+        task.read(100)
+
+
+def test_a_server_that_is_gone_answers_nothing_until_it_is_back(daq, task):
+    daq.server.faults.add(ServerGone())
+    with pytest.raises(RpcError) as caught:
+        task.read(1)
+    assert caught.value.rpc_code is grpc.StatusCode.UNAVAILABLE
+    daq.server.faults.clear()
+    task.read(1)

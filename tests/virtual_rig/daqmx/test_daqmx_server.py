@@ -1,0 +1,116 @@
+"""The simulated DAQ as a server: other services beside it, vanished clients, other processes, and its end."""
+
+import subprocess
+import sys
+import threading
+
+import grpc
+import numpy as np
+import pytest
+from nidaqmx import Task
+from nidaqmx.constants import WAIT_INFINITELY, AcquisitionType
+from nidaqmx.error_codes import DAQmxErrors
+from nidaqmx.errors import DaqError
+
+from vibench.acquisition.errors import ConfigurationError
+from vibench.virtual_rig.daqmx.server import serve
+
+PATIENCE_S = 20.0
+
+OTHER_PROCESS = """
+import sys, grpc, numpy as np
+from nidaqmx import GrpcSessionOptions, Task
+from nidaqmx.constants import AcquisitionType
+from nidaqmx.stream_readers import AnalogMultiChannelReader
+with grpc.insecure_channel(sys.argv[1]) as channel:
+    with Task(grpc_options=GrpcSessionOptions(channel, "")) as task:
+        task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai1:3")
+        task.timing.cfg_samp_clk_timing(51200, sample_mode=AcquisitionType.CONTINUOUS)
+        block = np.empty((3, 5120))
+        reader = AnalogMultiChannelReader(task.in_stream)
+        for _ in range(5):
+            reader.read_many_sample(block, 5120)
+        print(*np.abs(block - 0.5).max(axis=1))
+"""
+
+
+def test_a_program_in_another_process_reads_the_same_world(daq):
+    done = subprocess.run(
+        [sys.executable, "-c", OTHER_PROCESS, daq.server.address], capture_output=True, text=True, check=True
+    )
+    assert [float(each) for each in done.stdout.split()] == pytest.approx([2, 3, 4], rel=1e-3)
+
+
+def test_tasks_of_a_vanished_client_are_there_until_the_reset(daq):
+    leaked = Task("leaked", grpc_options=daq.options)
+    leaked.ai_channels.add_ai_voltage_chan("Dev1/ai0")
+    leaked.timing.cfg_samp_clk_timing(1000, sample_mode=AcquisitionType.CONTINUOUS)
+    leaked.start()
+    leaked._close_on_exit, leaked._handle = False, None  # the program is gone; its task is not
+    assert daq.server.task_names == ("leaked",)
+    daq.server.reset()
+    assert daq.server.task_names == ()
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai0")
+    task.start()
+
+
+def test_another_service_can_share_the_port(connect):
+    echo = grpc.method_handlers_generic_handler(
+        "rig.Echo", {"Say": grpc.unary_unary_rpc_method_handler(lambda request, context: request[::-1])}
+    )
+    daq = connect(handlers=(echo,))
+    say = daq.options.grpc_channel.unary_unary("/rig.Echo/Say")
+    assert say(b"abc") == b"cba"
+    daq.task()
+
+
+def test_a_message_of_many_megabytes_passes(daq):
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai1:2")
+    task.timing.cfg_samp_clk_timing(100e3, sample_mode=AcquisitionType.CONTINUOUS)
+    assert np.shape(task.read(400_000)) == (2, 400_000)
+
+
+def test_the_end_of_the_server_frees_a_reader_that_waits_for_ever(connect):
+    daq = connect()
+    task = Task(grpc_options=daq.options)
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai1")
+    task.timing.cfg_samp_clk_timing(1000)
+    task.triggers.start_trigger.cfg_dig_edge_start_trig("/Dev1/PFI0")
+    task.start()
+    ends = []
+
+    def read_for_ever():
+        try:
+            task.read(10, timeout=WAIT_INFINITELY)
+        except DaqError as error:
+            ends.append(error.error_code)
+
+    reader = threading.Thread(target=read_for_ever)
+    reader.start()
+    daq.server.reset()
+    reader.join(PATIENCE_S)
+    assert not reader.is_alive()
+    # Whether the reset came during the read or just before it is a race that both outcomes may win.
+    assert ends[0] in (DAQmxErrors.RUNTIME_ABORTED_ROUTING, DAQmxErrors.INVALID_TASK)
+    task._close_on_exit, task._handle = False, None
+
+
+def test_closing_ends_every_thread_of_the_server(connect):
+    before = {thread.name for thread in threading.enumerate()}
+    daq = connect()
+    Task(grpc_options=daq.options).close()
+    daq.server.close()
+    daq.server.close()
+    after = {thread.name for thread in threading.enumerate()}
+    assert not [name for name in after - before if name.startswith(("daqmx", "rig clock"))]
+
+
+def test_an_address_in_use_is_refused_in_a_sentence(daq):
+    with pytest.raises(ConfigurationError, match=f"{daq.server.address}.*port 0"):
+        serve(daq.world, address=daq.server.address)
+
+
+def test_the_default_address_is_this_computer_only(daq):
+    assert daq.server.address.startswith("127.0.0.1:")

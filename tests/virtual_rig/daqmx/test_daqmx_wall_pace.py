@@ -1,0 +1,138 @@
+"""A simulated DAQ on a clock: samples come in their time, late readers lose them, early ones wait."""
+
+import threading
+
+import numpy as np
+import pytest
+from nidaqmx.constants import READ_ALL_AVAILABLE, AcquisitionType
+from nidaqmx.error_codes import DAQmxErrors
+from nidaqmx.errors import DaqError, DaqReadError
+
+from vibench.virtual_rig.daqmx.pace import WallPace
+
+
+class HandClock:
+    """A clock that a test moves."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+@pytest.fixture
+def clock():
+    return HandClock()
+
+
+def continuous(daq, rate_hz=1000.0, samples=1000):
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai1")
+    task.timing.cfg_samp_clk_timing(rate_hz, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=samples)
+    return task
+
+
+def wait_for(daq, samples, task):
+    """Wait until the server has caught up with its clock."""
+    rig = daq.server._rig
+    with rig.changed:
+        assert rig.changed.wait_for(lambda: rig._acquisitions[0].acquired >= samples, 10.0)
+
+
+def test_samples_exist_when_their_time_has_come_and_not_before(connect, clock):
+    daq = connect(WallPace(clock=clock))
+    task = continuous(daq)
+    task.start()
+    assert task.in_stream.avail_samp_per_chan == 0
+    with pytest.raises(DaqReadError) as caught:
+        task.read(1, timeout=0.0)
+    assert caught.value.error_code == DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE
+    clock.now_s += 0.25
+    wait_for(daq, 250, task)
+    assert task.in_stream.total_samp_per_chan_acquired == 250
+
+
+def test_a_timeout_hands_over_what_has_come(connect, clock):
+    daq = connect(WallPace(clock=clock))
+    task = continuous(daq)
+    task.start()
+    clock.now_s += 0.1
+    wait_for(daq, 100, task)
+    with pytest.raises(DaqReadError) as caught:
+        task.read(150, timeout=0.02)
+    assert caught.value.error_code == DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE
+    assert caught.value.samps_per_chan_read == 100
+    assert task.in_stream.curr_read_pos == 100
+
+
+def test_a_partial_read_of_two_channels_leaves_every_row_in_its_place(connect, clock):
+    daq = connect(WallPace(clock=clock))
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai1:2")
+    task.timing.cfg_samp_clk_timing(1000, sample_mode=AcquisitionType.CONTINUOUS)
+    task.start()
+    clock.now_s += 0.05
+    wait_for(daq, 50, task)
+    block = np.full((2, 80), np.nan)
+    with pytest.raises(DaqReadError):
+        task._interpreter.read_analog_f64(task._handle, 80, 0.01, 0, block)
+    time_s = np.arange(50) / 1000
+    np.testing.assert_allclose(block[0, :50], 0.5 + 2 * np.sin(2 * np.pi * 80 * time_s), atol=1e-9)
+    np.testing.assert_allclose(block[1, :50], 0.5 + 3 * np.sin(2 * np.pi * 120 * time_s), atol=1e-9)
+
+
+def test_a_reader_that_comes_too_late_has_lost_samples_and_is_told(connect, clock):
+    daq = connect(WallPace(clock=clock))
+    task = continuous(daq)
+    task.in_stream.input_buf_size = 500
+    task.start()
+    clock.now_s += 0.5
+    wait_for(daq, 500, task)
+    assert len(task.read(READ_ALL_AVAILABLE)) == 500
+    clock.now_s += 0.6
+    rig = daq.server._rig
+    with rig.changed:
+        assert rig.changed.wait_for(lambda: rig._acquisitions[0].failure is not None, 10.0)
+    with pytest.raises(DaqReadError) as caught:
+        task.read(10)
+    assert caught.value.error_code == DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE
+    with pytest.raises(DaqError) as caught:
+        task.is_task_done()
+    assert caught.value.error_code == DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE
+
+
+def test_a_reader_waits_for_the_clock(connect, clock):
+    daq = connect(WallPace(clock=clock))
+    task = continuous(daq)
+    task.start()
+    brought = []
+    reader = threading.Thread(target=lambda: brought.append(task.read(100, timeout=20.0)))
+    reader.start()
+    clock.now_s += 0.1
+    reader.join(20.0)
+    assert len(brought[0]) == 100
+
+
+def test_speed_makes_rig_time_pass_faster(connect, clock):
+    daq = connect(WallPace(speed=20.0, clock=clock))
+    task = continuous(daq, samples=10000)
+    task.start()
+    clock.now_s += 0.1
+    wait_for(daq, 2000, task)
+    assert task.in_stream.total_samp_per_chan_acquired == 2000
+
+
+def test_the_real_clock_brings_samples_without_a_gap(connect):
+    daq = connect(WallPace(speed=10.0))
+    task = continuous(daq, rate_hz=51200.0)
+    read = np.concatenate([task.read(5120, timeout=10.0) for _ in range(20)])
+    first_s = np.asarray(daq.world.conversions[0].start_s)
+    time_s = first_s + np.arange(read.size) / 51200
+    np.testing.assert_allclose(read, 0.5 + 2 * np.sin(2 * np.pi * 80 * time_s), atol=1e-6)
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, float("inf"), float("nan")])
+def test_a_clock_that_does_not_run_forward_is_refused(speed):
+    with pytest.raises(ValueError, match="above 0"):
+        WallPace(speed)

@@ -1,0 +1,69 @@
+"""A rig that other computers can hear lets nobody in without its token."""
+
+import grpc
+import nidaqmx
+import pytest
+from nidaqmx import GrpcSessionOptions
+
+from vibench.acquisition.bench import open_bench
+from vibench.acquisition.errors import InstrumentLost
+from vibench.acquisition.rig.calibration import CalibrationRule
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.rig.knobs import confirm_simulated
+from vibench.acquisition.rig.server_token import VARIABLE
+from vibench.virtual_rig.daqmx.token import token_for
+from vibench.virtual_rig.rig import VirtualRig
+from vibench.virtual_rig.usb.usb_remote import RemoteUsbDevice
+
+
+@pytest.fixture
+def served(pytestconfig):
+    rig = load_rig(pytestconfig.rootpath / "hardware_configs" / "virtual_rig.toml")
+    resource = "USB0::0x0699::0x0353::TOKEN::INSTR"
+    rig = rig.model_copy(update={"generator": rig.generator.model_copy(update={"resource": resource})})
+    with VirtualRig(rig, "0.0.0.0:0") as virtual:
+        yield virtual, virtual.daq_address.replace("0.0.0.0", "127.0.0.1")
+
+
+def connected(virtual, address):
+    return virtual.rig.model_copy(
+        update={"virtual": None, "daq": virtual.rig.daq.model_copy(update={"server": address})}
+    )
+
+
+def bench_on(rig):
+    return open_bench(rig, confirm=confirm_simulated, calibration=CalibrationRule.WAIVED)
+
+
+def test_loopback_needs_no_token_and_every_other_address_does():
+    assert token_for("127.0.0.1:31763") is None
+    assert token_for("localhost:0") is None
+    assert token_for("0.0.0.0:31763") != token_for("192.168.0.7:31763")
+
+
+def test_a_stranger_is_turned_away_from_converter_and_cable(served):
+    _, address = served
+    with (
+        grpc.insecure_channel(address) as channel,
+        pytest.raises(nidaqmx.errors.RpcError, match=r"UNAUTHENTICATED|served with a token"),
+    ):
+        nidaqmx.Task(grpc_options=GrpcSessionOptions(channel, ""))
+    with pytest.raises(InstrumentLost, match="UNAUTHENTICATED"):
+        RemoteUsbDevice(address)
+
+
+def test_a_bench_with_the_token_is_let_in(served, monkeypatch):
+    virtual, address = served
+    monkeypatch.setenv(VARIABLE, virtual.token)
+    with bench_on(connected(virtual, address)) as bench:
+        assert bench.digitizer.identity.model == "NI 9234"
+    remote = RemoteUsbDevice(address)
+    assert remote.identification.product == "AFG1022"
+    remote.close()
+
+
+def test_a_wrong_token_is_no_token(served, monkeypatch):
+    virtual, address = served
+    monkeypatch.setenv(VARIABLE, virtual.token[:-1])
+    with pytest.raises(InstrumentLost, match="UNAUTHENTICATED"):
+        RemoteUsbDevice(address)

@@ -1,0 +1,312 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vibench.virtual_rig.generator.afg1022 import AFG1022
+from vibench.virtual_rig.generator.scpi_command import Quirks
+
+PLAIN = Quirks(
+    first_identity_after_clear_is_empty=False,
+    high_impedance_has_ohm_sign=False,
+    unknown_is_syntax_error=False,
+    noise_is_not_played=False,
+    out_of_range_becomes_default=False,
+    dc_ignores_offset=False,
+    duty_queues_error=False,
+)
+
+
+def generator(quirks=PLAIN):
+    return AFG1022(lambda: 0.0, quirks=quirks)
+
+
+def ask(device, message):
+    return device.execute(message.encode()).data.decode("ascii").removesuffix("\n")
+
+
+def errors(device):
+    """Every queued error number, oldest first."""
+    found = []
+    while (code := int(ask(device, "SYST:ERR?").partition(",")[0])) != 0:
+        found.append(code)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("command", "query", "answer"),
+    [
+        ("OUTP1:STAT ON", "OUTP1:STAT?", "1"),
+        ("OUTPUT2 ON", "OUTP2:STAT?", "1"),
+        ("OUTP1:STAT 0", "OUTP1?", "0"),
+        ("OUTP1:IMP INF", "OUTP1:IMP?", "9.9E+37"),
+        ("OUTP1:IMP 600", "OUTP1:IMP?", "6.0E+02"),
+        ("SOUR1:FUNC:SHAP SQU", "SOUR1:FUNC?", "SQU"),
+        ("func sinusoid", "FUNC:SHAPE?", "SIN"),
+        ("SOUR2:FUNC:SHAP RAMP", "SOUR2:FUNC:SHAP?", "RAMP"),
+        ("FUNC PULSE", "FUNC?", "PULS"),
+        ("FUNC PRN", "FUNC?", "PRN"),
+        ("FUNC DC", "FUNC?", "DC"),
+        ("FUNC sinc", "FUNC?", "Sinc"),
+        ("FUNC Stair Up&Dwn", "FUNC?", "Stair Up&Dwn"),
+        ("FUNC EMEM", "FUNC?", "EMEM"),
+        ("SOUR1:FREQ 1.5kHz", "SOUR1:FREQ:FIX?", "1.5E+03"),
+        ("FREQ 1 uHz", "FREQ?", "1.0E-06"),
+        ("FREQ MAX", "FREQ?", "2.5E+07"),
+        ("FREQ DEF", "FREQ?", "1.0E+06"),
+        ("FREQ 5", "FREQ? MIN", "1.0E-06"),
+        ("SOUR1:VOLT:LEV:IMM:AMPL 2.5VPP", "VOLT?", "2.5E+00"),
+        ("VOLT 50 mVpp", "VOLT?", "5.0E-02"),
+        ("VOLT MIN", "VOLT?", "1.0E-03"),
+        ("VOLT MAX", "VOLT?", "1.0E+01"),
+        ("VOLT:OFFS -100mV", "VOLT:OFFS?", "-1.0E-01"),
+        ("PULS:DCYC 20", "PULS:DCYC?", "2.0E+01"),
+        ("BURS:STAT ON", "BURS:STAT?", "1"),
+        ("BURS:NCYC 7", "BURS:NCYC?", "7.0E+00"),
+        ("BURS:NCYC INF", "BURS:NCYC?", "9.9E+37"),
+        ("BURS:MODE GAT", "BURS:MODE?", "GAT"),
+        ("FREQ:STAR 10Hz", "FREQ:STAR?", "1.0E+01"),
+        ("FREQ:STOP 500Hz", "FREQ:STOP?", "5.0E+02"),
+        ("FREQ:MODE SWE", "FREQ:MODE?", "SWE"),
+        ("FREQ:MODE SWE;MODE CW", "FREQ:MODE?", "CW"),
+        ("FREQ:CONC ON", "FREQ:CONC?", "1"),
+        ("AM:STAT ON", "AM:STAT?", "1"),
+        ("FM:SOUR EXT", "FM:SOUR?", "EXT"),
+        ("PM:INT:FREQ 2mHz", "SOUR1:PM:INT:FREQ?", None),
+        ("PM:INT:FREQ 20kHz", "PM:INT:FREQ?", "2.0E+04"),
+        ("AM:INT:FUNC SQU", "AM:INT:FUNC:SHAP?", "SQU"),
+        ("AM:INT:FUNC EMEM", "AM:INT:FUNC?", "EMEM"),
+        ("AM:DEPT 30", "AM:DEPT?", "3.0E+01"),
+        ("FM:DEV 1kHz", "FM:DEV?", "1.0E+03"),
+        ("FSK:FREQ 2kHz", "FSK?", "2.0E+03"),
+        ("FSK:INT:RATE 5", "FSK:INT:FREQ?", "5.0E+00"),
+        ("ASK:AMPL 0.25", "ASK?", "2.5E-01"),
+        ("FUNC PULS;:PWM:STAT ON", "PWM:STAT?", "1"),
+        ("PWM:DEV:DCYC 12", "PWM:DEV?", "1.2E+01"),
+        ("PSK:DEV 90DEG", "PSK:DEV?", "1.57079632679E+00"),
+        ("DATA:DEF EMEM,512", "DATA:POIN? EMEM", "512"),
+        ("DATA:VAL EMEM,3,16383", "DATA:VAL? EMEM,3", "16383"),
+        ("DATA:COPY USER5,EMEM", "DATA:CAT?", '"EMEM","USER5"'),
+        ("DATA:COPY USER5,EMEM;DEL USER5", "DATA:CAT?", '"EMEM"'),
+        ("*ESE 60", "*ESE?", "60"),
+        ("*SRE 32", "*SRE?", "32"),
+        ("*WAI", "*OPC?", "1"),
+        ("*RST", "*TST?", "0"),
+        ("*CLS", "SYST:VERS?", "1999.0"),
+    ],
+)
+def test_a_setting_reads_back_and_leaves_no_error(command, query, answer):
+    device = generator()
+    assert device.execute(command.encode()).data == b""
+    if answer is None:  # mHz is megahertz, so this one is refused
+        assert errors(device) == [-222]
+        return
+    assert ask(device, query) == answer
+    assert errors(device) == []
+
+
+@pytest.mark.parametrize(
+    ("command", "code"),
+    [
+        ("VOLT 20.1", -222),
+        ("VOLT 0.5mV", -222),
+        ("FREQ 26MHz", -222),
+        ("FUNC RAMP;:FREQ 2MHz", -222),
+        ("BURS ON;:FREQ 1uHz", -222),
+        ("OUTP:IMP 0.1", -222),
+        ("BURS:NCYC 60000", -222),
+        ("PHAS:ADJ -1DEG", -222),
+        ("VOLT 9;VOLT:OFFS 1", -221),
+        ("FUNC PULS;:FREQ:MODE SWE", -221),
+        ("FUNC PRN;:BURS ON", -221),
+        ("FUNC PRN;:AM:STAT ON", -221),
+        ("AM:STAT ON;:FUNC PRN", -221),
+        ("FUNC SIN;:PWM:STAT ON", -221),
+        ("FUNC USER7", -224),
+        ("FUNC USER256", -224),
+        ("FUNC NOTASHAPE", -224),
+        ("FREQ", -109),
+        ("FREQ 1,2", -108),
+        ("FREQ 1V", -131),
+        ("FREQ much", -104),
+        ("VOLT:HIGH 1", -113),
+        ("VOLT:UNIT VRMS", -113),
+        ("TRIG:SOUR EXT", -113),
+        ("DATA:CAT", -113),
+        ("SOUR3:FREQ 1", -114),
+        ("SOUR2:BURS ON", -114),
+        ("DATA:DEF EMEM,1", -222),
+        ("DATA:DEF EMEM,8193", -222),
+        ("DATA:VAL EMEM,1,16384", -222),
+        ("DATA:DATA EMEM,#13abc", -161),
+        ("DATA:DATA EMEM,#14\x00\x01~~", -222),
+        ("*RCL 1", -224),
+    ],
+)
+def test_a_refused_command_queues_its_number_and_changes_nothing(command, code):
+    device = generator()
+    *before, last = command.split(";")
+    device.execute(";".join(before).encode())
+    assert errors(device) == []
+    settings = (device.settings(1), device.settings(2), device.memory.catalogue)
+    device.execute((last if last.startswith((":", "*")) else ":" + last).encode())
+    assert errors(device) == [code]
+    assert (device.settings(1), device.settings(2), device.memory.catalogue) == settings
+
+
+def test_peak_limit_is_ten_volts_open_and_five_into_fifty_ohm():
+    device = generator()
+    device.execute(b"VOLT 8;VOLT:OFFS 1")
+    assert errors(device) == []
+    device.execute(b":VOLT:OFFS 1.001")
+    assert errors(device) == [-221]
+    device.execute(b":OUTP:IMP INF;:VOLT:OFFS 2;:VOLT 16")
+    assert errors(device) == []
+    device.execute(b":VOLT 16.001")
+    assert errors(device) == [-221]
+
+
+def test_declaring_another_load_changes_the_reading_and_not_the_output():
+    device = generator()
+    device.execute(b"VOLT 2;:OUTP:IMP INF")
+    assert ask(device, "VOLT?") == "4.0E+00"
+    device.execute(b"OUTP:IMP 150")
+    assert float(ask(device, "VOLT?")) == pytest.approx(3.0)
+
+
+def test_phase_is_in_radians_and_kept_in_whole_degrees():
+    device = generator()
+    device.execute(b"PHAS:ADJ 31.9DEG")
+    assert float(ask(device, "PHAS?")) == pytest.approx(math.radians(31))
+    device.execute(f"PHAS:ADJ {math.radians(31):.12g}".encode())
+    assert float(ask(device, "PHAS?")) == pytest.approx(math.radians(31))
+
+
+def test_a_shape_that_cannot_go_so_fast_lowers_the_frequency():
+    device = generator()
+    device.execute(b"FREQ 20MHz;:FUNC SQU")
+    assert ask(device, "FREQ?") == "1.25E+07"
+
+
+def test_locked_channels_share_one_frequency():
+    device = generator()
+    device.execute(b"SOUR1:FREQ 100;:SOUR1:FREQ:CONC ON")
+    assert ask(device, "SOUR2:FREQ?") == "1.0E+02"
+    device.execute(b"SOUR2:FREQ 333")
+    assert ask(device, "SOUR1:FREQ?") == "3.33E+02"
+
+
+def test_several_queries_in_one_message_answer_in_one_line():
+    assert ask(generator(), "*OPC?;SOUR1:FREQ?;VOLT?") == "1;1.0E+06;1.0E+00"
+
+
+def test_reset_is_a_sine_of_one_megahertz_and_one_volt_with_the_output_off():
+    device = generator()
+    device.execute(b"OUTP ON;:FUNC RAMP;:FREQ 5;:VOLT 3;:VOLT:OFFS 1;:OUTP2 ON")
+    device.execute(b"*RST")
+    assert ask(device, "OUTP?;:OUTP2?;:FUNC?;:FREQ?;:VOLT?;:VOLT:OFFS?") == "0;0;SIN;1.0E+06;1.0E+00;0.0E+00"
+
+
+def test_a_saved_setup_comes_back_with_the_output_off():
+    device = generator()
+    device.execute(b"FREQ 123;:VOLT 2;:OUTP ON;*SAV 3;*RST;*RCL 3")
+    assert ask(device, "FREQ?;:VOLT?;:OUTP?") == "1.23E+02;2.0E+00;0"
+
+
+def test_the_event_register_tells_kinds_of_error_apart_and_clears_when_read():
+    device = generator()
+    assert ask(device, "*ESR?") == "128"  # power on
+    device.execute(b"NONSENSE")
+    assert ask(device, "*ESR?") == "32"
+    device.execute(b"FREQ 99MHz;*OPC")
+    assert ask(device, "*ESR?;*ESR?") == "17;0"
+
+
+def test_the_status_byte_summarises_queue_and_enabled_events():
+    device = generator()
+    assert ask(device, "*CLS;*ESE 32;*SRE 32;*STB?") == "0"
+    device.execute(b"NONSENSE")
+    assert ask(device, "*STB?") == str(4 + 32 + 64)
+
+
+def test_the_error_queue_overflows_at_its_end_and_clears_with_cls():
+    device = generator()
+    for _ in range(30):
+        device.execute(b"NONSENSE")
+    found = errors(device)
+    assert found == [-113] * 19 + [-350]
+    device.execute(b"NONSENSE;*CLS")
+    assert errors(device) == []
+
+
+@pytest.mark.parametrize("points", [2, 3, 8192])
+def test_an_uploaded_waveform_reads_back_identical(points):
+    codes = np.random.default_rng(points).integers(0, 16384, points).astype(">u2").tobytes()
+    count = str(len(codes))
+    block = f"#{len(count)}{count}".encode() + codes
+    device = generator()
+    device.execute(b"DATA:DATA EMEM," + block + b"\n")
+    device.execute(b"DATA:COPY USER255,EMEM")
+    assert device.execute(b"DATA:DATA? USER255").data == block + b"\n"
+    assert errors(device) == []
+
+
+class TestQuirks:
+    def test_the_first_identity_after_clear_is_empty_and_the_second_is_not(self):
+        device = generator(replace(PLAIN, first_identity_after_clear_is_empty=True))
+        identity = ask(device, "*IDN?")
+        assert identity.split(",")[:3] == ["TEKTRONIX", "AFG1022", "C010101"]
+        device.execute(b"*CLS")
+        assert [ask(device, "*IDN?"), ask(device, "*IDN?")] == ["", identity]
+
+    def test_high_impedance_is_answered_with_an_ohm_sign_in_gbk(self):
+        device = generator(replace(PLAIN, high_impedance_has_ohm_sign=True))
+        device.execute(b"OUTP:IMP INF")
+        reply = device.execute(b"OUTP:IMP?").data
+        assert reply == b"9.9E+37\xa6\xb8\n"
+        assert reply.decode("gbk").strip() == "9.9E+37Ω"
+
+    def test_an_unknown_query_answers_an_empty_line_and_queues_minus_102(self):
+        device = generator(replace(PLAIN, unknown_is_syntax_error=True))
+        assert device.execute(b"VOLT:LIM?").data == b"\n"
+        assert errors(device) == [-102]
+
+    def test_without_that_quirk_an_unknown_query_is_not_answered(self):
+        device = generator()
+        assert device.execute(b"VOLT:LIM?").data == b""
+        assert errors(device) == [-113]
+
+    def test_a_value_out_of_range_silently_becomes_the_default(self):
+        device = generator(replace(PLAIN, out_of_range_becomes_default=True))
+        device.execute(b"VOLT 0.2;VOLT 11;:FREQ 30MHz")
+        assert ask(device, "VOLT?;:FREQ?") == "1.0E+00;1.0E+06"
+        assert errors(device) == []
+
+    def test_the_load_may_be_a_matter_of_the_panel_alone(self):
+        device = generator(replace(PLAIN, load_is_panel_only=True))
+        device.execute(b"OUTP:IMP INF")
+        assert errors(device) == [-113]
+        device.execute(b"OUTP ON")
+        assert ask(device, "OUTP?") == "1"
+
+    def test_the_sweep_may_be_unknown(self):
+        device = generator(replace(PLAIN, sweep_is_unknown=True))
+        device.execute(b"FREQ:STAR 10")
+        assert errors(device) == [-113]
+
+    def test_the_duty_is_set_and_complained_about(self):
+        device = generator(replace(PLAIN, duty_queues_error=True))
+        device.execute(b"PULS:DCYC 20")
+        assert ask(device, "PULS:DCYC?") == "2.0E+01"
+        assert errors(device) == [-102]
+
+
+def test_a_corrupted_reply_is_followed_by_a_sound_one():
+    device = generator()
+    sound = device.execute(b"*IDN?").data
+    device.corrupt_next_reply()
+    spoilt = device.execute(b"*IDN?").data
+    assert (len(spoilt), spoilt[-1:]) == (len(sound), b"\n")
+    assert not spoilt.isascii()
+    assert device.execute(b"*IDN?").data == sound

@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vibench.virtual_rig.generator import built_in_shape
+from vibench.virtual_rig.generator.arbitrary_memory import TOP_CODE
+from vibench.virtual_rig.generator.periodic_shape import Rectangle, Sine, Table, Triangle
+
+TABLE = Table(np.random.default_rng(5).integers(0, TOP_CODE + 1, 37).astype(np.uint16))
+SHAPES = {
+    "sine": Sine(),
+    "square": Rectangle(),
+    "narrow pulse": Rectangle(0.07),
+    "triangle": Triangle(),
+    "table": TABLE,
+}
+STARTS = st.floats(0, 1, exclude_max=True)
+SPANS = st.floats(1e-6, 40)
+
+
+def mean(shape, start, span):
+    return float(shape.mean(np.array([start]), np.array([span]))[0])
+
+
+@pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
+@given(start=STARTS, span=SPANS)
+def test_a_mean_agrees_with_many_values(shape, start, span):
+    points = 20_001
+    phase = (start + span * (np.arange(points) + 0.5) / points) % 1.0
+    brute = shape.mean(phase, np.zeros(points)).mean()
+    # A midpoint sum misplaces each of the jumps (37 a cycle) by at most half a step of height 2.
+    allowed = 2 * 40 * (span + 1) / points
+    assert mean(shape, start, span) == pytest.approx(brute, abs=allowed)
+
+
+@pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
+@given(start=STARTS, first=SPANS, second=SPANS)
+def test_two_stretches_add_up_to_one(shape, start, first, second):
+    middle = (start + first) % 1.0
+    parts = first * mean(shape, start, first) + second * mean(shape, middle, second)
+    assert (first + second) * mean(shape, start, first + second) == pytest.approx(parts, abs=1e-9)
+
+
+@given(st.integers(0, 36), st.integers(1, 200))
+def test_a_table_mean_over_whole_points_is_the_mean_of_its_codes(first, count):
+    codes = TABLE.codes[np.arange(first, first + count) % 37].astype(float)
+    expected = 2 * codes.mean() / TOP_CODE - 1
+    assert mean(TABLE, (first + 1e-12) / 37, count / 37) == pytest.approx(expected, abs=1e-9)
+
+
+def test_the_lowest_and_highest_codes_are_the_ends_of_the_range():
+    table = Table(np.array([0, TOP_CODE], dtype=np.uint16))
+    values = table.mean(np.array([0.1, 0.6]), np.zeros(2))
+    assert values.tolist() == [-1.0, 1.0]
+
+
+def test_a_stretch_far_below_the_resolution_of_a_point_still_reads_the_point():
+    assert mean(TABLE, 0.3, 1e-15) == mean(TABLE, 0.3, 0.0)
+
+
+def test_a_sine_averages_to_nothing_over_a_whole_cycle():
+    assert mean(Sine(), 0.3, 1.0) == pytest.approx(0, abs=1e-15)
+
+
+def test_there_are_45_built_in_shapes_and_all_fill_the_range_but_dc():
+    assert len(built_in_shape.FORMULAS) == 45
+    for name in built_in_shape.FORMULAS:
+        codes = built_in_shape.codes(name)
+        assert len(codes) == 8192
+        if name != "DC":
+            assert (codes.min(), codes.max()) == (0, TOP_CODE), name

@@ -1,0 +1,50 @@
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vibench.virtual_rig.generator.scpi_message import message_end, units
+from vibench.virtual_rig.generator.scpi_value import as_block, block
+
+
+def test_a_chain_becomes_one_unit_for_each_command():
+    found = units(b"SOUR1:FREQ 1kHz; VOLT?;;*OPC?\n")
+    assert [(unit.header, unit.asks, unit.parameters) for unit in found] == [
+        ("SOUR1:FREQ", False, (b"1kHz",)),
+        ("VOLT", True, ()),
+        ("*OPC", True, ()),
+    ]
+
+
+def test_only_the_first_unit_of_a_line_starts_at_the_root():
+    found = units(b"FREQ 1;VOLT 2\nPHAS 3;DEL 4\n")
+    assert [unit.starts_line for unit in found] == [True, False, True, False]
+
+
+def test_separators_inside_quotes_separate_nothing():
+    (unit,) = units(b"TEXT \"a;b,c\n\",'d,e'\n")
+    assert unit.parameters == (b'"a;b,c\n"', b"'d,e'")
+
+
+@given(st.binary(max_size=300))
+def test_a_block_passes_any_bytes_unchanged_between_other_units(data):
+    message = b"FREQ 1;:DATA EMEM," + as_block(data) + b";VOLT?\n"
+    _, upload, query = units(message)
+    assert block(upload.parameters[1]) == data
+    assert query.header == "VOLT"
+
+
+@given(st.binary(max_size=300), st.binary(max_size=20))
+def test_a_stream_is_cut_after_the_newline_that_is_not_in_the_block(data, after):
+    message = b"DATA EMEM," + as_block(data) + b"\n"
+    assert message_end(message + after) == len(message)
+
+
+@given(st.binary(min_size=1, max_size=300), st.data())
+def test_no_message_ends_before_it_is_complete(data, draw):
+    message = b"DATA EMEM," + as_block(data) + b"\n"
+    cut = draw.draw(st.integers(0, len(message) - 1))
+    assert message_end(message[:cut]) is None
+
+
+def test_an_indefinite_block_lasts_to_the_end_of_the_message():
+    (upload,) = units(b"DATA EMEM,#0\x01\x02;\n\x03")
+    assert block(upload.parameters[1]) == b"\x01\x02;\n\x03"

@@ -1,0 +1,276 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vibench.virtual_rig.generator.afg1022 import AFG1022
+from vibench.virtual_rig.generator.output_signal import Panel
+from vibench.virtual_rig.generator.scpi_command import Quirks
+from vibench.virtual_rig.generator.terminal_voltage import Terminal
+
+INTERVAL_S = 1 / 51_200
+FIRMWARE = Quirks()
+PANEL = Panel()
+OPEN = Terminal(load_ohm=math.inf, noise_v_per_rt_hz=0.0)
+
+
+class Rig:
+    """A generator whose clock is what has been rendered so far, as in the virtual rig."""
+
+    def __init__(self, terminal=OPEN, quirks=FIRMWARE, panel=PANEL):
+        self.time_s = 0.0
+        self.generator = AFG1022(lambda: self.time_s, terminal=terminal, quirks=quirks, panel=panel)
+        self.send("OUTP1:IMP INF")
+
+    def send(self, message):
+        self.generator.execute(message.encode())
+
+    def upload(self, codes):
+        data = np.asarray(codes, dtype=">u2").tobytes()
+        count = str(len(data))
+        self.generator.execute(f"DATA:DATA EMEM,#{len(count)}{count}".encode() + data)
+
+    def render(self, count, interval_s=INTERVAL_S):
+        volts = self.generator.render(self.time_s, interval_s, count)
+        self.time_s += count * interval_s
+        return volts
+
+
+def sine_means(amplitude_v, frequency_hz, start_s, count, interval_s=INTERVAL_S, phase=0.0):
+    """Closed form of the mean of a sine over each interval."""
+    edges = phase + 2 * np.pi * frequency_hz * (start_s + interval_s * np.arange(count + 1))
+    return -amplitude_v * np.diff(np.cos(edges)) / (2 * np.pi * frequency_hz * interval_s)
+
+
+def test_a_sine_has_the_amplitude_and_phase_it_was_set_to():
+    rig = Rig()
+    rig.send("FREQ 100;:VOLT 3;:VOLT:OFFS 0.5;:PHAS 30DEG;:PHAS:INIT;:OUTP ON")
+    expected = 0.5 + sine_means(1.5, 100.0, 0.0, 2000, phase=math.radians(30))
+    assert rig.render(2000) == pytest.approx(expected, abs=1e-11)
+
+
+def test_an_output_that_is_off_is_exactly_silent_whatever_is_set():
+    rig = Rig(Terminal(noise_v_per_rt_hz=1e-3))
+    rig.send("FREQ 100;:VOLT 3;:VOLT:OFFS 2")
+    assert not rig.render(1000).any()
+    rig.send("OUTP ON")
+    assert rig.render(1000).any()
+    rig.send("OUTP OFF")
+    assert not rig.render(1000).any()
+
+
+@pytest.mark.parametrize(
+    ("declared", "load_ohm", "factor"),
+    [("50", math.inf, 2.0), ("50", 50.0, 1.0), ("INF", math.inf, 1.0), ("50", 15e3, 2 * 15e3 / 15050)],
+)
+def test_the_real_voltage_is_twice_the_displayed_one_if_the_declared_50_ohm_are_not_there(
+    declared, load_ohm, factor
+):
+    rig = Rig(Terminal(load_ohm=load_ohm, noise_v_per_rt_hz=0.0))
+    rig.send(f"OUTP:IMP {declared};:FREQ 100;:VOLT 1;:OUTP ON")
+    assert rig.render(512).max() == pytest.approx(0.5 * factor, rel=1e-4)
+
+
+def test_the_phase_does_not_jump_when_the_frequency_changes():
+    rig = Rig()
+    rig.send("FREQ 100;:VOLT 2;:PHAS:INIT;:OUTP ON")
+    first = rig.render(777)
+    rig.send("FREQ 133.7")
+    second = rig.render(777)
+    change_s = 777 * INTERVAL_S
+    phase = 2 * np.pi * (100 - 133.7) * change_s
+    assert first == pytest.approx(sine_means(1.0, 100.0, 0.0, 777), abs=1e-10)
+    assert second == pytest.approx(sine_means(1.0, 133.7, change_s, 777, phase=phase), abs=1e-10)
+
+
+def test_a_command_acts_at_the_time_it_arrives_even_inside_an_interval():
+    rig = Rig(quirks=Quirks(dc_ignores_offset=False))
+    rig.send("FUNC DC;:VOLT:OFFS 1;:OUTP ON")
+    rig.time_s = 2.25 * INTERVAL_S
+    rig.send("VOLT:OFFS 3")
+    rig.time_s = 0.0
+    assert rig.render(4) == pytest.approx([1, 1, 0.25 * 1 + 0.75 * 3, 3])
+
+
+def test_what_is_already_rendered_is_never_changed_afterwards():
+    rig = Rig(quirks=Quirks(dc_ignores_offset=False))
+    rig.send("FUNC DC;:VOLT:OFFS 1;:OUTP ON")
+    rig.render(4)
+    rig.time_s = INTERVAL_S  # a clock that lags behind the rendering
+    rig.send("VOLT:OFFS 3")
+    rig.time_s = 4 * INTERVAL_S
+    assert rig.render(3) == pytest.approx([3, 3, 3])
+
+
+def test_arbitrary_means_agree_with_a_brute_force_staircase():
+    rig = Rig()
+    codes = np.random.default_rng(1).integers(0, 16384, 1000)
+    rig.upload(codes)
+    repetition_hz, oversampling = 3.7, 2000
+    rig.send(f"FUNC EMEM;:FREQ {repetition_hz};:VOLT 2;:PHAS:INIT;:OUTP ON")
+    count = 600
+    times = (np.arange(count * oversampling) + 0.5) * INTERVAL_S / oversampling
+    points = np.floor((times * repetition_hz % 1.0) * 1000).astype(int)
+    staircase = (2 * codes[points] / 16383 - 1).reshape(count, oversampling).mean(axis=1)
+    assert rig.render(count) == pytest.approx(staircase, abs=2.0 / oversampling)
+
+
+def test_arbitrary_means_are_exact_where_an_interval_is_a_whole_number_of_points():
+    rig = Rig()
+    codes = np.random.default_rng(2).integers(0, 16384, 8192)
+    rig.upload(codes)
+    rig.send("FUNC EMEM;:FREQ 1;:VOLT 2;:PHAS:INIT;:OUTP ON")
+    interval_s = 4 / 8192  # a power of two: no rounding of time
+    expected = 2 * codes.reshape(2048, 4).mean(axis=1) / 16383 - 1
+    assert np.abs(rig.render(2048, interval_s) - expected).max() < 1e-12
+
+
+def test_a_waveform_changed_in_memory_is_heard_at_once():
+    rig = Rig()
+    rig.upload([0, 0])
+    rig.send("FUNC EMEM;:FREQ 10;:VOLT 2;:OUTP ON")
+    assert rig.render(3) == pytest.approx([-1, -1, -1])
+    rig.upload([16383, 16383])
+    assert rig.render(3) == pytest.approx([1, 1, 1])
+
+
+MODES = {
+    "sine": "FREQ 123.4",
+    "square": "FUNC SQU;:FREQ 123.4",
+    "arbitrary": "FUNC EMEM;:FREQ 2",
+    "sweep": "FREQ:STAR 50;STOP 900;MODE SWE",
+    "AM": "FREQ 1000;:AM:INT:FREQ 7;:AM:STAT ON",
+    "FM": "FREQ 1000;:FM:DEV 300;:FM:INT:FREQ 7;:FM:STAT ON",
+    "PM": "FREQ 1000;:PM:DEV 90DEG;:PM:INT:FREQ 7;:PM:STAT ON",
+    "FSK": "FREQ 1000;:FSK:FREQ 300;:FSK:INT:RATE 70;:FSK:STAT ON",
+    "PSK": "FREQ 1000;:PSK:DEV 180DEG;:PSK:INT:RATE 70;:PSK:STAT ON",
+    "ASK": "FREQ 1000;:ASK:AMPL 0.1;:ASK:INT:RATE 70;:ASK:STAT ON",
+    "PWM": "FUNC PULS;:FREQ 1000;:PWM:DEV 20;:PWM:INT:FREQ 7;:PWM:STAT ON",
+    "burst": "FREQ 100;:BURS:NCYC 3;:BURS ON;*TRG",
+    "noise": "FUNC PRN",
+}
+
+
+@pytest.mark.parametrize("mode", MODES.values(), ids=MODES)
+def test_blocks_of_any_size_give_the_same_samples(mode):
+    def rendered(sizes):
+        rig = Rig(Terminal(seed=3, clock_error_ppm=20), Quirks(noise_is_not_played=False))
+        rig.upload(np.random.default_rng(3).integers(0, 16384, 500))
+        rig.send(mode)
+        rig.send("OUTP ON")
+        return np.concatenate([rig.render(size) for size in sizes])
+
+    whole = rendered([9000])
+    assert whole.std() > 0
+    assert np.array_equal(whole, rendered([1, 999, 4096, 3, 3901]))
+
+
+@given(seed=st.integers(0, 2**31), density=st.floats(1e-8, 1e-3))
+def test_the_noise_has_the_rms_of_its_density_in_half_the_sample_rate(seed, density):
+    rig = Rig(
+        Terminal(load_ohm=math.inf, noise_v_per_rt_hz=density, seed=seed), Quirks(dc_ignores_offset=False)
+    )
+    rig.send("FUNC DC;:OUTP ON")
+    noise = rig.render(20_000)
+    expected = density * math.sqrt(1 / (2 * INTERVAL_S))
+    # The rms of 20 000 normal samples scatters by 0.5 %; six of that never happens.
+    assert noise.std() == pytest.approx(expected, rel=0.03)
+
+
+def test_two_seeds_give_two_noises_and_one_seed_gives_one():
+    def noise(seed):
+        rig = Rig(Terminal(seed=seed))
+        rig.send("OUTP ON")
+        return rig.render(100)
+
+    assert np.array_equal(noise(1), noise(1))
+    assert not np.array_equal(noise(1), noise(2))
+
+
+def test_a_clock_that_is_fast_makes_every_frequency_higher():
+    rig = Rig(Terminal(load_ohm=math.inf, noise_v_per_rt_hz=0, clock_error_ppm=100.0))
+    rig.send("FREQ 1000;:VOLT 2;:PHAS:INIT;:OUTP ON")
+    assert rig.render(5000) == pytest.approx(sine_means(1.0, 1000.1, 0.0, 5000), abs=1e-9)
+
+
+def test_the_phase_has_not_drifted_after_ten_hours():
+    rig = Rig()
+    rig.send("FREQ 333.333333;:VOLT 2;:PHAS:INIT;:OUTP ON")
+    rig.time_s = 36_000.0
+    expected = sine_means(1.0, 333.333333, 0.0, 500, phase=2 * np.pi * ((333.333333 * 36_000) % 1.0))
+    assert rig.render(500) == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_burst_plays_its_cycles_once_for_each_trigger_and_then_rests():
+    rig = Rig()
+    rig.send("FREQ 100;:VOLT 2;:BURS:NCYC 3;:BURS ON;:OUTP ON")
+    assert not rig.render(1000).any()
+    start_s = rig.time_s
+    rig.send("*TRG")
+    volts = rig.render(4000)
+    cycles = round(0.03 / INTERVAL_S)
+    assert volts[:cycles] == pytest.approx(sine_means(1.0, 100.0, 0.0, cycles), abs=1e-9)
+    assert volts[cycles + 1 :] == pytest.approx(np.zeros(4000 - cycles - 1), abs=1e-9)
+    assert start_s > 0
+    rig.send("*TRG")
+    assert rig.render(500).max() > 0.9
+
+
+def test_a_gated_burst_never_opens_because_the_gate_input_is_empty():
+    rig = Rig()
+    rig.send("FREQ 100;:VOLT 2;:BURS:MODE GAT;:BURS ON;:OUTP ON;*TRG")
+    assert rig.render(2000) == pytest.approx(np.zeros(2000), abs=1e-12)
+
+
+def test_a_sweep_runs_from_start_to_stop_in_the_time_set_at_the_panel():
+    rig = Rig(panel=Panel(sweep_s=0.5))
+    rig.send("VOLT 2;:FREQ:STAR 100;STOP 500;:PHAS:INIT;:FREQ:MODE SWE;:OUTP ON")
+    volts = rig.render(25_600)
+    time_s = (np.arange(25_600) + 0.5) * INTERVAL_S
+    phase = 2 * np.pi * (100 * time_s + 0.5 * (400 / 0.5) * time_s**2)
+    # The mean differs from the middle value by the sine's sag over one interval, (pi f dt)^2 / 6.
+    assert volts == pytest.approx(np.sin(phase), abs=2e-4)
+
+
+def test_amplitude_modulation_swings_between_nothing_and_the_full_amplitude():
+    rig = Rig()
+    rig.send("FREQ 1000;:VOLT 2;:AM:DEPT 100;:AM:INT:FREQ 5;:AM:STAT ON;:OUTP ON")
+    envelope = np.abs(rig.render(51_200)).reshape(-1, 512).max(axis=1)
+    assert envelope.max() == pytest.approx(1.0, abs=0.01)
+    assert envelope.min() < 0.03
+
+
+def test_noise_is_accepted_but_the_shape_before_goes_on_playing():
+    rig = Rig()
+    rig.send("FREQ 100;:VOLT 2;:PHAS:INIT;:OUTP ON;:FUNC PRN")
+    assert rig.generator.execute(b"FUNC?").data == b"PRN\n"
+    assert rig.render(1000) == pytest.approx(sine_means(1.0, 100.0, 0.0, 1000), abs=1e-10)
+
+
+def test_noise_that_does_play_is_far_too_wide_for_a_shaker():
+    rig = Rig(quirks=Quirks(noise_is_not_played=False))
+    rig.send("FUNC PRN;:VOLT 10;:OUTP ON")
+    # Vpp/6 over 25 MHz leaves sqrt(25.6 kHz / 25 MHz) of it (hardware reference, section 2).
+    assert rig.render(20_000).std() == pytest.approx(10 / 6 * math.sqrt(25_600 / 25e6), rel=0.03)
+
+
+def test_the_built_in_dc_ignores_the_offset_and_a_flat_waveform_does_not():
+    rig = Rig()
+    rig.send("FUNC DC;:VOLT:OFFS 1;:OUTP ON")
+    assert not rig.render(5).any()
+    rig.upload([8191, 8191])
+    rig.send("FUNC EMEM;:VOLT 0.002")
+    assert rig.render(5) == pytest.approx([1] * 5, abs=1e-6)
+
+
+def test_a_welded_relay_keeps_playing_although_the_output_reports_off():
+    rig = Rig()
+    rig.send("FREQ 100;:VOLT 2;:OUTP ON")
+    rig.generator.weld_output_relay()
+    rig.send("OUTP OFF")
+    assert rig.generator.execute(b"OUTP?").data == b"0\n"
+    assert rig.render(512).max() == pytest.approx(1.0, rel=1e-3)
+    rig.generator.repair_output_relay()
+    assert not rig.render(512).any()

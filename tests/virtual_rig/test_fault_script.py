@@ -1,0 +1,241 @@
+"""A script of faults: each begins at its rig time, heals after its time, and has its effect."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vibench.acquisition.bench import open_bench
+from vibench.acquisition.campaign.kept_bench import KeptBench
+from vibench.acquisition.errors import (
+    ConfigurationError,
+    DataLost,
+    InstrumentBusy,
+    InstrumentError,
+    InstrumentLost,
+)
+from vibench.acquisition.recording.disk_room import claim_room
+from vibench.acquisition.rig.configuration import load_rig, with_faults
+from vibench.acquisition.rig_power import RigPower
+from vibench.virtual_rig.analogue import Coupling, Input
+from vibench.virtual_rig.fault_kinds import DISK_FAULTS
+from vibench.virtual_rig.fault_script import FaultScript, PlayedFault, load_fault_script
+from vibench.virtual_rig.rig import DiskFaults, VirtualRig
+
+ROOT = Path(__file__).parents[2]
+NIGHT = ROOT / "hardware_configs" / "faults" / "night.toml"
+STEP_S = 1 / 102_400
+_serials = itertools.count(1)
+
+
+@pytest.fixture
+def rig():
+    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    resource = f"USB0::0x0699::0x0353::F{next(_serials):04d}::INSTR"
+    return rig.model_copy(
+        update={
+            "daq": rig.daq.model_copy(update={"sample_rate_hz": 5120}),
+            "generator": rig.generator.model_copy(update={"resource": resource}),
+        }
+    )
+
+
+@pytest.fixture
+def scripted(rig, tmp_path):
+    def make(text, **changes):
+        path = tmp_path / "faults.toml"
+        path.write_text(text, encoding="utf-8")
+        changed = rig.model_copy(update={"virtual": rig.virtual.model_copy(update=changes)})
+        return with_faults(changed, path)
+
+    return make
+
+
+def fault(name, at_s, **parameters):
+    lines = [f"{key} = {value!r}".replace("'", '"') for key, value in parameters.items()]
+    return "\n".join(["[[faults]]", f"at_s = {at_s}", f'fault = "{name}"', *lines, ""])
+
+
+def read_for(bench, duration_s):
+    """Read in tenths of a second, as a run does."""
+    rate_hz = bench.digitizer.sample_rate_hz
+    for _ in range(round(duration_s / 0.1)):
+        bench.digitizer.read(round(0.1 * rate_hz))
+
+
+class TestTheScript:
+    def test_the_shipped_night_has_twenty_faults_that_all_end_within_eight_hours(self):
+        faults = load_fault_script(NIGHT).faults
+        assert len(faults) == 20
+        assert max(each.at_s + (each.for_s or 0.0) for each in faults) < 8 * 3600
+        kinds = {each.fault for each in faults}
+        asked_for = {
+            "pull_usb_cable", "overrun", "reserve_device", "lose_daq_server", "jump_clock", "drop_laser",
+            "over_range", "stick_output", "fill_disk", "slow_disk",
+        }  # fmt: skip
+        assert asked_for <= kinds
+
+    @pytest.mark.parametrize(
+        ("text", "said"),
+        [
+            (fault("pull_the_plug", 1), "pull_the_plug.*pull_usb_cable"),
+            (fault("drop_laser", 1), "for_s is missing"),
+            (fault("jump_clock", 1, by_ms=3), "by_s is missing.*by_ms is not a known key"),
+            (fault("overrun", -1), r"at_s = -1"),
+        ],
+    )
+    def test_a_fault_that_nobody_can_play_is_refused_by_name(self, tmp_path, text, said):
+        path = tmp_path / "faults.toml"
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(ConfigurationError, match=rf"faults\.toml.*{said}"):
+            load_fault_script(path)
+
+    def test_a_configuration_names_its_script_from_its_own_folder(self, tmp_path):
+        (tmp_path / "bad.toml").write_text(fault("overrun", 1), encoding="utf-8")
+        text = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text(encoding="utf-8")
+        (tmp_path / "rig.toml").write_text(text + '\nfaults = "bad.toml"\n', encoding="utf-8")
+        assert Path(load_rig(tmp_path / "rig.toml").virtual.faults) == tmp_path / "bad.toml"
+
+    def test_a_real_rig_has_no_script(self, rig):
+        with pytest.raises(ConfigurationError, match="is a real one"):
+            with_faults(rig.model_copy(update={"virtual": None}), NIGHT)
+
+    @pytest.mark.parametrize("name", sorted(DISK_FAULTS))
+    def test_a_rig_that_only_serves_refuses_faults_of_a_disk_it_cannot_reach(self, scripted, name):
+        text = fault(name, 1, **({"delay_s": 0.1} if name == "slow_disk" else {}))
+        with pytest.raises(ConfigurationError, match="befall the program that records"):
+            VirtualRig(scripted(text), disk=DiskFaults.REFUSED)
+
+
+class TestTime:
+    def test_every_fault_begins_at_its_step_however_the_world_is_advanced(self, scripted):
+        text = fault("corrupt_reply", 0.12345) + fault("over_range", 0.5, for_s=0.1)
+        shown = []
+        for piece_s in (0.05, 0.7):
+            with VirtualRig(scripted(text)) as virtual:
+                sampler = virtual.world.sample((Input("cDAQ1Mod1/ai3", 5.0, Coupling.DC),), 51_200)
+                count = round(piece_s * 51_200)
+                parts = [sampler.read(count)[0] for _ in range(round(0.7 / piece_s))]
+                shown.append(np.concatenate(parts))
+                assert virtual.played_faults == (
+                    PlayedFault("corrupt_reply", pytest.approx(0.12345, abs=STEP_S)),
+                    PlayedFault("over_range", pytest.approx(0.5, abs=STEP_S)),
+                )
+        np.testing.assert_array_equal(*shown)
+        full = np.flatnonzero(shown[0] > 3.9) / 51_200
+        assert (full[0], full[-1]) == pytest.approx((0.5, 0.6), abs=2e-3)
+
+    def test_a_rig_on_the_walls_clock_plays_its_script_too(self, scripted):
+        text = fault("overrun", 0.3)
+        with open_bench(scripted(text, pace="wall", speed=3.0)) as bench:
+            bench.digitizer.start()
+            with pytest.raises(DataLost):
+                read_for(bench, 2.0)
+
+    def test_a_rig_lives_on_while_its_bench_is_closed_and_opened(self, scripted):
+        with RigPower(scripted(fault("corrupt_reply", 1.0))) as power:
+            for _ in range(3):
+                with open_bench(power.rig, power=power) as bench:
+                    bench.digitizer.start()
+                    read_for(bench, 0.5)
+                    bench.digitizer.stop()
+            assert [each.fault for each in power.played_faults] == ["corrupt_reply"]
+
+
+class TestEffects:
+    @pytest.mark.parametrize(
+        ("name", "parameters", "error"),
+        [
+            ("overrun", {}, DataLost),
+            ("lose_daq_server", {}, InstrumentLost),
+            ("fail_daq", {"call": "ReadAnalogF64", "code": -200361}, DataLost),
+        ],
+    )
+    def test_a_fault_of_the_converter_stops_its_reader_and_heals(self, scripted, name, parameters, error):
+        with KeptBench(scripted(fault(name, 0.5, for_s=0.4, **parameters))) as kept:
+            kept.bench.digitizer.start()
+            with pytest.raises(error):
+                read_for(kept.bench, 1.0)
+            kept.reopen()  # in another second of rig time
+            kept.bench.digitizer.start()
+            read_for(kept.bench, 0.5)
+
+    def test_a_fault_ends_in_time_for_a_program_that_does_nothing_but_try_again(self, scripted):
+        with open_bench(scripted(fault("overrun", 0.1, for_s=2.0))) as bench:
+            failures = 0
+            for _ in range(10):
+                bench.digitizer.start()
+                try:
+                    read_for(bench, 0.3)
+                except DataLost:
+                    failures += 1
+                bench.digitizer.stop()
+        # The first at once, half a second each after it, and nothing else lets the time of this rig pass.
+        assert failures == 5
+
+    def test_a_full_disk_is_emptied_in_time_for_who_tries_again(self, scripted, tmp_path):
+        with RigPower(scripted(fault("fill_disk", 0.1, for_s=2.5))) as power:
+            power.let_pass(0.2)
+            refusals = 0
+            for attempt in range(10):
+                try:
+                    claim_room(tmp_path / f"{attempt}", 10, 10)
+                except OSError:
+                    refusals += 1
+            assert refusals == 4  # the first at once, a second each after it
+
+    def test_a_device_taken_by_another_program_is_named_as_such_until_it_is_given_back(self, scripted):
+        with KeptBench(scripted(fault("reserve_device", 0.2, for_s=1.5))) as kept:
+            kept.bench.digitizer.start()
+            read_for(kept.bench, 0.5)  # a task that runs goes on
+            with pytest.raises(InstrumentBusy, match="another program"):
+                kept.reopen()
+            kept.reopen()
+
+    @pytest.mark.parametrize(
+        ("name", "said"), [("pull_usb_cable", "amplifier"), ("hang_generator", "MAY STILL BE ON")]
+    )
+    def test_a_generator_out_of_reach_is_found_at_the_next_command_and_comes_back(self, scripted, name, said):
+        with KeptBench(scripted(fault(name, 0.2, for_s=1.5))) as kept:
+            kept.bench.digitizer.start()
+            read_for(kept.bench, 0.3)
+            with pytest.raises(InstrumentError, match=said):
+                kept.bench.generator.set_amplitude(0.1)
+            with pytest.raises(InstrumentError):
+                kept.reopen()
+            kept.reopen()
+            kept.bench.generator.set_amplitude(0.1)
+
+    def test_a_clock_that_jumps_turns_the_phase_by_as_much(self, scripted):
+        with open_bench(scripted(fault("jump_clock", 1.0, by_s=0.0025))) as bench:
+            bench.generator.load_sine(100.0, 1.0)
+            bench.generator.start()
+            bench.digitizer.start()
+            volts = bench.digitizer.read(2 * 5120).volts[0]
+        time_s = np.arange(5120) / 5120
+        turned = np.exp(-2j * np.pi * 100.0 * time_s)
+        middle = slice(512, 4608)
+        before, after = (np.angle(np.sum((part * turned)[middle])) for part in (volts[:5120], volts[5120:]))
+        assert (after - before) % (2 * np.pi) == pytest.approx(np.pi / 2, abs=0.02)
+
+    def test_a_knob_that_was_turned_is_turned_back(self, scripted):
+        with VirtualRig(scripted(fault("turn_amplifier_gain", 0.1, gain_db=20, for_s=0.1))) as virtual:
+            gains = []
+            for _ in range(3):
+                gains.append(virtual.world.plant._tables.gain)
+                virtual.world.advance(0.11)
+            assert gains == pytest.approx([10**0.5, 10.0, 10**0.5])
+
+    def test_a_cable_that_fell_out_is_plugged_in_again(self, scripted):
+        text = fault("disconnect", 0.3, channel="cDAQ1Mod1/ai0", for_s=0.3)
+        with open_bench(scripted(text)) as bench:
+            bench.generator.load_sine(100.0, 1.0)
+            bench.generator.start()
+            bench.digitizer.start()
+            heard = [np.std(bench.digitizer.read(512).volts[0]) > 0.05 for _ in range(10)]
+        assert heard == [True] * 3 + [False] * 3 + [True] * 4
+
+
+def test_an_empty_script_is_a_quiet_night():
+    assert FaultScript().faults == ()

@@ -1,0 +1,121 @@
+"""A generator in this process, opened by a program in another one."""
+
+import errno
+import subprocess
+import sys
+import textwrap
+from concurrent.futures import ThreadPoolExecutor
+
+import grpc
+import numpy as np
+import pytest
+
+from vibench.acquisition.errors import InstrumentLost
+from vibench.virtual_rig.generator.afg1022 import AFG1022
+from vibench.virtual_rig.usb.usb_device import BULK_OUT, Setup
+from vibench.virtual_rig.usb.usb_remote import RemoteUsbDevice, usb_service
+from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
+
+
+class Rig:
+    """A generator behind a gRPC server on a free port."""
+
+    def __init__(self):
+        self.generator = AFG1022(lambda: 0.0)
+        self.cable = UsbTmcInstrument(self.generator)
+        self.server = grpc.server(ThreadPoolExecutor(max_workers=4))
+        self.server.add_generic_rpc_handlers((usb_service(self.cable),))
+        self.address = f"127.0.0.1:{self.server.add_insecure_port('127.0.0.1:0')}"
+        self.server.start()
+
+    def close(self):
+        self.server.stop(grace=None).wait()
+
+
+@pytest.fixture
+def rig():
+    one = Rig()
+    yield one
+    one.close()
+
+
+@pytest.fixture
+def proxy(rig):
+    device = RemoteUsbDevice(rig.address)
+    yield device
+    device.close()
+
+
+def test_a_program_in_another_process_needs_one_line(rig):
+    program = """
+        import sys, warnings
+        warnings.simplefilter("ignore")
+        from vibench.virtual_rig.usb import usb_bus
+        usb_bus.plug_in_remote(sys.argv[1])
+        import numpy as np
+        import pyvisa
+        rm = pyvisa.ResourceManager("@py")
+        (name,) = [name for name in rm.list_resources() if name.startswith("USB")]
+        afg = rm.open_resource(name)
+        print(afg.query("*IDN?").split(",")[1])
+        codes = np.arange(8192) * 2
+        afg.write_binary_values("DATA:DATA EMEM,", codes, datatype="H", is_big_endian=True)
+        back = afg.query_binary_values("DATA:DATA? EMEM", datatype="H", is_big_endian=True)
+        print(back == codes.tolist())
+        afg.write("FREQ 321;:OUTP ON")
+        print(afg.query("SYST:ERR?").strip())
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(program), rig.address],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert done.stdout.splitlines() == ["AFG1022", "True", '0,"No error"'], done.stderr
+    assert rig.generator.settings(1).frequency_hz == 321
+    assert np.any(rig.generator.render(0.0, 1e-7, 100))
+
+
+def test_the_proxy_says_about_itself_what_the_device_says(rig, proxy):
+    assert proxy.identification == rig.cable.identification
+
+
+def test_every_kind_of_transfer_passes_unchanged(rig, proxy):
+    proxy.bulk_out(bytes([1, 1, 254, 0, 5, 0, 0, 0, 1, 0, 0, 0]) + b"*OPC?\0\0\0")
+    proxy.bulk_out(bytes([2, 2, 253, 0, 64, 0, 0, 0, 0, 0, 0, 0]))
+    assert proxy.bulk_in(64, 1000)[12:14] == b"1\n"
+    assert proxy.control(Setup(0xA1, 128, 5, 0, 3), b"") == bytes([1, 5, 0])
+    assert proxy.interrupt_in(2, 1000) == bytes([0x85, 0])
+
+
+def test_a_timeout_and_a_stall_look_the_same_at_both_ends(proxy):
+    with pytest.raises(TimeoutError):
+        proxy.bulk_in(64, 1000)
+    with pytest.raises(BrokenPipeError):
+        proxy.bulk_out(b"")
+    proxy.clear_halt(BULK_OUT)
+    proxy.bulk_out(bytes([1, 1, 254, 0, 4, 0, 0, 0, 1, 0, 0, 0]) + b"*CLS")
+
+
+def test_a_pulled_cable_and_a_dead_server_are_both_a_device_that_is_gone(rig, proxy):
+    rig.cable.pull_cable()
+    with pytest.raises(OSError, match="No such device") as pulled:
+        proxy.bulk_out(bytes(12))
+    rig.cable.plug_cable()
+    rig.close()
+    with pytest.raises(OSError, match="No such device") as dead:
+        proxy.bulk_out(bytes(12))
+    assert pulled.value.errno == dead.value.errno == errno.ENODEV
+
+
+def test_a_connection_closed_on_this_side_is_a_device_that_is_gone(proxy):
+    proxy.close()
+    with pytest.raises(OSError, match="No such device") as error:
+        proxy.bulk_in(64, 1000)
+    assert error.value.errno == errno.ENODEV
+
+
+def test_an_address_where_no_rig_answers_is_named_in_the_error():
+    with pytest.raises(InstrumentLost, match=r"127\.0\.0\.1:1.*vibench serve-rig"):
+        RemoteUsbDevice("127.0.0.1:1")

@@ -1,0 +1,198 @@
+import errno
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vibench.virtual_rig.generator.afg1022 import AFG1022
+from vibench.virtual_rig.usb.usb_device import BULK_OUT, Setup
+from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
+
+TIMEOUT_MS = 2000
+CLASS_IN_INTERFACE, CLASS_IN_ENDPOINT = 0xA1, 0xA2
+
+
+class Host:
+    """The host's side of USBTMC, written from the standard and not from the simulation."""
+
+    def __init__(self):
+        self.generator = AFG1022(lambda: 0.0)
+        self.device = UsbTmcInstrument(self.generator)
+        self.tag = 0
+
+    def header(self, message_id, length, attributes):
+        self.tag = self.tag % 255 + 1
+        return struct.pack("<BBBBIB3x", message_id, self.tag, ~self.tag & 255, 0, length, attributes)
+
+    def write(self, payload, end=True):
+        padding = bytes(-len(payload) % 4)
+        self.device.bulk_out(self.header(1, len(payload), int(end)) + payload + padding)
+
+    def request(self, length):
+        self.device.bulk_out(self.header(2, length, 0))
+
+    def read(self, length=1024, buffer=2048):
+        """One transfer: payload and whether the message ends with it."""
+        self.request(length)
+        transfer = self.device.bulk_in(buffer, TIMEOUT_MS)
+        message_id, tag, inverse, _, size, attributes = struct.unpack_from("<BBBBIB", transfer)
+        assert (message_id, tag, inverse) == (2, self.tag, ~self.tag & 255)
+        assert len(transfer) % 4 == 0
+        return transfer[12 : 12 + size], bool(attributes & 1)
+
+    def ask(self, message):
+        self.write(message)
+        return self.read()[0]
+
+    def control(self, request, value=0, length=64, kind=CLASS_IN_INTERFACE):
+        return self.device.control(Setup(kind, request, value, 0, length), b"")
+
+
+@given(st.integers(1, 40))
+def test_a_message_may_come_in_pieces_of_any_size(size):
+    host = Host()
+    message = b"SOUR1:FREQ 1234;:SOUR1:FREQ?"
+    pieces = [message[i : i + size] for i in range(0, len(message), size)]
+    for number, piece in enumerate(pieces, start=1):
+        host.write(piece, end=number == len(pieces))
+    assert host.read() == (b"1.234E+03\n", True)
+
+
+@given(st.integers(1, 60))
+def test_a_reply_may_be_fetched_in_pieces_and_only_the_last_ends_the_message(size):
+    host = Host()
+    identity = host.ask(b"*IDN?")
+    host.write(b"*IDN?")
+    collected, ends = b"", False
+    while not ends:
+        piece, ends = host.read(length=size)
+        collected += piece
+        assert ends == (collected == identity)
+
+
+@given(st.integers(12, 64))
+def test_a_transfer_larger_than_the_hosts_buffer_continues_in_the_next_read(buffer):
+    host = Host()
+    identity = host.ask(b"*IDN?")
+    host.write(b"*IDN?")
+    host.request(1024)
+    transfer = b""
+    while len(transfer) < 12 + len(identity):
+        transfer += host.device.bulk_in(buffer, TIMEOUT_MS)
+    assert transfer[12 : 12 + len(identity)] == identity
+
+
+def test_a_termination_character_ends_a_transfer_early():
+    host = Host()
+    host.write(b"*OPC?;*OPC?")
+    host.tag += 1
+    host.device.bulk_out(struct.pack("<BBBBIBB2x", 2, host.tag, ~host.tag & 255, 0, 100, 2, ord(";")))
+    transfer = host.device.bulk_in(100, TIMEOUT_MS)
+    assert transfer[12:14] == b"1;"
+    assert host.read() == (b"1\n", True)
+
+
+def test_a_new_message_throws_away_an_unread_reply_and_says_so():
+    host = Host()
+    host.write(b"*IDN?")
+    assert host.ask(b"SYST:ERR?") == b'-410,"Query INTERRUPTED"\n'
+
+
+def test_a_read_without_a_query_times_out_and_says_so():
+    host = Host()
+    with pytest.raises(TimeoutError):
+        host.read()
+    assert host.ask(b"SYST:ERR?") == b'-420,"Query UNTERMINATED"\n'
+
+
+def test_a_late_reply_times_out_and_is_there_for_the_next_read():
+    host = Host()
+    host.generator.delay_next_reply(5.0)
+    host.write(b"*OPC?")
+    for _ in range(2):  # 2 s and 2 s of the 5 s
+        with pytest.raises(TimeoutError):
+            host.read()
+    assert host.read() == (b"1\n", True)
+
+
+def test_an_aborted_read_ends_with_a_short_packet_and_leaves_the_reply():
+    host = Host()
+    host.generator.delay_next_reply(1.0)
+    host.write(b"*OPC?")
+    host.request(100)
+    assert host.control(3, value=host.tag, length=2, kind=CLASS_IN_ENDPOINT) == bytes([1, host.tag])
+    assert host.device.bulk_in(64, TIMEOUT_MS) == b""
+    assert host.control(4, length=8, kind=CLASS_IN_ENDPOINT)[0] == 1
+    assert host.read()[0] == b"1\n"
+
+
+def test_aborting_a_read_that_is_not_there_is_refused():
+    assert Host().control(3, value=9, length=2, kind=CLASS_IN_ENDPOINT)[0] == 0x81
+
+
+def test_a_device_clear_forgets_half_a_message_and_the_unread_reply():
+    host = Host()
+    host.write(b"*IDN?")
+    host.write(b"NONSEN", end=False)
+    assert host.control(5, length=1) == b"\x01"
+    assert host.control(6, length=2)[0] == 1
+    assert host.ask(b"*OPC?") == b"1\n"
+
+
+def test_the_status_byte_says_that_a_message_waits():
+    host = Host()
+    assert host.control(128, value=2, length=3) == bytes([1, 2, 0])
+    assert host.device.interrupt_in(2, TIMEOUT_MS) == bytes([0x82, 0])
+    host.write(b"*IDN?")
+    host.control(128, value=3, length=3)
+    assert host.device.interrupt_in(2, TIMEOUT_MS) == bytes([0x83, 16])
+
+
+def test_the_interrupt_endpoint_is_silent_unless_asked():
+    with pytest.raises(TimeoutError):
+        Host().device.interrupt_in(2, TIMEOUT_MS)
+
+
+def test_capabilities_promise_488_2_remote_control_and_trigger():
+    answer = Host().control(7, length=0x18)
+    assert len(answer) == 0x18
+    assert answer[0] == 1
+    assert answer[14] & 0b111 == 0b111
+
+
+def test_a_trigger_message_starts_a_waiting_burst():
+    host = Host()
+    host.write(b"FREQ 100;:BURS ON;:OUTP ON")
+    assert abs(host.generator.render(0.0, 1e-4, 10)).max() < 1e-3
+    host.device.bulk_out(host.header(128, 0, 0))
+    assert abs(host.generator.render(1e-3, 1e-4, 30)).max() > 0.4
+
+
+@pytest.mark.parametrize("damage", [b"", b"\x01\x01\x01\x00" + bytes(8), b"\x63\x01\xfe\x00" + bytes(8)])
+def test_a_malformed_transfer_stalls_the_endpoint_until_it_is_cleared(damage):
+    host = Host()
+    with pytest.raises(BrokenPipeError):
+        host.device.bulk_out(damage)
+    with pytest.raises(BrokenPipeError):
+        host.write(b"*CLS")
+    host.device.clear_halt(BULK_OUT)
+    assert host.ask(b"*OPC?") == b"1\n"
+
+
+def test_an_unknown_class_request_stalls():
+    with pytest.raises(BrokenPipeError):
+        Host().control(99)
+
+
+def test_nothing_passes_a_pulled_cable_and_the_instrument_plays_on():
+    host = Host()
+    host.write(b"OUTP ON")
+    host.device.pull_cable()
+    for transfer in (lambda: host.write(b"OUTP OFF"), host.read, lambda: host.control(7)):
+        with pytest.raises(OSError, match="No such device") as error:
+            transfer()
+        assert error.value.errno == errno.ENODEV
+    assert host.generator.execute(b"OUTP?").data == b"1\n"
+    host.device.plug_cable()
+    assert host.ask(b"OUTP?") == b"1\n"

@@ -1,0 +1,99 @@
+"""A coarser grid of the virtual rig: what it costs in accuracy, and which ones are refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vibench.acquisition.errors import ConfigurationError, LimitExceeded
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.plan.limits import require_within_limits
+from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.rig.configuration import Rig, load_rig
+from vibench.acquisition.rig.specimen import specimen_of
+from vibench.acquisition.rig.virtual import COARSEST_GRID_RATE_HZ, WATCHED_HZ, highest_carried_hz, level_error
+from vibench.acquisition.toml_file import validated
+from vibench.virtual_rig.world.analogue_filter import RunningFilter, resonant
+from vibench.virtual_rig.world.plant import TRUTH_COLUMNS, Plant
+from vibench.virtual_rig.world.time_grid import TimeGrid
+from vibench.virtual_rig.world.world import World
+
+RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
+COARSE = TimeGrid(COARSEST_GRID_RATE_HZ)
+
+
+def rig_with(sample_rate_hz, **virtual):
+    content = RIG.model_dump(mode="json", exclude_none=True)
+    content["daq"]["sample_rate_hz"] = sample_rate_hz
+    content["virtual"] |= virtual
+    return validated(content, Rig, "rig.toml")
+
+
+def moved(frequency_hz, amplitude_v, grid):
+    """Complex amplitude of base and m0 in the fifth second, shape (2,) [m]."""
+    plant, count = Plant(RIG, specimen_of(RIG), grid.step_s), int(grid.rate_hz)
+    edges = 2 * np.pi * frequency_hz * grid.step_s * np.arange(5 * count + 1)
+    drive = -amplitude_v * np.diff(np.cos(edges)) / (edges[1] - edges[0])
+    truth = plant.move(drive, np.zeros(len(drive)), len(drive)).truth[-count:]
+    seen = truth[:, [TRUTH_COLUMNS.index("base_displacement"), TRUTH_COLUMNS.index("x")]]
+    return 2 * np.exp(-2j * np.pi * frequency_hz * grid.step_s * np.arange(count)) @ seen / count
+
+
+@pytest.mark.parametrize("frequency_hz", [60.0, 201.0, 266.0, 480.0, WATCHED_HZ])
+def test_the_coarsest_grid_moves_the_base_within_its_stated_error_and_the_specimen_as_it_should(frequency_hz):
+    coarse, fine = (moved(frequency_hz, 5e-3, TimeGrid(rate_hz)) for rate_hz in (COARSE.rate_hz, 409_600.0))
+    # Near 266 Hz the specimen pushes back with its whole resonance.
+    allowed = max(level_error(frequency_hz, COARSE.rate_hz), 6e-3)
+    assert abs(coarse[0]) == pytest.approx(abs(fine[0]), rel=allowed)
+    assert coarse[1] / coarse[0] == pytest.approx(fine[1] / fine[0], rel=1e-4)
+
+
+def test_a_resonance_beyond_the_grid_is_left_out_and_not_folded_into_the_band():
+    analogue, band_hz = resonant(30e3, 0.02), np.linspace(50.0, 2500.0, 200)
+    running = RunningFilter(analogue, COARSE.step_s)
+    error = running.response(band_hz, COARSE.step_s) / analogue.response(band_hz) - 1
+    assert np.max(np.abs(error)) < 5e-3
+    assert np.max(np.abs(error[band_hz < WATCHED_HZ])) < 5e-4
+    rang = running.run(np.concatenate([np.ones(1), np.zeros(100)]))
+    assert np.all(rang[6:] == 0.0)
+
+
+def test_impacts_are_resolved_inside_a_coarse_step():
+    rates = []
+    for grid in (TimeGrid(), COARSE):
+        plant = Plant(RIG, specimen_of(RIG), grid.step_s)
+        count = 3 * int(grid.rate_hz)
+        plant.move(0.75 * np.sin(2 * np.pi * 250 * grid.step_s * np.arange(count)), np.zeros(count))
+        rates.append(plant.impacts / 3)
+    assert rates[1] == pytest.approx(rates[0], rel=0.1)
+    assert rates[0] > 200
+
+
+@pytest.mark.parametrize("rate_hz", [6400.0, 12_799.0, 204_800.0])
+def test_a_grid_whose_error_is_too_large_is_refused_with_the_error(rate_hz):
+    with pytest.raises(
+        ConfigurationError, match=r"grid_rate_hz = .*12800 to 102400 steps.*0\.8% too little at 500 Hz"
+    ):
+        rig_with(5120.0, grid_rate_hz=rate_hz)
+
+
+def test_a_coarse_grid_is_refused_for_a_sample_rate_that_it_does_not_carry():
+    with pytest.raises(ConfigurationError, match=r"carries 6400 samples a second at most.*51200"):
+        rig_with(51_200.0, grid_rate_hz=COARSE.rate_hz)
+    world = World(rig_with(6400.0, grid_rate_hz=COARSE.rate_hz), terminal=None)
+    with pytest.raises(ConfigurationError, match=r"51200 Hz is not possible .* 12800 steps.*500 to 6400 Hz"):
+        world.sample((), 51_200.0)
+
+
+def test_a_plan_above_what_a_coarse_grid_carries_is_refused_before_anything_moves():
+    def dwell(frequency_hz):
+        excitation = Dwell(frequency_hz=frequency_hz, amplitude_vpp=0.1, duration_s=1)
+        return Measurement(name="dwell", excitation=excitation)
+
+    coarse = rig_with(6400.0, grid_rate_hz=COARSE.rate_hz)
+    carried_hz = highest_carried_hz(COARSE.rate_hz)
+    assert level_error(carried_hz, COARSE.rate_hz) == pytest.approx(0.01)
+    require_within_limits(dwell(carried_hz - 1), coarse)
+    with pytest.raises(LimitExceeded, match=r"coarse grid would be 600 Hz, allowed is at most 549.*1% off"):
+        require_within_limits(dwell(600), coarse)
+    require_within_limits(dwell(600), rig_with(6400.0))

@@ -1,0 +1,30 @@
+"""What runs behind the sockets is compiled when the rig is switched on, not while a reader waits."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[3]
+PROGRAM = """
+from pathlib import Path
+from vibench.acquisition.bench import open_bench
+from vibench.virtual_rig.world import conversion, decimation, input_stage, plant, recursive_filter
+
+kernels = (
+    plant._move, decimation._weigh, input_stage._clipped, conversion._quantise, recursive_filter._run
+)
+with open_bench(Path("hardware_configs/virtual_rig.toml")) as bench:
+    before = [len(each.signatures) for each in kernels]
+    bench.digitizer.start()
+    bench.digitizer.read(512)
+    print(before, [len(each.signatures) for each in kernels])
+"""
+
+
+def test_the_first_read_of_a_process_compiles_nothing():
+    told = subprocess.run(
+        [sys.executable, "-c", PROGRAM], cwd=ROOT, capture_output=True, text=True, check=True, timeout=120
+    )
+    before, after = told.stdout.strip().split("] ")
+    assert before.removeprefix("[") == after.strip("[]")
+    assert "0" not in after

@@ -1,0 +1,86 @@
+"""What reaches the converter: excitation, coupling, clipping."""
+
+import numpy as np
+import pytest
+
+from vibench.virtual_rig.analogue import Coupling, Input
+from vibench.virtual_rig.world.input_stage import AC_CUT_HZ, OVER_RANGE, InputStage, clip_v
+from vibench.virtual_rig.world.sensors import IEPE_BIAS_V
+from vibench.virtual_rig.world.time_grid import USUAL_GRID
+from vibench.virtual_rig.world.wiring import OPEN_INPUT, Behind, Cable, Signal
+
+SENSOR = Cable(Behind.IEPE_SENSOR, Signal.BASE_ACCELERATION)
+SOURCE = Cable(Behind.VOLTAGE_SOURCE, Signal.DRIVE)
+
+
+def stage(cable, coupling=Coupling.DC, iepe_current_a=0.0, range_v=5.0):
+    return InputStage(Input("Dev1/ai0", range_v, coupling, iepe_current_a), cable)
+
+
+def signals(value):
+    return np.tile(value, (len(Signal), 1))
+
+
+STEP_S = USUAL_GRID.step_s
+SINE = 0.5 * np.sin(2 * np.pi * 400 * STEP_S * np.arange(20_480))
+
+
+def test_an_iepe_sensor_without_excitation_shows_nothing():
+    volts, clips = stage(SENSOR).pass_on(signals(SINE))
+    assert np.all(volts == 0)
+    assert not clips
+
+
+def test_an_excited_iepe_sensor_on_ac_coupling_shows_its_signal_without_its_bias():
+    volts, clips = stage(SENSOR, Coupling.AC, 0.002).pass_on(signals(SINE))
+    assert volts == pytest.approx(SINE, abs=0.01)
+    assert not clips
+
+
+def test_the_bias_of_an_excited_iepe_sensor_overloads_a_five_volt_input_on_dc_coupling():
+    volts, clips = stage(SENSOR, Coupling.DC, 0.002).pass_on(signals(SINE))
+    assert np.all(volts == clip_v(5.0))
+    assert clips
+
+
+def test_a_wider_input_shows_bias_and_signal():
+    volts, clips = stage(SENSOR, Coupling.DC, 0.002, range_v=12.0).pass_on(signals(SINE))
+    assert volts == pytest.approx(IEPE_BIAS_V + SINE)
+    assert not clips
+
+
+def test_an_open_input_shows_nothing_unless_it_is_excited():
+    assert np.all(stage(OPEN_INPUT).pass_on(signals(SINE))[0] == 0)
+    assert stage(OPEN_INPUT, iepe_current_a=0.002).pass_on(signals(SINE))[1]
+
+
+def test_excitation_on_a_voltage_source_shifts_it_by_the_drop_in_the_source():
+    volts, _ = stage(SOURCE, iepe_current_a=0.002).pass_on(signals(SINE))
+    assert volts == pytest.approx(SINE + 0.1)
+
+
+def test_a_divider_in_front_of_the_input_divides():
+    volts, _ = stage(Cable(Behind.VOLTAGE_SOURCE, Signal.DRIVE, attenuation=10.0)).pass_on(signals(SINE))
+    assert volts == pytest.approx(SINE / 10)
+
+
+def test_ac_coupling_is_down_by_the_root_of_two_at_its_cut():
+    time_s = STEP_S * np.arange(819_200)
+    volts, _ = stage(SOURCE, Coupling.AC).pass_on(signals(np.sin(2 * np.pi * AC_CUT_HZ * time_s)))
+    assert np.max(np.abs(volts[-204_800:])) == pytest.approx(np.sqrt(0.5), rel=1e-3)
+
+
+def test_an_input_goes_a_little_beyond_its_range_before_it_clips():
+    within, clips_within = stage(SOURCE).pass_on(signals(np.array([5.0 * OVER_RANGE])))
+    beyond, clips_beyond = stage(SOURCE).pass_on(signals(np.array([-5.2])))
+    assert (within[0], clips_within) == (5.0 * OVER_RANGE, False)
+    assert (beyond[0], clips_beyond) == (-5.0 * OVER_RANGE, True)
+
+
+def test_another_cable_takes_effect_in_the_next_steps():
+    running = stage(SOURCE)
+    before, _ = running.pass_on(signals(SINE))
+    running.plug(OPEN_INPUT)
+    after, _ = running.pass_on(signals(SINE))
+    assert np.any(before != 0)
+    assert np.all(after == 0)

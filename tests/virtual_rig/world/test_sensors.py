@@ -1,0 +1,105 @@
+"""The vibrometer and the accelerometer: scale, noise, full scale, dropouts."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition.rig.configuration import load_rig
+from vibench.virtual_rig.world.disturbance import Disturbance, RandomDropouts
+from vibench.virtual_rig.world.noise import PAGE, NoiseStream
+from vibench.virtual_rig.world.sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer
+from vibench.virtual_rig.world.time_grid import FULL_BAND_HZ, USUAL_GRID
+
+RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
+GRID_RATE_HZ = USUAL_GRID.rate_hz
+FULL_SCALE_V = RIG.vibrometer.full_scale_v
+FULL_SCALE_M_PER_S = RIG.vibrometer.full_scale_m_per_s
+
+
+def vibrometer(noise_density=0.0, dropouts_per_s=0.0, **config):
+    dropouts = RandomDropouts(dropouts_per_s, NoiseStream(1, "dropouts"))
+    return Vibrometer(
+        RIG.vibrometer.model_copy(update=config), noise_density, dropouts, NoiseStream(1, "vibrometer")
+    )
+
+
+def accelerometer(noise_m_per_s2=0.0, **config):
+    return Accelerometer(
+        RIG.accelerometer.model_copy(update=config), noise_m_per_s2, NoiseStream(1, "accelerometer")
+    )
+
+
+def test_a_steady_velocity_shows_as_volts_by_the_decoders_range():
+    volts = vibrometer().show(np.full(200, 0.3 * FULL_SCALE_M_PER_S), 0)
+    assert volts[-1] == pytest.approx(0.3 * FULL_SCALE_V, rel=1e-9)
+
+
+def test_velocity_beyond_full_scale_is_clipped_and_counted():
+    instrument = vibrometer()
+    volts = instrument.show(np.full(200, -1.7 * FULL_SCALE_M_PER_S), 0)
+    assert np.min(volts) == -FULL_SCALE_V
+    assert instrument.over_range_steps > 190
+
+
+def test_the_vibrometers_noise_has_the_density_that_is_configured():
+    density = 2e-8
+    volts = vibrometer(noise_density=density).show(np.zeros(200_000), 0)
+    rms = np.std(volts) * FULL_SCALE_M_PER_S / FULL_SCALE_V
+    assert rms == pytest.approx(density * np.sqrt(GRID_RATE_HZ / 2), rel=0.01)
+
+
+def test_the_accelerometers_noise_has_its_rms_in_the_full_band():
+    acceleration = accelerometer(noise_m_per_s2=0.005).show(np.zeros(200_000), 0)
+    acceleration /= RIG.accelerometer.sensitivity_v_per_m_per_s2
+    spectrum = np.abs(np.fft.rfft(acceleration)) ** 2 * 2 / len(acceleration) ** 2
+    in_band = np.fft.rfftfreq(len(acceleration), 1 / GRID_RATE_HZ) < FULL_BAND_HZ
+    assert np.sqrt(np.sum(spectrum[in_band])) == pytest.approx(0.005, rel=0.01)
+
+
+def test_the_accelerometer_clips_at_its_full_scale():
+    limit = RIG.accelerometer.full_scale_v
+    volts = accelerometer().show(np.full(2000, 3 * limit / RIG.accelerometer.sensitivity_v_per_m_per_s2), 0)
+    assert volts[-1] == limit
+
+
+def test_the_decoders_whole_delay_is_that_of_its_bandwidth_and_the_rest():
+    config = RIG.vibrometer
+    bandwidth_s = 1 / (2 * np.pi * config.bandwidth_hz)
+    assert vibrometer().delay_steps / GRID_RATE_HZ + bandwidth_s == pytest.approx(config.delay_s)
+
+
+def test_a_delay_that_cannot_be_simulated_is_refused():
+    with pytest.raises(ConfigurationError, match=r"delay_s = 0\.1 s.*at most"):
+        vibrometer(delay_s=0.1)
+    assert vibrometer(delay_s=LONGEST_DELAY_S).delay_steps > 0
+
+
+def test_a_dropout_on_demand_replaces_the_signal_for_its_time():
+    instrument = vibrometer()
+    instrument.disturb(Disturbance(150, 160, 1.0))
+    first, second = (instrument.show(np.full(100, 0.01), start) for start in (100, 200))
+    assert np.all(first[50:60] == FULL_SCALE_V)
+    assert instrument.over_range_steps == 10
+    quiet = 0.01 / FULL_SCALE_M_PER_S * FULL_SCALE_V
+    assert np.concatenate([first[60:], second]) == pytest.approx(quiet, rel=1e-6)
+
+
+def test_dropouts_come_at_random_as_often_as_configured():
+    per_s, steps = 50.0, 1_000_000
+    found = RandomDropouts(per_s, NoiseStream(2, "dropouts")).between(0, steps)
+    begun = [one for one in found if 0 <= one.first_step < steps]
+    expected = per_s * steps / GRID_RATE_HZ
+    assert abs(len(begun) - expected) < 5 * np.sqrt(expected)
+    lengths = [one.stop_step - one.first_step for one in begun]
+    assert np.mean(lengths) == pytest.approx(RandomDropouts.MEAN_S * GRID_RATE_HZ, rel=0.15)
+
+
+def test_dropouts_do_not_depend_on_the_blocks_they_are_looked_up_in():
+    steps = 5 * PAGE  # a multiple of 640
+    whole = vibrometer(dropouts_per_s=200.0).show(np.zeros(steps), 0)
+    instrument = vibrometer(dropouts_per_s=200.0)
+    parts = [instrument.show(np.zeros(640), start) for start in range(0, steps, 640)]
+    assert np.count_nonzero(whole) > 500
+    assert np.array_equal(np.concatenate(parts), whole)
