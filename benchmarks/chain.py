@@ -10,15 +10,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.chain.chain import chain_of
-from vibench.sim.chain.integrate import integrate_chain
-from vibench.sim.chain.lyapunov import largest_chain_exponent
-from vibench.sim.chain.response import chain_response
-from vibench.sim.chain.tables import chain_tables
-from vibench.sim.drive import Harmonic
-from vibench.sim.integrate import integrate
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, gong2025, integrate
+from vibench.sim.chain import chain_of, chain_response, integrate_chain, largest_chain_exponent
+from vibench.sim.chain._tables import chain_tables
 
 REPEATS = 5
 LENGTHS = (1, 2, 4, 8, 16, 32, 64)

@@ -4,12 +4,9 @@ import time
 
 import numpy as np
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.compiled import compiled
-from vibench.sim.drive import Harmonic, LinearSweep, Sampled
-from vibench.sim.engine.interval import advance_interval, interval_tables, new_state
-from vibench.sim.integrate import integrate
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, LinearSweep, Sampled, gong2025, integrate
+from vibench.sim.kernels import compiled
+from vibench.sim.stepping import advance_interval, interval_tables, new_state
 
 REPEATS = 3
 UNITS = np.repeat([1e-4, 0.1], 3)

@@ -13,16 +13,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Harmonic
-from vibench.sim.engine.clock import clock_at
-from vibench.sim.engine.harmonic_run import advance_harmonic
-from vibench.sim.engine.harmonic_tables import harmonic_tables
-from vibench.sim.engine.interval import new_state
-from vibench.sim.growth.tangent import unit_tangent
-from vibench.sim.integrate import new_record
-from vibench.sim.lyapunov import Precision, largest_exponent
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, gong2025, largest_exponent
+from vibench.sim.exponents import Precision
+from vibench.sim.kernels import clock_at
+from vibench.sim.motion import new_record
+from vibench.sim.slots import unit_tangent
+from vibench.sim.stepping import advance_harmonic, harmonic_tables, new_state
 
 REPEATS = 5
 COST_S = 10.0

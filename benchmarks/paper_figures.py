@@ -8,12 +8,8 @@ import argparse
 import os
 import time
 
-from vibench.sim.answer.solve import solve_scene
-from vibench.sim.drive import Harmonic
-from vibench.sim.scene import Observable, Scene
-from vibench.sim.specimen import gong2025
-from vibench.sim.study.solve import solve_study
-from vibench.sim.study.study import Study
+from vibench.sim import Harmonic, Observable, Scene, gong2025, solve_scene
+from vibench.sim.study import Study, solve_study
 
 AMPLITUDES_M = (1e-6, 5e-6, 10e-6, 50e-6)
 FREQUENCIES = {"start": 10, "stop": 600, "step": 1}

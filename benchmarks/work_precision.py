@@ -21,14 +21,14 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.answer.followed_run import FollowedRun
-from vibench.sim.contact_law import PowerLaw
-from vibench.sim.independent_solution import independent_state, state_error
-from vibench.sim.plain_equations import Place, law_of, numbers_of, rates_at
-from vibench.sim.study.software import software
-from vibench.sim.trade.measuring import settled_state
-from vibench.sim.trade.regimes import MOTIONS, Regime
+from vibench.sim import Accuracy, PowerLaw
+from vibench.sim.accuracy_benchmark import MOTIONS
+from vibench.sim.accuracy_benchmark._independent_solution import independent_state, state_error
+from vibench.sim.accuracy_benchmark._measuring import settled_state
+from vibench.sim.accuracy_benchmark._plain_equations import Place, law_of, numbers_of, rates_at
+from vibench.sim.accuracy_benchmark._regimes import Regime
+from vibench.sim.scene._followed_run import FollowedRun
+from vibench.sim.study import software
 
 PERIODIC_S, CHAOTIC_S = 0.2, 0.03
 """For errors. Chaos of 112 per second makes e^3 of an error in 0.03 s: still the error of the solver."""

@@ -12,9 +12,7 @@ from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
 from vibench.acquisition.recording.layout import Origin, RecordingState
 from vibench.acquisition.recording.provenance import Provenance
 from vibench.acquisition.recording.writer import create_recording
-from vibench.sim.drive import Sampled
-from vibench.sim.integrate import integrate
-from vibench.sim.specimen import gong2025
+from vibench.sim import Sampled, gong2025, integrate
 
 RATE = 6400.0
 RAMP_S = 0.5

@@ -7,9 +7,8 @@ import pytest
 
 from vibench.analysis.accuracy_document import accuracy_document, worst_error
 from vibench.analysis.figures.tradeoff import tradeoff_figure
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.trade.measuring import Thoroughness, measured_trade
-from vibench.sim.trade.regimes import MOTIONS
+from vibench.sim import Accuracy
+from vibench.sim.accuracy_benchmark import MOTIONS, Thoroughness, measured_trade
 
 PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
 

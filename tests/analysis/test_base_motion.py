@@ -13,10 +13,7 @@ from vibench.analysis.base_motion import advanced, lowest_frequency_hz, recorded
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.recording_facts import plan_of
 from vibench.analysis.simulated_channels import shaken
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Sampled
-from vibench.sim.integrate import integrate
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Sampled, gong2025, integrate
 
 RATE = 6400.0
 

@@ -7,9 +7,7 @@ import pytest
 
 from vibench.analysis.collision_region import collisions
 from vibench.analysis.sweep import sweep_response
-from vibench.sim.drive import LinearSweep
-from vibench.sim.integrate import integrate
-from vibench.sim.specimen import gong2025
+from vibench.sim import LinearSweep, gong2025, integrate
 
 RATE = 12_800.0
 NOISE_DENSITY = 2e-7  # m/s per root hertz, a vibrometer's

@@ -10,9 +10,7 @@ from vibench.analysis.dwell import dwell_response
 from vibench.analysis.errors import InvalidRequest, NotEnoughData, UnusableData
 from vibench.analysis.spectra import spectral_density
 from vibench.analysis.stroboscope import stroboscope
-from vibench.sim.drive import Harmonic
-from vibench.sim.integrate import integrate
-from vibench.sim.specimen import gong2025
+from vibench.sim import Harmonic, gong2025, integrate
 
 RATE = 12_800.0
 DRIVE_HZ = 260.0031  # the generator's 260 Hz by the converter's clock

@@ -1,8 +1,7 @@
 """An envelope holds the signal, and touches it in every stretch."""
 
 import numpy as np
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 
 from vibench.analysis.envelope import envelope

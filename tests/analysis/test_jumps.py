@@ -7,12 +7,7 @@ from vibench.analysis.errors import InvalidRequest
 from vibench.analysis.hysteresis import hysteresis
 from vibench.analysis.jumps import jumps
 from vibench.analysis.sweep import sweep_response
-from vibench.sim.drive import LinearSweep
-from vibench.sim.integrate import integrate
-from vibench.sim.periodic.condensation import structure_of
-from vibench.sim.periodic.first_order_balance import jump_frequencies
-from vibench.sim.periodic.restoring_force import spring_of
-from vibench.sim.specimen import gong2025
+from vibench.sim import LinearSweep, gong2025, integrate, jump_frequencies, spring_of, structure_of
 
 TIME_S = 0.1 * np.arange(2000)
 FREQUENCY_HZ = 150 + TIME_S

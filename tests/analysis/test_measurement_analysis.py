@@ -14,8 +14,7 @@ from vibench.analysis.measurement_analysis import (
     analyse_recording,
 )
 from vibench.analysis.measurement_checks import Verdict
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.specimen import gong2025
+from vibench.sim import base_transmissibility, gong2025
 
 RATE = 6400.0
 

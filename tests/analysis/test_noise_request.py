@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from vibench.acquisition.instruments import Overload
 from vibench.acquisition.recording.reader import open_recording

@@ -15,8 +15,7 @@ from vibench.analysis.confidence import phase_half_width
 from vibench.analysis.errors import NotEnoughData
 from vibench.analysis.noise_response import noise_response
 from vibench.analysis.recorded_channels import RecordedChannels
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.specimen import gong2025
+from vibench.sim import base_transmissibility, gong2025
 from vibench.virtual_rig.world.input_stage import AC_CUT_HZ
 
 STREAMING = Path(__file__).parents[2] / "hardware_configs" / "virtual_rig_streaming.toml"

@@ -8,8 +8,7 @@ from vibench.analysis.difference import logarithmic_difference
 from vibench.analysis.measurement_analysis import analyse_recording
 from vibench.analysis.overlay import DwellOverlay, NoiseOverlay, SweepOverlay, equivalent_amplitude, overlay
 from vibench.analysis.prediction import paper_amplitude_m, predicted
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.specimen import gong2025
+from vibench.sim import base_transmissibility, gong2025
 
 
 def laid_over(path, **how):

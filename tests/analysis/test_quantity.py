@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from vibench.analysis.errors import InvalidRequest
 from vibench.analysis.quantity import Quantity, converted_signal, converted_transmission, derivative_factor

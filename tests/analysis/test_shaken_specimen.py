@@ -16,10 +16,7 @@ from vibench.analysis.gap_fit import fit_gap, onsets, swept_relative
 from vibench.analysis.report.findings import findings
 from vibench.analysis.shaken_specimen import shaken_specimen
 from vibench.analysis.specimen_parameters import LINEAR, Parameter, parameter_value, with_values
-from vibench.sim.drive import Sampled
-from vibench.sim.integrate import integrate
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.specimen import gong2025
+from vibench.sim import Sampled, base_transmissibility, gong2025, integrate
 
 TRUE = with_values(
     gong2025(),

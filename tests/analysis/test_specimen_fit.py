@@ -11,8 +11,7 @@ from vibench.analysis.errors import InvalidRequest, NotEnoughData
 from vibench.analysis.results import Estimator, Transmission, TransmissionSettings
 from vibench.analysis.specimen_fit import fit_specimen
 from vibench.analysis.specimen_parameters import LINEAR, Parameter, parameter_value, with_values
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.specimen import gong2025
+from vibench.sim import base_transmissibility, gong2025
 
 NOMINAL = gong2025()
 TRUE = {

@@ -6,9 +6,7 @@ import pytest
 from vibench.analysis.periodic_transmission import PeriodicSums
 from vibench.analysis.quantity import Quantity, converted_transmission
 from vibench.analysis.resonance import resonances
-from vibench.sim.drive import Sampled
-from vibench.sim.integrate import integrate
-from vibench.sim.specimen import gong2025
+from vibench.sim import Sampled, gong2025, integrate
 
 RATE = 12_800.0
 REPETITION_HZ = 4.0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition.excitation.multisine_noise import MultisineNoise
-from vibench.sim.specimen import gong2025
+from vibench.sim import gong2025
 
 PLACE = Path(__file__).parents[1] / "analysis" / "synthetic_recordings.py"
 DAMPING_S = 3.3e-5

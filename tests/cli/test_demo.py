@@ -8,8 +8,7 @@ import pytest
 from vibench.acquisition.recording.layout import RecordingState
 from vibench.acquisition.recording.reader import open_recording
 from vibench.analysis.measurement_analysis import analyse_recording
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.specimen import gong2025
+from vibench.sim import base_transmissibility, gong2025
 
 LINEAR_HZ = (95.0, 266.0, 500.0)
 TERMINAL_HZ = (201.0, 436.0)

@@ -4,9 +4,7 @@ import json
 
 import pytest
 
-from vibench.sim.drive import Harmonic
-from vibench.sim.response import steady_response
-from vibench.sim.specimen import gong2025
+from vibench.sim import Harmonic, gong2025, steady_response
 
 COMPILING_S = 300
 """For whoever runs the first of these tests after a change of the simulation."""

@@ -12,9 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.sim.study.layout import PointState
-from vibench.sim.study.results import open_study
-from vibench.sim.study.study import Study
+from vibench.sim.study import PointState, Study, open_study
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = """

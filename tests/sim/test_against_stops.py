@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.sim.against_stops import base_answer
-from vibench.sim.drive import Harmonic
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.response import steady_response
-from vibench.sim.specimen import Specimen, gong2025
+from vibench.sim import Harmonic, Specimen, base_answer, base_transmissibility, gong2025, steady_response
 
 FREQUENCY_HZ = np.array([20.0, 94.0, 201.0, 266.0, 350.0, 436.0, 500.0])
 

@@ -4,28 +4,28 @@ import subprocess
 import sys
 from pathlib import Path
 
-import vibench.sim.compiled
+import vibench.sim
 
-INNER = "from .compiled import compiled\n\n@compiled\ndef inner(x):\n    return {factor} * x\n"
+KERNELS = Path(vibench.sim.__file__).parent / "kernels"
+IMPORT = "from .kernels._compile import compiled\n"
+INNER = IMPORT + "\n@compiled\ndef inner(x):\n    return {factor} * x\n"
 
 
 def test_a_kernel_is_recompiled_when_a_kernel_that_it_calls_changes_in_another_file(tmp_path):
-    package = tmp_path / "sim"
-    package.mkdir()
-    shutil.copy(Path(vibench.sim.compiled.__file__), package / "compiled.py")
+    package = tmp_path / "vibench" / "sim"
+    (package / "kernels").mkdir(parents=True)
+    shutil.copy(KERNELS / "_compile.py", package / "kernels" / "_compile.py")
     (package / "__init__.py").write_text("")
     inner = package / "inner.py"
     (package / "outer.py").write_text(
-        "from .compiled import compiled\nfrom .inner import inner\n\n"
+        f"{IMPORT}from .inner import inner\n\n"
         "@compiled\ndef outer(x):\n    return inner(x)\n\nprint(outer(1.0))\n"
     )
     answers = []
     for factor in (2.0, 3.0):
-        inner.write_text(
-            f"from .compiled import compiled\n\n@compiled\ndef inner(x):\n    return {factor} * x\n"
-        )
+        inner.write_text(INNER.format(factor=factor))
         run = subprocess.run(
-            [sys.executable, "-c", "import sim.outer"],
+            [sys.executable, "-c", "import vibench.sim.outer"],
             cwd=tmp_path,
             capture_output=True,
             text=True,
@@ -35,12 +35,22 @@ def test_a_kernel_is_recompiled_when_a_kernel_that_it_calls_changes_in_another_f
     assert answers == [2.0, 3.0]
 
 
+def test_importing_vibench_leaves_the_cache_of_other_peoples_kernels_alone():
+    program = (
+        "from numba import config; before = config.CACHE_DIR\n"
+        "import vibench.sim.study, vibench.sim.chain, vibench.virtual_rig.rig, vibench.analysis\n"
+        "from vibench.sim import integrate, lyapunov_spectrum\n"
+        "assert config.CACHE_DIR == before, config.CACHE_DIR"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
 ARRAYS = {"Vector", "Table", "Complex", "Stride", "Watcher", "Space", "FlightTables"}
 
 
 def kernels():
     """Every kernel of the package: its name, its decorator, its syntax tree."""
-    for source in sorted((Path(vibench.sim.compiled.__file__).parent).rglob("*.py")):
+    for source in sorted(Path(vibench.sim.__file__).parent.rglob("*.py")):
         for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef):
                 decorators = {each.id for each in node.decorator_list if isinstance(each, ast.Name)}

@@ -4,26 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from pydantic import TypeAdapter
 
-from vibench.sim.contact_law import (
-    ContactLaw,
-    Hertz,
-    HuntCrossley,
-    LinearGap,
-    NoContact,
-    PowerLaw,
-    RigidStops,
-    fitted_linear_gap,
-    fitted_power_law,
-)
-from vibench.sim.engine.parameters import power_terms
-from vibench.sim.engine.power_flow import power_force
-from vibench.sim.model_name import model_named
-from vibench.sim.periodic.restoring_force import spring_of
-from vibench.sim.specimen import gong2025
+from vibench.sim import Hertz, HuntCrossley, LinearGap, NoContact, PowerLaw, RigidStops, gong2025, spring_of
+from vibench.sim.model import model_named
+from vibench.sim.model._contact_law import ContactLaw, fitted_linear_gap, fitted_power_law
+from vibench.sim.power_law import power_force
+from vibench.sim.slots import power_terms
 
 HERTZ = Hertz(4.9e9)
 GAP = 45e-6

@@ -5,23 +5,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.integrate import solve_ivp
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.contact_law import Hertz, HuntCrossley, LinearGap, RigidStops
-from vibench.sim.drive import Harmonic, LinearSweep, Sampled
-from vibench.sim.engine.contact import step_factor
-from vibench.sim.engine.contact_flow import CVX, STAGES, WIDTH, WORK_ROWS, R, W, contact_error
-from vibench.sim.engine.smooth import MOTIONS, smooth_error
-from vibench.sim.integrate import integrate
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.outcome import Outcome
-from vibench.sim.periodic.restoring_force import spring_of
-from vibench.sim.response import steady_response
-from vibench.sim.response_curve import response_curve
-from vibench.sim.specimen import gong2025
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    Hertz,
+    HuntCrossley,
+    LinearGap,
+    LinearSweep,
+    Outcome,
+    RigidStops,
+    Sampled,
+    base_transmissibility,
+    gong2025,
+    integrate,
+    response_curve,
+    spring_of,
+    steady_response,
+)
+from vibench.sim.contact import CVX, STAGES, WIDTH, R, W, step_factor
+from vibench.sim.contact._flow import WORK_ROWS, contact_error
+from vibench.sim.power_law._smooth import MOTIONS, smooth_error
 
 pytestmark = pytest.mark.timeout(300)
 """A hang is a failure: the first test compiles, the others take milliseconds."""

@@ -10,16 +10,16 @@ import pytest
 FIRST_USE = """
 import json, time
 import numpy as np
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Harmonic, Sampled
-from vibench.sim.engine.power_run import advance_under_power
-from vibench.sim.engine.rigid_stop import rebound
-from vibench.sim.engine.sample_by_sample import follow_samples
-from vibench.sim.engine.stick import hold, hold_on_series
-from vibench.sim.engine.stops_run import advance_between_stops
-from vibench.sim.growth.tangent_contact import carry_through_steps
-from vibench.sim.response import steady_response
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy
+from vibench.sim import Harmonic, Sampled
+from vibench.sim.power_law import advance_under_power
+from vibench.sim.rigid import rebound
+from vibench.sim import follow_samples
+from vibench.sim.sticking import hold, hold_on_series
+from vibench.sim.stepping._stops_run import advance_between_stops
+from vibench.sim.contact import carry_through_steps
+from vibench.sim import steady_response
+from vibench.sim import gong2025
 
 start, specimen = time.process_time(), gong2025()
 steady_response(specimen, Harmonic(260.0, 5e-6), Accuracy.QUICK, duration_s=0.2, window_s=0.1)

@@ -11,15 +11,19 @@ import numpy as np
 import pytest
 from numba import njit
 
-from vibench.sim.contact_law import LinearGap, RigidStops
-from vibench.sim.drive import Harmonic
-from vibench.sim.growth.dynamical_exponents import map_exponents
-from vibench.sim.growth.lyapunov_spectrum import lyapunov_spectrum
-from vibench.sim.growth.settling import FinalMotion
-from vibench.sim.integrate import integrate
-from vibench.sim.lyapunov import Source, Tendency, largest_exponent
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.specimen import Specimen
+from vibench.sim import (
+    Harmonic,
+    LinearGap,
+    RigidStops,
+    Specimen,
+    base_transmissibility,
+    integrate,
+    largest_exponent,
+    lyapunov_spectrum,
+)
+from vibench.sim.exponents._dynamical_exponents import map_exponents
+from vibench.sim.exponents._lyapunov import Source, Tendency
+from vibench.sim.exponents._settling import FinalMotion
 
 HEAVY, FAST, SLOW = 1e10, 3.0, 2.0
 """Mass of m0 and m2 over that of m1, and their natural frequencies; they are damped by half."""

@@ -5,13 +5,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.contact_law import Hertz, RigidStops
-from vibench.sim.drive import Harmonic
-from vibench.sim.independent_solution import independent_state, state_error
-from vibench.sim.integrate import integrate
-from vibench.sim.plain_equations import plain_rates
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, Hertz, RigidStops, gong2025, integrate
+from vibench.sim.accuracy_benchmark._independent_solution import independent_state, state_error
+from vibench.sim.accuracy_benchmark._plain_equations import plain_rates
 
 STILL = Harmonic(100.0, 0.0)
 MOVING = np.array([0.0, 0.0, 0.0, 0.0, 0.2, -0.1])

@@ -2,17 +2,21 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.integrate import simpson, solve_ivp
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.base_motion import sweep_error_m
-from vibench.sim.drive import Harmonic, LinearSweep, LogarithmicSweep, Sampled
-from vibench.sim.integrate import integrate
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.outcome import Outcome
-from vibench.sim.specimen import gong2025
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    LinearSweep,
+    LogarithmicSweep,
+    Outcome,
+    Sampled,
+    base_transmissibility,
+    gong2025,
+    integrate,
+)
+from vibench.sim.motion._base_motion import sweep_error_m
 
 PERIODIC = Harmonic(130.0, 20e-6)
 """Strikes about 260 times a second and settles on a stable period."""

@@ -5,18 +5,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.integrate import simpson, solve_ivp
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.contact_law import HuntCrossley, LinearGap, PowerLaw
-from vibench.sim.drive import Harmonic, LinearSweep, Sampled
-from vibench.sim.integrate import integrate
-from vibench.sim.outcome import Outcome
-from vibench.sim.periodic.restoring_force import spring_of
-from vibench.sim.response import steady_response
-from vibench.sim.specimen import Specimen, gong2025
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    HuntCrossley,
+    LinearGap,
+    LinearSweep,
+    Outcome,
+    PowerLaw,
+    Sampled,
+    Specimen,
+    gong2025,
+    integrate,
+    spring_of,
+    steady_response,
+)
 
 DRIVE = Harmonic(130.0, 20e-6)
 STILL = Harmonic(100.0, 0.0)

@@ -5,13 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.contact_law import LinearGap
-from vibench.sim.drive import Harmonic
-from vibench.sim.growth.settling import FinalMotion
-from vibench.sim.lyapunov import FEWEST_INTERVALS, Precision, Source, Tendency, largest_exponent
-from vibench.sim.outcome import Outcome
-from vibench.sim.specimen import Specimen, gong2025
+from vibench.sim import Accuracy, Harmonic, LinearGap, Outcome, Specimen, gong2025, largest_exponent
+from vibench.sim.exponents import Precision
+from vibench.sim.exponents._lyapunov import FEWEST_INTERVALS, Source, Tendency
+from vibench.sim.exponents._settling import FinalMotion
 
 CHAOS = Harmonic(260.0, 5e-6)
 

@@ -2,11 +2,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from vibench.sim.modes import base_transmissibility, modal_form, state_matrix
-from vibench.sim.specimen import gong2025
+from vibench.sim import base_transmissibility, gong2025
+from vibench.sim.model import modal_form, state_matrix
 
 DAMPINGS = st.floats(0.0, 1e-2)
 

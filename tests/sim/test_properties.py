@@ -5,16 +5,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.contact_law import Hertz, HuntCrossley, LinearGap, PowerLaw
-from vibench.sim.drive import Harmonic, LinearSweep, Sampled
-from vibench.sim.integrate import integrate
-from vibench.sim.outcome import Outcome
-from vibench.sim.response_curve import response_curve
-from vibench.sim.specimen import gong2025
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    Hertz,
+    HuntCrossley,
+    LinearGap,
+    LinearSweep,
+    Outcome,
+    PowerLaw,
+    Sampled,
+    gong2025,
+    integrate,
+    response_curve,
+)
 
 LAWS = ["hertz", "linear_gap", "hunt_crossley:0.5", "power:5", "power:29", "rigid:0", "rigid:0.7", "rigid:1"]
 DRIVE = Harmonic(170.0, 20e-6)

@@ -2,14 +2,16 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Harmonic
-from vibench.sim.integrate import integrate
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.outcome import Outcome
-from vibench.sim.response import steady_response
-from vibench.sim.response_curve import response_curve
-from vibench.sim.specimen import gong2025
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    Outcome,
+    base_transmissibility,
+    gong2025,
+    integrate,
+    response_curve,
+    steady_response,
+)
 
 
 @pytest.mark.parametrize("frequency_hz", [7.3, 60.0, 266.2, 601.7])

@@ -5,21 +5,27 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.contact_law import Hertz, HuntCrossley, RigidStops
-from vibench.sim.drive import Harmonic, LinearSweep, Sampled
-from vibench.sim.engine.interval import new_state
-from vibench.sim.engine.parameters import parameters
-from vibench.sim.engine.rigid_stop import rebound
-from vibench.sim.integrate import integrate
-from vibench.sim.outcome import Outcome
-from vibench.sim.response import steady_response
-from vibench.sim.specimen import Specimen, gong2025
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    Hertz,
+    HuntCrossley,
+    LinearSweep,
+    Outcome,
+    RigidStops,
+    Sampled,
+    Specimen,
+    gong2025,
+    integrate,
+    steady_response,
+)
+from vibench.sim.rigid import rebound
+from vibench.sim.slots import parameters
+from vibench.sim.stepping import new_state
 
 STILL = Harmonic(100.0, 0.0)
 STICKING = Harmonic(200.0, 50e-6)

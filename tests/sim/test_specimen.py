@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from vibench.sim.contact_law import Elasticity, Hertz, hertz_stiffness
-from vibench.sim.specimen import Specimen, gong2025
+from vibench.sim import Hertz, Specimen, gong2025
+from vibench.sim.model import hertz_stiffness
+from vibench.sim.model._contact_law import Elasticity
 
 
 def test_the_papers_materials_give_the_stiffness_of_its_contact():

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.trade.figures import LEAST_GAIN, LevelFigures, MotionTrade, SolverFigures, Trade
+from vibench.sim import Accuracy
+from vibench.sim.accuracy_benchmark import LEAST_GAIN, LevelFigures, MotionTrade, SolverFigures, Trade
 
 _HEAD = (
     "| level or solver | simulated s per s | error of the state "

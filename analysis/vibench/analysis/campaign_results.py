@@ -7,7 +7,7 @@ from pathlib import Path
 
 from vibench.acquisition.errors import RecordingError
 from vibench.acquisition.recording.reader import Recording, open_recording
-from vibench.sim.specimen import Specimen
+from vibench.sim import Specimen
 
 from .errors import AnalysisError, NotEnoughData
 from .measurement_analysis import (

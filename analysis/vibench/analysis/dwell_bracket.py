@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.specimen import Specimen
+from vibench.sim import Specimen, base_transmissibility
 
 from .errors import NotEnoughData
 from .measurement_analysis import DwellAnalysis

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.specimen import Specimen
+from vibench.sim import Specimen, base_transmissibility
 
 from .arrays import Complexes, Reals
 from .collision_region import Edge

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.special import i0
 
-from vibench.sim.compiled import compiled
+from vibench.sim.kernels import compiled
 
 from .arrays import Reals
 

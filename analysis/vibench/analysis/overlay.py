@@ -7,8 +7,7 @@ from typing import assert_never
 import numpy as np
 
 from vibench.acquisition.recording.reader import Recording
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.specimen import Specimen
+from vibench.sim import Accuracy, Specimen
 
 from .arrays import Reals
 from .collision_region import Collisions, collisions

@@ -8,12 +8,15 @@ from enum import StrEnum
 
 import numpy as np
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Harmonic
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.outcome import Outcome
-from vibench.sim.response import Response, steady_response
-from vibench.sim.specimen import Specimen
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    Outcome,
+    Response,
+    Specimen,
+    base_transmissibility,
+    steady_response,
+)
 
 from .arrays import Flags, Integers, Reals
 

@@ -11,7 +11,7 @@ from vibench.acquisition.instruments import Identity
 from vibench.acquisition.plan.measurement import Measurement
 from vibench.acquisition.recording.layout import Origin, RecordingState
 from vibench.acquisition.recording.reader import Recording
-from vibench.sim.specimen import Specimen, gong2025
+from vibench.sim import Specimen, gong2025
 
 from .channel_levels import ChannelLevel, OnRead, channel_levels, ignore_reading
 from .errors import UnusableData

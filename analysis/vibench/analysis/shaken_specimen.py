@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vibench.sim.specimen import Specimen
+from vibench.sim import Specimen
 
 from .campaign_results import CampaignResults
 from .dwell_bracket import bracketed_gap

@@ -6,10 +6,7 @@ import numpy as np
 
 from vibench.acquisition.plan.measurement import Measurement
 from vibench.acquisition.recording.reader import Recording
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Sampled
-from vibench.sim.engine.sample_by_sample import follow_samples
-from vibench.sim.specimen import Specimen
+from vibench.sim import Accuracy, Sampled, Specimen, follow_samples
 
 from .arrays import Flags, Integers, Reals
 from .base_motion import RecordedBaseMotion, recorded_base_motion

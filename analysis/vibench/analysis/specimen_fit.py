@@ -7,8 +7,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 from scipy.stats import t as student
 
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.specimen import Specimen
+from vibench.sim import Specimen, base_transmissibility
 
 from .arrays import Complexes, Reals
 from .confidence import DEFAULT_CONFIDENCE

@@ -7,7 +7,7 @@ from typing import assert_never
 
 import numpy as np
 
-from vibench.sim.specimen import Specimen
+from vibench.sim import Specimen
 
 
 class Parameter(StrEnum):

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from vibench.acquisition.errors import AcquisitionError
 from vibench.analysis.errors import AnalysisError
-from vibench.sim.study.errors import StudyError
+from vibench.sim.study import StudyError
 
 from .late_command import Place, late_commands
 

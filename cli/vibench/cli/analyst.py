@@ -11,11 +11,7 @@ import numpy as np
 
 from vibench.acquisition.follow_parent import follow_parent
 from vibench.analysis.campaign_results import CampaignResults, analyse_files, assembled
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Harmonic, Sampled
-from vibench.sim.engine.sample_by_sample import follow_samples
-from vibench.sim.response import steady_response
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, Sampled, follow_samples, gong2025, steady_response
 
 
 class Analyst:

@@ -12,7 +12,7 @@ from vibench.analysis.figures.drawn import DrawnFigure, ImageKind
 from vibench.analysis.figures.paper.catalogue import PAPER_FIGURES
 from vibench.analysis.figures.paper.options import FigureOptions, FrequencyGrid
 from vibench.analysis.report.figure_choice import recording_figures, result_figures
-from vibench.sim.accuracy import Accuracy
+from vibench.sim import Accuracy
 
 from .analyse import complain_about
 from .kept_study import kept_study

@@ -3,7 +3,7 @@
 import math
 
 from vibench.analysis.errors import InvalidRequest
-from vibench.sim.study.frequency_range import frequency_range
+from vibench.sim.study import frequency_range
 
 _RANGE_PARTS = 3
 _ADVICE = "give one frequency above 0 Hz, or START:STOP:STEP [Hz] such as 10:600:1"

@@ -5,9 +5,7 @@ from pathlib import Path
 
 import typer
 
-from vibench.sim.study.results import StudyResults
-from vibench.sim.study.solve import Existing, solve_study
-from vibench.sim.study.study import Study
+from vibench.sim.study import Existing, Study, StudyResults, solve_study
 
 from .interruption import told_to_stop
 from .study import STOPPED_EXIT_CODE

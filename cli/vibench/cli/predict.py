@@ -11,14 +11,8 @@ from pydantic import ValidationError
 from rich.table import Table
 
 from vibench.analysis.errors import InvalidRequest
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.answer.plan import ScenePlan, plan_scene
-from vibench.sim.scene import Observable, Rest
-from vibench.sim.study.doubts import doubts
-from vibench.sim.study.results import StudyResults
-from vibench.sim.study.software import software
-from vibench.sim.study.solve import Existing, solve_study
-from vibench.sim.study.study import Start, Study
+from vibench.sim import Accuracy, Observable, Rest, ScenePlan, plan_scene
+from vibench.sim.study import Existing, Start, Study, StudyResults, doubts, software, solve_study
 
 from .frequency_option import frequencies
 from .interruption import told_to_stop

@@ -18,7 +18,7 @@ from vibench.analysis.reproduction.document import Picture, Reproduction, reprod
 from vibench.analysis.reproduction.evidence import Evidence
 from vibench.analysis.reproduction.reproduce import reproduction
 from vibench.analysis.reproduction.studies import levels_asked
-from vibench.sim.accuracy import Accuracy
+from vibench.sim import Accuracy
 
 from .kept_study import kept_study
 from .output import bold, console

@@ -6,10 +6,7 @@ from typing import Annotated
 import typer
 
 from vibench.acquisition.toml_file import load_toml
-from vibench.sim.study.doubts import doubts
-from vibench.sim.study.results import StudyResults
-from vibench.sim.study.solve import Existing, solve_study
-from vibench.sim.study.study import Study
+from vibench.sim.study import Existing, Study, StudyResults, doubts, solve_study
 
 from .interruption import told_to_stop
 from .output import console, print_json, print_warnings

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from vibench.sim.study.progress import StudyProgress, Watcher
+from vibench.sim.study import StudyProgress, Watcher
 
 SECONDS_OF_A_MINUTE = 60.0
 MINUTES_OF_AN_HOUR = 60.0

@@ -13,10 +13,8 @@ from rich.table import Table
 from vibench.analysis.accuracy_document import accuracy_document, worst_error
 from vibench.analysis.errors import InvalidRequest
 from vibench.analysis.figures.tradeoff import tradeoff_figure
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.trade.figures import MotionTrade, Trade
-from vibench.sim.trade.measuring import Thoroughness, measured_trade
-from vibench.sim.trade.regimes import MOTIONS
+from vibench.sim import Accuracy
+from vibench.sim.accuracy_benchmark import MOTIONS, MotionTrade, Thoroughness, Trade, measured_trade
 
 from .output import console, print_json
 from .paths import AsJson, room_for_folder

@@ -1,1 +1,23 @@
-"""The physics: specimen, contact, exact flight, responses. Imports nothing of ours."""
+"""The physics of the specimen: models, exact integration, responses, exponents, periodic motions.
+
+Three masses in a chain on a moving base, m1 between two stops on m2 (Gong et al. 2025): displacements x, y,
+z [m], absolute; p = y - z reaches a stop at the gap. Free flight is solved in closed form, contact in steps
+of controlled error (docs/decisions/0004-contact-integration.md). SI units everywhere. It imports no other
+package of vibench: instruments, files of recordings and figures are unknown here. `vibench.sim.study`
+solves many scenes at once, `vibench.sim.chain` joins many specimens; what each level of `Accuracy` costs is
+in docs/accuracy.md.
+
+>>> from vibench.sim import Accuracy, Harmonic, base_transmissibility, gong2025, steady_response
+>>> specimen = gong2025(damping_time_s=2e-5, gap_m=45e-6, contact="hertz")
+>>> free = base_transmissibility(specimen, 266.2)[0]  # x, y, z and p over the base, without stops
+>>> [round(float(value), 1) for value in abs(free)]
+[22.6, 6.0, 36.7, 42.7]
+>>> drive = Harmonic(frequency_hz=130.0, amplitude_m=20e-6)
+>>> response = steady_response(specimen, drive, Accuracy.STANDARD, duration_s=4.0, window_s=1.0)
+>>> round(response.relative_i, 2), round(response.relative_ii, 2), response.impacts
+(2.31, 1.21, 260)
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,8 +1,7 @@
 """Halving the way to a jump, wherever it lies."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from vibench.acquisition.control.jump_search import LocatedJump, Side, Visit, is_on_branch, located, side
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from vibench.acquisition.control.level_control import Held, LevelControl, MeasuredLevel, measured_level
 from vibench.acquisition.excitation.feedback import BaseLevel

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition.control.mode_fit import fitted_mode
-from vibench.sim.specimen import gong2025
+from vibench.sim import gong2025
 
 SPECIMEN = gong2025()
 MODES = list(zip(SPECIMEN.natural_frequencies_hz, SPECIMEN.damping_ratios, strict=True))

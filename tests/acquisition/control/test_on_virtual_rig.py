@@ -16,9 +16,7 @@ from vibench.acquisition.plan.measurement import Measurement
 from vibench.acquisition.recording.reader import open_recording
 from vibench.acquisition.run.run_measurement import run_measurement
 from vibench.acquisition.run.state import RunState
-from vibench.sim.drive import Harmonic
-from vibench.sim.integrate import integrate
-from vibench.sim.specimen import gong2025
+from vibench.sim import Harmonic, gong2025, integrate
 
 SAMPLE_RATE_HZ = 10240.0
 HEAVY_KG = 0.6

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from vibench.acquisition.control.steadiness import Steadiness, judged
 from vibench.acquisition.excitation.feedback import Settling

@@ -13,10 +13,7 @@ from vibench.acquisition.plan.measurement import Measurement
 from vibench.acquisition.plan.specimen_loads import predicted_specimen_loads
 from vibench.acquisition.rig.model import Quantity, RigModel
 from vibench.acquisition.rig.specimen import specimen_of
-from vibench.sim.against_stops import base_answer
-from vibench.sim.drive import Harmonic
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.response import steady_response
+from vibench.sim import Harmonic, base_answer, base_transmissibility, steady_response
 
 
 def base_m(rig, amplitude_vpp, frequency_hz):

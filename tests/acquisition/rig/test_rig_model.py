@@ -4,8 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from vibench.acquisition.rig.configuration import load_rig
 from vibench.acquisition.rig.model import Quantity, RigModel, suspended_mass_kg

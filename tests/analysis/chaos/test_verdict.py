@@ -5,9 +5,8 @@ import pytest
 
 from vibench.analysis.chaos.period import Points, shortest_period
 from vibench.analysis.chaos.verdict import MotionKind, motion_verdict
-from vibench.sim.drive import Harmonic
-from vibench.sim.periodic.poincare import stroboscopic_section
-from vibench.sim.specimen import gong2025
+from vibench.sim import Harmonic, gong2025
+from vibench.sim.motion import stroboscopic_section
 
 DRIVE_HZ = 260.0
 QUIET = np.array([1e-5, 1e-5])

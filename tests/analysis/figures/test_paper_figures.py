@@ -9,8 +9,8 @@ from vibench.analysis.figures.paper.catalogue import PAPER_FIGURES
 from vibench.analysis.figures.paper.options import AMPLITUDES_M, FigureOptions
 from vibench.analysis.figures.paper.responses import responses, shade
 from vibench.analysis.similarity import LogarithmOf
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.study.solve import solve_study
+from vibench.sim import Accuracy
+from vibench.sim.study import solve_study
 
 SHORT = FigureOptions(accuracy=Accuracy.QUICK, duration_s=1.5, window_s=0.5)
 """Long enough for the paper's peaks, far too short for its chaos."""

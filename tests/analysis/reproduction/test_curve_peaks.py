@@ -10,7 +10,7 @@ from vibench.analysis.reproduction.curve_peaks import (
     nearest,
     two_highest,
 )
-from vibench.sim.specimen import gong2025
+from vibench.sim import gong2025
 
 GRID = np.arange(5.0, 605.0, 5.0)
 

@@ -16,8 +16,8 @@ from vibench.analysis.reproduction.evidence import Evidence
 from vibench.analysis.reproduction.page_tables import regions, regions_table
 from vibench.analysis.reproduction.reproduce import reproduction
 from vibench.analysis.reproduction.score import scores
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.study.solve import solve_study
+from vibench.sim import Accuracy
+from vibench.sim.study import solve_study
 
 SHORT = FigureOptions(accuracy=Accuracy.QUICK, duration_s=0.6, window_s=0.25, highest_hz=355.0)
 LINEAR_KEYS = ("linear-resonances", "bound-resonances", "fits")

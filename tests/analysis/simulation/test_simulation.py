@@ -14,9 +14,7 @@ from vibench.analysis.simulation.course import SimulationCourse
 from vibench.analysis.simulation.growing import simulate
 from vibench.analysis.simulation.request import SimulationRequest
 from vibench.analysis.simulation.worker import Begin, Cancel, Ended, Grown, serve
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, base_transmissibility, gong2025
 
 LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "step_hz": 50.0, "start_hz": 50.0}
 

@@ -1,8 +1,7 @@
 """What people type is read, and what is shown reads back as the same number."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from vibench.acquisition.errors import ConfigurationError
 from vibench.gui.forms.quantity_text import parsed_quantity, quantity_text

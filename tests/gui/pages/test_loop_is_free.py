@@ -15,8 +15,7 @@ from vibench.acquisition.plan.axis import Range
 from vibench.acquisition.plan.measurement import Measurement
 from vibench.acquisition.plan.sweep import Axis
 from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
-from vibench.acquisition.recording.layout import Origin as RecordingOrigin
-from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording.layout import Origin as RecordingOrigin, RecordingState
 from vibench.acquisition.recording.writer import create_recording
 from vibench.acquisition.shipped import shipped
 from vibench.analysis.comparison.trace import Origin, Response, Trace

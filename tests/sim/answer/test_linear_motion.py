@@ -2,15 +2,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.answer.linear_motion import linear_motion, never_touches
-from vibench.sim.drive import Harmonic
-from vibench.sim.integrate import integrate
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, base_transmissibility, gong2025, integrate
+from vibench.sim.scene._linear_motion import linear_motion, never_touches
 
 DRIVE = Harmonic(137.0, 3e-6, phase_rad=0.7)
 START = (2e-6, -1e-6, 3e-6, 1e-3, -2e-3, 5e-4)

@@ -1,10 +1,7 @@
 import pytest
 
-from vibench.sim.answer.plan import plan_scene
-from vibench.sim.drive import Harmonic
-from vibench.sim.prediction import Method
-from vibench.sim.scene import AutomaticDuration, FixedDuration, Given, Observable, Scene
-from vibench.sim.specimen import gong2025
+from vibench.sim import Harmonic, Observable, Scene, gong2025, plan_scene
+from vibench.sim.scene import AutomaticDuration, FixedDuration, Given, Method
 
 QUIET, LOUD = Harmonic(200.0, 1e-6), Harmonic(260.0, 5e-6)
 

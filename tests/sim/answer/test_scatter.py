@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
 
-from vibench.sim.answer.scatter import bootstrap_of_largest, response_ensemble, window_scatter
-from vibench.sim.drive import Harmonic
-from vibench.sim.specimen import gong2025
+from vibench.sim import Harmonic, gong2025
+from vibench.sim.scene._scatter import bootstrap_of_largest, response_ensemble, window_scatter
 
 
 def test_it_is_the_bootstrap_of_the_largest_in_closed_form():

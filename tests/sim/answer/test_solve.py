@@ -3,15 +3,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.answer.solve import solve_scene
-from vibench.sim.drive import Harmonic
-from vibench.sim.modes import base_transmissibility, modal_form
-from vibench.sim.outcome import Outcome
-from vibench.sim.prediction import Method, MotionKind
-from vibench.sim.response import steady_response
-from vibench.sim.scene import AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
-from vibench.sim.specimen import gong2025
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    Observable,
+    Outcome,
+    Rest,
+    Scene,
+    base_transmissibility,
+    gong2025,
+    solve_scene,
+    steady_response,
+)
+from vibench.sim.model import modal_form
+from vibench.sim.scene import AutomaticDuration, FixedDuration, Given, Method, MotionKind
 
 RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
 PERIODIC = [

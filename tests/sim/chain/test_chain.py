@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from vibench.sim.chain.chain import Chain, chain_of
-from vibench.sim.contact_law import RigidStops
-from vibench.sim.specimen import Specimen, gong2025
+from vibench.sim import RigidStops, Specimen, gong2025
+from vibench.sim.chain import Chain, chain_of
 
 
 def test_a_chain_of_one_cell_has_the_matrices_of_the_specimen():

@@ -6,15 +6,19 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson, solve_ivp
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.chain.chain import Chain, chain_of
-from vibench.sim.chain.integrate import integrate_chain
-from vibench.sim.chain.modes import chain_transmissibility
-from vibench.sim.contact_law import Hertz, HuntCrossley, LinearGap, PowerLaw
-from vibench.sim.drive import Harmonic, Sampled
-from vibench.sim.integrate import integrate
-from vibench.sim.outcome import Outcome
-from vibench.sim.specimen import gong2025
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    Hertz,
+    HuntCrossley,
+    LinearGap,
+    Outcome,
+    PowerLaw,
+    Sampled,
+    gong2025,
+    integrate,
+)
+from vibench.sim.chain import Chain, chain_of, chain_transmissibility, integrate_chain
 
 pytestmark = pytest.mark.timeout(300)
 """The first run compiles the kernels: half a minute of processor time, more on a busy machine."""

@@ -4,13 +4,9 @@ import math
 
 import pytest
 
-from vibench.sim.chain.chain import chain_of
-from vibench.sim.chain.lyapunov import largest_chain_exponent
-from vibench.sim.chain.modes import chain_modal_form
-from vibench.sim.drive import Harmonic
-from vibench.sim.lyapunov import largest_exponent
-from vibench.sim.outcome import Outcome
-from vibench.sim.specimen import gong2025
+from vibench.sim import Harmonic, Outcome, gong2025, largest_exponent
+from vibench.sim.chain import chain_of, largest_chain_exponent
+from vibench.sim.chain._modes import chain_modal_form
 
 pytestmark = pytest.mark.timeout(300)
 """The first run compiles the kernels: half a minute of processor time, more on a busy machine."""

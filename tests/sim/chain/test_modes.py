@@ -4,14 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from vibench.sim.chain.chain import Chain, chain_of
-from vibench.sim.chain.dispersion import band_frequencies_hz, band_gaps, bloch_factor
-from vibench.sim.chain.modes import chain_modal_form, chain_state_matrix, chain_transmissibility
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.specimen import gong2025
+from vibench.sim import base_transmissibility, gong2025
+from vibench.sim.chain import Chain, band_gaps, bloch_factor, chain_of, chain_transmissibility
+from vibench.sim.chain._dispersion import band_frequencies_hz
+from vibench.sim.chain._modes import chain_modal_form, chain_state_matrix
 
 OVERDAMPED = gong2025(damping_time_s=1e-2)
 UNEVEN = replace(gong2025(), dampings=(0.5, 0.0, 0.9))

@@ -4,15 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.chain.chain import chain_of
-from vibench.sim.chain.integrate import integrate_chain
-from vibench.sim.chain.modes import chain_transmissibility
-from vibench.sim.chain.response import chain_response
-from vibench.sim.drive import Harmonic
-from vibench.sim.outcome import Outcome
-from vibench.sim.response import steady_response
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, steady_response
+from vibench.sim.chain import chain_of, chain_response, chain_transmissibility, integrate_chain
 
 pytestmark = pytest.mark.timeout(300)
 """The first run compiles the kernels: half a minute of processor time, more on a busy machine."""

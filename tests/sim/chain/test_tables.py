@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.chain.chain import chain_of
-from vibench.sim.chain.modes import chain_impulses, chain_state_matrix
-from vibench.sim.chain.tables import CROSS_SHARE, chain_tables, cross_answers, markov_between
-from vibench.sim.drive import Harmonic
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, gong2025
+from vibench.sim.chain import chain_of
+from vibench.sim.chain._modes import chain_impulses, chain_state_matrix
+from vibench.sim.chain._tables import CROSS_SHARE, chain_tables, cross_answers, markov_between
 
 DRIVE = Harmonic(220.0, 40e-6)
 

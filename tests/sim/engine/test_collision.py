@@ -5,23 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.answer.followed_run import FollowedRun, Samples, Watch
-from vibench.sim.drive import Harmonic
-from vibench.sim.engine.clock import clock_at
-from vibench.sim.engine.collision import collide, new_collision
-from vibench.sim.engine.collision_tables import (
-    DEPTHS,
-    DURATION,
-    HALF_FORCE,
-    SOFTEST,
-    SPACING,
-    collision_tables,
-)
-from vibench.sim.engine.contact import begin_contact
-from vibench.sim.engine.harmonic_tables import harmonic_tables
-from vibench.sim.engine.interval import new_state
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, gong2025
+from vibench.sim.collision import collide, collision_tables, new_collision
+from vibench.sim.collision._tables import DEPTHS, DURATION, HALF_FORCE, SOFTEST, SPACING
+from vibench.sim.contact import begin_contact
+from vibench.sim.kernels import clock_at
+from vibench.sim.scene._followed_run import FollowedRun, Samples, Watch
+from vibench.sim.stepping import harmonic_tables, new_state
 
 DRIVE = Harmonic(130.0, 20e-6)
 GAP = 45e-6

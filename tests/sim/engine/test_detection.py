@@ -1,10 +1,9 @@
 """No touch is missed, however short: polynomials whose peak is known to the last digit."""
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from vibench.sim.engine.detection import NEVER, SERIES_TERMS, first_contact
+from vibench.sim.flight import NEVER, SERIES_TERMS, first_contact
 
 GAP = 45e-6
 LENGTH = 4e-5

@@ -2,17 +2,14 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.compiled import compiled
-from vibench.sim.engine.interval import advance_interval, base_reaction, interval_tables, new_state
-from vibench.sim.engine.piece import FAILED
-from vibench.sim.modes import state_matrix
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, gong2025
+from vibench.sim.kernels import compiled
+from vibench.sim.model import state_matrix
+from vibench.sim.stepping import FAILED, advance_interval, base_reaction, interval_tables, new_state
 
 
 @compiled

@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from vibench.sim.compiled import compiled
-from vibench.sim.engine.lanes import (
+from vibench.sim.kernels import (
+    compiled,
     eight,
     eight_of_eight,
     eight_of_sixteen,
     eights,
-    first_outside,
     largest,
     root,
     sixteen,
@@ -17,6 +16,7 @@ from vibench.sim.engine.lanes import (
     store,
     total,
 )
+from vibench.sim.kernels._simd import first_outside
 
 RANDOM = np.random.default_rng(7)
 

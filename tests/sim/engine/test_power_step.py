@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.answer.followed_run import FollowedRun, Watch
-from vibench.sim.contact_law import PowerLaw
-from vibench.sim.drive import Harmonic
-from vibench.sim.engine.harmonic_tables import harmonic_tables
-from vibench.sim.engine.linear_series import WIDE, P
-from vibench.sim.engine.power_numbers import FEED, FREE, GAIN, INNER, MOVE
-from vibench.sim.engine.power_tables import POINTS_AT
-from vibench.sim.integrate import integrate
-from vibench.sim.modes import state_matrix
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, PowerLaw, gong2025, integrate
+from vibench.sim.flight import WIDE, P
+from vibench.sim.model import state_matrix
+from vibench.sim.power_law import FEED, FREE, GAIN, MOVE
+from vibench.sim.power_law._numbers import INNER
+from vibench.sim.power_law._tables import POINTS_AT
+from vibench.sim.scene._followed_run import FollowedRun, Watch
+from vibench.sim.stepping import harmonic_tables
 
 DRIVE = Harmonic(130.0, 20e-6)
 LAW = "power:3+5+7"

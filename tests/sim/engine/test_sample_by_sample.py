@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Sampled
-from vibench.sim.engine.sample_by_sample import follow_samples
-from vibench.sim.integrate import integrate
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Sampled, follow_samples, gong2025, integrate
 
 RATE_HZ = 51_200.0
 

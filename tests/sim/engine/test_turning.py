@@ -2,11 +2,18 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from vibench.sim.compiled import compiled
-from vibench.sim.engine.turning import AHEAD, fill_series, march, series_rows, steps_ahead, sum_now, turn_by
+from vibench.sim.kernels import (
+    AHEAD,
+    compiled,
+    fill_series,
+    march,
+    series_rows,
+    steps_ahead,
+    sum_now,
+    turn_by,
+)
 
 RATES = np.array([-3.0 + 600.0j, -20.0 + 1700.0j, -60.0 + 3100.0j, 1630.0j])
 GRID_S = 0.25 / 3101.0

@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from vibench.sim.growth.blocking import blocked_mean
+from vibench.sim.exponents import blocked_mean
 
 
 def autoregression(memory, count, seed):

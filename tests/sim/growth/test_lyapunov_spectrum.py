@@ -4,17 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Harmonic
-from vibench.sim.growth.lyapunov_spectrum import kaplan_yorke, lyapunov_spectrum
-from vibench.sim.growth.tangent_run import interval_for, run_with_tangent
-from vibench.sim.lyapunov import Source, Tendency, largest_exponent
-from vibench.sim.modes import state_matrix
-from vibench.sim.outcome import Outcome
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, largest_exponent, lyapunov_spectrum
+from vibench.sim.exponents._lyapunov import Source, Tendency
+from vibench.sim.exponents._lyapunov_spectrum import kaplan_yorke
+from vibench.sim.exponents._tangent_run import interval_for, run_with_tangent
+from vibench.sim.model import state_matrix
 
 CHAOS = Harmonic(260.0, 5e-6)
 LARGE = Harmonic(430.0, 50e-6)

@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from vibench.sim.growth.orthonormal import orthonormal_rows, orthonormalise
+from vibench.sim.kernels import orthonormal_rows, orthonormalise
 
 METRIC = np.array([[4.0, 1.0, 0.0], [1.0, 3.0, 0.5], [0.0, 0.5, 100.0]])
 

@@ -3,13 +3,10 @@
 import numpy as np
 import pytest
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Harmonic
-from vibench.sim.growth.settling import FinalMotion, settling
-from vibench.sim.growth.tangent_run import Interval, TangentRun
-from vibench.sim.lyapunov import Source, Tendency, largest_exponent
-from vibench.sim.outcome import Outcome
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, largest_exponent
+from vibench.sim.exponents._lyapunov import Source, Tendency
+from vibench.sim.exponents._settling import FinalMotion, settling
+from vibench.sim.exponents._tangent_run import Interval, TangentRun
 
 COUNT = 400
 CHAOTIC_SECTION = np.random.default_rng(5).standard_normal((COUNT, 6))

@@ -3,16 +3,11 @@
 import numpy as np
 import pytest
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Harmonic
-from vibench.sim.engine.clock import clock_at
-from vibench.sim.engine.harmonic_run import advance_harmonic
-from vibench.sim.engine.harmonic_tables import harmonic_tables
-from vibench.sim.engine.interval import new_state
-from vibench.sim.growth.tangent import derivative_of, unit_tangent
-from vibench.sim.integrate import integrate, new_record
-from vibench.sim.outcome import Outcome
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, integrate
+from vibench.sim.kernels import clock_at
+from vibench.sim.motion import new_record
+from vibench.sim.slots import derivative_of, unit_tangent
+from vibench.sim.stepping import advance_harmonic, harmonic_tables, new_state
 
 DRIVE = Harmonic(130.0, 20e-6)
 DURATION_S = 0.02

@@ -5,13 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Harmonic
-from vibench.sim.growth.tangent_run import interval_for, run_with_tangent
-from vibench.sim.growth.two_trajectories import two_trajectory_exponent
-from vibench.sim.lyapunov import largest_exponent
-from vibench.sim.outcome import Outcome
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, largest_exponent
+from vibench.sim.exponents._tangent_run import interval_for, run_with_tangent
+from vibench.sim.exponents._two_trajectories import two_trajectory_exponent
 
 CHAOS = Harmonic(260.0, 5e-6)
 

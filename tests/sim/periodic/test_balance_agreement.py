@@ -1,15 +1,11 @@
 import numpy as np
 import pytest
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Harmonic
-from vibench.sim.periodic.balance_agreement import Agreement, check_balance
-from vibench.sim.periodic.balance_solver import BalanceOptions, Guess, balance
-from vibench.sim.periodic.condensation import structure_of
-from vibench.sim.periodic.frequency_time import phasors_of
-from vibench.sim.periodic.restoring_force import spring_of
-from vibench.sim.periodic.shooting import SAMPLES, periodic_orbit
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, gong2025, periodic_orbit, spring_of, structure_of
+from vibench.sim.periodic._balance_agreement import Agreement, check_balance
+from vibench.sim.periodic._balance_solver import BalanceOptions, Guess, balance
+from vibench.sim.periodic._frequency_time import phasors_of
+from vibench.sim.periodic._shooting import SAMPLES
 
 SPECIMEN = gong2025(damping_time_s=3e-5)
 

@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vibench.sim.periodic.balance_branch import balance_branch, raised_balance
-from vibench.sim.periodic.balance_solver import BalanceOptions, balance
-from vibench.sim.periodic.branch import Happening, Parameter
-from vibench.sim.periodic.condensation import Structure, structure_of
-from vibench.sim.periodic.continuation import ArcEnd, ArcSteps
-from vibench.sim.periodic.first_order_balance import jump_frequencies
-from vibench.sim.periodic.harmonic_balance import BalanceEnd, HarmonicSet
-from vibench.sim.periodic.restoring_force import GapSpring, NoForce, PowerSpring, spring_of
-from vibench.sim.specimen import gong2025
+from vibench.sim import PowerSpring, balance_branch, gong2025, jump_frequencies, spring_of, structure_of
+from vibench.sim.periodic._balance_branch import raised_balance
+from vibench.sim.periodic._balance_solver import BalanceOptions, balance
+from vibench.sim.periodic._branch import Happening, Parameter
+from vibench.sim.periodic._condensation import Structure
+from vibench.sim.periodic._continuation import ArcEnd, ArcSteps
+from vibench.sim.periodic._harmonic_balance import BalanceEnd, HarmonicSet
+from vibench.sim.periodic._restoring_force import GapSpring, NoForce
 
 ONE = np.array([[1.0]])
 

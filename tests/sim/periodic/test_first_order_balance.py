@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.periodic.condensation import Structure, condense, structure_of
-from vibench.sim.periodic.first_order_balance import (
+from vibench.sim import (
+    PowerSpring,
+    base_transmissibility,
     first_order_states,
-    fold_amplitudes,
-    fundamental_share,
+    gong2025,
     jump_frequencies,
+    structure_of,
 )
-from vibench.sim.periodic.restoring_force import PowerSpring
-from vibench.sim.specimen import gong2025
+from vibench.sim.periodic._condensation import Structure, condense
+from vibench.sim.periodic._first_order_balance import fold_amplitudes, fundamental_share
 
 FIT_LENGTH, FIT_FORCE = 46e-6, 4.891e9 * 1e-6**1.5
 

@@ -3,17 +3,22 @@ import math
 import numpy as np
 import pytest
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Harmonic
-from vibench.sim.integrate import integrate
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.periodic.balance_solver import BalanceOptions, Guess, balance
-from vibench.sim.periodic.condensation import Structure, structure_of
-from vibench.sim.periodic.first_order_balance import first_order_states
-from vibench.sim.periodic.frequency_time import phasors_of, waveform
-from vibench.sim.periodic.harmonic_balance import BalanceEnd, BalanceProblem, HarmonicSet, harmonics_up_to
-from vibench.sim.periodic.restoring_force import GapSpring, NoForce, PowerSpring, spring_of
-from vibench.sim.specimen import gong2025
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    PowerSpring,
+    base_transmissibility,
+    first_order_states,
+    gong2025,
+    integrate,
+    spring_of,
+    structure_of,
+)
+from vibench.sim.periodic._balance_solver import BalanceOptions, Guess, balance
+from vibench.sim.periodic._condensation import Structure
+from vibench.sim.periodic._frequency_time import phasors_of, waveform
+from vibench.sim.periodic._harmonic_balance import BalanceEnd, BalanceProblem, HarmonicSet, harmonics_up_to
+from vibench.sim.periodic._restoring_force import GapSpring, NoForce
 
 FIT_LENGTH, FIT_FORCE = 46e-6, 4.891e9 * 1e-6**1.5
 SETTLED_S = 3.0

@@ -1,17 +1,19 @@
 import numpy as np
 import pytest
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Harmonic
-from vibench.sim.integrate import integrate
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.periodic.branch import Happening, Parameter
-from vibench.sim.periodic.continuation import ArcEnd, ArcSteps
-from vibench.sim.periodic.orbit_branch import orbit_branch
-from vibench.sim.periodic.period_map import OrbitShape
-from vibench.sim.periodic.poincare import state_scales
-from vibench.sim.periodic.shooting import periodic_orbit
-from vibench.sim.specimen import gong2025
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    base_transmissibility,
+    gong2025,
+    integrate,
+    orbit_branch,
+    periodic_orbit,
+)
+from vibench.sim.motion import state_scales
+from vibench.sim.periodic._branch import Happening, Parameter
+from vibench.sim.periodic._continuation import ArcEnd, ArcSteps
+from vibench.sim.periodic._period_map import OrbitShape
 
 SPECIMEN = gong2025(damping_time_s=3e-5)
 STEPS = ArcSteps(first=0.02, longest=0.3, shortest=1e-7, tolerance=1e-9, most_points=60)

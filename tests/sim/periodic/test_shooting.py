@@ -3,14 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.drive import Harmonic
-from vibench.sim.integrate import integrate
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.periodic.period_map import OrbitShape, PeriodMap
-from vibench.sim.periodic.poincare import smallest_period, state_scales, stroboscopic_section
-from vibench.sim.periodic.shooting import ShootingEnd, periodic_orbit
-from vibench.sim.specimen import gong2025
+from vibench.sim import Accuracy, Harmonic, base_transmissibility, gong2025, integrate, periodic_orbit
+from vibench.sim.motion import smallest_period, state_scales, stroboscopic_section
+from vibench.sim.periodic._period_map import OrbitShape, PeriodMap
+from vibench.sim.periodic._shooting import ShootingEnd
 
 SPECIMEN = gong2025(damping_time_s=3e-5)
 TRACE = 390.081

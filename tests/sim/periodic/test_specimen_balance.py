@@ -1,11 +1,9 @@
 import pytest
 
-from vibench.sim.drive import Harmonic
-from vibench.sim.periodic.balance_solver import BalanceOptions
-from vibench.sim.periodic.harmonic_balance import BalanceEnd
-from vibench.sim.periodic.specimen_balance import balance_specimen
-from vibench.sim.response import steady_response
-from vibench.sim.specimen import gong2025
+from vibench.sim import Harmonic, gong2025, steady_response
+from vibench.sim.periodic._balance_solver import BalanceOptions
+from vibench.sim.periodic._harmonic_balance import BalanceEnd
+from vibench.sim.periodic._specimen_balance import balance_specimen
 
 SPECIMEN = gong2025(damping_time_s=3e-5)
 

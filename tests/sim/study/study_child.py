@@ -3,8 +3,7 @@
 import sys
 from pathlib import Path
 
-from vibench.sim.study.solve import Existing, solve_study
-from vibench.sim.study.study import Study
+from vibench.sim.study import Existing, Study, solve_study
 
 STUDY = Study(
     frequencies_hz={"start": 180.0, "stop": 300.0, "step": 2.0},

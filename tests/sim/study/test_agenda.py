@@ -1,12 +1,11 @@
 import random
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from vibench.sim.study.agenda import NOBODY, Agenda
-from vibench.sim.study.costs import Costs
-from vibench.sim.study.grid import Grid
+from vibench.sim.study._costs import Costs
+from vibench.sim.study._grid import Grid
+from vibench.sim.study._point_scheduler import NOBODY, Agenda
 
 
 def agenda_of(planned_s, after=None, is_done=None):

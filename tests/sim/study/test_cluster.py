@@ -14,18 +14,17 @@ import numpy as np
 import pytest
 
 import vibench.sim
-from vibench.sim.study.columns import SESSION
-from vibench.sim.study.errors import ClusterLost
-from vibench.sim.study.layout import STATE, PointState
-from vibench.sim.study.results import open_study, results_of
-from vibench.sim.study.run import StudyEnd, run_study
-from vibench.sim.study.solve import Existing, solve_study
-from vibench.sim.study.store import FileStore, MemoryStore
-from vibench.sim.study.study import Study
+from vibench.sim.study import Existing, MemoryStore, PointState, Study, open_study, run_study, solve_study
+from vibench.sim.study._columns import SESSION
+from vibench.sim.study._errors import ClusterLost
+from vibench.sim.study._layout import STATE
+from vibench.sim.study._results import results_of
+from vibench.sim.study._run import StudyEnd
+from vibench.sim.study._store import FileStore
 
 pytest.importorskip("distributed", reason="a cluster needs the extra 'cluster'")
 
-from vibench.sim.study.cluster import ClusterExecutor
+from vibench.sim.study._cluster import ClusterExecutor
 
 START_PATIENCE_S = 60.0
 SHORT_S = 3.0

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from vibench.sim.study.costs import Costs
-from vibench.sim.study.grid import Grid
+from vibench.sim.study._costs import Costs
+from vibench.sim.study._grid import Grid
 
 
 def line_of(planned_s):

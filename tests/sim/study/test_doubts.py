@@ -2,8 +2,7 @@
 
 import pytest
 
-from vibench.sim.study.doubts import doubts
-from vibench.sim.study.study import Study
+from vibench.sim.study import Study, doubts
 
 
 def study(amplitudes_m, gaps_m=(45e-6,)):

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from vibench.sim.study.frequency_range import frequency_range, listed
+from vibench.sim.study import frequency_range
+from vibench.sim.study._frequency_range import listed
 
 
 def test_a_range_includes_its_stop_when_it_is_hit():

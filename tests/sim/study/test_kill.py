@@ -10,14 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.sim.answer.solve import solve_scene
-from vibench.sim.study.columns import SESSION
-from vibench.sim.study.layout import STATE, PointState
-from vibench.sim.study.results import open_study
-from vibench.sim.study.run import StudyEnd, run_study
-from vibench.sim.study.solve import solve_study
-from vibench.sim.study.store import FileStore
-from vibench.sim.study.threads import ThreadExecutor
+from vibench.sim import solve_scene
+from vibench.sim.study import PointState, ThreadExecutor, open_study, run_study, solve_study
+from vibench.sim.study._columns import SESSION
+from vibench.sim.study._layout import STATE
+from vibench.sim.study._run import StudyEnd
+from vibench.sim.study._store import FileStore
 
 CHILD = Path(__file__).with_name("study_child.py")
 SPEC = importlib.util.spec_from_file_location("study_child", CHILD)

@@ -5,25 +5,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from vibench.sim.answer.solve import solve_scene
-from vibench.sim.drive import Harmonic
-from vibench.sim.outcome import Outcome
-from vibench.sim.scene import FixedDuration, Given, Rest, Scene
-from vibench.sim.specimen import gong2025
-from vibench.sim.study.columns import CONTINUES, PHASE
-from vibench.sim.study.errors import InvalidStudy
-from vibench.sim.study.executor import Reply
-from vibench.sim.study.layout import PointState
-from vibench.sim.study.results import results_of
-from vibench.sim.study.run import StudyEnd, run_study
-from vibench.sim.study.solve import solve_study
-from vibench.sim.study.store import MemoryStore
-from vibench.sim.study.study import GivenStart, Study
-from vibench.sim.study.threads import ThreadExecutor
-from vibench.sim.study.timing import solve_timed
+from vibench.sim import Harmonic, Outcome, Rest, Scene, gong2025, solve_scene
+from vibench.sim.scene import FixedDuration, Given
+from vibench.sim.study import MemoryStore, PointState, Study, ThreadExecutor, run_study, solve_study
+from vibench.sim.study._columns import CONTINUES, PHASE
+from vibench.sim.study._errors import InvalidStudy
+from vibench.sim.study._executor import Reply
+from vibench.sim.study._results import results_of
+from vibench.sim.study._run import StudyEnd
+from vibench.sim.study._study import GivenStart
+from vibench.sim.study._timing import solve_timed
 
 
 class UnreliableExecutor:

@@ -8,21 +8,26 @@ import h5py
 import numpy as np
 import pytest
 
-from vibench.sim.answer.solve import solve_scene
-from vibench.sim.prediction import Prediction
-from vibench.sim.scene import Rest
-from vibench.sim.study.columns import COLUMNS, IDENTITY, NUMBERS, SESSION
-from vibench.sim.study.disk import SoleWriter
-from vibench.sim.study.errors import StudyError
-from vibench.sim.study.file_making import make_file
-from vibench.sim.study.layout import STATE, PointState
-from vibench.sim.study.results import open_study, results_of
-from vibench.sim.study.run import StudyEnd, run_study
-from vibench.sim.study.scene_identity import scene_identity
-from vibench.sim.study.solve import Existing, solve_study
-from vibench.sim.study.store import FileStore, MemoryStore
-from vibench.sim.study.study import Study
-from vibench.sim.study.threads import ThreadExecutor
+from vibench.sim import Prediction, Rest, solve_scene
+from vibench.sim.study import (
+    Existing,
+    MemoryStore,
+    PointState,
+    Study,
+    StudyError,
+    ThreadExecutor,
+    open_study,
+    run_study,
+    solve_study,
+)
+from vibench.sim.study._columns import COLUMNS, IDENTITY, NUMBERS, SESSION
+from vibench.sim.study._disk import SoleWriter
+from vibench.sim.study._file_making import make_file
+from vibench.sim.study._layout import STATE
+from vibench.sim.study._results import results_of
+from vibench.sim.study._run import StudyEnd
+from vibench.sim.study._scene_identity import scene_identity
+from vibench.sim.study._store import FileStore
 
 
 @pytest.fixture(scope="module")

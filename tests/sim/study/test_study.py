@@ -1,9 +1,10 @@
 import pytest
 from pydantic import ValidationError
 
-from vibench.sim.specimen import gong2025
-from vibench.sim.study.axes import FREQUENCY
-from vibench.sim.study.study import GivenStart, Start, Study
+from vibench.sim import gong2025
+from vibench.sim.study import Start, Study
+from vibench.sim.study._axes import FREQUENCY
+from vibench.sim.study._study import GivenStart
 
 LEAST = {"frequencies_hz": [100.0, 200.0], "amplitudes_m": [1e-6]}
 

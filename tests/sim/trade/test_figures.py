@@ -2,9 +2,9 @@
 
 import pytest
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.trade.figures import LevelFigures, MotionTrade
-from vibench.sim.trade.regimes import Motion, Regime
+from vibench.sim import Accuracy
+from vibench.sim.accuracy_benchmark import LevelFigures, MotionTrade
+from vibench.sim.accuracy_benchmark._regimes import Motion, Regime
 
 
 def trade(*state_errors, regime=Regime.PERIODIC):

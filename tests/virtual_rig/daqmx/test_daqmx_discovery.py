@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from nidaqmx import DaqError
 from nidaqmx.constants import AcquisitionType, Coupling, ProductCategory, TerminalConfiguration, UsageTypeAI
 from nidaqmx.error_codes import DAQmxErrors

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from vibench.virtual_rig.generator import built_in_shape
 from vibench.virtual_rig.generator.arbitrary_memory import TOP_CODE

@@ -2,8 +2,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from vibench.virtual_rig.generator.periodic_shape import Rectangle, Sine
 from vibench.virtual_rig.generator.phase_course import (

@@ -1,5 +1,4 @@
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from vibench.virtual_rig.generator.scpi_message import message_end, units
 from vibench.virtual_rig.generator.scpi_value import as_block, block

@@ -2,8 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from vibench.virtual_rig.generator.afg1022 import AFG1022
 from vibench.virtual_rig.generator.output_signal import Panel

@@ -2,8 +2,7 @@ import errno
 import struct
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from vibench.virtual_rig.generator.afg1022 import AFG1022
 from vibench.virtual_rig.usb.usb_device import BULK_OUT, Setup

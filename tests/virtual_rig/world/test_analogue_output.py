@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from vibench.virtual_rig.world.analogue_output import AnalogueOutput
 from vibench.virtual_rig.world.time_grid import USUAL_GRID

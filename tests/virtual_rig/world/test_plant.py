@@ -8,8 +8,7 @@ import pytest
 from vibench.acquisition.errors import AcquisitionError
 from vibench.acquisition.rig.configuration import load_rig
 from vibench.acquisition.rig.model import Quantity, RigModel, amplifier_gain, suspended_mass_kg
-from vibench.sim.modes import base_transmissibility
-from vibench.sim.specimen import gong2025
+from vibench.sim import base_transmissibility, gong2025
 from vibench.virtual_rig.world.plant import TRUTH_COLUMNS, Plant
 from vibench.virtual_rig.world.time_grid import USUAL_GRID
 

@@ -5,14 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from vibench.acquisition.errors import ConfigurationError
 from vibench.acquisition.rig.configuration import load_rig
 from vibench.acquisition.rig.model import Quantity, RigModel
 from vibench.acquisition.rig.specimen import specimen_of
-from vibench.sim.modes import base_transmissibility
+from vibench.sim import base_transmissibility
 from vibench.virtual_rig.analogue import Coupling, Input
 from vibench.virtual_rig.world.conversion import volts_per_count
 from vibench.virtual_rig.world.decimation import GROUP_DELAY_SAMPLES

@@ -1,7 +1,7 @@
 """How far the specimen swings, and how fast its main mass moves, while a plan plays: an estimate beforehand.
 
 Exact where p stays inside the gap. Where it does not, the fundamental of a motion whose p is held at the
-gap (`vibench.sim.against_stops`). Impacts add to it; tests/acquisition/plan/test_specimen_loads.py says how
+gap (`vibench.sim.model`). Impacts add to it; tests/acquisition/plan/test_specimen_loads.py says how
 much. What moves in fact is watched while it runs.
 """
 
@@ -12,9 +12,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.against_stops import BaseAnswer, base_answer
-from vibench.sim.contact_law import NoContact
-from vibench.sim.specimen import Specimen
+from vibench.sim import BaseAnswer, NoContact, Specimen, base_answer
 
 from ..excitation.kinds import Excitation
 from ..excitation.steps import SampleSource, Tone, Waveform

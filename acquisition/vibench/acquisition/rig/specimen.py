@@ -1,6 +1,6 @@
 """The specimen of a rig as the simulation knows it."""
 
-from vibench.sim.specimen import Specimen, gong2025
+from vibench.sim import Specimen, gong2025
 
 from .configuration import Rig
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from matplotlib.axes import Axes
 
-from vibench.sim.specimen import Specimen
+from vibench.sim import Specimen
 
 from .style import BOUNDS, TERMINAL
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.trade.figures import Trade
+from vibench.sim import Accuracy
+from vibench.sim.accuracy_benchmark import Trade
 
 from ..tables import table
 from .drawn import DrawnFigure

@@ -2,10 +2,7 @@
 
 import numpy as np
 
-from vibench.sim.periodic.condensation import structure_of
-from vibench.sim.periodic.first_order_balance import first_order_states
-from vibench.sim.periodic.restoring_force import PowerSpring, spring_of
-from vibench.sim.specimen import gong2025
+from vibench.sim import PowerSpring, first_order_states, gong2025, spring_of, structure_of
 
 from ..arrays import Reals
 from ..prediction import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ

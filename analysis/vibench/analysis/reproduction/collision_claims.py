@@ -2,10 +2,7 @@
 
 import numpy as np
 
-from vibench.sim.drive import LinearSweep
-from vibench.sim.integrate import integrate
-from vibench.sim.outcome import Outcome
-from vibench.sim.scene import Observable
+from vibench.sim import LinearSweep, Observable, Outcome, integrate
 
 from ..arrays import Flags, Reals
 from ..figures.paper.options import AMPLITUDES_M

@@ -3,8 +3,7 @@
 import numpy as np
 from scipy.signal import find_peaks
 
-from vibench.sim.engine.bound_modes import JOIN
-from vibench.sim.specimen import Specimen
+from vibench.sim import JOIN, Specimen
 
 from ..arrays import Reals
 from ..prediction import linear_transmission

@@ -4,8 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from vibench.sim.study.results import StudyResults
-from vibench.sim.study.study import Study
+from vibench.sim.study import Study, StudyResults
 
 Kept = TypeVar("Kept")
 Solve = Callable[[Study], StudyResults]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibench.sim.specimen import gong2025
+from vibench.sim import gong2025
 
 from ..arrays import Flags, Reals
 from ..figures.paper.options import AMPLITUDES_M

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from vibench.sim.study.software import PACKAGES, software
+from vibench.sim.study import PACKAGES, software
 
 from ..figures.paper.options import FigureOptions
 from .case import AS_CHOSEN, Case

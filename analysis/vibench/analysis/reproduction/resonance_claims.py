@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vibench.sim.scene import Observable
+from vibench.sim import Observable
 
 from ..figures.paper.fig11_clearance import GAPS_M, clearance_studies
 from ..figures.paper.responses import responses

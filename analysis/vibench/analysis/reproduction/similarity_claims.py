@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from vibench.sim.periodic.restoring_force import spring_of
-from vibench.sim.specimen import gong2025
+from vibench.sim import gong2025, spring_of
 
 from ..arrays import Reals
 from ..figures.paper.options import AMPLITUDES_M

@@ -2,9 +2,8 @@
 
 from collections.abc import Sequence
 
-from vibench.sim.scene import Observable
-from vibench.sim.specimen import Specimen, gong2025
-from vibench.sim.study.study import Kept, Study
+from vibench.sim import Observable, Specimen, gong2025
+from vibench.sim.study import Kept, Study
 
 from ..figures.paper.options import AMPLITUDES_M
 from ..figures.paper.responses import Responses, responses

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from vibench.sim.accuracy import Accuracy
+from vibench.sim import Accuracy
 
 from .request import Exponent, SimulationRequest
 

@@ -4,18 +4,18 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from vibench.sim.drive import Harmonic
-from vibench.sim.integrate import integrate
-from vibench.sim.outcome import Outcome
-from vibench.sim.prediction import Prediction
-from vibench.sim.study.answers import prediction_at
-from vibench.sim.study.arrays import PointAnswer
-from vibench.sim.study.columns import MESSAGE
-from vibench.sim.study.layout import PointState
-from vibench.sim.study.run import run_study
-from vibench.sim.study.store import MemoryStore
-from vibench.sim.study.study import Start, Study
-from vibench.sim.study.threads import ThreadExecutor
+from vibench.sim import Harmonic, Outcome, Prediction, integrate
+from vibench.sim.study import (
+    MESSAGE,
+    MemoryStore,
+    PointAnswer,
+    PointState,
+    Start,
+    Study,
+    ThreadExecutor,
+    prediction_at,
+    run_study,
+)
 
 from .answers import Piece, SimulatedPoint, SimulatedSignal, Trouble
 from .request import SimulationRequest

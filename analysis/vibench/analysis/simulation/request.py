@@ -6,10 +6,8 @@ from typing import Annotated, Self
 from pydantic import Field, PositiveFloat, model_validator
 
 from vibench.acquisition.toml_file import FrozenModel
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.scene import Observable
-from vibench.sim.study.frequency_range import frequency_range
-from vibench.sim.study.study import Study
+from vibench.sim import Accuracy, Observable
+from vibench.sim.study import Study, frequency_range
 
 MOST_POINTS = 20_000
 """Of both models together: a picture shows no more, and an afternoon computes no more."""

@@ -1,1 +1,20 @@
-"""Studies: many scenes as one work queue, on threads or a cluster, kept in HDF5 and resumable."""
+"""Studies: every combination of models, gaps, amplitudes and frequencies, solved as one queue of scenes.
+
+`solve_study` computes on threads or on a Dask cluster and keeps the answers in memory or in an HDF5 file
+that survives a kill and is resumed where it ended (docs/studies.md, docs/decisions/0010-studies.md). A
+start `up` or `down` continues from the neighbouring frequency. An answer does not depend on where it is
+computed; every file names the software that computed it. Physics is `vibench.sim.scene`'s; this room only
+orders, stores and reports.
+
+>>> from vibench.sim.study import Study, frequency_range, solve_study
+>>> study = Study(models=["linear"], frequencies_hz=frequency_range(90.0, 100.0, 5.0), amplitudes_m=[1e-6])
+>>> results = solve_study(study)
+>>> results.is_complete
+True
+>>> [round(float(value), 3) for value in results.values("response_i", model="linear").ravel()]
+[1.527, 2.541, 0.715]
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -8,7 +8,7 @@ from vibench.analysis.simulation.answers import SimulatedPoint, SimulatedSignal,
 from vibench.analysis.simulation.request import SimulationRequest
 from vibench.gui.pages.simulate.simulate_page import SimulatePage
 from vibench.gui.theme import DARK
-from vibench.sim.accuracy import Accuracy
+from vibench.sim import Accuracy
 
 LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "start_hz": 50.0, "step_hz": 10.0}
 

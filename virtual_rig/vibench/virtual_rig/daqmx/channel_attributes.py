@@ -6,6 +6,7 @@ from typing import Any
 from nidaqmx.constants import (
     AOIdleOutputBehavior,
     ChannelType,
+    Coupling as WireCoupling,
     DataJustification,
     ExcitationDCorAC,
     ExcitationSource,
@@ -15,7 +16,6 @@ from nidaqmx.constants import (
     TerminalConfiguration,
     UsageTypeAO,
 )
-from nidaqmx.constants import Coupling as WireCoupling
 
 from ..analogue import Coupling
 from .attributes import Attribute, AttributeGroup, Attributes

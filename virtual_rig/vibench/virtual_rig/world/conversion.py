@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.compiled import compiled
+from vibench.sim.kernels import compiled
 
 from .decimation import Decimator, decimator
 from .input_stage import InputStage

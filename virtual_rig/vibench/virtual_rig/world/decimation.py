@@ -12,7 +12,7 @@ from math import ceil, floor
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.compiled import compiled
+from vibench.sim.kernels import compiled
 
 FloatArray = NDArray[np.float64]
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.compiled import compiled
+from vibench.sim.kernels import compiled
 
 from ..analogue import Coupling, Input
 from .recursive_filter import RecursiveFilter

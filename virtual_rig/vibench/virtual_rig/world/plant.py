@@ -15,10 +15,9 @@ from scipy.linalg import expm
 from vibench.acquisition.errors import AcquisitionError
 from vibench.acquisition.rig.configuration import Rig
 from vibench.acquisition.rig.model import RigModel
-from vibench.sim.compiled import compiled
-from vibench.sim.engine.interval import advance_interval, base_reaction, interval_tables, new_state
-from vibench.sim.engine.piece import IntervalTables
-from vibench.sim.specimen import Specimen
+from vibench.sim import Specimen
+from vibench.sim.kernels import compiled
+from vibench.sim.stepping import IntervalTables, advance_interval, base_reaction, interval_tables, new_state
 
 FloatArray = NDArray[np.float64]
 
@@ -38,7 +37,7 @@ REACTION_BEFORE = 5
 _PLANT_SIZE = 6
 
 TRUTH_COLUMNS = ("base_displacement", "base_velocity", "current", "x", "y", "z", "vx", "vy", "vz")
-"""What the truth holds at the end of a step, SI; the specimen's as in vibench.sim.specimen."""
+"""What the truth holds at the end of a step, SI; the specimen's as in vibench.sim.model."""
 _SHAKER_SIZE = 3
 
 

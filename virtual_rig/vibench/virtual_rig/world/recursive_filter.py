@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vibench.sim.compiled import compiled
+from vibench.sim.kernels import compiled
 
 FloatArray = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from vibench.acquisition.errors import ConfigurationError
 from vibench.acquisition.rig.configuration import Rig
 from vibench.acquisition.rig.specimen import specimen_of
 from vibench.acquisition.rig.virtual import VirtualConfig, fastest_sample_rate_hz
-from vibench.sim.specimen import Specimen
+from vibench.sim import Specimen
 
 from ..analogue import Input
 from .analogue_output import AnalogueOutput

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from vibench.sim.periodic.restoring_force import spring_of
-from vibench.sim.study.structure import Structure
+from vibench.sim import spring_of
+from vibench.sim.study import Structure
 
 from ...tables import table
 from ..drawn import DrawnFigure

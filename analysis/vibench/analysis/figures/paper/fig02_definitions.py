@@ -1,7 +1,6 @@
 """Fig. 2: what Responses I and II are: a time signal at 200 Hz, its spectrum, and the curves."""
 
-from vibench.sim.study.results import StudyResults
-from vibench.sim.study.study import Study
+from vibench.sim.study import Study, StudyResults
 
 from ...tables import table
 from ..drawn import DrawnFigure

@@ -5,12 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.axes import Axes
 
-from vibench.sim.periodic.condensation import structure_of
-from vibench.sim.periodic.first_order_balance import first_order_states, jump_frequencies
-from vibench.sim.periodic.restoring_force import PowerSpring, spring_of
-from vibench.sim.specimen import Specimen
-from vibench.sim.study.results import StudyResults
-from vibench.sim.study.study import Study
+from vibench.sim import PowerSpring, Specimen, first_order_states, jump_frequencies, spring_of, structure_of
+from vibench.sim.study import Study, StudyResults
 
 from ...arrays import Reals
 from ...tables import Table, table

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from vibench.sim.scene import Observable
-from vibench.sim.study.results import StudyResults
-from vibench.sim.study.study import Study
+from vibench.sim import Observable
+from vibench.sim.study import Study, StudyResults
 
 from ...tables import table
 from ..drawn import DrawnFigure

@@ -3,8 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from vibench.sim.study.results import StudyResults
-from vibench.sim.study.study import Study
+from vibench.sim.study import Study, StudyResults
 
 from ...tables import table
 from ..drawn import DrawnFigure

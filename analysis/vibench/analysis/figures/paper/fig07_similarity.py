@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from vibench.sim.study.results import StudyResults
-from vibench.sim.study.study import Study
+from vibench.sim.study import Study, StudyResults
 
 from ...arrays import Reals
 from ...similarity import Curve, Similarity, similarity

@@ -3,9 +3,8 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from vibench.sim.scene import Observable
-from vibench.sim.study.results import StudyResults
-from vibench.sim.study.study import Study
+from vibench.sim import Observable
+from vibench.sim.study import Study, StudyResults
 
 from ...arrays import Reals
 from ...tables import table

@@ -1,7 +1,6 @@
 """Fig. 11: the gap at equal amplitude: whatever it is, two resonances remain."""
 
-from vibench.sim.study.results import StudyResults
-from vibench.sim.study.study import Study
+from vibench.sim.study import Study, StudyResults
 
 from ...tables import table
 from ..drawn import DrawnFigure

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from vibench.sim.accuracy import Accuracy
-from vibench.sim.study.frequency_range import frequency_range
+from vibench.sim import Accuracy
+from vibench.sim.study import frequency_range
 
 from ...errors import InvalidRequest
 from ...similarity import THRESHOLD, LogarithmOf

@@ -5,10 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 
-from vibench.sim.drive import Harmonic
-from vibench.sim.specimen import Specimen
-from vibench.sim.study.results import StudyResults
-from vibench.sim.study.study import Study
+from vibench.sim import Harmonic, Specimen
+from vibench.sim.study import Study, StudyResults
 
 from ...arrays import Flags, Reals
 from ...prediction import linear_transmission

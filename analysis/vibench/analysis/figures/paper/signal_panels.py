@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from vibench.sim.specimen import Specimen
+from vibench.sim import Specimen
 
 from ..style import COLLIDING, MEASURED, TERMINAL, magnitude_axis
 from .options import FigureOptions

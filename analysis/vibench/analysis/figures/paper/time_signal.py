@@ -4,9 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibench.sim.drive import Harmonic
-from vibench.sim.integrate import integrate
-from vibench.sim.specimen import Specimen
+from vibench.sim import Harmonic, Specimen, integrate
 
 from ...arrays import Reals
 from ...envelope import Envelope, envelope

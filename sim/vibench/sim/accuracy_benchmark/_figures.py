@@ -1,0 +1,119 @@
+"""What a measurement of the trade says: cost and error of each level, and of general solvers beside them."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+from ..model import Accuracy
+from ._regimes import Motion, Regime
+
+LEAST_GAIN = 2.0
+"""A level whose error is not smaller than the one before it by this factor buys nothing."""
+
+
+@dataclass(frozen=True)
+class LevelFigures:
+    """One level of accuracy on one motion."""
+
+    accuracy: Accuracy
+    cost: float
+    """Processor time over simulated time."""
+    state_error: float | None
+    """Of the state at the end of the span, as `vibench.sim.accuracy_benchmark.state_error`; None in
+    chaos.
+    """
+    response_i_error: float | None
+    """Relative, against the reference level; None in chaos."""
+    response_ii_error: float | None
+    response_i: float
+    """Mean over all starts in chaos."""
+    response_i_scatter: float
+    """Relative standard deviation of Response I over starts; 0 where all agree."""
+    exponent_per_s: float
+    exponent_error_per_s: float
+    """Standard error of the exponent itself, whatever the accuracy."""
+
+
+@dataclass(frozen=True)
+class SolverFigures:
+    """A general solver on one motion."""
+
+    name: str
+    cost: float
+    """Processor time over simulated time."""
+    state_error: float | None
+    """Over its own, shorter span, against the independent solution."""
+
+
+@dataclass(frozen=True)
+class MotionTrade:
+    """The trade on one motion."""
+
+    motion: Motion
+    span_s: float
+    solver_span_s: float
+    levels: tuple[LevelFigures, ...]
+    solvers: tuple[SolverFigures, ...]
+
+    @property
+    def advice(self) -> str:
+        """Say in a sentence which level to take."""
+        match self.motion.regime:
+            case Regime.FREE:
+                return "Flight is exact: all levels are the same."
+            case Regime.PERIODIC:
+                return self._periodic_advice()
+            case Regime.CHAOTIC:
+                return (
+                    "Quick is as good as any: with the start of the motion Response I scatters by "
+                    f"{self.levels[0].response_i_scatter:.1%}, which no accuracy lessens."
+                )
+
+    @property
+    def without_gain(self) -> tuple[tuple[LevelFigures, LevelFigures], ...]:
+        """Levels whose state is no better than that of the level before, each with that one."""
+        return tuple(
+            (level, before)
+            for before, level in pairwise(self.levels)
+            if self.motion.regime is Regime.PERIODIC and not _is_better(level, before)
+        )
+
+    def _periodic_advice(self) -> str:
+        quick, standard, reference = self.levels
+        steps = f"{quick.state_error:.0e}, {standard.state_error:.0e} and {reference.state_error:.0e}"
+        errors = f"{steps} of the state"
+        price = f"costs {reference.cost / quick.cost:.1f} times the first"
+        match [level.accuracy for level, _ in self.without_gain]:
+            case []:
+                return f"Each level buys digits: {errors}; the last {price}."
+            case [Accuracy.STANDARD]:
+                return f"Standard is no better than quick, reference is: {errors}; the last {price}."
+            case [Accuracy.REFERENCE]:
+                return f"Standard buys digits, reference no more: {errors}; the last {price}."
+            case _:
+                return f"No level buys digits: {errors}; the last {price}."
+
+
+def _is_better(level: LevelFigures, before: LevelFigures) -> bool:
+    if level.state_error is None or before.state_error is None:
+        return False
+    return LEAST_GAIN * level.state_error < before.state_error
+
+
+@dataclass(frozen=True)
+class Trade:
+    """Everything that was measured in one run."""
+
+    motions: tuple[MotionTrade, ...]
+    machine: str
+    """Processor and cores."""
+    software: str
+
+    def solver_ratio(self, name: str, accuracy: Accuracy) -> dict[str, float]:
+        """Cost of a general solver over that of a level, by motion."""
+        return {
+            each.motion.name: solver.cost / level.cost
+            for each in self.motions
+            for solver in each.solvers
+            for level in each.levels
+            if solver.name == name and level.accuracy is accuracy
+        }

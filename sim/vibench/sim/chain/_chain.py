@@ -1,0 +1,112 @@
+"""A chain of vibro-impact cells: specimens whose outer masses hang on one another. SI units.
+
+Cell i is a `Specimen`; its (k0, c0) join its m0 to the m0 of the cell before, those of the first cell to
+the base. The far end is free. Displacements are in the order x1, y1, z1, x2, y2, z2, ...
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict
+
+from ..model import Matrix, RigidStops, Specimen, Triple
+
+MASSES_PER_CELL = 3
+"""m0, m1, m2: a cell's displacements x, y, z."""
+MOST_CELLS = 1000
+"""The modes of more cells do not fit into an ordinary memory."""
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Cells from the driven base to the free end; they may differ in everything."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
+
+    cells: tuple[Specimen, ...]
+    """Index 0 hangs on the base through its own (k0, c0), cell i on cell i - 1."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= len(self.cells) <= MOST_CELLS:
+            msg = f"A chain of {len(self.cells)} cells is not allowed: give 1 to {MOST_CELLS}."
+            raise ValueError(msg)
+        for place, cell in enumerate(self.cells, start=1):
+            match cell.contact:
+                case RigidStops():
+                    msg = f"Cell {place} has rigid stops, which a chain cannot follow: use HuntCrossley."
+                    raise ValueError(msg)
+                case _:
+                    pass
+
+    @property
+    def size(self) -> int:
+        """How many cells."""
+        return len(self.cells)
+
+    @property
+    def masses(self) -> NDArray[np.float64]:
+        """Shape (3 cells,) [kg]."""
+        return np.asarray([mass for cell in self.cells for mass in cell.masses])
+
+    @property
+    def mass_matrix(self) -> Matrix:
+        """M, shape (3 cells, 3 cells) [kg]."""
+        return np.diag(self.masses)
+
+    @property
+    def stiffness_matrix(self) -> Matrix:
+        """K without contact, shape (3 cells, 3 cells) [N/m]."""
+        return _assembled([cell.stiffnesses for cell in self.cells])
+
+    @property
+    def damping_matrix(self) -> Matrix:
+        """C, shape (3 cells, 3 cells) [N s/m]."""
+        return _assembled([cell.dampings for cell in self.cells])
+
+    @property
+    def natural_frequencies_hz(self) -> NDArray[np.float64]:
+        """Undamped natural frequencies without contact, ascending, shape (3 cells,) [Hz]."""
+        root = np.sqrt(self.masses)
+        values = np.linalg.eigvalsh(self.stiffness_matrix / np.outer(root, root))
+        return np.asarray(np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), dtype=np.float64)
+
+
+def chain_of(specimen: Specimen, cells: int) -> Chain:
+    """Build a chain of equal cells.
+
+    Parameters
+    ----------
+    specimen
+        One cell; its k0 and c0 are the coupling, to the base and from cell to cell.
+    cells
+        One or more; one cell is the specimen itself.
+
+    """
+    if not 1 <= cells <= MOST_CELLS:
+        msg = f"A chain of {cells} cells is not allowed: give 1 to {MOST_CELLS}."
+        raise ValueError(msg)
+    return Chain((specimen,) * cells)
+
+
+def _assembled(links: list[Triple]) -> Matrix:
+    """Symmetric matrix of springs (or dampers): links 0, 1, 2 of every cell."""
+    size = MASSES_PER_CELL * len(links)
+    matrix = np.zeros((size, size))
+    for cell, (outer, inner, middle) in enumerate(links):
+        x, y, z = range(MASSES_PER_CELL * cell, MASSES_PER_CELL * (cell + 1))
+        _join(matrix, y, z, inner)
+        _join(matrix, x, z, middle)
+        if cell == 0:
+            matrix[x, x] += outer
+        else:
+            _join(matrix, x - MASSES_PER_CELL, x, outer)
+    return matrix
+
+
+def _join(matrix: Matrix, one: int, other: int, link: float) -> None:
+    matrix[one, one] += link
+    matrix[other, other] += link
+    matrix[one, other] -= link
+    matrix[other, one] -= link

@@ -1,0 +1,165 @@
+"""The largest Lyapunov exponent of a chain, from two neighbouring motions. SI units.
+
+Two motions a small distance apart are followed; after every interval their distance is read, in the energy
+norm, and the second motion is put back to the small distance along the line between them (Benettin, Galgani
+and Strelcyn, Kolmogorov entropy and numerical experiments, Phys. Rev. A 14 (1976) 2338). The distance is far
+above the error of a contact and far below the motion itself, which is why the accuracy is REFERENCE at first.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..exponents import BlockedMean, blocked_mean
+from ..kernels import Floats, Table, clock_at
+from ..model import Accuracy, Harmonic, Outcome
+from ..motion import MAX_IMPACT_RATE_HZ
+from ._chain import MASSES_PER_CELL, Chain
+from ._integrate import integrate_chain, new_chain_record, new_tally, start_chain, state_of_phasors
+from ._run import IMPACTS, advance_chain
+from ._tables import ChainTables, chain_tables
+from ._tally import NOTHING
+
+NEARNESS = 1e-6
+"""Distance of the two motions over the size of the first."""
+SHORTEST_INTERVAL_S = 5e-3
+"""A growth of 100 per second then stays below 2: the motions remain near."""
+FEWEST_INTERVALS = 32
+"""Intervals that must fit into the duration, so that a mean can have an error."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChainExponent:
+    """How fast neighbouring motions of a chain part. NaN where the run did not reach its end."""
+
+    drive: Harmonic
+    accuracy: Accuracy
+    exponent_per_s: float
+    """Mean growth [1/s]; negative where neighbours come together."""
+    standard_error_per_s: float
+    blocks: BlockedMean | None
+    """How the mean and its error were taken [1/s]."""
+    interval_s: float
+    """Whole drive periods between readings."""
+    local_exponents_per_s: Floats
+    """In each interval after settling, shape (n,)."""
+    impacts: int
+    """Of all cells, while the exponent was read."""
+    final_state: Floats
+    """x, y, z, vx, vy, vz of every cell at the end, shape (cells, 6)."""
+    outcome: Outcome
+
+
+def largest_chain_exponent(
+    chain: Chain,
+    drive: Harmonic,
+    accuracy: Accuracy = Accuracy.REFERENCE,
+    duration_s: float = 5.0,
+    settle_s: float = 2.0,
+    initial_state: ArrayLike | None = None,
+    *,
+    seed: int = 0,
+    max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
+) -> ChainExponent:
+    """Tell whether neighbouring motions of a chain part, and how fast.
+
+    Parameters
+    ----------
+    chain, drive, accuracy, initial_state, max_impact_rate_hz
+        As in `vibench.sim.chain.integrate_chain`.
+    duration_s, settle_s
+        The exponent is the mean over ``duration_s``, after ``settle_s`` which find the attractor [s].
+    seed
+        Of the direction in which the second motion starts.
+
+    Raises
+    ------
+    ValueError
+        When an argument is not allowed, or the duration holds too few intervals for an error.
+
+    """
+    interval_s = math.ceil(SHORTEST_INTERVAL_S * drive.frequency_hz) / drive.frequency_hz
+    intervals = math.floor(duration_s / interval_s * (1.0 + 1e-9)) if math.isfinite(duration_s) else 0
+    if intervals < FEWEST_INTERVALS:
+        msg = (
+            f"Duration {duration_s} s is not allowed for an exponent at {drive.frequency_hz} Hz: "
+            f"it must be finite and hold {FEWEST_INTERVALS} intervals of {interval_s} s."
+        )
+        raise ValueError(msg)
+    settled = integrate_chain(
+        chain, drive, settle_s, accuracy, initial_state, max_impact_rate_hz=max_impact_rate_hz
+    )
+    pair = _Pair(chain, chain_tables(chain, drive, accuracy), accuracy, max_impact_rate_hz)
+    first = settled.final_state
+    second = _put_near(chain, first, first + np.random.default_rng(seed).normal(size=first.shape), drive)
+    growths, impacts, outcome = [], 0, settled.outcome
+    for index in range(intervals if outcome is Outcome.REACHED_END else 0):
+        start_s = settle_s + index * interval_s
+        before = _size(chain, second - first)
+        first, struck, outcome = pair.advance(first, start_s, interval_s)
+        second, _, other = pair.advance(second, start_s, interval_s)
+        outcome = max(outcome, other)
+        if outcome is not Outcome.REACHED_END:
+            break
+        growths.append(math.log(_size(chain, second - first) / before) / interval_s)
+        second = _put_near(chain, first, second, drive)
+        impacts += struck
+    local = np.asarray(growths)
+    blocks = blocked_mean(local) if outcome is Outcome.REACHED_END else None
+    return ChainExponent(
+        drive=drive,
+        accuracy=accuracy,
+        exponent_per_s=math.nan if blocks is None else blocks.mean,
+        standard_error_per_s=math.nan if blocks is None else blocks.standard_error,
+        blocks=blocks,
+        interval_s=interval_s,
+        local_exponents_per_s=local,
+        impacts=impacts,
+        final_state=first,
+        outcome=outcome,
+    )
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """What advances both motions."""
+
+    chain: Chain
+    tables: ChainTables
+    accuracy: Accuracy
+    max_impact_rate_hz: float
+
+    def advance(self, state: Floats, start_s: float, duration_s: float) -> tuple[Floats, int, Outcome]:
+        """Follow one motion for an interval; gives its end, how often it struck, and how the run ended."""
+        cells, phasors = start_chain(self.chain, state, start_s, self.tables, self.accuracy)
+        record = new_chain_record(self.chain, start_s, duration_s, None, self.max_impact_rate_hz)
+        code = advance_chain(
+            cells,
+            phasors,
+            clock_at(start_s),
+            start_s + duration_s,
+            self.tables,
+            self.accuracy.tolerance,
+            record,
+            new_tally(self.chain, NOTHING),
+        )
+        return state_of_phasors(self.chain, phasors, self.tables), int(record.counts[IMPACTS]), Outcome(code)
+
+
+def _put_near(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Floats:
+    """Move the second motion along the line to the first, to the small distance from it."""
+    apart = second - first
+    # A chain at rest under a drive is as large as the drive would move it.
+    base = np.zeros_like(first)
+    base[:, :MASSES_PER_CELL] = drive.amplitude_m
+    size = max(_size(chain, first), _size(chain, base))
+    return first + apart * (NEARNESS * size / _size(chain, apart))
+
+
+def _size(chain: Chain, state: Floats) -> float:
+    """Root of twice the energy of a motion without its contacts [J^0.5]."""
+    q, v = state[:, :MASSES_PER_CELL].ravel(), state[:, MASSES_PER_CELL:].ravel()
+    stiffness: Table = chain.stiffness_matrix
+    return math.sqrt(float(np.sum(chain.masses * v**2) + q @ stiffness @ q))

@@ -1,0 +1,155 @@
+"""Responses I and II of every mass of a chain under one harmonic drive. SI units."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..kernels import Complex, Floats, clock_at
+from ..model import Accuracy, Harmonic, Outcome
+from ..motion import MAX_IMPACT_RATE_HZ, whole_periods
+from ._chain import MASSES_PER_CELL, Chain
+from ._integrate import impacts_of, new_chain_record, new_tally, start_chain, state_of_phasors
+from ._modes import chain_impulses, chain_state_matrix
+from ._run import IMPACTS, advance_chain
+from ._tables import chain_tables
+from ._tally import NOTHING, PEAKS, PEAKS_AND_LINES
+
+OF_P = 3
+"""Column of p in `ChainResponse`, after x, y, z."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChainResponse:
+    """What one point of a chain's response curves says. NaN where the run did not reach its end."""
+
+    drive: Harmonic
+    accuracy: Accuracy
+    duration_s: float
+    window_s: float
+    """The largest values are taken over this long before the end."""
+    line_periods: int
+    """The lines, over this many whole drive periods before the end: the most that the window holds."""
+    largest_m: Floats
+    """Largest abs of x, y, z and p = y - z of every cell over the window, shape (cells, 4)."""
+    lines_m: Complex
+    """Their components at the drive frequency, q = Re(line exp(i (omega t + phase))), shape (cells, 4)."""
+    impacts: NDArray[np.int64]
+    """Contacts that began within the window, in each cell; shape (cells,)."""
+    impacts_before: NDArray[np.int64]
+    """Contacts that began before the window."""
+    final_state: Floats
+    """x, y, z, vx, vy, vz of every cell at the end, shape (cells, 6): where a next run may start."""
+    outcome: Outcome
+
+    @property
+    def response_i(self) -> Floats:
+        """Largest abs of x, y, z, p of every cell over the drive amplitude, shape (cells, 4)."""
+        return self.largest_m / self.drive.amplitude_m
+
+    @property
+    def response_ii(self) -> Floats:
+        """Amplitudes of x, y, z, p at the drive frequency over the drive amplitude, shape (cells, 4)."""
+        return np.asarray(np.abs(self.lines_m) / self.drive.amplitude_m, dtype=np.float64)
+
+
+def chain_response(
+    chain: Chain,
+    drive: Harmonic,
+    accuracy: Accuracy = Accuracy.STANDARD,
+    duration_s: float = 30.0,
+    window_s: float = 5.0,
+    initial_state: ArrayLike | None = None,
+    *,
+    max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
+) -> ChainResponse:
+    """Drive a chain for a while and say how large the motion of every mass is at the end.
+
+    The defaults are those of `vibench.sim.motion.steady_response`. A long chain settles more slowly than
+    a cell.
+
+    Parameters
+    ----------
+    chain, drive, accuracy, duration_s, window_s, max_impact_rate_hz
+        As in `vibench.sim.chain.integrate_chain`; the window is the end of the run that is
+        observed [s].
+    initial_state
+        Shape (cells, 6); at rest when None.
+
+    Raises
+    ------
+    ValueError
+        When the drive has no amplitude, or the window is longer than the run or shorter than one period.
+
+    """
+    periods = whole_periods(drive, duration_s, window_s)
+    tables = chain_tables(chain, drive, accuracy)
+    cells, phasors = start_chain(chain, initial_state, 0.0, tables, accuracy)
+    clock, line_s = clock_at(0.0), periods / drive.frequency_hz
+    record = new_chain_record(chain, 0.0, duration_s, None, max_impact_rate_hz)
+    tally, before, line_start = new_tally(chain, NOTHING), 0, phasors
+    code = int(Outcome.REACHED_END)
+    ends = (duration_s - window_s, duration_s - line_s, duration_s)
+    for mode, until in zip((NOTHING, PEAKS, PEAKS_AND_LINES), ends, strict=True):
+        if code == Outcome.REACHED_END:
+            before = int(record.counts[IMPACTS]) if mode == PEAKS else before
+            line_start = phasors.copy()
+            code = advance_chain(
+                cells, phasors, clock, until, tables, accuracy.tolerance, record, tally._replace(mode=mode)
+            )
+    start = _state_against_drive(line_start, tables.shapes)
+    change = _state_against_drive(phasors, tables.shapes) - start
+    lines = _lines(chain, drive, tally.forces, change, line_s)
+    largest = np.column_stack([*tally.peaks[1:], tally.peaks[0]])
+    void = 1.0 if code == Outcome.REACHED_END else math.nan
+    impacts = impacts_of(chain, record).cells
+    return ChainResponse(
+        drive=drive,
+        accuracy=accuracy,
+        duration_s=duration_s,
+        window_s=window_s,
+        line_periods=periods,
+        largest_m=void * largest,
+        lines_m=void * lines,
+        impacts=np.bincount(impacts[before:], minlength=chain.size),
+        impacts_before=np.bincount(impacts[:before], minlength=chain.size),
+        final_state=state_of_phasors(chain, phasors, tables),
+        outcome=Outcome(code),
+    )
+
+
+def _state_against_drive(phasors: Complex, shapes: Complex) -> Complex:
+    """State times exp(-i (omega t + phase)), shape (6 cells,); the last phasor is the drive."""
+    return np.asarray((phasors @ shapes).real * phasors[-1].conjugate(), dtype=np.complex128)
+
+
+def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line_s: float) -> Complex:
+    """Components of every motion at the drive frequency, shape (cells, 4), from those of the forces.
+
+    s' = A s + b f - sum B F, multiplied by exp(-i omega t) and integrated by parts over whole periods, is
+    (i omega - A) S = b f - B F - change, with S, f, F the integrals.
+
+    Parameters
+    ----------
+    chain, drive
+        As observed.
+    forces
+        Integral of the force in each cell against the drive's term, shape (cells,) [N s].
+    change
+        Of the state times exp(-i omega t) from the start to the end of the lines, shape (6 cells,).
+    line_s
+        How long they were [s].
+
+    """
+    omega = 2.0 * math.pi * drive.frequency_hz
+    system, entry = chain_state_matrix(chain)
+    first = chain.cells[0]
+    push = (first.stiffnesses[0] + 1j * omega * first.dampings[0]) * -1j * drive.amplitude_m
+    right = entry * push * 0.5 * line_s - chain_impulses(chain) @ forces - change
+    # Velocities in units of omega times displacements: every row and column of like size.
+    units = np.repeat([1.0, omega], MASSES_PER_CELL * chain.size)
+    balanced = 1j * np.eye(len(units)) - system / units[:, None] * units[None, :] / omega
+    moved = np.linalg.solve(balanced, right / units / omega) * units * (2.0 / line_s)
+    by_cell = moved[: MASSES_PER_CELL * chain.size].reshape(chain.size, MASSES_PER_CELL)
+    return np.column_stack([by_cell, by_cell[:, 1] - by_cell[:, 2]])

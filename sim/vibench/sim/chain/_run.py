@@ -1,0 +1,314 @@
+"""A run of a chain under a harmonic drive, window by window. SI units.
+
+In a window every cell moves as if the others were free: its own force acts on it with nothing left out,
+another's only from the window's end on. What this leaves out is bounded when the windows are chosen
+(`vibench.sim.chain`), so that simultaneous contacts need no common time: each is followed in its own.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels import Complex, Table, Vector, advance_clock, compiled, lean, time_until
+from ..model import Outcome
+from ._cell_flow import CELL_SIZE, MEMORY, POWER, SIDE
+from ._cell_power import begin_power
+from ._cell_window import COUNT, cross_window
+from ._tables import KIND, LOWER, OBSERVED, PATH, UPPER, ChainTables
+from ._tally import NOTHING, PEAKS_AND_LINES, ChainTally, tally_busy, tally_forces, tally_idle
+from ._windows import (
+    Space,
+    copy_motion,
+    copy_terms,
+    deposit,
+    drive_term,
+    fill_observed,
+    find_busy,
+    is_bounded,
+    law_of,
+    march,
+    neighbours_clash,
+    place_motion,
+    place_observed,
+    set_ceilings,
+    space_for,
+    turn_window,
+    weigh,
+)
+
+REACHED_END = int(Outcome.REACHED_END)
+TOO_MANY_IMPACTS = int(Outcome.TOO_MANY_IMPACTS)
+LOST = int(Outcome.NOT_FINITE)
+
+NEXT_SAMPLE, IMPACTS = 0, 1
+"""Places of `ChainRecord.counts`."""
+
+
+class ChainRecord(NamedTuple):
+    """What a run fills on its way."""
+
+    start: float
+    """Time of sample 0 [s]."""
+    sample_rate: float
+    samples: Table
+    """Shape (n, 6 cells); n = 0 keeps none."""
+    impact_times: Vector
+    """Shape (most impacts,) [s], ascending but within a window; a run ends in the window that fills it."""
+    impact_cells: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    """Samples and impacts so far."""
+
+
+@compiled
+def advance_chain(  # noqa: C901 - the kinds of window and their ends are one loop
+    cells: Table,
+    phasors: Complex,
+    clock: Vector,
+    until: float,
+    tables: ChainTables,
+    tolerance: float,
+    record: ChainRecord,
+    tally: ChainTally,
+) -> int:
+    """Advance cells, phasors and clock in place to the instant ``until`` [s]; returns an `Outcome` code."""
+    space = space_for(tables)
+    observed = 1 if tally.mode == NOTHING else OBSERVED
+    count, drive = len(cells), len(phasors) - 1
+    phasors[drive] = drive_term(clock, 0.0, tables)
+    while True:
+        longest = time_until(clock, until)
+        if longest <= 0.0:
+            return REACHED_END
+        if count > 0:
+            # A force has acted: what was known of the paths to come is void.
+            place_observed(space.motion, phasors, observed, tables)
+            weigh(space, phasors, observed, tables)
+            if is_bounded(space) == 0:
+                return LOST
+            if is_quiet(space, cells, tables) == 1:
+                _go_quietly(space, phasors, cells, clock, until, tables, tolerance, record, tally)
+                return REACHED_END
+        if _march_on(space, phasors, cells, clock, longest, tally, record, tables) > 0:
+            count = 0
+            continue
+        length, count = _choose_window(space, cells, phasors, clock, longest, observed, tables)
+        code = _cross(space, cells, phasors, count, length, clock, tables, tolerance, record, tally)
+        if record.counts[NEXT_SAMPLE] < len(record.samples):
+            _sample(space, phasors, clock, length, tables, tolerance, record)
+        for k in range(count):
+            deposit(space.turned, cells[space.busy[k]], space.busy[k], tables)
+        copy_terms(phasors, space.turned)
+        copy_motion(space.motion, space.motion_end, observed)
+        if length >= longest:
+            clock[0], clock[1] = until, 0.0
+        else:
+            advance_clock(clock, length)
+        if code != REACHED_END:
+            return code
+
+
+@compiled
+def _go_quietly(
+    space: Space,
+    phasors: Complex,
+    cells: Table,
+    clock: Vector,
+    until: float,
+    tables: ChainTables,
+    tolerance: float,
+    record: ChainRecord,
+    tally: ChainTally,
+) -> None:
+    """Go to the end in one step when no cell can ever touch; who watches looks at every window."""
+    longest, drive = time_until(clock, until), len(phasors) - 1
+    space.busy_count[0] = 0
+    copy_terms(space.start, phasors)
+    if record.counts[NEXT_SAMPLE] < len(record.samples):
+        _sample(space, phasors, clock, longest, tables, tolerance, record)
+    if tally.mode != NOTHING:
+        then = np.zeros(2)
+        then[0], then[1] = clock[0], clock[1]
+        left = longest
+        while left > 0.0:
+            if _march_on(space, phasors, cells, then, left, tally, record, tables) == 0:
+                length = min(left, tables.windows[0])
+                turn_window(space, phasors, then, length, 0, tables)
+                place_observed(space.motion_end, space.turned, OBSERVED, tables)
+                for i in range(len(cells)):
+                    tally_idle(tally, i, space, phasors, length, tables)
+                copy_terms(phasors, space.turned)
+                copy_motion(space.motion, space.motion_end, OBSERVED)
+                advance_clock(then, length)
+            left = time_until(then, until)
+    for j in range(drive):
+        phasors[j] = space.start[j] * np.exp(tables.rates[j] * longest)
+    clock[0], clock[1] = until, 0.0
+    phasors[drive] = drive_term(clock, 0.0, tables)
+
+
+@lean
+def _march_on(
+    space: Space,
+    phasors: Complex,
+    cells: Table,
+    clock: Vector,
+    longest: float,
+    tally: ChainTally,
+    record: ChainRecord,
+    tables: ChainTables,
+) -> int:
+    """Advance over whole windows in which nothing can happen; gives how many there were."""
+    observed = 1 if tally.mode == NOTHING else OBSERVED
+    for i in range(len(cells)):
+        if cells[i, SIDE] != 0.0:
+            return 0
+    window, free = tables.windows[0], longest
+    if record.counts[NEXT_SAMPLE] < len(record.samples):
+        free = min(free, time_until(clock, record.start + record.counts[NEXT_SAMPLE] / record.sample_rate))
+    # One window less than fits: the last one before an instant is cut to end on it.
+    steps = int(free / window) - 1
+    if steps <= 0:
+        return 0
+    set_ceilings(space, tally.peaks, observed, window, tables)
+    for what in range(observed):
+        for i in range(len(cells)):
+            if not space.floor[what, i] < space.motion[what, i] < space.ceiling[what, i]:
+                return 0
+    return march(space, phasors, clock, observed, steps, tables)
+
+
+@lean
+def _choose_window(
+    space: Space,
+    cells: Table,
+    phasors: Complex,
+    clock: Vector,
+    longest: float,
+    observed: int,
+    tables: ChainTables,
+) -> tuple[float, int]:
+    """Take the longest window in which no two busy cells feel each other, and turn the phasors to its end.
+
+    Gives its length [s], and how many cells are busy.
+    """
+    length, count = longest, 0
+    for level in range(len(tables.windows)):
+        length = min(longest, tables.windows[level])
+        turn_window(space, phasors, clock, length, level, tables)
+        place_observed(space.motion_end, space.turned, observed, tables)
+        count = find_busy(space, cells, length, tables)
+        if neighbours_clash(space.busy, count, tables.clash[level]) == 0:
+            break
+    return length, count
+
+
+@lean
+def is_quiet(space: Space, cells: Table, tables: ChainTables) -> int:
+    """Say (1 or 0) whether no cell can ever touch: free phasors only shrink."""
+    for i in range(len(cells)):
+        law = tables.laws[i]
+        if cells[i, SIDE] != 0.0 or law[KIND] == POWER or space.reach[PATH, i] >= min(law[LOWER], law[UPPER]):
+            return 0
+    return 1
+
+
+@lean
+def _cross(
+    space: Space,
+    cells: Table,
+    phasors: Complex,
+    count: int,
+    length: float,
+    clock: Vector,
+    tables: ChainTables,
+    tolerance: float,
+    record: ChainRecord,
+    tally: ChainTally,
+) -> int:
+    """Take every cell through the window and observe it."""
+    observed = 1 if tally.mode == NOTHING else OBSERVED
+    log = space.no_log if tally.mode == NOTHING else space.log
+    worst, busy = REACHED_END, 0
+    for i in range(len(cells)):
+        if busy == count or space.busy[busy] != i:
+            if tally.mode != NOTHING:
+                tally_idle(tally, i, space, phasors, length, tables)
+            continue
+        busy += 1
+        cell, series, markov = cells[i], space.series[i], tables.markov[i, PATH]
+        law = law_of(tables.laws[i])
+        fill_observed(series, phasors, i, observed, space.terms, tables)
+        for k in range(MEMORY, CELL_SIZE):
+            cell[k] = 0.0
+        if law.kind == POWER:
+            begin_power(cell, series[PATH], markov, law, length)
+        for k in range(CELL_SIZE):
+            space.before[i, k] = cell[k]
+        space.touches[COUNT] = 0.0
+        code = cross_window(
+            cell, 0.0, length, series[PATH], markov, space.reach[PATH, i], law, tolerance,
+            space.later, space.work, space.touches, log,
+        )  # fmt: skip
+        if code == REACHED_END:
+            code = _record_touches(space.touches, i, clock, record)
+        if tally.mode != NOTHING:
+            tally_busy(tally, i, series, log, tables)
+        if tally.mode == PEAKS_AND_LINES:
+            tally_forces(tally, cell, i, space.turned[len(phasors) - 1], tables.omega)
+        worst = max(worst, code)
+    return worst
+
+
+@lean
+def _record_touches(touches: Vector, place: int, clock: Vector, record: ChainRecord) -> int:
+    for k in range(1, int(touches[COUNT]) + 1):
+        impact = record.counts[IMPACTS]
+        if impact == len(record.impact_times):
+            return TOO_MANY_IMPACTS
+        record.impact_times[impact] = clock[0] + touches[k]
+        record.impact_cells[impact] = place
+        record.counts[IMPACTS] += 1
+    return REACHED_END
+
+
+@compiled
+def _sample(
+    space: Space,
+    phasors: Complex,
+    clock: Vector,
+    length: float,
+    tables: ChainTables,
+    tolerance: float,
+    record: ChainRecord,
+) -> None:
+    """Keep the samples that fall into a window, by a second run of the busy cells that lands on each."""
+    counts, reached, count = record.counts, 0.0, space.busy_count[0]
+    drive = len(phasors) - 1
+    while counts[NEXT_SAMPLE] < len(record.samples):
+        later = time_until(clock, record.start + counts[NEXT_SAMPLE] / record.sample_rate)
+        if later > length:
+            return
+        now = space.terms
+        for j in range(drive):
+            now[j] = phasors[j] * np.exp(tables.rates[j] * later)
+        now[drive] = drive_term(clock, later, tables)
+        for k in range(count):
+            i = space.busy[k]
+            space.touches[COUNT] = 0.0
+            if later > reached:
+                cross_window(
+                    space.before[i], reached, later, space.series[i, PATH], tables.markov[i, PATH],
+                    space.reach[PATH, i], law_of(tables.laws[i]), tolerance,
+                    space.later, space.work, space.touches, space.no_log,
+                )  # fmt: skip
+            deposit(now, space.before[i], i, tables)
+        reached = max(reached, later)
+        place_motion(record.samples[counts[NEXT_SAMPLE]], now, tables)
+        counts[NEXT_SAMPLE] += 1
+
+
+@compiled
+def chain_cells(count: int) -> Table:
+    """Make the rows of cells in flight."""
+    return np.zeros((count, CELL_SIZE))

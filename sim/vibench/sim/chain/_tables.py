@@ -1,0 +1,170 @@
+"""What the kernels need to know of a chain and its drive: modes, windows, answers to forces. SI units."""
+
+import cmath
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels import Complex, Table, Vector
+from ..model import MOST_TERMS, Accuracy, Harmonic, Specimen
+from ..slots import parameters, power_terms
+from ._cell_flow import MARKOV_TERMS, POWER, WINDOW_TURN, YIELDING
+from ._chain import MASSES_PER_CELL, Chain
+from ._modes import chain_impulses, chain_modal_form, chain_state_matrix, chain_transmissibility
+
+PATH, ACROSS, INNER, MIDDLE = range(4)
+"""What is observed of a cell: p, x, y, z."""
+OBSERVED = 4
+
+KIND, LOWER, UPPER, LINEAR, CONTACT, LOSS, INVERSE_REFERENCE, HALVES = range(8)
+"""Places of a cell's law; from HALVES on the power terms' halves, then their forces."""
+LAW_SIZE = HALVES + 2 * MOST_TERMS
+
+CROSS_SHARE = 0.05
+"""Part of the tolerance that one cell's force may change another's rate within a window, unseen."""
+MOST_HALVINGS = 20
+
+
+class ChainTables(NamedTuple):
+    """Chain and drive, diagonalised. Terms 0..n-1 are modes, term n is the drive."""
+
+    frequency: float
+    omega: float
+    phase: complex
+    """exp(i phase) of the drive at time zero."""
+    rates: Complex
+    """l_j, shape (n+1,) [1/s]; one of each conjugate pair."""
+    shapes: Complex
+    """V_j, shape (n+1, 6 cells): motion of a unit phasor."""
+    observed: Complex
+    """Shape (cells, 4, n+1): what a unit phasor adds to p, x, y, z of a cell."""
+    real: Table
+    """The same, real and imaginary part and magnitude, shape (n+1, 4, cells): rows to take at once."""
+    imaginary: Table
+    reaches: Table
+    curvatures: Table
+    """reaches times abs(l_j)^2: bounds on accelerations."""
+    rows: Complex
+    """Left rows, shape (n, 6 cells), with the weight 2 of a pair: a state's phasors."""
+    push: Complex
+    """Shape (cells, n): what a unit impulse in a cell, along its p, adds to the phasors."""
+    markov: Table
+    """g_k of `vibench.sim.chain` for p, x, y, z of the cell itself, shape (cells, 4,
+    MARKOV_TERMS).
+    """
+    laws: Table
+    """Shape (cells, LAW_SIZE)."""
+    windows: Vector
+    """Lengths of the long and the short window [s]."""
+    factors: Complex
+    """exp(l_j window), shape (2, n+1)."""
+    clash: NDArray[np.int64]
+    """In such a window, cells at most so far apart may not both be busy; shape (2,)."""
+
+
+def chain_tables(chain: Chain, drive: Harmonic, accuracy: Accuracy) -> ChainTables:
+    """Prepare flight and contact for a chain and a harmonic drive."""
+    modes = chain_modal_form(chain)
+    omega = 2.0 * math.pi * drive.frequency_hz
+    moved = chain_transmissibility(chain, drive.frequency_hz)[0, :, :MASSES_PER_CELL].ravel()
+    motion = -1j * drive.amplitude_m * np.concatenate([moved, 1j * omega * moved])
+    rates = np.append(modes.rates, 1j * omega)
+    shapes = np.vstack([modes.shapes, motion])
+    displacement = shapes[:, : MASSES_PER_CELL * chain.size].reshape(len(rates), chain.size, MASSES_PER_CELL)
+    path = displacement[:, :, 1] - displacement[:, :, 2]
+    observed = np.concatenate([path[:, :, None], displacement], axis=2)
+    reaches = np.ascontiguousarray(np.abs(observed).transpose(0, 2, 1))
+    between = markov_between(chain)
+    longest = WINDOW_TURN / float(np.max(np.abs(rates)))
+    windows, clash = _windows(between, longest, CROSS_SHARE * accuracy.tolerance)
+    return ChainTables(
+        frequency=drive.frequency_hz,
+        omega=omega,
+        phase=cmath.exp(1j * drive.phase_rad),
+        rates=rates,
+        shapes=shapes,
+        observed=np.ascontiguousarray(observed.transpose(1, 2, 0)),
+        real=np.ascontiguousarray(observed.real.transpose(0, 2, 1)),
+        imaginary=np.ascontiguousarray(observed.imag.transpose(0, 2, 1)),
+        reaches=reaches,
+        curvatures=reaches * (np.abs(rates) ** 2)[:, None, None],
+        rows=modes.rows,
+        push=np.ascontiguousarray((modes.rows @ chain_impulses(chain)).T),
+        markov=_own_markov(between),
+        laws=np.vstack([_law_row(cell) for cell in chain.cells]),
+        windows=windows,
+        factors=np.exp(windows[:, None] * rates[None, :]),
+        clash=clash,
+    )
+
+
+def markov_between(chain: Chain) -> Table:
+    """Taylor coefficients of p, x, y, z of every cell after a unit impulse in every cell.
+
+    Shape (MARKOV_TERMS, 4, answering cells, struck cells).
+    """
+    system, _ = chain_state_matrix(chain)
+    answer = chain_impulses(chain)
+    between = np.zeros((MARKOV_TERMS, OBSERVED, chain.size, chain.size))
+    for k in range(MARKOV_TERMS):
+        moved = answer[: MASSES_PER_CELL * chain.size].reshape(chain.size, MASSES_PER_CELL, chain.size)
+        between[k, ACROSS:] = moved.transpose(1, 0, 2)
+        between[k, PATH] = moved[:, 1] - moved[:, 2]
+        answer = system @ answer
+    return between
+
+
+def _own_markov(between: Table) -> Table:
+    """Of every cell after an impulse in itself, shape (cells, 4, MARKOV_TERMS)."""
+    return np.ascontiguousarray(np.diagonal(between, axis1=2, axis2=3).transpose(2, 1, 0))
+
+
+def cross_answers(between: Table, window: float) -> Vector:
+    """Bound how an impulse in one cell changes dp/dt of another within a window, over its own; by distance.
+
+    Shape (cells,): entry d is the largest among cells d apart; entry 0 is not used.
+    """
+    cells = between.shape[2]
+    path = np.abs(between[:, PATH])
+    answer = sum(path[k] * window ** (k - 1) / math.factorial(k - 1) for k in range(1, MARKOV_TERMS))
+    relative = answer / np.diagonal(path[1])[:, None]
+    distance = np.abs(np.subtract.outer(np.arange(cells), np.arange(cells)))
+    return np.asarray([np.max(relative[distance == d]) for d in range(cells)])
+
+
+def _windows(between: Table, longest: float, allowed: float) -> tuple[Vector, NDArray[np.int64]]:
+    """Choose the long and the short window and who may not be busy together in them.
+
+    A short window is one in which even neighbours may.
+    """
+    clash = _clash(cross_answers(between, longest), allowed)
+    short = longest
+    for _ in range(MOST_HALVINGS):
+        if _clash(cross_answers(between, short), allowed) == 0:
+            break
+        short *= 0.5
+    return np.array([longest, short]), np.array([clash, 0], dtype=np.int64)
+
+
+def _clash(answers: Vector, allowed: float) -> int:
+    return max((d for d in range(1, len(answers)) if answers[d] > allowed), default=0)
+
+
+def _law_row(cell: Specimen) -> Vector:
+    par, power = parameters(cell), power_terms(cell)
+    row = np.zeros(LAW_SIZE)
+    row[:HALVES] = (
+        YIELDING if power is None else POWER,
+        par.lower,
+        par.upper,
+        par.linear_stiffness,
+        par.contact_stiffness,
+        par.loss,
+        0.0 if power is None else power.inverse_reference,
+    )
+    if power is not None:
+        row[HALVES : HALVES + MOST_TERMS] = power.halves
+        row[HALVES + MOST_TERMS :] = power.forces
+    return row

@@ -1,0 +1,104 @@
+"""What is observed of a chain while it runs: the largest motions, and the forces' lines. SI units.
+
+The largest motions are extremes of the motion itself, not of samples. The lines of all displacements follow
+from those of the forces in the cells by the equations of motion (`vibench.sim.chain`), so that
+only the latter are summed.
+"""
+
+from typing import NamedTuple
+
+from ..contact import DEEPEST, LOGGED
+from ..flight import polynomial_at, series_peak
+from ..kernels import Complex, Table, Vector, lean
+from ._cell_flow import MEMORY, MOMENT, MOMENTS, T
+from ._tables import OBSERVED, PATH, ChainTables
+from ._windows import Space, fill_observed
+
+NOTHING, PEAKS, PEAKS_AND_LINES = range(3)
+"""What a tally's mode asks for."""
+SECANTS = 3
+"""Secant steps to the extreme of a cubic: there its slope is zero, so that their error counts squared."""
+
+
+class ChainTally(NamedTuple):
+    """Sums of a run."""
+
+    mode: int
+    peaks: Table
+    """Largest abs of p, x, y, z of every cell, shape (4, cells) [m]."""
+    forces: Complex
+    """Integral of each cell's force against exp(-i (omega t + phase)), shape (cells,) [N s]."""
+
+
+@lean
+def tally_forces(tally: ChainTally, cell: Vector, place: int, end: complex, omega: float) -> None:
+    """Add the moments of a window's force; ``end`` is the drive's term at the window's end."""
+    total = complex(0.0, 0.0)
+    for k in range(MOMENTS - 1, -1, -1):
+        total = total * complex(0.0, omega) + cell[MEMORY + k]
+    tally.forces[place] += end.conjugate() * total
+
+
+@lean
+def tally_idle(
+    tally: ChainTally, place: int, space: Space, phasors: Complex, length: float, tables: ChainTables
+) -> None:
+    """Look for larger motions of a cell without a force; its row of ``space.series`` is overwritten.
+
+    A window is looked at only if the bounds let it hold a larger value than the largest so far.
+    """
+    series = space.series[place]
+    is_filled = False
+    for what in range(OBSERVED):
+        at_ends = max(abs(space.motion[what, place]), abs(space.motion_end[what, place]))
+        if at_ends + space.curvature[what, place] * length * length / 8.0 <= tally.peaks[what, place]:
+            continue
+        if not is_filled:
+            fill_observed(series, phasors, place, OBSERVED, space.terms, tables)
+            is_filled = True
+        tally.peaks[what, place] = series_peak(tally.peaks[what, place], series[what], 0.0, length)
+
+
+@lean
+def _node(series: Vector, markov: Vector, at: Vector) -> tuple[float, float]:
+    """Value and slope of an observed motion at a logged instant."""
+    value, slope = polynomial_at(series, at[T])
+    for k in range(1, MOMENTS):
+        value -= markov[k] * at[MOMENT + k]
+        slope -= markov[k] * at[MOMENT + k - 1]
+    return value, slope - markov[MOMENTS] * at[MOMENT + MOMENTS - 1]
+
+
+@lean
+def tally_busy(tally: ChainTally, place: int, series: Table, log: Table, tables: ChainTables) -> None:
+    """Look for larger motions of a cell between the logged instants of its window."""
+    tally.peaks[PATH, place] = max(tally.peaks[PATH, place], log[0, DEEPEST])
+    for what in range(OBSERVED):
+        markov, best = tables.markov[place, what], tally.peaks[what, place]
+        value, slope = _node(series[what], markov, log[1])
+        for row in range(2, int(log[0, LOGGED]) + 1):
+            step = log[row, T] - log[row - 1, T]
+            value_end, slope_end = _node(series[what], markov, log[row])
+            best = _cubic_peak(best, value, step * slope, value_end, step * slope_end)
+            value, slope = value_end, slope_end
+        tally.peaks[what, place] = best
+
+
+@lean
+def _cubic_peak(best: float, x0: float, v0: float, x1: float, v1: float) -> float:
+    """Largest magnitude on [0, 1] of the cubic with these end values and slopes, or ``best``."""
+    best = max(best, abs(x0), abs(x1))
+    if v0 * v1 >= 0.0:
+        return best
+    rise = x1 - x0
+    quadratic, cubic = 3.0 * rise - 2.0 * v0 - v1, v0 + v1 - 2.0 * rise
+    low, high, slope_low, slope_high = 0.0, 1.0, v0, v1
+    for _ in range(SECANTS):
+        part = low - slope_low * (high - low) / (slope_high - slope_low)
+        slope = v0 + part * (2.0 * quadratic + part * 3.0 * cubic)
+        best = max(best, abs(x0 + part * (v0 + part * (quadratic + part * cubic))))
+        if slope * slope_low > 0.0:
+            low, slope_low = part, slope
+        else:
+            high, slope_high = part, slope
+    return best

@@ -1,0 +1,132 @@
+"""What is observed of a whole collision: its peaks and its lines. SI units."""
+
+from ..contact import hermite_peak
+from ..flight import AT_X, COSINE, SINE, X_RATE
+from ..kernels import (
+    Lanes,
+    Vector,
+    eight_of_eight,
+    inlined,
+    largest,
+    lean,
+    sixteen,
+    sixteen_of_sixteen,
+    store,
+    total,
+)
+from ..slots import LINE_P_IM, LINE_P_RE, LINE_X_IM, LINE_X_RE, MODE, PEAK_P, PEAK_X, PEAKS_AND_LINES
+from ._collision import ACROSS, ACROSS_RATE, DEPTHS, FORCE, Collision
+from ._sums import at_heights, pushed
+from ._tables import POINTS, TERMS, CollisionTables, deepest_of
+
+FIRST_OF_FORCE = 2
+"""A force reaches x by way of m2 and a damper: two integrals later."""
+LAST_OF_FORCE = 5
+ABOVE_POINTS = 1.03
+"""The largest depth is at most this many times the largest one at the points."""
+
+
+@inlined
+def tally_collision(
+    tally: Vector,
+    collision: Collision,
+    duration: float,
+    gap: float,
+    omega: float,
+    collisions: CollisionTables,
+) -> None:
+    """Add a collision that lasted for ``duration``; what is odd in the side has both signs squared away."""
+    motion, after = collision.motion, collision.after
+    store(collision.course, 0, eight_of_eight(collisions.onto_x, 0, motion))
+    tally[PEAK_X] = max(tally[PEAK_X], abs(motion[AT_X]), abs(after[AT_X]))
+    if motion[X_RATE] * after[X_RATE] < 0.0:
+        tally[PEAK_X] = _turning_peak(tally[PEAK_X], collision, duration, collisions)
+    unit, depths = collision.deepest[0] * collision.deepest[1], collision.room[DEPTHS]
+    if gap + unit * ABOVE_POINTS * largest(sixteen(depths, 0)) > tally[PEAK_P]:
+        tally[PEAK_P] = max(tally[PEAK_P], gap + unit * deepest_of(depths))
+    if tally[MODE] == PEAKS_AND_LINES:
+        _add_lines(tally, collision, duration, gap, omega, collisions)
+
+
+@inlined
+def _add_lines(
+    tally: Vector,
+    collision: Collision,
+    duration: float,
+    gap: float,
+    omega: float,
+    collisions: CollisionTables,
+) -> None:
+    """Add the integrals of x and p against the drive, by Gauss's sums in phi."""
+    _fill_across(collision, duration, collisions)
+    room, drive = collision.room, collision.motion
+    angle, weight = (
+        omega * duration * sixteen(collisions.heights, 0),
+        duration * sixteen(collisions.weights, 0),
+    )
+    square = angle * angle
+    cosine, sine = weight * cosine_of(square), weight * (angle * sine_over(square))
+    along = drive[COSINE] * cosine - drive[SINE] * sine
+    across = drive[COSINE] * sine + drive[SINE] * cosine
+    x, p = sixteen(room, ACROSS), gap + collision.deepest[0] * sixteen(room, DEPTHS)
+    tally[LINE_X_RE] += total(x * along)
+    tally[LINE_X_IM] -= total(x * across)
+    tally[LINE_P_RE] += total(p * along)
+    tally[LINE_P_IM] -= total(p * across)
+
+
+@inlined
+def cosine_of(square: Lanes) -> Lanes:
+    """Cosine of angles below `vibench.sim.collision.LONGEST_TURN`, from their squares: to 3e-11."""
+    return 1.0 + square * (
+        -1.0 / 2.0 + square * (1.0 / 24.0 + square * (-1.0 / 720.0 + square * (1.0 / 40320.0)))
+    )
+
+
+@inlined
+def sine_over(square: Lanes) -> Lanes:
+    """Sine over the angle, likewise."""
+    return 1.0 + square * (
+        -1.0 / 6.0 + square * (1.0 / 120.0 + square * (-1.0 / 5040.0 + square * (1.0 / 362880.0)))
+    )
+
+
+@inlined
+def _fill_across(collision: Collision, duration: float, collisions: CollisionTables) -> None:
+    """Write x at the points."""
+    room, turn = collision.room, collisions.fastest * duration
+    free = collision.motion[AT_X] + at_heights(collision.course, turn * sixteen(collisions.heights, 0))
+    store(
+        room,
+        ACROSS,
+        free + pushed(room[FORCE], FIRST_OF_FORCE, LAST_OF_FORCE, AT_X, duration, collisions),
+    )
+
+
+@inlined
+def _fill_across_rate(collision: Collision, duration: float, collisions: CollisionTables) -> None:
+    """Write vx at the points."""
+    room, turn, course = collision.room, collisions.fastest * duration, collision.course
+    turns, factor = turn * sixteen(collisions.heights, 0), turn
+    rate = 0.0 * turns
+    for term in range(TERMS - 1, 0, -1):
+        rate = rate * turns + term * collisions.fastest * course[term]
+    for term in range(FIRST_OF_FORCE, LAST_OF_FORCE):
+        factor *= turn
+        onto = sixteen_of_sixteen(collisions.shares[term - 1], 0, room[FORCE])
+        rate += term * factor * collisions.struck[term, AT_X] * onto
+    store(room, ACROSS_RATE, rate)
+
+
+@lean
+def _turning_peak(best: float, collision: Collision, duration: float, collisions: CollisionTables) -> float:
+    """Largest magnitude of x in a collision in which it turns."""
+    room, motion, after = collision.room, collision.motion, collision.after
+    _fill_across(collision, duration, collisions)
+    _fill_across_rate(collision, duration, collisions)
+    before, x, rate = 0.0, motion[AT_X], motion[X_RATE]
+    for i in range(POINTS):
+        step = duration * (collisions.heights[i] - before)
+        best = hermite_peak(best, x, rate, room[ACROSS, i], room[ACROSS_RATE, i], step)
+        before, x, rate = collisions.heights[i], room[ACROSS, i], room[ACROSS_RATE, i]
+    return hermite_peak(best, x, rate, after[AT_X], after[X_RATE], duration * (1.0 - before))

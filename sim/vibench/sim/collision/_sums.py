@@ -1,0 +1,45 @@
+"""Sums over the points of a collision, and over the terms of what is slow beside it. SI units."""
+
+from ..kernels import Lanes, Vector, eight, eight_of_eight, inlined, sixteen_of_sixteen, store
+from ._tables import TERMS, CollisionTables
+
+
+@inlined
+def at_heights(terms: Vector, turns: Lanes) -> Lanes:
+    """Give a polynomial without its first term."""
+    value: Lanes = terms[TERMS - 1] * turns
+    for term in range(TERMS - 2, 0, -1):
+        value = (value + terms[term]) * turns
+    return value
+
+
+@inlined
+def pushed(
+    force: Vector, first: int, last: int, place: int, duration: float, collisions: CollisionTables
+) -> Lanes:
+    """Give what a force at the points does to a number of the motion, by some terms of the series."""
+    turn = collisions.fastest * duration
+    factor = duration * turn**first
+    value: Lanes = (
+        factor * collisions.struck[first, place] * sixteen_of_sixteen(collisions.shares[first], 0, force)
+    )
+    for term in range(first + 1, last):
+        factor *= turn
+        value += (
+            factor * collisions.struck[term, place] * sixteen_of_sixteen(collisions.shares[term], 0, force)
+        )
+    return value
+
+
+@inlined
+def move_on(
+    after: Vector, before: Vector, moments: Vector, duration: float, collisions: CollisionTables
+) -> None:
+    """Write what becomes of a motion under a force with such moments."""
+    turn, factor = collisions.fastest * duration, 1.0
+    value = eight(before, 0) + duration * moments[0] * eight(collisions.struck, 0)
+    for term in range(1, TERMS):
+        factor *= turn
+        moved = eight_of_eight(collisions.powers[term], 0, before)
+        value += factor * (moved + duration * moments[term] * eight(collisions.struck, term))
+    store(after, 0, value)

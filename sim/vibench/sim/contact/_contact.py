@@ -1,0 +1,311 @@
+"""Contact with a stop that yields: from touching it to leaving it, with controlled error. SI units."""
+
+import math
+
+import numpy as np
+
+from ..kernels import Table, Vector, compiled, copy_row, inlined, lean
+from ..model import VX, VY, VZ, X, Y, Z
+from ..slots import PACE, RATE, RATE_SCALE, ROOT, ROOT_SCALE, SIDE, STEP, Parameters
+from ._end import step_to_exit, step_to_time
+from ._flow import (
+    CVX,
+    CVZ,
+    CX,
+    CZ,
+    POINT,
+    SPARE,
+    STAGES,
+    TRIAL,
+    WIDTH,
+    WORK_ROWS,
+    R,
+    T,
+    W,
+    contact_error,
+    contact_rates,
+    trial_step,
+)
+
+LEFT, HELD, NOT_FINITE, STALLED = range(4)
+"""How a call ends: the stop was left; the time limit came first; NaN; no progress."""
+
+SLOWEST_TOUCH = 1e-12
+"""A touch slower than this [m/s] enters at this rate: at exactly w = r = 0 the flow in s stands still."""
+ROOT_FLOOR = 1e-6
+"""Added to the error scale of w [m^0.5] (a penetration of 1 pm), so that it never vanishes."""
+RATE_FLOOR = 1e-6
+"""Added to the error scale of r [m/s]."""
+SAFETY, SHRINK, GROW = 0.9, 0.2, 4.0
+"""Step control: aim below the tolerance; the most a step may shrink and grow."""
+MOST_STEPS = 100_000
+"""Steps within one call; a contact takes about ten."""
+LANDING = 1e-11
+"""An exit is found when |w| is below this part of its scale."""
+APEX_SECANTS = 3
+"""Secant steps to the deepest point: there w is flat, so its own error is the square of theirs."""
+STANDARD_TOLERANCE = 3e-7
+"""The tolerance for which steps are foreseen; they scale with its eighth root."""
+DEEP = 1.05
+"""Up to this part of the foreseen depth a contact is the collision that was foreseen."""
+PRESSED = 0.7
+"""First step of a contact that the other springs press, over its time scale."""
+NEAR = 0.1
+"""A hair before the exit, over the last w and the square root of the tolerance: what is left out there, the
+third power of it, is far less than the tolerance."""
+
+
+LOG_ROWS = 256
+LOGGED, DEEPEST, STAGES_ONLY = range(3)
+"""Places of a log's first row: how many steps' ends are in the rows below; the largest w so far; 1 when no
+deepest point is wanted, only the stages."""
+LOG_TIME, LOG_X, LOG_VX, LOG_P, LOG_RATE, LOG_AX, LOG_AP = range(7)
+"""Columns of the rows below: time, x, vx, p and dp/dt at the ends of the accepted steps; under a power law,
+whose steps are long, the accelerations of x and p too."""
+LOG_COLUMNS = 7
+LOG_STEP = 7
+LOG_STAGE_T, LOG_STAGE_W = LOG_STEP + 1, LOG_STEP + 1 + STAGES
+"""Further columns of a wide log, about the step that begins at a row: its length in s, and the rates of t and
+w at its stages, from which a small change of the motion is carried along exactly as the motion was."""
+WIDE_LOG_COLUMNS = LOG_STEP + 1 + 2 * STAGES
+
+
+@compiled
+def contact_workspace() -> Table:
+    """Memory that one run (one thread) hands to every contact."""
+    return np.zeros((WORK_ROWS, WIDTH))
+
+
+def log_for(tally: Vector, tangent: Table | None) -> Table:
+    """Make the log of contacts that a tally (as `vibench.sim.flight` says) or a tangent needs."""
+    if tangent is not None and len(tangent) > 0:
+        wide = np.zeros((LOG_ROWS, WIDE_LOG_COLUMNS))
+        wide[0, STAGES_ONLY] = 1.0 if tally[0] == 0.0 else 0.0
+        return wide
+    return np.zeros((LOG_ROWS if tally[0] != 0.0 else 0, LOG_COLUMNS))
+
+
+@lean
+def gap_of(side: float, par: Parameters) -> float:
+    """Clearance of the stop on one side [m]."""
+    return par.upper if side > 0.0 else par.lower
+
+
+@lean
+def begin_contact(state: Vector, side: float, par: Parameters, tolerance: float) -> None:
+    """Enter contact from the flight state, at any penetration (zero when the stop is just touched).
+
+    The first step resolves whichever is faster: the elastic collision (a half-wave in s of about
+    5.1 w_max/v), or the other springs pressing a slow contact (w'' = -(a/2) w).
+    """
+    p = state[Y] - state[Z]
+    gap = gap_of(side, par)
+    root = math.sqrt(max(side * p - gap, 0.0))
+    rate = side * (state[VY] - state[VZ])
+    if root == 0.0:
+        rate = max(rate, SLOWEST_TOUCH)
+    # In a collision with the speed v: m v^2 / 2 = k1 d^2 / 2 + 2 k d^(5/2) / 5, each spring taken alone.
+    hertz = 0.8 * par.contact_stiffness / par.reduced_mass
+    linear = par.linear_stiffness / par.reduced_mass
+    speed = math.sqrt(rate * rate + hertz * root**5 + linear * root**4)
+    deepest = min((speed * speed / hertz) ** 0.2, math.sqrt(speed / math.sqrt(linear)))
+    pull = par.k2 * (state[Z] - state[X]) + par.c2 * (state[VZ] - state[VX])
+    pressing = par.k1 * gap + par.c1 * rate
+    press = abs(side * pull / par.mass2 - pressing / par.reduced_mass)
+    state[SIDE] = side
+    state[ROOT] = root
+    state[RATE] = rate
+    state[PACE] = deepest / speed
+    state[ROOT_SCALE] = deepest + ROOT_FLOOR
+    state[RATE_SCALE] = speed + RATE_FLOOR
+    whole = min(deepest / speed, PRESSED / math.sqrt(0.5 * press + 1e-300))
+    state[STEP] = step_scale(tolerance) * _foreseen(root / state[ROOT_SCALE], rate) * whole
+
+
+@lean
+def step_scale(tolerance: float) -> float:
+    """Give the ratio of steps at a tolerance to those at the standard one: its eighth root."""
+    return math.sqrt(math.sqrt(math.sqrt(tolerance / STANDARD_TOLERANCE)))
+
+
+@inlined
+def _foreseen(depth: float, rate: float) -> float:
+    """Foresee the longest step that will do, over the collision's time scale, at a depth over the largest.
+
+    Contacts are all alike: the errors of the last step know nothing of the turn ahead, where steps must be
+    half as long. Measured on Hertz collisions of any speed (5.1 long in all) as what a third of the tolerance
+    allows; on linear stops it is a little less than that.
+    """
+    if rate > 0.0:
+        return max(1.02 - 0.95 * depth, 0.46)
+    if depth > 0.93:
+        return 0.48
+    return 0.6 if depth > 0.65 else 0.9
+
+
+@lean
+def _gather(work: Table, state: Vector, tau: float) -> None:
+    at = work[POINT]
+    at[W], at[R], at[CX], at[CZ] = state[ROOT], state[RATE], state[X], state[Z]
+    at[CVX], at[CVZ], at[T], at[WIDTH - 1] = state[VX], state[VZ], tau, 0.0
+
+
+@lean
+def _scatter(work: Table, state: Vector, par: Parameters) -> None:
+    at, side = work[POINT], state[SIDE]
+    state[ROOT], state[RATE] = at[W], at[R]
+    state[X], state[Z], state[VX], state[VZ] = at[CX], at[CZ], at[CVX], at[CVZ]
+    state[Y] = at[CZ] + side * (gap_of(side, par) + at[W] * at[W])
+    state[VY] = at[CVZ] + side * at[R]
+
+
+@lean
+def _start_log(log: Table, work: Table, side: float, par: Parameters) -> None:
+    if len(log) > 0:
+        log[0, LOGGED] = 0.0
+        log[0, DEEPEST] = work[POINT, W]
+        _log_point(log, work, side, par)
+
+
+@lean
+def _log_point(log: Table, work: Table, side: float, par: Parameters) -> None:
+    """Add the accepted point as the log's next row."""
+    at = work[POINT]
+    log[0, LOGGED] += 1.0
+    row = int(log[0, LOGGED])
+    log[row, LOG_TIME], log[row, LOG_X], log[row, LOG_VX] = at[T], at[CX], at[CVX]
+    log[row, LOG_P], log[row, LOG_RATE] = side * (gap_of(side, par) + at[W] * at[W]), side * at[R]
+
+
+@lean
+def log_stages(log: Table, work: Table, step: float) -> None:
+    """Add the stages of the step just taken to the row of its start, if the log is wide enough."""
+    if log.shape[1] == WIDE_LOG_COLUMNS:
+        row = log[int(log[0, LOGGED])]
+        row[LOG_STEP] = step
+        for stage in range(STAGES):
+            row[LOG_STAGE_T + stage], row[LOG_STAGE_W + stage] = work[stage, T], work[stage, W]
+
+
+@lean
+def _log_apex(
+    log: Table, work: Table, step: float, side: float, force: Vector, middle: float, par: Parameters
+) -> None:
+    """Note the deepest point of the step just taken; where r turns, step to r = 0 exactly."""
+    log[0, DEEPEST] = max(log[0, DEEPEST], work[TRIAL, W])
+    before, after = work[POINT, R], work[TRIAL, R]
+    if not before > 0.0 > after:
+        return
+    copy_row(work[SPARE], work[TRIAL])
+    low, high = 0.0, step
+    for _ in range(APEX_SECANTS):
+        part = low + (high - low) * before / (before - after)
+        trial_step(work, part, side, force, middle, par)
+        log[0, DEEPEST] = max(log[0, DEEPEST], work[TRIAL, W])
+        if work[TRIAL, R] > 0.0:
+            low, before = part, work[TRIAL, R]
+        else:
+            high, after = part, work[TRIAL, R]
+    copy_row(work[TRIAL], work[SPARE])
+
+
+@lean
+def step_factor(error: float) -> float:
+    """Next step over this one. The eighth root as three square roots; an error of NaN shrinks."""
+    if not error < 1e300:
+        return SHRINK
+    if error <= 1e-12:
+        return GROW
+    return min(GROW, max(SHRINK, SAFETY / math.sqrt(math.sqrt(math.sqrt(error)))))
+
+
+@lean
+def advance_contact(  # noqa: C901, PLR0912 - a step control and its three ends are one loop
+    state: Vector,
+    tau: float,
+    limit: float,
+    force: Vector,
+    middle: float,
+    par: Parameters,
+    tolerance: float,
+    work: Table,
+    log: Table,
+) -> tuple[int, float]:
+    """Advance a contact until m1 leaves the stop or the time reaches ``limit``, whichever is first.
+
+    Parameters
+    ----------
+    state
+        In and out; ``state[SIDE]`` is back at 0 when the stop was left.
+    tau, limit
+        Time now and time to stop at [s], on the clock of ``force``.
+    force, middle
+        k0 U + c0 dU/dt as coefficients in powers of (tau - middle), shape (8,).
+    tolerance
+        Relative error allowed in a step, on w and r.
+    work
+        From `contact_workspace`.
+    log
+        Filled with the accepted steps, for who observes the contact; no rows keep nothing. A full log
+        ends the call with HELD before the limit.
+
+    Returns
+    -------
+    LEFT, HELD, NOT_FINITE or STALLED, and the time reached.
+
+    """
+    side, step = state[SIDE], state[STEP]
+    root_scale, rate_scale = state[ROOT_SCALE], state[RATE_SCALE]
+    longest = state[PACE] * step_scale(tolerance)
+    near = NEAR * math.sqrt(tolerance)
+    _gather(work, state, tau)
+    _start_log(log, work, side, par)
+    if tau >= limit:
+        return HELD, tau
+    contact_rates(work[POINT], work[0], side, force, middle, par)
+    for _ in range(MOST_STEPS):
+        trial_step(work, step, side, force, middle, par)
+        error = contact_error(work, step, root_scale, rate_scale, tolerance)
+        factor = step_factor(error)
+        if not error <= 1.0:
+            step *= min(factor, 1.0)
+            if step < 1e-300:
+                return NOT_FINITE, work[POINT, T]
+            continue
+        taken, code = step, -1
+        if work[TRIAL, W] <= 0.0:
+            taken = step_to_exit(
+                work, step, side, force, middle, par, LANDING * root_scale, near * work[POINT, W]
+            )
+            code = LEFT
+        if work[TRIAL, T] >= limit:
+            taken = step_to_time(work, taken, limit, side, force, middle, par)
+            code = HELD
+        if work[TRIAL, T] < work[POINT, T]:
+            # Time runs backwards where w < 0: the step leapt over the exit and came back.
+            step *= 0.5
+            continue
+        if len(log) > 0:
+            log_stages(log, work, taken)
+            if log[0, STAGES_ONLY] == 0.0:
+                _log_apex(log, work, taken, side, force, middle, par)
+        copy_row(work[POINT], work[TRIAL])
+        if code == LEFT:
+            work[POINT, W] = 0.0
+        if len(log) > 0:
+            _log_point(log, work, side, par)
+            if code < 0 and log[0, LOGGED] + 1 == len(log):
+                code = HELD
+        if code >= 0:
+            _scatter(work, state, par)
+            state[STEP] = step
+            if code == LEFT:
+                state[SIDE] = 0.0
+            return code, work[POINT, T]
+        contact_rates(work[POINT], work[0], side, force, middle, par)
+        step *= factor
+        depth = work[POINT, W] / root_scale
+        if depth < DEEP:
+            step = min(step, longest * _foreseen(depth, work[POINT, R]))
+    _scatter(work, state, par)
+    return STALLED, work[POINT, T]

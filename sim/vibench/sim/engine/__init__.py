@@ -1,1 +1,0 @@
-"""The engine: flight in closed form, contacts in controlled steps, and what is observed on the way."""

@@ -1,0 +1,92 @@
+"""One way to compile a kernel: typed for the checker, cached on disk, and never stale."""
+
+import hashlib
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+from numba import config, njit
+
+Kernel = TypeVar("Kernel", bound=Callable[..., object])
+SIM = Path(__file__).parents[1]
+
+
+@cache
+def _digest_of_sources(folder: Path) -> str:
+    """Digest of every source below a folder: where it lies and what stands in it."""
+    digest = hashlib.sha256()
+    for source in sorted(folder.rglob("*.py")):
+        digest.update(source.relative_to(folder).as_posix().encode())
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+SOURCES = _digest_of_sources(SIM)
+"""What this process runs, whatever is changed on the disk meanwhile."""
+
+
+@cache
+def _sources_behind(package: str) -> str:
+    """Digest of the sources that a kernel of a package may call: the package's own, and these."""
+    folder = Path(str(sys.modules[package].__file__)).parent
+    return SOURCES if folder == SIM else f"{SOURCES}-{_digest_of_sources(folder)}"
+
+
+@contextmanager
+def _cache_of(kernel: Callable[..., object]) -> Iterator[None]:
+    """Keep what is compiled in a directory of its own for every state of the sources.
+
+    numba's cache notices a change in the file of a kernel but not in the files of the kernels that
+    it calls: an update of one file would go on running the physics of before. numba reads its setting
+    while a kernel is declared, so it is put back: other people's kernels stay where they were. A
+    directory that numba cannot write to makes it fall back on its own choice.
+    """
+    package = ".".join(kernel.__module__.split(".")[:2])
+    # numba fills its configuration at run time, out of sight of a checker.
+    chosen: str = config.CACHE_DIR  # type: ignore[attr-defined]
+    place = Path(chosen or Path(__file__).parent / "__pycache__")
+    config.CACHE_DIR = str(place / f"kernels-{_sources_behind(package)}")  # type: ignore[attr-defined]
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = chosen  # type: ignore[attr-defined]
+
+
+_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+"""How every kernel is compiled. Nobody calls one as a C function, so that wrapper is left out."""
+_COUNTING, _LEAN = ({**_OPTIONS, "_nrt": counts} for counts in (True, False))
+"""With numba's memory and without. Said outright, or a kernel would take after the first that calls it."""
+
+
+def compiled(kernel: Kernel) -> Kernel:
+    """Compile with numba: cached on disk, without the interpreter lock, IEEE division.
+
+    ``error_model="numpy"`` divides as the processor does (x/0 is inf): kernels guard their own
+    denominators and must not raise. ``fastmath`` stays off: it may assume that no NaN exists,
+    and the step control must see one.
+    """
+    with _cache_of(kernel):
+        return cast("Kernel", njit(**_COUNTING)(kernel))
+
+
+def lean(kernel: Kernel) -> Kernel:
+    """Compile like `compiled` what makes no array and hands none back.
+
+    Such a kernel need not count references to the arrays that it is given. Counting is atomic, twice for
+    every array of a named tuple in every call: more than half of the time of a step under a power law.
+    """
+    with _cache_of(kernel):
+        return cast("Kernel", njit(**_LEAN)(kernel))
+
+
+def inlined(kernel: Kernel) -> Kernel:
+    """Copy into every caller, before it is compiled: for what costs less than its call.
+
+    numba hands a named tuple of arrays to a call as hundreds of numbers, each copied; a run with impacts took
+    twice as long for that alone. What is copied as source has no arguments.
+    """
+    with _cache_of(kernel):
+        return cast("Kernel", njit(**_LEAN, inline="always")(kernel))

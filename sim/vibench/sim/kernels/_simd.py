@@ -1,0 +1,276 @@
+"""Eight or sixteen numbers that a kernel computes with as with one: a processor keeps them in its registers.
+
+numba compiles loops over arrays, and LLVM finds the registers in them only where it can prove that what is
+written is not what is read; for so few numbers the proof costs more than the sum. So these numbers are a type
+of their own. Every operation is IEEE's, place by place and uncontracted: the same on every processor.
+"""
+
+import operator
+from collections.abc import Callable
+from typing import Any, Self, cast
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
+
+from ._arrays import Table, Vector
+
+_DOUBLE, _PLACE = ir.DoubleType(), ir.IntType(32)
+_ALIGNED = 8
+"""Bytes: what numpy promises."""
+_CHAINS = 4
+"""Sums of rows that run beside each other, so that no addition waits for the one before."""
+
+
+class Lanes:
+    """Eight or sixteen numbers, in a kernel only; a number beside them counts as often."""
+
+    def __add__(self, _other: Self | float) -> Self:
+        raise NotImplementedError
+
+    def __radd__(self, _other: float) -> Self:
+        raise NotImplementedError
+
+    def __sub__(self, _other: Self | float) -> Self:
+        raise NotImplementedError
+
+    def __mul__(self, _other: Self | float) -> Self:
+        raise NotImplementedError
+
+    def __rmul__(self, _other: float) -> Self:
+        raise NotImplementedError
+
+
+class _LanesType(types.Type):
+    def __init__(self, count: int) -> None:
+        self.vector = ir.VectorType(_DOUBLE, count)
+        super().__init__(name=f"Lanes({count})")
+
+
+@register_model(_LanesType)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, lanes: _LanesType) -> None:
+        super().__init__(manager, lanes, lanes.vector)
+
+
+_EIGHT, _SIXTEEN = _LanesType(8), _LanesType(16)
+
+
+def _spread(builder: Any, value: Any, vector: Any) -> Any:
+    """Put a number in every lane."""
+    if value.type == vector:
+        return value
+    nothing = ir.Constant(vector, ir.Undefined)
+    everywhere = ir.Constant(ir.VectorType(_PLACE, vector.count), [0] * vector.count)
+    return builder.shuffle_vector(builder.insert_element(nothing, value, _PLACE(0)), nothing, everywhere)
+
+
+def _begins(context: Any, builder: Any, kind: Any, array: Any, row: Any, vector: Any) -> Any:
+    """Give the address of a row's first number; an array has as many columns as there are lanes."""
+    data = context.make_array(kind)(context, builder, array).data
+    return builder.gep(data, [builder.mul(row, ir.Constant(row.type, vector.count))])
+
+
+def _load(builder: Any, begins: Any, row: int, vector: Any) -> Any:
+    """Load a row from the address of the first one."""
+    begins = builder.gep(begins, [_PLACE(row * vector.count)])
+    return builder.load(builder.bitcast(begins, vector.as_pointer()), align=_ALIGNED)
+
+
+def _is_array(kind: Any) -> bool:
+    return isinstance(kind, types.Array) and kind.dtype == types.float64 and kind.layout == "C"
+
+
+def _loading(lanes: _LanesType) -> Any:
+    @intrinsic
+    def load(_context: Any, array: Any, row: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            first = _begins(context, builder, signature.args[0], given[0], given[1], lanes.vector)
+            return _load(builder, first, 0, lanes.vector)
+
+        fits = _is_array(array) and isinstance(row, types.Integer)
+        return (lanes(array, types.intp), code) if fits else None
+
+    return load
+
+
+def _spreading(lanes: _LanesType) -> Any:
+    @intrinsic
+    def spread(_context: Any, value: Any) -> Any:
+        def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
+            return _spread(builder, given[0], lanes.vector)
+
+        return (lanes(types.float64), code) if isinstance(value, types.Float) else None
+
+    return spread
+
+
+def _weighing(lanes: _LanesType, rows: int) -> Any:
+    @intrinsic
+    def weigh(_context: Any, table: Any, first: Any, weights: Any) -> Any:  # noqa: ARG001 - numba's names
+        def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            vector = lanes.vector
+            top = _begins(context, builder, signature.args[0], given[0], given[1], vector)
+            weight = _numbers(context, builder, weights, given[2])
+            parts = (
+                builder.fmul(_spread(builder, weight(row), vector), _load(builder, top, row, vector))
+                for row in range(rows)
+            )
+            chains = [next(parts) for _ in range(_CHAINS)]
+            for row, part in enumerate(parts):
+                chains[row % _CHAINS] = builder.fadd(chains[row % _CHAINS], part)
+            one, two = (builder.fadd(chains[i], chains[i + 1]) for i in (0, 2))
+            return builder.fadd(one, two)
+
+        fits = _is_array(table) and (_is_array(weights) or isinstance(weights, _LanesType))
+        return (lanes(table, types.intp, weights), code) if fits else None
+
+    return weigh
+
+
+def _numbers(context: Any, builder: Any, kind: Any, given: Any) -> Callable[[int], Any]:
+    """Give what draws single numbers from lanes, or from an array."""
+    if isinstance(kind, _LanesType):
+        return lambda place: builder.extract_element(given, _PLACE(place))
+    data = context.make_array(kind)(context, builder, given).data
+    return lambda place: builder.load(builder.gep(data, [_PLACE(place)]))
+
+
+eight = cast("Callable[[Table | Vector, int], Lanes]", _loading(_EIGHT))
+"""A row of an array with eight columns."""
+sixteen = cast("Callable[[Table | Vector, int], Lanes]", _loading(_SIXTEEN))
+"""A row of an array with sixteen columns."""
+eights = cast("Callable[[float], Lanes]", _spreading(_EIGHT))
+"""Eight times the same number."""
+Weigh = Callable[[Table, int, Vector | Lanes], Lanes]
+eight_of_eight = cast("Weigh", _weighing(_EIGHT, 8))
+"""The sum of eight rows of eight numbers from one on, each times its weight."""
+eight_of_sixteen = cast("Weigh", _weighing(_EIGHT, 16))
+"""The sum of sixteen rows of eight numbers."""
+sixteen_of_sixteen = cast("Weigh", _weighing(_SIXTEEN, 16))
+"""The sum of sixteen rows of sixteen numbers."""
+
+
+@intrinsic
+def _store(_context: Any, array: Any, row: Any, lanes: Any) -> Any:  # noqa: ARG001 - numba's names
+    def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        begins = _begins(context, builder, signature.args[0], given[0], given[1], lanes.vector)
+        builder.store(given[2], builder.bitcast(begins, lanes.vector.as_pointer()), align=_ALIGNED)
+        return context.get_dummy_value()
+
+    return types.none(array, types.intp, lanes), code
+
+
+store = cast("Callable[[Table | Vector, int, Lanes], None]", _store)
+"""Write to a row of an array with as many columns."""
+
+
+@intrinsic
+def _root(_context: Any, lanes: Any) -> Any:
+    def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
+        nothing = ir.Constant(lanes.vector, [0.0] * lanes.vector.count)
+        positive = builder.select(builder.fcmp_ordered(">", given[0], nothing), given[0], nothing)
+        name, kind = f"llvm.sqrt.v{lanes.vector.count}f64", ir.FunctionType(lanes.vector, [lanes.vector])
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [positive])
+
+    return lanes(lanes), code
+
+
+root = cast("Callable[[Lanes], Lanes]", _root)
+"""Square roots; zero of what is negative."""
+
+
+def _by_halves(builder: Any, part: Any, join: Callable[[Any, Any], Any]) -> Any:
+    """Join the upper half of all lanes with the lower one until there is one number."""
+    count = part.type.count
+    while count > 1:
+        count //= 2
+        nothing = ir.Constant(part.type, ir.Undefined)
+        lower, upper = (
+            builder.shuffle_vector(
+                part, nothing, ir.Constant(ir.VectorType(_PLACE, count), list(range(first, first + count)))
+            )
+            for first in (0, count)
+        )
+        part = join(lower, upper)
+    return builder.extract_element(part, _PLACE(0))
+
+
+@intrinsic
+def _total(_context: Any, lanes: Any) -> Any:
+    def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
+        return _by_halves(builder, given[0], builder.fadd)
+
+    return types.float64(lanes), code
+
+
+total = cast("Callable[[Lanes], float]", _total)
+"""The sum of all, by halves."""
+
+
+@intrinsic
+def _largest(_context: Any, lanes: Any) -> Any:
+    def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
+        size, count = ir.FunctionType(lanes.vector, [lanes.vector]), lanes.vector.count
+        positive = cgutils.get_or_insert_function(builder.module, size, f"llvm.fabs.v{count}f64")
+
+        def larger(one: Any, other: Any) -> Any:
+            # What is not a number wins, from either side.
+            kept = builder.or_(builder.fcmp_ordered(">", one, other), builder.fcmp_unordered("!=", one, one))
+            return builder.select(kept, one, other)
+
+        return _by_halves(builder, builder.call(positive, [given[0]]), larger)
+
+    return types.float64(lanes), code
+
+
+largest = cast("Callable[[Lanes], float]", _largest)
+"""The largest magnitude of all; NaN where one is not a number."""
+
+
+@intrinsic
+def _first_outside(_context: Any, lanes: Any, low: Any, high: Any) -> Any:  # noqa: ARG001 - numba's names
+    def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
+        vector = lanes.vector
+        above = builder.fcmp_ordered(">", given[0], _spread(builder, given[1], vector))
+        below = builder.fcmp_ordered("<", given[0], _spread(builder, given[2], vector))
+        outside = builder.bitcast(builder.not_(builder.and_(above, below)), ir.IntType(vector.count))
+        wide = builder.zext(outside, ir.IntType(64))
+        # A bit beyond the last lane stands for none.
+        return builder.cttz(builder.or_(wide, ir.Constant(wide.type, 1 << vector.count)), ir.IntType(1)(1))
+
+    return types.intp(lanes, types.float64, types.float64), code
+
+
+first_outside = cast("Callable[[Lanes, float, float], int]", _first_outside)
+"""The first lane that is not between two numbers; the count of lanes if all are."""
+
+
+def _give_operator(function: Callable[..., object], name: str) -> None:
+    """Give lanes an operator of Python."""
+
+    def typer(_context: Any) -> Callable[..., object]:
+        def typed(one: object, other: object) -> object:
+            found = [each for each in (one, other) if isinstance(each, _LanesType)]
+            fits = found and all(each in (found[0], types.float64) for each in (one, other))
+            return found[0] if fits else None
+
+        return typed
+
+    def lowered(_context: Any, builder: Any, signature: Any, pair: Any) -> Any:
+        vector = signature.return_type.vector
+        return getattr(builder, name)(*(_spread(builder, each, vector) for each in pair))
+
+    type_callable(function)(typer)
+    for one, other in ((_LanesType, _LanesType), (_LanesType, types.Float), (types.Float, _LanesType)):
+        lower_builtin(function, one, other)(lowered)
+
+
+for name, functions in {
+    "fadd": (operator.add, operator.iadd),
+    "fsub": (operator.sub, operator.isub),
+    "fmul": (operator.mul, operator.imul),
+}.items():
+    for function in functions:
+        _give_operator(function, name)

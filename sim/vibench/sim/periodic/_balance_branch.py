@@ -1,0 +1,196 @@
+"""Branches of harmonic balance: responses along frequency or amplitude, through folds. SI units."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._balance_solver import BalanceOptions, balance, described
+from ._branch import Branch, Parameter
+from ._branch_following import Followed, OrbitReport, follow
+from ._condensation import Structure, condense
+from ._continuation import ArcEnd, ArcSteps
+from ._floquet import Motion, crossings, multipliers, transition
+from ._harmonic_balance import (
+    Balance,
+    BalanceEnd,
+    BalanceProblem,
+    HarmonicSet,
+    harmonics_up_to,
+    with_harmonics,
+)
+from ._orbit_events import OrbitSigns, Symmetry
+from ._restoring_force import RestoringForce
+
+Vector = NDArray[np.float64]
+Table = NDArray[np.float64]
+
+RANGE_LENGTH = 10.0
+"""The parameter's range counts as this many units of length, the spring's length scale as one."""
+SAFE_SHARE = 0.1
+"""A power law hardly bends the response while p stays below this part of its length scale."""
+
+
+@dataclass(frozen=True, eq=False)
+class BalanceFamily:
+    """Solutions of the balance at one number of harmonics; the last component is the parameter / scale."""
+
+    problem: BalanceProblem
+    parameter: Parameter
+    fixed: float
+    """The drive amplitude [m] along frequency, the frequency [Hz] along amplitude."""
+    scale: float
+    """Hz, or m, per unit of length."""
+    options: BalanceOptions
+
+    @property
+    def tolerance(self) -> float:
+        """Part of the fundamental of p."""
+        return self.options.tolerance
+
+    def drive(self, point: Vector) -> tuple[float, float]:
+        """Frequency [Hz] and amplitude [m] at a point."""
+        value = float(point[-1]) * self.scale
+        return (value, self.fixed) if self.parameter is Parameter.FREQUENCY else (self.fixed, value)
+
+    def linearised(self, point: Vector) -> tuple[Vector, Table]:
+        """Residual and its derivatives by all unknowns and the parameter."""
+        frequency, amplitude = self.drive(point)
+        omega = 2.0 * math.pi * frequency
+        residual, jacobian, by_omega, by_amplitude = self.problem.linearised(point[:-1], omega, amplitude)
+        along = {Parameter.FREQUENCY: 2.0 * math.pi * by_omega, Parameter.AMPLITUDE: by_amplitude}
+        return residual, np.column_stack([jacobian, along[self.parameter] * self.scale])
+
+    def report(self, point: Vector) -> OrbitReport:
+        """Responses, multipliers and contacts."""
+        found = self.balance_at(point)
+        return OrbitReport(
+            frequency_hz=found.frequency_hz,
+            amplitude_m=found.amplitude_m,
+            response_i=found.response_i,
+            response_ii=found.response_ii,
+            state=found.state,
+            signs=orbit_signs(self.problem.structure, self.problem.spring, found, self.options.kept),
+            left_out=found.left_out,
+        )
+
+    def balance_at(self, point: Vector) -> Balance:
+        """Give the solution at a point."""
+        frequency, amplitude = self.drive(point)
+        return described(self.problem, point[:-1], frequency, amplitude, self.tolerance)
+
+    def refined(self, point: Vector, tangent: Vector) -> "tuple[BalanceFamily, Vector, Vector] | None":
+        """Twice the harmonics, the new ones of size zero."""
+        highest = int(self.problem.harmonics[-1])
+        more = min(2 * highest + 1, self.options.most)
+        if more <= highest:
+            return None
+        harmonics = harmonics_up_to(more, self.options.kept)
+        problem = BalanceProblem(self.problem.structure, self.problem.spring, harmonics)
+        finer = BalanceFamily(problem, self.parameter, self.fixed, self.scale, self.options)
+        return finer, self._carried(point, problem), self._carried(tangent, problem)
+
+    def _carried(self, point: Vector, problem: BalanceProblem) -> Vector:
+        phasors = self.problem.phasors(point[:-1])
+        padded = with_harmonics(phasors, self.problem.harmonics, problem.harmonics)
+        return np.append(problem.packed(padded), point[-1])
+
+
+def orbit_signs(
+    structure: Structure, spring: RestoringForce, found: Balance, kept: HarmonicSet
+) -> OrbitSigns:
+    """Stability and contacts of a solution, by the exact variational equation along it."""
+    motion = Motion(found.frequency_hz, found.harmonics, found.relative)
+    contacts = len(crossings(spring, motion, 2.0 * math.pi))
+    if kept is HarmonicSet.ODD:
+        half = -transition(structure, spring, motion, math.pi)
+        return OrbitSigns(multipliers(half), contacts, Symmetry.MIRRORED)
+    return OrbitSigns(multipliers(transition(structure, spring, motion)), contacts, Symmetry.NONE)
+
+
+def balance_branch(
+    structure: Structure,
+    spring: RestoringForce,
+    start: Balance,
+    parameter: Parameter,
+    stop: float,
+    options: BalanceOptions = BalanceOptions(),  # noqa: B008 - frozen
+    steps: ArcSteps = ArcSteps(),  # noqa: B008 - frozen
+) -> Branch:
+    """Follow a solution along frequency [Hz] or drive amplitude [m], from where it is to ``stop``.
+
+    The branch ends at ``stop``, or back at its start's value where it turned round. Harmonics are added
+    where those left out would matter.
+
+    Raises
+    ------
+    ValueError
+        When the start did not converge, or is where the branch shall stop.
+
+    """
+    return _followed(structure, spring, start, parameter, stop, options, steps).branch
+
+
+def _followed(
+    structure: Structure,
+    spring: RestoringForce,
+    start: Balance,
+    parameter: Parameter,
+    stop: float,
+    options: BalanceOptions,
+    steps: ArcSteps,
+) -> Followed:
+    if start.outcome is BalanceEnd.NO_SOLUTION:
+        msg = f"A branch cannot start at {start.frequency_hz} Hz and {start.amplitude_m} m: {start.outcome}."
+        raise ValueError(msg)
+    family, point = _family_at(structure, spring, start, parameter, stop, options)
+    here, there = float(point[-1]), stop / family.scale
+    return follow(family, point, there - here, (min(here, there), max(here, there)), steps, parameter)
+
+
+def _family_at(
+    structure: Structure,
+    spring: RestoringForce,
+    start: Balance,
+    parameter: Parameter,
+    stop: float,
+    options: BalanceOptions,
+) -> tuple[BalanceFamily, Vector]:
+    along = {
+        Parameter.FREQUENCY: (start.frequency_hz, start.amplitude_m),
+        Parameter.AMPLITUDE: (start.amplitude_m, start.frequency_hz),
+    }
+    value, fixed = along[parameter]
+    if not 0.0 < stop < math.inf or stop == value:
+        msg = f"A branch from {value} to {stop} is not allowed: positive, and two different ends."
+        raise ValueError(msg)
+    problem = BalanceProblem(structure, spring, start.harmonics)
+    scale = abs(stop - value) / RANGE_LENGTH
+    family = BalanceFamily(problem, parameter, fixed, scale, options)
+    return family, np.append(problem.packed(start.relative), value / scale)
+
+
+def raised_balance(
+    structure: Structure,
+    spring: RestoringForce,
+    frequency_hz: float,
+    amplitude_m: float,
+    options: BalanceOptions = BalanceOptions(),  # noqa: B008 - frozen
+    steps: ArcSteps = ArcSteps(),  # noqa: B008 - frozen
+) -> tuple[Balance, Branch]:
+    """Find the motion that is reached by raising the drive from nothing: along the branch, through folds.
+
+    Gives the motion, and the branch along amplitude that leads there. Where the branch was lost on the
+    way, the motion's outcome is NO_SOLUTION.
+    """
+    seen = condense(structure, 2.0 * math.pi * frequency_hz, np.array([1]))
+    weak = min(0.5 * amplitude_m, SAFE_SHARE * spring.length / max(abs(seen.linear), 1e-300))
+    start = balance(structure, spring, frequency_hz, weak, options)
+    followed = _followed(structure, spring, start, Parameter.AMPLITUDE, amplitude_m, options, steps)
+    family, branch = followed.family, followed.branch
+    assert isinstance(family, BalanceFamily)
+    found = family.balance_at(followed.last)
+    if branch.end is ArcEnd.REACHED_BOUND and found.amplitude_m > weak:
+        return found, branch
+    return replace(found, outcome=BalanceEnd.NO_SOLUTION), branch

@@ -1,0 +1,84 @@
+"""A branch: periodic motions along a parameter, their stability and special points. SI units."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels import Complex
+from ._continuation import ArcEnd
+
+Floats = NDArray[np.float64]
+
+
+class Parameter(StrEnum):
+    """What changes along a branch."""
+
+    FREQUENCY = "frequency"
+    """Drive frequency [Hz]."""
+    AMPLITUDE = "amplitude"
+    """Drive amplitude [m]."""
+
+
+class Happening(StrEnum):
+    """What a special point of a branch is."""
+
+    FOLD = "fold"
+    """The branch turns back: a swept response jumps here. One multiplier is +1."""
+    SYMMETRY_BREAKING = "symmetry breaking"
+    """Two motions that are each other's mirror images leave the symmetric one. One multiplier is +1."""
+    PERIOD_DOUBLING = "period doubling"
+    """A motion of twice the period leaves. One multiplier is -1."""
+    NEIMARK_SACKER = "Neimark-Sacker"
+    """A quasi-periodic motion leaves. A complex pair of multipliers crosses the unit circle."""
+    GRAZING = "grazing"
+    """A contact begins or ends at zero speed."""
+
+
+@dataclass(frozen=True, eq=False)
+class BranchEvent:
+    """A special point."""
+
+    kind: Happening
+    frequency_hz: float
+    amplitude_m: float
+    state: Floats
+    """Displacements and velocities at the drive's time zero, shape (2 n,): to go on from there."""
+    index: int
+    """It lies after this point of the branch, and before the next."""
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Periodic motions in the order in which the branch runs through them; m points, n displacements."""
+
+    parameter: Parameter
+    frequencies_hz: Floats
+    """Shape (m,)."""
+    amplitudes_m: Floats
+    """Drive amplitude, shape (m,)."""
+    response_i: Floats
+    """Largest magnitude over a period of every displacement (x, y, z) and of p, over the drive amplitude,
+    shape (m, n + 1)."""
+    response_ii: Floats
+    """Amplitude of the component at the drive frequency, likewise."""
+    states: Floats
+    """Displacements and velocities at the drive's time zero, shape (m, 2 n)."""
+    multipliers: Complex
+    """Floquet multipliers over one period of the motion, largest first, shape (m, 2 n)."""
+    left_out: Floats
+    """Error estimate of each point as part of the fundamental of p, shape (m,)."""
+    events: tuple[BranchEvent, ...]
+    end: ArcEnd
+    """Why the branch was left."""
+
+    @property
+    def is_stable(self) -> NDArray[np.bool_]:
+        """All multipliers inside the unit circle, shape (m,)."""
+        return np.asarray(np.abs(self.multipliers[:, 0]) < 1.0)
+
+    @property
+    def parameters(self) -> Floats:
+        """The one that changes, shape (m,)."""
+        return self.frequencies_hz if self.parameter is Parameter.FREQUENCY else self.amplitudes_m

@@ -1,0 +1,154 @@
+"""The paper's analytical solution: first-order harmonic balance of power laws, all branches. SI units.
+
+With p = Re(P exp(i w t)), the balance of the fundamental (Gong et al. 2025, eqs. 4 and 5) is
+P (1 + G N(|P|)) = P_lin: G is the compliance that the spring sees and N its describing function. Squared,
+it is one equation for |P| with a few powers (`vibench.sim.periodic`), so no branch can be missed.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from ..kernels import Complex
+from ._condensation import Structure, condense
+from ._fewnomial import positive_zeros
+from ._restoring_force import PowerSpring
+
+Floats = NDArray[np.float64]
+FUNDAMENTAL = np.array([1])
+
+
+def fundamental_share(exponent: int) -> float:
+    """Amplitude of the fundamental of cos^n: binomial(n, (n-1)/2) / 2^(n-1); 3/4 for n = 3, 5/8 for n = 5.
+
+    Whole numbers of any size divided once: correctly rounded for every odd n.
+    """
+    if exponent < 1 or exponent % 2 == 0:
+        msg = f"Exponent {exponent} is not allowed: the first-order balance takes odd powers 1, 3, 5, ..."
+        raise ValueError(msg)
+    return math.comb(exponent, (exponent - 1) // 2) / (1 << (exponent - 1))
+
+
+@dataclass(frozen=True, eq=False)
+class FirstOrderState:
+    """One solution of the first-order balance at one frequency."""
+
+    relative: complex
+    """Phasor P of p, time as exp(+i w t) under U = A0 sin(w t) [m]."""
+    displacements: Complex
+    """Phasors of every displacement of the structure, shape (n,) [m]."""
+    is_stable_to_amplitude: bool
+    """False on the middle one of three branches, which no experiment sees.
+
+    It says nothing of other instabilities: `vibench.sim.periodic` does.
+    """
+
+
+def first_order_states(
+    structure: Structure, spring: PowerSpring, frequency_hz: float, amplitude_m: float
+) -> list[FirstOrderState]:
+    """Find every first-order solution at one frequency and drive amplitude, by ascending abs(P).
+
+    Parameters
+    ----------
+    structure, spring
+        What is shaken: `vibench.sim.periodic.structure_of` a specimen, and its power law.
+    frequency_hz, amplitude_m
+        Of the drive U = amplitude sin(2 pi frequency t); positive, and zero or positive.
+
+    """
+    seen = condense(structure, 2.0 * math.pi * frequency_hz, FUNDAMENTAL)
+    drive = -1j * amplitude_m
+    alone = seen.linear * drive
+    compliance = complex(seen.compliance[0])
+    coefficients, exponents = _squared_balance(compliance, spring)
+    target = abs(alone / spring.length) ** 2
+    sizes = positive_zeros(np.append(coefficients, -target), np.append(exponents, 0.0))
+    slopes = [_slope_sign(size, coefficients, exponents) for size in sizes]
+    states = []
+    for size, slope in zip(sizes, slopes, strict=True):
+        describing = _describing(float(size), spring)
+        relative = alone / (1.0 + compliance * describing)
+        states.append(
+            FirstOrderState(
+                relative=relative,
+                displacements=seen.carried * drive - seen.reach[0] * describing * relative,
+                is_stable_to_amplitude=slope > 0.0,
+            )
+        )
+    return states
+
+
+def fold_amplitudes(structure: Structure, spring: PowerSpring, frequency_hz: float) -> Floats:
+    """Drive amplitudes at which two first-order solutions meet, by ascending abs(P), shape (0,) or (2,) [m].
+
+    (More than two are possible for sums with terms of both signs.) Closed form for one power law; the
+    turning points of the same sum of powers in general.
+    """
+    seen = condense(structure, 2.0 * math.pi * frequency_hz, FUNDAMENTAL)
+    compliance = complex(seen.compliance[0])
+    coefficients, exponents = _squared_balance(compliance, spring)
+    sizes = positive_zeros(coefficients * exponents, exponents)
+    strengths = [abs(1.0 + compliance * _describing(float(size), spring)) for size in sizes]
+    return np.asarray(sizes * np.array(strengths) * spring.length / abs(seen.linear), dtype=np.float64)
+
+
+def jump_frequencies(
+    structure: Structure,
+    spring: PowerSpring,
+    amplitude_m: float,
+    start_hz: float,
+    stop_hz: float,
+    grid_points: int = 2001,
+) -> Floats:
+    """Frequencies at which the first-order response folds, where a swept response jumps; ascending [Hz].
+
+    The fold amplitude is a function of frequency known in closed form; its crossings with the amplitude
+    given are bracketed on a grid and then solved for. Two folds closer than a grid step can hide.
+    """
+    if not 0.0 < start_hz < stop_hz < math.inf:
+        msg = f"Frequencies {start_hz} to {stop_hz} Hz are not allowed: positive and ascending."
+        raise ValueError(msg)
+
+    def excess(frequency_hz: float, which: int) -> float:
+        return math.log(fold_amplitudes(structure, spring, frequency_hz)[which] / amplitude_m)
+
+    grid = np.linspace(start_hz, stop_hz, grid_points)
+    folds = [fold_amplitudes(structure, spring, float(f)) for f in grid]
+    found: list[float] = []
+    for k in range(len(grid) - 1):
+        if len(folds[k]) == 0 or len(folds[k]) != len(folds[k + 1]):
+            continue
+        crossed = np.flatnonzero((folds[k] - amplitude_m) * (folds[k + 1] - amplitude_m) < 0.0)
+        found += [float(brentq(excess, grid[k], grid[k + 1], args=(int(w),), rtol=1e-13)) for w in crossed]
+    return np.array(sorted(found), dtype=np.float64)
+
+
+def _describing(size: float, spring: PowerSpring) -> float:
+    """N = F_1 / P [N/m] at abs(P) = size * length; infinite where it overflows."""
+    with np.errstate(over="ignore"):
+        return float(
+            sum(
+                fundamental_share(n) * f / spring.length * np.float64(size) ** (n - 1)
+                for n, f in spring.terms
+            )
+        )
+
+
+def _squared_balance(compliance: complex, spring: PowerSpring) -> tuple[Floats, Floats]:
+    """|P/length|^2 |1 + G N|^2 as coefficients and exponents of |P|/length."""
+    weights = np.array([fundamental_share(n) * f / spring.length for n, f in spring.terms])
+    powers = np.array([float(n) for n, _ in spring.terms])
+    coefficients = np.concatenate(
+        [[1.0], 2.0 * compliance.real * weights, (abs(compliance) ** 2 * np.outer(weights, weights)).ravel()]
+    )
+    exponents = np.concatenate([[2.0], powers + 1.0, (powers[:, None] + powers[None, :]).ravel()])
+    return coefficients, exponents
+
+
+def _slope_sign(size: float, coefficients: Floats, exponents: Floats) -> float:
+    sizes = exponents * math.log(size)
+    return float(np.sum(coefficients * exponents * np.exp(sizes - sizes.max())))

@@ -1,0 +1,111 @@
+"""A run under a power law, whose force acts at every p: one long step after another. SI units."""
+
+import math
+
+from ..flight import FlightTables
+from ..kernels import Table, Vector, advance_clock, compiled, inlined, lean, time_until
+from ..model import X, Y, Z
+from ..slots import LEVEL, LOST, MODE, NEXT_SAMPLE, NOTHING, REACHED_END, STUCK, PowerTerms, Record
+from ._numbers import fill_ends, fill_inner
+from ._observer import Watcher, new_watcher, sample_step, tally_step
+from ._step import (
+    FIRST_LEVEL,
+    Stride,
+    accept_step,
+    begin_stride,
+    end_stride,
+    level_after,
+    level_that_sees,
+    new_stride,
+    set_drive,
+    try_step,
+)
+from ._tables import LEVELS, PowerTables
+from ._variation import carry_through_power, power_memory
+
+
+@compiled
+def advance_under_power(
+    state: Vector,
+    clock: Vector,
+    until: float,
+    tables: FlightTables,
+    tolerance: float,
+    record: Record,
+    power: PowerTerms,
+    steps: PowerTables,
+    tangent: Table | None,
+) -> int:
+    """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code."""
+    stride, watcher, memory = new_stride(), new_watcher(), power_memory()
+    return _advance(
+        state, clock, until, tables, tolerance, record, power, steps, tangent, stride, watcher, memory
+    )
+
+
+@lean
+def _advance(
+    state: Vector,
+    clock: Vector,
+    until: float,
+    tables: FlightTables,
+    tolerance: float,
+    record: Record,
+    power: PowerTerms,
+    steps: PowerTables,
+    tangent: Table | None,
+    stride: Stride,
+    watcher: Watcher,
+    memory: Table,
+) -> int:
+    """Do so in the workspaces that are given."""
+    level = int(state[LEVEL]) - 1 if state[LEVEL] > 0.0 else FIRST_LEVEL
+    begin_stride(stride, state, power)
+    set_drive(stride.motion, clock, tables)
+    code, left = REACHED_END, time_until(clock, until)
+    while left > 0.0:
+        level = level_that_sees(level, stride.motion, tables.par, power, steps)
+        if level >= LEVELS:
+            code = STUCK if math.isfinite(state[X] + state[Y] + state[Z]) else LOST
+            break
+        length, numbers = steps.lengths[level], steps.levels[level]
+        if left <= length:
+            length, numbers = left, stride.other
+            fill_ends(numbers, length, steps.series)
+        misfit = try_step(stride, numbers, length, tolerance, tables.par, power)
+        if not misfit <= 1.0:
+            level = level_after(level, misfit)
+            continue
+        _watch(stride, numbers, length, clock, record, power, steps, watcher)
+        if tangent is not None and len(tangent) > 0:
+            carry_through_power(tangent, stride, numbers, power, memory)
+        accept_step(stride, length)
+        if length < left:
+            advance_clock(clock, length)
+            level = level_after(level, misfit)
+        else:
+            clock[0], clock[1] = until, 0.0
+        left = time_until(clock, until)
+        set_drive(stride.motion, clock, tables)
+    end_stride(stride, state, level)
+    return code
+
+
+@inlined
+def _watch(
+    stride: Stride,
+    numbers: Table,
+    length: float,
+    clock: Vector,
+    record: Record,
+    power: PowerTerms,
+    steps: PowerTables,
+    watcher: Watcher,
+) -> None:
+    """Observe the step just tried, which begins at clock time."""
+    if record.tally[MODE] != NOTHING:
+        if numbers is stride.other:
+            fill_inner(numbers, length, steps.series)
+        tally_step(record.tally, stride, numbers, length, watcher)
+    if record.counts[NEXT_SAMPLE] < len(record.samples):
+        sample_step(stride, clock, length, power, steps, record, watcher)

@@ -1,0 +1,137 @@
+"""A motion followed for a given time and observed at its end, or until it has settled. SI units.
+
+It is looked at once a drive period. Where it has not begun to repeat by the time that it should have
+forgotten its start, a small change is carried along and extremes are kept block by block: a motion that
+never repeats is known only by its growth and its statistics.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kernels import Floats
+from ..model import Accuracy, Outcome, PowerLaw, Specimen
+from ._followed_run import FollowedRun, Stretch
+from ._observed_window import ObservedWindow, follow_strobed, states_of, watch_window
+from ._prediction import MotionKind
+from ._repetition import Growth, Repetition, Sharpness, kind_of, repetition, section_needed
+
+FORGETTING = 8.0
+"""Forgetting times after which a motion that does not repeat is taken to be on its attractor."""
+FEWEST_TIMES = 40.0
+"""The longest run holds this many forgetting times; slower modes, and undamped ones, count as so slow."""
+FEWEST_PERIODS = 32
+"""Drive periods after which a motion that does not repeat is taken to be on its attractor, at least."""
+SETTLED = {Accuracy.QUICK: 1e-5, Accuracy.STANDARD: 1e-6, Accuracy.REFERENCE: 1e-8}
+"""Distance from the motion that it repeats, over its size, at which it counts as settled."""
+ROUNDING = 1e-10
+"""Noise of exact flight and of contacts that begin and end as they did a period before."""
+STEPPING = 100.0
+"""Noise over the tolerance where steps follow one another without a break: they fall elsewhere in each
+period. Measured: 70 at most (p^7 at 130 Hz and 20 um)."""
+
+
+@dataclass(frozen=True)
+class Pace:
+    """What decides how long is long, for one drive."""
+
+    frequency_hz: float
+    forgetting_s: float
+    """Time in which the slowest mode without contact fades by e."""
+    sharpness: Sharpness
+
+    @property
+    def forgetting_periods(self) -> float:
+        """The forgetting time in drive periods."""
+        return self.forgetting_s * self.frequency_hz
+
+    @property
+    def attractor_s(self) -> float:
+        """When a motion that does not repeat is taken to be on its attractor."""
+        return max(FORGETTING * self.forgetting_s, FEWEST_PERIODS / self.frequency_hz)
+
+    @property
+    def section_s(self) -> float:
+        """Length of the section that lets every period be found."""
+        return (section_needed(self.forgetting_periods) + 1) / self.frequency_hz
+
+    def repeats(self, stretches: Sequence[Stretch]) -> Repetition | None:
+        """Say whether the motion of these stretches, one after the other, repeats at their end."""
+        omega = 2.0 * np.pi * self.frequency_hz
+        return repetition(states_of(stretches), omega, self.forgetting_periods, self.sharpness)
+
+
+def pace_of(
+    specimen: Specimen, frequency_hz: float, accuracy: Accuracy, slowest_rate: float, longest_s: float
+) -> Pace:
+    """Choose the pace for a specimen whose slowest mode has ``slowest_rate`` [1/s], zero or negative."""
+    slowest_s = longest_s / FEWEST_TIMES
+    forgetting_s = min(slowest_s, -1.0 / slowest_rate) if slowest_rate < 0.0 else slowest_s
+    match specimen.contact:
+        case PowerLaw():
+            noise = STEPPING * accuracy.tolerance
+        case _:
+            noise = ROUNDING
+    return Pace(frequency_hz, forgetting_s, Sharpness(max(SETTLED[accuracy], 2.0 * noise), noise))
+
+
+@dataclass(frozen=True, eq=False)
+class SceneRun:
+    """A run's end, and what was learnt on the way."""
+
+    window: ObservedWindow
+    block_peaks_m: Floats
+    """Largest abs(x) in equal blocks of the settled motion, those of the window last, shape (blocks,)."""
+    blocks_in_window: int
+    motion: MotionKind
+    repeats: Repetition | None
+    settled_s: float | None
+    """When it was known to be settled; None where that was not looked for, or not found."""
+    ended: str
+    """Why it was followed no longer."""
+
+
+def run_for(run: FollowedRun, duration_s: float, window_s: float, pace: Pace) -> SceneRun:
+    """Follow a motion that is at time zero for a while, and observe the last ``window_s`` of it."""
+    last = _last_section(run, duration_s - window_s, pace)
+    if pace.repeats([last]) is None:
+        run.carry_tangent()
+    window = watch_window(run, window_s)
+    return judged(run, window, [last], pace, f"the {duration_s:g} s asked for are over")
+
+
+def judged(
+    run: FollowedRun, window: ObservedWindow, before: Sequence[Stretch], pace: Pace, ended: str
+) -> SceneRun:
+    """Say what a motion is, from its window and the stretches before it.
+
+    Those before it that were watched are blocks as long as the window's own.
+    """
+    stretches = [*before, *window.stretches]
+    repeats = pace.repeats(stretches)
+    growth = growth_of(stretches)
+    peaks = [stretch.peak_x_m for stretch in before if stretch.peak_x_m > 0.0]
+    is_lost = run.outcome is not Outcome.REACHED_END
+    return SceneRun(
+        window=window,
+        block_peaks_m=np.array([*peaks, *window.block_peaks_m]),
+        blocks_in_window=len(window.block_peaks_m),
+        motion=MotionKind.UNDECIDED if is_lost else kind_of(repeats, growth, pace.forgetting_s),
+        repeats=None if is_lost else repeats,
+        settled_s=None,
+        ended=run.outcome.text if is_lost else ended,
+    )
+
+
+def growth_of(stretches: Sequence[Stretch]) -> Growth:
+    """Growth of a small change over those stretches in which one was carried."""
+    carried = [stretch for stretch in stretches if np.isfinite(stretch.growth)]
+    logarithms = np.array([stretch.growth for stretch in carried])
+    return Growth(logarithms, sum(stretch.length_s for stretch in carried))
+
+
+def _last_section(run: FollowedRun, until_s: float, pace: Pace) -> Stretch:
+    """Advance to an instant; the states of the last periods are kept."""
+    run.follow(max(run.time_s, until_s - pace.section_s))
+    return follow_strobed(run, until_s)

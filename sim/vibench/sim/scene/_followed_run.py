@@ -1,0 +1,162 @@
+"""A motion under a harmonic drive, followed stretch by stretch, each watched in its own way. SI units."""
+
+import math
+from copy import copy
+from dataclasses import dataclass
+from enum import Enum
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..kernels import Floats, clock_at
+from ..model import Accuracy, Harmonic, Outcome, Specimen
+from ..motion import MAX_IMPACT_RATE_HZ, new_record, start_motion, state_scales
+from ..slots import (
+    GROWTH,
+    IMPACTS,
+    LINE_P_IM,
+    LINE_P_RE,
+    LINE_X_IM,
+    LINE_X_RE,
+    MODE,
+    NEXT_SAMPLE,
+    NOTHING,
+    PEAK_P,
+    PEAK_X,
+    PEAKS,
+    PEAKS_AND_LINES,
+    TANGENT_SIZE,
+    no_tangent,
+)
+from ..stepping import advance_harmonic, harmonic_tables, new_state
+
+
+class Watch(Enum):
+    """What is observed of a stretch."""
+
+    NOTHING = NOTHING
+    PEAKS = PEAKS
+    """Extremes of x and p."""
+    PEAKS_AND_LINES = PEAKS_AND_LINES
+    """Their components at the drive frequency as well."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """States to keep: the first at an instant, the others at a rate."""
+
+    first_s: float
+    rate_hz: float
+    count: int
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """What was seen of a motion between two instants."""
+
+    start_s: float
+    end_s: float
+    outcome: Outcome
+    impacts: int
+    """Contacts that began."""
+    peak_x_m: float
+    """Largest abs(x); zero where it was not watched."""
+    peak_p_m: float
+    area_x: complex
+    """Integral of x exp(-i (omega t + phase)) [m s]; zero where it was not watched."""
+    area_p: complex
+    states: Floats
+    """Samples, shape (n, 6)."""
+    growth: float
+    """Natural logarithm of how much a small change grew; NaN where no tangent was carried."""
+
+    @property
+    def length_s(self) -> float:
+        """From its start to its end."""
+        return self.end_s - self.start_s
+
+
+class FollowedRun:
+    """A specimen under way; its state is advanced in place.
+
+    Raises ValueError when the specimen cannot be followed in time, or cannot begin so.
+    """
+
+    def __init__(
+        self, specimen: Specimen, drive: Harmonic, tolerance: float, start: ArrayLike, time_s: float = 0.0
+    ) -> None:
+        self.specimen = specimen
+        self.drive = drive
+        self.outcome = Outcome.REACHED_END
+        """Of all stretches so far."""
+        self._tolerance = tolerance
+        self._state = new_state(specimen, start_motion(start), Accuracy.REFERENCE)
+        self._clock = clock_at(time_s)
+        self._tables = harmonic_tables(specimen, drive)
+        self._scales = state_scales(specimen, drive)
+        self._tangent = no_tangent()
+
+    @property
+    def time_s(self) -> float:
+        """Now."""
+        return float(self._clock[0])
+
+    @property
+    def state(self) -> Floats:
+        """X, y, z, vx, vy, vz now, shape (6,)."""
+        return self._state[: len(self._scales)].copy()
+
+    def apart(self, tolerance: float | None = None) -> Self:
+        """Give the same motion, to be followed apart from this one, at a tolerance of its own if need be."""
+        twin = copy(self)
+        twin.__dict__.update(
+            _state=self._state.copy(),
+            _clock=self._clock.copy(),
+            _tangent=no_tangent() if tolerance is not None else self._tangent.copy(),
+            _tolerance=self._tolerance if tolerance is None else tolerance,
+        )
+        return twin
+
+    def carry_tangent(self) -> None:
+        """Carry a small change along from now on, in no special direction."""
+        self._tangent = np.zeros((1, TANGENT_SIZE))
+        self._tangent[0, :GROWTH] = self._scales * np.linspace(1.0, 2.0, GROWTH)
+
+    def follow(self, until_s: float, watch: Watch = Watch.NOTHING, samples: Samples | None = None) -> Stretch:
+        """Advance to an instant; a run that has failed stays where it is."""
+        start_s, before = self.time_s, self._size()
+        kept = Samples(start_s, 1.0, 0) if samples is None else samples
+        record = new_record(start_s, until_s - start_s, None, MAX_IMPACT_RATE_HZ)._replace(
+            start=kept.first_s,
+            sample_rate=kept.rate_hz,
+            samples=np.zeros((kept.count, GROWTH)),
+            tangent=self._tangent,
+        )
+        tally = record.tally
+        tally[MODE] = watch.value
+        if self.outcome is Outcome.REACHED_END:
+            code = advance_harmonic(self._state, self._clock, until_s, self._tables, self._tolerance, record)
+            self.outcome = Outcome(code)
+        if self.outcome is Outcome.REACHED_END:
+            # Samples that rounding puts a hair beyond the end.
+            record.samples[record.counts[NEXT_SAMPLE] :] = self._state[:GROWTH]
+        return Stretch(
+            start_s=start_s,
+            end_s=self.time_s,
+            outcome=self.outcome,
+            impacts=int(record.counts[IMPACTS]),
+            peak_x_m=float(tally[PEAK_X]),
+            peak_p_m=float(tally[PEAK_P]),
+            area_x=complex(tally[LINE_X_RE], tally[LINE_X_IM]),
+            area_p=complex(tally[LINE_P_RE], tally[LINE_P_IM]),
+            states=record.samples,
+            growth=self._size() - before,
+        )
+
+    def _size(self) -> float:
+        """Natural logarithm of the size of the small change; NaN where there is none."""
+        if len(self._tangent) == 0:
+            return math.nan
+        change = self._tangent[0]
+        return float(np.log(np.linalg.norm(change[:GROWTH] / self._scales)) + change[GROWTH])

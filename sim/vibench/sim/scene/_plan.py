@@ -1,0 +1,152 @@
+"""How a scene will be answered, decided before it is run: only what it requires is modelled. SI units."""
+
+import math
+from dataclasses import dataclass
+
+from ..model import PowerLaw, Specimen
+from ._linear_motion import LinearMotion, linear_motion, never_touches
+from ._prediction import Method
+from ._scatter import MEMBERS
+from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
+
+FORGOTTEN = 1e-9
+"""Share of the response that the start may still have where the steady motion stands for it."""
+
+CLOSED_FORM_S = 5e-4
+"""Time for a closed form [s]; this and the next three as measured on one core of a small machine."""
+FLIGHT_S, IMPACT_S, STEPS_S = 5e-5, 6e-6, 4e-3
+"""Time for a second of flight, for an impact, and for a second under a force at every p [s]."""
+TANGENT = 1.5
+"""Time with a tangent vector over the time without."""
+SETTLING_S = 10.0
+"""Duration that an automatic one is planned as; one that repeats is done in a tenth of it [s]."""
+IMPACTS_PER_PERIOD = 2.0
+"""Where p would pass both stops once a period; more where it would pass them by far."""
+MICROMETRES = 1e6
+
+
+@dataclass(frozen=True)
+class ScenePlan:
+    """How a scene will be answered, and what it will cost."""
+
+    method: Method
+    sentences: tuple[str, ...]
+    """What is modelled, what is carried along, what is not, and why."""
+    cost_s: float
+    """Estimated time on one core."""
+    largest_p_m: float
+    """As long as no stop is touched, abs(p) stays below this."""
+
+    @property
+    def alike(self) -> tuple[str, ...]:
+        """Two scenes with the same are answered in the same way, whatever their numbers."""
+        return (self.method.value, *self.sentences[1:])
+
+    def explain(self) -> str:
+        """Say the plan to a reader."""
+        return "\n".join((*self.sentences, f"Estimated time on one core: {self.cost_s:.1g} s."))
+
+
+def plan_scene(scene: Scene) -> ScenePlan:
+    """Decide how a scene is to be answered, without running it.
+
+    Raises ValueError when the specimen cannot be followed in time.
+    """
+    return plan_of(scene, linear_motion(scene.specimen, scene.drive, scene.start.state))
+
+
+def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
+    """Plan a scene whose motion, as long as nothing is touched, is ``motion``."""
+    method = _method(scene.specimen, motion, scene.duration)
+    if method is Method.CLOSED_FORM:
+        return ScenePlan(method, (_why_closed(scene.specimen, motion),), CLOSED_FORM_S, motion.largest_p_m)
+    sentences = (
+        _why_followed(scene.specimen, motion, method),
+        *_carried(scene.observe),
+        _length(scene.duration),
+    )
+    return ScenePlan(method, sentences, _cost_s(scene, motion, method), motion.largest_p_m)
+
+
+def forgotten_s(motion: LinearMotion) -> float:
+    """When the start has no share in a motion without contact any more; infinite if never."""
+    return motion.died_away_s(FORGOTTEN)
+
+
+def _method(specimen: Specimen, motion: LinearMotion, duration: FixedDuration | AutomaticDuration) -> Method:
+    match specimen.contact, duration:
+        case PowerLaw(), _:
+            return Method.POLYNOMIAL
+        case _, FixedDuration():
+            by_s = duration.duration_s - duration.window_s
+        case _, AutomaticDuration():
+            by_s = duration.longest_s - 1.0 / motion.drive.frequency_hz
+    is_proved = never_touches(specimen, motion) and forgotten_s(motion) <= by_s
+    return Method.CLOSED_FORM if is_proved else Method.EVENT_DRIVEN
+
+
+def _why_closed(specimen: Specimen, motion: LinearMotion) -> str:
+    steady = "The steady motion is known in closed form; nothing is followed in time."
+    if specimen.contact.kind == "linear":
+        return f"There are no stops. {steady}"
+    return (
+        f"No stop is ever touched: abs(p) stays below {motion.largest_p_m * MICROMETRES:.3g} um, "
+        f"transient and all, and the gap is {min(specimen.gaps_m) * MICROMETRES:.3g} um. {steady}"
+    )
+
+
+def _why_followed(specimen: Specimen, motion: LinearMotion, method: Method) -> str:
+    if method is Method.POLYNOMIAL:
+        return "The force acts at every p: one adaptive method of order 8 follows the motion throughout."
+    largest, gap = motion.largest_p_m * MICROMETRES, min(specimen.gaps_m) * MICROMETRES
+    if never_touches(specimen, motion):
+        return (
+            "No stop is ever touched, but the start is not forgotten before the window: "
+            "the motion is followed by exact flight."
+        )
+    return (
+        f"A stop may be touched: without stops abs(p) might reach {largest:.3g} um, "
+        f"and the gap is {gap:.3g} um. "
+        "Flight between contacts is exact; contacts are resolved to the tolerance of the accuracy."
+    )
+
+
+def _carried(observe: tuple[Observable, ...]) -> list[str]:
+    sentences = [
+        "A tangent vector is carried for the exponent."
+        if Observable.LYAPUNOV in observe
+        else "A tangent vector is carried only if the motion does not repeat, to tell what it is."
+    ]
+    if Observable.SPECTRUM in observe:
+        sentences.append("Samples are kept over the window for the spectrum.")
+    else:
+        sentences.append("No samples are kept but the states once a drive period.")
+    if Observable.SCATTER in observe:
+        sentences.append(f"The scene is run {MEMBERS} more times, from starts a millionth of the gap apart.")
+    return sentences
+
+
+def _length(duration: FixedDuration | AutomaticDuration) -> str:
+    window = f"{duration.window_s:g} s"
+    match duration:
+        case FixedDuration(duration_s=duration_s):
+            return f"The motion is followed for {duration_s:g} s, the last {window} observed."
+        case AutomaticDuration(longest_s=longest_s):
+            return (
+                "The motion is followed until it repeats, and observed over one of its periods; "
+                f"if it never does, over {window}; for {longest_s:g} s at most."
+            )
+
+
+def _cost_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
+    match scene.duration:
+        case FixedDuration(duration_s=length_s):
+            pass
+        case AutomaticDuration(longest_s=longest_s):
+            length_s = min(SETTLING_S, longest_s)
+    share = abs(motion.steady_p) / min(scene.specimen.gaps_m)
+    rate_hz = IMPACTS_PER_PERIOD * scene.drive.frequency_hz * math.sqrt(share) * min(1.0, share) ** 2
+    per_s = STEPS_S if method is Method.POLYNOMIAL else FLIGHT_S + IMPACT_S * rate_hz
+    runs = 1.0 + (TANGENT if Observable.LYAPUNOV in scene.observe else 0.0)
+    runs += MEMBERS if Observable.SCATTER in scene.observe else 0.0
+    return CLOSED_FORM_S + per_s * length_s * runs

@@ -1,0 +1,112 @@
+"""What a scene's answer says: one flat, frozen value that goes into tables, files and JSON. SI units."""
+
+from dataclasses import dataclass, fields
+from enum import StrEnum
+
+import numpy as np
+
+from ..kernels import Floats
+from ..model import Outcome
+
+State = tuple[float, float, float, float, float, float]
+"""x, y, z, vx, vy, vz, absolute [m, m/s]."""
+
+
+class MotionKind(StrEnum):
+    """What a motion has come to, as its states once a drive period tell."""
+
+    PERIODIC = "periodic"
+    """It repeats after `Prediction.period` drive periods."""
+    QUASI_PERIODIC = "quasi-periodic"
+    """It neither repeats nor forgets where it began."""
+    CHAOTIC = "chaotic"
+    """It does not repeat, and forgets where it began."""
+    UNDECIDED = "undecided"
+    """It was not followed for long enough to tell."""
+
+
+class Method(StrEnum):
+    """How a scene is answered."""
+
+    CLOSED_FORM = "closed form"
+    """No stop is ever touched, by a bound: the linear specimen's exact answer."""
+    EVENT_DRIVEN = "event driven"
+    """Exact flight from contact to contact; contacts resolved to the tolerance."""
+    POLYNOMIAL = "polynomial"
+    """A force at every p: one adaptive method of order 8 from end to end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Responses of one scene and all that is needed to judge them. None where it was not asked, or not found.
+
+    Responses are over the drive amplitude, those called relative are of p = y - z.
+    """
+
+    frequency_hz: float
+    amplitude_m: float
+    response_i: float | None
+    """Largest abs(x) over the window."""
+    response_ii: float | None
+    """Amplitude of x at the drive frequency."""
+    relative_i: float | None
+    """Largest abs(p) over the window."""
+    relative_ii: float | None
+    """Amplitude of p at the drive frequency."""
+    impacts: int
+    """Contacts that began within the window."""
+    impact_rate_hz: float
+    """The same, per second."""
+    motion: MotionKind
+    period: int | None
+    """Of a periodic motion, in drive periods."""
+    duration_s: float
+    """How long the specimen was followed."""
+    window_s: float
+    """The last part of it, over which the largest values were taken."""
+    settled_s: float | None
+    """When the motion was found to be settled; None where the duration was given."""
+    ended: str
+    """Why it was followed no longer."""
+    error_estimate: float | None
+    """Relative; see `vibench.sim.scene.solve_scene`."""
+    integration_error: float | None
+    """The part of it that a stricter accuracy would lessen."""
+    scatter: float | None
+    """Relative standard deviation of Response I between windows, where the motion never repeats."""
+    lyapunov_per_s: float | None
+    """Largest Lyapunov exponent [1/s]."""
+    lyapunov_error_per_s: float | None
+    """Its standard error [1/s]."""
+    start: str
+    """The state it began from: "rest", or as the scene calls it."""
+    final_state: State
+    outcome: Outcome
+    method: Method
+    accuracy: str
+    section: Floats | None = None
+    """States once a drive period within the window, where a Poincare section was asked for, shape (n, 6)."""
+    spectrum_hz: Floats | None = None
+    """Frequencies of the lines, where a spectrum was asked for, shape (lines,)."""
+    spectrum: Floats | None = None
+    """Amplitude of x at each of them over the drive amplitude, shape (lines,)."""
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values for JSON: None where there is no number."""
+        return {field.name: _plain(getattr(self, field.name)) for field in fields(self)}
+
+
+def _plain(value: object) -> object:
+    match value:
+        case Outcome():
+            return value.text
+        case StrEnum():
+            return str(value)
+        case np.ndarray():
+            return value.tolist()
+        case float() if not np.isfinite(value):
+            return None
+        case tuple():
+            return [_plain(each) for each in value]
+        case _:
+            return value

@@ -1,0 +1,230 @@
+"""The answer to a scene: what was seen, and how far to trust it. SI units."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from ..exponents import LyapunovEstimate, Precision, largest_exponent
+from ..kernels import Floats
+from ..model import Accuracy, Outcome
+from ._fixed_run import Pace, SceneRun, pace_of, run_for
+from ._followed_run import FollowedRun
+from ._integration_error import error_of_repeating, error_per_period
+from ._line_spectrum import spectrum_of
+from ._linear_motion import LinearMotion, linear_motion
+from ._observed_window import states_of, whole_periods
+from ._plan import forgotten_s, plan_of
+from ._prediction import Method, MotionKind, Prediction, State
+from ._scatter import WindowScatter, response_ensemble, window_scatter
+from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
+from ._settled_run import run_until_settled
+
+SAFETY = 2.0
+"""Error that is stated over the error that was measured."""
+ROUNDING = 1e-11
+"""Relative error of an exact answer."""
+EXPONENT_S = 25.0
+"""An exponent is averaged for so long, if it is not known well enough before [s]."""
+EXPONENT_PRECISION = Precision(absolute_per_s=0.2, relative=0.01)
+
+
+def solve_scene(scene: Scene) -> Prediction:
+    """Run a scene as planned, and say what was seen and how far to trust it.
+
+    ``error_estimate`` is how far, relatively, Response I of another run of the same scene at a far stricter
+    accuracy may lie. Where the motion repeats it holds for all four responses: twice the measured difference
+    to a run with a hundredth of the tolerance, both taken on from the end until they have forgotten it.
+    Where it does not repeat, another run is another draw: the estimate is what two draws differ by in 19
+    cases of 20 (`WindowScatter.between_runs`), and what the same comparison finds for single drive periods.
+
+    Raises
+    ------
+    ValueError
+        When the specimen cannot be followed in time, or not from such a start.
+
+    """
+    motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
+    plan = plan_of(scene, motion)
+    if plan.method is Method.CLOSED_FORM:
+        return _in_closed_form(scene, motion)
+    return _followed(scene, plan.method, motion)
+
+
+def _in_closed_form(scene: Scene, motion: LinearMotion) -> Prediction:
+    """Give the steady motion without contact."""
+    amplitude, period_s = scene.drive.amplitude_m, 1.0 / scene.drive.frequency_hz
+    settled_s: float | None = None
+    match scene.duration:
+        case FixedDuration(duration_s=duration_s, window_s=window_s):
+            ended = f"the {duration_s:g} s asked for are over"
+        case AutomaticDuration():
+            settled_s, window_s = forgotten_s(motion), period_s
+            duration_s = settled_s + period_s
+            ended = "it repeats after 1 drive period(s)"
+    x, p = abs(motion.steady_x) / amplitude, abs(motion.steady_p) / amplitude
+    has_exponent = Observable.LYAPUNOV in scene.observe
+    found = Prediction(
+        frequency_hz=scene.drive.frequency_hz,
+        amplitude_m=amplitude,
+        response_i=x,
+        response_ii=x,
+        relative_i=p,
+        relative_ii=p,
+        impacts=0,
+        impact_rate_hz=0.0,
+        motion=MotionKind.PERIODIC,
+        period=1,
+        duration_s=duration_s,
+        window_s=window_s,
+        settled_s=settled_s,
+        ended=ended,
+        error_estimate=motion.share_left(duration_s - window_s) + ROUNDING,
+        integration_error=0.0,
+        scatter=0.0 if Observable.SCATTER in scene.observe else None,
+        lyapunov_per_s=motion.slowest_rate if has_exponent else None,
+        lyapunov_error_per_s=0.0 if has_exponent else None,
+        start=scene.start.name,
+        final_state=_state(motion.state(duration_s)),
+        outcome=Outcome.REACHED_END,
+        method=Method.CLOSED_FORM,
+        accuracy=scene.accuracy.value,
+    )
+    if Observable.POINCARE in scene.observe:
+        periods = whole_periods(duration_s, scene.drive.frequency_hz)
+        count = whole_periods(window_s, scene.drive.frequency_hz)
+        found = replace(found, section=np.tile(motion.state(periods * period_s), (count, 1)))
+    if Observable.SPECTRUM in scene.observe:
+        return replace(found, spectrum_hz=np.array([scene.drive.frequency_hz]), spectrum=np.array([x]))
+    return found
+
+
+def _followed(scene: Scene, method: Method, motion: LinearMotion) -> Prediction:
+    """Follow the motion in time, and judge it."""
+    tolerance = scene.accuracy.tolerance
+    run = FollowedRun(scene.specimen, scene.drive, tolerance, scene.start.state)
+    seen, pace = _seen(scene, run, motion)
+    window, amplitude = seen.window, scene.drive.amplitude_m
+    is_whole = run.outcome is Outcome.REACHED_END
+    error = _integration_error(scene.accuracy, seen, run, pace) if is_whole else None
+    drawn = _between_windows(seen) if is_whole else None
+    exponent = _exponent(scene, run) if is_whole and Observable.LYAPUNOV in scene.observe else None
+    found = Prediction(
+        frequency_hz=scene.drive.frequency_hz,
+        amplitude_m=amplitude,
+        response_i=window.largest_x_m / amplitude if is_whole else None,
+        response_ii=abs(window.line_x_m) / amplitude if is_whole else None,
+        relative_i=window.largest_p_m / amplitude if is_whole else None,
+        relative_ii=abs(window.line_p_m) / amplitude if is_whole else None,
+        impacts=window.impacts,
+        impact_rate_hz=window.impacts / window.length_s if window.length_s > 0.0 else 0.0,
+        motion=seen.motion,
+        period=None if seen.repeats is None else seen.repeats.period,
+        duration_s=run.time_s,
+        window_s=window.length_s,
+        settled_s=seen.settled_s,
+        ended=seen.ended,
+        error_estimate=_error_estimate(seen, error, drawn),
+        integration_error=error,
+        scatter=_scatter(scene, seen, run.time_s, drawn) if is_whole else None,
+        lyapunov_per_s=_known(exponent.exponent_per_s) if exponent is not None else None,
+        lyapunov_error_per_s=_known(exponent.standard_error_per_s) if exponent is not None else None,
+        start=scene.start.name,
+        final_state=_state(run.state),
+        outcome=run.outcome,
+        method=method,
+        accuracy=scene.accuracy.value,
+    )
+    return _with_pictures(scene, found, seen) if is_whole else found
+
+
+def _seen(scene: Scene, run: FollowedRun, motion: LinearMotion) -> tuple[SceneRun, Pace]:
+    """Follow the motion for as long as was asked."""
+    drive = scene.drive
+    match scene.duration:
+        case FixedDuration(duration_s=longest_s):
+            pass
+        case AutomaticDuration(longest_s=longest_s):
+            pass
+    pace = pace_of(scene.specimen, drive.frequency_hz, scene.accuracy, motion.slowest_rate, longest_s)
+    match scene.duration:
+        case FixedDuration(duration_s=duration_s, window_s=window_s):
+            return run_for(run, duration_s, window_s, pace), pace
+        case AutomaticDuration(window_s=window_s):
+            return run_until_settled(run, window_s, longest_s, pace), pace
+
+
+def _integration_error(accuracy: Accuracy, seen: SceneRun, run: FollowedRun, pace: Pace) -> float | None:
+    """Measure the error of the steps; None where the comparison was lost."""
+    if seen.repeats is None:
+        return _known(error_per_period(run, accuracy))
+    return _known(error_of_repeating(run, accuracy, seen.repeats.period, pace.forgetting_s))
+
+
+def _between_windows(seen: SceneRun) -> WindowScatter | None:
+    """Find the scatter of Response I from blocks, if nothing repeats."""
+    if seen.motion is MotionKind.PERIODIC:
+        return None
+    return window_scatter(seen.block_peaks_m, seen.blocks_in_window)
+
+
+def _scatter(scene: Scene, seen: SceneRun, duration_s: float, drawn: WindowScatter | None) -> float | None:
+    """Find the scatter of Response I from many starts if it was asked for."""
+    if Observable.SCATTER in scene.observe:
+        return response_ensemble(
+            scene.specimen,
+            scene.drive,
+            scene.accuracy,
+            duration_s,
+            seen.window.length_s,
+            scene.start.state,
+        ).scatter_i
+    return None if drawn is None else drawn.relative
+
+
+def _error_estimate(seen: SceneRun, error: float | None, drawn: WindowScatter | None) -> float | None:
+    """Add up what Response I may be off by; None where a part of it is not known."""
+    if error is None:
+        return None
+    if seen.repeats is not None:
+        return SAFETY * error + seen.repeats.distance + ROUNDING
+    return None if drawn is None else drawn.between_runs + SAFETY * error
+
+
+def _exponent(scene: Scene, run: FollowedRun) -> LyapunovEstimate:
+    """Find the largest exponent of the motion that a run has come to."""
+    drive = scene.drive
+    phase = math.fmod(
+        2.0 * math.pi * math.fmod(drive.frequency_hz * run.time_s, 1.0) + drive.phase_rad, 2.0 * math.pi
+    )
+    return largest_exponent(
+        scene.specimen,
+        replace(drive, phase_rad=phase),
+        scene.accuracy,
+        EXPONENT_S,
+        0.0,
+        run.state,
+        precision=EXPONENT_PRECISION,
+    )
+
+
+def _with_pictures(scene: Scene, found: Prediction, seen: SceneRun) -> Prediction:
+    """Add the section and the spectrum where they were asked for."""
+    window = seen.window
+    if Observable.POINCARE in scene.observe:
+        found = replace(found, section=states_of(window.stretches))
+    if Observable.SPECTRUM in scene.observe:
+        lines = spectrum_of(window)
+        return replace(
+            found, spectrum_hz=lines.frequency_hz, spectrum=lines.amplitude_m / scene.drive.amplitude_m
+        )
+    return found
+
+
+def _state(values: Floats) -> State:
+    x, y, z, vx, vy, vz = (float(value) for value in values)
+    return (x, y, z, vx, vy, vz)
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,101 @@
+"""The memory of one run, slot by slot: the specimen's numbers, the state vector, the record, the observed.
+
+`parameters` turns a `Specimen` into plain numbers and numbers the places of the state vector that every
+kernel advances in place; `record` is what a run fills on its way (samples, impacts, counts) and its codes
+of ending; `observed` numbers the array of peaks and lines; `variation` is the table of small changes that
+are carried along. Filling a slot never changes a step of the motion.
+"""
+
+from ._observed import (
+    LINE_P_IM,
+    LINE_P_RE,
+    LINE_X_IM,
+    LINE_X_RE,
+    MODE,
+    NOTHING,
+    PEAK_P,
+    PEAK_X,
+    PEAKS,
+    PEAKS_AND_LINES,
+    SECANTS,
+    TALLY_SIZE,
+)
+from ._parameters import (
+    CLOSED,
+    LEVEL,
+    PACE,
+    RATE,
+    RATE_SCALE,
+    ROOT,
+    ROOT_SCALE,
+    SCALES,
+    SIDE,
+    STATE_SIZE,
+    STEP,
+    Parameters,
+    PowerTerms,
+    parameters,
+    power_terms,
+)
+from ._record import (
+    IMPACTS,
+    LOST,
+    NEXT_SAMPLE,
+    REACHED_END,
+    STUCK,
+    TOO_MANY_IMPACTS,
+    Record,
+)
+from ._variation import (
+    GROWTH,
+    TANGENT_SIZE,
+    UNITS,
+    derivative_of,
+    keep_in_range,
+    no_tangent,
+    unit_tangent,
+)
+
+__all__ = [
+    "CLOSED",
+    "GROWTH",
+    "IMPACTS",
+    "LEVEL",
+    "LINE_P_IM",
+    "LINE_P_RE",
+    "LINE_X_IM",
+    "LINE_X_RE",
+    "LOST",
+    "MODE",
+    "NEXT_SAMPLE",
+    "NOTHING",
+    "PACE",
+    "PEAKS",
+    "PEAKS_AND_LINES",
+    "PEAK_P",
+    "PEAK_X",
+    "RATE",
+    "RATE_SCALE",
+    "REACHED_END",
+    "ROOT",
+    "ROOT_SCALE",
+    "SCALES",
+    "SECANTS",
+    "SIDE",
+    "STATE_SIZE",
+    "STEP",
+    "STUCK",
+    "TALLY_SIZE",
+    "TANGENT_SIZE",
+    "TOO_MANY_IMPACTS",
+    "UNITS",
+    "Parameters",
+    "PowerTerms",
+    "Record",
+    "derivative_of",
+    "keep_in_range",
+    "no_tangent",
+    "parameters",
+    "power_terms",
+    "unit_tangent",
+]

@@ -1,0 +1,59 @@
+"""A run under a harmonic drive, up to an instant, under whatever law. SI units.
+
+A state and a clock are advanced in place, and on the way what is given is filled: samples, impact times, a
+tally. None of them changes a single step, so what is observed never changes the motion.
+
+What a run needs is chosen by types, before anything is compiled: most of `HarmonicTables`, and
+`Record.tangent`, are None where there is nothing of the kind, and a kernel for Hertz's stops then holds no
+power law, no rigid stop and no tangent. To compile all of them took twice as long as a first run may.
+"""
+
+from ..collision import CollisionTables
+from ..flight import FlightTables
+from ..kernels import Table, Vector, lean
+from ..power_law import PowerTables, advance_under_power
+from ..slots import PowerTerms, Record
+from ..sticking import HeldTables
+from ._harmonic_tables import HarmonicTables
+from ._stops_run import advance_between_stops
+from ._workspace import Room, room_for
+
+
+def advance_harmonic(
+    state: Vector, clock: Vector, until: float, tables: HarmonicTables, tolerance: float, record: Record
+) -> int:
+    """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code."""
+    flight, power, steps, held, collisions = tables
+    tangent = record.tangent
+    if power is not None and steps is not None:
+        return advance_under_power(state, clock, until, flight, tolerance, record, power, steps, tangent)
+    room = room_for(len(flight.rates), record.tally, tangent)
+    return advance_between_stops(
+        state, clock, until, flight, tolerance, record, held, collisions, tangent, room
+    )
+
+
+@lean
+def advance_by_law(
+    state: Vector,
+    clock: Vector,
+    until: float,
+    tables: FlightTables,
+    tolerance: float,
+    record: Record,
+    power: PowerTerms | None,
+    steps: PowerTables | None,
+    held: HeldTables | None,
+    collisions: CollisionTables | None,
+    tangent: Table | None,
+    room: Room,
+) -> int:
+    """Do the same within a kernel; what may be None is given once more.
+
+    numba leaves out a branch on an argument that is None, but not one on an attribute.
+    """
+    if power is not None and steps is not None:
+        return advance_under_power(state, clock, until, tables, tolerance, record, power, steps, tangent)
+    return advance_between_stops(
+        state, clock, until, tables, tolerance, record, held, collisions, tangent, room
+    )

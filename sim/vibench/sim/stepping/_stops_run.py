@@ -1,0 +1,226 @@
+"""A run between stops: flight, contact, flight, ... up to an instant. SI units."""
+
+import math
+
+import numpy as np
+
+from ..collision import CollisionTables, carry_through_collision, collide, tally_collision
+from ..contact import HELD, LEFT, NOT_FINITE, advance_contact, carry_through_steps, gap_of, tally_contact
+from ..flight import (
+    CLEAR,
+    DEPARTS,
+    OUT_OF_RANGE,
+    FlightTables,
+    carry_through_flight,
+    fill_base_force,
+    fly,
+    place_on_phasors,
+    take_off,
+    tally_flight,
+    turn_phasors,
+)
+from ..kernels import Complex, Table, Vector, advance_clock, compiled, copy_row, inlined, lean, time_until
+from ..model import X, Y, Z
+from ..rigid import carry_through_impact, is_resolved
+from ..slots import (
+    CLOSED,
+    IMPACTS,
+    LOST,
+    MODE,
+    NEXT_SAMPLE,
+    NOTHING,
+    REACHED_END,
+    SIDE,
+    STUCK,
+    TOO_MANY_IMPACTS,
+    Parameters,
+    Record,
+)
+from ..sticking import HeldTables, closed_for, departure, hold, place_held, tally_held
+from ._sampling import sample_contact, sample_flight
+from ._touch import strike
+from ._workspace import Room
+
+STRETCH_TURN = 0.3
+"""Longest stretch of a contact, as drive phase [rad]: the base force is a polynomial of degree 7 about
+its middle, whose first term left out is 0.15^8/8! = 6e-12 of the force."""
+
+
+@lean
+def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and their ends are one loop
+    state: Vector,
+    clock: Vector,
+    until: float,
+    tables: FlightTables,
+    tolerance: float,
+    record: Record,
+    held: HeldTables | None,
+    collisions: CollisionTables | None,
+    tangent: Table | None,
+    room: Room,
+) -> int:
+    """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code.
+
+    ``held`` is how m1 moves on a stop that holds it, None where stops yield; ``collisions`` are known of
+    Hertz's stops alone.
+    """
+    phasors, landed, now = room.phasors, room.landed, room.now
+    workspace, series = room.terms, room.series
+    force, work, shadow, log, memory = room.force, room.work, room.shadow, room.log, room.memory
+    counts = record.counts
+    while True:
+        longest = time_until(clock, until)
+        if longest <= 0.0:
+            return REACHED_END
+        if not math.isfinite(state[X] + state[Y] + state[Z]):
+            return LOST
+        if state[SIDE] == 0.0:
+            take_off(phasors, state, clock, tables)
+            ends, length = _fly_on(phasors, now, workspace, series, clock, longest, tables, held)
+            if ends == OUT_OF_RANGE:
+                return LOST
+            turn_phasors(landed, phasors, length, clock, tables)
+            if record.tally[MODE] != NOTHING:
+                tally_flight(record.tally, phasors, landed, now, workspace, series, clock, length, tables)
+            if tangent is not None and len(tangent) > 0:
+                carry_through_flight(tangent, length, tables)
+            if counts[NEXT_SAMPLE] < len(record.samples):
+                sample_flight(phasors, now, clock, length, tables, record)
+            place_on_phasors(state, landed, tables)
+            if ends == CLEAR:
+                clock[0], clock[1] = until, 0.0
+                continue
+            advance_clock(clock, length)
+            if ends == DEPARTS:
+                continue
+            if counts[IMPACTS] == len(record.impact_times):
+                return TOO_MANY_IMPACTS
+            record.impact_times[counts[IMPACTS]] = clock[0]
+            counts[IMPACTS] += 1
+            copy_row(shadow, state)
+            if held is not None:
+                state[CLOSED] = closed_for(landed, tables)
+            strike(state, tables.par, tables.par.restitution, tolerance)
+            if held is not None:
+                _carry_through_impact(tangent, shadow, state, tables.par, tables.par.restitution)
+        elif held is not None:
+            ends, length = _stay_held(state, clock, longest, series, record, held, tangent)
+            if ends == OUT_OF_RANGE:
+                return LOST
+            if ends == CLEAR:
+                clock[0], clock[1] = until, 0.0
+            else:
+                advance_clock(clock, length)
+                state[SIDE] = 0.0
+        else:
+            copy_row(shadow, state)
+            if collisions is not None:
+                length = collide(state, clock, longest, tolerance, tables, collisions, room.collision)
+                if length > 0.0:
+                    _watch_collision(
+                        shadow, clock, length, tables, tolerance, record, collisions, tangent, room
+                    )
+                    advance_clock(clock, length)
+                    continue
+            middle = min(0.5 * longest, 0.5 * STRETCH_TURN / tables.omega)
+            limit = min(longest, 2.0 * middle)
+            fill_base_force(force, clock, middle, tables)
+            code, length = advance_contact(state, 0.0, limit, force, middle, tables.par, tolerance, work, log)
+            if code == NOT_FINITE:
+                return LOST
+            if code not in (LEFT, HELD):
+                return STUCK
+            if record.tally[MODE] != NOTHING:
+                tally_contact(record.tally, log, clock, tables)
+            if tangent is not None and len(tangent) > 0:
+                carry_through_steps(tangent, log, tables.par, memory)
+            if counts[NEXT_SAMPLE] < len(record.samples):
+                sample_contact(shadow, clock, length, force, middle, tables, tolerance, work, record)
+            if length >= longest:
+                clock[0], clock[1] = until, 0.0
+            else:
+                advance_clock(clock, length)
+
+
+@inlined
+def _fly_on(
+    phasors: Complex,
+    now: Complex,
+    terms: Complex,
+    series: Vector,
+    clock: Vector,
+    longest: float,
+    tables: FlightTables,
+    held: HeldTables | None,
+) -> tuple[int, float]:
+    """Find how long a flight lasts, as `vibench.sim.flight.fly`; off a rigid stop it first departs."""
+    if held is not None:
+        if not is_resolved(closed_for(phasors, tables), tables.par):
+            return OUT_OF_RANGE, 0.0
+        leaves = departure(phasors, terms, series, tables)
+        if leaves > 0.0:
+            return (DEPARTS, leaves) if leaves < longest else (CLEAR, longest)
+    return fly(phasors, now, terms, series, clock, longest, tables)
+
+
+@inlined
+def _watch_collision(
+    shadow: Vector,
+    clock: Vector,
+    length: float,
+    tables: FlightTables,
+    tolerance: float,
+    record: Record,
+    collisions: CollisionTables,
+    tangent: Table | None,
+    room: Room,
+) -> None:
+    """Observe a collision that began in the state ``shadow`` at clock time."""
+    par, collision = tables.par, room.collision
+    if record.tally[MODE] != NOTHING:
+        gap = gap_of(shadow[SIDE], par)
+        tally_collision(record.tally, collision, length, gap, tables.omega, collisions)
+    if tangent is not None and len(tangent) > 0:
+        carry_through_collision(tangent, collision, length, par, collisions, room.equations)
+    if record.counts[NEXT_SAMPLE] < len(record.samples):
+        fill_base_force(room.force, clock, 0.5 * length, tables)
+        sample_contact(shadow, clock, length, room.force, 0.5 * length, tables, tolerance, room.work, record)
+
+
+@lean
+def _carry_through_impact(
+    tangent: Table | None, before: Vector, after: Vector, par: Parameters, restitution: float | None
+) -> None:
+    if tangent is not None and restitution is not None:
+        carry_through_impact(tangent, before, after, par, restitution)
+
+
+@compiled
+def _stay_held(
+    state: Vector,
+    clock: Vector,
+    longest: float,
+    series: Vector,
+    record: Record,
+    held: HeldTables,
+    tangent: Table | None,
+) -> tuple[int, float]:
+    """Advance while a rigid stop holds m1, to where it lets go or by ``longest``."""
+    flight = held.flight
+    terms, side, first = len(flight.rates), state[SIDE], record.counts[NEXT_SAMPLE]
+    phasors, now = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
+    landed, workspace = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
+    take_off(phasors, state, clock, flight)
+    ends, length = hold(side, phasors, now, workspace, series, clock, longest, flight, held.pulls)
+    if ends == OUT_OF_RANGE:
+        return ends, length
+    turn_phasors(landed, phasors, length, clock, flight)
+    tally_flight(record.tally, phasors, landed, now, workspace, series, clock, length, flight)
+    tally_held(record.tally, side, clock, length, flight)
+    if tangent is not None and len(tangent) > 0:
+        carry_through_flight(tangent, length, flight)
+    sample_flight(phasors, now, clock, length, flight, record)
+    for row in range(first, record.counts[NEXT_SAMPLE]):
+        record.samples[row, Y] += side * gap_of(side, flight.par)
+    place_held(state, side, landed, flight)
+    return ends, length

@@ -1,0 +1,54 @@
+from ._answers import (
+    prediction_at as prediction_at,
+)
+from ._arrays import (
+    PointAnswer as PointAnswer,
+)
+from ._columns import (
+    MESSAGE as MESSAGE,
+)
+from ._errors import (
+    StudyError as StudyError,
+)
+from ._frequency_range import (
+    frequency_range as frequency_range,
+)
+from ._layout import (
+    PointState as PointState,
+)
+from ._plausibility_warnings import (
+    doubts as doubts,
+)
+from ._progress import (
+    StudyProgress as StudyProgress,
+    Watcher as Watcher,
+)
+from ._results import (
+    StudyResults as StudyResults,
+    open_study as open_study,
+)
+from ._run import (
+    run_study as run_study,
+)
+from ._software import (
+    PACKAGES as PACKAGES,
+    software as software,
+)
+from ._solve import (
+    Existing as Existing,
+    solve_study as solve_study,
+)
+from ._store import (
+    MemoryStore as MemoryStore,
+)
+from ._structure import (
+    Structure as Structure,
+)
+from ._study import (
+    Kept as Kept,
+    Start as Start,
+    Study as Study,
+)
+from ._threads import (
+    ThreadExecutor as ThreadExecutor,
+)

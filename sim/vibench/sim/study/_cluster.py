@@ -1,0 +1,189 @@
+"""A Dask cluster as workers: any number of processes on any number of machines.
+
+Dask runs a task again when its worker dies, and moves work between workers; a scene's answer does not
+depend on where it is computed, so that neither changes a result. Workers must have the same software.
+"""
+
+import queue
+import time
+import uuid
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+from distributed import CancelledError, Client, Future
+from distributed.comm import get_address_host_port
+
+from ..scene import Scene, solve_scene
+from ._errors import ClusterLost
+from ._executor import Bundle, Reply, Solved
+from ._software import software
+from ._threads import arrived_in
+from ._timing import Solver, solve_timed
+
+CONNECT_PATIENCE_S = 30.0
+"""How long the scheduler, and then its first worker, is waited for."""
+LOOK_AGAIN_S = 1.0
+"""How often the number of workers is asked for."""
+RUNNING, CONNECTING = "running", "connecting"
+FINISHED, ERROR = "finished", "error"
+
+Answer = tuple[str, tuple[Solved, ...]]
+"""Software of the worker, and what it computed."""
+
+
+def solve_bundle(scenes: Sequence[Scene], solver: Solver) -> Answer:
+    """Solve scenes one after the other; runs on a worker."""
+    return software(), tuple(solve_timed(scene, solver) for scene in scenes)
+
+
+class ClusterExecutor:
+    """The workers behind a Dask scheduler.
+
+    Raises
+    ------
+    ClusterLost
+        When nobody answers at the address, no worker comes, or a worker has no vibench or another one.
+
+    """
+
+    def __init__(
+        self, address: str, solver: Solver = solve_scene, patience_s: float = CONNECT_PATIENCE_S
+    ) -> None:
+        self._address = address
+        self._solver = solver
+        self._client = _connected(address, patience_s)
+        try:
+            _require_workers(self._client, address, patience_s)
+        except BaseException:
+            self._client.close()
+            raise
+        self._arrived: queue.SimpleQueue[tuple[Bundle, Future]] = queue.SimpleQueue()
+        # A future that nobody holds is forgotten by the scheduler.
+        self._held: dict[str, Future] = {}
+        self._prefix = f"vibench-{uuid.uuid4().hex}"
+        self._submitted = 0
+        self._slots = 0
+        self._look_s = -LOOK_AGAIN_S
+
+    @property
+    def description(self) -> str:
+        """What it is, for the record."""
+        return f"Dask cluster at {self._address}, {self.slots} worker thread(s) at first"
+
+    @property
+    def slots(self) -> int:
+        """Threads of all workers, as of a moment ago; 0 while the scheduler does not answer."""
+        if not self._is_in_contact():
+            return 0
+        now_s = time.monotonic()
+        if now_s - self._look_s >= LOOK_AGAIN_S:
+            self._look_s = now_s
+            self._slots = self._count_threads()
+        return self._slots
+
+    def submit(self, bundle: Bundle) -> None:
+        """Hand a bundle to the scheduler."""
+        self._submitted += 1
+        key = f"{self._prefix}-{self._submitted}"
+        future = self._client.submit(solve_bundle, bundle.scenes, self._solver, key=key, pure=False)
+        self._held[key] = future
+        future.add_done_callback(partial(self._note, bundle))
+
+    def replies(self, timeout_s: float) -> Sequence[Reply]:
+        """Give what has come back; a bundle that the scheduler has dropped comes back empty."""
+        arrived = arrived_in(self._arrived, timeout_s)
+        if not arrived:
+            self._is_in_contact()
+        answers = self._fetched([future for _, future in arrived if future.status == FINISHED])
+        return [self._reply(bundle, future, answers) for bundle, future in arrived]
+
+    def cancel(self) -> Sequence[Reply]:
+        """Let the scheduler drop everything; a worker ends the bundle it is at, for nobody."""
+        if self._client.status == RUNNING and self._held:
+            self._client.cancel(list(self._held.values()))
+        self._held.clear()
+        return ()
+
+    def close(self) -> None:
+        """Cancel, and leave the cluster to itself."""
+        self.cancel()
+        self._client.close()
+
+    def _note(self, bundle: Bundle, future: Future) -> None:
+        """Pass on; this is a thread of the client."""
+        self._arrived.put((bundle, future))
+
+    def _fetched(self, futures: Sequence[Future]) -> Mapping[str, Answer]:
+        """Bring all finished answers here in one go; none when they were lost on the way."""
+        if not futures:
+            return {}
+        try:
+            answers = self._client.gather(list(futures))
+        except (CancelledError, OSError):
+            return {}
+        return {future.key: answer for future, answer in zip(futures, answers, strict=True)}
+
+    def _reply(self, bundle: Bundle, future: Future, answers: Mapping[str, Answer]) -> Reply:
+        self._held.pop(future.key, None)
+        if future.status == ERROR:
+            return Reply(bundle, (), future.exception())
+        if future.key not in answers:
+            return Reply(bundle, ())
+        made_by, solved = answers[future.key]
+        if made_by != software():
+            raise ClusterLost(_other_software(self._address, made_by))
+        return Reply(bundle, solved)
+
+    def _is_in_contact(self) -> bool:
+        """Whether the scheduler answers; a client that has given up is an error."""
+        if self._client.status in (RUNNING, CONNECTING):
+            return bool(self._client.status == RUNNING)
+        raise ClusterLost(
+            f"The cluster at {self._address} is gone. What was computed before is kept;"
+            " start it again and resume."
+        )
+
+    def _count_threads(self) -> int:
+        try:
+            return sum(self._client.nthreads().values())
+        except (CancelledError, OSError):
+            return 0
+
+
+def _connected(address: str, patience_s: float) -> Client:
+    try:
+        # Asked first: a client that was begun with an address of another form cannot be closed again.
+        get_address_host_port(address)
+        return Client(address, timeout=patience_s, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ClusterLost(
+            f"No Dask scheduler answers at {address!r} ({error});"
+            " give the address that `dask scheduler` prints, such as tcp://host:8786."
+        ) from error
+
+
+def _require_workers(client: Client, address: str, patience_s: float) -> None:
+    """Refuse a cluster without workers, or with workers that would compute something else."""
+    try:
+        client.wait_for_workers(1, timeout=patience_s)
+    except OSError as error:
+        raise ClusterLost(
+            f"The cluster at {address} has no worker after {patience_s:g} s;"
+            f" start some with `dask worker {address}`."
+        ) from error
+    try:
+        found = client.run(software)
+    except ImportError as error:
+        raise ClusterLost(
+            f"A worker of {address} has no vibench ({error}); install the same version on every machine."
+        ) from error
+    for made_by in found.values():
+        if made_by != software():
+            raise ClusterLost(_other_software(address, made_by))
+
+
+def _other_software(address: str, made_by: str) -> str:
+    return (
+        f"A worker of {address} has other software, whose answers may differ: {made_by} there,"
+        f" {software()} here. Install the same versions on every machine, and restart the workers."
+    )

@@ -1,0 +1,100 @@
+"""The columns of a study's file: what is kept of each point, in which type and unit."""
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from ..model import Outcome
+from ..scene import Method, MotionKind
+from ._layout import STATE, STATE_DTYPE, PointState
+
+Cell = float | int | bytes | tuple[float, ...]
+
+REAL, WHOLE = "<f8", "<i4"
+MISSING_WHOLE = -1
+"""Stands for a missing whole number or flag; CF's ``_FillValue``."""
+COORDINATE = "coordinate"
+COORDINATES = ("x", "y", "z", "vx", "vy", "vz")
+IDENTITY_DIGITS = 32
+TEXT_BYTES = 200
+"""Kept of a text; longer ones are cut."""
+
+TAKEN, SESSION, MESSAGE, IDENTITY = "taken", "session", "message", "scene"
+CONTINUES, PHASE, FINAL_STATE, OUTCOME = "continues", "drive_phase", "final_state", "outcome"
+DURATION, MOTION, METHOD, ENDED = "duration", "motion", "method", "ended"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One quantity over all points."""
+
+    name: str
+    dtype: str
+    units: str
+    """UDUNITS text; 1 for ratios and counts."""
+    long_name: str
+    meanings: tuple[str, ...] = ()
+    """Of the values 0, 1, 2, ... of a flag."""
+    components: int = 1
+    """More than one: with an axis of its own at the end."""
+
+    @property
+    def missing(self) -> float | int | bytes:
+        """What stands for nothing."""
+        match self.dtype[:2]:
+            case "<f":
+                return math.nan
+            case "<i":
+                return MISSING_WHOLE
+            case "u1":
+                return int(PointState.MISSING)
+            case _:
+                return b""
+
+
+def _meanings(kind: type[Enum]) -> tuple[str, ...]:
+    """One word for each member, as CF wants flags to be named."""
+    return tuple(member.name.lower() for member in kind)
+
+
+NUMBERS = {
+    "response_i": Column("response_i", REAL, "1", "largest displacement of m0 over the drive amplitude"),
+    "response_ii": Column(
+        "response_ii", REAL, "1", "displacement of m0 at the drive frequency over the drive amplitude"
+    ),
+    "relative_i": Column(
+        "relative_i", REAL, "1", "largest displacement of m1 against m2 over the drive amplitude"
+    ),
+    "relative_ii": Column(
+        "relative_ii", REAL, "1", "displacement of m1 against m2 at the drive frequency over its amplitude"
+    ),
+    "impacts": Column("impacts", WHOLE, "1", "impacts within the window"),
+    "impact_rate_hz": Column("impact_rate", REAL, "Hz", "impacts a second within the window"),
+    "period": Column("period", WHOLE, "1", "drive periods after which the motion repeats"),
+    "duration_s": Column(DURATION, REAL, "s", "how long the specimen was followed"),
+    "window_s": Column("window", REAL, "s", "the last part of it, which was observed"),
+    "settled_s": Column("settled", REAL, "s", "when the motion was found to be settled"),
+    "error_estimate": Column("error_estimate", REAL, "1", "relative error of the responses, estimated"),
+    "integration_error": Column(
+        "integration_error", REAL, "1", "part of it that a stricter accuracy would lessen"
+    ),
+    "scatter": Column("scatter", REAL, "1", "relative standard deviation of Response I between windows"),
+    "lyapunov_per_s": Column("lyapunov", REAL, "s-1", "largest Lyapunov exponent"),
+    "lyapunov_error_per_s": Column("lyapunov_error", REAL, "s-1", "standard error of the largest exponent"),
+}
+"""By the field of `Prediction` that they keep."""
+OTHERS = (
+    Column(MOTION, WHOLE, "", "what the motion has come to", _meanings(MotionKind)),
+    Column(METHOD, WHOLE, "", "how the scene was answered", _meanings(Method)),
+    Column(OUTCOME, WHOLE, "", "how the run ended", _meanings(Outcome)),
+    Column(ENDED, f"S{TEXT_BYTES}", "", "why it was followed no longer"),
+    Column(FINAL_STATE, REAL, "m and m/s", "state at the end of the run", components=len(COORDINATES)),
+    Column(PHASE, REAL, "rad", "phase of the drive when the run began"),
+    Column(CONTINUES, WHOLE, "1", "number of the point, from 0, whose end is this one's start"),
+    Column(TAKEN, REAL, "s", "processor time; missing where kernels were compiled in it"),
+    Column(SESSION, WHOLE, "1", "row of sessions in which it was computed"),
+    Column(IDENTITY, f"S{IDENTITY_DIGITS}", "", "digest of everything that the scene says"),
+    Column(MESSAGE, f"S{TEXT_BYTES}", "", "why the scene could not be computed"),
+    Column(STATE, STATE_DTYPE, "", "what is known of the point", _meanings(PointState)),
+)
+COLUMNS = (*NUMBERS.values(), *OTHERS)

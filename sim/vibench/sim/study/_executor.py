@@ -1,0 +1,67 @@
+"""The boundary between the queue and whatever computes: threads here, processes elsewhere."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from ..scene import Prediction, Scene
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """Scenes that are handed over together, so that short ones do not drown in overhead."""
+
+    numbers: tuple[int, ...]
+    """Which points of the study they are."""
+    scenes: tuple[Scene, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """The answer to one scene, and what it cost."""
+
+    prediction: Prediction
+    taken_s: float
+    """Processor time of the thread that computed it [s]; NaN when compiling was part of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reply:
+    """What came back for a bundle."""
+
+    bundle: Bundle
+    solved: tuple[Solved, ...]
+    """One for each scene, in order; fewer when it was cancelled or failed on the way."""
+    error: BaseException | None = None
+    """Why there are fewer, if that was an error."""
+
+
+class Executor(Protocol):
+    """What computes bundles. It may lose workers, but no bundle; the order of replies is its own."""
+
+    @property
+    def description(self) -> str:
+        """What it is, for the record."""
+
+    @property
+    def slots(self) -> int:
+        """How many bundles it computes at the same time; may change. None at the moment: 0."""
+
+    def submit(self, bundle: Bundle) -> None:
+        """Take a bundle, and compute it when its turn comes."""
+
+    def replies(self, timeout_s: float) -> Sequence[Reply]:
+        """Give what has come back; waits for the first, at most ``timeout_s``.
+
+        Raises
+        ------
+        ClusterLost
+            When nothing can come back any more.
+
+        """
+
+    def cancel(self) -> Sequence[Reply]:
+        """Begin nothing more, end soon, and give what has come back until then. Legal at any time."""
+
+    def close(self) -> None:
+        """Let go of every worker. Legal at any time."""

@@ -1,0 +1,128 @@
+"""A study's points as scenes: what each one begins from, and what is kept of its answer."""
+
+import math
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels import Floats
+from ..model import Outcome
+from ..scene import Given, Rest, Scene, plan_scene
+from ._answers import cells_of, cut_text
+from ._arrays import Arrays, PointAnswer
+from ._columns import CONTINUES, DURATION, FINAL_STATE, IDENTITY, MESSAGE, PHASE, TAKEN, Cell
+from ._executor import Solved
+from ._layout import PointState
+from ._point_scheduler import NOBODY
+from ._scene_identity import scene_identity
+from ._study import GivenStart, Start, Study
+
+PLANNED = 2000
+"""Points that are planned one by one; of a larger study every so manyth, for all up to the next."""
+
+
+class Expansion:
+    """The scenes of a study, made when they are asked for."""
+
+    def __init__(self, study: Study) -> None:
+        self._study = study
+        self._grid = study.grid
+
+    @cached_property
+    def after(self) -> NDArray[np.int64]:
+        """Point that each one continues, or NOBODY, shape (points,)."""
+        frequencies = len(self._study.frequencies_hz)
+        blocks = np.full((*self._grid.shape[:-2], len(self._study.starts), frequencies), NOBODY)
+        numbers = np.arange(self._grid.size).reshape(blocks.shape)
+        for index, start in enumerate(self._study.starts):
+            match start:
+                case Start.UP:
+                    blocks[..., index, 1:] = numbers[..., index, :-1]
+                case Start.DOWN:
+                    blocks[..., index, :-1] = numbers[..., index, 1:]
+                case _:
+                    pass
+        return blocks.reshape(-1)
+
+    @cached_property
+    def planned_s(self) -> Floats:
+        """Time that each point is planned to take, shape (points,)."""
+        every = max(1, math.ceil(self._grid.size / PLANNED))
+        some = [self._planned(number) for number in range(0, self._grid.size, every)]
+        return np.repeat(some, every)[: self._grid.size]
+
+    def scene(self, number: int, arrays: Arrays) -> Scene:
+        """Make the scene of a point whose predecessor, if it has one, is done.
+
+        A point whose predecessor ended in no finite state begins at rest; its ``continues`` says so.
+
+        Raises
+        ------
+        ValueError
+            When a scene of these numbers is not allowed.
+
+        """
+        before = self._predecessor(number, arrays)
+        if before == NOBODY:
+            return self._unchained(number)
+        state = tuple(float(value) for value in arrays[FINAL_STATE][before])
+        x, y, z, vx, vy, vz = state
+        name = continued_from(self._study.frequencies_hz[self._grid.place(before)[-1]])
+        start = Given((x, y, z, vx, vy, vz), name)
+        return self._study.scene(self._grid.place(number), start, self._end_phase(before, arrays))
+
+    def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
+        """Say what is kept of a prediction."""
+        is_at_end = solved.prediction.outcome == Outcome.REACHED_END
+        cells = {**cells_of(solved.prediction), **self._origin(number, scene, arrays), TAKEN: solved.taken_s}
+        state = PointState.DONE if is_at_end else PointState.STOPPED
+        return PointAnswer(number, state, cells, solved.taken_s)
+
+    def failure(self, number: int, error: BaseException) -> PointAnswer:
+        """Say what is kept of a scene that could not be computed."""
+        return PointAnswer(number, PointState.FAILED, {MESSAGE: cut_text(f"{type(error).__name__}: {error}")})
+
+    def _origin(self, number: int, scene: Scene, arrays: Arrays) -> dict[str, Cell]:
+        """Say where a point began, and which scene it is."""
+        before = self._predecessor(number, arrays)
+        known = "" if before == NOBODY else bytes(arrays[IDENTITY][before]).decode()
+        return {
+            CONTINUES: before,
+            PHASE: scene.drive.phase_rad,
+            IDENTITY: scene_identity(scene, known).encode(),
+        }
+
+    def _predecessor(self, number: int, arrays: Arrays) -> int:
+        before = int(self.after[number])
+        if before == NOBODY or not np.all(np.isfinite(arrays[FINAL_STATE][before].astype(np.float64))):
+            return NOBODY
+        return before
+
+    def _end_phase(self, before: int, arrays: Arrays) -> float:
+        """Phase at which the predecessor's drive stopped: the base goes on from where it is."""
+        frequency_hz = self._study.frequencies_hz[self._grid.place(before)[-1]]
+        turns = math.fmod(frequency_hz * float(arrays[DURATION][before]), 1.0)
+        return math.fmod(2.0 * math.pi * turns + float(arrays[PHASE][before]), 2.0 * math.pi)
+
+    def _unchained(self, number: int) -> Scene:
+        """Make the scene of a point that continues no other."""
+        place = self._grid.place(number)
+        start = self._study.starts[place[-2]]
+        match start:
+            case GivenStart():
+                return self._study.scene(place, Given(start.state, start.label))
+            case _:
+                return self._study.scene(place, Rest())
+
+    def _planned(self, number: int) -> float:
+        """Planned time of a point; none when its scene is not allowed, which its answer will say."""
+        try:
+            return plan_scene(self._unchained(number)).cost_s
+        except ValueError:
+            return 0.0
+
+
+def continued_from(frequency_hz: float) -> str:
+    """Name of a start that is the end of another point."""
+    return f"end at {frequency_hz:g} Hz"

@@ -1,0 +1,119 @@
+"""Which points of a study may be computed now: those whose predecessor is done, longest first."""
+
+import heapq
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._costs import Costs
+
+NOBODY = -1
+"""Predecessor of a point that depends on none."""
+
+
+class Agenda:
+    """The work that is left, in the order in which it should begin.
+
+    Starting the longest first keeps all workers busy to the end; a point counts with the planned time of
+    all that wait for it in its chain. Points are handed out once, until they are put back.
+    """
+
+    def __init__(self, after: NDArray[np.int64], is_done: NDArray[np.bool_], costs: Costs) -> None:
+        self._after = after
+        self._costs = costs
+        self._is_done = is_done.copy()
+        self._left = int(np.count_nonzero(~is_done))
+        self._is_out = np.zeros(len(after), dtype=np.bool_)
+        self._is_alone = np.zeros(len(after), dtype=np.bool_)
+        self._next = np.full(len(after), NOBODY, dtype=np.int64)
+        chained = np.flatnonzero(after != NOBODY)
+        self._next[after[chained]] = chained
+        self._behind_s = self._times_behind()
+        self._queue: list[tuple[float, int]] = []
+        for number in np.flatnonzero(~self._is_done):
+            if self._is_ready(int(number)):
+                self._push(int(number))
+
+    @property
+    def is_missing(self) -> NDArray[np.bool_]:
+        """Points without an answer, shape (points,); those under way too."""
+        return ~self._is_done
+
+    @property
+    def left(self) -> int:
+        """How many points have no answer."""
+        return self._left
+
+    def take(self, worth_s: float, most: int) -> tuple[int, ...]:
+        """Hand out the longest point that is ready, and short ones with it until they are ``worth_s``."""
+        taken: list[int] = []
+        sum_s = 0.0
+        while len(taken) < most and sum_s < worth_s:
+            number = self._pop()
+            if number is None:
+                break
+            if taken and self._is_alone[number]:
+                self._push(number)
+                break
+            self._is_out[number] = True
+            taken.append(number)
+            sum_s += self._costs.estimate_s(number)
+            if self._is_alone[number]:
+                break
+        return tuple(taken)
+
+    def learn(self, number: int, taken_s: float) -> None:
+        """Note what a point took: its neighbours' times are known better."""
+        for changed in self._costs.learn(number, taken_s):
+            if self._is_ready(changed):
+                self._push(changed)
+
+    def finish(self, number: int) -> None:
+        """Take note of an answer, good or bad: who waited for it may begin."""
+        self._is_done[number] = True
+        self._left -= 1
+        self._is_out[number] = False
+        follower = int(self._next[number])
+        if follower != NOBODY and self._is_ready(follower):
+            self._push(follower)
+
+    def put_back(self, number: int) -> None:
+        """Let a point that was handed out be handed out again."""
+        self._is_out[number] = False
+        self._push(number)
+
+    def put_back_alone(self, number: int) -> None:
+        """Put back one that came to grief among others, to see whether it does so by itself."""
+        self._is_alone[number] = True
+        self.put_back(number)
+
+    def _is_ready(self, number: int) -> bool:
+        before = int(self._after[number])
+        is_free = before == NOBODY or bool(self._is_done[before])
+        return is_free and not self._is_done[number] and not self._is_out[number]
+
+    def _weight(self, number: int) -> float:
+        return self._costs.estimate_s(number) + float(self._behind_s[number])
+
+    def _push(self, number: int) -> None:
+        heapq.heappush(self._queue, (-self._weight(number), number))
+
+    def _pop(self) -> int | None:
+        """Longest point that is ready; entries overtaken by an answer or a better estimate are dropped."""
+        while self._queue:
+            weight, number = heapq.heappop(self._queue)
+            if self._is_ready(number) and -weight == self._weight(number):
+                return number
+        return None
+
+    def _times_behind(self) -> NDArray[np.float64]:
+        """Planned time of everything that waits for a point, directly or through others, shape (points,)."""
+        behind = np.zeros(len(self._after))
+        for last in np.flatnonzero(self._next == NOBODY):
+            number, sum_s = int(last), 0.0
+            while self._after[number] != NOBODY:
+                if not self._is_done[number]:
+                    sum_s += self._costs.estimate_s(number)
+                number = int(self._after[number])
+                behind[number] = sum_s
+        return behind

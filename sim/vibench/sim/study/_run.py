@@ -1,0 +1,170 @@
+"""Running a study: one queue, whatever computes; answers are kept as they come."""
+
+import math
+import time
+from collections.abc import Iterable, Sequence
+from enum import StrEnum
+
+import numpy as np
+
+from ._arrays import PointAnswer, states
+from ._columns import TAKEN
+from ._costs import Costs
+from ._executor import Bundle, Executor, Reply
+from ._expansion import Expansion
+from ._layout import PointState
+from ._point_scheduler import Agenda
+from ._progress import Cancelled, StudyProgress, Watcher
+from ._store import Store
+from ._study import Study
+
+BUNDLE_S = 0.05
+"""Worker time worth a trip to a worker and back, which costs a few milliseconds on a cluster."""
+MOST_IN_BUNDLE = 64
+"""Answers that may be lost together with their worker."""
+SHARE = 8
+"""A bundle is at most this part of what is left for each worker, so that all end together."""
+QUEUED_PER_SLOT = 2
+"""Bundles handed over for each worker: one to compute, and the next, so that it never waits."""
+LOOK_S = 0.2
+"""How often a cancellation is asked for."""
+
+
+class StudyEnd(StrEnum):
+    """How a session ended."""
+
+    COMPLETE = "complete"
+    CANCELLED = "cancelled"
+
+
+def run_study(
+    study: Study,
+    executor: Executor,
+    store: Store,
+    watcher: Watcher | None = None,
+    cancelled: Cancelled | None = None,
+) -> StudyEnd:
+    """Compute every point that the store misses, longest first.
+
+    The answers do not depend on the executor or on the order: each scene is computed alone, and a point
+    that continues another waits for it. An error in one scene is that point's answer.
+
+    Raises
+    ------
+    StudyError
+        When the store or the executor fails; what was kept before is kept.
+
+    """
+    session = _Session(study, executor, store)
+    if session.is_unfinished:
+        store.begin(executor.description)
+    while session.is_unfinished:
+        session.feed()
+        replies = executor.replies(LOOK_S)
+        session.keep(replies)
+        if replies and watcher is not None:
+            watcher(session.progress())
+        if cancelled is not None and cancelled():
+            session.keep(executor.cancel())
+            return StudyEnd.COMPLETE if not session.is_unfinished else StudyEnd.CANCELLED
+    return StudyEnd.COMPLETE
+
+
+class _Session:
+    """One go at a study."""
+
+    def __init__(self, study: Study, executor: Executor, store: Store) -> None:
+        self._executor = executor
+        self._store = store
+        self._expansion = Expansion(study)
+        is_done = states(store.arrays) != PointState.MISSING
+        self._costs = Costs(study.grid, self._expansion.planned_s)
+        for number in np.flatnonzero(is_done & np.isfinite(store.arrays[TAKEN].astype(float))):
+            for _ in self._costs.learn(int(number), float(store.arrays[TAKEN][number])):
+                pass
+        self._agenda = Agenda(self._expansion.after, is_done, self._costs)
+        self._points = study.grid.size
+        self._failed = int(np.count_nonzero(states(store.arrays) > PointState.DONE))
+        self._out = 0
+        self._looked_s = -math.inf
+        self._work_left_s = 0.0
+        self._began_s = time.monotonic()
+        self._first_s = math.nan
+        self._taken_s = 0.0
+
+    @property
+    def is_unfinished(self) -> bool:
+        """Whether points are missing."""
+        return self._agenda.left > 0
+
+    def feed(self) -> None:
+        """Hand bundles to the executor until every worker has enough."""
+        self._look()
+        slots = self._executor.slots
+        while self._out < slots * QUEUED_PER_SLOT:
+            worth_s = min(BUNDLE_S, self._work_left_s / (slots * SHARE))
+            numbers = self._agenda.take(worth_s, MOST_IN_BUNDLE)
+            if not numbers:
+                return
+            scenes = tuple(self._expansion.scene(number, self._store.arrays) for number in numbers)
+            self._executor.submit(Bundle(numbers, scenes))
+            self._out += 1
+
+    def keep(self, replies: Sequence[Reply]) -> None:
+        """Keep all answers in one commit, and note what they mean for the rest."""
+        answers = [answer for reply in replies for answer in self._answers(reply)]
+        if answers:
+            self._store.keep(answers)
+        for answer in answers:
+            self._agenda.finish(answer.number)
+            self._failed += answer.state > PointState.DONE
+        for number, taken_s in [
+            (each.number, each.taken_s) for each in answers if math.isfinite(each.taken_s)
+        ]:
+            self._agenda.learn(number, taken_s)
+            self._taken_s += taken_s
+        if answers and math.isnan(self._first_s):
+            # Workers spend their first moments on compiling: what comes after tells their pace.
+            self._first_s, self._taken_s = time.monotonic(), 0.0
+
+    def progress(self) -> StudyProgress:
+        """Where it stands."""
+        return StudyProgress(
+            points=self._points,
+            kept=self._points - self._agenda.left,
+            failed=self._failed,
+            elapsed_s=time.monotonic() - self._began_s,
+            left_s=self._left_s(),
+        )
+
+    def _left_s(self) -> float | None:
+        """Time that the rest takes, at the pace of the workers since the first answer."""
+        if not self.is_unfinished:
+            return 0.0
+        if self._taken_s == 0.0:
+            return None
+        return self._work_left_s * (time.monotonic() - self._first_s) / self._taken_s
+
+    def _look(self) -> None:
+        """Add up the work that is left, now and then: there may be millions of points."""
+        now_s = time.monotonic()
+        if now_s - self._looked_s >= LOOK_S:
+            self._looked_s = now_s
+            self._work_left_s = self._costs.left_s(self._agenda.is_missing)
+
+    def _answers(self, reply: Reply) -> Iterable[PointAnswer]:
+        """Take a reply apart; what has no answer goes back to the agenda."""
+        self._out -= 1
+        numbers = reply.bundle.numbers
+        for number, scene, solved in zip(numbers, reply.bundle.scenes, reply.solved, strict=False):
+            yield self._expansion.answer(number, scene, solved, self._store.arrays)
+        rest = numbers[len(reply.solved) :]
+        match reply.error, rest:
+            case None, _:
+                for number in rest:
+                    self._agenda.put_back(number)
+            case error, (number,) if len(numbers) == 1:
+                yield self._expansion.failure(number, error)
+            case _:
+                for number in rest:
+                    self._agenda.put_back_alone(number)

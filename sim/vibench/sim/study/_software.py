@@ -1,0 +1,22 @@
+"""Which software computed a point: enough to say whether two machines compute the same."""
+
+import json
+import platform
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+
+from ..kernels import SOURCES
+
+PACKAGES = ("vibench", "numpy", "scipy", "numba")
+
+
+@cache
+def software() -> str:
+    """Versions, and the digest of the simulation's sources, as JSON text with sorted keys."""
+    found = {"python": platform.python_version(), "sim_sources": SOURCES}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return json.dumps(found, sort_keys=True)

@@ -1,0 +1,94 @@
+"""One call that does it all: a study, workers, a place for the answers, and the answers."""
+
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from enum import StrEnum
+from pathlib import Path
+
+from ._errors import ClusterLost
+from ._executor import Executor
+from ._progress import Cancelled, Watcher
+from ._results import StudyResults, open_study, results_of
+from ._run import run_study
+from ._store import FileStore, MemoryStore
+from ._study import Study
+from ._threads import ThreadExecutor
+
+
+class Existing(StrEnum):
+    """What to do with a file that is there already."""
+
+    REFUSE = "refuse"
+    RESUME = "resume"
+
+
+def solve_study(
+    study: Study,
+    out: Path | None = None,
+    existing: Existing = Existing.REFUSE,
+    workers: int | None = None,
+    cluster: str | None = None,
+    watcher: Watcher | None = None,
+    cancelled: Cancelled | None = None,
+) -> StudyResults:
+    """Compute what a study asks for, and what its file does not hold yet.
+
+    Parameters
+    ----------
+    study
+        What is asked for.
+    out
+        The file that keeps the answers, ``NAME.h5``; in memory alone when None.
+    existing
+        Whether a file that is there is refused or resumed. Resuming computes what is missing; a file that
+        is not there is begun.
+    workers
+        Threads of this process; one for each processor when None.
+    cluster
+        Address of a Dask scheduler, whose workers compute instead.
+    watcher, cancelled
+        Told, and asked, in the calling thread.
+
+    Returns
+    -------
+    StudyResults
+        Complete, or what there was when it was cancelled.
+
+    Raises
+    ------
+    StudyError
+        In one sentence: a file of another study, a cluster that does not answer, a full disk, ...
+
+    """
+    with _executor(workers, cluster) as executor:
+        if out is None:
+            store = MemoryStore(study)
+            run_study(study, executor, store, watcher, cancelled)
+            return results_of(study, store.arrays)
+        with _file_store(study, out, existing) as kept:
+            run_study(study, executor, kept, watcher, cancelled)
+        return open_study(out)
+
+
+def _file_store(study: Study, out: Path, existing: Existing) -> FileStore:
+    if existing is Existing.RESUME and out.exists():
+        return FileStore(out, study)
+    return FileStore.created(out, study)
+
+
+@contextmanager
+def _executor(workers: int | None, cluster: str | None) -> Iterator[Executor]:
+    executor = ThreadExecutor(workers) if cluster is None else _cluster_executor(cluster)
+    with closing(executor):
+        yield executor
+
+
+def _cluster_executor(address: str) -> Executor:
+    try:
+        from ._cluster import ClusterExecutor  # noqa: PLC0415 - Dask is optional, and slow to import
+    except ModuleNotFoundError as error:
+        raise ClusterLost(
+            f"A cluster needs Dask, and {error.name} is not installed;"
+            " install vibench with its extra 'cluster'."
+        ) from error
+    return ClusterExecutor(address)
