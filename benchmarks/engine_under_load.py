@@ -16,14 +16,12 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from vibench.acquisition.engine.client import EngineClient
-from vibench.acquisition.engine.requests import Look
-from vibench.acquisition.engine.start import start_engine
-from vibench.acquisition.engine.state import Attendance, EngineState
-from vibench.acquisition.engine.wire import Message, send
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition import open_recording
+from vibench.acquisition.engine import Attendance, EngineClient, EngineState, start_engine
+from vibench.acquisition.engine._requests import Look
+from vibench.acquisition.engine._wire import Message, send
+from vibench.acquisition.plan import Campaign
+from vibench.acquisition.rig import load_rig
 
 RIG = Path(__file__).parent.parent / "hardware_configs" / "virtual_rig.toml"
 BUSY = "while True: sum(i * i for i in range(100_000))"

@@ -16,13 +16,15 @@ from pathlib import Path
 import numpy as np
 from scipy import signal
 
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.instruments import Block
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
-from vibench.acquisition.recording.layout import Origin, RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import Block, open_recording
+from vibench.acquisition.plan import Measurement, StreamedNoise
+from vibench.acquisition.recording import (
+    ChannelHeader,
+    Origin,
+    RecordingHeader,
+    RecordingState,
+    create_recording,
+)
 from vibench.analysis.measurement_analysis import analyse_recording
 from vibench.analysis.recorded_channels import BASE, DRIVE, RESPONSE
 

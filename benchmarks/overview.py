@@ -15,14 +15,15 @@ from pathlib import Path
 
 import numpy as np
 
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.instruments import Block
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
-from vibench.acquisition.recording.layout import Origin
-from vibench.acquisition.recording.overview import OverviewSums
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import Block, open_recording
+from vibench.acquisition.plan import Measurement, StreamedNoise
+from vibench.acquisition.recording import (
+    ChannelHeader,
+    Origin,
+    OverviewSums,
+    RecordingHeader,
+    create_recording,
+)
 from vibench.analysis.live.envelope import envelope
 from vibench.analysis.overview import overview_of
 

@@ -19,15 +19,12 @@ from collections import Counter
 from contextlib import closing
 from pathlib import Path
 
-from vibench.acquisition.campaign.happening import Happening
-from vibench.acquisition.campaign.item import AfterFailure, CampaignItem, Existing, Item
-from vibench.acquisition.engine.engine import Engine
-from vibench.acquisition.engine.orders import Orders
-from vibench.acquisition.engine.state import Attendance
-from vibench.acquisition.errors import RecordingError
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.rig.configuration import Rig, load_rig
-from vibench.virtual_rig.fault_script import load_fault_script
+from vibench.acquisition import RecordingError
+from vibench.acquisition.campaign import AfterFailure, CampaignItem, Existing, Happening, Item
+from vibench.acquisition.engine import Attendance, Engine, Orders
+from vibench.acquisition.plan import Campaign
+from vibench.acquisition.rig import Rig, load_rig
+from vibench.virtual_rig import load_fault_script
 
 ROOT = Path(__file__).resolve().parent.parent
 HOUR_S = 3600.0

@@ -12,12 +12,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.run.progress import Progress
-from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.acquisition import open_bench, open_recording, run_measurement
+from vibench.acquisition.plan import Dwell, Measurement
+from vibench.acquisition.run import Progress
 
 ROOT = Path(__file__).resolve().parent.parent
 MINUTE_S = 60.0

@@ -9,14 +9,21 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from vibench.acquisition import Block, Identity
 from vibench.acquisition.errors import DataLost
-from vibench.acquisition.instruments import Block, Identity, IdleOutput, Samples
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.rig.channel import Channel, channels_of
-from vibench.acquisition.rig.configuration import Rig, Role, load_rig
-from vibench.acquisition.rig.knobs import KnobSheet
-from vibench.acquisition.rig.model import Quantity, RigModel
-from vibench.acquisition.rig.output import OutputConfig
+from vibench.acquisition.instruments import IdleOutput, Samples
+from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.rig import (
+    Channel,
+    KnobSheet,
+    OutputConfig,
+    Quantity,
+    Rig,
+    RigModel,
+    Role,
+    channels_of,
+    load_rig,
+)
 
 ROOT = Path(__file__).parent.parent.parent
 SAMPLE_RATE_HZ = 5120.0

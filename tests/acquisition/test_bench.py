@@ -8,29 +8,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench import Reality, open_bench
-from vibench.acquisition.drivers.afg1022x import AFG1022X
-from vibench.acquisition.drivers.daqmx import DaqmxDigitizer
-from vibench.acquisition.errors import (
-    CheckFailed,
-    ConfigurationError,
-    DataLost,
-    InstrumentBusy,
-    InstrumentError,
-    InstrumentLost,
-)
+from vibench.acquisition import CheckFailed, ConfigurationError, InstrumentError, InstrumentLost, open_bench
+from vibench.acquisition.bench import Reality
+from vibench.acquisition.drivers import AFG1022X, DaqmxDigitizer
+from vibench.acquisition.errors import DataLost, InstrumentBusy
 from vibench.acquisition.instruments import Digitizer, FunctionGenerator
-from vibench.acquisition.rig.calibration import CalibrationRule, calibrations, check_calibrations
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.rig.knobs import (
-    confirm_by_asking,
+from vibench.acquisition.rig import (
+    CalibrationRule,
+    calibrations,
+    check_calibrations,
     confirm_by_sheet,
     confirm_simulated,
+    load_rig,
     save_knob_sheet,
 )
-from vibench.virtual_rig.generator.output_signal import Panel
-from vibench.virtual_rig.generator.scpi_command import Quirks
-from vibench.virtual_rig.rig import VirtualRig
+from vibench.acquisition.rig._knobs import confirm_by_asking
+from vibench.virtual_rig import VirtualRig
+from vibench.virtual_rig.generator import Panel, Quirks
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = ROOT / "hardware_configs"

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from vibench.acquisition.bench_list import list_instruments
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.virtual_rig.rig import VirtualRig
+from vibench.acquisition import list_instruments
+from vibench.acquisition.rig import load_rig
+from vibench.virtual_rig import VirtualRig
 
 ROOT = Path(__file__).parents[2]
 

@@ -8,7 +8,7 @@ import pytest
 PROGRAM = """
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from vibench.acquisition.follow_parent import follow_parent
+from vibench.acquisition import follow_parent
 import os, signal
 
 if __name__ == "__main__":

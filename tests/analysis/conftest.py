@@ -7,11 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.multisine_noise import MultisineNoise
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.excitation.stepped_sine import SteppedSine
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.plan import Dwell, MultisineNoise, SineSweep, SteppedSine, StreamedNoise
 
 
 def _load(name):

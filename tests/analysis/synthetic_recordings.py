@@ -6,12 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from vibench.acquisition.instruments import Block, Identity
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
-from vibench.acquisition.recording.layout import Origin, RecordingState
-from vibench.acquisition.recording.provenance import Provenance
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import Block, Identity
+from vibench.acquisition.plan import Measurement
+from vibench.acquisition.recording import (
+    ChannelHeader,
+    Origin,
+    RecordingHeader,
+    RecordingState,
+    create_recording,
+)
+from vibench.acquisition.recording._provenance import Provenance
 from vibench.sim import Sampled, gong2025, integrate
 
 RATE = 6400.0

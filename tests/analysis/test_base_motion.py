@@ -3,12 +3,9 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.multisine_noise import MultisineNoise
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.excitation.stepped_sine import FrequencyGrid, SteppedSine
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
+from vibench.acquisition.excitation._stepped_sine import FrequencyGrid
+from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep, SteppedSine
 from vibench.analysis.base_motion import advanced, lowest_frequency_hz, recorded_base_motion
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.recording_facts import plan_of

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.excitation.odd_multisine import OddMultisine
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
+from vibench.acquisition.plan import OddMultisine
 from vibench.analysis.distortion import distortion
 from vibench.analysis.figures.distortion import distortion_caption, distortion_figure
 from vibench.analysis.measurement_analysis import analyse_recording

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
 from vibench.analysis.chaos.verdict import MotionKind
 from vibench.analysis.figures.portraits import portraits_figure
 from vibench.analysis.measurement_analysis import analyse_recording

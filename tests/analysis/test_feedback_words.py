@@ -5,13 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.excitation.resonance_tracking import ResonanceTracking
-from vibench.acquisition.excitation.settled_sine import SettledSine
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.acquisition import open_bench, open_recording, run_measurement
+from vibench.acquisition.plan import Measurement, ResonanceTracking, SettledSine
+from vibench.acquisition.rig import load_rig
 from vibench.analysis.campaign_results import CampaignResults, SteppedSineResult
 from vibench.analysis.feedback_notes import FeedbackNote
 from vibench.analysis.feedback_words import feedback_sentences, noted_jumps

@@ -5,12 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.plan.campaign import load_campaign
-from vibench.acquisition.plan.loads import predicted_loads
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.rig.model import Quantity
+from vibench.acquisition import load_campaign
+from vibench.acquisition.plan import Measurement, SineSweep, predicted_loads
+from vibench.acquisition.rig import Quantity, load_rig
 from vibench.analysis.foresight import bands_of, base_amplitude_m, foresee
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -5,12 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.excitation.stepped_level import SteppedLevel
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.acquisition import open_bench, open_recording, run_measurement
+from vibench.acquisition.plan import Measurement, SteppedLevel
+from vibench.acquisition.rig import load_rig
 from vibench.analysis.campaign_results import CampaignResults, SteppedSineResult
 from vibench.analysis.figures.stepped_sine import stepped_sine_figure
 from vibench.analysis.level_jumps import hysteresis_vpp, level_jumps

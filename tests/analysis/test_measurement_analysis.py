@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
+from vibench.acquisition.recording import RecordingState
 from vibench.analysis.errors import NotEnoughData, UnusableData
 from vibench.analysis.measurement_analysis import (
     DwellAnalysis,

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.instruments import Overload
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import Overload, open_recording
 from vibench.analysis.errors import InvalidRequest, NotEnoughData
 from vibench.analysis.measurement_analysis import analyse_recording
 from vibench.analysis.noise_request import NoiseRequest, longest_segment

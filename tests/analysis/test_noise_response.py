@@ -5,18 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.check.low_level import BenchCheck
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.acquisition import open_bench, open_recording, run_measurement
+from vibench.acquisition.plan import Measurement, StreamedNoise
+from vibench.acquisition.run._low_level_check import BenchCheck
 from vibench.analysis.confidence import phase_half_width
 from vibench.analysis.errors import NotEnoughData
 from vibench.analysis.noise_response import noise_response
 from vibench.analysis.recorded_channels import RecordedChannels
 from vibench.sim import base_transmissibility, gong2025
-from vibench.virtual_rig.world.input_stage import AC_CUT_HZ
+from vibench.virtual_rig.world._input_stage import AC_CUT_HZ
 
 STREAMING = Path(__file__).parents[2] / "hardware_configs" / "virtual_rig_streaming.toml"
 WEAK_VPP, STRONG_VPP = 0.067, 7.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
 from vibench.analysis.difference import logarithmic_difference
 from vibench.analysis.measurement_analysis import analyse_recording
 from vibench.analysis.overlay import DwellOverlay, NoiseOverlay, SweepOverlay, equivalent_amplitude, overlay

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.recording.overview import BIN_SAMPLES
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
+from vibench.acquisition.plan import Dwell
+from vibench.acquisition.recording import BIN_SAMPLES
 from vibench.analysis.errors import InvalidRequest
 from vibench.analysis.overview import has_overview, overview_of
 

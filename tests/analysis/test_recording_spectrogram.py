@@ -5,10 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vibench.acquisition.instruments import Block
-from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
-from vibench.acquisition.recording.layout import Origin, RecordingState
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import Block
+from vibench.acquisition.recording import (
+    ChannelHeader,
+    Origin,
+    RecordingHeader,
+    RecordingState,
+    create_recording,
+)
 from vibench.analysis.errors import NotEnoughData
 from vibench.analysis.recording_spectrogram import RowSpacing, SpectrogramRequest, recording_spectrogram
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 import synthetic_recordings as synthetic
 
-from vibench.acquisition.excitation.multisine_noise import MultisineNoise
-from vibench.acquisition.excitation.sine_sweep import SineSweep
+from vibench.acquisition.plan import MultisineNoise, SineSweep
 from vibench.analysis.campaign_results import CampaignResults, Simulation, analyse_files
 from vibench.analysis.dwell_bracket import bracketed_gap, brackets
 from vibench.analysis.errors import NotEnoughData

@@ -5,8 +5,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
+from vibench.acquisition.plan import StreamedNoise
 from vibench.analysis.measurement_analysis import analyse_recording
 from vibench.analysis.noise_request import NoiseRequest
 from vibench.analysis.noise_response import noise_response

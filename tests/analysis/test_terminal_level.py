@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
 from vibench.analysis.measurement_analysis import analyse_recording
 from vibench.analysis.terminal_level import terminal_levels
 

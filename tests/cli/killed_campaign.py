@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from vibench.acquisition.campaign.journal import journal_path
-from vibench.acquisition.campaign.journal_point import PointState, read_journal
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
+from vibench.acquisition.campaign import PointState, read_journal
+from vibench.acquisition.campaign._journal import journal_path
+from vibench.acquisition.recording import RecordingState
 
 from .conftest import ENVIRONMENT, ROOT
 

@@ -11,9 +11,8 @@ import h5py
 import numpy as np
 import pytest
 
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.plan import Dwell, StreamedNoise
+from vibench.acquisition.recording import RecordingState
 from vibench.analysis.campaign_results import Simulation, analyse_files
 
 PLACE = Path(__file__).parents[1] / "analysis" / "synthetic_recordings.py"

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.excitation.multisine_noise import MultisineNoise
+from vibench.acquisition.plan import MultisineNoise
 from vibench.sim import gong2025
 
 PLACE = Path(__file__).parents[1] / "analysis" / "synthetic_recordings.py"

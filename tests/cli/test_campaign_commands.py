@@ -3,7 +3,7 @@
 import json
 import sys
 
-from vibench.acquisition.campaign.estimate import Estimate
+from vibench.acquisition.campaign import Estimate
 from vibench.cli.estimate_text import estimate_text
 
 from .killed_campaign import short_points, slow_rig

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
+from vibench.acquisition.recording import RecordingState
 from vibench.analysis.measurement_analysis import analyse_recording
 from vibench.sim import base_transmissibility, gong2025
 

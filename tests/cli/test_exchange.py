@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from vibench.acquisition.instruments import Block
-from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
-from vibench.acquisition.recording.layout import Origin
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import Block, open_recording
+from vibench.acquisition.recording import ChannelHeader, Origin, RecordingHeader, create_recording
 from vibench.cli.__main__ import app
 
 MAPPING = """

@@ -6,7 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from vibench.acquisition.campaign.journal_point import PointState, read_journal
+from vibench.acquisition.campaign import PointState, read_journal
 
 from .conftest import ENVIRONMENT
 from .killed_campaign import amplitudes, branches, command, done, killed, short_points, slow_rig

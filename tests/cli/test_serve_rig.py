@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """
 import sys, warnings
 warnings.simplefilter("ignore")
-from vibench.virtual_rig.usb import usb_bus; usb_bus.plug_in_remote(sys.argv[1])
+from vibench.virtual_rig import plug_in_remote; plug_in_remote(sys.argv[1])
 import pyvisa
 manager = pyvisa.ResourceManager("@py")
 generator = manager.open_resource("USB0::0x0699::0x0353::C019999::INSTR")

@@ -10,13 +10,12 @@ from threading import Event
 
 import pytest
 
-from vibench.acquisition.engine.address import EngineAddress
-from vibench.acquisition.engine.announcement import announced, announced_engines
-from vibench.acquisition.engine.start import start_engine
-from vibench.acquisition.engine.state import Attendance, EngineState
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition import open_recording
+from vibench.acquisition.engine import Attendance, EngineState, announced_engines, start_engine
+from vibench.acquisition.engine._address import EngineAddress
+from vibench.acquisition.engine._announcement import announced
+from vibench.acquisition.plan import Campaign
+from vibench.acquisition.rig import load_rig
 
 ROOT = Path(__file__).resolve().parents[2]
 PAUSE, LOOK_S = Event(), 0.01

@@ -9,10 +9,9 @@ import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QLineEdit, QMenu, QVBoxLayout
 
-from vibench.acquisition.engine.start import start_engine
-from vibench.acquisition.engine.state import Attendance, EngineState
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
+from vibench.acquisition.engine import Attendance, EngineState, start_engine
+from vibench.acquisition.plan import Measurement
 from vibench.gui.desk import Desk
 from vibench.gui.orders import ABORT_KEY
 from vibench.gui.page_names import COMPARE, FILES, RUN, TEST

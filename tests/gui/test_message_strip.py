@@ -3,7 +3,7 @@
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QLabel, QPlainTextEdit, QPushButton
 
-from vibench.acquisition.errors import LimitExceeded
+from vibench.acquisition import LimitExceeded
 from vibench.gui.message_strip import MessageStrip
 from vibench.gui.notice import Notice, NoticeKind, notice_of
 

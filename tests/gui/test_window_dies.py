@@ -10,8 +10,8 @@ from threading import Event
 
 import pytest
 
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
+from vibench.acquisition.recording import RecordingState
 
 ROOT = Path(__file__).resolve().parents[2]
 SILENT_WITHIN_S = 1.0

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from PySide6.QtCore import QTimer
 
-from vibench.acquisition.engine.state import EngineState
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.engine import EngineState
+from vibench.acquisition.plan import Campaign
+from vibench.acquisition.rig import load_rig
 from vibench.gui.app import application
 from vibench.gui.desk import Desk
 from vibench.gui.pages.catalogue import PAGES

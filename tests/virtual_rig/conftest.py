@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from nidaqmx import GrpcSessionOptions, Task
 
-from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition import ConfigurationError
 from vibench.virtual_rig.analogue import Coupling, Input
-from vibench.virtual_rig.daqmx.pace import Pace
-from vibench.virtual_rig.daqmx.server import DaqServer, serve
+from vibench.virtual_rig.daqmx import DaqServer, Pace, serve
 
 OFFSET_V = 0.5
 LOOPED_BACK = {"Dev1/ai0": "Dev1/ao0", "Dev2/ai0": "Dev2/ao0"}

@@ -6,22 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.campaign.kept_bench import KeptBench
-from vibench.acquisition.errors import (
-    ConfigurationError,
-    DataLost,
-    InstrumentBusy,
-    InstrumentError,
-    InstrumentLost,
-)
-from vibench.acquisition.recording.disk_room import claim_room
-from vibench.acquisition.rig.configuration import load_rig, with_faults
-from vibench.acquisition.rig_power import RigPower
+from vibench.acquisition import ConfigurationError, InstrumentError, InstrumentLost, open_bench
+from vibench.acquisition.bench import RigPower
+from vibench.acquisition.campaign import KeptBench
+from vibench.acquisition.errors import DataLost, InstrumentBusy
+from vibench.acquisition.recording._disk_room import claim_room
+from vibench.acquisition.rig import load_rig, with_faults
+from vibench.virtual_rig import DiskFaults, VirtualRig, load_fault_script
 from vibench.virtual_rig.analogue import Coupling, Input
-from vibench.virtual_rig.fault_kinds import DISK_FAULTS
-from vibench.virtual_rig.fault_script import FaultScript, PlayedFault, load_fault_script
-from vibench.virtual_rig.rig import DiskFaults, VirtualRig
+from vibench.virtual_rig.rig._fault_kinds import DISK_FAULTS
+from vibench.virtual_rig.rig._fault_script import FaultScript, PlayedFault
 
 ROOT = Path(__file__).parents[2]
 NIGHT = ROOT / "hardware_configs" / "faults" / "night.toml"

@@ -13,13 +13,11 @@ from nidaqmx.constants import AcquisitionType, Coupling, ExcitationSource
 from nidaqmx.errors import DaqError, DaqReadError, RpcError
 from nidaqmx.stream_readers import AnalogMultiChannelReader
 
-from vibench.acquisition.errors import AcquisitionError, ConfigurationError
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.rig.model import Quantity, RigModel
-from vibench.virtual_rig.generator.output_signal import Panel
-from vibench.virtual_rig.generator.scpi_command import Quirks
-from vibench.virtual_rig.rig import VirtualRig
-from vibench.virtual_rig.usb.usb_remote import RemoteUsbDevice
+from vibench.acquisition import AcquisitionError, ConfigurationError
+from vibench.acquisition.rig import Quantity, RigModel, load_rig
+from vibench.virtual_rig import VirtualRig
+from vibench.virtual_rig.generator import Panel, Quirks
+from vibench.virtual_rig.usb._remote import RemoteUsbDevice
 
 SHIPPED = load_rig(Path(__file__).parents[2] / "hardware_configs" / "virtual_rig.toml")
 RIG = SHIPPED.model_copy(

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
 
-from vibench.acquisition.errors import RecordingError
-from vibench.acquisition.recording.reader import Recording, open_recording
+from vibench.acquisition import RecordingError, open_recording
+from vibench.acquisition.recording import Recording
 from vibench.sim import Specimen
 
 from .errors import AnalysisError, NotEnoughData

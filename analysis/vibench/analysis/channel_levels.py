@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibench.acquisition.recording.header import ChannelHeader
-from vibench.acquisition.recording.reader import Recording
+from vibench.acquisition.recording import ChannelHeader, Recording
 
 from .arrays import Integers, Reals
 from .envelope import DEFAULT_BINS, Envelope

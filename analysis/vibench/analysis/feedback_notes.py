@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from vibench.acquisition.recording.reader import Recording
+from vibench.acquisition.recording import Recording
 
 FEEDBACK_KINDS = ("settled", "achieved", "level", "jump", "resonance")
 """Events whose text is JSON: one object of numbers and words."""

@@ -5,14 +5,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from vibench.acquisition.excitation.kinds import Excitation
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.excitation.stepped_sine import Direction, FrequencySteps
-from vibench.acquisition.plan.band import excited_band_hz
-from vibench.acquisition.plan.loads import predicted_loads
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.rig.configuration import Rig
-from vibench.acquisition.rig.model import Quantity, RigModel
+from vibench.acquisition.plan import (
+    Direction,
+    Excitation,
+    FrequencySteps,
+    Measurement,
+    SineSweep,
+    excited_band_hz,
+    predicted_loads,
+)
+from vibench.acquisition.rig import Quantity, Rig, RigModel
 
 from .arrays import Flags, Reals
 from .overlay import prediction_grid

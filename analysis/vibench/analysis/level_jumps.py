@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 
-from vibench.acquisition.excitation.stepped_level import SteppedLevel
+from vibench.acquisition.plan import SteppedLevel
 
 from .stepped_response import SteppedResponse, Steps
 

@@ -4,18 +4,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.held_dwell import HeldDwell
-from vibench.acquisition.excitation.held_sweep import HeldSweep
-from vibench.acquisition.excitation.multisine_noise import MultisineNoise
-from vibench.acquisition.excitation.odd_multisine import OddMultisine
-from vibench.acquisition.excitation.resonance_tracking import ResonanceTracking
-from vibench.acquisition.excitation.settled_sine import SettledSine
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.excitation.stepped_level import SteppedLevel
-from vibench.acquisition.excitation.stepped_sine import SteppedSine
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.recording.reader import Recording
+from vibench.acquisition.plan import (
+    Dwell,
+    HeldDwell,
+    HeldSweep,
+    MultisineNoise,
+    OddMultisine,
+    ResonanceTracking,
+    SettledSine,
+    SineSweep,
+    SteppedLevel,
+    SteppedSine,
+    StreamedNoise,
+)
+from vibench.acquisition.recording import Recording
 
 from .channel_faults import require_moving_channels
 from .collision_region import Collisions, collisions

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from datetime import date
 from enum import StrEnum
 
-from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording import RecordingState
 
 from .recorded_channels import DRIVE
 from .recording_facts import RecordingFacts

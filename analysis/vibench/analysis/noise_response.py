@@ -4,9 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vibench.acquisition.excitation.multisine_noise import MultisineNoise
-from vibench.acquisition.excitation.odd_multisine import OddMultisine
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.plan import MultisineNoise, OddMultisine, StreamedNoise
 
 from .arrays import Complexes, Flags, Reals
 from .confidence import relative_sd, student_half_width

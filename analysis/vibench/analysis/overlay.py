@@ -6,7 +6,7 @@ from typing import assert_never
 
 import numpy as np
 
-from vibench.acquisition.recording.reader import Recording
+from vibench.acquisition.recording import Recording
 from vibench.sim import Accuracy, Specimen
 
 from .arrays import Reals

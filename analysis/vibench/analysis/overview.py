@@ -10,10 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.acquisition.recording.header import ChannelHeader
-from vibench.acquisition.recording.layout import CHUNK_SAMPLES, MISSING_COUNT
-from vibench.acquisition.recording.overview import BIN_SAMPLES, CountOverview, OverviewSums
-from vibench.acquisition.recording.reader import Recording
+from vibench.acquisition.recording import (
+    BIN_SAMPLES,
+    CHUNK_SAMPLES,
+    MISSING_COUNT,
+    ChannelHeader,
+    CountOverview,
+    OverviewSums,
+    Recording,
+)
 
 from .arrays import Reals
 from .errors import InvalidRequest

@@ -5,7 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
-from vibench.acquisition.recording.reader import Recording
+from vibench.acquisition.recording import Recording
 
 from .arrays import Flags, Reals
 from .errors import NotEnoughData, UnusableData

@@ -7,10 +7,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from vibench.acquisition.instruments import Identity
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.layout import Origin, RecordingState
-from vibench.acquisition.recording.reader import Recording
+from vibench.acquisition import Identity
+from vibench.acquisition.plan import Measurement
+from vibench.acquisition.recording import Origin, Recording, RecordingState
 from vibench.sim import Specimen, gong2025
 
 from .channel_levels import ChannelLevel, OnRead, channel_levels, ignore_reading

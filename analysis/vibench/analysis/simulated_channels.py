@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.reader import Recording
+from vibench.acquisition.plan import Measurement
+from vibench.acquisition.recording import Recording
 from vibench.sim import Accuracy, Sampled, Specimen, follow_samples
 
 from .arrays import Flags, Integers, Reals

@@ -4,10 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibench.acquisition.excitation.resonance_tracking import RESONANCE_LABEL, ResonanceTracking
-from vibench.acquisition.excitation.settled_sine import STEP_LABEL, SettledSine
-from vibench.acquisition.excitation.stepped_level import SteppedLevel
-from vibench.acquisition.excitation.stepped_sine import SteppedSine
+from vibench.acquisition.plan import (
+    RESONANCE_LABEL,
+    STEP_LABEL,
+    ResonanceTracking,
+    SettledSine,
+    SteppedLevel,
+    SteppedSine,
+)
 
 from .arrays import Reals
 from .dwell import DwellResponse, dwell_response

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.acquisition.errors import RecordingError
-from vibench.acquisition.recording.reader import Recording, open_recording
+from vibench.acquisition import RecordingError, open_recording
+from vibench.acquisition.recording import Recording
 
 from .overview import has_overview, overview_of
 from .recorded_channels import RESPONSE

@@ -8,7 +8,7 @@ from . import blas_threads  # noqa: F401 - numpy reads its setting, so it comes 
 import typer
 from rich.console import Console
 
-from vibench.acquisition.errors import AcquisitionError
+from vibench.acquisition import AcquisitionError
 from vibench.analysis.errors import AnalysisError
 from vibench.sim.study import StudyError
 

@@ -6,17 +6,20 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.bench_list import list_instruments, list_rig_instruments
-from vibench.acquisition.check.admission import check_and_keep
-from vibench.acquisition.check.archive import last_result
-from vibench.acquisition.check.finding import Verdict
-from vibench.acquisition.check.result import CheckResult
-from vibench.acquisition.engine.lock import BenchLock
-from vibench.acquisition.errors import CheckFailed
-from vibench.acquisition.rig.configuration import Rig, load_rig
-from vibench.acquisition.run.stop import StopSwitch
-from vibench.acquisition.run.stop_on_signal import stop_on_signal
+from vibench.acquisition import (
+    CheckFailed,
+    CheckResult,
+    StopSwitch,
+    Verdict,
+    check_and_keep,
+    last_result,
+    list_instruments,
+    list_rig_instruments,
+    open_bench,
+    stop_on_signal,
+)
+from vibench.acquisition.engine import BenchLock
+from vibench.acquisition.rig import Rig, load_rig
 
 from .output import bold, console, print_json
 from .paths import AsJson, BenchPath, bench_path

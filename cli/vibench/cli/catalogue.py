@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.campaign.catalogue import Refresh, catalogue
-from vibench.acquisition.campaign.catalogue_entry import CatalogueEntry
+from vibench.acquisition.campaign import CatalogueEntry, Refresh, catalogue
 
 from .output import console, print_json
 from .paths import AsJson

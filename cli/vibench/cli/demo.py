@@ -5,11 +5,10 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.campaign.item import CampaignItem, Item
-from vibench.acquisition.engine.orders import Orders
-from vibench.acquisition.plan.campaign import load_campaign
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.shipped import shipped
+from vibench.acquisition import load_campaign, shipped
+from vibench.acquisition.campaign import CampaignItem, Item
+from vibench.acquisition.engine import Orders
+from vibench.acquisition.rig import load_rig
 from vibench.analysis.report.report import write_report
 from vibench.analysis.summary import campaign_summary
 

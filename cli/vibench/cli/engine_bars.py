@@ -8,8 +8,7 @@ from typing import Self
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from vibench.acquisition.engine.state import DRIVING
-from vibench.acquisition.engine.status import EngineMessage, EngineStatus, MessageKind, RowStatus, RunStatus
+from vibench.acquisition.engine import DRIVING, EngineMessage, EngineStatus, MessageKind, RowStatus, RunStatus
 
 from .output import console
 

@@ -4,7 +4,7 @@ from dataclasses import asdict
 from datetime import timedelta
 from enum import StrEnum
 
-from vibench.acquisition.campaign.estimate import Estimate
+from vibench.acquisition.campaign import Estimate
 
 from .output import console, print_json
 

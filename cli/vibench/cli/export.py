@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
 from vibench.analysis.exchange.excerpt import excerpt
 from vibench.analysis.exchange.export import Format, Results, export_samples
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.toml_file import load_toml
+from vibench.acquisition import load_toml
 from vibench.analysis.errors import InvalidRequest
 from vibench.analysis.exchange.import_recording import import_recording
 from vibench.analysis.exchange.mapping import ImportMapping

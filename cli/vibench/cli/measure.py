@@ -7,18 +7,10 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.campaign.estimate import estimate
-from vibench.acquisition.campaign.item import AfterFailure, ChangedBench, Existing, Item
-from vibench.acquisition.check.rule import CheckRule
-from vibench.acquisition.engine.desk import Desk
-from vibench.acquisition.engine.engine import Engine
-from vibench.acquisition.engine.hosted import hosted
-from vibench.acquisition.engine.orders import Orders
-from vibench.acquisition.engine.state import Attendance
-from vibench.acquisition.engine.work import Work
-from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.plan.campaign import load_campaign
-from vibench.acquisition.rig.configuration import Rig
+from vibench.acquisition import CheckRule, ConfigurationError, load_campaign
+from vibench.acquisition.campaign import AfterFailure, ChangedBench, Existing, Item, estimate
+from vibench.acquisition.engine import Attendance, Desk, Engine, Orders, Work, hosted
+from vibench.acquisition.rig import Rig
 
 from .engine_bars import Watching
 from .estimate_text import Form, tell_estimate

@@ -5,9 +5,8 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.campaign.mail import MailMessenger, MailSettings
-from vibench.acquisition.campaign.notice import CommandMessenger, Messenger
-from vibench.acquisition.toml_file import load_toml
+from vibench.acquisition import load_toml
+from vibench.acquisition.campaign import CommandMessenger, MailMessenger, MailSettings, Messenger
 
 NotifyCommand = Annotated[
     str | None,

@@ -6,9 +6,8 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.rig.configuration import Rig, load_rig, with_faults
-from vibench.acquisition.shipped import shipped
+from vibench.acquisition import ConfigurationError, shipped
+from vibench.acquisition.rig import Rig, load_rig, with_faults
 
 BenchPath = Annotated[
     Path | None,

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.recording.recover import recover
+from vibench.acquisition.recording import recover
 
 from .output import console
 

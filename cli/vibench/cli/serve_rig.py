@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.rig.server_token import METADATA_KEY, VARIABLE
-from vibench.virtual_rig.rig import DiskFaults, VirtualRig
+from vibench.acquisition.rig import METADATA_KEY, VARIABLE
+from vibench.virtual_rig import DiskFaults, VirtualRig
 
 from .output import bold, console
 from .paths import FaultsPath, rig_at
@@ -36,7 +36,7 @@ def serve_rig(
         console.print(f'  grpc.insecure_channel("{rig.daq_address}")  # GrpcSessionOptions(channel, "")')
         console.print("The generator, for pyvisa in Python (one line before the resource manager):")
         console.print(
-            f'  from acquisition.virtual.usb import usb_bus; usb_bus.plug_in_remote("{rig.daq_address}")'
+            f'  from vibench.virtual_rig import plug_in_remote; plug_in_remote("{rig.daq_address}")'
         )
         console.print(f'  ResourceManager("@py").open_resource("{rig.visa_resource}")')
         console.print("The generator, for any other VISA program:")

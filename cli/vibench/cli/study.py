@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.toml_file import load_toml
+from vibench.acquisition import load_toml
 from vibench.sim.study import Existing, Study, StudyResults, doubts, solve_study
 
 from .interruption import told_to_stop

@@ -5,11 +5,15 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.engine.announcement import Announcement, announced_engines, the_engine
-from vibench.acquisition.engine.client import EngineClient
-from vibench.acquisition.engine.errors import EngineGone
-from vibench.acquisition.engine.state import DRIVING
-from vibench.acquisition.run.stop import StopLevel
+from vibench.acquisition import StopLevel
+from vibench.acquisition.engine import (
+    DRIVING,
+    Announcement,
+    EngineClient,
+    EngineGone,
+    announced_engines,
+    the_engine,
+)
 
 from .engine_bars import INTERVAL_S, EngineBars
 from .output import console, print_json

@@ -11,7 +11,7 @@ from typing import Any, ParamSpec, TypeVar
 
 from PySide6.QtCore import QObject, QTimer
 
-from vibench.acquisition.follow_parent import follow_parent
+from vibench.acquisition import follow_parent
 
 POLL_MS = 50
 NICE = 10

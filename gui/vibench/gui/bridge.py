@@ -9,18 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from vibench.acquisition.campaign.item import Existing
-from vibench.acquisition.engine.client import EngineClient
-from vibench.acquisition.engine.errors import EngineGone
-from vibench.acquisition.engine.recent import Glance
-from vibench.acquisition.engine.start import start_engine
-from vibench.acquisition.engine.state import DRIVING, EngineState
-from vibench.acquisition.engine.status import ArmedPlan, BenchFacts, EngineMessage, EngineStatus
-from vibench.acquisition.errors import AcquisitionError
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.rig.configuration import Rig
-from vibench.acquisition.rig.knobs import KnobSheet
-from vibench.acquisition.run.stop import StopLevel
+from vibench.acquisition import AcquisitionError, StopLevel
+from vibench.acquisition.campaign import Existing
+from vibench.acquisition.engine import (
+    DRIVING,
+    ArmedPlan,
+    BenchFacts,
+    EngineClient,
+    EngineGone,
+    EngineMessage,
+    EngineState,
+    EngineStatus,
+    Glance,
+    start_engine,
+)
+from vibench.acquisition.plan import Campaign
+from vibench.acquisition.rig import KnobSheet, Rig
 from vibench.analysis.live.view import LiveView
 
 from .engine_line import EngineLine, Starter, Urgency

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
-from vibench.acquisition.engine.start import start_engine
+from vibench.acquisition.engine import start_engine
 
 from .background import Background
 from .bridge import Bridge

@@ -8,10 +8,8 @@ from itertools import count
 from queue import Empty, PriorityQueue, SimpleQueue
 from typing import Any
 
-from vibench.acquisition.engine.client import EngineClient
-from vibench.acquisition.engine.pulse import Pulse
-from vibench.acquisition.engine.start import EngineProcess, start_engine
-from vibench.acquisition.errors import AcquisitionError
+from vibench.acquisition import AcquisitionError
+from vibench.acquisition.engine import EngineClient, EngineProcess, Pulse, start_engine
 
 Starter = Callable[[], EngineProcess]
 Question = Callable[[EngineClient], Any]

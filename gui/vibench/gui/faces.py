@@ -4,8 +4,7 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from vibench.acquisition.engine.state import EngineState
-from vibench.acquisition.engine.status import EngineStatus, RunStatus
+from vibench.acquisition.engine import EngineState, EngineStatus, RunStatus
 
 from .banner import CLOSED, Face
 from .status_line import StatusField

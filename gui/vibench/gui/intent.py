@@ -4,9 +4,8 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.rig.configuration import Rig
+from vibench.acquisition.plan import Campaign, Measurement
+from vibench.acquisition.rig import Rig
 from vibench.analysis.foresight import Foresight
 
 

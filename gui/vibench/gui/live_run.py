@@ -2,12 +2,9 @@
 
 import numpy as np
 
-from vibench.acquisition.engine.status import BenchFacts
-from vibench.acquisition.plan.band import excited_band_hz
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.rig.configuration import Rig
-from vibench.acquisition.run.schedule import lead_in_s
+from vibench.acquisition.engine import BenchFacts
+from vibench.acquisition.plan import Campaign, Measurement, excited_band_hz, lead_in_s
+from vibench.acquisition.rig import Rig
 from vibench.analysis.live.view import LiveChannel, LiveView
 
 WHOLE_BAND_HZ = (20.0, 2000.0)

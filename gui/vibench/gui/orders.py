@@ -4,11 +4,10 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject
 
-from vibench.acquisition.campaign.item import Existing
-from vibench.acquisition.engine.state import EngineState
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.run.stop import StopLevel
+from vibench.acquisition import StopLevel
+from vibench.acquisition.campaign import Existing
+from vibench.acquisition.engine import EngineState
+from vibench.acquisition.plan import Campaign, Measurement
 
 from .desk import Desk
 from .notice import Notice, NoticeKind

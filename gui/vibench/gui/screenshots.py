@@ -12,10 +12,9 @@ from PySide6.QtCore import QEventLoop, QTimer
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 
-from vibench.acquisition.engine.start import start_engine
-from vibench.acquisition.engine.state import Attendance, EngineState
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.shipped import shipped
+from vibench.acquisition import shipped
+from vibench.acquisition.engine import Attendance, EngineState, start_engine
+from vibench.acquisition.plan import Measurement
 from vibench.analysis.recording_spectrogram import RowSpacing
 
 from .app import application

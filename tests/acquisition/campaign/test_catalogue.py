@@ -5,17 +5,11 @@ from dataclasses import replace
 
 import pytest
 
-from vibench.acquisition.campaign import catalogue as catalogue_module
-from vibench.acquisition.campaign.catalogue import CATALOGUE_NAME, Refresh, catalogue
-from vibench.acquisition.campaign.run_campaign import run_campaign
-from vibench.acquisition.errors import RecordingError
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.instruments import Overload
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.run.run import Run
-from vibench.acquisition.run.state import RunState
+from vibench.acquisition import Overload, RecordingError, run_campaign
+from vibench.acquisition.campaign import Refresh, _catalogue as catalogue_module, catalogue
+from vibench.acquisition.campaign._catalogue import CATALOGUE_NAME
+from vibench.acquisition.plan import Campaign, Dwell, Measurement, RunState, SineSweep
+from vibench.acquisition.run._run import Run
 
 DWELL = Measurement(
     name="dwell",

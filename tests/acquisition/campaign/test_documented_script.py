@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from vibench.acquisition.campaign.journal import journal_path
-from vibench.acquisition.campaign.journal_point import PointState, read_journal
+from vibench.acquisition.campaign import PointState, read_journal
+from vibench.acquisition.campaign._journal import journal_path
 
 ROOT = Path(__file__).parents[3]
 CAMPAIGN = """

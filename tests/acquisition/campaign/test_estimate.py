@@ -2,13 +2,9 @@
 
 import pytest
 
-from vibench.acquisition.campaign.estimate import estimate
-from vibench.acquisition.campaign.item import Existing
-from vibench.acquisition.campaign.run_campaign import run_campaign
-from vibench.acquisition.errors import RecordingError
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.toml_file import validated
+from vibench.acquisition import RecordingError, open_recording, run_campaign, validated
+from vibench.acquisition.campaign import Existing, estimate
+from vibench.acquisition.plan import Campaign
 
 CAMPAIGN = validated(
     {

@@ -6,16 +6,12 @@ import sqlite3
 
 import pytest
 
-from vibench.acquisition.campaign.bench_identity import BenchIdentity
-from vibench.acquisition.campaign.journal import Journal, journal_path
-from vibench.acquisition.campaign.journal_database import is_begun
-from vibench.acquisition.campaign.journal_point import PointState, read_journal
-from vibench.acquisition.campaign.why import Why
-from vibench.acquisition.errors import RecordingError
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.plan.point import Point
+from vibench.acquisition import RecordingError
+from vibench.acquisition.campaign import PointState, Why, read_journal
+from vibench.acquisition.campaign._bench_identity import BenchIdentity
+from vibench.acquisition.campaign._journal import Journal, journal_path
+from vibench.acquisition.campaign._journal_database import is_begun
+from vibench.acquisition.plan import Campaign, Dwell, Measurement, Point
 
 
 def dwell(name):

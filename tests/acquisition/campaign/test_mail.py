@@ -5,9 +5,8 @@ import threading
 
 import pytest
 
-from vibench.acquisition.campaign.mail import MailMessenger, MailSettings
-from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.toml_file import load_toml
+from vibench.acquisition import ConfigurationError, load_toml
+from vibench.acquisition.campaign import MailMessenger, MailSettings
 
 NOTICE = {"campaign": "c", "event": "ended", "reason": "c is through", "recorded": 3}
 

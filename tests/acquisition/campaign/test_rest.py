@@ -6,22 +6,13 @@ from time import monotonic
 
 import pytest
 
-from vibench.acquisition.campaign.attempts import LOOK_EVERY_S
-from vibench.acquisition.campaign.estimate import estimate
-from vibench.acquisition.campaign.happening import Event
-from vibench.acquisition.campaign.item import Existing, Item
-from vibench.acquisition.campaign.journal import journal_path
-from vibench.acquisition.campaign.journal_point import PointState, read_journal
-from vibench.acquisition.campaign.kept_bench import KeptBench
-from vibench.acquisition.campaign.run_campaign import run_campaign
-from vibench.acquisition.errors import ConfigurationError, DataLost
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.plan.retry import RetryPolicy
-from vibench.acquisition.run.state import RunState
-from vibench.acquisition.run.stop import Cause, StopRequest, StopSwitch
-from vibench.acquisition.toml_file import validated
+from vibench.acquisition import ConfigurationError, StopSwitch, run_campaign, validated
+from vibench.acquisition.campaign import Event, Existing, Item, KeptBench, PointState, estimate, read_journal
+from vibench.acquisition.campaign._attempts import LOOK_EVERY_S
+from vibench.acquisition.campaign._journal import journal_path
+from vibench.acquisition.errors import DataLost
+from vibench.acquisition.plan import Campaign, Dwell, Measurement, RetryPolicy, RunState
+from vibench.acquisition.stopping import Cause, StopRequest
 
 REST_S = 12.0
 

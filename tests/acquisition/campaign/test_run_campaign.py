@@ -4,16 +4,18 @@ import signal
 
 import pytest
 
-from vibench.acquisition.campaign.item import AfterFailure, Existing, Item
-from vibench.acquisition.campaign.run_campaign import run_campaign
-from vibench.acquisition.errors import DataLost, InstrumentLost, LimitExceeded, RecordingError
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.run.run_measurement import run_measurement
-from vibench.acquisition.run.state import RunState
+from vibench.acquisition import (
+    InstrumentLost,
+    LimitExceeded,
+    RecordingError,
+    open_recording,
+    run_campaign,
+    run_measurement,
+)
+from vibench.acquisition.campaign import AfterFailure, Existing, Item
+from vibench.acquisition.errors import DataLost
+from vibench.acquisition.plan import Campaign, Dwell, Measurement, RunState
+from vibench.acquisition.recording import RecordingState
 
 
 def dwell(name, amplitude_vpp=1.0, frequency_hz=260.0):

@@ -3,16 +3,11 @@
 import json
 from pathlib import Path
 
-from vibench.acquisition.campaign.item import AfterFailure, Item
-from vibench.acquisition.campaign.kept_bench import KeptBench
-from vibench.acquisition.campaign.run_campaign import run_campaign
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.plan.retry import Retryable, RetryPolicy
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.rig.configuration import with_faults
+from vibench.acquisition import open_recording, run_campaign
+from vibench.acquisition.campaign import AfterFailure, Item, KeptBench
+from vibench.acquisition.plan import Campaign, Dwell, Measurement, Retryable, RetryPolicy
+from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.rig import with_faults
 
 SCRIPT = [
     {"at_s": 1.9, "fault": "pull_usb_cable", "for_s": 1.5},

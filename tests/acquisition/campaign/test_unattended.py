@@ -5,20 +5,28 @@ import sys
 
 import pytest
 
-from vibench.acquisition.campaign.item import AfterFailure, ChangedBench, Existing, Item
-from vibench.acquisition.campaign.journal import journal_path
-from vibench.acquisition.campaign.journal_point import PointState, read_journal
-from vibench.acquisition.campaign.notice import CommandMessenger
-from vibench.acquisition.campaign.run_campaign import run_campaign
-from vibench.acquisition.campaign.why import Why
-from vibench.acquisition.errors import CheckFailed, DataLost, InstrumentLost, RecordingError
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.instruments import Identity
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.plan.retry import Retryable, RetryPolicy
-from vibench.acquisition.run.state import RunState
-from vibench.acquisition.run.stop import Cause, StopRequest, StopSwitch
+from vibench.acquisition import (
+    CheckFailed,
+    Identity,
+    InstrumentLost,
+    RecordingError,
+    StopSwitch,
+    run_campaign,
+)
+from vibench.acquisition.campaign import (
+    AfterFailure,
+    ChangedBench,
+    CommandMessenger,
+    Existing,
+    Item,
+    PointState,
+    Why,
+    read_journal,
+)
+from vibench.acquisition.campaign._journal import journal_path
+from vibench.acquisition.errors import DataLost
+from vibench.acquisition.plan import Campaign, Dwell, Measurement, Retryable, RetryPolicy, RunState
+from vibench.acquisition.stopping import Cause, StopRequest
 
 
 def dwell(name, frequency_hz=260.0):

@@ -6,11 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.rig.calibration import CalibrationRule
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.rig.knobs import confirm_simulated
-from vibench.virtual_rig.rig import VirtualRig
+from vibench.acquisition import open_bench
+from vibench.acquisition.rig import CalibrationRule, confirm_simulated, load_rig
+from vibench.virtual_rig import VirtualRig
 
 ROOT = Path(__file__).parents[3]
 _serials = itertools.count(1)

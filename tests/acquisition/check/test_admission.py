@@ -5,17 +5,25 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.check.admission import check_and_keep, require_fresh, why_not
-from vibench.acquisition.check.archive import archive_path, keep, last_result
-from vibench.acquisition.check.finding import BenchReport, Finding, Verdict
-from vibench.acquisition.check.result import CheckResult, rig_digest
-from vibench.acquisition.check.rule import CheckRule
-from vibench.acquisition.errors import CheckFailed, RecordingError
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.acquisition import (
+    BenchReport,
+    CheckFailed,
+    CheckResult,
+    CheckRule,
+    Finding,
+    RecordingError,
+    Verdict,
+    check_and_keep,
+    last_result,
+    open_bench,
+    open_recording,
+    run_measurement,
+)
+from vibench.acquisition.bench import rig_digest
+from vibench.acquisition.check import require_fresh
+from vibench.acquisition.check._admission import why_not
+from vibench.acquisition.check._archive import archive_path, keep
+from vibench.acquisition.plan import Dwell, Measurement
 
 NOW = datetime(2026, 5, 4, 12, 0, tzinfo=UTC)
 DWELL = Measurement(

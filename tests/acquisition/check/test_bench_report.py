@@ -6,15 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.check.bench_report import check_bench
-from vibench.acquisition.check.finding import BenchReport, Bounds, Verdict
-from vibench.acquisition.check.sine_fit import clock_ratio, fit_sine
-from vibench.acquisition.errors import CheckStopped, InstrumentLost
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.run.stop import Cause, StopRequest, StopSwitch
-from vibench.virtual_rig.generator.output_signal import Panel
-from vibench.virtual_rig.generator.scpi_command import Quirks
+from vibench.acquisition import BenchReport, InstrumentLost, StopSwitch, Verdict, open_bench
+from vibench.acquisition.bench import Bounds
+from vibench.acquisition.check._bench_report import check_bench
+from vibench.acquisition.check._sine_fit import clock_ratio, fit_sine
+from vibench.acquisition.errors import CheckStopped
+from vibench.acquisition.rig import load_rig
+from vibench.acquisition.stopping import Cause, StopRequest
+from vibench.virtual_rig.generator import Panel, Quirks
 
 ROOT = Path(__file__).parents[3]
 

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.check.low_level import judged
-from vibench.acquisition.errors import CheckFailed
-from vibench.acquisition.rig.channel import channels_of
-from vibench.acquisition.rig.configuration import Role
-from vibench.acquisition.rig.model import Quantity, RigModel
+from vibench.acquisition import CheckFailed
+from vibench.acquisition.rig import Quantity, RigModel, Role, channels_of
+from vibench.acquisition.run._low_level_check import judged
 
 RATE_HZ = 51_200.0
 AMPLITUDE_VPP = 0.02

@@ -6,14 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from vibench.acquisition.control.conduct import conduct
-from vibench.acquisition.control.move import Heard, Move
-from vibench.acquisition.excitation.steps import Tone
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.plan.needed_setting import needed_vpp
-from vibench.acquisition.rig.channel import channels_of
-from vibench.acquisition.rig.configuration import Rig, Role
-from vibench.acquisition.run.state import RunState
+from vibench.acquisition.control import conduct
+from vibench.acquisition.control._control_action import Heard, Move
+from vibench.acquisition.excitation import Tone
+from vibench.acquisition.plan import Measurement, RunState, needed_vpp
+from vibench.acquisition.rig import Rig, Role, channels_of
 
 RATE_HZ = 5120.0
 SLOW_STEP_S = 1e-3

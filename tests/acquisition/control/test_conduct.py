@@ -6,14 +6,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vibench.acquisition.excitation.feedback import BaseLevel, JumpSearch, Settling
-from vibench.acquisition.excitation.held_dwell import HeldDwell
-from vibench.acquisition.excitation.held_sweep import HeldSweep
-from vibench.acquisition.excitation.resonance_tracking import ResonanceTracking
-from vibench.acquisition.excitation.settled_sine import SettledSine
-from vibench.acquisition.excitation.stepped_sine import Direction, FrequencyGrid
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.run.schedule import duration_s
+from vibench.acquisition.excitation import BaseLevel, Settling
+from vibench.acquisition.excitation._feedback import JumpSearch
+from vibench.acquisition.excitation._stepped_sine import FrequencyGrid
+from vibench.acquisition.plan import (
+    Direction,
+    HeldDwell,
+    HeldSweep,
+    Measurement,
+    ResonanceTracking,
+    SettledSine,
+    duration_s,
+)
 
 HARDENING = 3e12
 LEVEL = 0.6

@@ -5,20 +5,22 @@ import json
 import numpy as np
 import pytest
 
-from vibench.acquisition.check.low_level import BenchCheck
-from vibench.acquisition.errors import ConfigurationError, LimitExceeded
-from vibench.acquisition.excitation.feedback import BaseLevel, Settling
-from vibench.acquisition.excitation.held_dwell import HeldDwell
-from vibench.acquisition.excitation.held_sweep import HeldSweep
-from vibench.acquisition.excitation.settled_sine import SettledSine
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.rig.configuration import Role
-from vibench.acquisition.rig.output import OutputUse
-from vibench.acquisition.run.run import Run
-from vibench.acquisition.run.schedule import CHECK_S, duration_s
-from vibench.acquisition.run.state import RunState
-from vibench.acquisition.run.stop import Cause, StopRequest
+from vibench.acquisition import ConfigurationError, LimitExceeded
+from vibench.acquisition.excitation import BaseLevel, Settling
+from vibench.acquisition.plan import (
+    CHECK_S,
+    HeldDwell,
+    HeldSweep,
+    Measurement,
+    RunState,
+    SettledSine,
+    duration_s,
+)
+from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.rig import OutputUse, Role
+from vibench.acquisition.run._low_level_check import BenchCheck
+from vibench.acquisition.run._run import Run
+from vibench.acquisition.stopping import Cause, StopRequest
 
 SETTLING = Settling(longest_wait_s=2, tolerance=0.02)
 # On the loop the base answers as the model does at 160 Hz; m0 stands still.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.control.gain_track import GainTrack
+from vibench.acquisition.control._gain_estimator import GainTrack
 
 STEP_S = 0.1
 

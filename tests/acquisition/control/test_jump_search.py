@@ -3,7 +3,7 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.control.jump_search import LocatedJump, Side, Visit, is_on_branch, located, side
+from vibench.acquisition.control._jump_search import LocatedJump, Side, Visit, is_on_branch, located, side
 
 
 def found(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=0.4):

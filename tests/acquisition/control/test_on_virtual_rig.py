@@ -5,17 +5,18 @@ import json
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.check.low_level import sine_amplitude
-from vibench.acquisition.excitation.feedback import BaseLevel, JumpSearch, Settling
-from vibench.acquisition.excitation.held_dwell import HeldDwell
-from vibench.acquisition.excitation.resonance_tracking import ResonanceTracking
-from vibench.acquisition.excitation.settled_sine import SettledSine
-from vibench.acquisition.excitation.stepped_sine import Direction
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.run.run_measurement import run_measurement
-from vibench.acquisition.run.state import RunState
+from vibench.acquisition import open_bench, open_recording, run_measurement
+from vibench.acquisition.excitation import BaseLevel, Settling
+from vibench.acquisition.excitation._feedback import JumpSearch
+from vibench.acquisition.plan import (
+    Direction,
+    HeldDwell,
+    Measurement,
+    ResonanceTracking,
+    RunState,
+    SettledSine,
+)
+from vibench.acquisition.run._low_level_check import sine_amplitude
 from vibench.sim import Harmonic, gong2025, integrate
 
 SAMPLE_RATE_HZ = 10240.0

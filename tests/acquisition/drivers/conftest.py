@@ -6,14 +6,10 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from vibench.acquisition.rig.configuration import GeneratorConfig
-from vibench.virtual_rig.generator.afg1022 import AFG1022, Reply
-from vibench.virtual_rig.generator.afg1022_settings import ChannelSettings
-from vibench.virtual_rig.generator.output_signal import Panel
-from vibench.virtual_rig.generator.scpi_command import Quirks
-from vibench.virtual_rig.generator.scpi_status import ErrorCode, StatusByte
-from vibench.virtual_rig.usb import usb_bus
-from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
+from vibench.acquisition.rig import GeneratorConfig
+from vibench.virtual_rig.generator import AFG1022, ErrorCode, Panel, Quirks, Reply, StatusByte
+from vibench.virtual_rig.generator._afg1022_settings import ChannelSettings
+from vibench.virtual_rig.usb import UsbTmcInstrument, plug_in, unplug
 
 _SERIALS = (f"C02{number:04d}" for number in itertools.count(1))
 
@@ -111,7 +107,7 @@ class Bus:
         )
         log = listener(instrument)
         usb = UsbTmcInstrument(log)
-        usb_bus.plug_in(usb)
+        plug_in(usb)
         self.plugged.append(Plugged(instrument, usb, log))
         return self.plugged[-1]
 
@@ -121,7 +117,7 @@ def bus() -> Iterator[Bus]:
     made = Bus()
     yield made
     for plugged in made.plugged:
-        usb_bus.unplug(plugged.usb)
+        unplug(plugged.usb)
 
 
 @pytest.fixture

@@ -5,20 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from vibench.acquisition.drivers.afg1022_limits import Shape
-from vibench.acquisition.drivers.afg1022_modes import SweepSupport, Unsupported
-from vibench.acquisition.drivers.afg1022x import AFG1022X
-from vibench.acquisition.errors import (
-    InstrumentBusy,
-    InstrumentError,
-    InstrumentLost,
-    LimitExceeded,
-    SettingRefused,
-)
-from vibench.acquisition.rig.configuration import Knob
-from vibench.virtual_rig.generator.afg1022_settings import OPEN_AMPLITUDE_RANGE_VPP
-from vibench.virtual_rig.generator.output_signal import Panel
-from vibench.virtual_rig.generator.scpi_command import Quirks
+from vibench.acquisition import InstrumentError, InstrumentLost, LimitExceeded
+from vibench.acquisition.drivers import AFG1022X
+from vibench.acquisition.drivers._afg1022_limits import Shape
+from vibench.acquisition.drivers._afg1022_modes import SweepSupport, Unsupported
+from vibench.acquisition.errors import InstrumentBusy, SettingRefused
+from vibench.acquisition.rig import Knob
+from vibench.virtual_rig.generator import Panel, Quirks
+from vibench.virtual_rig.generator._afg1022_settings import OPEN_AMPLITUDE_RANGE_VPP
 
 SINE = np.sin(2 * np.pi * np.arange(1024) / 1024)
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 
-from vibench.acquisition.drivers.arbitrary_codes import HIGHEST_CODE, arbitrary_codes
-from vibench.acquisition.errors import LimitExceeded
+from vibench.acquisition import LimitExceeded
+from vibench.acquisition.drivers._arbitrary_codes import HIGHEST_CODE, arbitrary_codes
 
 waveforms = arrays(np.float64, st.integers(2, 300), elements=st.floats(-1, 1, allow_subnormal=False)).filter(
     lambda values: np.ptp(values) > 1e-6

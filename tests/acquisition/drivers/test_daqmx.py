@@ -9,19 +9,13 @@ from hypothesis import given, strategies as st
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError
 
-from vibench.acquisition.drivers.daqmx import DaqmxDigitizer
-from vibench.acquisition.drivers.daqmx_errors import MEANINGS, from_code
-from vibench.acquisition.drivers.daqmx_inputs import InputScaling
-from vibench.acquisition.errors import (
-    AcquisitionError,
-    ConfigurationError,
-    DataLost,
-    InstrumentBusy,
-    InstrumentError,
-    InstrumentLost,
-)
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.virtual_rig.rig import VirtualRig
+from vibench.acquisition import AcquisitionError, ConfigurationError, InstrumentError, InstrumentLost
+from vibench.acquisition.drivers import DaqmxDigitizer
+from vibench.acquisition.drivers._daqmx_errors import MEANINGS, from_code
+from vibench.acquisition.drivers._daqmx_inputs import InputScaling
+from vibench.acquisition.errors import DataLost, InstrumentBusy
+from vibench.acquisition.rig import load_rig
+from vibench.virtual_rig import VirtualRig
 
 ROOT = Path(__file__).parents[3]
 RATE_HZ = 5120.0

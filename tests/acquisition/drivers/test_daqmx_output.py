@@ -7,22 +7,14 @@ import nidaqmx
 import numpy as np
 import pytest
 
-from vibench.acquisition.drivers.daqmx import DaqmxDigitizer
-from vibench.acquisition.drivers.daqmx_output import DaqmxOutput, _told_to_idle_at_zero
-from vibench.acquisition.drivers.daqmx_session import daqmx_session
-from vibench.acquisition.errors import (
-    ConfigurationError,
-    DataLost,
-    InstrumentBusy,
-    InstrumentError,
-    InstrumentLost,
-    LimitExceeded,
-    SettingRefused,
-)
+from vibench.acquisition import ConfigurationError, InstrumentError, InstrumentLost, LimitExceeded
+from vibench.acquisition.drivers import DaqmxDigitizer, DaqmxOutput
+from vibench.acquisition.drivers._daqmx_output import _told_to_idle_at_zero
+from vibench.acquisition.drivers._daqmx_session import daqmx_session
+from vibench.acquisition.errors import DataLost, InstrumentBusy, SettingRefused
 from vibench.acquisition.instruments import AnalogOutput, IdleOutput
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.rig.output import OutputConfig
-from vibench.virtual_rig.rig import VirtualRig
+from vibench.acquisition.rig import OutputConfig, load_rig
+from vibench.virtual_rig import VirtualRig
 
 ROOT = Path(__file__).parents[3]
 RATE_HZ = 12_800.0

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import pyvisa
 
-from vibench.acquisition.drivers.scpi import ScpiPort
-from vibench.acquisition.errors import InstrumentError, InstrumentLost
+from vibench.acquisition import InstrumentError, InstrumentLost
+from vibench.acquisition.drivers._scpi import ScpiPort
 
 TIMEOUT = pyvisa.VisaIOError(pyvisa.constants.StatusCode.error_timeout)
 LOST = pyvisa.VisaIOError(pyvisa.constants.StatusCode.error_connection_lost)

@@ -8,13 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from vibench.acquisition.engine.client import EngineClient
-from vibench.acquisition.engine.start import EngineProcess, start_engine
-from vibench.acquisition.engine.state import Attendance, EngineState
-from vibench.acquisition.engine.status import EngineStatus
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.rig.configuration import Rig, load_rig
-from vibench.acquisition.run.stop import StopLevel
+from vibench.acquisition import StopLevel
+from vibench.acquisition.engine import (
+    Attendance,
+    EngineClient,
+    EngineProcess,
+    EngineState,
+    EngineStatus,
+    start_engine,
+)
+from vibench.acquisition.plan import Campaign
+from vibench.acquisition.rig import Rig, load_rig
 
 ROOT = Path(__file__).parent.parent.parent.parent
 PATIENCE_S = 60.0

@@ -14,22 +14,25 @@ from threading import Event
 import numpy as np
 import pytest
 
-from vibench.acquisition.check.rule import CheckRule
-from vibench.acquisition.engine.address import EngineAddress
-from vibench.acquisition.engine.client import EngineClient
-from vibench.acquisition.engine.errors import EngineError, EngineGone
-from vibench.acquisition.engine.lock import BenchLock
-from vibench.acquisition.engine.orders import Orders
-from vibench.acquisition.engine.requests import Look
-from vibench.acquisition.engine.start import start_engine
-from vibench.acquisition.engine.state import Attendance, EngineState, Visit
-from vibench.acquisition.engine.status import MessageKind
-from vibench.acquisition.engine.wire import Message, send
-from vibench.acquisition.errors import InstrumentBusy, LimitExceeded, RecordingError
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.run.stop import StopLevel
-from vibench.virtual_rig.rig import VirtualRig
+from vibench.acquisition import CheckRule, LimitExceeded, RecordingError, StopLevel, open_recording
+from vibench.acquisition.engine import (
+    Attendance,
+    BenchLock,
+    EngineClient,
+    EngineGone,
+    EngineState,
+    MessageKind,
+    Orders,
+    start_engine,
+)
+from vibench.acquisition.engine._address import EngineAddress
+from vibench.acquisition.engine._errors import EngineError
+from vibench.acquisition.engine._requests import Look
+from vibench.acquisition.engine._state import Visit
+from vibench.acquisition.engine._wire import Message, send
+from vibench.acquisition.errors import InstrumentBusy
+from vibench.acquisition.recording import RecordingState
+from vibench.virtual_rig import VirtualRig
 
 from .conftest import campaign, until, until_state, until_there
 

@@ -2,8 +2,7 @@
 
 from threading import Event
 
-from vibench.acquisition.engine.pulse import Pulse
-from vibench.acquisition.engine.state import DRIVING, EngineState
+from vibench.acquisition.engine import DRIVING, EngineState, Pulse
 
 from .conftest import campaign, until, until_state
 

@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.campaign.item import CampaignItem, CampaignProgress, Item
-from vibench.acquisition.campaign.why import Why
-from vibench.acquisition.engine.shown import Shown
-from vibench.acquisition.engine.state import Attendance
-from vibench.acquisition.engine.status import BenchFacts, ChannelFacts
-from vibench.acquisition.instruments import Block
-from vibench.acquisition.run.progress import Progress
-from vibench.acquisition.run.state import RunState
+from vibench.acquisition import Block
+from vibench.acquisition.campaign import CampaignItem, CampaignProgress, Item, Why
+from vibench.acquisition.engine import Attendance, BenchFacts
+from vibench.acquisition.engine._published_state import Shown
+from vibench.acquisition.engine._status import ChannelFacts
+from vibench.acquisition.plan import RunState
+from vibench.acquisition.run import Progress
 
 from .conftest import campaign
 

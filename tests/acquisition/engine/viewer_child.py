@@ -4,10 +4,9 @@ import sys
 from pathlib import Path
 from threading import Event
 
-from vibench.acquisition.engine.start import start_engine
-from vibench.acquisition.engine.state import EngineState
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.rig.configuration import Rig
+from vibench.acquisition.engine import EngineState, start_engine
+from vibench.acquisition.plan import Campaign
+from vibench.acquisition.rig import Rig
 
 PLAN = {
     "name": "trial",

@@ -6,19 +6,23 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from vibench.acquisition.excitation.feedback import BaseLevel, JumpSearch, Settling
-from vibench.acquisition.excitation.held_dwell import HeldDwell
-from vibench.acquisition.excitation.held_sweep import HeldSweep
-from vibench.acquisition.excitation.plan import AbstractFeedback
-from vibench.acquisition.excitation.resonance_tracking import ResonanceTracking
-from vibench.acquisition.excitation.settled_sine import MOST_SETTLED_STEPS, SettledSine
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.excitation.stepped_sine import FrequencyGrid
-from vibench.acquisition.plan.campaign import load_campaign
-from vibench.acquisition.plan.limits import limit_checks
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.plan.needed_setting import needed_vpp
-from vibench.acquisition.run.schedule import HUSH_S, duration_s
+from vibench.acquisition import load_campaign
+from vibench.acquisition.excitation import AbstractFeedback, BaseLevel, Settling
+from vibench.acquisition.excitation._feedback import JumpSearch
+from vibench.acquisition.excitation._settled_sine import MOST_SETTLED_STEPS
+from vibench.acquisition.excitation._stepped_sine import FrequencyGrid
+from vibench.acquisition.plan import (
+    HUSH_S,
+    HeldDwell,
+    HeldSweep,
+    Measurement,
+    ResonanceTracking,
+    SettledSine,
+    SineSweep,
+    duration_s,
+    needed_vpp,
+)
+from vibench.acquisition.plan._limits import limit_checks
 
 SMART = load_campaign(Path(__file__).parent.parent.parent.parent / "campaigns" / "smart.toml").measurements
 every_plan = pytest.mark.parametrize("plan", SMART, ids=[each.name for each in SMART])

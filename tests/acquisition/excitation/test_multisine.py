@@ -4,13 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.acquisition.excitation.multisine import (
-    MEMORY_POINTS,
-    band_lines,
-    flat_periods,
-    held_lines,
-    hold_droop,
-)
+from vibench.acquisition.excitation import held_lines
+from vibench.acquisition.excitation._multisine import MEMORY_POINTS, band_lines, flat_periods, hold_droop
 
 BAND = np.arange(20, 801)
 OVERSAMPLING = 16

@@ -5,13 +5,18 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.kinds import Excitation
-from vibench.acquisition.excitation.multisine_noise import MultisineNoise
-from vibench.acquisition.excitation.odd_multisine import OddMultisine
-from vibench.acquisition.excitation.sine_sweep import SineSweep, Spacing
-from vibench.acquisition.excitation.stepped_sine import Direction, FrequencyGrid, SteppedSine
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.excitation._sine_sweep import Spacing
+from vibench.acquisition.excitation._stepped_sine import FrequencyGrid
+from vibench.acquisition.plan import (
+    Direction,
+    Dwell,
+    Excitation,
+    MultisineNoise,
+    OddMultisine,
+    SineSweep,
+    SteppedSine,
+    StreamedNoise,
+)
 
 PLANS = [
     MultisineNoise(amplitude_vpp=1.5, band_start_hz=20, band_stop_hz=800, realisations=3),

@@ -6,14 +6,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from vibench.acquisition.errors import LimitExceeded
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.stepped_level import SteppedLevel
-from vibench.acquisition.plan.limits import require_within_limits
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.run.schedule import phases
-from vibench.acquisition.run.state import RunState
+from vibench.acquisition import LimitExceeded
+from vibench.acquisition.plan import Dwell, Measurement, RunState, SteppedLevel, phases, require_within_limits
+from vibench.acquisition.rig import load_rig
 
 ROOT = Path(__file__).parents[3]
 

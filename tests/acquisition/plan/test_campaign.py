@@ -5,18 +5,22 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.multisine_noise import MultisineNoise
-from vibench.acquisition.excitation.odd_multisine import OddMultisine
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.excitation.stepped_sine import FrequencyGrid, SteppedSine
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.plan.campaign import Campaign, load_campaign
-from vibench.acquisition.plan.limits import require_within_limits
-from vibench.acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.toml_text import toml_text
+from vibench.acquisition import ConfigurationError, load_campaign, toml_text
+from vibench.acquisition.excitation._stepped_sine import FrequencyGrid
+from vibench.acquisition.plan import (
+    Campaign,
+    Dwell,
+    InRunLimits,
+    Measurement,
+    MultisineNoise,
+    OddMultisine,
+    OnOverload,
+    SineSweep,
+    SteppedSine,
+    StreamedNoise,
+    require_within_limits,
+)
+from vibench.acquisition.rig import load_rig
 
 ROOT = Path(__file__).parent.parent.parent.parent
 SHIPPED = sorted((ROOT / "campaigns").glob("*.toml"))

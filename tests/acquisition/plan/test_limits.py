@@ -5,16 +5,20 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.signal import lsim
 
-from vibench.acquisition.errors import LimitExceeded
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.multisine_noise import MultisineNoise
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.excitation.steps import Waveform
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.plan.limits import limit_checks, limit_table, require_within_limits, shortest_ramp_s
-from vibench.acquisition.plan.loads import predicted_loads
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.rig.model import Quantity, RigModel
+from vibench.acquisition import LimitExceeded
+from vibench.acquisition.excitation import Waveform
+from vibench.acquisition.plan import (
+    Dwell,
+    Measurement,
+    MultisineNoise,
+    SineSweep,
+    StreamedNoise,
+    predicted_loads,
+    require_within_limits,
+    shortest_ramp_s,
+)
+from vibench.acquisition.plan._limits import limit_checks, limit_table
+from vibench.acquisition.rig import Quantity, RigModel
 
 
 def plan(excitation, **fields):
@@ -78,7 +82,7 @@ def test_streamed_noise_reaches_the_terminal_s_range_and_no_more(rig):
 def test_loads_grow_with_the_setting(factor):
     from pathlib import Path
 
-    from vibench.acquisition.rig.configuration import load_rig
+    from vibench.acquisition.rig import load_rig
 
     rig = load_rig(Path(__file__).parent.parent.parent.parent / "hardware_configs" / "virtual_rig.toml")
     one = predicted_loads(Dwell(amplitude_vpp=1.0, frequency_hz=50, duration_s=1), rig)

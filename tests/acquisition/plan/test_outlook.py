@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.plan.band import excited_band_hz
-from vibench.acquisition.plan.campaign import load_campaign
-from vibench.acquisition.plan.outlook import MOST_SAMPLES, SPECTRUM_POINTS, outlook
-from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition import load_campaign
+from vibench.acquisition.plan import excited_band_hz, outlook
+from vibench.acquisition.plan._measurement_preview import MOST_SAMPLES, SPECTRUM_POINTS
+from vibench.acquisition.rig import load_rig
 
 ROOT = Path(__file__).resolve().parents[3]
 QUICK = {each.name: each for each in load_campaign(ROOT / "campaigns" / "quick.toml").measurements}

@@ -2,15 +2,18 @@
 
 import pytest
 
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.multisine_noise import MultisineNoise
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.excitation.stepped_sine import SteppedSine
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.plan.limits import limit_checks
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.plan.player import Player, player_of
-from vibench.acquisition.rig.output import OutputConfig, OutputUse
+from vibench.acquisition.plan import (
+    Dwell,
+    Measurement,
+    MultisineNoise,
+    Player,
+    SineSweep,
+    SteppedSine,
+    StreamedNoise,
+    player_of,
+)
+from vibench.acquisition.plan._limits import limit_checks
+from vibench.acquisition.rig import OutputConfig, OutputUse
 
 STREAM = StreamedNoise(amplitude_vpp=1, band_start_hz=50, band_stop_hz=600, duration_s=1)
 TONES = [

@@ -3,16 +3,18 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.errors import LimitExceeded
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.multisine_noise import MultisineNoise
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.plan.limits import limit_checks, require_within_limits
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.plan.specimen_loads import predicted_specimen_loads
-from vibench.acquisition.rig.model import Quantity, RigModel
-from vibench.acquisition.rig.specimen import specimen_of
+from vibench.acquisition import LimitExceeded
+from vibench.acquisition.plan import (
+    Dwell,
+    Measurement,
+    MultisineNoise,
+    SineSweep,
+    StreamedNoise,
+    require_within_limits,
+)
+from vibench.acquisition.plan._limits import limit_checks
+from vibench.acquisition.plan._specimen_loads import predicted_specimen_loads
+from vibench.acquisition.rig import Quantity, RigModel, specimen_of
 from vibench.sim import Harmonic, base_answer, base_transmissibility, steady_response
 
 

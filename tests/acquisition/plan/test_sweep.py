@@ -2,15 +2,9 @@
 
 import pytest
 
-from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.plan.campaign import Campaign, load_campaign
-from vibench.acquisition.plan.limits import require_within_limits
-from vibench.acquisition.plan.loads import predicted_loads
-from vibench.acquisition.rig.model import Quantity
-from vibench.acquisition.run.schedule import phases
-from vibench.acquisition.run.state import RunState
-from vibench.acquisition.toml_file import validated
-from vibench.acquisition.toml_text import toml_text
+from vibench.acquisition import ConfigurationError, load_campaign, toml_text, validated
+from vibench.acquisition.plan import Campaign, RunState, phases, predicted_loads, require_within_limits
+from vibench.acquisition.rig import Quantity
 
 DWELL = {"kind": "dwell", "settle_s": 1.0, "duration_s": 2.0}
 

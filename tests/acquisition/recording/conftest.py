@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.instruments import Block
-from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
-from vibench.acquisition.recording.layout import Origin
+from vibench.acquisition import Block
+from vibench.acquisition.recording import ChannelHeader, Origin, RecordingHeader
 
 RANGE_V = 5.0
 STEP_V = RANGE_V / 2**23

@@ -14,10 +14,14 @@ import time
 
 import numpy as np
 
-from vibench.acquisition.instruments import Block
-from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
-from vibench.acquisition.recording.layout import Origin, RecordingState
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import Block
+from vibench.acquisition.recording import (
+    ChannelHeader,
+    Origin,
+    RecordingHeader,
+    RecordingState,
+    create_recording,
+)
 
 RATE_HZ = 51_200.0
 BLOCK = 512

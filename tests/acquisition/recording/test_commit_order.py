@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from vibench.acquisition.instruments import Overload
-from vibench.acquisition.recording.disk import PositionedFile
-from vibench.acquisition.recording.layout import RecordingState, part_of
-from vibench.acquisition.recording.preallocate import ITEM_BYTES, preallocate
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.writer import RecordingWriter
+from vibench.acquisition import Overload, open_recording
+from vibench.acquisition.recording import RecordingState, RecordingWriter, part_of
+from vibench.acquisition.recording._disk import PositionedFile
+from vibench.acquisition.recording._preallocate import ITEM_BYTES, preallocate
 
 BLOCKS, BLOCK = 40, 7
 PAGE = 4096

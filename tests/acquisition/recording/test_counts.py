@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.errors import RecordingError
-from vibench.acquisition.recording.counts import CountScale
-from vibench.acquisition.recording.header import ChannelHeader
+from vibench.acquisition import RecordingError
+from vibench.acquisition.recording import ChannelHeader
+from vibench.acquisition.recording._counts import CountScale
 
 
 def scale(step, zero=0.0, range_v=5.0):

@@ -5,12 +5,14 @@ import time
 
 import pytest
 
-from vibench.acquisition.errors import RecordingError
-from vibench.acquisition.recording.disk_trouble import DiskTrouble, troubled_disks
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.recover import recover
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import RecordingError, open_recording
+from vibench.acquisition.recording import (
+    DiskTrouble,
+    RecordingState,
+    create_recording,
+    recover,
+    troubled_disks,
+)
 
 
 @pytest.fixture

@@ -6,11 +6,9 @@ import h5py
 import numpy as np
 import pytest
 
-from vibench.acquisition.instruments import Overload
-from vibench.acquisition.recording.chunks import create_counts, write_chunks
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.results import ResultArray
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import Overload, open_recording
+from vibench.acquisition.recording import ResultArray, create_recording
+from vibench.acquisition.recording._chunks import create_counts, write_chunks
 
 SAMPLES = 120_000
 

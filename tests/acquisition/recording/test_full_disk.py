@@ -5,20 +5,19 @@ import sys
 
 import pytest
 
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.recover import recover
+from vibench.acquisition import open_recording
+from vibench.acquisition.recording import RecordingState, recover
 
 resource = pytest.importorskip("resource", reason="limits on file size exist on POSIX only")
 
 SCRIPT = """
 import resource, sys
 import numpy as np
-from vibench.acquisition.errors import RecordingError
-from vibench.acquisition.instruments import Block
-from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
-from vibench.acquisition.recording.layout import Origin, RecordingState
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import RecordingError
+from vibench.acquisition import Block
+from vibench.acquisition.recording import ChannelHeader, RecordingHeader
+from vibench.acquisition.recording import Origin, RecordingState
+from vibench.acquisition.recording import create_recording
 
 when, path = sys.argv[1:]
 channels = tuple(ChannelHeader(role, "ai0", "voltage", "V", 1.0, 5.0, 1e-6) for role in ("drive", "response"))

@@ -17,9 +17,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.recover import recover
+from vibench.acquisition import open_recording
+from vibench.acquisition.recording import RecordingState, recover
 
 CHILD = Path(__file__).with_name("recording_child.py")
 SPEC = importlib.util.spec_from_file_location("recording_child", CHILD)

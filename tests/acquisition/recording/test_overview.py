@@ -2,10 +2,15 @@ import h5py
 import numpy as np
 import pytest
 
-from vibench.acquisition.recording.layout import CHUNK_SAMPLES, MISSING_COUNT
-from vibench.acquisition.recording.overview import BIN_SAMPLES, OverviewSums, extremes
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import open_recording
+from vibench.acquisition.recording import (
+    BIN_SAMPLES,
+    CHUNK_SAMPLES,
+    MISSING_COUNT,
+    OverviewSums,
+    create_recording,
+)
+from vibench.acquisition.recording._overview import extremes
 
 SAMPLES = 2 * CHUNK_SAMPLES + 1000
 

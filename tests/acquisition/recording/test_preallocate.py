@@ -5,10 +5,8 @@ import os
 
 import h5py
 
-from vibench.acquisition.recording import preallocate as preallocate_module
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import open_recording
+from vibench.acquisition.recording import RecordingState, _preallocate as preallocate_module, create_recording
 
 
 def _die_before(step, path, header):

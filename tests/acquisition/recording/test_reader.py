@@ -2,11 +2,8 @@ import h5py
 import numpy as np
 import pytest
 
-from vibench.acquisition.errors import RecordingError
-from vibench.acquisition.instruments import Identity
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.results import ResultArray
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import Identity, RecordingError, open_recording
+from vibench.acquisition.recording import ResultArray, create_recording
 
 IDENTITY = Identity("TEKTRONIX", "AFG1022", "1234", "V1.2.6", "TEKTRONIX,AFG1022,1234,V1.2.6")
 SAMPLES = 2500

@@ -4,13 +4,10 @@ import h5py
 import numpy as np
 import pytest
 
-from vibench.acquisition.errors import RecordingError
-from vibench.acquisition.recording.disk import PositionedFile
-from vibench.acquisition.recording.layout import RecordingState, part_of
-from vibench.acquisition.recording.preallocate import preallocate
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.recover import recover
-from vibench.acquisition.recording.writer import RecordingWriter, create_recording
+from vibench.acquisition import RecordingError, open_recording
+from vibench.acquisition.recording import RecordingState, RecordingWriter, create_recording, part_of, recover
+from vibench.acquisition.recording._disk import PositionedFile
+from vibench.acquisition.recording._preallocate import preallocate
 
 
 @pytest.fixture

@@ -3,11 +3,8 @@ from threading import Event
 import numpy as np
 import pytest
 
-from vibench.acquisition.errors import RecordingError
-from vibench.acquisition.instruments import Overload
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import Overload, RecordingError, open_recording
+from vibench.acquisition.recording import RecordingState, create_recording
 
 BLOCK = 250
 

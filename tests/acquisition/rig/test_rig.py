@@ -4,9 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.rig.channel import channels_of
-from vibench.acquisition.rig.configuration import Rig, Role, load_rig
+from vibench.acquisition import ConfigurationError
+from vibench.acquisition.rig import Rig, Role, channels_of, load_rig
 
 CONFIGS = Path(__file__).resolve().parents[3] / "hardware_configs"
 VIRTUAL = CONFIGS / "virtual_rig.toml"

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.rig.model import Quantity, RigModel, suspended_mass_kg
+from vibench.acquisition.rig import Quantity, RigModel, load_rig, suspended_mass_kg
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 MODEL = RigModel(RIG)

@@ -5,8 +5,8 @@ from contextlib import ExitStack
 
 import pytest
 
-from vibench.acquisition.rig.configuration import Rig
-from vibench.virtual_rig.rig import VirtualRig
+from vibench.acquisition.rig import Rig
+from vibench.virtual_rig import VirtualRig
 
 Laboratory = Callable[..., tuple[VirtualRig, Rig]]
 

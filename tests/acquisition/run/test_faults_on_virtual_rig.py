@@ -8,27 +8,20 @@ import re
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.errors import (
+from vibench.acquisition import (
     AcquisitionError,
     CheckFailed,
-    DataLost,
-    InstrumentBusy,
     InstrumentError,
     InstrumentLost,
-    SettingRefused,
+    open_bench,
+    open_recording,
+    run_measurement,
 )
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.rig.calibration import CalibrationRule
-from vibench.acquisition.rig.knobs import confirm_simulated
-from vibench.acquisition.run.run_measurement import run_measurement
-from vibench.acquisition.run.state import RunState
-from vibench.virtual_rig.generator.output_signal import Panel
-from vibench.virtual_rig.generator.scpi_command import Quirks
+from vibench.acquisition.errors import DataLost, InstrumentBusy, SettingRefused
+from vibench.acquisition.plan import Dwell, Measurement, RunState, SineSweep
+from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.rig import CalibrationRule, confirm_simulated
+from vibench.virtual_rig.generator import Panel, Quirks
 
 DWELL = Measurement(
     name="run",
@@ -181,8 +174,8 @@ def test_a_laser_dropout_and_an_over_range_are_flagged_and_the_run_goes_on(labor
 
 
 def test_an_output_relay_that_sticks_is_seen_by_the_bench_check(laboratory, tmp_path):
-    from vibench.acquisition.check.bench_report import check_bench
-    from vibench.acquisition.check.finding import Verdict
+    from vibench.acquisition import Verdict
+    from vibench.acquisition.check._bench_report import check_bench
 
     virtual, connected = laboratory()
     with bench_on(connected) as bench:

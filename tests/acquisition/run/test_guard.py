@@ -7,14 +7,11 @@ from collections import deque
 import numpy as np
 import pytest
 
-from vibench.acquisition.errors import LimitExceeded
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.instruments import Block, Overload
-from vibench.acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
-from vibench.acquisition.rig.channel import channels_of
-from vibench.acquisition.rig.configuration import Role
-from vibench.acquisition.run.guard import Guard
-from vibench.acquisition.run.run import Run
+from vibench.acquisition import Block, LimitExceeded, Overload
+from vibench.acquisition.plan import Dwell, InRunLimits, Measurement, OnOverload
+from vibench.acquisition.rig import Role, channels_of
+from vibench.acquisition.run._limit_monitor import Guard
+from vibench.acquisition.run._run import Run
 
 RATE_HZ = 51_200.0
 BLOCK = 5120

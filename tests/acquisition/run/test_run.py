@@ -6,29 +6,35 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from vibench.acquisition.check.low_level import BenchCheck, sine_amplitude
-from vibench.acquisition.errors import (
+from vibench.acquisition import (
     CheckFailed,
     ConfigurationError,
-    DataLost,
     InstrumentLost,
     LimitExceeded,
+    Overload,
     RecordingError,
+    StopLevel,
+    StopSwitch,
 )
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.multisine_noise import MultisineNoise
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.excitation.stepped_sine import SteppedSine
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.instruments import Overload
-from vibench.acquisition.plan.limits import shortest_ramp_s
-from vibench.acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.run.performance import HOLD_LONGEST_S
-from vibench.acquisition.run.run import Run
-from vibench.acquisition.run.schedule import CHECK_S
-from vibench.acquisition.run.state import RunState
-from vibench.acquisition.run.stop import Cause, StopLevel, StopRequest, StopSwitch
+from vibench.acquisition.errors import DataLost
+from vibench.acquisition.plan import (
+    CHECK_S,
+    Dwell,
+    InRunLimits,
+    Measurement,
+    MultisineNoise,
+    OnOverload,
+    RunState,
+    SineSweep,
+    SteppedSine,
+    StreamedNoise,
+    shortest_ramp_s,
+)
+from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.run._low_level_check import BenchCheck, sine_amplitude
+from vibench.acquisition.run._phase_runner import HOLD_LONGEST_S
+from vibench.acquisition.run._run import Run
+from vibench.acquisition.stopping import Cause, StopRequest
 
 RATE = 5120.0
 AMPLITUDE_VPP = 1.0

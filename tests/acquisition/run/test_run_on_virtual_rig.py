@@ -8,23 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.campaign.item import Item
-from vibench.acquisition.campaign.run_campaign import run_campaign
-from vibench.acquisition.check.low_level import sine_amplitude
-from vibench.acquisition.errors import CheckFailed
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.multisine_noise import MultisineNoise
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.plan.campaign import load_campaign
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.plan.specimen_loads import predicted_specimen_loads
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.run.run import Run
-from vibench.acquisition.run.run_measurement import run_measurement
-from vibench.acquisition.run.state import RunState
+from vibench.acquisition import (
+    CheckFailed,
+    load_campaign,
+    open_bench,
+    open_recording,
+    run_campaign,
+    run_measurement,
+)
+from vibench.acquisition.campaign import Item
+from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, RunState, SineSweep
+from vibench.acquisition.plan._specimen_loads import predicted_specimen_loads
+from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.rig import load_rig
+from vibench.acquisition.run._low_level_check import sine_amplitude
+from vibench.acquisition.run._run import Run
 
 ROOT = Path(__file__).parent.parent.parent.parent
 VIRTUAL = ROOT / "hardware_configs" / "virtual_rig.toml"
@@ -157,11 +155,11 @@ CHILD = """
 import signal
 import sys
 from pathlib import Path
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.run.run_measurement import run_measurement
-from vibench.acquisition.run.state import RunState
+from vibench.acquisition import open_bench
+from vibench.acquisition.plan import Dwell
+from vibench.acquisition.plan import Measurement
+from vibench.acquisition import run_measurement
+from vibench.acquisition.plan import RunState
 
 told = []
 

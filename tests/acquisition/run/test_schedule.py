@@ -2,11 +2,16 @@
 
 import pytest
 
-from vibench.acquisition.excitation.dwell import Dwell, LeadIn
-from vibench.acquisition.excitation.resonance_tracking import ResonanceTracking
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.run.schedule import CHECK_S, HUSH_S, lead_in_s
+from vibench.acquisition.plan import (
+    CHECK_S,
+    HUSH_S,
+    Dwell,
+    LeadIn,
+    Measurement,
+    ResonanceTracking,
+    SineSweep,
+    lead_in_s,
+)
 
 
 def measurement(excitation):

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.excitation.steps import Stream, Tone, Waveform
-from vibench.acquisition.excitation.streamed_noise import GaussianBand
-from vibench.acquisition.run.schedule import Phase
-from vibench.acquisition.run.score import RELEASE_S, Score
-from vibench.acquisition.run.state import RunState
+from vibench.acquisition import ConfigurationError
+from vibench.acquisition.excitation import Stream, Tone, Waveform
+from vibench.acquisition.excitation._streamed_noise import GaussianBand
+from vibench.acquisition.plan import Phase, RunState
+from vibench.acquisition.run._output_synthesizer import RELEASE_S, Score
 
 RATE_HZ = 5120.0
 NOISE = Stream(GaussianBand(50.0, 600.0, seed=3))

@@ -14,21 +14,20 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.errors import AcquisitionError, InstrumentLost
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.plan.limits import shortest_ramp_s
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.writer import create_recording
-from vibench.acquisition.rig.calibration import CalibrationRule
-from vibench.acquisition.rig.knobs import confirm_simulated
-from vibench.acquisition.run.run import Run
-from vibench.acquisition.run.state import RunState
-from vibench.acquisition.run.stop import Cause, StopLevel, StopRequest
-from vibench.acquisition.run.stop_on_signal import stop_on_signal
-from vibench.acquisition.run.tape import BLOCK_S
+from vibench.acquisition import (
+    AcquisitionError,
+    InstrumentLost,
+    StopLevel,
+    open_bench,
+    open_recording,
+    stop_on_signal,
+)
+from vibench.acquisition.plan import Dwell, Measurement, RunState, shortest_ramp_s
+from vibench.acquisition.recording import RecordingState, create_recording
+from vibench.acquisition.rig import CalibrationRule, confirm_simulated
+from vibench.acquisition.run import BLOCK_S
+from vibench.acquisition.run._run import Run
+from vibench.acquisition.stopping import Cause, StopRequest
 
 RAMP_S = 0.3
 PLAN = Measurement(
@@ -213,7 +212,7 @@ def check_recording(path, run, stop, error, disk):
     if disk.is_full and not path.exists():
         # Nothing more could be written, the ending included: what was committed is recovered.
         disk.is_full = False
-        from vibench.acquisition.recording.recover import recover
+        from vibench.acquisition.recording import recover
 
         recover(path)
         with open_recording(path) as recording:

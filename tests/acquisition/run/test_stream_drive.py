@@ -3,17 +3,21 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.check.low_level import BenchCheck
-from vibench.acquisition.errors import DataLost, InstrumentLost, LimitExceeded, RecordingError
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.instruments import Overload
-from vibench.acquisition.plan.limits import shortest_ramp_s
-from vibench.acquisition.plan.measurement import InRunLimits, Measurement, OnOverload
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.run.run import Run
-from vibench.acquisition.run.schedule import CHECK_S
-from vibench.acquisition.run.state import RunState
-from vibench.acquisition.run.stop import Cause, StopLevel, StopRequest
+from vibench.acquisition import InstrumentLost, LimitExceeded, Overload, RecordingError, StopLevel
+from vibench.acquisition.errors import DataLost
+from vibench.acquisition.plan import (
+    CHECK_S,
+    InRunLimits,
+    Measurement,
+    OnOverload,
+    RunState,
+    StreamedNoise,
+    shortest_ramp_s,
+)
+from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.run._low_level_check import BenchCheck
+from vibench.acquisition.run._run import Run
+from vibench.acquisition.stopping import Cause, StopRequest
 
 RATE = 5120.0
 AHEAD = 2560

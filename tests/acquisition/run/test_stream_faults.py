@@ -11,24 +11,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.errors import (
-    DataLost,
+from vibench.acquisition import (
     InstrumentError,
     InstrumentLost,
     LimitExceeded,
     RecordingError,
+    open_bench,
+    open_recording,
+    run_measurement,
 )
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.plan.measurement import InRunLimits, Measurement
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.writer import create_recording
-from vibench.acquisition.rig.calibration import CalibrationRule
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.rig.knobs import confirm_simulated
-from vibench.acquisition.run.run_measurement import run_measurement
-from vibench.acquisition.run.state import RunState
+from vibench.acquisition.errors import DataLost
+from vibench.acquisition.plan import InRunLimits, Measurement, RunState, StreamedNoise
+from vibench.acquisition.recording import RecordingState, create_recording
+from vibench.acquisition.rig import CalibrationRule, confirm_simulated, load_rig
 from vibench.virtual_rig.analogue import Coupling, Input
 
 try:

@@ -7,19 +7,13 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.check.low_level import BenchCheck
-from vibench.acquisition.errors import CheckFailed
-from vibench.acquisition.excitation.sine_sweep import Hold, SineSweep
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.rig.output import OutputUse
-from vibench.acquisition.run.run_measurement import run_measurement
-from vibench.acquisition.run.state import RunState
-from vibench.virtual_rig.world.decimation import GROUP_DELAY_SAMPLES
+from vibench.acquisition import CheckFailed, open_bench, open_recording, run_measurement
+from vibench.acquisition.excitation._sine_sweep import Hold
+from vibench.acquisition.plan import Measurement, RunState, SineSweep, StreamedNoise
+from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.rig import OutputUse, load_rig
+from vibench.acquisition.run._low_level_check import BenchCheck
+from vibench.virtual_rig.world._decimation import GROUP_DELAY_SAMPLES
 
 STREAMING = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig_streaming.toml"
 RIG = load_rig(STREAMING)

@@ -5,12 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.acquisition import open_bench, open_recording, run_measurement
+from vibench.acquisition.plan import Dwell, Measurement
+from vibench.acquisition.recording import RecordingState
 
 VIRTUAL = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml"
 MINUTES = 10

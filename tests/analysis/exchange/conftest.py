@@ -5,11 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from vibench.acquisition.instruments import Block
-from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
-from vibench.acquisition.recording.layout import Origin
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import Block, open_recording
+from vibench.acquisition.recording import ChannelHeader, Origin, RecordingHeader, create_recording
 
 RATE_HZ = 51_200.0
 SAMPLES = 120_000

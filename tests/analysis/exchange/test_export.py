@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from scipy.io import loadmat, wavfile
 
-from vibench.acquisition.errors import RecordingError
-from vibench.acquisition.instruments import Block
-from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
-from vibench.acquisition.recording.layout import Origin
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.results import ResultArray
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import Block, RecordingError, open_recording
+from vibench.acquisition.recording import (
+    ChannelHeader,
+    Origin,
+    RecordingHeader,
+    ResultArray,
+    create_recording,
+)
 from vibench.analysis.errors import InvalidRequest, NotEnoughData
 from vibench.analysis.exchange.excerpt import excerpt
 from vibench.analysis.exchange.export import Format, Results, export_samples

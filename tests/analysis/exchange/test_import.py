@@ -12,10 +12,8 @@ import numpy as np
 import pytest
 from scipy.io import savemat, wavfile
 
-from vibench.acquisition.errors import ConfigurationError, RecordingError
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.toml_file import load_toml
+from vibench.acquisition import ConfigurationError, RecordingError, load_toml, open_recording
+from vibench.acquisition.recording import RecordingState
 from vibench.analysis.errors import AnalysisError, InvalidRequest, UnusableData
 from vibench.analysis.exchange.excerpt import excerpt
 from vibench.analysis.exchange.export import Format, export_samples

@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
-from vibench.acquisition.recording.reader import open_recording
-from vibench.acquisition.recording.results import ResultArray
+from vibench.acquisition import open_recording
+from vibench.acquisition.recording import ResultArray
 
 RATE_HZ = 51_200.0
 ROLES = ("drive_voltage", "m0_velocity")

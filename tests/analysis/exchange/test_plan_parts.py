@@ -2,7 +2,7 @@
 
 import pytest
 
-from vibench.acquisition.toml_file import validated
+from vibench.acquisition import validated
 from vibench.analysis.errors import InvalidRequest
 from vibench.analysis.exchange.mapping import ImportMapping
 from vibench.analysis.exchange.plan_parts import laid_parts

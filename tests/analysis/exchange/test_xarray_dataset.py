@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
 from vibench.analysis.errors import InvalidRequest
 from vibench.analysis.exchange.xarray_dataset import xarray_dataset
 

@@ -6,13 +6,8 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.multisine_noise import MultisineNoise
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.excitation.stepped_sine import SteppedSine
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
+from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep, SteppedSine, StreamedNoise
 from vibench.analysis.campaign_results import Simulation, result_of
 from vibench.analysis.figures.bench_levels import bench_levels_figure
 from vibench.analysis.figures.dwells import dwells_figure, spectrum_columns

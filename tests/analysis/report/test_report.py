@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from vibench.acquisition.recording.layout import RecordingState
+from vibench.acquisition.recording import RecordingState
 from vibench.analysis.campaign_results import Simulation, analyse_files, recordings_in
 from vibench.analysis.errors import NotEnoughData
 from vibench.analysis.report.report import write_report

@@ -6,9 +6,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel
 
-from vibench.acquisition.excitation.kinds import KINDS
-from vibench.acquisition.plan.campaign import load_campaign
-from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition import load_campaign
+from vibench.acquisition.plan import KINDS, Measurement
 from vibench.gui.forms.model_form import ModelForm
 
 CAMPAIGNS = Path(__file__).resolve().parents[3] / "campaigns"

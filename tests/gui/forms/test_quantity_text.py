@@ -3,7 +3,7 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition import ConfigurationError
 from vibench.gui.forms.quantity_text import parsed_quantity, quantity_text
 
 

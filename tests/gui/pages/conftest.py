@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QEventLoop, QTimer
 
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.instruments import Block, Overload
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
-from vibench.acquisition.recording.layout import Origin, RecordingState
-from vibench.acquisition.recording.writer import create_recording
+from vibench.acquisition import Block, Overload
+from vibench.acquisition.plan import Dwell, Measurement, StreamedNoise
+from vibench.acquisition.recording import (
+    ChannelHeader,
+    Origin,
+    RecordingHeader,
+    RecordingState,
+    create_recording,
+)
 from vibench.gui.desk import Desk
 from vibench.gui.settings import Settings
 

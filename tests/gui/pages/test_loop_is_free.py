@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QTimer
 
-from vibench.acquisition.excitation.stepped_sine import SteppedSine
-from vibench.acquisition.instruments import Block, Overload
-from vibench.acquisition.plan.axis import Range
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.plan.sweep import Axis
-from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
-from vibench.acquisition.recording.layout import Origin as RecordingOrigin, RecordingState
-from vibench.acquisition.recording.writer import create_recording
-from vibench.acquisition.shipped import shipped
+from vibench.acquisition import Block, Overload, shipped
+from vibench.acquisition.plan import Axis, Measurement, Range, SteppedSine
+from vibench.acquisition.recording import (
+    ChannelHeader,
+    Origin as RecordingOrigin,
+    RecordingHeader,
+    RecordingState,
+    create_recording,
+)
 from vibench.analysis.comparison.trace import Origin, Response, Trace
 from vibench.analysis.live.view import LiveChannel, LiveView
 from vibench.analysis.simulation.answers import SimulatedPoint, SimulatedSignal

@@ -12,8 +12,8 @@ from nidaqmx.constants import WAIT_INFINITELY, AcquisitionType
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError
 
-from vibench.acquisition.errors import ConfigurationError
-from vibench.virtual_rig.daqmx.server import serve
+from vibench.acquisition import ConfigurationError
+from vibench.virtual_rig.daqmx import serve
 
 PATIENCE_S = 20.0
 

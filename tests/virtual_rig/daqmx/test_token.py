@@ -5,15 +5,11 @@ import nidaqmx
 import pytest
 from nidaqmx import GrpcSessionOptions
 
-from vibench.acquisition.bench import open_bench
-from vibench.acquisition.errors import InstrumentLost
-from vibench.acquisition.rig.calibration import CalibrationRule
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.rig.knobs import confirm_simulated
-from vibench.acquisition.rig.server_token import VARIABLE
-from vibench.virtual_rig.daqmx.token import token_for
-from vibench.virtual_rig.rig import VirtualRig
-from vibench.virtual_rig.usb.usb_remote import RemoteUsbDevice
+from vibench.acquisition import InstrumentLost, open_bench
+from vibench.acquisition.rig import VARIABLE, CalibrationRule, confirm_simulated, load_rig
+from vibench.virtual_rig import VirtualRig
+from vibench.virtual_rig.daqmx import token_for
+from vibench.virtual_rig.usb._remote import RemoteUsbDevice
 
 
 @pytest.fixture

@@ -4,8 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vibench.virtual_rig.generator.afg1022 import AFG1022
-from vibench.virtual_rig.generator.scpi_command import Quirks
+from vibench.virtual_rig.generator import AFG1022, Quirks
 
 PLAIN = Quirks(
     first_identity_after_clear_is_empty=False,

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.virtual_rig.generator.periodic_shape import Rectangle, Sine
-from vibench.virtual_rig.generator.phase_course import (
+from vibench.virtual_rig.generator._periodic_shape import Rectangle, Sine
+from vibench.virtual_rig.generator._phase_course import (
     FrequencyModulatedPhase,
     Modulator,
     PhaseModulatedPhase,

@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.virtual_rig.generator.afg1022 import AFG1022
-from vibench.virtual_rig.generator.output_signal import Panel
-from vibench.virtual_rig.generator.scpi_command import Quirks
-from vibench.virtual_rig.generator.terminal_voltage import Terminal
+from vibench.virtual_rig.generator import AFG1022, Panel, Quirks, Terminal
 
 INTERVAL_S = 1 / 51_200
 FIRMWARE = Quirks()

@@ -10,12 +10,9 @@ import pyvisa
 import usb.core
 from pyvisa.errors import VisaIOError
 
-from vibench.acquisition.errors import ConfigurationError
-from vibench.virtual_rig.generator.afg1022 import AFG1022
-from vibench.virtual_rig.generator.scpi_command import Quirks
-from vibench.virtual_rig.generator.terminal_voltage import Terminal
-from vibench.virtual_rig.usb import usb_bus
-from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
+from vibench.acquisition import ConfigurationError
+from vibench.virtual_rig.generator import AFG1022, Quirks, Terminal
+from vibench.virtual_rig.usb import UsbTmcInstrument, plug_in, unplug
 
 
 def listing(test):
@@ -36,14 +33,14 @@ class Plugged:
         terminal = Terminal(noise_v_per_rt_hz=0.0)
         self.generator = AFG1022(lambda: 0.0, serial=serial, quirks=quirks or Quirks(), terminal=terminal)
         self.cable = UsbTmcInstrument(self.generator)
-        usb_bus.plug_in(self.cable)
+        plug_in(self.cable)
         self.resources = pyvisa.ResourceManager("@py")
         self.instrument = self.resources.open_resource(f"USB0::0x0699::0x0353::{serial}::INSTR")
 
     def close(self):
         self.instrument.close()
         self.resources.close()
-        usb_bus.unplug(self.cable)
+        unplug(self.cable)
 
 
 @pytest.fixture
@@ -127,7 +124,7 @@ def test_a_lost_device_raises_on_every_call(plugged, how):
     if how == "cable":
         plugged.cable.pull_cable()
     else:
-        usb_bus.unplug(plugged.cable)
+        unplug(plugged.cable)
     for call in (
         lambda: plugged.instrument.write("OUTP OFF"),
         lambda: plugged.instrument.query("*IDN?"),
@@ -146,7 +143,7 @@ def test_a_cable_put_back_works_with_the_session_that_was_open(plugged):
 @listing
 def test_an_unplugged_device_is_no_longer_listed(plugged):
     plugged.instrument.close()
-    usb_bus.unplug(plugged.cable)
+    unplug(plugged.cable)
     assert not [name for name in plugged.resources.list_resources() if "C010101" in name]
 
 
@@ -167,7 +164,7 @@ def test_several_generators_on_one_bus_keep_apart(plugged):
 def test_one_serial_number_cannot_be_plugged_in_twice(plugged):
     twin = UsbTmcInstrument(AFG1022(lambda: 0.0))
     with pytest.raises(ConfigurationError, match=r"C010101.*already on the virtual USB bus"):
-        usb_bus.plug_in(twin)
+        plug_in(twin)
 
 
 def test_a_second_session_is_refused_while_the_first_is_open(plugged):
@@ -199,10 +196,10 @@ def test_it_works_although_pyvisa_was_imported_first_without_libusb():
             rm.open_resource(name)
         except ValueError as error:
             print("before:", type(error).__name__)
-        from vibench.virtual_rig.usb import usb_bus
-        from vibench.virtual_rig.generator.afg1022 import AFG1022
-        from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
-        usb_bus.plug_in(UsbTmcInstrument(AFG1022(lambda: 0.0)))
+        from vibench.virtual_rig.usb import plug_in
+        from vibench.virtual_rig.generator import AFG1022
+        from vibench.virtual_rig.usb import UsbTmcInstrument
+        plug_in(UsbTmcInstrument(AFG1022(lambda: 0.0)))
         print("after:", rm.open_resource(name).query("*IDN?").split(",")[1])
     """
     done = subprocess.run(

@@ -10,11 +10,11 @@ import grpc
 import numpy as np
 import pytest
 
-from vibench.acquisition.errors import InstrumentLost
-from vibench.virtual_rig.generator.afg1022 import AFG1022
-from vibench.virtual_rig.usb.usb_device import BULK_OUT, Setup
-from vibench.virtual_rig.usb.usb_remote import RemoteUsbDevice, usb_service
-from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
+from vibench.acquisition import InstrumentLost
+from vibench.virtual_rig.generator import AFG1022
+from vibench.virtual_rig.usb import UsbTmcInstrument, usb_service
+from vibench.virtual_rig.usb._device import BULK_OUT, Setup
+from vibench.virtual_rig.usb._remote import RemoteUsbDevice
 
 
 class Rig:
@@ -50,8 +50,8 @@ def test_a_program_in_another_process_needs_one_line(rig):
     program = """
         import sys, warnings
         warnings.simplefilter("ignore")
-        from vibench.virtual_rig.usb import usb_bus
-        usb_bus.plug_in_remote(sys.argv[1])
+        from vibench.virtual_rig.usb import plug_in_remote
+        plug_in_remote(sys.argv[1])
         import numpy as np
         import pyvisa
         rm = pyvisa.ResourceManager("@py")

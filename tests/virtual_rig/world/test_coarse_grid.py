@@ -5,18 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.errors import ConfigurationError, LimitExceeded
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.plan.limits import require_within_limits
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.rig.configuration import Rig, load_rig
-from vibench.acquisition.rig.specimen import specimen_of
-from vibench.acquisition.rig.virtual import COARSEST_GRID_RATE_HZ, WATCHED_HZ, highest_carried_hz, level_error
-from vibench.acquisition.toml_file import validated
-from vibench.virtual_rig.world.analogue_filter import RunningFilter, resonant
-from vibench.virtual_rig.world.plant import TRUTH_COLUMNS, Plant
-from vibench.virtual_rig.world.time_grid import TimeGrid
-from vibench.virtual_rig.world.world import World
+from vibench.acquisition import ConfigurationError, LimitExceeded, validated
+from vibench.acquisition.plan import Dwell, Measurement, require_within_limits
+from vibench.acquisition.rig import Rig, highest_carried_hz, load_rig, specimen_of
+from vibench.acquisition.rig._virtual import COARSEST_GRID_RATE_HZ, WATCHED_HZ, level_error
+from vibench.virtual_rig.world import World
+from vibench.virtual_rig.world._analogue_filter import RunningFilter, resonant
+from vibench.virtual_rig.world._plant import TRUTH_COLUMNS, Plant
+from vibench.virtual_rig.world._time_grid import TimeGrid
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 COARSE = TimeGrid(COARSEST_GRID_RATE_HZ)

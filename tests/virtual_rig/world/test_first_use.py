@@ -7,7 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[3]
 PROGRAM = """
 from pathlib import Path
-from vibench.acquisition.bench import open_bench
+from vibench.acquisition import open_bench
 from vibench.virtual_rig.world import conversion, decimation, input_stage, plant, recursive_filter
 
 kernels = (

@@ -10,11 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.rig.model import Quantity, RigModel
-from vibench.acquisition.rig.specimen import specimen_of
-from vibench.virtual_rig.world.plant import TRUTH_COLUMNS, Plant
-from vibench.virtual_rig.world.time_grid import USUAL_GRID
+from vibench.acquisition.rig import Quantity, RigModel, load_rig, specimen_of
+from vibench.virtual_rig.world._plant import TRUTH_COLUMNS, Plant
+from vibench.virtual_rig.world._time_grid import USUAL_GRID
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 STEP_S = USUAL_GRID.step_s

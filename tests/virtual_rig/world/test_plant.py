@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.errors import AcquisitionError
-from vibench.acquisition.rig.configuration import load_rig
-from vibench.acquisition.rig.model import Quantity, RigModel, amplifier_gain, suspended_mass_kg
+from vibench.acquisition import AcquisitionError
+from vibench.acquisition.rig import Quantity, RigModel, load_rig, suspended_mass_kg
+from vibench.acquisition.rig._model import amplifier_gain
 from vibench.sim import base_transmissibility, gong2025
-from vibench.virtual_rig.world.plant import TRUTH_COLUMNS, Plant
-from vibench.virtual_rig.world.time_grid import USUAL_GRID
+from vibench.virtual_rig.world._plant import TRUTH_COLUMNS, Plant
+from vibench.virtual_rig.world._time_grid import USUAL_GRID
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 STEP_S = USUAL_GRID.step_s

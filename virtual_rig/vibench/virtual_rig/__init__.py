@@ -1,1 +1,25 @@
-"""The simulated instruments, and the analogue world between them."""
+"""The simulated laboratory: function generator, USB cable, DAQ service, and the analogue world between them.
+
+Unmodified pyvisa finds an AFG1022, unmodified nidaqmx a converter behind a gRPC port; the samples it
+reads are what the generator's output does to amplifier, shaker, specimen, vibrometer and converter, in
+rig time. Faults happen on demand or by a script (docs/faults.md). It takes the configuration, errors and
+disk troubles from `vibench.acquisition`, physics from `vibench.sim`; it knows no driver, plan or run, and
+only a bench and ``vibench serve-rig`` switch it on. Levels and time: docs/decisions/0006-virtual-rig.md.
+
+::
+
+    with VirtualRig(load_rig(path)) as rig:  # rig.visa_resource for pyvisa, rig.daq_address for nidaqmx
+        ...
+
+In another process, ``plug_in_remote(rig.daq_address)`` puts the generator on pyvisa's USB bus.
+
+>>> from vibench.acquisition import shipped
+>>> from vibench.virtual_rig import load_fault_script
+>>> script = load_fault_script(shipped("hardware_configs/faults/night.toml"))
+>>> len(script.faults), script.faults[0].fault, script.faults[0].at_s
+(20, 'drop_laser', 600.0)
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,1 +1,25 @@
-"""A campaign that one can leave alone: its journal, its retries, who is told, and a folder's catalogue."""
+"""Many measurements, unattended: journal, attempts, reconnecting, notices, and the catalogue of a folder.
+
+Every state of every point is committed to an SQLite journal before and after each step, so that a
+campaign that was killed resumes at its first unfinished point; each attempt is a file of its own
+(``NAME.h5``, ``NAME.2.h5``). Who is away is told by command or mail. `estimate` says beforehand what a
+campaign takes, `catalogue` lists the recordings of a folder. It starts and stops runs, and knows nothing
+of the engine's process and its viewers. See docs/campaigns.md and
+docs/decisions/0014-chains-of-points.md.
+
+>>> from pathlib import Path
+>>> from tempfile import TemporaryDirectory
+>>> from vibench.acquisition import load_campaign, shipped
+>>> from vibench.acquisition.campaign import estimate
+>>> from vibench.acquisition.rig import load_rig
+>>> campaign = load_campaign(shipped("campaigns/quick.toml"))
+>>> rig = load_rig(shipped("hardware_configs/virtual_rig.toml"))
+>>> with TemporaryDirectory() as folder:
+...     needed = estimate(campaign, rig, Path(folder))
+>>> needed.recordings, needed.kept, round(needed.duration_s)
+(15, 0, 63)
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,1 +1,11 @@
-"""Steps that depend on what was measured: clocks, settling, levels, jumps, resonances, conductors."""
+"""Feedback controllers: measurements whose next step depends on what was measured.
+
+A controller is a generator: it yields a phase to play, is sent the samples of that phase, and decides the
+next: settling, holding a level, stepping on one branch, locating a jump, tracking a phase resonance.
+Period by period, from the recorded drive; no real-time loop. It touches no instrument. See
+docs/decisions/0015-feedback.md and docs/feedback.md.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

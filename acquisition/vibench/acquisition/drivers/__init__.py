@@ -1,1 +1,11 @@
-"""Real instruments: the only place, with `virtual`, that talks to pyvisa and nidaqmx."""
+"""Real instruments: the Tektronix AFG1022 over VISA, and converters and outputs behind NI-DAQmx.
+
+Each keeps the promises of `vibench.acquisition.instruments`: every setting is read back, every refusal
+becomes an error that says what to do, and outputs go off whatever happens. The only place of this package
+that imports pyvisa, nidaqmx and grpc. It knows the rig's configuration, and neither plans nor runs; it
+cannot tell a simulated instrument from a real one.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

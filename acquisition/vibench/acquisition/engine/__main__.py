@@ -9,13 +9,13 @@ import sys
 from threading import Event, Thread
 from types import FrameType
 
-from ..run.stop import Cause
-from .desk import Desk
-from .engine import Engine
-from .hosted import hosted
-from .server import LOOPBACK, spoken
-from .state import Attendance
-from .work import Work
+from ..stopping import Cause
+from ._engine import Engine
+from ._job_queue import Work
+from ._request_handler import Desk
+from ._server import LOOPBACK, spoken
+from ._serving import hosted
+from ._state import Attendance
 
 FORGOTTEN_S = 60.0
 """An unattended engine that was never used waits this long for somebody to ask [s]."""

@@ -1,1 +1,168 @@
-"""What is to be measured: measurements, campaigns, and what they will do to the rig."""
+"""What to measure: excitations, measurements, campaigns, sweeps, and what they will do to the rig.
+
+A `Measurement` is one excitation with its ramps and limits while running; a `Campaign` an ordered list of
+them and of nested sweeps, read from TOML. Before anything moves, a plan is held against the limits of the
+rig by its linear model (`predicted_loads`, `Outlook`) and laid out in phases of time (`duration_s`). All
+are frozen and validated. Frequencies in Hz, times in s, amplitudes peak to peak in V. Plans open no
+instrument and know no bench and no run. Chains of points: docs/decisions/0014-chains-of-points.md.
+Feedback: docs/feedback.md.
+
+>>> from vibench.acquisition.plan import Measurement, SineSweep, duration_s
+>>> sweep = SineSweep(amplitude_vpp=1.5, start_hz=220, stop_hz=310, duration_s=6)
+>>> round(duration_s(Measurement(name="up", excitation=sweep)), 3)  # with settling and ramps [s]
+11.0
+"""
+
+from ..excitation import (
+    KINDS,
+    RESONANCE_LABEL,
+    STEP_LABEL,
+    AbstractExcitation,
+    Direction,
+    Dwell,
+    Excitation,
+    FrequencySteps,
+    HeldDwell,
+    HeldSweep,
+    LeadIn,
+    MultisineNoise,
+    OddMultisine,
+    Preview,
+    ResonanceTracking,
+    Segment,
+    SettledSine,
+    SineSweep,
+    Step,
+    SteppedLevel,
+    SteppedSine,
+    StreamedNoise,
+)
+from ._axis import (
+    Range,
+    RangeSpacing,
+)
+from ._band import (
+    excited_band_hz,
+)
+from ._campaign import (
+    BYTES_PER_SAMPLE,
+    Campaign,
+    load_campaign,
+)
+from ._drive_source import (
+    Player,
+    player_of,
+)
+from ._limits import (
+    LimitCheck,
+    Side,
+    require_within_limits,
+    shortest_ramp_s,
+)
+from ._loads import (
+    predicted_loads,
+)
+from ._measurement import (
+    InRunLimits,
+    Measurement,
+    OnOverload,
+)
+from ._measurement_preview import (
+    Outlook,
+    outlook,
+)
+from ._needed_setting import (
+    needed_vpp,
+)
+from ._point import (
+    Point,
+)
+from ._retry import (
+    Retryable,
+    RetryPolicy,
+)
+from ._run_state import (
+    RunState,
+)
+from ._schedule import (
+    CHECK_FREQUENCY_HZ,
+    CHECK_S,
+    HUSH_S,
+    Phase,
+    check_amplitude_vpp,
+    check_phases,
+    duration_s,
+    half_cosine,
+    known_phases,
+    lead_in_s,
+    measured_s,
+    phases,
+    ramp,
+    stairs,
+)
+from ._sweep import (
+    Axis,
+)
+
+__all__ = [
+    "BYTES_PER_SAMPLE",
+    "CHECK_FREQUENCY_HZ",
+    "CHECK_S",
+    "HUSH_S",
+    "KINDS",
+    "RESONANCE_LABEL",
+    "STEP_LABEL",
+    "AbstractExcitation",
+    "Axis",
+    "Campaign",
+    "Direction",
+    "Dwell",
+    "Excitation",
+    "FrequencySteps",
+    "HeldDwell",
+    "HeldSweep",
+    "InRunLimits",
+    "LeadIn",
+    "LimitCheck",
+    "Measurement",
+    "MultisineNoise",
+    "OddMultisine",
+    "OnOverload",
+    "Outlook",
+    "Phase",
+    "Player",
+    "Point",
+    "Preview",
+    "Range",
+    "RangeSpacing",
+    "ResonanceTracking",
+    "RetryPolicy",
+    "Retryable",
+    "RunState",
+    "Segment",
+    "SettledSine",
+    "Side",
+    "SineSweep",
+    "Step",
+    "SteppedLevel",
+    "SteppedSine",
+    "StreamedNoise",
+    "check_amplitude_vpp",
+    "check_phases",
+    "duration_s",
+    "excited_band_hz",
+    "half_cosine",
+    "known_phases",
+    "lead_in_s",
+    "load_campaign",
+    "measured_s",
+    "needed_vpp",
+    "outlook",
+    "phases",
+    "player_of",
+    "predicted_loads",
+    "ramp",
+    "require_within_limits",
+    "shortest_ramp_s",
+    "stairs",
+]

@@ -1,25 +1,112 @@
-"""The HDF5 recording: its layout, writing, finalising, recovering and reading.
+"""The HDF5 recording: its layout, writing, finishing, recovering and reading.
 
-The names below are how the rest of the house, and scripts of users, reach it.
+While it is made it is ``NAME.h5.part``: one writer thread commits samples, syncs, then commits the
+counters, so that a kill or power cut costs at most the last second. Finished, it is compressed,
+checksummed ``NAME.h5``; nothing is overwritten. Samples are the converter's int32 counts with scale
+factors to SI units; lost ones are marked. Readable without this code: docs/recording-format.md; reasons:
+docs/decisions/0003-recording-format.md and 0020. It knows blocks of samples and instruments' identities,
+and nothing of rigs, plans (kept as JSON) and runs.
+
+>>> from pathlib import Path
+>>> from tempfile import TemporaryDirectory
+>>> import numpy as np
+>>> from vibench.acquisition import Block, open_recording
+>>> from vibench.acquisition.recording import (
+...     ChannelHeader, Origin, RecordingHeader, RecordingState, create_recording
+... )
+>>> channel = ChannelHeader(
+...     "m0_velocity", "Dev1/ai0", "velocity", "m s-1", physical_per_volt=0.125, range_v=5.0
+... )
+>>> header = RecordingHeader((channel,), 1000.0, expected_samples=500, origin=Origin.SIMULATED)
+>>> with TemporaryDirectory() as folder:
+...     with create_recording(Path(folder) / "sine.h5", header) as writer:
+...         writer.append(Block(0, np.sin(0.1 * np.arange(500))[np.newaxis]))
+...         path = writer.finish(RecordingState.COMPLETE)
+...     with open_recording(path) as recording:
+...         print(recording.state.value, recording.samples, f"{recording.read('m0_velocity').max():.3f}")
+complete 500 0.125
 """
 
-from .header import ChannelHeader, RecordingHeader
-from .layout import Origin, RecordingState
-from .reader import Recording, open_recording
-from .recover import recover
-from .results import ResultArray, SavedResult
-from .writer import RecordingWriter, create_recording
+from ._disk import (
+    sole_use,
+)
+from ._disk_trouble import (
+    DiskTrouble,
+    troubled_disks,
+)
+from ._header import (
+    ROLE_PATTERN,
+    ChannelHeader,
+    RecordingHeader,
+)
+from ._layout import (
+    CHUNK_SAMPLES,
+    MISSING_COUNT,
+    PART_SUFFIX,
+    SUFFIX,
+    Origin,
+    RecordingState,
+    part_of,
+    tmp_of,
+)
+from ._opening import (
+    name_now,
+)
+from ._overview import (
+    BIN_SAMPLES,
+    CountOverview,
+    OverviewSums,
+)
+from ._preallocate import (
+    HOLD_ROOM_S,
+)
+from ._provenance import (
+    collect_provenance,
+)
+from ._reader import (
+    RecordedBlock,
+    Recording,
+    open_recording,
+)
+from ._recover import (
+    recover,
+)
+from ._results import (
+    ResultArray,
+    SavedResult,
+)
+from ._writer import (
+    RecordingWriter,
+    create_recording,
+)
 
 __all__ = [
+    "BIN_SAMPLES",
+    "CHUNK_SAMPLES",
+    "HOLD_ROOM_S",
+    "MISSING_COUNT",
+    "PART_SUFFIX",
+    "ROLE_PATTERN",
+    "SUFFIX",
     "ChannelHeader",
+    "CountOverview",
+    "DiskTrouble",
     "Origin",
+    "OverviewSums",
+    "RecordedBlock",
     "Recording",
     "RecordingHeader",
     "RecordingState",
     "RecordingWriter",
     "ResultArray",
     "SavedResult",
+    "collect_provenance",
     "create_recording",
+    "name_now",
     "open_recording",
+    "part_of",
     "recover",
+    "sole_use",
+    "tmp_of",
+    "troubled_disks",
 ]

@@ -5,7 +5,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
-from vibench.acquisition.toml_file import FrozenModel
+from vibench.acquisition import FrozenModel
 
 from ..campaign_results import Simulation
 from ..confidence import DEFAULT_CONFIDENCE

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import open_recording
 
 from ..arrays import Reals
 from ..campaign_results import (

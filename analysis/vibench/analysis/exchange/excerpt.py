@@ -3,8 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from vibench.acquisition.recording.header import ChannelHeader
-from vibench.acquisition.recording.reader import RecordedBlock, Recording
+from vibench.acquisition.recording import ChannelHeader, RecordedBlock, Recording
 
 from ..arrays import Reals
 from ..errors import InvalidRequest, NotEnoughData

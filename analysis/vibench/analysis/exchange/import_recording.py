@@ -12,11 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from vibench.acquisition.instruments import Block, Overload
-from vibench.acquisition.recording.header import ChannelHeader, RecordingHeader
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.provenance import collect_provenance
-from vibench.acquisition.recording.writer import RecordingWriter, create_recording
+from vibench.acquisition import Block, Overload
+from vibench.acquisition.recording import (
+    ChannelHeader,
+    RecordingHeader,
+    RecordingState,
+    RecordingWriter,
+    collect_provenance,
+    create_recording,
+)
 
 from ..arrays import Flags, Reals
 from ..errors import InvalidRequest

@@ -5,10 +5,9 @@ from typing import Literal, Self
 
 from pydantic import AwareDatetime, Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.header import ROLE_PATTERN
-from vibench.acquisition.recording.layout import Origin
-from vibench.acquisition.toml_file import FrozenModel
+from vibench.acquisition import FrozenModel
+from vibench.acquisition.plan import Measurement
+from vibench.acquisition.recording import ROLE_PATTERN, Origin
 
 from ..recorded_channels import BASE, DRIVE, RESPONSE
 

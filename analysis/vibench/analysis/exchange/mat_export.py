@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.io import savemat
 
-from vibench.acquisition.recording.header import ChannelHeader
+from vibench.acquisition.recording import ChannelHeader
 
 from ..arrays import Reals
 from ..errors import InvalidRequest

@@ -4,8 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
 
-from vibench.acquisition.excitation.plan import AbstractExcitation
-from vibench.acquisition.excitation.steps import Segment, Step
+from vibench.acquisition.plan import AbstractExcitation, Segment, Step
 
 from ..errors import InvalidRequest
 from .mapping import ImportMapping

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vibench.acquisition.recording.reader import Recording
-from vibench.acquisition.recording.results import ResultArray, SavedResult
+from vibench.acquisition.recording import Recording, ResultArray, SavedResult
 
 from ..errors import NotEnoughData
 from ..tables import Table, table, write_csv

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 
-from vibench.acquisition.recording.header import ChannelHeader
+from vibench.acquisition.recording import ChannelHeader
 
 from .excerpt import Excerpt, Watcher, unwatched
 from .uff_format import (

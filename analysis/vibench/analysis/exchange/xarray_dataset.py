@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.acquisition.recording.header import ChannelHeader
-from vibench.acquisition.recording.reader import Recording
+from vibench.acquisition.recording import ChannelHeader, Recording
 
 from ..errors import InvalidRequest
 from .excerpt import excerpt

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from vibench.acquisition.excitation.preview import Preview
-from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.plan import Measurement, Preview
 
 from ..arrays import Reals
 from ..envelope import envelope

@@ -3,8 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from vibench.acquisition.excitation.resonance_tracking import ResonanceTracking
-from vibench.acquisition.excitation.stepped_level import SteppedLevel
+from vibench.acquisition.plan import ResonanceTracking, SteppedLevel
 
 from ..arrays import Reals
 from ..feedback_words import feedback_sentences, noted_jumps

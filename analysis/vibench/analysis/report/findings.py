@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-from vibench.acquisition.excitation.resonance_tracking import ResonanceTracking
-from vibench.acquisition.excitation.stepped_level import SteppedLevel
+from vibench.acquisition.plan import ResonanceTracking, SteppedLevel
 
 from ..campaign_results import CampaignResults, DwellResult, NoiseResult, SweepResult
 from ..feedback_words import feedback_sentences

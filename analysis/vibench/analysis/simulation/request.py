@@ -5,7 +5,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
-from vibench.acquisition.toml_file import FrozenModel
+from vibench.acquisition import FrozenModel
 from vibench.sim import Accuracy, Observable
 from vibench.sim.study import Study, frequency_range
 

@@ -4,7 +4,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFocusEvent, QPaintEvent, QValidator, QWheelEvent
 from PySide6.QtWidgets import QAbstractSpinBox, QWidget
 
-from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition import ConfigurationError
 
 from .field_edge import draw_edge
 from .quantity_text import parsed_quantity, quantity_text

@@ -2,7 +2,7 @@
 
 import re
 
-from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition import ConfigurationError
 
 PREFIXES = {"p": 1e-12, "n": 1e-9, "µ": 1e-6, "u": 1e-6, "μ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
 _SHOWN = ((1e-12, "p"), (1e-9, "n"), (1e-6, "µ"), (1e-3, "m"))

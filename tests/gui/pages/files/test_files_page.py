@@ -7,17 +7,13 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
-from vibench.acquisition.campaign.bench_identity import BenchIdentity
-from vibench.acquisition.campaign.journal import Journal, journal_path
-from vibench.acquisition.campaign.journal_point import PointState
-from vibench.acquisition.campaign.why import Why
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.rig.configuration import Rig
-from vibench.acquisition.shipped import shipped
-from vibench.acquisition.toml_file import load_toml
+from vibench.acquisition import load_toml, shipped
+from vibench.acquisition.campaign import PointState, Why
+from vibench.acquisition.campaign._bench_identity import BenchIdentity
+from vibench.acquisition.campaign._journal import Journal, journal_path
+from vibench.acquisition.plan import Campaign, Dwell, Measurement
+from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.rig import Rig
 from vibench.analysis.thumbnail import thumbnail
 from vibench.gui.pages.files.files_page import FilesPage
 from vibench.gui.pages.files.listing import made_levels

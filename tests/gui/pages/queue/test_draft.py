@@ -2,12 +2,8 @@
 
 import pytest
 
-from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.plan.axis import Range
-from vibench.acquisition.plan.campaign import load_campaign
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.plan.sweep import Axis
-from vibench.acquisition.toml_text import save_toml
+from vibench.acquisition import ConfigurationError, load_campaign, save_toml
+from vibench.acquisition.plan import Axis, Measurement, Range
 from vibench.gui.pages.queue.draft import moved_up, with_measurement, with_sweep, without
 
 DWELL = Measurement.model_validate(

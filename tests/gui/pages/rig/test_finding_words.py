@@ -2,7 +2,7 @@
 
 import pytest
 
-from vibench.acquisition.check.finding import Finding, Verdict
+from vibench.acquisition import Finding, Verdict
 from vibench.gui.pages.rig.finding_words import expected_text, finding_name, measured_text
 
 

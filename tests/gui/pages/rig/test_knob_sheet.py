@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from vibench.acquisition.rig.configuration import load_rig
+from vibench.acquisition.rig import load_rig
 from vibench.gui.pages.rig.knob_sheet import KnobSheetForm
 
 CONFIGS = Path(__file__).resolve().parents[4] / "hardware_configs"

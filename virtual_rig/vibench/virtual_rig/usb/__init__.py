@@ -1,1 +1,26 @@
-"""The USB cable of the simulated generator, for the unmodified PyUSB."""
+"""The USB cable of the simulated generator: bus, descriptors, USBTMC, and a cable through the network.
+
+Works with unmodified PyUSB and pyvisa-py, without libusb; while this bus is installed, PyUSB sees it
+instead of the machine's own devices. Transfers fail as real ones do (errno). Sources: USB 2.0 chapter
+9.6, USBTMC 1.0, USB488 1.0.
+"""
+
+from ._bus import (
+    plug_in,
+    plug_in_remote,
+    unplug,
+)
+from ._remote import (
+    usb_service,
+)
+from ._usbtmc import (
+    UsbTmcInstrument,
+)
+
+__all__ = [
+    "UsbTmcInstrument",
+    "plug_in",
+    "plug_in_remote",
+    "unplug",
+    "usb_service",
+]

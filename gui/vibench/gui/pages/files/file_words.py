@@ -1,7 +1,6 @@
 """How sizes, times and states of recordings are written in a list."""
 
-from vibench.acquisition.recording.layout import RecordingState
-from vibench.acquisition.recording.reader import Recording
+from vibench.acquisition.recording import Recording, RecordingState
 
 _STATE_SYMBOLS: dict[str, str] = {
     RecordingState.COMPLETE: "✔",

@@ -12,9 +12,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from vibench.acquisition.errors import RecordingError
-from vibench.acquisition.recording.opening import name_now
-from vibench.acquisition.recording.reader import Recording, open_recording
+from vibench.acquisition import RecordingError, open_recording
+from vibench.acquisition.recording import Recording, name_now
 from vibench.analysis.overview import RecordingOverview, has_overview, kept_levels
 from vibench.analysis.thumbnail import Thumbnail
 

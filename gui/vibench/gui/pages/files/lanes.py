@@ -8,8 +8,7 @@ from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent, QPalette, QResizeEvent
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
-from vibench.acquisition.recording.header import ChannelHeader
-from vibench.acquisition.recording.reader import Recording
+from vibench.acquisition.recording import ChannelHeader, Recording
 from vibench.analysis.live.envelope import zigzag
 from vibench.analysis.overview import RecordingOverview
 

@@ -4,12 +4,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from vibench.acquisition.campaign.catalogue import catalogue
-from vibench.acquisition.campaign.catalogue_entry import UNREADABLE, CatalogueEntry
-from vibench.acquisition.campaign.journal import JOURNAL_SUFFIX
-from vibench.acquisition.campaign.journal_point import PointState, read_journal
-from vibench.acquisition.errors import RecordingError
-from vibench.acquisition.recording.reader import open_recording
+from vibench.acquisition import RecordingError, open_recording
+from vibench.acquisition.campaign import (
+    JOURNAL_SUFFIX,
+    UNREADABLE,
+    CatalogueEntry,
+    PointState,
+    catalogue,
+    read_journal,
+)
 from vibench.analysis.overview import Level, overview_levels
 from vibench.analysis.thumbnail import Thumbnail, thumbnail
 

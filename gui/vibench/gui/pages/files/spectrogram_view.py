@@ -9,7 +9,7 @@ from PySide6.QtCore import QRectF
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
-from vibench.acquisition.recording.reader import Recording
+from vibench.acquisition.recording import Recording
 from vibench.analysis.recorded_channels import RESPONSE
 from vibench.analysis.recording_spectrogram import (
     DensityPicture,

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.rig.configuration import Rig
+from vibench.acquisition.plan import Campaign
+from vibench.acquisition.rig import Rig
 
 from .row_words import entry_rows
 

@@ -4,11 +4,8 @@ from collections.abc import Sequence
 
 from pydantic import BaseModel
 
-from vibench.acquisition.plan.axis import Range
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.plan.sweep import Axis
-from vibench.acquisition.toml_file import validated
+from vibench.acquisition import validated
+from vibench.acquisition.plan import Axis, Campaign, Measurement, Range
 
 USUAL_NAME = "queue"
 

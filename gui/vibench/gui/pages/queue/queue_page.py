@@ -16,16 +16,17 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from vibench.acquisition.campaign.item import Existing
-from vibench.acquisition.engine.state import EngineState
-from vibench.acquisition.engine.status import EngineStatus
-from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.plan.axis import Range
-from vibench.acquisition.plan.campaign import Campaign, load_campaign
-from vibench.acquisition.plan.sweep import Axis
-from vibench.acquisition.shipped import all_shipped
-from vibench.acquisition.toml_file import validated
-from vibench.acquisition.toml_text import save_toml, toml_text
+from vibench.acquisition import (
+    ConfigurationError,
+    all_shipped,
+    load_campaign,
+    save_toml,
+    toml_text,
+    validated,
+)
+from vibench.acquisition.campaign import Existing
+from vibench.acquisition.engine import EngineState, EngineStatus
+from vibench.acquisition.plan import Axis, Campaign, Range
 
 from ...desk import Desk
 from ...faces import clock

@@ -2,10 +2,8 @@
 
 from collections.abc import Sequence
 
-from vibench.acquisition.engine.state import DRIVING, EngineState
-from vibench.acquisition.engine.status import RowStatus
-from vibench.acquisition.plan.campaign import Campaign
-from vibench.acquisition.run.schedule import duration_s
+from vibench.acquisition.engine import DRIVING, EngineState, RowStatus
+from vibench.acquisition.plan import Campaign, duration_s
 
 from ...faces import clock
 

@@ -4,8 +4,7 @@ from pydantic import ValidationError
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFormLayout, QGroupBox, QLabel, QPushButton, QWidget
 
-from vibench.acquisition.plan.axis import Range, RangeSpacing
-from vibench.acquisition.plan.sweep import Axis
+from vibench.acquisition.plan import Axis, Range, RangeSpacing
 
 from ...forms.editor import Choice
 from ...forms.quantity_edit import QuantityEdit

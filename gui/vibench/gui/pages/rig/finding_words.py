@@ -2,7 +2,7 @@
 
 from math import floor, isfinite, log10
 
-from vibench.acquisition.check.finding import Finding
+from vibench.acquisition import Finding
 
 _PREFIXED = frozenset({"V", "A", "s", "m", "Hz", "W"})
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}

@@ -5,8 +5,7 @@ from datetime import UTC, datetime
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QGroupBox, QLabel, QVBoxLayout, QWidget
 
-from vibench.acquisition.rig.configuration import Knob, Rig
-from vibench.acquisition.rig.knobs import KnobSheet
+from vibench.acquisition.rig import Knob, KnobSheet, Rig
 
 from ...forms.field_edge import LineField
 

@@ -5,9 +5,8 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFileDialog, QFormLayout, QHBoxLayout, QLabel, QPushButton, QWidget
 
-from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.rig.configuration import Rig, load_rig
-from vibench.acquisition.shipped import all_shipped
+from vibench.acquisition import ConfigurationError, all_shipped
+from vibench.acquisition.rig import Rig, load_rig
 
 from ...forms.editor import Choice
 

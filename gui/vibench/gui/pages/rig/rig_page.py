@@ -13,11 +13,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from vibench.acquisition.bench_list import InstrumentList, list_rig_instruments
-from vibench.acquisition.check.finding import BenchReport, Verdict
-from vibench.acquisition.engine.state import EngineState
-from vibench.acquisition.engine.status import EngineStatus
-from vibench.acquisition.shipped import shipped
+from vibench.acquisition import BenchReport, InstrumentList, Verdict, list_rig_instruments, shipped
+from vibench.acquisition.engine import EngineState, EngineStatus
 
 from ...desk import Desk
 from ...faces import moment_text

@@ -3,8 +3,7 @@
 from PySide6.QtCore import Signal, SignalInstance
 from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
-from vibench.acquisition.engine.state import DRIVING, EngineState
-from vibench.acquisition.engine.status import EngineStatus
+from vibench.acquisition.engine import DRIVING, EngineState, EngineStatus
 
 _HINTS = {
     EngineState.CLOSED: "No bench is open. Open one on the Rig page (Ctrl+1).",

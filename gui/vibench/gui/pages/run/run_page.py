@@ -6,9 +6,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
 
-from vibench.acquisition.engine.state import EngineState
-from vibench.acquisition.plan.band import excited_band_hz
-from vibench.acquisition.rig.channel import channels_of
+from vibench.acquisition.engine import EngineState
+from vibench.acquisition.plan import excited_band_hz
+from vibench.acquisition.rig import channels_of
 from vibench.analysis.foresight import Foresight
 from vibench.analysis.live.view import LiveView
 

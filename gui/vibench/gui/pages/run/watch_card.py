@@ -13,8 +13,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from vibench.acquisition.engine.state import DRIVING
-from vibench.acquisition.engine.status import EngineStatus, RunStatus
+from vibench.acquisition.engine import DRIVING, EngineStatus, RunStatus
 from vibench.analysis.live.view import LiveView
 
 from ...faces import clock

@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass
 
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.plan.outlook import Outlook, outlook
-from vibench.acquisition.rig.configuration import Rig
+from vibench.acquisition.plan import Measurement, Outlook, outlook
+from vibench.acquisition.rig import Rig
 from vibench.analysis.foresight import Foresight, foresee
 
 

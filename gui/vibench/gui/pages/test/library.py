@@ -3,11 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.plan.campaign import load_campaign
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.shipped import all_shipped
-from vibench.acquisition.toml_file import load_toml
+from vibench.acquisition import ConfigurationError, all_shipped, load_campaign, load_toml
+from vibench.acquisition.plan import Measurement
 
 MOST_OF_ONE = 12
 """Tests listed of one campaign; sweeps make hundreds."""

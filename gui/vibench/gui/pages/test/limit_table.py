@@ -3,7 +3,7 @@
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QTableWidgetItem, QWidget
 
-from vibench.acquisition.plan.limits import LimitCheck, Side
+from vibench.acquisition.plan import LimitCheck, Side
 
 from ...plots.bar_delegate import SHARE_ROLE, BarDelegate
 from ...read_table import ReadTable

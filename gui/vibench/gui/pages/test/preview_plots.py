@@ -3,7 +3,7 @@
 import numpy as np
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from vibench.acquisition.plan.outlook import Outlook
+from vibench.acquisition.plan import Outlook
 
 from ...plots.axis import LOG_FREQUENCY, TIME, Axis, Scale
 from ...plots.ink import trace

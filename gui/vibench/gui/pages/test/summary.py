@@ -1,7 +1,6 @@
 """The live arithmetic of a test: what it comes to, in one line."""
 
-from vibench.acquisition.plan.limits import LimitCheck
-from vibench.acquisition.plan.outlook import Outlook
+from vibench.acquisition.plan import LimitCheck, Outlook
 
 from ...faces import clock
 

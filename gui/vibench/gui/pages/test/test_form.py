@@ -4,7 +4,7 @@ from pydantic import ValidationError
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGroupBox, QLabel, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
 
-from vibench.acquisition.plan.measurement import Measurement
+from vibench.acquisition.plan import Measurement
 
 from ...forms.model_form import Loc, ModelForm
 

@@ -16,12 +16,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.plan.measurement import Measurement
-from vibench.acquisition.plan.outlook import Outlook
-from vibench.acquisition.rig.configuration import Rig
-from vibench.acquisition.toml_file import validated
-from vibench.acquisition.toml_text import save_toml, toml_text
+from vibench.acquisition import ConfigurationError, save_toml, toml_text, validated
+from vibench.acquisition.plan import Measurement, Outlook
+from vibench.acquisition.rig import Rig
 from vibench.analysis.foresight import Foresight
 
 from ...desk import Desk

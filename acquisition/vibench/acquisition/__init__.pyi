@@ -1,0 +1,57 @@
+from .bench import (
+    Bench as Bench,
+    BenchReport as BenchReport,
+    CheckResult as CheckResult,
+    Finding as Finding,
+    InstrumentList as InstrumentList,
+    Verdict as Verdict,
+    list_instruments as list_instruments,
+    list_rig_instruments as list_rig_instruments,
+    open_bench as open_bench,
+)
+from .campaign import (
+    run_campaign as run_campaign,
+)
+from .check import (
+    CheckRule as CheckRule,
+    check_and_keep as check_and_keep,
+    last_result as last_result,
+)
+from .errors import (
+    AcquisitionError as AcquisitionError,
+    CheckFailed as CheckFailed,
+    ConfigurationError as ConfigurationError,
+    InstrumentError as InstrumentError,
+    InstrumentLost as InstrumentLost,
+    LimitExceeded as LimitExceeded,
+    RecordingError as RecordingError,
+)
+from .host import (
+    FrozenModel as FrozenModel,
+    all_shipped as all_shipped,
+    follow_parent as follow_parent,
+    load_toml as load_toml,
+    save_toml as save_toml,
+    shipped as shipped,
+    toml_text as toml_text,
+    validated as validated,
+)
+from .instruments import (
+    Block as Block,
+    Identity as Identity,
+    Overload as Overload,
+)
+from .plan import (
+    load_campaign as load_campaign,
+)
+from .recording import (
+    open_recording as open_recording,
+)
+from .run import (
+    run_measurement as run_measurement,
+)
+from .stopping import (
+    StopLevel as StopLevel,
+    StopSwitch as StopSwitch,
+    stop_on_signal as stop_on_signal,
+)

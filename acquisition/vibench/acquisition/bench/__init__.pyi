@@ -1,0 +1,28 @@
+from ._bench import (
+    Bench as Bench,
+    Reality as Reality,
+    open_bench as open_bench,
+)
+from ._finding import (
+    BenchReport as BenchReport,
+    Bounds as Bounds,
+    Finding as Finding,
+    Verdict as Verdict,
+    judged as judged,
+)
+from ._instrument_list import (
+    InstrumentList as InstrumentList,
+    list_instruments as list_instruments,
+    list_rig_instruments as list_rig_instruments,
+)
+from ._protocol import (
+    RunBench as RunBench,
+)
+from ._result import (
+    CheckResult as CheckResult,
+    ago as ago,
+    rig_digest as rig_digest,
+)
+from ._rig_power import (
+    RigPower as RigPower,
+)

@@ -1,0 +1,179 @@
+"""The bench: all instruments of a rig, opened together or not at all, and left with the generator silent."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from ..drivers import AFG1022X, DaqmxDigitizer, DaqmxOutput
+from ..errors import AcquisitionError
+from ..instruments import Identity
+from ..rig import (
+    CalibrationRule,
+    Channel,
+    Confirm,
+    KnobSheet,
+    Rig,
+    channels_of,
+    check_calibrations,
+    confirm_at_terminal,
+    confirm_simulated,
+    load_rig,
+)
+from ._result import CheckResult
+from ._rig_power import RigPower
+
+
+class Reality(StrEnum):
+    """Whether the numbers of a bench come from the world or from a calculation."""
+
+    REAL = "real"
+    SIMULATED = "simulated"
+
+
+class Bench:
+    """The open instruments of a rig. Use it in a ``with``, or `close` it.
+
+    Leaving silences generator and analogue output first, then closes everything, whatever happened; an
+    error that is under way stays in front, and what fails while leaving becomes a note on it.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        generator: AFG1022X,
+        digitizer: DaqmxDigitizer,
+        output: DaqmxOutput | None,
+        confirmations: KnobSheet,
+        power: RigPower,
+        closing: ExitStack,
+    ) -> None:
+        self.rig = rig
+        self.generator = generator
+        self.digitizer = digitizer
+        self.output = output
+        self.confirmations = confirmations
+        self.last_check: CheckResult | None = None
+        """The check that this bench was admitted on; see `check.admission`."""
+        self._power = power
+        self._closing = closing
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What is recorded, in the order of the rows of a block."""
+        return channels_of(self.rig)
+
+    @property
+    def identities(self) -> dict[str, Identity]:
+        """Who answered: ``"generator"``, ``"digitizer"``, and ``"output"`` where there is one."""
+        identities = {"generator": self.generator.identity, "digitizer": self.digitizer.identity}
+        return identities if self.output is None else {**identities, "output": self.output.identity}
+
+    @property
+    def reality(self) -> Reality:
+        """Whether the instruments are simulated."""
+        return Reality.REAL if self.rig.virtual is None else Reality.SIMULATED
+
+    def idle(self, duration_s: float) -> None:
+        """Wait while nothing is sampled [s]; a virtual rig at its own pace lets its own time pass."""
+        self._power.idle(duration_s)
+
+    def close(self) -> None:
+        """Silence everything that plays, then close everything. Legal at any time."""
+        self._closing.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        _leave(self._closing, error)
+
+
+def open_bench(
+    config: Rig | Path,
+    confirm: Confirm | None = None,
+    calibration: CalibrationRule = CalibrationRule.ENFORCED,
+    power: RigPower | None = None,
+) -> Bench:
+    """Open every instrument of a rig, with generator and analogue output silent.
+
+    Parameters
+    ----------
+    config
+        The rig, or the path of its TOML file. With a ``[virtual]`` table the simulated instruments
+        are started as well, and stopped when the bench is left.
+    confirm
+        How settings made by hand are confirmed; see `knobs`. Absent: at the terminal, and for a
+        virtual rig without asking.
+    calibration
+        What a calibration that has run out does; a virtual rig's never runs out.
+    power
+        What keeps a virtual rig on beyond this bench; absent, it is switched off with it.
+
+    Raises
+    ------
+    ConfigurationError
+        When the file says something that is not allowed.
+    CheckFailed
+        When a calibration has run out, or a knob is not confirmed.
+    InstrumentError
+        When an instrument cannot be opened; the others are then closed again.
+
+    """
+    rig = config if isinstance(config, Rig) else load_rig(config)
+    if rig.virtual is None and calibration is CalibrationRule.ENFORCED:
+        check_calibrations(rig, datetime.now(UTC).astimezone().date())
+    closing = ExitStack()
+    try:
+        return _opened(rig, confirm, power, closing)
+    except BaseException as error:
+        _leave(closing, error)
+        raise
+
+
+def _opened(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: ExitStack) -> Bench:
+    power = closing.enter_context(RigPower(rig)) if power is None else power
+    connected = power.connected
+    digitizer = DaqmxDigitizer.open(connected)
+    closing.callback(digitizer.close)
+    output = _output(connected, digitizer, closing)
+    generator = AFG1022X.open(connected.generator)
+    closing.callback(generator.close)
+    closing.callback(generator.stop)  # the last to enter is the first to happen
+    if output is not None:
+        closing.callback(output.stop)
+    ask = confirm or _usual_confirmation(rig)
+    sheet = ask((*rig.knobs, *generator.unconfirmed))
+    return Bench(rig, generator, digitizer, output, sheet, power, closing)
+
+
+def _output(rig: Rig, digitizer: DaqmxDigitizer, closing: ExitStack) -> DaqmxOutput | None:
+    config, physical = rig.daq.output, rig.daq.output_channel
+    if config is None or physical is None:
+        return None
+    output = DaqmxOutput.open(physical, config, digitizer)
+    closing.callback(output.close)
+    return output
+
+
+def _usual_confirmation(rig: Rig) -> Callable[..., KnobSheet]:
+    return confirm_at_terminal if rig.virtual is None else confirm_simulated
+
+
+def _leave(closing: ExitStack, error: BaseException | None) -> None:
+    try:
+        closing.close()
+    except AcquisitionError as failure:
+        if error is None:
+            raise
+        error.add_note(f"While leaving the bench: {failure}")
+        # One failure after another: each carries the one before it.
+        earlier = failure.__context__
+        while earlier is not None and earlier is not error:
+            error.add_note(f"While leaving the bench: {earlier}")
+            earlier = earlier.__context__

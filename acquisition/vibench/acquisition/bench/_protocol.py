@@ -1,0 +1,55 @@
+"""What a run needs of a bench: open instruments, and who they are."""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from ..instruments import AnalogOutput, Digitizer, FunctionGenerator, Identity
+from ..rig import Channel, KnobSheet, Rig
+from ._result import CheckResult
+
+
+class CountingDigitizer(Digitizer, Protocol):
+    """A digitizer that knows the step of its converter."""
+
+    @property
+    def volts_per_count(self) -> tuple[float | None, ...]:
+        """Step for each channel [V]; None where volts are no whole multiples of one step."""
+
+
+class RunBench(Protocol):
+    """The open instruments of a rig, as `vibench.acquisition.bench.open_bench` gives them."""
+
+    @property
+    def rig(self) -> Rig:
+        """The configuration that the bench was opened from."""
+
+    @property
+    def generator(self) -> FunctionGenerator:
+        """What plays sines and waveforms."""
+
+    @property
+    def output(self) -> AnalogOutput | None:
+        """What plays signals that never repeat; None where the rig has no analogue output."""
+
+    @property
+    def digitizer(self) -> CountingDigitizer:
+        """What listens."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What is recorded, in the order of the rows of a block."""
+
+    @property
+    def identities(self) -> Mapping[str, Identity]:
+        """Who answered, by the instrument's part in the bench."""
+
+    @property
+    def confirmations(self) -> KnobSheet:
+        """What the operator confirmed by hand."""
+
+    def idle(self, duration_s: float) -> None:
+        """Wait while nothing is sampled [s], in the rig's own time."""
+
+    @property
+    def last_check(self) -> CheckResult | None:
+        """The check that the bench was admitted on; None when it was waived and there was none."""

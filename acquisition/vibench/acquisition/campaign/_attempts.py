@@ -1,0 +1,175 @@
+"""One point of a campaign until it is done, or its attempts are used up; each attempt in the journal."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from time import monotonic
+
+from ..bench import RunBench
+from ..errors import AcquisitionError, InstrumentError
+from ..plan import Point, Retryable, RetryPolicy, RunState
+from ..recording import open_recording
+from ..run import Outcome, Progress, run_measurement
+from ..stopping import StopSwitch
+from ._attempt_files import next_attempt
+from ._bench_identity import BenchIdentity
+from ._cooling_pause import Rest
+from ._event import Event, Happening, Listener
+from ._journal import Journal
+from ._journal_point import PointState
+from ._opening import require_same_bench
+from ._point_outcome import CampaignItem, Item
+from ._reason_code import Why, why_of
+
+Reopen = Callable[[], RunBench]
+"""Closes a bench that has lost an instrument, and opens it again; raises AcquisitionError."""
+
+LOOK_EVERY_S = 1.0
+"""How often a lost instrument is looked for, and how long another attempt waits [s]."""
+BESIDE = frozenset({"check", "lead_in", "ramp_up", "ramp_down"})
+"""Segments that no result is taken from."""
+
+
+class Attempts:
+    """Carries out points on a bench, as often as the policy says."""
+
+    def __init__(
+        self,
+        bench: RunBench,
+        journal: Journal,
+        policy: RetryPolicy,
+        switch: StopSwitch,
+        say: Listener,
+        rest: Rest,
+        reopen: Reopen | None,
+    ) -> None:
+        self._bench = bench
+        self._journal = journal
+        self._policy = policy
+        self._switch = switch
+        self._say = say
+        self._rest = rest
+        self._reopen = reopen
+
+    def rest_before(self, name: str) -> None:
+        """Leave the time between two recordings that the campaign asks for; a stop ends it."""
+        self._rest.take(self._bench, name)
+
+    def carry_out(self, point: Point, tell: Callable[[Path, Progress], None]) -> CampaignItem:
+        """Make one recording of a point that counts; ``tell`` is called after every block.
+
+        Raises
+        ------
+        AcquisitionError
+            What the last attempt failed with; it stands in the journal.
+
+        """
+        for left in reversed(range(self._policy.attempts)):
+            path = next_attempt(self._journal.path.parent, point.name)
+            self._rest.owe()
+            self._journal.start(point.name, path.name)
+            self._tell(Event.POINT_BEGUN, f"{path.name} begins", point, path)
+            try:
+                outcome = run_measurement(
+                    self._bench, point.measurement, path, on_progress=partial(tell, path), switch=self._switch
+                )
+            except AcquisitionError as error:
+                self._failed(point, path, error)
+                if not (left and self._may_mend(why_of(error))):
+                    raise
+                self._made_ready(point, path, error)
+                self._rested(point, error)
+            except BaseException as error:
+                reason = f"{type(error).__name__}: {error}".removesuffix(": ")
+                self._journal.end(point.name, PointState.INTERRUPTED, Why.STOPPED, reason)
+                raise
+            else:
+                item = self._ended(point, outcome)
+                if not (left and item.why is Why.OVER_RANGE and self._may_mend(item.why)):
+                    return item
+                self._tell(Event.RETRY, f"{point.name} is tried again: {item.reason}", point, path)
+                self.rest_before(point.name)
+                if self._switch.request is not None:
+                    return item
+        raise AssertionError("the last attempt returns or raises")
+
+    def _ended(self, point: Point, outcome: Outcome) -> CampaignItem:
+        if outcome.state is not RunState.FINISHED:
+            self._journal.end(point.name, PointState.INTERRUPTED, Why.STOPPED, outcome.reason)
+            self._tell(Event.POINT_STOPPED, f"{point.name}: {outcome.reason}", point, outcome.path)
+            return CampaignItem(point.name, Item.STOPPED, outcome.path, outcome.reason, Why.STOPPED)
+        over = _over_range(outcome.path)
+        why = Why.OVER_RANGE if over else Why.CARRIED_OUT
+        reason = f"{outcome.reason}; {over}" if over else outcome.reason
+        self._journal.end(point.name, PointState.DONE, why, reason)
+        self._tell(Event.POINT_DONE, f"{point.name}: {reason}", point, outcome.path)
+        return CampaignItem(point.name, Item.RECORDED, outcome.path, reason, why)
+
+    def _failed(self, point: Point, path: Path, error: AcquisitionError) -> None:
+        why = why_of(error)
+        self._journal.end(point.name, PointState.FAILED, why, str(error))
+        self._say(
+            Happening(
+                Event.FAULT,
+                f"{point.name}: {error}",
+                {"point": point.name, "file": path.name, "why": why.value},
+            )
+        )
+
+    def _may_mend(self, why: Why) -> bool:
+        is_stopping = self._switch.request is not None
+        return not is_stopping and why.value in {each.value for each in self._policy.on}
+
+    def _made_ready(self, point: Point, path: Path, error: AcquisitionError) -> None:
+        """Wait a little, or open the bench again when an instrument failed: another attempt has a chance."""
+        if isinstance(error, InstrumentError):
+            if self._reopen is None:
+                raise error
+            self._bench = self._reopened(self._reopen, error)
+            self._tell(Event.BENCH_REOPENED, "the bench was closed and opened again", point, path)
+        else:
+            self._bench.idle(LOOK_EVERY_S)  # what has just failed seldom works in the next instant
+        self._tell(Event.RETRY, f"{point.name} is tried again", point, path)
+
+    def _rested(self, point: Point, failed: AcquisitionError) -> None:
+        """Rest before another attempt; where a stop comes meanwhile there is none."""
+        self.rest_before(point.name)
+        if self._switch.request is not None:
+            raise failed
+
+    def _reopened(self, reopen: Reopen, lost: AcquisitionError) -> RunBench:
+        began, idled_s = monotonic(), 0.0
+        while True:
+            try:
+                bench = reopen()
+            except AcquisitionError as error:
+                # A virtual rig at its own pace idles at once: its time counts, or else the clock's.
+                looked_s = max(monotonic() - began, idled_s)
+                if looked_s >= self._policy.reopen_for_s or self._switch.request is not None:
+                    lost.add_note(f"The bench could not be opened again: {error}")
+                    raise lost from error
+                # An instrument comes back when somebody plugs it in: there is nothing to be told by.
+                self._bench.idle(LOOK_EVERY_S)
+                idled_s += LOOK_EVERY_S
+            else:
+                require_same_bench(self._journal.bench, BenchIdentity.of(bench))
+                return bench
+
+    def _tell(self, event: Event, text: str, point: Point, path: Path) -> None:
+        self._say(Happening(event, text, {"point": point.name, "file": path.name}))
+
+
+def _over_range(path: Path) -> str:
+    """Say which inputs were near full scale while it counted; empty when none was."""
+    with open_recording(path) as recording:
+        counting = [each for each in recording.segments if each.label not in BESIDE]
+        roles = {
+            overload.channel: None
+            for overload in recording.overloads
+            for segment in counting
+            if overload.first_sample <= segment.last_sample and overload.last_sample >= segment.first_sample
+        }
+    return f"near full scale: {', '.join(roles)}" if roles else ""
+
+
+assert {each.value for each in Retryable} <= {each.value for each in Why}

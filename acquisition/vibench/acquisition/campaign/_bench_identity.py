@@ -1,0 +1,62 @@
+"""Which bench a campaign was begun on: its configuration, its instruments, and its knobs."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Self
+
+from ..bench import RunBench
+from ..host import FrozenModel
+from ..rig import Rig
+
+
+class Instrument(FrozenModel):
+    """Who an instrument said it was."""
+
+    maker: str
+    model: str
+    serial: str
+    firmware: str
+
+
+class BenchIdentity(FrozenModel):
+    """What must not change in the middle of a campaign without somebody saying so."""
+
+    rig: Rig
+    instruments: dict[str, Instrument]
+    knobs: dict[str, str]
+    """What is set by hand, as it was confirmed; not when, nor by whom."""
+
+    @classmethod
+    def of(cls, bench: RunBench) -> Self:
+        """Take it from an open bench."""
+        instruments = {
+            part: Instrument(maker=each.maker, model=each.model, serial=each.serial, firmware=each.firmware)
+            for part, each in bench.identities.items()
+        }
+        knobs = {f"{knob.instrument} {knob.setting}": knob.value for knob in bench.confirmations.knobs}
+        return cls(rig=bench.rig, instruments=instruments, knobs=knobs)
+
+    def differences(self, now: "BenchIdentity") -> tuple[str, ...]:
+        """Say in a clause each what differs in ``now``."""
+        return tuple(_differences("", self.model_dump(mode="json"), now.model_dump(mode="json")))
+
+
+def _differences(place: str, before: Any, now: Any) -> Iterator[str]:
+    match before, now:
+        case Mapping(), Mapping():
+            for key in dict.fromkeys((*before, *now)):
+                yield from _differences(
+                    f"{place}.{key}".removeprefix("."), before.get(key, _ABSENT), now.get(key, _ABSENT)
+                )
+        case list(), list() if len(before) == len(now):
+            for number, (one, other) in enumerate(zip(before, now, strict=True)):
+                yield from _differences(f"{place}.{number}", one, other)
+        case _ if before != now:
+            yield f"{place} was {before!r} and is {now!r}"
+
+
+class _Absent:
+    def __repr__(self) -> str:
+        return "absent"
+
+
+_ABSENT = _Absent()

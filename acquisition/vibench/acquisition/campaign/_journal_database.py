@@ -1,0 +1,75 @@
+"""The file of a journal: how it is opened, that it is one, and its errors as sentences."""
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+from ..errors import RecordingError
+from ._journal_tables import VERSION
+
+
+def is_begun(path: Path) -> bool:
+    """Whether a journal stands there; one whose program died before its first commit does not."""
+    if not path.exists():
+        return False
+    with sentences(path), closing(opened_to_look(path)) as connection:
+        return (
+            connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'campaign'").fetchone() is not None
+        )
+
+
+def connected(path: Path) -> sqlite3.Connection:
+    """Open a database to write, so that what it has committed survives a kill and a power cut."""
+    with sentences(path):
+        connection = opened(path.resolve().as_uri())
+        connection.execute("PRAGMA journal_mode = WAL")
+        connection.execute("PRAGMA synchronous = FULL")
+        connection.execute("PRAGMA foreign_keys = ON")
+        return connection
+
+
+def opened(uri: str) -> sqlite3.Connection:
+    """Open a database as its address says; transactions are begun and ended by hand."""
+    connection = sqlite3.connect(uri, uri=True, isolation_level=None)
+    connection.row_factory = sqlite3.Row
+    return connection
+
+
+def opened_to_look(path: Path) -> sqlite3.Connection:
+    """Open a database to read it, also where nothing may be written."""
+    address = path.resolve().as_uri()
+    try:
+        # One that may write tidies up behind itself when it was the last to look.
+        connection = opened(f"{address}?mode=rw")
+        connection.execute("PRAGMA query_only = ON")
+        connection.execute("SELECT 1 FROM sqlite_master").fetchone()
+    except sqlite3.OperationalError:
+        return opened(f"{address}?mode=ro")
+    return connection
+
+
+def require_version(path: Path, connection: sqlite3.Connection) -> None:
+    """Refuse what is no journal, or one of a newer version; raises RecordingError."""
+    try:
+        row = connection.execute("SELECT value FROM campaign WHERE key = 'version'").fetchone()
+    except sqlite3.Error as error:
+        raise RecordingError(
+            f"{path} is no journal of a campaign ({error}). Nothing was changed; give another folder"
+        ) from error
+    if row is None or int(row["value"]) > VERSION:
+        raise RecordingError(
+            f"{path} was written by a newer version of vibench. Nothing was changed; use that version"
+        )
+
+
+@contextmanager
+def sentences(path: Path) -> Iterator[None]:
+    """Let an error of the database become a sentence."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise RecordingError(
+            f"the journal {path} cannot be read or written ({error}). What was recorded is kept; see that "
+            "the disk has room and the folder may be written, and resume"
+        ) from error

@@ -1,0 +1,83 @@
+"""A point as a campaign's journal knows it, for the campaign itself and for whoever looks."""
+
+import sqlite3
+from contextlib import closing
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from ..errors import RecordingError
+from ..plan import Measurement
+from ._journal_database import opened_to_look, require_version, sentences
+from ._journal_tables import POINTS
+from ._reason_code import Why
+
+
+class PointState(StrEnum):
+    """Where a point stands."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    DONE = "done"
+    FAILED = "failed"
+    INTERRUPTED = "interrupted"
+    """Stopped by somebody, or by the end of its program."""
+
+
+@dataclass(frozen=True)
+class JournalPoint:
+    """One point as the journal knows it."""
+
+    name: str
+    measurement: Measurement
+    chain: str
+    added_after: str
+    """The point whose result asked for this one; empty when it stood in the plan."""
+    state: PointState
+    why: Why
+    reason: str
+    file: str
+    """Of the last attempt; a name in the journal's folder, empty before the first."""
+    attempts: int
+    is_followed_up: bool
+    """Whether what its result asks for is in the journal."""
+    begun_utc: str
+    ended_utc: str
+    """Of the last attempt."""
+
+
+def read_journal(path: Path) -> tuple[JournalPoint, ...]:
+    """Look at a journal, also while its campaign runs; changes nothing.
+
+    Raises
+    ------
+    RecordingError
+        When there is no journal, or it is not one.
+
+    """
+    if not path.exists():
+        raise RecordingError(f"{path} does not exist; give the path of a campaign's journal.")
+    with sentences(path), closing(opened_to_look(path)) as connection:
+        require_version(path, connection)
+        return points_of(connection)
+
+
+def points_of(connection: sqlite3.Connection) -> tuple[JournalPoint, ...]:
+    """Every point, in the order in which they are made."""
+    return tuple(
+        JournalPoint(
+            name=row["name"],
+            measurement=Measurement.model_validate_json(row["measurement_json"]),
+            chain=row["chain"],
+            added_after=row["added_after"],
+            state=PointState(row["state"]),
+            why=Why(row["why"]),
+            reason=row["reason"],
+            file=row["file"],
+            attempts=row["attempts"],
+            is_followed_up=bool(row["is_followed_up"]),
+            begun_utc=row["begun_utc"],
+            ended_utc=row["ended_utc"],
+        )
+        for row in connection.execute(POINTS)
+    )

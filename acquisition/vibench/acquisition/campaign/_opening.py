@@ -1,0 +1,191 @@
+"""Beginning or resuming a campaign: what stands in the way, what is kept, and which journal is written on."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import assert_never
+
+from ..bench import RunBench
+from ..errors import CheckFailed, LimitExceeded, RecordingError
+from ..plan import Campaign, Measurement, Point, require_within_limits
+from ..run import drive_for
+from ._attempt_files import attempts_in, next_attempt
+from ._bench_identity import BenchIdentity
+from ._journal import Journal, journal_path
+from ._journal_database import is_begun
+from ._journal_point import PointState, read_journal
+from ._point_outcome import ChangedBench, Existing
+from ._reconcile import found_complete, reconcile
+
+MOST_DIFFERENCES = 5
+"""Shown of a bench that has changed."""
+
+
+@dataclass(frozen=True)
+class PlannedRecording:
+    """One recording that a campaign wants, and where it goes."""
+
+    name: str
+    measurement: Measurement
+    path: Path
+    is_complete: bool = False
+    """It exists already, made by the same plan."""
+
+
+def require_all_within_limits(points: tuple[Point, ...], bench: RunBench) -> None:
+    """Refuse a campaign of which any point passes a limit, or cannot be played; raises LimitExceeded."""
+    complaints: dict[str, None] = {}
+    for point in points:
+        try:
+            require_within_limits(point.measurement, bench.rig)
+            drive_for(bench, point.measurement)  # refuses what nothing on this bench can play
+        except LimitExceeded as error:
+            complaints[str(error)] = None
+    if complaints:
+        raise LimitExceeded(" ".join(complaints))
+
+
+def planned_recordings(campaign: Campaign, folder: Path, existing: Existing) -> tuple[PlannedRecording, ...]:
+    """Say which recordings are to be made and which are there; touches nothing.
+
+    Raises
+    ------
+    RecordingError
+        When recordings exist and ``existing`` refuses that, or a complete one was made by another plan.
+
+    """
+    points = campaign.points()
+    match existing:
+        case Existing.REFUSE:
+            require_new(campaign, points, folder)
+            return tuple(
+                PlannedRecording(each.name, each.measurement, next_attempt(folder, each.name))
+                for each in points
+            )
+        case Existing.RESUME:
+            return _resumable(campaign, points, folder)
+        case _:
+            assert_never(existing)
+
+
+def opened_journal(
+    bench: RunBench, campaign: Campaign, folder: Path, existing: Existing, changed: ChangedBench
+) -> Journal:
+    """Begin a journal, or open the one that the campaign was begun with and bring it up to date.
+
+    Raises
+    ------
+    RecordingError
+        When the folder holds recordings of the campaign and ``existing`` refuses that, or the journal
+        belongs to another plan.
+    CheckFailed
+        When the bench is another one than the campaign was begun on and ``changed`` refuses that.
+
+    """
+    path = journal_path(folder, campaign.name)
+    identity = BenchIdentity.of(bench)
+    match existing:
+        case Existing.REFUSE:
+            require_new(campaign, campaign.points(), folder)
+            return Journal.begin(path, campaign, identity)
+        case Existing.RESUME if is_begun(path):
+            return _gone_on_with(path, campaign, identity, folder, changed)
+        case Existing.RESUME:
+            found = found_complete(campaign.points(), folder)
+            journal = Journal.begin(path, campaign, identity)
+            for name, recording in found.items():
+                journal.keep(name, recording.name)
+            return journal
+        case _:
+            assert_never(existing)
+
+
+def require_same_bench(begun_on: BenchIdentity, now: BenchIdentity) -> None:
+    """Refuse to go on with a campaign on another bench; raises CheckFailed."""
+    found = begun_on.differences(now)
+    if found:
+        shown = "; ".join(found[:MOST_DIFFERENCES])
+        more = f"; and {len(found) - MOST_DIFFERENCES} more" if len(found) > MOST_DIFFERENCES else ""
+        raise CheckFailed(
+            f"the bench differs from the one that the campaign was begun on: {shown}{more}. Nothing was "
+            "played; put it back as it was, or accept the change (--accept-changed-bench)"
+        )
+
+
+def make_folder(folder: Path) -> None:
+    """Make the folder for the recordings; raises RecordingError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(
+            f"{folder} cannot be made a folder for recordings ({error.strerror}). Nothing was played; "
+            "give a folder that exists, or the name of a new one"
+        ) from error
+
+
+def _gone_on_with(
+    path: Path, campaign: Campaign, now: BenchIdentity, folder: Path, changed: ChangedBench
+) -> Journal:
+    journal = Journal.open(path)
+    try:
+        _require_same_plan(journal, campaign)
+        begun_on = journal.bench
+        match changed:
+            case ChangedBench.REFUSE:
+                require_same_bench(begun_on, now)
+            case ChangedBench.ACCEPT if begun_on.differences(now):
+                journal.accept_bench(now)
+        reconcile(journal, folder)
+    except BaseException:
+        journal.close()
+        raise
+    return journal
+
+
+def _require_same_plan(journal: Journal, campaign: Campaign) -> None:
+    if _wanted(journal.campaign) != _wanted(campaign):
+        raise RecordingError(
+            f"{journal.path} was begun with another plan than {campaign.name!r} has now. Nothing was "
+            "recorded; give the changed campaign another name, or another folder"
+        )
+
+
+def _wanted(campaign: Campaign) -> tuple[tuple[str, Measurement], ...]:
+    """List what a plan makes, without notes: they may be added to."""
+    return tuple((name, each.model_copy(update={"notes": ""})) for name, each in campaign.recordings())
+
+
+def require_new(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> None:
+    """Refuse to begin a campaign over an older one; raises RecordingError and touches nothing."""
+    present = [str(path) for point in points for path in attempts_in(folder, point.name)]
+    path = journal_path(folder, campaign.name)
+    if not present and is_begun(path):
+        present = [str(path)]
+    if present:
+        shown = ", ".join(present[:MOST_DIFFERENCES]) + (
+            " and more" if len(present) > MOST_DIFFERENCES else ""
+        )
+        verb = "exists" if len(present) == 1 else "exist"
+        raise RecordingError(
+            f"{shown} {verb} already, and nothing is ever overwritten. "
+            "Nothing was recorded; give another folder, or resume the campaign"
+        )
+
+
+def _resumable(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> tuple[PlannedRecording, ...]:
+    path = journal_path(folder, campaign.name)
+    if not is_begun(path):
+        found = found_complete(points, folder)
+        wanted = [(each.name, each.measurement) for each in points]
+    else:
+        known = read_journal(path)
+        found = {
+            each.name: folder / each.file
+            for each in known
+            if each.state is PointState.DONE and (folder / each.file).exists()
+        }
+        wanted = [(each.name, each.measurement) for each in known]
+    return tuple(
+        PlannedRecording(name, measurement, done or next_attempt(folder, name), done is not None)
+        for name, measurement in wanted
+        for done in [found.get(name)]
+    )

@@ -1,0 +1,131 @@
+"""A campaign from its first point to its last: one recording each, every step in a journal."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from ..bench import RunBench
+from ..errors import RecordingError
+from ..plan import Campaign
+from ..recording import sole_use
+from ..stopping import StopSwitch, stop_on_signal
+from ._attempts import Attempts, Reopen
+from ._cooling_pause import Rest
+from ._event import Happening, Listener, ignore_happening
+from ._log import LOG_SUFFIX, CampaignLog
+from ._notice import Messenger, Notifier
+from ._opening import make_folder, opened_journal, require_all_within_limits, require_new
+from ._point_outcome import (
+    After,
+    AfterFailure,
+    CampaignItem,
+    CampaignProgress,
+    ChangedBench,
+    Existing,
+    ignore_campaign_progress,
+    ignore_item,
+)
+from ._runner import Course
+from ._status_line import STATUS_SUFFIX, StatusLine
+
+
+def run_campaign(
+    bench: RunBench,
+    campaign: Campaign,
+    folder: Path,
+    existing: Existing = Existing.REFUSE,
+    after_failure: AfterFailure = AfterFailure.STOP,
+    on_progress: Callable[[CampaignProgress], None] = ignore_campaign_progress,
+    on_item: Callable[[CampaignItem], None] = ignore_item,
+    switch: StopSwitch | None = None,
+    after: After | None = None,
+    reopen: Reopen | None = None,
+    changed_bench: ChangedBench = ChangedBench.REFUSE,
+    on_happening: Listener = ignore_happening,
+    messengers: tuple[Messenger, ...] = (),
+) -> tuple[CampaignItem, ...]:
+    """Make every recording of ``campaign`` in ``folder``, in order, on an open bench.
+
+    All points are held against the limits of the rig before the first one begins. What was done, what
+    failed and why stands in the campaign's journal, so that a campaign that was killed goes on with
+    ``Existing.RESUME`` at its first unfinished point. Ctrl-C ends the running measurement softly, and
+    the campaign with it.
+
+    Parameters
+    ----------
+    bench, campaign, folder
+        On what, what, and where to.
+    existing, after_failure, changed_bench
+        What to do about recordings that are there, about a point whose attempts are used up, and about
+        another bench than the campaign was begun on.
+    on_progress, on_item, on_happening
+        Called after every block, after every recording, and whenever something happens.
+    switch
+        Lets others hold the running measurement, or end the campaign.
+    after
+        Asked after every point that is done; the measurements it gives are made next, in this session
+        or after a resume.
+    reopen
+        Closes and opens the bench when an instrument is lost and the campaign's retries allow another
+        attempt; absent, a lost instrument ends the campaign.
+    messengers
+        Ways to reach somebody at every fault and at the end.
+
+    Returns
+    -------
+    tuple of CampaignItem
+        What was made, kept or failed; it ends early when the campaign was stopped.
+
+    Raises
+    ------
+    LimitExceeded
+        When any point would pass a limit; nothing was played.
+    RecordingError
+        When the folder holds recordings already and ``existing`` refuses that, or another program carries
+        out the same campaign.
+    CheckFailed
+        When the bench has changed and ``changed_bench`` refuses that.
+    AcquisitionError
+        Whatever a failing run raises, when ``after_failure`` says stop, or an instrument is lost.
+
+    """
+    points = campaign.points()
+    require_all_within_limits(points, bench)
+    if existing is Existing.REFUSE:
+        require_new(campaign, points, folder)
+    make_folder(folder)
+    stop = StopSwitch() if switch is None else switch
+    with ExitStack() as session:
+        log = session.enter_context(_log_alone(folder, campaign))
+        journal = session.enter_context(opened_journal(bench, campaign, folder, existing, changed_bench))
+        where = folder / f"{campaign.name}{STATUS_SUFFIX}"
+        status = StatusLine(where, campaign.name, journal.points(), campaign.rest_s)
+        notifier = Notifier(campaign.name, folder, messengers, log)
+        session.enter_context(stop_on_signal(stop))
+
+        def say(happening: Happening) -> None:
+            for listener in (log, status, notifier, on_happening):
+                listener(happening)
+
+        def progress(stand: CampaignProgress) -> None:
+            status.progress(stand)
+            on_progress(stand)
+
+        rest = Rest(campaign.rest_s, stop, say)
+        attempts = Attempts(bench, journal, campaign.retry, stop, say, rest, reopen)
+        course = Course(journal, folder, attempts, stop, after_failure, after, say)
+        return course.gone_through(campaign, progress, on_item)
+
+
+@contextmanager
+def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
+    """Open the log, which also marks the campaign as running; the mark goes with the process."""
+    with CampaignLog(folder / f"{campaign.name}{LOG_SUFFIX}") as log, ExitStack() as mark:
+        try:
+            mark.enter_context(sole_use(log.path))
+        except RecordingError as error:
+            raise RecordingError(
+                f"the campaign {campaign.name!r} is being carried out in {folder} by another program. "
+                "Nothing was changed; let it end, or stop it"
+            ) from error
+        yield log

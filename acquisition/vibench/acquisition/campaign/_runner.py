@@ -1,0 +1,139 @@
+"""The way through the points of a campaign, in order, with what results add to it."""
+
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+
+from ..errors import AcquisitionError, InstrumentLost, RecordingError
+from ..plan import Campaign, Measurement, Point
+from ..recording import open_recording
+from ..run import Progress
+from ..stopping import StopSwitch
+from ._attempts import Attempts
+from ._event import Event, Happening, Listener
+from ._journal import Journal
+from ._journal_point import JournalPoint, PointState
+from ._point_outcome import After, AfterFailure, CampaignItem, CampaignProgress, DonePoint, Finished, Item
+from ._reason_code import why_of
+
+
+class Course:
+    """The way through the points, with what results add to it."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        folder: Path,
+        attempts: Attempts,
+        stop: StopSwitch,
+        after_failure: AfterFailure,
+        after: After | None,
+        say: Listener,
+    ) -> None:
+        self._journal = journal
+        self._folder = folder
+        self._attempts = attempts
+        self._stop = stop
+        self._after_failure = after_failure
+        self._after = after
+        self._say = say
+        self._coming = deque(journal.points())
+        self._count = len(self._coming)
+        self._items: list[CampaignItem] = []
+
+    def gone_through(
+        self,
+        campaign: Campaign,
+        on_progress: Callable[[CampaignProgress], None],
+        on_item: Callable[[CampaignItem], None],
+    ) -> tuple[CampaignItem, ...]:
+        """Make the points one after the other; returns how each came out."""
+        done = sum(point.state is PointState.DONE for point in self._coming)
+        begun = Event.RESUMED if any(point.attempts for point in self._coming) or done else Event.BEGUN
+        text = f"{campaign.name}: {self._count} points, {done} done before"
+        self._say(Happening(begun, text, {"points": self._count, "done": done}))
+        try:
+            while self._coming and self._may_begin(self._coming[0]):
+                point = self._coming.popleft()
+                number = len(self._items) + 1
+
+                def tell(
+                    path: Path, progress: Progress, name: str = point.name, number: int = number
+                ) -> None:
+                    on_progress(CampaignProgress(name, number, self._count, path, progress))
+
+                item = self._made(point, tell)
+                self._items.append(item)
+                on_item(item)
+                self._follow_up(point, item)
+                if item.result is Item.STOPPED:
+                    break
+        except AcquisitionError as error:
+            self._ended(f"{campaign.name} ended: {error}", str(why_of(error)))
+            raise
+        except BaseException as error:
+            self._ended(f"{campaign.name} ended: {type(error).__name__}", "stopped")
+            raise
+        self._ended(f"{campaign.name} {self._closing()}", "stopped" if self._coming else "carried_out")
+        return tuple(self._items)
+
+    def _may_begin(self, point: JournalPoint) -> bool:
+        """Rest before a point that is to be made; a stop ends the rest, and the campaign."""
+        if point.state is not PointState.DONE and self._stop.request is None:
+            self._attempts.rest_before(point.name)
+        return self._stop.request is None
+
+    def _made(self, point: JournalPoint, tell: Callable[[Path, Progress], None]) -> CampaignItem:
+        if point.state is PointState.DONE:
+            path = self._folder / point.file
+            return CampaignItem(point.name, Item.KEPT, path, "complete before", point.why)
+        try:
+            return self._attempts.carry_out(Point(point.name, point.measurement, point.chain), tell)
+        except (InstrumentLost, RecordingError):
+            raise  # without instruments, or without room on the disk, the next point would fail too
+        except AcquisitionError as error:
+            if self._after_failure is AfterFailure.STOP:
+                raise
+            path = self._folder / next(
+                each.file for each in self._journal.points() if each.name == point.name
+            )
+            return CampaignItem(point.name, Item.FAILED, path, str(error), why_of(error))
+
+    def _follow_up(self, point: JournalPoint, item: CampaignItem) -> None:
+        """Ask what a result asks for, once, and put it next."""
+        is_done = item.result in (Item.RECORDED, Item.KEPT)
+        if not is_done or point.is_followed_up or self._after is None:
+            return
+        done = tuple(
+            DonePoint(each.name, each.measurement, self._folder / each.file)
+            for each in self._journal.points()
+            if each.state is PointState.DONE
+        )
+        this = next(each for each in done if each.name == point.name)
+        with open_recording(item.path) as recording:
+            asked = tuple(self._after(Finished(this, done), recording))
+        further = tuple(Point(name, each) for each in asked for name in _names(each))
+        self._journal.follow_up(point.name, further)
+        if not further:
+            return
+        names = {each.name for each in further}
+        added = [each for each in self._journal.points() if each.name in names]
+        self._coming.extendleft(reversed(added))
+        self._count += len(added)
+        text = f"{point.name} asks for {', '.join(each.name for each in added)}"
+        self._say(Happening(Event.FURTHER, text, {"point": point.name, "points": len(added)}))
+
+    def _closing(self) -> str:
+        request = self._stop.request
+        if request is not None:
+            return f"was stopped: {request.reason}"
+        failed = sum(item.result is Item.FAILED for item in self._items)
+        return f"is through, {failed} points failed" if failed else "is through"
+
+    def _ended(self, text: str, why: str) -> None:
+        counts = {each.value: sum(item.result is each for item in self._items) for each in Item}
+        self._say(Happening(Event.ENDED, text, {"why": why, "left": len(self._coming), **counts}))
+
+
+def _names(measurement: Measurement) -> tuple[str, ...]:
+    return tuple(point.name for point in Campaign(name="further", measurements=(measurement,)).points())

@@ -1,0 +1,212 @@
+"""The check of a whole bench before a day's work: silence first, then a small sine, then silence again."""
+
+import shutil
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from ..bench import Bench, BenchReport, Bounds, Finding, Verdict, judged
+from ..errors import CheckStopped
+from ..excitation import Dwell, Tone
+from ..instruments import AnalogOutput, IdleOutput, Samples
+from ..plan import CHECK_FREQUENCY_HZ, Measurement, Phase, Player, RunState
+from ..rig import Channel, calibrations
+from ..run import BLOCK_S, Drive, drive_for
+from ..stopping import StopSwitch
+from ._loop import LoopCheck
+
+CHECK_SHARE = 0.02
+"""Level of the sine, of the bench's amplitude limit: far below anything that collides or clips."""
+# An AC coupling of 0.5 Hz has forgotten a step after this time.
+_SETTLE_S = 1.5
+_LISTEN_S = 2.0
+_BYTES_PER_SAMPLE = 4
+_SECONDS_PER_HOUR = 3600.0
+
+
+NOISE_SHARE = Bounds(1e-3, 2e-2)
+"""rms of a silent channel, of its full scale."""
+OFFSET_SHARE = Bounds(1e-2, 1e-1)
+"""Mean of a silent channel, of its full scale."""
+LATENCY_S = Bounds(0.5, 5.0)
+"""Of one verified setting: it bounds how fast the generator can be stopped."""
+ROOM_H = Bounds(-10.0, -1.0)
+"""Recording time that the disk should hold, negative since more is better [h]."""
+
+
+def check_bench(bench: Bench, folder: Path, switch: StopSwitch | None = None) -> BenchReport:
+    """Look at everything that can be known before a measurement; the generator is silent afterwards.
+
+    Listens in silence, plays two per cent of the amplitude limit at 160 Hz for some seconds by
+    whatever plays sines on this bench, and listens in silence again.
+
+    Parameters
+    ----------
+    bench
+        Open, and not sampling.
+    folder
+        Where recordings will go.
+    switch
+        Lets others end the check, within a block of samples.
+
+    Raises
+    ------
+    CheckStopped
+        When somebody did.
+    InstrumentError
+        When an instrument fails; what is merely wrong is a finding.
+
+    """
+    findings = [*_identified(bench), *_calibrated(bench), _room(bench, folder)]
+    amplitude_vpp = CHECK_SHARE * bench.rig.generator.amplitude_limit_vpp
+    drive = drive_for(bench, _small_sine(amplitude_vpp))
+    ear = _Ear(bench, StopSwitch() if switch is None else switch)
+    bench.generator.stop()
+    quiet = ear.in_silence()
+    heard = ear.during_sine(drive)
+    after = ear.in_silence()
+    if drive.player is Player.GENERATOR:
+        findings.append(_latency(bench))
+    if bench.output is not None:
+        findings.append(_idle(bench.output))
+    for channel, row in zip(bench.channels, quiet, strict=True):
+        findings += [_noise(channel, row), _offset(channel, row)]
+    findings += LoopCheck(bench, amplitude_vpp, heard, after).findings()
+    return BenchReport(findings=tuple(findings))
+
+
+class _Ear:
+    """Listens to a bench for the check, in blocks between which the check can be stopped."""
+
+    def __init__(self, bench: Bench, switch: StopSwitch) -> None:
+        self._bench = bench
+        self._switch = switch
+
+    def in_silence(self) -> Samples:
+        """Hear what there is when nothing plays, after couplings have settled."""
+        digitizer = self._bench.digitizer
+        digitizer.start()
+        try:
+            self._heard_for(_SETTLE_S)
+            return np.concatenate(self._heard_for(_LISTEN_S), axis=1)
+        finally:
+            digitizer.stop()
+
+    def during_sine(self, drive: Drive) -> Samples:
+        """Play the sine without a ramp, as the check of a run does, and hear it when all has settled."""
+        tone = Tone(CHECK_FREQUENCY_HZ)
+        settling = Phase(RunState.CHECKING, tone, _SETTLE_S)
+        listening = Phase(RunState.CHECKING, tone, _LISTEN_S)
+        try:
+            drive.arm((settling, listening))
+            self._bench.digitizer.start()
+            for wait_s in drive.perform(settling):
+                self._heard_for(wait_s)
+            heard = [block for wait_s in drive.perform(listening) for block in self._heard_for(wait_s)]
+            return np.concatenate(heard, axis=1)
+        finally:
+            try:
+                drive.silence()
+            finally:
+                self._bench.digitizer.stop()
+
+    def _heard_for(self, duration_s: float) -> list[Samples]:
+        digitizer = self._bench.digitizer
+        rate_hz = digitizer.sample_rate_hz
+        left, longest = round(duration_s * rate_hz), round(BLOCK_S * rate_hz)
+        heard = []
+        while left > 0:
+            if (request := self._switch.request) is not None:
+                raise CheckStopped(
+                    f"the bench check was stopped: {request.reason}. The output is off; check the bench again"
+                )
+            heard.append(digitizer.read(min(longest, left)).volts)
+            left -= heard[-1].shape[1]
+        return heard
+
+
+def _small_sine(amplitude_vpp: float) -> Measurement:
+    sine = Dwell(
+        amplitude_vpp=amplitude_vpp,
+        frequency_hz=CHECK_FREQUENCY_HZ,
+        settle_s=_SETTLE_S,
+        duration_s=_LISTEN_S,
+    )
+    return Measurement(name="check", excitation=sine)
+
+
+def _identified(bench: Bench) -> list[Finding]:
+    return [
+        Finding(name=part, value=identity.reply, expected="an answer", verdict=Verdict.OK)
+        for part, identity in bench.identities.items()
+    ]
+
+
+def _calibrated(bench: Bench) -> list[Finding]:
+    today = datetime.now(UTC).astimezone().date()
+    return [
+        Finding(
+            name=f"calibration of {one.what}",
+            value=f"{one.calibrated}",
+            expected=f"at most {one.valid_days} days ago",
+            verdict=Verdict.OK if one.is_valid else Verdict.WARN,
+            number=one.age_days,
+            unit="d",
+            advice="" if one.is_valid else "have it calibrated, and enter the date in the configuration",
+        )
+        for one in calibrations(bench.rig, today)
+    ]
+
+
+def _room(bench: Bench, folder: Path) -> Finding:
+    bytes_per_s = bench.digitizer.sample_rate_hz * len(bench.channels) * _BYTES_PER_SAMPLE
+    hours = shutil.disk_usage(folder).free / bytes_per_s / _SECONDS_PER_HOUR
+    return judged(
+        "room on the disk",
+        hours,
+        "h",
+        f"{-ROOM_H.well:g} h or more",
+        ROOM_H.verdict(-hours),
+        "make room, or record elsewhere",
+    )
+
+
+def _idle(output: AnalogOutput) -> Finding:
+    is_zero = output.idle is IdleOutput.ZERO
+    advice = "a program that dies leaves the last value on the shaker: keep the amplifier's knob within reach"
+    return Finding(
+        name="output without a program",
+        value=output.idle.value,
+        expected=IdleOutput.ZERO.value,
+        verdict=Verdict.OK if is_zero else Verdict.WARN,
+        advice="" if is_zero else advice,
+    )
+
+
+def _latency(bench: Bench) -> Finding:
+    latency_s = bench.generator.measured_latency_s()
+    verdict = LATENCY_S.verdict(latency_s)
+    advice = "shorten generator.settle_s, or look for what keeps the bus busy: a stop takes as long"
+    return judged("time of one setting", latency_s, "s", f"{LATENCY_S.well:g} s or less", verdict, advice)
+
+
+def _noise(channel: Channel, row: Samples) -> Finding:
+    rms_v = float(np.std(row))
+    verdict = NOISE_SHARE.verdict(rms_v / channel.full_scale_v)
+    advice = "look for hum, a loose shield, or a cable that picks it up"
+    if rms_v == 0.0:
+        verdict, advice = (
+            Verdict.FAIL,
+            "a living input is never quite still: see whether it is sampled at all",
+        )
+    expected = f"{NOISE_SHARE.well * channel.full_scale_v:.3g} V or less"
+    return judged(f"noise of {channel.role.value}", rms_v, "V", expected, verdict, advice)
+
+
+def _offset(channel: Channel, row: Samples) -> Finding:
+    mean_v = float(np.mean(row))
+    verdict = OFFSET_SHARE.verdict(abs(mean_v) / channel.full_scale_v)
+    advice = "look for an open input, a sensor's bias on DC coupling, or a shaker off its centre"
+    expected = f"0 V within {OFFSET_SHARE.well * channel.full_scale_v:.3g} V"
+    return judged(f"offset of {channel.role.value}", mean_v, "V", expected, verdict, advice)

@@ -1,0 +1,157 @@
+"""One sine round the loop: does every channel hear it, and as loud as generator, knob and model say?"""
+
+from math import log10, pi, sqrt
+
+import numpy as np
+
+from ..bench import Bench, Bounds, Finding, Verdict, judged
+from ..instruments import Samples
+from ..plan import CHECK_FREQUENCY_HZ
+from ..rig import Quantity, RigModel, Role
+from ._sine_fit import SineFit, clock_ratio, fit_sine
+
+DRIVE_DEVIATION = Bounds(0.02, 0.15)
+"""Of the measured drive from the setting."""
+GAIN_DB = Bounds(1.0, 3.0)
+"""Of the amplifier's gain from its knob's."""
+BASE_DB = Bounds(1.5, 3.0)
+"""Of the base's acceleration from the rig's model."""
+CLOCK_PPM = Bounds(100.0, 500.0)
+"""Two oscillators of 50 ppm each."""
+HEARD = 10.0
+"""A channel hears the sine when it is this many times its uncertainty."""
+WRONG_LOAD = 2.0
+PHASE_DEG = Bounds(45.0, 90.0)
+"""Of a channel against the drive from the rig's model: beyond a right angle its sign is wrong."""
+LEFT_OVER = Bounds(0.02, 0.05)
+"""Share of the drive that may be left when the output is off."""
+
+
+class LoopCheck:
+    """What a small sine shows on its way from the generator round to the inputs."""
+
+    def __init__(self, bench: Bench, amplitude_vpp: float, heard: Samples, after: Samples) -> None:
+        self._rig = bench.rig
+        self._rate_hz = bench.digitizer.sample_rate_hz
+        self._channels = {channel.role: channel for channel in bench.channels}
+        self._rows = dict(zip(self._channels, heard, strict=True))
+        self._after = dict(zip(self._channels, after, strict=True))
+        self._terminal_v = 0.5 * amplitude_vpp * bench.rig.generator.terminal_factor()
+        self._model = RigModel(bench.rig)
+
+    def findings(self) -> list[Finding]:
+        """Answer what can be answered with the channels that there are."""
+        found = [self._alive(role) for role in self._channels]
+        if Role.DRIVE_VOLTAGE in self._channels:
+            found += [self._drive(), self._silence()]
+        # What hears nothing has no frequency and no gain: it has been found fault with already.
+        if self._hears(Role.DRIVE_VOLTAGE):
+            found.append(self._clocks())
+        if self._hears(Role.DRIVE_VOLTAGE) and self._hears(Role.AMPLIFIER_VOLTAGE):
+            found += [self._gain(), self._sign(Role.AMPLIFIER_VOLTAGE, Quantity.AMPLIFIER_VOLTAGE)]
+        if self._hears(Role.BASE_ACCELERATION):
+            found.append(self._base())
+        if self._hears(Role.DRIVE_VOLTAGE) and self._hears(Role.BASE_ACCELERATION):
+            found.append(self._sign(Role.BASE_ACCELERATION, Quantity.ACCELERATION))
+        return found
+
+    def _hears(self, role: Role) -> bool:
+        if role not in self._channels:
+            return False
+        fit = self._fit(role)
+        return fit.amplitude > HEARD * fit.uncertainty
+
+    def _fit(self, role: Role) -> SineFit:
+        volts = self._rows[role] * self._channels[role].units_per_volt
+        return fit_sine(volts, CHECK_FREQUENCY_HZ, self._rate_hz)
+
+    def _alive(self, role: Role) -> Finding:
+        fit = self._fit(role)
+        is_heard = self._hears(role)
+        advice = {
+            Role.M0_VELOCITY: "see whether the laser is on, focused, and its beam free",
+            Role.BASE_ACCELERATION: "see whether the accelerometer is plugged in and its current on",
+        }.get(role, "see whether the cable is open or shorted, its source plugged in, and the amplifier on")
+        return Finding(
+            name=f"{role.value} hears the sine",
+            value=f"{fit.amplitude:.3g} +- {fit.uncertainty:.1g} {self._channels[role].unit}",
+            expected=f"more than {HEARD:g} times its uncertainty",
+            verdict=Verdict.OK if is_heard else Verdict.FAIL,
+            number=fit.amplitude,
+            uncertainty=fit.uncertainty,
+            unit=self._channels[role].unit,
+            advice="" if is_heard else advice,
+        )
+
+    def _drive(self) -> Finding:
+        fit = self._fit(Role.DRIVE_VOLTAGE)
+        ratio = fit.amplitude / self._terminal_v
+        verdict = DRIVE_DEVIATION.verdict(abs(ratio - 1))
+        advice = "check the cable to the drive_voltage input, its range and its attenuation"
+        for wrong in (WRONG_LOAD, 1 / WRONG_LOAD):
+            if abs(ratio / wrong - 1) <= DRIVE_DEVIATION.fail:
+                advice = (
+                    f"a factor of {wrong:g} is a wrong load: compare the load on the generator's panel with "
+                    "generator.load_ohm (or the divider with daq.channels.attenuation)"
+                )
+        return judged(
+            "drive over setting", ratio, "", f"1 within {DRIVE_DEVIATION.well:.0%}", verdict, advice,
+            fit.uncertainty / self._terminal_v,
+        )  # fmt: skip
+
+    def _silence(self) -> Finding:
+        volts = self._after[Role.DRIVE_VOLTAGE] * self._channels[Role.DRIVE_VOLTAGE].units_per_volt
+        left = fit_sine(volts, CHECK_FREQUENCY_HZ, self._rate_hz).amplitude / self._terminal_v
+        advice = "the output says off and plays on: switch the amplifier off, and have what plays repaired"
+        return judged(
+            "drive left after stop",
+            left,
+            "",
+            f"{LEFT_OVER.well:.0%} or less",
+            LEFT_OVER.verdict(left),
+            advice,
+        )
+
+    def _clocks(self) -> Finding:
+        ratio = clock_ratio(self._rows[Role.DRIVE_VOLTAGE], CHECK_FREQUENCY_HZ, self._rate_hz)
+        verdict = CLOCK_PPM.verdict(abs(ratio.ppm))
+        advice = "compare daq.sample_rate_hz and the reference of what plays; phases over a minute need it"
+        expected = f"0 ppm within {CLOCK_PPM.well:g} ppm"
+        return judged("drive's clock", ratio.ppm, "ppm", expected, verdict, advice, ratio.uncertainty_ppm)
+
+    def _gain(self) -> Finding:
+        drive, output = self._fit(Role.DRIVE_VOLTAGE), self._fit(Role.AMPLIFIER_VOLTAGE)
+        relative = sqrt(
+            (drive.uncertainty / drive.amplitude) ** 2 + (output.uncertainty / output.amplitude) ** 2
+        )
+        gain_db = _db(output.amplitude / drive.amplitude)
+        expected_db = _db(abs(complex(self._model.transfer(Quantity.AMPLIFIER_VOLTAGE, CHECK_FREQUENCY_HZ))))
+        verdict = GAIN_DB.verdict(abs(gain_db - expected_db))
+        advice = f"set the gain of the {self._rig.amplifier.model} to {self._rig.amplifier.gain_db:g} dB"
+        expected = f"{expected_db:.2f} dB within {GAIN_DB.well:g} dB"
+        return judged("amplifier gain", gain_db, "dB", expected, verdict, advice, _db(1 + relative))
+
+    def _base(self) -> Finding:
+        fit = self._fit(Role.BASE_ACCELERATION)
+        transfer = abs(complex(self._model.transfer(Quantity.ACCELERATION, CHECK_FREQUENCY_HZ)))
+        modelled = self._terminal_v * transfer
+        verdict = BASE_DB.verdict(abs(_db(fit.amplitude / modelled)))
+        expected = f"{modelled:.3g} m/s2 within {BASE_DB.well:g} dB"
+        advice = "check the accelerometer's sensitivity, the fixture's mass, the amplifier's power and gain"
+        return judged("base acceleration", fit.amplitude, "m/s2", expected, verdict, advice, fit.uncertainty)
+
+    def _sign(self, role: Role, quantity: Quantity) -> Finding:
+        """Compare a channel's phase against the drive with the model's: half a turn is a wrong sign."""
+        turned_rad = self._fit(role).phase_rad - self._fit(Role.DRIVE_VOLTAGE).phase_rad
+        modelled_rad = float(np.angle(self._model.transfer(quantity, CHECK_FREQUENCY_HZ)))
+        off_deg = np.rad2deg((turned_rad - modelled_rad + pi) % (2 * pi) - pi)
+        advice = {
+            Role.BASE_ACCELERATION: "turn the accelerometer round, or swap the wires of coil or amplifier",
+        }.get(role, "swap the two wires of this input, or see whether the amplifier inverts")
+        expected = f"0 deg within {PHASE_DEG.well:g} deg"
+        verdict = PHASE_DEG.verdict(abs(off_deg))
+        return judged(f"sign of {role.value}", float(off_deg), "deg", expected, verdict, advice)
+
+
+def _db(ratio: float) -> float:
+    return 20 * log10(ratio)

@@ -1,0 +1,57 @@
+"""What passes between a run and who conducts it: a move to make, and what was heard meanwhile."""
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias, TypeVar
+
+import numpy as np
+
+from ..instruments import Block, Samples
+from ..plan import Phase
+
+
+@dataclass(frozen=True)
+class Note:
+    """Something decided or found, for the recording's events."""
+
+    kind: str
+    """``"settled"``, ``"step"``, ``"jump"``, ``"level"``, ``"resonance"``."""
+    text: str
+
+
+@dataclass(frozen=True)
+class Move:
+    """The next phase, and what is noted at its first sample."""
+
+    phase: Phase | None
+    """None for the notes alone: nothing is heard then."""
+    notes: tuple[Note, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Heard:
+    """The samples of a phase, from its first one, or from the last hole in them, to its end."""
+
+    first_sample: int
+    volts: Samples
+    """Shape (channels, samples) [V]."""
+
+
+Result = TypeVar("Result")
+Conduct: TypeAlias = Generator[Move, Heard, Result]
+"""Yields moves and is sent what was heard during each; returns what it was for."""
+
+SILENCE = Heard(0, np.empty((0, 0)))
+"""What is heard during notes alone."""
+
+
+def heard(blocks: Sequence[Block]) -> Heard:
+    """Join the blocks of a phase; one before which samples are missing (the run was held) begins anew."""
+    if not blocks:
+        return SILENCE
+    joined: list[Block] = []
+    for block in blocks:
+        if joined and block.first_sample != joined[-1].first_sample + joined[-1].volts.shape[1]:
+            joined.clear()
+        joined.append(block)
+    return Heard(joined[0].first_sample, np.concatenate([block.volts for block in joined], axis=1))

@@ -1,0 +1,48 @@
+"""A dwell at a level: settled first, then watched and corrected while it is recorded."""
+
+import json
+from math import ceil
+
+from ..excitation import HeldDwell
+from ..plan import RunState
+from ._closed_loop_check import require_answer
+from ._control_action import Conduct
+from ._level_control import Held, LevelControl, measured_level
+from ._settle import Settler, shortened
+from ._sine_loop import SinePlay
+from ._start import started
+
+
+def hold_dwell(play: SinePlay, plan: HeldDwell) -> Conduct[None]:
+    """Ramp up to the level, settle, record, ramp down."""
+    settler = Settler(play, plan.settling, plan.base_level)
+    yield from started(play, plan.frequency_hz, plan.base_level)
+    yield from settler.settled()
+    control = LevelControl(plan.base_level, play.most_vpp)
+    target = plan.base_level.acceleration_at(plan.frequency_hz)
+    pieces = ceil(plan.duration_s / plan.update_s * (1 - 1e-9))
+    outside = 0
+    play.forget()
+    for number in range(pieces):
+        begun_s = number * plan.update_s
+        piece_s = min(plan.update_s, plan.duration_s - begun_s)
+        yield from play.listen(RunState.RECORDING, piece_s, plan.segment)
+        measured = measured_level(play.periods.base)
+        require_answer(play.rig, plan.frequency_hz, play.played.setting_vpp, measured.amplitude)
+        held = settler.held(measured)
+        outside += held is Held.OUTSIDE
+        said = {
+            "at_s": shortened(begun_s + piece_s),
+            "base_m_per_s2": shortened(measured.amplitude),
+            "base_u": shortened(measured.uncertainty),
+            "setting_vpp": shortened(play.played.setting_vpp),
+            "level": held.value,
+        }
+        play.note("level", json.dumps(said))
+        # The figures of all pieces since the last change are one mean: chaos needs it long.
+        next_vpp = control.next_vpp(play.played.setting_vpp, measured, target)
+        if next_vpp != play.played.setting_vpp and number + 1 < pieces:
+            play.change(plan.frequency_hz, next_vpp)
+    play.note("achieved", json.dumps({"segment": "dwell", "looks": pieces, "looks_outside": outside}))
+    yield from play.ramp_down()
+    yield from play.say()

@@ -1,0 +1,84 @@
+"""The three channels that feedback listens to, in their units."""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from ..errors import ConfigurationError
+from ..instruments import Samples
+from ..rig import Channel, Role
+from ._control_action import Heard
+from ._stroboscope import Phasors, Stroboscope
+
+
+@dataclass(frozen=True)
+class Ears:
+    """Finds drive, base and m0 in what was heard."""
+
+    drive: int
+    """Row of the drive's channel."""
+    base: int
+    response: int
+    base_units_per_volt: float
+    """[m/s2 per V]"""
+    response_units_per_volt: float
+    """[m/s per V]"""
+    response_delay_s: float
+    """Of the vibrometer; taken out of every phase [s]."""
+    sample_rate_hz: float
+
+    def rows(self, heard: Heard) -> tuple[Samples, Samples, Samples]:
+        """Give drive [V], base acceleration [m/s2] and m0 velocity [m/s], each of shape (samples,)."""
+        return (
+            heard.volts[self.drive],
+            heard.volts[self.base] * self.base_units_per_volt,
+            heard.volts[self.response] * self.response_units_per_volt,
+        )
+
+    def stroboscope(self, near_hz: float) -> Stroboscope:
+        """Begin to look once a period."""
+        return Stroboscope(near_hz, self.sample_rate_hz)
+
+    def transmissibility(self, base: Phasors, response: Phasors, frequency_hz: float) -> complex:
+        """Displacement of m0 over that of the base, from fundamentals of velocity and acceleration.
+
+        Zero where the base shows nothing at all.
+        """
+        if not np.any(base):
+            return 0j
+        turned = np.exp(2j * pi * frequency_hz * self.response_delay_s)
+        return complex(2j * pi * frequency_hz * turned * np.mean(response) / np.mean(base))
+
+
+def ears_of(channels: tuple[Channel, ...], sample_rate_hz: float) -> Ears:
+    """Find the channels that feedback needs.
+
+    Raises
+    ------
+    ConfigurationError
+        When one is missing.
+
+    """
+    drive, base, response = (
+        _row(channels, role) for role in (Role.DRIVE_VOLTAGE, Role.BASE_ACCELERATION, Role.M0_VELOCITY)
+    )
+    return Ears(
+        drive=drive,
+        base=base,
+        response=response,
+        base_units_per_volt=channels[base].units_per_volt,
+        response_units_per_volt=channels[response].units_per_volt,
+        response_delay_s=channels[response].delay_s,
+        sample_rate_hz=sample_rate_hz,
+    )
+
+
+def _row(channels: tuple[Channel, ...], role: Role) -> int:
+    roles = [channel.role for channel in channels]
+    if role not in roles:
+        raise ConfigurationError(
+            f"feedback listens to {role.value}, and this rig has no such channel. Nothing was played; add it "
+            "to daq.channels, or use an excitation without feedback"
+        )
+    return roles.index(role)

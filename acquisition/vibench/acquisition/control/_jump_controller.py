@@ -1,0 +1,215 @@
+"""Localising one jump: back to before it, on the branch it was left from, and halving the way to it."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from ..excitation import SEARCH_LABEL, Segment, SettledSine
+from ._control_action import Conduct
+from ._decay_motion import let_die
+from ._jump_search import LocatedJump, Side, Visit, is_on_branch, located, side
+from ._record import recorded
+from ._settle import Settled, Settler, shortened
+from ._start import glided
+
+_MOST_BRACKETS = 4
+"""How often the search begins anew where the motion left its branch earlier than the last time."""
+
+
+class _Return(Enum):
+    """How the way back to the branch ended."""
+
+    BACK = auto()
+    NOT_FOUND = auto()
+    LEFT = auto()
+    """The branch was found, and left again before its end."""
+
+
+class _Pace(Enum):
+    """How the way forward is gone."""
+
+    GLIDE = auto()
+    STEP = auto()
+
+
+@dataclass
+class _Hunted:
+    """Where the search stands."""
+
+    branch: list[Visit]
+    """Visits on the branch before the jump, in the order of the pass."""
+    after: Visit
+    here: Side
+
+    @property
+    def bracket(self) -> LocatedJump:
+        """What is known of the jump."""
+        return LocatedJump(self.branch[-1], self.after)
+
+    def narrow(self, visit: Visit) -> None:
+        """Take in a visit between the two ends."""
+        self.here = side(visit, self.branch[-1], self.after)
+        match self.here:
+            case Side.BEFORE:
+                self.branch.append(visit)
+            case Side.AFTER:
+                self.after = visit
+
+    def left(self, place: int, visit: Visit) -> None:
+        """Take in that the branch was left on the way to its visit number ``place``."""
+        del self.branch[place:]
+        self.after = visit
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """Where a search has ended, at the frequency it was begun for."""
+
+    visit: Visit
+    branch: Side
+    is_jump: bool
+
+
+class JumpHunt:
+    """Looks into one jump of a pass."""
+
+    def __init__(self, settler: Settler, plan: SettledSine, direction: str, number: int) -> None:
+        assert plan.jumps is not None
+        self._settler = settler
+        self._plan = plan
+        self._rule = plan.jumps
+        self._direction = direction
+        self._number = number
+        self._until_s = settler.play.elapsed_s + plan.search_s
+
+    def localised(self, visited: Sequence[Visit], after: Visit) -> Conduct[Arrival]:
+        """Narrow the bracket between the last of ``visited`` and ``after``; end at ``after``'s frequency.
+
+        A response that only changes steeply is no jump: it closes as the bracket does. Where both
+        branches are there at ``after``, the way to it may end on either, which is said.
+        """
+        hunted = _Hunted(list(visited), after, Side.AFTER)
+        found, why = yield from self._bisected(hunted)
+        is_jump = found.is_jump(self._rule.factor)
+        end = yield from self._led_to(after.frequency_hz)
+        visit = end.visit
+        has_arrived = is_on_branch(visit, after, self._rule.factor)
+        branch = Side.AFTER if has_arrived or not is_jump else Side.BEFORE
+        self._say(found, why, branch)
+        return Arrival(visit, branch, is_jump)
+
+    def _bisected(self, hunted: _Hunted) -> Conduct[tuple[LocatedJump, str]]:
+        for _ in range(_MOST_BRACKETS):
+            found = yield from self._halved(hunted)
+            if found is not None:
+                return found
+        return hunted.bracket, "the motion jumped somewhere else each time"
+
+    def _halved(self, hunted: _Hunted) -> Conduct[tuple[LocatedJump, str] | None]:
+        """Halve the bracket to its end; None when the motion left its branch earlier: a new bracket."""
+        seek = located(hunted.branch[-1], hunted.after, self._rule.resolution_hz)
+        try:
+            frequency_hz = next(seek)
+            while True:
+                if hunted.here is Side.AFTER:
+                    match (yield from self._led_back(hunted)):
+                        case _Return.NOT_FOUND if not self._is_late():
+                            return hunted.bracket, "its branch was not found again"
+                        case _Return.LEFT:
+                            return None
+                if self._is_late():
+                    return hunted.bracket, "the time for the search was over"
+                visit = yield from self._searched(frequency_hz)
+                hunted.narrow(visit)
+                if not hunted.bracket.is_jump(self._rule.factor):
+                    return hunted.bracket, "steep, but no jump"
+                frequency_hz = seek.send(visit)
+        except StopIteration:
+            return hunted.bracket, "localised"
+
+    def _led_back(self, hunted: _Hunted) -> Conduct[_Return]:
+        """Go back along the pass until its branch is found again, then forward to the branch's end.
+
+        Forward in one glide, which is quick; if that leaves the branch, step by step, which tells where.
+        """
+        left: tuple[int, Visit] | None = None
+        for pace in _Pace:
+            place = yield from self._rejoined(hunted.branch)
+            if place is None:
+                return _Return.NOT_FOUND
+            end = len(hunted.branch)
+            steps = range(max(place + 1, end - 1), end) if pace is _Pace.GLIDE else range(place + 1, end)
+            left = yield from self._left(hunted.branch, steps)
+            if left is None:
+                return _Return.BACK
+            if self._is_late():
+                return _Return.NOT_FOUND
+        assert left is not None, "both paces were gone"
+        hunted.left(*left)
+        return _Return.LEFT
+
+    def _left(self, branch: Sequence[Visit], steps: range) -> Conduct[tuple[int, Visit] | None]:
+        """Go forward; give place and finding where the motion has left the branch."""
+        for place in steps:
+            found = yield from self._led_to(branch[place].frequency_hz)
+            if self._is_late() or not is_on_branch(found.visit, branch[place], self._rule.factor):
+                return place, found.visit
+        return None
+
+    def _rejoined(self, branch: Sequence[Visit]) -> Conduct[int | None]:
+        """Go back, in longer and longer strides, until a response of the branch is met; give its place."""
+        stride = 1
+        place = len(branch) - 1
+        while not self._is_late():
+            found = yield from self._led_to(branch[place].frequency_hz)
+            if is_on_branch(found.visit, branch[place], self._rule.factor):
+                return place
+            if place == 0:
+                return (yield from self._revived(branch[0]))
+            place, stride = max(0, place - stride), 2 * stride
+        return None
+
+    def _revived(self, first: Visit) -> Conduct[int | None]:
+        """Let the motion die at the branch's first frequency: a branch that began from rest is back then."""
+        yield from let_die(self._settler.play)
+        found = yield from self._settler.settled()
+        return 0 if is_on_branch(found.visit, first, self._rule.factor) else None
+
+    def _led_to(self, frequency_hz: float) -> Conduct[Settled]:
+        plan = self._plan
+        yield from glided(self._settler.play, frequency_hz, plan.base_level, plan.glide_step_hz)
+        return (yield from self._settler.settled())
+
+    def _searched(self, frequency_hz: float) -> Conduct[Visit]:
+        found = yield from self._led_to(frequency_hz)
+        segment = Segment(
+            SEARCH_LABEL,
+            {
+                "frequency_hz": frequency_hz,
+                "direction": self._direction,
+                "pass": self._number,
+                **found.numbers(),
+            },
+        )
+        yield from recorded(self._settler, found, segment, self._plan.record_s)
+        return found.visit
+
+    def _is_late(self) -> bool:
+        """Whether the time left is too short for one more step and the way to the end."""
+        step_s = self._plan.settling.longest_wait_s
+        return self._settler.play.elapsed_s + 2 * step_s + self._plan.record_s > self._until_s
+
+    def _say(self, found: LocatedJump, how: str, arrived: Side) -> None:
+        said = {
+            "direction": self._direction,
+            "pass": self._number,
+            "frequency_hz": shortened(found.frequency_hz),
+            "before_hz": found.before.frequency_hz,
+            "after_hz": found.after.frequency_hz,
+            "response_before": shortened(found.before.response),
+            "response_after": shortened(found.after.response),
+            "how": how,
+            "arrived": arrived.value,
+        }
+        self._settler.play.note("jump", json.dumps(said))

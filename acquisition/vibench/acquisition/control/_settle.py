@@ -1,0 +1,151 @@
+"""Waiting until a motion has settled, while the base is brought to its level and kept there."""
+
+import json
+from dataclasses import dataclass
+from math import isfinite
+
+from ..excitation import BaseLevel, Settling
+from ..plan import RunState
+from ._closed_loop_check import require_answer
+from ._control_action import Conduct
+from ._jump_search import Visit
+from ._level_control import Held, LevelControl, MeasuredLevel, measured_level
+from ._sine_loop import SinePlay
+from ._steadiness import Judgement, Steadiness, judged
+
+LOOK_S = 0.2
+"""Time between two looks at the motion [s]; ten periods at least."""
+LOOK_PERIODS = 10
+_SURE = 2.0
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What was found at one frequency after waiting."""
+
+    frequency_hz: float
+    """As commanded [Hz]."""
+    drive_hz: float
+    """As seen by the converter [Hz]."""
+    setting_vpp: float
+    waited_s: float
+    judgement: Judgement
+    base: MeasuredLevel
+    """Acceleration of the base's fundamental [m/s2]."""
+    held: Held
+    transmissibility: complex
+    """Displacement of m0 over that of the base, fundamentals."""
+
+    @property
+    def response(self) -> float:
+        """Response II: the magnitude of the transmissibility."""
+        return abs(self.transmissibility)
+
+    @property
+    def visit(self) -> Visit:
+        """What a search for a jump needs of it."""
+        return Visit(self.frequency_hz, self.response, self.judgement.period)
+
+    def numbers(self) -> dict[str, int | float | str]:
+        """Give what belongs beside the samples."""
+        found = self.judgement
+        return {
+            "motion": found.steadiness.value,
+            "period": found.period,
+            "waited_s": round(self.waited_s, 3),
+            # Too few periods for a figure: as wide as the motion itself.
+            "scatter": shortened(found.scatter) if isfinite(found.scatter) else 1.0,
+            "noise": shortened(found.noise) if isfinite(found.noise) else 0.0,
+            "setting_vpp": shortened(self.setting_vpp),
+            "base_m_per_s2": shortened(self.base.amplitude),
+            "base_u": shortened(self.base.uncertainty),
+            "level": self.held.value,
+        }
+
+
+@dataclass(frozen=True)
+class Settler:
+    """Brings the motion at one frequency to rest, as far as it comes to rest."""
+
+    play: SinePlay
+    rule: Settling
+    level: BaseLevel | None
+
+    def settled(self) -> Conduct[Settled]:
+        """Wait at the frequency that is played; correct the setting whenever the level is off."""
+        waited_s = 0.0
+        while True:
+            look_s = max(LOOK_S, LOOK_PERIODS / self.play.played.frequency_hz)
+            yield from self.play.listen(RunState.SETTLING, look_s)
+            waited_s += look_s
+            is_late = waited_s + look_s > self.rule.longest_wait_s
+            if waited_s < self.rule.shortest_wait_s and not is_late:
+                continue
+            if not is_late and self._corrected():
+                continue
+            found = self._found(waited_s)
+            if is_late or (self._is_steady(found) and found.judgement.steadiness is not Steadiness.UNSETTLED):
+                self._say(found)
+                return found
+
+    def measured(self) -> MeasuredLevel:
+        """Measure the base over the newer half of what was seen since the last change."""
+        periods = self.play.periods
+        return measured_level(periods.base[periods.count // 2 :])
+
+    def held(self, measured: MeasuredLevel) -> Held:
+        """Say whether a measured level is the one to be held."""
+        if self.level is None:
+            return Held.OPEN
+        return measured.held(self._target, self.level.tolerance)
+
+    @property
+    def _target(self) -> float:
+        """Acceleration that the base should have here [m/s2]."""
+        assert self.level is not None
+        return self.level.acceleration_at(self.play.played.frequency_hz)
+
+    def _corrected(self) -> bool:
+        """Change the setting if the level asks for it; whether it did."""
+        if self.level is None or self.play.periods.count < LOOK_PERIODS:
+            return False
+        now = self.play.played
+        measured = self.measured()
+        require_answer(self.play.rig, now.frequency_hz, now.setting_vpp, measured.amplitude)
+        control = LevelControl(self.level, self.play.most_vpp)
+        next_vpp = control.next_vpp(now.setting_vpp, measured, self._target)
+        if next_vpp == now.setting_vpp:
+            return False
+        self.play.change(now.frequency_hz, next_vpp)
+        return True
+
+    def _found(self, waited_s: float) -> Settled:
+        play, periods = self.play, self.play.periods
+        newest = periods.last(max(self.rule.periods, periods.count // 2))
+        measured = measured_level(newest.base)
+        return Settled(
+            frequency_hz=play.played.frequency_hz,
+            drive_hz=play.drive_hz,
+            setting_vpp=play.played.setting_vpp,
+            waited_s=waited_s,
+            judgement=judged(periods.response, self.rule, play.noise),
+            base=measured,
+            held=self.held(measured),
+            transmissibility=play.ears.transmissibility(newest.base, newest.response[:, 1], play.drive_hz),
+        )
+
+    def _is_steady(self, found: Settled) -> bool:
+        """Whether the level is known well enough to be called held; it may be out of reach, too."""
+        if self.level is None:
+            return True
+        is_known = _SURE * found.base.uncertainty <= self.level.tolerance * self._target
+        is_at_the_end = found.setting_vpp >= self.play.most_vpp
+        return is_known and (found.held is Held.WITHIN or is_at_the_end)
+
+    def _say(self, found: Settled) -> None:
+        self.play.note("settled", json.dumps({"frequency_hz": found.frequency_hz, **found.numbers()}))
+
+
+def shortened(value: float) -> float:
+    """Round to six figures: the recording's table is narrow."""
+    return float(f"{value:.6g}")

@@ -1,0 +1,110 @@
+"""One sine at a time, played and listened to: the moves that all feedback is made of."""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..excitation import LOWEST_AMPLITUDE_VPP, Segment, Tone
+from ..plan import HUSH_S, Measurement, Phase, RunState, ramp
+from ..rig import Rig
+from ._control_action import Conduct, Heard, Move, Note
+from ._feedback_channels import Ears
+from ._stroboscope import Periods, Stroboscope
+
+
+@dataclass(frozen=True)
+class Played:
+    """What the generator is set to."""
+
+    frequency_hz: float
+    setting_vpp: float
+
+
+class SinePlay:
+    """Knows what is played, and looks at it once a period."""
+
+    def __init__(self, ears: Ears, rig: Rig, measurement: Measurement) -> None:
+        self._measurement = measurement
+        self._notes: list[Note] = []
+        self._scope: Stroboscope
+        self._silence = np.zeros(0)
+        self.ears = ears
+        self.rig = rig
+        self.most_vpp = measurement.excitation.amplitude_vpp
+        """Largest setting of the plan [V]."""
+        self.played = Played(0.0, LOWEST_AMPLITUDE_VPP)
+        self.elapsed_s = 0.0
+        """Listened so far [s]."""
+
+    @property
+    def periods(self) -> Periods:
+        """What was seen since the last change."""
+        return self._scope.periods()
+
+    @property
+    def drive_hz(self) -> float:
+        """Frequency of the drive in the converter's time [Hz]."""
+        return self._scope.clock.frequency_hz
+
+    @property
+    def noise(self) -> float:
+        """Rms of the response channel's own noise, in the orders seen at the frequency of now [m/s]."""
+        return Stroboscope.noise_of(self._silence, self.played.frequency_hz, self.ears.sample_rate_hz)
+
+    def hush(self) -> Conduct[None]:
+        """Listen to silence: what the response shows then is noise."""
+        heard = yield from self._move(Phase(RunState.ARMED, None, HUSH_S))
+        _, _, response = self.ears.rows(heard)
+        # The first half lets the bench check ring out.
+        self._silence = response[len(response) // 2 :]
+
+    def change(self, frequency_hz: float, setting_vpp: float) -> None:
+        """Play something else from the next move on."""
+        if frequency_hz != self.played.frequency_hz:
+            self._scope = self.ears.stroboscope(frequency_hz)
+        self.played = Played(frequency_hz, setting_vpp)
+        self.forget()
+
+    def bounded_vpp(self, setting_vpp: float) -> float:
+        """Keep a setting between the generator's smallest and the plan's largest [V]."""
+        return min(max(setting_vpp, LOWEST_AMPLITUDE_VPP), self.most_vpp)
+
+    def forget(self) -> None:
+        """Look anew from the next move on."""
+        self._scope.forget()
+
+    def note(self, kind: str, text: str) -> None:
+        """Have something noted with the next move."""
+        self._notes.append(Note(kind, text))
+
+    def ramp_up(self) -> Conduct[None]:
+        """Begin to play."""
+        yield from self._move(ramp(RunState.RAMPING_UP, self._tone, self._measurement))
+
+    def ramp_down(self) -> Conduct[None]:
+        """End the play."""
+        yield from self._move(ramp(RunState.RAMPING_DOWN, self._tone, self._measurement))
+
+    def listen(self, state: RunState, duration_s: float, segment: Segment | None = None) -> Conduct[None]:
+        """Play on for a while, and look."""
+        heard = yield from self._move(Phase(state, self._tone, duration_s, segment))
+        self.elapsed_s += duration_s
+        self._scope.add(heard.first_sample, *self.ears.rows(heard))
+
+    def say(self) -> Conduct[None]:
+        """Have everything noted that is still to be noted."""
+        if self._notes:
+            yield Move(None, self._taken_notes())
+
+    def _move(self, phase: Phase) -> Generator[Move, Heard, Heard]:
+        return (yield Move(phase, self._taken_notes()))
+
+    def _taken_notes(self) -> tuple[Note, ...]:
+        notes = tuple(self._notes)
+        self._notes.clear()
+        return notes
+
+    @property
+    def _tone(self) -> Tone:
+        return Tone(self.played.frequency_hz, self.played.setting_vpp / self.most_vpp)

@@ -1,0 +1,87 @@
+"""From one sine to the next: the first one ramped up, the others reached without a kick."""
+
+from math import ceil
+
+import numpy as np
+
+from ..excitation import GLIDE_TONE_S, BaseLevel
+from ..plan import RunState, needed_vpp
+from ._closed_loop_check import require_answer
+from ._control_action import Conduct
+from ._gain_estimator import GainTrack
+from ._sine_loop import SinePlay
+
+_GLIDE_MEMORY_S = 0.5
+"""Over which a glide averages the base's answer [s]."""
+
+
+def started(play: SinePlay, frequency_hz: float, level: BaseLevel | None) -> Conduct[None]:
+    """Ramp up at a frequency: to the level, as the rig's model has it, or to the plan's setting."""
+    setting_vpp = play.most_vpp
+    if level is not None:
+        guess_vpp = needed_vpp(play.rig, level.acceleration_at(frequency_hz), frequency_hz)
+        setting_vpp = play.bounded_vpp(guess_vpp)
+    play.change(frequency_hz, setting_vpp)
+    yield from play.hush()
+    yield from play.ramp_up()
+
+
+def glided(play: SinePlay, frequency_hz: float, level: BaseLevel | None, step_hz: float) -> Conduct[None]:
+    """Go to another frequency through others at most ``step_hz`` apart: a large step would be a kick."""
+    begin_hz = play.played.frequency_hz
+    tones = max(1, ceil(abs(frequency_hz - begin_hz) / step_hz * (1 - 1e-9)))
+    track = GainTrack(_GLIDE_MEMORY_S)
+    for tone in range(1, tones):
+        tracked(play, begin_hz + (frequency_hz - begin_hz) * tone / tones, level, track, GLIDE_TONE_S)
+        yield from play.listen(RunState.SETTLING, GLIDE_TONE_S)
+        followed(play, level, track)
+    tracked(play, frequency_hz, level, track, GLIDE_TONE_S)
+
+
+def moved(play: SinePlay, frequency_hz: float, level: BaseLevel | None) -> None:
+    """Play another frequency: the setting follows the rig's model from where it is."""
+    setting_vpp = play.played.setting_vpp
+    if level is not None:
+        setting_vpp *= needed_vpp(play.rig, level.acceleration_at(frequency_hz), frequency_hz)
+        setting_vpp /= _modelled_vpp(play, level)
+    _change(play, frequency_hz, setting_vpp, level)
+
+
+def tracked(
+    play: SinePlay, frequency_hz: float, level: BaseLevel | None, track: GainTrack, duration_s: float
+) -> None:
+    """Play another frequency for ``duration_s``, at the setting that the track foresees for its middle."""
+    if level is None or not track.is_known:
+        moved(play, frequency_hz, level)
+        return
+    modelled_vpp = needed_vpp(play.rig, level.acceleration_at(frequency_hz), frequency_hz)
+    gain = track.gain_at(play.elapsed_s + 0.5 * duration_s)
+    _change(play, frequency_hz, modelled_vpp / gain, level)
+
+
+def followed(play: SinePlay, level: BaseLevel | None, track: GainTrack) -> None:
+    """Take what was just heard into the track."""
+    if level is None:
+        return
+    now = play.played
+    if play.periods.count:
+        acceleration = abs(complex(np.mean(play.periods.base)))
+        require_answer(play.rig, now.frequency_hz, now.setting_vpp, acceleration)
+    target = level.acceleration_at(now.frequency_hz)
+    modelled = target * now.setting_vpp / _modelled_vpp(play, level)
+    track.add(play.elapsed_s, play.periods.base, modelled, target)
+
+
+def _modelled_vpp(play: SinePlay, level: BaseLevel) -> float:
+    """Give the setting that the model needs for the level at the frequency of now [V]."""
+    frequency_hz = play.played.frequency_hz
+    return needed_vpp(play.rig, level.acceleration_at(frequency_hz), frequency_hz)
+
+
+def _change(play: SinePlay, frequency_hz: float, wanted_vpp: float, level: BaseLevel | None) -> None:
+    """Change frequency and setting, the latter by no more than the level allows at once."""
+    if level is not None:
+        now_vpp = play.played.setting_vpp
+        slow_vpp = min(max(wanted_vpp, now_vpp / level.most_change), now_vpp * level.most_change)
+        wanted_vpp = play.bounded_vpp(slow_vpp)
+    play.change(frequency_hz, wanted_vpp)

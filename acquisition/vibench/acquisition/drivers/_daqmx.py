@@ -1,0 +1,238 @@
+"""A converter behind NI-DAQmx: continuous, hardware-timed, without a gap, and never left reserved."""
+
+from contextlib import ExitStack
+from typing import Self
+
+import numpy as np
+from nidaqmx import DaqError, Task
+from nidaqmx.constants import AcquisitionType, TaskMode
+from nidaqmx.stream_readers import AnalogMultiChannelReader
+
+from ..errors import ConfigurationError, InstrumentError, SettingRefused
+from ..instruments import Block, Identity, Overload, Samples
+from ..rig import Channel, DaqConfig, Rig, channels_of
+from ._daqmx_errors import NOT_OFFERED, daqmx_call
+from ._daqmx_identity import daqmx_identity
+from ._daqmx_inputs import InputScaling, add_input
+from ._daqmx_session import DaqmxSession, daqmx_session
+from ._overload_ranges import overload_ranges
+
+# A read is cut into pieces of this length, so that no single call waits long and none needs the whole buffer.
+LONGEST_READ_S = 2.0
+# Added to the length of a read: how late samples may be before the device counts as dead.
+_READ_MARGIN_S = 10.0
+# Sigma-delta modules take the next higher rate of a list; lower, or twice as fast, is another measurement.
+_MOST_COERCED = 2.0
+
+
+class DaqmxDigitizer:
+    """A `Digitizer` on NI-DAQmx, on this computer or behind a gRPC device server.
+
+    Made by `open`, which reserves the device: every setting is checked then, not when a run begins.
+    """
+
+    def __init__(self, session: DaqmxSession, config: DaqConfig, channels: tuple[Channel, ...]) -> None:
+        self._session = session
+        self._config = config
+        self._channels = channels
+        self._resources = ExitStack()
+        self._task: Task | None = None
+        self._reader: AnalogMultiChannelReader | None = None
+        self._scalings: tuple[InputScaling | None, ...] = ()
+        self._identity: Identity | None = None
+        self._sample_rate_hz = 0.0
+        self._next_sample = 0
+        self._is_running = False
+        self._tells_overloads = True
+
+    @classmethod
+    def open(cls, rig: Rig) -> Self:
+        """Reserve the converter of a rig with all its inputs, and read back the rate that it takes.
+
+        Raises
+        ------
+        InstrumentBusy, InstrumentLost, InstrumentError, ConfigurationError, SettingRefused
+            As `daqmx_errors` tells them apart. Nothing stays reserved then.
+
+        """
+        digitizer = cls(daqmx_session(rig.daq.server), rig.daq, channels_of(rig))
+        with ExitStack() as undo:
+            undo.callback(digitizer._release)
+            with daqmx_call(f"opening {rig.daq.device} on {digitizer._session.place}"):
+                digitizer._reserve()
+            undo.pop_all()
+        return digitizer
+
+    @property
+    def identity(self) -> Identity:
+        """Product, serial number and driver version."""
+        if self._identity is None:
+            raise InstrumentError(f"{self._config.device} is not open; make it with DaqmxDigitizer.open")
+        return self._identity
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """The rate that the hardware runs at, read back from it."""
+        return self._sample_rate_hz
+
+    @property
+    def requested_rate_hz(self) -> float:
+        """The rate that the configuration asks for."""
+        return self._config.sample_rate_hz
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """Roles of the channels, in the order of the rows of a block."""
+        return tuple(channel.role.value for channel in self._channels)
+
+    @property
+    def volts_per_count(self) -> tuple[float | None, ...]:
+        """Step of the converter for each channel [V]; None where volts are no whole multiples of one step."""
+        return tuple(
+            None if scaling is None else scaling.volts_per_count(channel.range_v)
+            for scaling, channel in zip(self._scalings, self._channels, strict=True)
+        )
+
+    @property
+    def session(self) -> DaqmxSession:
+        """The way to the driver, for an output on the same one."""
+        return self._session
+
+    def start_trigger(self) -> str:
+        """Terminal on which other tasks see this one start; arm them before `start`."""
+        with daqmx_call(f"asking {self._config.device} for its start trigger"):
+            return str(self._open_task().triggers.start_trigger.term)
+
+    def start(self) -> None:
+        """Begin sampling; the first sample of the run is sample 0."""
+        task = self._open_task()
+        if self._is_running:
+            raise InstrumentError(f"{self._config.device} is sampling already; stop it before the next run")
+        with daqmx_call(f"starting {self._config.device}"):
+            task.start()
+        self._is_running = True
+        self._next_sample = 0
+
+    def read(self, samples: int) -> Block:
+        """Wait for the next ``samples`` of every channel and hand them over.
+
+        After a failure the run cannot go on, since its place in time is lost: stop, and start anew.
+
+        Raises
+        ------
+        DataLost
+            When samples were overwritten before they were read.
+        InstrumentLost
+            When the device or its server is gone.
+        InstrumentError
+            When the samples do not come in time, or nothing is running.
+
+        """
+        if not self._is_running:
+            raise InstrumentError(f"{self._config.device} is not sampling; start it before reading")
+        if samples < 1:
+            raise InstrumentError(f"{samples} samples were asked of {self._config.device}; ask for 1 or more")
+        volts = np.empty((len(self._channels), samples))
+        first_sample = self._next_sample
+        with daqmx_call(
+            f"reading samples {first_sample} to {first_sample + samples - 1} of {self._config.device}"
+        ):
+            self._is_running = False  # until the block is whole
+            self._fill(volts)
+            told = self._overloaded_roles()
+            self._is_running = True
+        self._next_sample += samples
+        return Block(first_sample, volts, self._overloads(volts, first_sample, told))
+
+    def stop(self) -> None:
+        """End sampling. Legal at any time."""
+        self._is_running = False
+        if self._task is not None:
+            with daqmx_call(f"stopping {self._config.device}"):
+                self._task.stop()
+
+    def close(self) -> None:
+        """Release the device. Legal at any time; the connection closes in any case."""
+        with daqmx_call(f"releasing {self._config.device}"):
+            self._release()
+
+    def _release(self) -> None:
+        self._is_running = False
+        self._task = None
+        self._reader = None
+        self._resources.close()
+
+    def _reserve(self) -> None:
+        self._resources.callback(self._session.close)
+        self._identity = self._identify()
+        self._task = task = self._resources.enter_context(Task(grpc_options=self._session.options))
+        pairs = zip(self._config.channels, self._channels, strict=True)
+        self._scalings = tuple(add_input(task, config, channel) for config, channel in pairs)
+        rate_hz = self._config.sample_rate_hz
+        task.timing.cfg_samp_clk_timing(
+            rate_hz,
+            sample_mode=AcquisitionType.CONTINUOUS,
+            samps_per_chan=int(self._config.buffer_s * rate_hz),
+        )
+        self._sample_rate_hz = float(task.timing.samp_clk_rate)
+        if not rate_hz * (1 - 1e-6) <= self._sample_rate_hz < _MOST_COERCED * rate_hz:
+            raise SettingRefused(
+                f"{self._config.device} was asked for {rate_hz:g} samples a second and takes "
+                f"{self._sample_rate_hz:g}; the next higher rate of the device was expected. It is released; "
+                "set daq.sample_rate_hz to a rate that it has"
+            )
+        task.control(TaskMode.TASK_RESERVE)
+        self._reader = AnalogMultiChannelReader(task.in_stream)
+        # Every array is made here for the channels of this task; the check would be a call of its own.
+        self._reader.verify_array_shape = False
+
+    def _identify(self) -> Identity:
+        identity = daqmx_identity(self._session, self._config.device)
+        if _plain(identity.model) != _plain(self._config.product):
+            raise ConfigurationError(
+                f"{self._config.device} on {self._session.place} is a {identity.model}, and daq.product says "
+                f"{self._config.product!r}. Nothing was reserved; correct daq.device or daq.product"
+            )
+        return identity
+
+    def _open_task(self) -> Task:
+        if self._task is None:
+            raise InstrumentError(f"{self._config.device} is closed; open the bench again")
+        return self._task
+
+    def _fill(self, volts: Samples) -> None:
+        assert self._reader is not None, "a running task has a reader"
+        piece = max(1, int(min(LONGEST_READ_S, self._config.buffer_s / 2) * self._sample_rate_hz))
+        for first in range(0, volts.shape[1], piece):
+            count = min(piece, volts.shape[1] - first)
+            # The reader wants C order, which a slice of columns has not: only a long read is copied.
+            target = volts if count == volts.shape[1] else np.empty((volts.shape[0], count))
+            timeout_s = count / self._sample_rate_hz + _READ_MARGIN_S
+            self._reader.read_many_sample(target, count, timeout_s)
+            if target is not volts:
+                volts[:, first : first + count] = target
+
+    def _overloaded_roles(self) -> frozenset[str]:
+        """Channels that the device itself flags: asked while it runs, and not all can tell."""
+        if not self._tells_overloads:
+            return frozenset()
+        stream = self._open_task().in_stream
+        try:
+            return frozenset(stream.overloaded_chans) if stream.overloaded_chans_exist else frozenset()
+        except DaqError as error:
+            if error.error_type not in NOT_OFFERED:
+                raise
+            self._tells_overloads = False
+            return frozenset()
+
+    def _overloads(self, volts: Samples, first_sample: int, told: frozenset[str]) -> tuple[Overload, ...]:
+        scales_v = tuple(channel.full_scale_v for channel in self._channels)
+        seen = overload_ranges(volts, self.roles, scales_v, first_sample)
+        unseen = told - {overload.channel for overload in seen}
+        # A clip too short for the samples to show: the block is all that is known of its time.
+        last_sample = first_sample + volts.shape[1] - 1
+        return (*seen, *(Overload(role, first_sample, last_sample) for role in sorted(unseen)))
+
+
+def _plain(product: str) -> str:
+    return product.upper().removeprefix("NI").strip(" -")

@@ -1,0 +1,213 @@
+"""An analogue output that streams samples ahead of time, never repeats old ones, and ends at zero."""
+
+from contextlib import ExitStack, suppress
+from dataclasses import replace
+from typing import Self
+
+import numpy as np
+from nidaqmx import Task
+from nidaqmx.constants import AcquisitionType, AOIdleOutputBehavior, RegenerationMode, TaskMode
+from nidaqmx.errors import DaqError
+from nidaqmx.stream_writers import AnalogSingleChannelWriter
+from nidaqmx.task.channels import AOChannel
+
+from ..errors import DataLost, InstrumentError, InstrumentLost, LimitExceeded, SettingRefused
+from ..instruments import Identity, IdleOutput, Samples
+from ..rig import OutputConfig
+from ._daqmx import DaqmxDigitizer
+from ._daqmx_errors import daqmx_call
+from ._daqmx_identity import daqmx_identity
+
+_WRITE_TIMEOUT_S = 10.0
+# The last of them is what the output holds; some devices want more than one.
+_ZERO_SAMPLES = 64
+# Two oscillators of one device differ by nothing; a rate that is off by more is another rate.
+_SAME_RATE = 1e-6
+
+
+class DaqmxOutput:
+    """An `AnalogOutput` on NI-DAQmx, started by the same trigger as the inputs.
+
+    ``open``, ``write`` the first stretch, ``arm``, then start the digitizer: both begin with sample
+    0. Go on writing as fast as samples are played. `stop` goes to zero volts at once; the next
+    ``write`` begins a new stream. A program that dies stops writing: the output then runs dry within
+    ``ahead_s`` and ends by itself.
+    """
+
+    def __init__(self, physical: str, config: OutputConfig, digitizer: DaqmxDigitizer) -> None:
+        self._physical = physical
+        self._config = config
+        self._digitizer = digitizer
+        self._resources = ExitStack()
+        self._task: Task | None = None
+        self._written = 0
+        self._is_open = True
+        self._idle = IdleOutput.HELD
+
+    @classmethod
+    def open(cls, physical: str, config: OutputConfig, digitizer: DaqmxDigitizer) -> Self:
+        """Set an output to zero volts and reserve it on the digitizer's driver.
+
+        Parameters
+        ----------
+        physical
+            Full name: ``"Dev1/ao0"``.
+
+        Raises
+        ------
+        SettingRefused
+            When the device takes another sample rate than the one asked for.
+        InstrumentError
+            As `daqmx_errors` tells them apart; nothing stays reserved then.
+
+        """
+        output = cls(physical, config, digitizer)
+        output._to_zero()
+        output._reserve()
+        return output
+
+    @property
+    def identity(self) -> Identity:
+        """Which module it belongs to, and which of its outputs it is."""
+        device, _, _ = self._physical.rpartition("/")
+        with daqmx_call(f"identifying {self._physical}"):
+            module = daqmx_identity(self._digitizer.session, device)
+        return replace(module, reply=f"{self._physical} of {module.reply}")
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """The rate that the output was asked for, and takes."""
+        return self._config.sample_rate_hz
+
+    @property
+    def idle(self) -> IdleOutput:
+        """What the device does when it runs dry: zero volts where it can be told to, and read back."""
+        return self._idle
+
+    @property
+    def ahead_samples(self) -> int:
+        """How many samples fit in front of what is being played."""
+        return int(self._config.ahead_s * self._config.sample_rate_hz)
+
+    def write(self, volts: Samples) -> None:
+        """Put samples behind those that are still to be played; wait for room when there is none.
+
+        Raises
+        ------
+        LimitExceeded
+            When a sample is past the limit of the bench, or no number. Nothing was written.
+        DataLost
+            When the output ran dry before: it has stopped.
+
+        """
+        peak_v = float(np.max(np.abs(volts), initial=0.0))
+        if not peak_v <= self._config.limit_v:  # so that a NaN does not pass
+            raise LimitExceeded(
+                f"{self._physical} was to play a peak of {peak_v:g} V; {self._config.limit_v:g} V are "
+                "allowed here. Nothing was written; lower the amplitude"
+            )
+        if not self._is_open:
+            raise InstrumentError(f"{self._physical} is closed; open the bench again")
+        task = self._task or self._reserve()
+        with daqmx_call(f"writing {volts.size} samples to {self._physical}"):
+            writer = AnalogSingleChannelWriter(task.out_stream, auto_start=False)
+            writer.write_many_sample(np.ascontiguousarray(volts), _WRITE_TIMEOUT_S)
+        self._written += volts.size
+
+    def arm(self) -> None:
+        """Wait for the inputs to start: call it before the digitizer's ``start``."""
+        if self._task is None or self._written == 0:
+            raise InstrumentError(f"{self._physical} has nothing to play; write the first stretch, then arm")
+        with daqmx_call(f"arming {self._physical}"):
+            self._task.start()
+
+    def stop(self) -> None:
+        """Stop playing and go to zero volts at once. Legal at any time.
+
+        Raises
+        ------
+        InstrumentLost
+            When the device or its server is gone: the output then runs dry by itself.
+
+        """
+        if self._task is None:
+            return
+        task, self._task, self._written = self._task, None, 0
+        try:
+            with ExitStack() as last:
+                last.callback(self._to_zero)  # also when stopping fails: devices may hold their last value
+                last.callback(self._release)
+                # An output that ran dry says so once more; it has stopped, which is what is wanted.
+                last.enter_context(suppress(DataLost))
+                with daqmx_call(f"stopping {self._physical}"):
+                    task.stop()
+        except InstrumentLost as error:
+            raise InstrumentLost(
+                f"{error}. {self._physical} MAY STILL BE PLAYING what was written ahead, at most "
+                f"{self._config.ahead_s:g} s, and some devices then hold their last value: switch the "
+                "amplifier off"
+            ) from error
+
+    def close(self) -> None:
+        """Release the output, at zero volts. Legal at any time."""
+        self._is_open = False
+        self.stop()
+
+    def _reserve(self) -> Task:
+        config, physical = self._config, self._physical
+        trigger = self._digitizer.start_trigger()
+        with ExitStack() as undo, daqmx_call(f"opening {physical}"):
+            undo.callback(self._resources.close)
+            task = self._resources.enter_context(Task(grpc_options=self._digitizer.session.options))
+            self._idle = _told_to_idle_at_zero(self._add_channel(task))
+            task.timing.cfg_samp_clk_timing(
+                config.sample_rate_hz,
+                sample_mode=AcquisitionType.CONTINUOUS,
+                samps_per_chan=self.ahead_samples,
+            )
+            rate_hz = float(task.timing.samp_clk_rate)
+            if abs(rate_hz - config.sample_rate_hz) > _SAME_RATE * config.sample_rate_hz:
+                raise SettingRefused(
+                    f"{physical} was asked for {config.sample_rate_hz:g} samples a second and takes "
+                    f"{rate_hz:g}: every frequency would be off. It was released; set "
+                    "daq.output.sample_rate_hz to a rate that it has"
+                )
+            task.out_stream.regen_mode = RegenerationMode.DONT_ALLOW_REGENERATION
+            task.out_stream.output_buf_size = self.ahead_samples
+            task.triggers.start_trigger.cfg_dig_edge_start_trig(trigger)
+            task.control(TaskMode.TASK_RESERVE)
+            undo.pop_all()
+        self._task = task
+        return task
+
+    def _release(self) -> None:
+        with daqmx_call(f"releasing {self._physical}"):
+            self._resources.close()
+
+    def _to_zero(self) -> None:
+        with (
+            daqmx_call(f"setting {self._physical} to zero"),
+            Task(grpc_options=self._digitizer.session.options) as task,
+        ):
+            self._add_channel(task)
+            # Clocked, since delta-sigma outputs know no other way.
+            zeros = np.zeros(_ZERO_SAMPLES)
+            task.timing.cfg_samp_clk_timing(
+                self._config.sample_rate_hz, sample_mode=AcquisitionType.FINITE, samps_per_chan=zeros.size
+            )
+            task.write(zeros, auto_start=True)
+            task.wait_until_done(_WRITE_TIMEOUT_S)
+
+    def _add_channel(self, task: Task) -> AOChannel:
+        limit_v = self._config.limit_v
+        return task.ao_channels.add_ao_voltage_chan(self._physical, min_val=-limit_v, max_val=limit_v)
+
+
+def _told_to_idle_at_zero(channel: AOChannel) -> IdleOutput:
+    """Ask for zero volts when idle, and believe what is read back: many devices hold their last value."""
+    # A device that cannot refuses the setting, and one that does not know it refuses to be asked.
+    with suppress(DaqError):
+        channel.ao_idle_output_behavior = AOIdleOutputBehavior.ZERO_VOLTS
+        if channel.ao_idle_output_behavior is AOIdleOutputBehavior.ZERO_VOLTS:
+            return IdleOutput.ZERO
+    return IdleOutput.HELD

@@ -1,0 +1,11 @@
+"""Where an engine can be asked: all that a viewer needs to know of its door."""
+
+from ..host import FrozenModel
+
+
+class EngineAddress(FrozenModel):
+    """Where an engine can be asked, and the word that lets one in."""
+
+    host: str
+    port: int
+    token: str

@@ -1,0 +1,187 @@
+"""What viewers may see of an engine: written by its own thread, read by any other, never waited for."""
+
+import shutil
+import threading
+from pathlib import Path
+from time import monotonic
+
+import numpy as np
+
+from ..bench import BenchReport
+from ..campaign import CampaignItem, CampaignProgress, Item
+from ..instruments import Block
+from ..plan import Campaign, RunState, measured_s
+from ._messages import Messages
+from ._sample_buffer import Recent
+from ._state import Attendance, EngineState
+from ._status import ArmedPlan, BenchFacts, ChannelFacts, ChannelLevel, EngineStatus, RowStatus, RunStatus
+
+DISK_INTERVAL_S = 2.0
+"""How often the room on the disk is looked at [s]."""
+_STATES = {RunState.HELD: EngineState.HELD, RunState.RAMPING_DOWN: EngineState.RAMPING_DOWN}
+
+
+class Shown:
+    """The newest of everything. Each value is replaced as a whole, so that no reader sees half of it."""
+
+    def __init__(self, attendance: Attendance) -> None:
+        self.recent = Recent()
+        self.messages = Messages()
+        self._lock = threading.Lock()
+        self._status = EngineStatus(state=EngineState.CLOSED, attendance=attendance)
+        self._armed_until_s = 0.0
+        self._folder = Path()
+        self._disk_due_s = 0.0
+        self._file = Path()
+        self._done_s = 0.0
+        self._campaign_s = 0.0
+        self._planned_s: dict[str, float] = {}
+        self._overloads = 0
+
+    @property
+    def state(self) -> EngineState:
+        """Where the engine stands."""
+        return self._status.state
+
+    def status(self) -> EngineStatus:
+        """Give the newest of everything but the samples."""
+        status = self._status
+        armed = status.armed
+        if armed is not None:
+            left_s = max(0.0, self._armed_until_s - monotonic())
+            armed = armed.model_copy(update={"expires_in_s": left_s})
+        return status.model_copy(
+            update={
+                "armed": armed,
+                "messages": self.messages.kept,
+                "samples": self.recent.samples,
+                "run_id": self.recent.run_id,
+                "lost_blocks": self.recent.gaps,
+            }
+        )
+
+    def enter(self, state: EngineState) -> None:
+        """Stand somewhere else; leaving a run or an armed plan forgets it."""
+        keeps_plan = state is EngineState.ARMED or state in _STATES.values() or state is EngineState.RUNNING
+        forgotten = {} if keeps_plan else {"armed": None, "run": None, "levels": ()}
+        self._put(state=state, **forgotten)
+
+    def bench(self, bench: BenchFacts | None) -> None:
+        """Show which bench is open; another one has not been checked."""
+        self._put(bench=bench, check=None, checked_utc="")
+        self._put_rows(())
+
+    def checked(self, report: BenchReport, utc: str) -> None:
+        """Show what the check has found."""
+        self._put(check=report, checked_utc=utc)
+
+    def arm(self, plan: ArmedPlan, campaign: Campaign) -> None:
+        """Show what is going to happen."""
+        self._armed_until_s = monotonic() + plan.expires_in_s
+        self._put_rows(_queued(campaign))
+        self._put(state=EngineState.ARMED, armed=plan)
+
+    def begin(self, campaign: Campaign, folder: Path) -> None:
+        """Show that a campaign is being carried out."""
+        self._folder = folder
+        self._campaign_s, self._done_s, self._file = campaign.duration_s, 0.0, Path()
+        self._planned_s = {name: measured_s(each) + campaign.rest_s for name, each in campaign.recordings()}
+        self._put_rows(_queued(campaign))
+        self._put(state=EngineState.RUNNING, armed=None)
+
+    def tell(self, progress: CampaignProgress, bench: BenchFacts) -> None:
+        """Show what a block has changed."""
+        run = progress.run
+        if progress.path != self._file:  # another attempt at one point is another recording
+            self._begin(progress, bench)
+        self.recent.add(run.block)
+        self._overloads += len(run.block.overloads)
+        self._put(
+            state=_STATES.get(run.state, EngineState.RUNNING),
+            run=self._run_status(progress),
+            levels=levels_of(run.block, bench.channels),
+            overloads=self._overloads,
+            **self._disk(),
+        )
+
+    def rests(self, rest_s: float, text: str) -> None:
+        """Show that the campaign rests between two recordings."""
+        self._done_s += rest_s
+        self.messages.info(text)
+
+    def item(self, item: CampaignItem) -> None:
+        """Show how a recording came out; what an earlier run has made is done already."""
+        if item.result is Item.KEPT:
+            self._done_s += self._planned_s.get(item.name, 0.0)
+        elif self._status.run is not None and item.name == self._status.run.name:
+            self._done_s += self._status.run.total_s
+        self._row(item.name, item.result.value, item.reason, str(item.path))
+
+    def failed(self, reason: str) -> None:
+        """Show that the recording that was running has failed."""
+        for row in self._status.rows:
+            if row.state == "running":
+                self._row(row.name, "failed", reason, row.file)
+
+    def _begin(self, progress: CampaignProgress, bench: BenchFacts) -> None:
+        self._file = progress.path
+        self._overloads = 0
+        self.recent.begin(len(bench.channels), bench.sample_rate_hz)
+        self._row(progress.name, "running", "", str(progress.path))
+
+    def _row(self, name: str, state: str, reason: str, file: str) -> None:
+        told = RowStatus(name=name, state=state, reason=reason, file=file)
+        self._put_rows(tuple(told if row.name == name else row for row in self._status.rows))
+
+    def _run_status(self, progress: CampaignProgress) -> RunStatus:
+        run = progress.run
+        return RunStatus(
+            name=progress.name,
+            number=progress.number,
+            count=progress.count,
+            file=str(progress.path),
+            run_state=run.state,
+            segment="" if run.segment is None else run.segment.label,
+            numbers={} if run.segment is None else run.segment.numbers,
+            elapsed_s=run.elapsed_s,
+            total_s=run.total_s,
+            campaign_elapsed_s=self._done_s + run.elapsed_s,
+            campaign_total_s=max(self._campaign_s, self._done_s + run.total_s),
+            amplitude_vpp=run.amplitude_vpp,
+            frequency_hz=run.frequency_hz,
+        )
+
+    def _disk(self) -> dict[str, int]:
+        if monotonic() < self._disk_due_s:
+            return {}
+        self._disk_due_s = monotonic() + DISK_INTERVAL_S
+        try:
+            return {"disk_free_bytes": shutil.disk_usage(self._folder).free}
+        except OSError:  # the folder is gone: the recorder will say so, and a picture ends no run
+            return {"disk_free_bytes": 0}
+
+    def _put_rows(self, rows: tuple[RowStatus, ...]) -> None:
+        self._put(rows=rows, rows_number=self._status.rows_number + 1)
+
+    def _put(self, **changes: object) -> None:
+        with self._lock:
+            self._status = self._status.model_copy(update=changes)
+
+
+def _queued(campaign: Campaign) -> tuple[RowStatus, ...]:
+    names = campaign.recording_names()
+    return tuple(RowStatus(name=name, state="queued", reason="", file="") for name in names)
+
+
+def levels_of(block: Block, channels: tuple[ChannelFacts, ...]) -> tuple[ChannelLevel, ...]:
+    """Say how far each channel was driven, of its full scale."""
+    peaks = np.max(np.abs(block.volts), axis=1)
+    rms = np.sqrt(np.mean(block.volts**2, axis=1))
+    return tuple(
+        ChannelLevel(
+            role=channel.role,
+            peak_share=peak / channel.full_scale_v,
+            rms_share=value / channel.full_scale_v,
+        )
+        for channel, peak, value in zip(channels, peaks.tolist(), rms.tolist(), strict=True)
+    )

@@ -1,0 +1,88 @@
+"""Starting an engine's process, and being the one whose end it follows."""
+
+import subprocess
+import sys
+from types import TracebackType
+from typing import Self
+
+from ._address import EngineAddress
+from ._client import EngineClient
+from ._errors import EngineGone
+from ._state import Attendance, Visit
+
+LEAVING_S = 10.0
+"""How long an engine may take to ramp down, finish its recording and end [s]."""
+
+
+class EngineProcess:
+    """An engine's process and a connection to it. An attended engine ends with whoever started it."""
+
+    def __init__(self, process: "subprocess.Popen[str]", address: EngineAddress) -> None:
+        self._process = process
+        self.address = address
+        """Where others may ask it as well."""
+        self.client = EngineClient.attach(address, Visit.ATTENDING)
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it still runs."""
+        return self._process.poll() is None
+
+    def close(self) -> None:
+        """Let the engine ramp down and end, and wait for that. Legal at any time."""
+        if self.is_alive:
+            try:
+                self.client.shutdown()
+            except EngineGone:
+                self._process.terminate()
+        self.client.close()
+        try:
+            self._process.wait(LEAVING_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        # Not before: the end of its input tells an engine that it has been left alone.
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                pipe.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def start_engine(attendance: Attendance = Attendance.ATTENDED) -> EngineProcess:
+    """Start an engine of this installation, with no bench open.
+
+    Raises
+    ------
+    EngineGone
+        When it does not start.
+
+    """
+    process = subprocess.Popen(  # noqa: S603 - this interpreter, and nothing of a user's
+        [sys.executable, "-m", "vibench.acquisition.engine", "--attendance", attendance.value],
+        stdin=subprocess.PIPE if attendance is Attendance.ATTENDED else subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        text=True,
+        # Ctrl-C in a terminal is for whoever shows the run: that one decides what the engine is told.
+        start_new_session=True,
+    )
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    if not line:
+        process.wait()
+        raise EngineGone(
+            f"the engine's process ended with code {process.returncode} before it could be asked; "
+            "run 'python -m vibench.acquisition.engine' to see why"
+        )
+    return EngineProcess(process, EngineAddress.model_validate_json(line))

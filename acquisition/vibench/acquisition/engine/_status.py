@@ -1,0 +1,126 @@
+"""What an engine tells whoever asks: where it stands, what it measures, what has happened."""
+
+from collections.abc import Mapping
+from enum import StrEnum
+
+from ..bench import BenchReport
+from ..host import FrozenModel
+from ..plan import RunState
+from ._state import Attendance, EngineState
+
+
+class ChannelFacts(FrozenModel):
+    """One channel, as needed to show its samples."""
+
+    role: str
+    unit: str
+    units_per_volt: float
+    full_scale_v: float
+
+
+class BenchFacts(FrozenModel):
+    """Which bench is open."""
+
+    rig_name: str
+    is_simulated: bool
+    identities: Mapping[str, str]
+    """Reply of each instrument, by its part in the bench."""
+    channels: tuple[ChannelFacts, ...]
+    sample_rate_hz: float
+
+
+class ArmedPlan(FrozenModel):
+    """What will happen at the start, in words that an experimenter can check."""
+
+    campaign: str
+    folder: str
+    lines: tuple[str, ...]
+    """What, at which level, within which limits, how long, and where it is saved."""
+    expires_in_s: float
+    """The engine disarms itself after this long."""
+
+
+class RunStatus(FrozenModel):
+    """The measurement that runs."""
+
+    name: str
+    number: int
+    """Of the campaign's recordings, from 1."""
+    count: int
+    file: str
+    run_state: RunState
+    segment: str
+    numbers: Mapping[str, int | float | str]
+    elapsed_s: float
+    total_s: float
+    campaign_elapsed_s: float
+    campaign_total_s: float
+    amplitude_vpp: float
+    frequency_hz: float | None
+
+
+class ChannelLevel(FrozenModel):
+    """How far a channel was driven during the last block, of its full scale."""
+
+    role: str
+    peak_share: float
+    rms_share: float
+
+
+class RowStatus(FrozenModel):
+    """One recording of the armed or running campaign."""
+
+    name: str
+    state: str
+    """``"queued"``, ``"running"``, or how it ended."""
+    reason: str
+    file: str
+
+
+class MessageKind(StrEnum):
+    """How a message is to be taken."""
+
+    INFO = "info"
+    WARNING = "warning"
+    FAULT = "fault"
+
+
+class EngineMessage(FrozenModel):
+    """Something that has happened: what, what was done about it, and what to do next."""
+
+    number: int
+    """Counts all messages of an engine, from 1."""
+    utc: str
+    kind: MessageKind
+    what: str
+    done: str = ""
+    next_step: str = ""
+    code: str = ""
+    """Name of the error, for a search."""
+
+
+class EngineStatus(FrozenModel):
+    """Everything a viewer shows, but the samples."""
+
+    state: EngineState
+    attendance: Attendance
+    bench: BenchFacts | None = None
+    check: BenchReport | None = None
+    checked_utc: str = ""
+    armed: ArmedPlan | None = None
+    run: RunStatus | None = None
+    levels: tuple[ChannelLevel, ...] = ()
+    rows: tuple[RowStatus, ...] = ()
+    rows_number: int = 0
+    """Changes whenever a row does: thousands of rows go over the wire only when they are news."""
+    overloads: int = 0
+    """Ranges of samples past a channel's full scale, in this run."""
+    lost_blocks: int = 0
+    """Gaps in this run's samples."""
+    disk_free_bytes: int = 0
+    samples: int = 0
+    """Samples per channel of this run so far."""
+    run_id: int = 0
+    """Changes with every recording; what was seen of another one is no longer true."""
+    messages: tuple[EngineMessage, ...] = ()
+    """The newest, oldest first."""

@@ -1,0 +1,56 @@
+"""One sine, held, with the base kept at a level while the specimen does what it likes."""
+
+from collections.abc import Iterator
+from typing import Literal
+
+from pydantic import PositiveFloat
+
+from ._feedback import BaseLevel, Settling
+from ._plan import AbstractFeedback, FrequencyHz
+from ._preview import Preview, preview_of
+from ._steps import Segment, Step, Tone
+
+
+class HeldDwell(AbstractFeedback):
+    """A dwell whose base motion is measured and held, before the recording and while it lasts."""
+
+    kind: Literal["held_dwell"] = "held_dwell"
+    frequency_hz: FrequencyHz
+    """Frequency of the sine [Hz]."""
+    base_level: BaseLevel
+    """Level of the base to be held."""
+    settling: Settling = Settling()
+    """When the recording begins."""
+    duration_s: PositiveFloat
+    """Time recorded after settling [s]."""
+    update_s: PositiveFloat = 1.0
+    """How often the level is looked at, and corrected if need be, while recording [s]."""
+
+    @property
+    def highest_frequency_hz(self) -> float:
+        """The frequency itself [Hz]."""
+        return self.frequency_hz
+
+    @property
+    def playing_s(self) -> float:
+        """The longest wait and the recording [s]."""
+        return self.settling.longest_wait_s + self.duration_s
+
+    @property
+    def segment(self) -> Segment:
+        """What the recorded part is called."""
+        return Segment("dwell", {"frequency_hz": self.frequency_hz})
+
+    def steps(self) -> Iterator[Step]:
+        """One step, without its wait, at the largest setting."""
+        yield Step(Tone(self.frequency_hz), 0.0, self.duration_s, self.segment)
+
+    def held_accelerations(self) -> Iterator[tuple[float, float]]:
+        """Give the level at the dwell's frequency."""
+        yield self.frequency_hz, self.base_level.acceleration_at(self.frequency_hz)
+
+    def preview(self, sample_rate_hz: float) -> Preview:
+        """Show the recorded part at the largest setting."""
+        return preview_of(
+            self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
+        )

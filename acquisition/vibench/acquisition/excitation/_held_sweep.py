@@ -1,0 +1,65 @@
+"""A sine sweep that keeps the measured motion of the base at a level."""
+
+from collections.abc import Iterator
+from typing import Literal
+
+from pydantic import PositiveFloat
+
+from ._feedback import BaseLevel, Settling
+from ._plan import AbstractFeedback
+from ._preview import Preview, preview_of
+from ._sine_sweep import MovingSine
+from ._steps import Segment, Step, Tone
+
+
+class HeldSweep(MovingSine, AbstractFeedback):
+    """A sweep whose setting is corrected after every step by what the base did in it.
+
+    A sweep does not wait: where the base's answer changes within a few steps, the level is off for as
+    long, and the recording says where.
+    """
+
+    kind: Literal["held_sweep"] = "held_sweep"
+    base_level: BaseLevel
+    """Level of the base to be held."""
+    average_s: PositiveFloat = 0.5
+    """Chance is averaged away, and the level judged, over this time; a trend is followed faster [s]."""
+    settling: Settling = Settling()
+    """When the sweep begins to move."""
+
+    @property
+    def playing_s(self) -> float:
+        """The longest wait at the start, and the sweep [s]."""
+        return self.settling.longest_wait_s + self.duration_s
+
+    @property
+    def segment(self) -> Segment:
+        """What the sweep is called."""
+        return Segment(
+            "sweep",
+            {
+                "start_hz": self.start_hz,
+                "stop_hz": self.stop_hz,
+                "duration_s": self.duration_s,
+                "step_s": self.step_s,
+                "spacing": self.spacing.value,
+                "hold": f"measured {self.base_level.quantity}",
+            },
+        )
+
+    def steps(self) -> Iterator[Step]:
+        """One step for every ``step_s``, all of one segment, at the largest setting."""
+        segment = self.segment
+        for mean_hz, duration_s in self.mean_steps():
+            yield Step(Tone(mean_hz), 0.0, duration_s, segment)
+
+    def held_accelerations(self) -> Iterator[tuple[float, float]]:
+        """Give the level at every step."""
+        for mean_hz, _ in self.mean_steps():
+            yield mean_hz, self.base_level.acceleration_at(mean_hz)
+
+    def preview(self, sample_rate_hz: float) -> Preview:
+        """Show the whole sweep at the largest setting."""
+        return preview_of(
+            self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
+        )

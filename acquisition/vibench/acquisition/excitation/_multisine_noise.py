@@ -1,0 +1,23 @@
+"""Band-limited white noise out of the generator's memory: a random-phase multisine, new for every average."""
+
+from typing import Literal
+
+from ._multisine import Lines
+from ._periodic_noise import PeriodicNoise
+
+
+class MultisineNoise(PeriodicNoise):
+    """White noise between two frequencies, as whole periods of flat lines with random phases.
+
+    A periodic signal needs no window and has no leakage, but averaging its periods averages the
+    sensors' noise only. Every realisation therefore has its own phases: it is the average over
+    realisations that stands for noise (Pintelon and Schoukens, System Identification, 2nd ed.,
+    section 4.3).
+    """
+
+    kind: Literal["multisine_noise"] = "multisine_noise"
+
+    @property
+    def lines(self) -> Lines:
+        """All harmonics of ``repetition_hz`` in the band."""
+        return self.candidates

@@ -1,0 +1,90 @@
+"""What all noise out of the generator's memory shares: flat lines of a band, new phases for every average."""
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from typing import Self
+
+import numpy as np
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+
+from ._multisine import Lines, band_lines, flat_periods, require_playable
+from ._plan import AbstractExcitation, FrequencyHz
+from ._preview import Preview, preview_of
+from ._steps import Segment, Step, Waveform
+
+
+class PeriodicNoise(AbstractExcitation):
+    """Whole periods of flat lines with random phases, one waveform for every realisation."""
+
+    band_start_hz: FrequencyHz
+    """Lowest frequency of the band [Hz]."""
+    band_stop_hz: FrequencyHz
+    """Highest frequency of the band [Hz]."""
+    repetition_hz: PositiveFloat = 1.0
+    """Periods per second, and the distance of the harmonics [Hz]."""
+    realisations: PositiveInt = 10
+    """Waveforms with phases of their own, all on the same lines."""
+    periods: PositiveInt = 2
+    """Periods recorded of each realisation; two or more show the noise of the sensors."""
+    settle_s: NonNegativeFloat = 3.0
+    """Wait after each change of waveform until the transient has died out [s]."""
+    seed: int = Field(default=1, ge=0)
+    """The same seed gives the same waveforms, on any machine."""
+
+    @property
+    @abstractmethod
+    def lines(self) -> Lines:
+        """The excited harmonics of ``repetition_hz``."""
+
+    @property
+    def candidates(self) -> Lines:
+        """Harmonics in the band that a plan of this kind may excite."""
+        return band_lines(self.band_start_hz, self.band_stop_hz, self.repetition_hz)
+
+    @model_validator(mode="after")
+    def _band_fits_the_memory(self) -> Self:
+        if self.band_stop_hz <= self.band_start_hz:
+            raise ValueError(
+                f"band_stop_hz = {self.band_stop_hz:g} is not above band_start_hz = {self.band_start_hz:g}; "
+                "give the band from low to high"
+            )
+        require_playable(self.candidates, self.band_stop_hz, self.repetition_hz)
+        return self
+
+    @property
+    def highest_frequency_hz(self) -> float:
+        """The upper edge of the band [Hz]."""
+        return self.band_stop_hz
+
+    @property
+    def playing_s(self) -> float:
+        """Settling and recording of all realisations [s]."""
+        return self.realisations * (self.settle_s + self.periods / self.repetition_hz)
+
+    def steps(self) -> Iterator[Step]:
+        """Yield one step for every realisation."""
+        lines = np.asarray(self.lines, dtype=np.int64)
+        for realisation, values in enumerate(flat_periods(lines, self.realisations, self.seed)):
+            yield Step(
+                play=Waveform(values, self.repetition_hz),
+                settle_s=self.settle_s,
+                record_s=self.periods / self.repetition_hz,
+                segment=Segment(
+                    "realisation",
+                    {
+                        "realisation": realisation,
+                        "repetition_hz": self.repetition_hz,
+                        "periods": self.periods,
+                        "band_start_hz": self.band_start_hz,
+                        "band_stop_hz": self.band_stop_hz,
+                    },
+                ),
+            )
+
+    def preview(self, sample_rate_hz: float) -> Preview:
+        """Show one period of the first realisation."""
+        first = next(self.steps())
+        period = Step(first.play, settle_s=0.0, record_s=1 / self.repetition_hz, segment=first.segment)
+        return preview_of(
+            [period], self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
+        )

@@ -1,0 +1,111 @@
+"""A sine that seeks the phase resonance of a mode and stays on it, level after level."""
+
+from collections.abc import Iterator
+from typing import Literal, Self
+
+from pydantic import Field, PositiveFloat, model_validator
+
+from ._feedback import BaseLevel, Settling
+from ._plan import AbstractFeedback, FrequencyHz
+from ._preview import Preview, preview_of
+from ._steps import Segment, Step, Tone
+
+RESONANCE_LABEL = "resonance"
+"""Segment recorded on a resonance."""
+
+
+class ResonanceTracking(AbstractFeedback):
+    """Phase resonance of one mode at rising (or falling) levels of the base: its backbone.
+
+    At the resonance m0 moves a quarter of a period behind the base. The loop measures that phase on
+    the fundamental of settled motion and moves the frequency until it is met. Other modes shift it a
+    little; the flanks tell the natural frequency and the damping apart from them, as long as the motion
+    is linear.
+    """
+
+    kind: Literal["resonance_tracking"] = "resonance_tracking"
+    start_hz: FrequencyHz
+    """Where the search begins; closer to this mode than to any other [Hz]."""
+    low_hz: FrequencyHz
+    """The frequency never goes below [Hz]."""
+    high_hz: FrequencyHz
+    """The frequency never goes above [Hz]."""
+    phase_deg: float = Field(default=-90.0, gt=-180, lt=180)
+    """Phase of m0 over the base at the resonance, both as displacements [degrees]."""
+    phase_tolerance_deg: float = Field(default=1.0, gt=0, le=30)
+    """How closely the phase must be met [degrees]."""
+    sensor_phase_deg: float = Field(default=0.3, ge=0, le=30)
+    """Standard uncertainty of the phase between accelerometer and vibrometer [degrees]."""
+    accelerations_m_per_s2: tuple[PositiveFloat, ...] = Field(min_length=1, max_length=100)
+    """Levels of the base's fundamental, peak, in the order played [m/s2]."""
+    level_tolerance: float = Field(default=0.025, gt=0, lt=1)
+    """How far the measured level may lie from its own, as a share."""
+    settling: Settling = Settling()
+    """When a motion counts as settled."""
+    widest_step_hz: PositiveFloat = 1.0
+    """Longest step of the search; shorter than from the resonance to the antiresonance beside it [Hz]."""
+    most_tries: int = Field(default=25, ge=3, le=200)
+    """How many frequencies are tried for one level."""
+    flank_pairs: int = Field(default=3, ge=0, le=10)
+    """Pairs of frequencies measured on both flanks, for the mode's natural frequency and damping."""
+    record_s: PositiveFloat = 1.0
+    """Time recorded on each resonance [s]."""
+
+    @model_validator(mode="after")
+    def _start_lies_inside(self) -> Self:
+        if not self.low_hz < self.start_hz < self.high_hz:
+            raise ValueError(
+                f"start_hz = {self.start_hz:g} is not between low_hz = {self.low_hz:g} and high_hz = "
+                f"{self.high_hz:g}; give the three in this order: low, start, high"
+            )
+        return self
+
+    @property
+    def highest_frequency_hz(self) -> float:
+        """The upper end of the range [Hz]."""
+        return self.high_hz
+
+    @property
+    def playing_s(self) -> float:
+        """All levels with the longest searches [s]."""
+        tries_s = (self.most_tries + 2 * self.flank_pairs) * self.settling.longest_wait_s
+        return len(self.accelerations_m_per_s2) * (tries_s + self.record_s)
+
+    def base_level(self, number: int) -> BaseLevel:
+        """Give one of the levels as what is held."""
+        return BaseLevel(
+            acceleration_m_per_s2=self.accelerations_m_per_s2[number], tolerance=self.level_tolerance
+        )
+
+    def segment(self, number: int, frequency_hz: float) -> Segment:
+        """Name the recording on the resonance of a level."""
+        return Segment(
+            RESONANCE_LABEL,
+            {
+                "level": number,
+                "frequency_hz": frequency_hz,
+                "asked_m_per_s2": self.accelerations_m_per_s2[number],
+            },
+        )
+
+    def steps(self) -> Iterator[Step]:
+        """One step for each level, where the search begins, at the largest setting."""
+        for number in range(len(self.accelerations_m_per_s2)):
+            yield Step(Tone(self.start_hz), 0.0, self.record_s, self.segment(number, self.start_hz))
+
+    def loudest_steps(self) -> Iterator[Step]:
+        """List the largest setting at both ends of the range and inside it, a hertz apart or less."""
+        count = int(self.high_hz - self.low_hz) + 2
+        for number in range(count):
+            frequency_hz = self.low_hz + (self.high_hz - self.low_hz) * number / (count - 1)
+            yield Step(Tone(frequency_hz), 0.0, self.record_s, Segment(RESONANCE_LABEL))
+
+    def held_accelerations(self) -> Iterator[tuple[float, float]]:
+        """Give the largest level where the search begins."""
+        yield self.start_hz, max(self.accelerations_m_per_s2)
+
+    def preview(self, sample_rate_hz: float) -> Preview:
+        """Show the recorded parts where the search begins, at the largest setting."""
+        return preview_of(
+            self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
+        )

@@ -1,0 +1,155 @@
+"""A sine whose frequency moves slowly through a band, in steps too small to notice."""
+
+from collections.abc import Iterator
+from enum import StrEnum
+from math import ceil, expm1, log
+from typing import Literal, Self
+
+from pydantic import NonNegativeFloat, PositiveFloat, model_validator
+
+from ._plan import LOWEST_AMPLITUDE_VPP, AbstractExcitation, FrequencyHz
+from ._preview import Preview, preview_of
+from ._steps import Segment, Step, Tone
+
+
+class Spacing(StrEnum):
+    """How the frequency moves with time."""
+
+    LINEAR = "linear"
+    """The same number of hertz in every second."""
+    LOGARITHMIC = "logarithmic"
+    """The same time in every octave."""
+
+
+class Hold(StrEnum):
+    """Which motion of the base stays about constant along a sweep, on a shaker that drives a mass.
+
+    Above its suspension resonance a shaker turns voltage into acceleration. What is held is only as
+    constant as that: what the base really did is in the recording.
+    """
+
+    ACCELERATION = "acceleration"
+    """The amplitude setting stays as it is."""
+    VELOCITY = "velocity"
+    """The setting grows in proportion to frequency."""
+    DISPLACEMENT = "displacement"
+    """The setting grows with the square of frequency: the base displacement of the paper's model."""
+
+    @property
+    def power(self) -> int:
+        """Power of the frequency that the amplitude setting follows."""
+        return {Hold.ACCELERATION: 0, Hold.VELOCITY: 1, Hold.DISPLACEMENT: 2}[self]
+
+
+class MovingSine(AbstractExcitation):
+    """A sine sweep, up or down, that the computer steps through: the generator has no sweep time to set.
+
+    Each step plays the mean frequency of the ideal sweep over its time, so that at the end of every
+    step the phase is the ideal sweep's. What the generator really played, and when, is in the
+    recorded drive.
+    """
+
+    start_hz: FrequencyHz
+    """Frequency at the beginning [Hz]; above ``stop_hz`` for a sweep downwards."""
+    stop_hz: FrequencyHz
+    """Frequency at the end [Hz]."""
+    duration_s: PositiveFloat
+    """Time from start to stop [s]."""
+    spacing: Spacing = Spacing.LINEAR
+    """How the frequency moves with time."""
+    step_s: PositiveFloat = 0.1
+    """Time at one frequency [s]; the last step may be shorter."""
+
+    @model_validator(mode="after")
+    def _sweep_moves(self) -> Self:
+        if self.start_hz == self.stop_hz:
+            raise ValueError(
+                f"start_hz and stop_hz are both {self.start_hz:g}, but a sweep moves; "
+                "use a dwell for one frequency"
+            )
+        if self.step_s > self.duration_s:
+            raise ValueError(
+                f"step_s = {self.step_s:g} is longer than the whole sweep of {self.duration_s:g} s; "
+                "give a shorter step"
+            )
+        return self
+
+    @property
+    def highest_frequency_hz(self) -> float:
+        """The upper end of the sweep [Hz]."""
+        return max(self.start_hz, self.stop_hz)
+
+    def cycles(self, time_s: float) -> float:
+        """Cycles of the ideal sweep since its start, in closed form."""
+        match self.spacing:
+            case Spacing.LINEAR:
+                rate = (self.stop_hz - self.start_hz) / self.duration_s
+                return self.start_hz * time_s + 0.5 * rate * time_s**2
+            case Spacing.LOGARITHMIC:
+                rate = log(self.stop_hz / self.start_hz) / self.duration_s
+                return self.start_hz * expm1(rate * time_s) / rate
+
+    def mean_steps(self) -> Iterator[tuple[float, float]]:
+        """Give mean frequency [Hz] and duration [s] of each step, in the order of time."""
+        # 1e-9 keeps a duration that is a whole number of steps, but for rounding, from growing a sliver.
+        count = ceil(self.duration_s / self.step_s * (1 - 1e-9))
+        for number in range(count):
+            begin_s = number * self.step_s
+            end_s = min(begin_s + self.step_s, self.duration_s)
+            yield (self.cycles(end_s) - self.cycles(begin_s)) / (end_s - begin_s), end_s - begin_s
+
+
+class SineSweep(MovingSine):
+    """A sine sweep at an amplitude setting that follows a power of the frequency."""
+
+    kind: Literal["sine_sweep"] = "sine_sweep"
+    hold: Hold = Hold.ACCELERATION
+    """What stays constant; ``amplitude_vpp`` is then the setting at the highest frequency."""
+    settle_s: NonNegativeFloat = 3.0
+    """Wait before the sweep starts, close to ``start_hz``, until the transient has died out [s]."""
+
+    @model_validator(mode="after")
+    def _quietest_step_is_playable(self) -> Self:
+        lowest_hz = min(self.start_hz, self.stop_hz)
+        quietest_vpp = self.amplitude_vpp * self.level(lowest_hz)
+        if quietest_vpp < LOWEST_AMPLITUDE_VPP:
+            raise ValueError(
+                f"holding the {self.hold} needs a setting of {quietest_vpp:.3g} Vpp at {lowest_hz:g} Hz, "
+                f"and the generator's smallest is {LOWEST_AMPLITUDE_VPP:g} Vpp; raise amplitude_vpp, or "
+                "narrow the band"
+            )
+        return self
+
+    def level(self, frequency_hz: float) -> float:
+        """Amplitude at a frequency as a fraction of ``amplitude_vpp``."""
+        return float((frequency_hz / self.highest_frequency_hz) ** self.hold.power)
+
+    @property
+    def playing_s(self) -> float:
+        """Settling and sweep [s]."""
+        return self.settle_s + self.duration_s
+
+    def steps(self) -> Iterator[Step]:
+        """One step for every ``step_s``, all of one segment."""
+        segment = Segment(
+            "sweep",
+            {
+                "start_hz": self.start_hz,
+                "stop_hz": self.stop_hz,
+                "duration_s": self.duration_s,
+                "step_s": self.step_s,
+                "spacing": self.spacing.value,
+                "hold": self.hold.value,
+            },
+        )
+        settle_s = self.settle_s
+        for mean_hz, duration_s in self.mean_steps():
+            yield Step(Tone(mean_hz, self.level(mean_hz)), settle_s, duration_s, segment)
+            settle_s = 0.0
+
+    def preview(self, sample_rate_hz: float) -> Preview:
+        """Show the whole sweep, without the wait before it."""
+        moving = (Step(step.play, 0.0, step.record_s, step.segment) for step in self.steps())
+        return preview_of(
+            moving, self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
+        )

@@ -1,0 +1,10 @@
+"""What the computer provides: TOML files in and out, shipped files, the state folder, the parent process.
+
+`FrozenModel` is the base of every validated value; what a file says wrongly is refused with file, key,
+what was given and what is allowed. ``VIBENCH_STATE_DIR`` names another state folder. Knows nothing of
+measurements.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

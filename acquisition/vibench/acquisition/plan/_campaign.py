@@ -1,0 +1,132 @@
+"""What to measure, in order: measurements and nested sweeps, and the TOML file that says them."""
+
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import Field, NonNegativeFloat, model_validator
+
+from ..excitation import KINDS
+from ..host import FrozenModel, load_toml
+from ._measurement import Measurement, Name
+from ._point import Point
+from ._retry import RetryPolicy
+from ._schedule import measured_s
+from ._sweep import Sweep
+
+DEFAULTS = "defaults"
+BYTES_PER_SAMPLE = 4
+"""A recording keeps the converter's counts as 32-bit integers while it runs; the finished file is smaller."""
+
+
+class Campaign(FrozenModel):
+    """Measurements to be made one after the other, and sweeps after them.
+
+    In a file, ``[defaults]`` holds what all measurements share, and ``[defaults.<kind>]`` what all
+    excitations of one kind share; a measurement's own values come first, and so do a sweep's. The
+    campaign itself has every value in its place. A file holds values and nothing that could be run.
+    """
+
+    name: Name
+    notes: str = ""
+    retry: RetryPolicy = RetryPolicy()
+    rest_s: NonNegativeFloat = Field(default=0.0, le=86400)
+    """Silence between two recordings [s]: specimen and amplifier cool."""
+    measurements: tuple[Measurement, ...] = ()
+    sweeps: tuple[Sweep, ...] = ()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_in_defaults(cls, content: Any) -> Any:
+        match content:
+            case {"defaults": dict(defaults), **rest}:
+                measurements = [_filled(each, defaults) for each in _listed(rest, "measurements")]
+                sweeps = [_filled_sweep(each, defaults) for each in _listed(rest, "sweeps")]
+                return {**rest, "measurements": measurements, "sweeps": sweeps}
+            case _:
+                return content
+
+    @model_validator(mode="after")
+    def _has_points_of_different_names(self) -> Self:
+        names = Counter(name.lower() for name in self.recording_names())
+        if not names:
+            raise ValueError("a campaign needs at least one of [[measurements]] and [[sweeps]]")
+        twice = sorted(name for name, count in names.items() if count > 1)
+        if twice:
+            raise ValueError(
+                f"two measurements would be recorded as {twice[0]!r}; give every measurement and sweep "
+                "a name of its own, and every axis different values (capital letters do not count)"
+            )
+        return self
+
+    def points(self) -> tuple[Point, ...]:
+        """Every recording that is wanted, in order: measurements, then sweeps."""
+        listed = (Point(name, each) for each in self.measurements for name in _names(each))
+        return (*listed, *(point for sweep in self.sweeps for point in sweep.points()))
+
+    def recordings(self) -> tuple[tuple[str, Measurement], ...]:
+        """Name of each recording, and the measurement it is one of, in order."""
+        return tuple((point.name, point.measurement) for point in self.points())
+
+    def recording_names(self) -> tuple[str, ...]:
+        """Names of all recordings, in order, without ``.h5``."""
+        return tuple(point.name for point in self.points())
+
+    @property
+    def duration_s(self) -> float:
+        """Time of all measurements with their ramps, one bench check each, and rests in between [s]."""
+        points = self.points()
+        return _recorded_s(points) + self.rest_s * (len(points) - 1)
+
+    def size_bytes(self, sample_rate_hz: float, channels: int) -> int:
+        """Disk space of all recordings while they are made; compressed afterwards, they need less."""
+        return round(_recorded_s(self.points()) * sample_rate_hz) * channels * BYTES_PER_SAMPLE
+
+
+def _recorded_s(points: tuple[Point, ...]) -> float:
+    return sum(measured_s(point.measurement) for point in points)
+
+
+def load_campaign(path: Path) -> Campaign:
+    """Read a campaign; raises ConfigurationError with file, key and what is allowed."""
+    return load_toml(path, Campaign)
+
+
+def _names(measurement: Measurement) -> tuple[str, ...]:
+    if measurement.repeats == 1:
+        return (measurement.name,)
+    return tuple(f"{measurement.name}-{number}" for number in range(1, measurement.repeats + 1))
+
+
+def _listed(content: Mapping[Any, Any], key: str) -> list[Any]:
+    """Give a list as it stands; what is none is left for the validation to refuse."""
+    given = content.get(key, [])
+    return list(given) if isinstance(given, list | tuple) else [given]
+
+
+def _filled_sweep(sweep: object, defaults: Mapping[str, Any]) -> object:
+    """Put the defaults underneath a sweep's template, and underneath each of its excitations."""
+    match sweep:
+        case {"measurement": dict(template), **rest}:
+            others = [
+                {**defaults.get(str(each.get("kind")), {}), **each} if isinstance(each, dict) else each
+                for each in _listed(rest, "excitations")
+            ]
+            return {**rest, "measurement": _filled(template, defaults), "excitations": others}
+        case _:
+            return sweep
+
+
+def _filled(measurement: object, defaults: Mapping[str, Any]) -> object:
+    """Put the defaults underneath a measurement's own values."""
+    match measurement:
+        case dict():
+            shared = {key: value for key, value in defaults.items() if key not in KINDS}
+            own = {**shared, **measurement}
+            match own.get("excitation"):
+                case {"kind": str(kind), **values}:
+                    own["excitation"] = {**defaults.get(kind, {}), **values, "kind": kind}
+            return own
+        case _:
+            return measurement

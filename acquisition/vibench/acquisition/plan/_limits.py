@@ -1,0 +1,287 @@
+"""The safety envelope: what a plan would do to the rig, next to what the rig survives."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from ..errors import LimitExceeded
+from ..rig import (
+    LARGEST_LEVEL_ERROR,
+    OutputConfig,
+    Quantity,
+    Rig,
+    Role,
+    channels_of,
+    highest_carried_hz,
+    suspended_mass_kg,
+)
+from ._drive_source import Player, player_of
+from ._loads import predicted_loads
+from ._measurement import Measurement, OnOverload
+from ._needed_setting import needed_vpp
+from ._specimen_loads import predicted_specimen_loads
+
+RAMP_PERIODS = 3.0
+"""A ramp must take this many periods of the shaker's suspension, or it shakes like a step."""
+USABLE_BANDWIDTH = 0.45
+"""Share of the sample rate below which a converter with an anti-alias filter is flat (NI 9234: 0.45)."""
+
+
+class Side(StrEnum):
+    """Which side of the limit is allowed."""
+
+    AT_MOST = "at most"
+    AT_LEAST = "at least"
+
+
+class Consequence(StrEnum):
+    """What follows when a limit would be passed."""
+
+    REFUSED = "refused"
+    """The plan is not played."""
+    TOLD = "told"
+    """It is said beforehand, and marked in the recording if it comes true."""
+
+
+@dataclass(frozen=True)
+class LimitCheck:
+    """One predicted value beside its limit."""
+
+    what: str
+    value: float
+    limit: float
+    unit: str
+    source: str
+    """Where the limit comes from."""
+    remedy: str
+    """What to change when it is exceeded."""
+    side: Side = Side.AT_MOST
+    consequence: Consequence = Consequence.REFUSED
+
+    @property
+    def use(self) -> float:
+        """How much of the limit is used: above 1 is too much."""
+        match self.side:
+            case Side.AT_MOST:
+                return self.value / self.limit
+            case Side.AT_LEAST:
+                return self.limit / self.value
+
+    @property
+    def forbids(self) -> bool:
+        """Whether the plan must not be played."""
+        return not self.is_kept and self.consequence is Consequence.REFUSED
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the value is allowed; a value on the limit is, but for rounding."""
+        return self.use <= 1 + 1e-9
+
+    def complaint(self) -> str:
+        """Say the violation in one clause."""
+        return (
+            f"{self.what} would be {self.value:.4g} {self.unit}, allowed is {self.side.value} "
+            f"{self.limit:.4g} {self.unit} ({self.source}): {self.remedy}"
+        )
+
+
+def limit_checks(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
+    """Every predicted load of ``measurement`` beside the limit of ``rig`` it must keep."""
+    return (*_settings(measurement, rig), *_loads(measurement, rig), *_specimen(measurement, rig))
+
+
+def require_within_limits(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
+    """Refuse a measurement that would pass any limit of the rig.
+
+    Raises
+    ------
+    LimitExceeded
+        Naming every violation with value, limit, source and remedy. Nothing was moved.
+
+    """
+    checks = limit_checks(measurement, rig)
+    violations = [check.complaint() for check in checks if check.forbids]
+    if violations:
+        raise LimitExceeded(f"{measurement.name}: {'; '.join(violations)}. Nothing was played.")
+    return checks
+
+
+def limit_table(checks: tuple[LimitCheck, ...]) -> str:
+    """Lay out the checks for a person, the most used limit first."""
+    rows = [("quantity", "predicted", "limit", "used", "source of the limit")]
+    rows += [
+        (
+            check.what,
+            f"{check.value:.4g} {check.unit}",
+            f"{check.side.value} {check.limit:.4g} {check.unit}",
+            f"{100 * check.use:.1f} %",
+            check.source,
+        )
+        for check in sorted(checks, key=lambda each: each.use, reverse=True)
+    ]
+    widths = [max(len(row[column]) for row in rows) for column in range(4)]
+    lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)) for row in rows)
+    return "\n".join(f"{line}  {row[4]}" for line, row in zip(lines, rows, strict=True))
+
+
+def shortest_ramp_s(rig: Rig) -> float:
+    """Three periods of the loaded shaker on its suspension [s]."""
+    shaker = rig.shaker
+    resonance = np.sqrt(shaker.suspension_stiffness_n_per_m / suspended_mass_kg(shaker)) / (2 * np.pi)
+    return float(RAMP_PERIODS / resonance)
+
+
+def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
+    excitation = measurement.excitation
+    yield LimitCheck(
+        "the generator's setting",
+        excitation.highest_amplitude_vpp,
+        rig.generator.amplitude_limit_vpp,
+        "Vpp",
+        "amplitude_limit_vpp of the hardware configuration",
+        "lower amplitude_vpp",
+    )
+    yield from _held_levels(measurement, rig)
+    yield LimitCheck(
+        "the highest frequency",
+        excitation.highest_frequency_hz,
+        USABLE_BANDWIDTH * rig.daq.sample_rate_hz,
+        "Hz",
+        f"{USABLE_BANDWIDTH:g} of the sample rate",
+        "lower the frequency or raise sample_rate_hz",
+    )
+    carried_hz = None if rig.virtual is None else highest_carried_hz(rig.virtual.grid_rate_hz)
+    if carried_hz is not None:
+        yield LimitCheck(
+            "the highest frequency on the virtual rig's coarse grid",
+            excitation.highest_frequency_hz,
+            carried_hz,
+            "Hz",
+            f"levels there are {LARGEST_LEVEL_ERROR:.0%} off",
+            "lower the frequency or raise virtual.grid_rate_hz",
+        )
+    if rig.daq.output is not None and player_of(measurement, rig) is Player.OUTPUT:
+        yield from _streaming(measurement, rig, rig.daq.output)
+    yield LimitCheck(
+        "the ramp",
+        measurement.ramp_s,
+        shortest_ramp_s(rig),
+        "s",
+        f"{RAMP_PERIODS:g} periods of the shaker's suspension",
+        "lengthen ramp_s",
+        Side.AT_LEAST,
+    )
+
+
+def _held_levels(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
+    """Check that the settings which held levels need, by the rig's model, are within the plan's largest."""
+    needed = [
+        (needed_vpp(rig, acceleration, frequency_hz), frequency_hz)
+        for frequency_hz, acceleration in measurement.excitation.held_accelerations()
+    ]
+    if needed:
+        most_vpp, at_hz = max(needed)
+        yield LimitCheck(
+            f"the setting that holds the base's level (at {at_hz:g} Hz)",
+            most_vpp,
+            measurement.excitation.amplitude_vpp,
+            "Vpp",
+            "amplitude_vpp of the plan, the largest that feedback may use",
+            "raise amplitude_vpp or lower the level",
+        )
+
+
+def _streaming(measurement: Measurement, rig: Rig, output: OutputConfig) -> Iterator[LimitCheck]:
+    """Check what only the analogue output limits."""
+    excitation = measurement.excitation
+    yield LimitCheck(
+        "the analogue output's voltage (peak)",
+        0.5 * excitation.highest_amplitude_vpp * rig.generator.terminal_factor(),
+        output.limit_v,
+        "V",
+        output.source,
+        "lower amplitude_vpp",
+    )
+    yield LimitCheck(
+        "the highest frequency of the analogue output",
+        excitation.highest_frequency_hz,
+        USABLE_BANDWIDTH * output.sample_rate_hz,
+        "Hz",
+        f"{USABLE_BANDWIDTH:g} of the output's sample rate",
+        "lower the frequency or raise daq.output.sample_rate_hz",
+    )
+
+
+def _loads(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
+    loads = predicted_loads(measurement.excitation, rig)
+    limits = rig.shaker.limits
+    less = "lower amplitude_vpp"
+    gentler = "lower amplitude_vpp or raise the lowest frequency"
+    for quantity, what, limit, unit, remedy in (
+        (Quantity.STROKE, "the stroke", limits.stroke_m, "m", gentler),
+        (Quantity.VELOCITY, "the table's velocity", limits.velocity_m_per_s, "m/s", gentler),
+        (Quantity.ACCELERATION, "the table's acceleration", limits.acceleration_m_per_s2, "m/s2", less),
+        (Quantity.FORCE, "the force", limits.force_n, "N", less),
+        (Quantity.CURRENT, "the coil current", limits.current_a, "A", less),
+    ):
+        load = loads[quantity]
+        name = f"{what} ({load.cause}, peak)"
+        yield LimitCheck(name, load.peak, limit.value, unit, limit.source, remedy)
+    current, volts = loads[Quantity.CURRENT], loads[Quantity.AMPLIFIER_VOLTAGE]
+    limiter = rig.amplifier.current_limit_a
+    yield LimitCheck(
+        f"the current ({current.cause}, rms)", current.rms, limiter.value, "A", limiter.source, less
+    )
+    clip = f"clipping of the {rig.amplifier.model}"
+    name = f"the amplifier's voltage ({volts.cause}, peak)"
+    yield LimitCheck(name, volts.peak, rig.amplifier.clip_v, "V", clip, "lower amplitude_vpp or the gain")
+    yield from _inputs(
+        rig, measurement.excitation.highest_amplitude_vpp, volts.peak, loads[Quantity.ACCELERATION].peak
+    )
+
+
+def _specimen(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
+    """Check the estimate of the specimen's motion against its springs and the vibrometer."""
+    loads = predicted_specimen_loads(measurement.excitation, rig)
+    limit = rig.specimen.amplitude_limit_m
+    yield LimitCheck(
+        f"the specimen's amplitude (about, {loads.amplitude.cause})",
+        loads.amplitude.peak,
+        limit.value,
+        "m",
+        limit.source,
+        "lower amplitude_vpp or keep away from the resonance",
+    )
+    flagged = measurement.limits.on_overload is OnOverload.FLAG
+    for channel in channels_of(rig):
+        if channel.role is Role.M0_VELOCITY:
+            yield LimitCheck(
+                f"the velocity of m0 (about, {loads.velocity.cause})",
+                loads.velocity.peak,
+                channel.full_scale_v * channel.units_per_volt,
+                channel.unit,
+                f"range of {channel.physical} and of the vibrometer",
+                "lower amplitude_vpp or widen the vibrometer's range",
+                consequence=Consequence.TOLD if flagged else Consequence.REFUSED,
+            )
+
+
+def _inputs(rig: Rig, amplitude_vpp: float, amplifier_v: float, acceleration: float) -> Iterator[LimitCheck]:
+    """Whether the converter can show what is predicted of the rig."""
+    peaks = {
+        Role.DRIVE_VOLTAGE: 0.5 * amplitude_vpp * rig.generator.terminal_factor(),
+        Role.AMPLIFIER_VOLTAGE: amplifier_v,
+        Role.BASE_ACCELERATION: acceleration,
+    }
+    for channel in channels_of(rig):
+        if channel.role in peaks:
+            yield LimitCheck(
+                f"the {channel.role.value.replace('_', ' ')} at the converter",
+                peaks[channel.role],
+                channel.full_scale_v * channel.units_per_volt,
+                channel.unit,
+                f"range of {channel.physical} and its sensor",
+                "lower amplitude_vpp or widen the range",
+            )

@@ -1,0 +1,69 @@
+"""The plan of one measurement: what is played, how it is ramped, when the run must end itself."""
+
+from enum import StrEnum
+from typing import Annotated, Self
+
+from pydantic import Field, PositiveFloat, PositiveInt, model_validator
+
+from ..excitation import Excitation
+from ..host import FrozenModel
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
+"""Becomes part of a file's name: letters, digits, ``_`` and ``-``, at most 64 of them."""
+
+Fraction = Annotated[float, Field(gt=0, le=1)]
+
+
+class OnOverload(StrEnum):
+    """What the run does when an input or the vibrometer passes 95 % of its range."""
+
+    FLAG = "flag"
+    """Mark the samples in the recording and go on: nothing breaks, the analysis leaves them out."""
+    STOP = "stop"
+    """Ramp down and end the run."""
+
+
+class InRunLimits(FrozenModel):
+    """When the running measurement must end itself: fractions of the rig's own limits."""
+
+    base_acceleration: Fraction = 1.0
+    """Of the shaker's acceleration limit, measured at the base."""
+    base_velocity: Fraction = 1.0
+    """Of the shaker's velocity limit, integrated from the acceleration at the base."""
+    stroke: Fraction = 1.0
+    """Of the shaker's stroke limit, integrated twice."""
+    force: Fraction = 1.0
+    """Of the shaker's force limit: the coil's, from its current, and the one that moves the table."""
+    amplifier_voltage: Fraction = 1.0
+    """Of the amplifier's clipping voltage, measured at its output."""
+    current: Fraction = 1.0
+    """Of the coil's peak current and of the amplifier's limiter (rms); the current is the amplifier voltage,
+    less what the moving coil induces, over the coil's resistance."""
+    specimen_amplitude: Fraction = 1.0
+    """Of the specimen's amplitude limit: the main mass against the base, from the vibrometer."""
+    on_overload: OnOverload = OnOverload.FLAG
+
+
+class Measurement(FrozenModel):
+    """One excitation, from ramp up to ramp down, into one recording."""
+
+    name: Name
+    excitation: Excitation
+    ramp_s: PositiveFloat = Field(default=1.0, le=60)
+    """Time of a half-cosine ramp from silence to full amplitude, and back [s]."""
+    ramp_step_s: PositiveFloat = 0.05
+    """The ramp is a staircase of amplitude settings; this is one stair [s]."""
+    repeats: PositiveInt = Field(default=1, le=1000)
+    """How many recordings a campaign makes of it."""
+    limits: InRunLimits = InRunLimits()
+    notes: str = ""
+
+    @model_validator(mode="after")
+    def _ramp_has_stairs(self) -> Self:
+        fewest = 4
+        if self.ramp_step_s * fewest > self.ramp_s * (1 + 1e-9):
+            raise ValueError(
+                f"ramp_step_s = {self.ramp_step_s:g} leaves fewer than {fewest} stairs in a ramp of "
+                f"{self.ramp_s:g} s; give at most {self.ramp_s / fewest:g}"
+            )
+        return self

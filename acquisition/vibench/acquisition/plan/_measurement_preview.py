@@ -1,0 +1,89 @@
+"""What a measurement will be, before anything moves: signal, loads beside limits, time, size."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..excitation import Preview, Samples
+from ..rig import Rig
+from ._campaign import BYTES_PER_SAMPLE
+from ._limits import LimitCheck, limit_checks
+from ._measurement import Measurement
+from ._schedule import duration_s
+
+MOST_SAMPLES = 1_000_000
+"""Of the signal that is shown: a long sweep is sampled less often than it will be played."""
+SPECTRUM_POINTS = 4000
+_LOWEST_RATE = 2.1
+"""Samples per period of the highest frequency, at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outlook:
+    """Everything that can be said of a measurement on a rig without touching it."""
+
+    measurement: Measurement
+    volts: Samples
+    """As the generator's panel promises them, shape (samples,) [V]."""
+    sample_rate_hz: float
+    spectrum_hz: Samples
+    """At most `SPECTRUM_POINTS`, each the highest line of its stretch [Hz]."""
+    spectrum_v: Samples
+    """Peak amplitude of the sine at each frequency [V]."""
+    rms_v: float
+    peak_v: float
+    checks: tuple[LimitCheck, ...]
+    """The most used limit first."""
+    duration_s: float
+    """From the first ramp to the last [s]."""
+    size_bytes: int
+    """Of the recording while it is made."""
+
+    @property
+    def is_allowed(self) -> bool:
+        """Whether it may be played."""
+        return not any(check.forbids for check in self.checks)
+
+    @property
+    def crest_factor(self) -> float:
+        """Peak over rms."""
+        return self.peak_v / self.rms_v
+
+
+def outlook(measurement: Measurement, rig: Rig) -> Outlook:
+    """Look ahead at a measurement on a rig; raises ConfigurationError when it cannot be sampled."""
+    excitation = measurement.excitation
+    rate_hz = _shown_rate_hz(excitation.playing_s, excitation.highest_frequency_hz, rig.daq.sample_rate_hz)
+    preview = excitation.preview(rate_hz)
+    spectrum_hz, spectrum_v = _highest_lines(preview)
+    length_s = duration_s(measurement)
+    checks = sorted(limit_checks(measurement, rig), key=lambda check: check.use, reverse=True)
+    return Outlook(
+        measurement=measurement,
+        volts=preview.volts.astype(np.float32),
+        sample_rate_hz=rate_hz,
+        spectrum_hz=spectrum_hz,
+        spectrum_v=spectrum_v,
+        rms_v=preview.rms_v,
+        peak_v=preview.peak_v,
+        checks=tuple(checks),
+        duration_s=length_s,
+        size_bytes=round(length_s * rig.daq.sample_rate_hz) * len(rig.daq.channels) * BYTES_PER_SAMPLE,
+    )
+
+
+def _shown_rate_hz(playing_s: float, highest_hz: float, converter_hz: float) -> float:
+    affordable = MOST_SAMPLES / max(playing_s, 1.0)
+    return max(min(converter_hz, affordable), _LOWEST_RATE * highest_hz)
+
+
+def _highest_lines(preview: Preview) -> tuple[Samples, Samples]:
+    """Keep of every stretch, equal in logarithm, its highest line: what is excited must not be lost."""
+    frequency_hz, amplitude_v = preview.frequency_hz[1:], preview.spectrum_v[1:]
+    if len(frequency_hz) <= SPECTRUM_POINTS:
+        return frequency_hz, amplitude_v
+    edges = np.geomspace(frequency_hz[0], frequency_hz[-1], SPECTRUM_POINTS)
+    starts = np.unique(np.searchsorted(frequency_hz, edges))
+    ends = np.append(starts[1:], len(frequency_hz))
+    lines = [int(first + np.argmax(amplitude_v[first:end])) for first, end in zip(starts, ends, strict=True)]
+    return frequency_hz[lines], amplitude_v[lines]

@@ -1,0 +1,141 @@
+"""A measurement laid out in time: phases with a state, something to play, and a duration."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import takewhile
+from math import ceil, cos, pi
+
+from ..excitation import LEAD_IN_LABEL, AbstractFeedback, Play, Segment, Step, Tone
+from ._measurement import Measurement
+from ._run_state import RunState
+
+CHECK_FREQUENCY_HZ = 160.0
+"""The bench check's sine: where accelerometers are calibrated (159.2 Hz, 1000 rad/s, ISO 16063-21)."""
+CHECK_FRACTION = 0.02
+"""Level of the bench check over the planned amplitude."""
+CHECK_LOWEST_VPP = 0.01
+"""The check is not done below this, as far as the plan allows: hum would take part [V]."""
+CHECK_QUIET_S = 0.1
+"""How long the check listens before anything plays [s]."""
+CHECK_SETTLE_S = 0.2
+CHECK_LISTEN_S = 0.3
+"""How long the check measures: 48 periods [s]."""
+HUSH_S = 1.0
+"""Silence before the first ramp of a measurement with feedback: what is heard then is noise [s]."""
+CHECK_S = CHECK_QUIET_S + CHECK_SETTLE_S + CHECK_LISTEN_S
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A stretch of time in one state, playing one thing."""
+
+    state: RunState
+    play: Play | None
+    """None for silence."""
+    duration_s: float
+    segment: Segment | None = None
+    """The named stretch of the recording that this phase belongs to."""
+
+    @property
+    def end_level(self) -> float:
+        """Where the level stands at its end, from 0 (quiet) to 1 (as planned); only ramps change it."""
+        return 0.0 if self.play is None or self.state is RunState.RAMPING_DOWN else 1.0
+
+
+def check_phases(measurement: Measurement) -> tuple[Phase, Phase, Phase]:
+    """Lay out the check of the bench: listen in silence, let a small sine settle, listen to it."""
+    planned_vpp = measurement.excitation.amplitude_vpp
+    amplitude_vpp = check_amplitude_vpp(planned_vpp)
+    tone = Tone(CHECK_FREQUENCY_HZ, amplitude_vpp / planned_vpp)
+    segment = Segment("check", {"frequency_hz": CHECK_FREQUENCY_HZ, "amplitude_vpp": amplitude_vpp})
+    return (
+        Phase(RunState.CHECKING, None, CHECK_QUIET_S, segment),
+        Phase(RunState.CHECKING, tone, CHECK_SETTLE_S, segment),
+        Phase(RunState.CHECKING, tone, CHECK_LISTEN_S, segment),
+    )
+
+
+def phases(measurement: Measurement) -> Iterator[Phase]:
+    """Lay out ``measurement`` from the first ramp up to the last ramp down, without the bench check.
+
+    A change of waveform is a change of everything at once: it happens in silence, between a ramp
+    down and a ramp up. A change of frequency keeps the phase and the amplitude and needs neither.
+    """
+    previous: Step | None = None
+    for step in measurement.excitation.steps():
+        if previous is None or not _follows_without_a_jump(previous.play, step.play):
+            if previous is not None:
+                yield ramp(RunState.RAMPING_DOWN, previous.play, measurement)
+            yield ramp(RunState.RAMPING_UP, step.play, measurement)
+        if step.settle_s > 0:
+            yield Phase(RunState.SETTLING, step.play, step.settle_s)
+        yield Phase(RunState.RECORDING, step.play, step.record_s, step.segment)
+        previous = step
+    if previous is not None:
+        yield ramp(RunState.RAMPING_DOWN, previous.play, measurement)
+
+
+def known_phases(measurement: Measurement) -> Iterator[Phase]:
+    """Lay out what can be said before anything was heard: all of it, or with feedback nothing."""
+    return iter(()) if isinstance(measurement.excitation, AbstractFeedback) else phases(measurement)
+
+
+def _follows_without_a_jump(before: Play, after: Play) -> bool:
+    match before, after:
+        case Tone(), Tone():
+            return True
+        case _:
+            return before is after
+
+
+def ramp(state: RunState, play: Play, measurement: Measurement) -> Phase:
+    """Lay out one ramp up to, or down from, what is played."""
+    return Phase(state, play, measurement.ramp_s, Segment(_RAMP_LABELS[state]))
+
+
+_RAMP_LABELS = {RunState.RAMPING_UP: "ramp_up", RunState.RAMPING_DOWN: "ramp_down"}
+
+
+def duration_s(measurement: Measurement) -> float:
+    """Time from the first ramp up to the end of the last ramp down, without the bench check [s].
+
+    With feedback it is the longest that it may take.
+    """
+    if isinstance(measurement.excitation, AbstractFeedback):
+        return HUSH_S + 2 * measurement.ramp_s + measurement.excitation.playing_s
+    return sum(phase.duration_s for phase in phases(measurement))
+
+
+def lead_in_s(measurement: Measurement) -> float:
+    """Time from the first sample until what is to be measured begins: bench check, ramp and settling [s].
+
+    With feedback it ends with the ramp: what settles then is part of what is watched.
+    """
+    if isinstance(measurement.excitation, AbstractFeedback):
+        return CHECK_S + HUSH_S + measurement.ramp_s
+    before = takewhile(_leads_in, phases(measurement))
+    return CHECK_S + sum(phase.duration_s for phase in before)
+
+
+def _leads_in(phase: Phase) -> bool:
+    return phase.segment is None or phase.segment.label in (LEAD_IN_LABEL, *_RAMP_LABELS.values())
+
+
+def measured_s(measurement: Measurement) -> float:
+    """Time of a measurement with its bench check, at most [s]."""
+    return CHECK_S + duration_s(measurement)
+
+
+def stairs(measurement: Measurement) -> int:
+    """Amplitude settings of one ramp."""
+    return ceil(measurement.ramp_s / measurement.ramp_step_s * (1 - 1e-9))
+
+
+def half_cosine(progress: float) -> float:
+    """Level of a ramp from 0 to 1, with no kink at either end."""
+    return 0.5 * (1 - cos(pi * progress))
+
+
+def check_amplitude_vpp(amplitude_vpp: float) -> float:
+    """Amplitude of the bench check for a plan at ``amplitude_vpp``, never above it [V]."""
+    return min(amplitude_vpp, max(CHECK_FRACTION * amplitude_vpp, CHECK_LOWEST_VPP))

@@ -1,0 +1,278 @@
+"""Nested sweeps: one template, several axes, and the named points that they make, in a stated order."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import product
+from math import prod
+from typing import Any, Self
+
+from pydantic import Field, PositiveFloat, PositiveInt, ValidationError, model_validator
+
+from ..excitation import MOST_LEAD_INS, Direction, Dwell, LeadIn
+from ..host import FrozenModel, complaints
+from ._axis import Values, values_of
+from ._measurement import Measurement, Name
+from ._point import Point
+
+MOST_POINTS = 10_000
+"""Of one sweep; more is a mistake rather than a plan."""
+LONGEST_NAME = 64
+
+
+class Axis(StrEnum):
+    """What a sweep may vary; the words of ``order``."""
+
+    REPETITION = "repetition"
+    EXCITATION = "excitation"
+    LEVEL = "amplitude_vpp"
+    DIRECTION = "direction"
+    FREQUENCY = "frequency_hz"
+
+
+USUAL_ORDER = (Axis.REPETITION, Axis.EXCITATION, Axis.LEVEL, Axis.DIRECTION, Axis.FREQUENCY)
+_UNITS = {Axis.LEVEL: "vpp", Axis.FREQUENCY: "hz"}
+_TURNING = frozenset({Direction.UP_THEN_DOWN, Direction.DOWN_THEN_UP})
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a point lies: its value on each axis that is given."""
+
+    values: Mapping[Axis, Any]
+    words: Mapping[Axis, str]
+    """Each value as a part of a name, in the order of the axes."""
+
+    def name(self, sweep: str) -> str:
+        """Name of the point here."""
+        return "-".join([sweep, *self.words.values()])
+
+    def with_words(self, **words: str) -> "_Place":
+        """Call some values otherwise."""
+        return _Place(self.values, {**self.words, **{Axis[axis]: word for axis, word in words.items()}})
+
+
+class Sweep(FrozenModel):
+    """Every combination of the given axes, each a measurement made from ``measurement``.
+
+    A point is called after the sweep and its values: ``line-0p5vpp-up-205hz``. With
+    ``continue_from_previous`` the points along that axis make a chain: each is a dwell to which the
+    specimen is led through all points before it, so that it stays on its branch, and a point that is
+    measured again, days later, lies on the same one.
+    """
+
+    name: Name
+    measurement: dict[str, Any]
+    """What all points share: a measurement without its name."""
+    excitations: tuple[dict[str, Any], ...] = ()
+    """Excitations in the template's place, one after the other; their values come before the template's."""
+    repetitions: PositiveInt = Field(default=1, le=1000)
+    amplitude_vpp: Values | None = None
+    direction: tuple[Direction, ...] = ()
+    frequency_hz: Values | None = None
+    order: tuple[Axis, ...] = USUAL_ORDER
+    """The axes, the outermost (slowest) first."""
+    continue_from_previous: Axis | None = None
+    """``frequency_hz`` or ``amplitude_vpp``: the innermost axis, along which the branch is kept."""
+    lead_s: PositiveFloat = 0.5
+    """Time at each earlier point of a chain on the way to a point [s]."""
+
+    lead_points: PositiveInt | None = Field(default=None, le=MOST_LEAD_INS)
+    """So many earlier points at most on the way to a point, the nearest ones; absent: all of its chain. A
+    shorter way takes less time, and leads to the wrong branch where it begins behind the jump."""
+
+    @model_validator(mode="after")
+    def _order_names_every_axis(self) -> Self:
+        if len(set(self.order)) != len(self.order):
+            raise ValueError(f"order = {_words(self.order)} names an axis twice; name each once")
+        missing = [axis for axis in self._axes() if axis not in self.order]
+        if missing:
+            raise ValueError(f"order leaves out {_words(missing)}; name every axis that is given")
+        return self
+
+    @model_validator(mode="after")
+    def _chain_is_innermost(self) -> Self:
+        axis = self.continue_from_previous
+        if axis is None:
+            return self
+        if axis not in (Axis.FREQUENCY, Axis.LEVEL):
+            raise ValueError(
+                f"continue_from_previous = {axis.value!r} is no axis to go along; allowed are "
+                "'frequency_hz' and 'amplitude_vpp'"
+            )
+        given = [each for each in self.order if each in self._axes() and each is not Axis.DIRECTION]
+        if not given or given[-1] is not axis:
+            raise ValueError(
+                f"continue_from_previous = {axis.value!r} must be the innermost axis that is given; "
+                f"the order is {_words(given)}"
+            )
+        passed = len(self._axes()[axis]) * (2 if _TURNING & set(self.direction) else 1)
+        longest = passed if self.lead_points is None else min(passed, self.lead_points)
+        if longest > MOST_LEAD_INS:
+            raise ValueError(
+                f"a chain of {longest} points was given, allowed are {MOST_LEAD_INS}; split the sweep"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _points_are_measurements(self) -> Self:
+        counts = {axis.value: len(values) for axis, values in self._axes().items()}
+        if self.direction:
+            counts[Axis.DIRECTION.value] = self._passes()
+        count = prod(counts.values())
+        if count > MOST_POINTS:
+            shown = " x ".join(f"{number} {axis}" for axis, number in counts.items())
+            raise ValueError(
+                f"the sweep {self.name!r} has {count} points ({shown}), allowed are {MOST_POINTS}: widen a "
+                "step or split it"
+            )
+        self.points()
+        return self
+
+    def points(self) -> tuple[Point, ...]:
+        """Make the points, in order.
+
+        Raises
+        ------
+        ValueError
+            When a combination is no measurement; the text names the point and the key.
+
+        """
+        return tuple(self._led()) if self.continue_from_previous else tuple(self._alone())
+
+    def _passes(self) -> int:
+        """How often the directions go through an axis."""
+        return sum(2 if way in _TURNING and self.continue_from_previous else 1 for way in self.direction)
+
+    def _axes(self) -> dict[Axis, tuple[Any, ...]]:
+        """Values of every axis that is given."""
+        given: dict[Axis, tuple[Any, ...]] = {}
+        if self.repetitions > 1:
+            given[Axis.REPETITION] = tuple(range(1, self.repetitions + 1))
+        if self.excitations:
+            given[Axis.EXCITATION] = tuple(range(len(self.excitations)))
+        if self.amplitude_vpp is not None:
+            given[Axis.LEVEL] = values_of(self.amplitude_vpp)
+        if self.direction:
+            given[Axis.DIRECTION] = self.direction
+        if self.frequency_hz is not None:
+            given[Axis.FREQUENCY] = values_of(self.frequency_hz)
+        return given
+
+    def _places(self, axes: Mapping[Axis, tuple[Any, ...]]) -> Iterator[_Place]:
+        ordered = [axis for axis in self.order if axis in axes]
+        for values in product(*(axes[axis] for axis in ordered)):
+            place = dict(zip(ordered, values, strict=True))
+            yield _Place(place, {axis: self._word(axis, value) for axis, value in place.items()})
+
+    def _alone(self) -> Iterator[Point]:
+        for place in self._places(self._axes()):
+            name = place.name(self.name)
+            content = self._content(name, place.values)
+            if Axis.DIRECTION in place.values:
+                _turn(content["excitation"], place.values[Axis.DIRECTION], name)
+            yield Point(name, _measurement(content, name))
+
+    def _led(self) -> Iterator[Point]:
+        """Go along each chain, the points passed before being the way to the next."""
+        axes = self._axes()
+        along = Axis(str(self.continue_from_previous))
+        rising = sorted(axes.pop(along))
+        for chain in self._places(axes):
+            way: list[LeadIn] = []
+            for word, value in _passed(chain.values.get(Axis.DIRECTION), rising):
+                there = chain.with_words(DIRECTION=word) if word else chain
+                name = f"{there.name(self.name)}-{self._word(along, value)}"
+                content = self._content(name, {**chain.values, along: value})
+                dwell = _dwell(content, name)
+                passed = way if self.lead_points is None else way[-self.lead_points :]
+                led = dwell.model_copy(update={"lead_in": tuple(passed), "lead_s": self.lead_s})
+                yield Point(name, _measurement({**content, "excitation": led}, name), chain.name(self.name))
+                way.append(LeadIn(frequency_hz=led.frequency_hz, amplitude_vpp=led.amplitude_vpp))
+
+    def _content(self, name: str, values: Mapping[Axis, Any]) -> dict[str, Any]:
+        """Put the values of a place into the template."""
+        excitation = dict(self.measurement.get("excitation", {}))
+        if Axis.EXCITATION in values:
+            excitation |= self.excitations[values[Axis.EXCITATION]]
+        for axis in (Axis.LEVEL, Axis.FREQUENCY):
+            if axis in values:
+                excitation[axis.value] = values[axis]
+        return {**self.measurement, "name": name, "excitation": excitation}
+
+    def _word(self, axis: Axis, value: Any) -> str:
+        """Write a value as a part of a name: ``0p5vpp``, ``205hz``, ``up``, ``r2``."""
+        match axis:
+            case Axis.REPETITION:
+                return f"r{value}"
+            case Axis.DIRECTION:
+                return str(value)
+            case Axis.EXCITATION:
+                kinds = [str(each.get("kind", self._template_kind())) for each in self.excitations]
+                kind = kinds[value]
+                return kind if kinds.count(kind) == 1 else f"{kind}{value + 1}"
+            case Axis.LEVEL | Axis.FREQUENCY:
+                return f"{value:.7g}{_UNITS[axis]}".replace(".", "p").replace("+", "")
+
+    def _template_kind(self) -> str:
+        return str(self.measurement.get("excitation", {}).get("kind", "excitation"))
+
+
+def _passed(way: Direction | None, rising: list[float]) -> Iterator[tuple[str, float]]:
+    """Go through a chain's values, once or there and back; each with the word for its direction."""
+    up = [("" if way is None else "up", value) for value in rising]
+    down = [("down", value) for value in reversed(rising)]
+    match way:
+        case None | Direction.UP:
+            yield from up
+        case Direction.DOWN:
+            yield from down
+        case Direction.UP_THEN_DOWN:
+            yield from (*up, *down)
+        case Direction.DOWN_THEN_UP:
+            yield from (*down, *up)
+
+
+def _turn(excitation: dict[str, Any], way: Direction, name: str) -> None:
+    """Let an excitation that moves by itself go the given way."""
+    match excitation.get("kind"):
+        case "stepped_sine":
+            excitation["direction"] = way.value
+        case "sine_sweep" if way not in _TURNING:
+            ends = sorted((excitation.get("start_hz", 0.0), excitation.get("stop_hz", 0.0)))
+            excitation["start_hz"], excitation["stop_hz"] = ends if way is Direction.UP else ends[::-1]
+        case kind:
+            raise ValueError(
+                f"{name}: direction = {way.value!r} says nothing to the excitation {kind!r} by itself; give "
+                "continue_from_previous to go along an axis, or leave direction out"
+            )
+
+
+def _dwell(content: Mapping[str, Any], name: str) -> Dwell:
+    """Read the excitation of a chain's point; only a dwell can be led to."""
+    kind = content["excitation"].get("kind")
+    if kind != "dwell":
+        raise ValueError(
+            f"{name}: continue_from_previous leads from dwell to dwell, and the excitation is {kind!r}; "
+            "give kind = 'dwell', or leave continue_from_previous out"
+        )
+    try:
+        return Dwell.model_validate(content["excitation"])
+    except ValidationError as error:
+        raise ValueError(f"{name}: {complaints(error)}") from error
+
+
+def _measurement(content: Mapping[str, Any], name: str) -> Measurement:
+    if len(name) > LONGEST_NAME:
+        raise ValueError(
+            f"the point {name!r} has a name of {len(name)} characters, allowed are {LONGEST_NAME}; give the "
+            "sweep a shorter name"
+        )
+    try:
+        return Measurement.model_validate(content)
+    except ValidationError as error:
+        raise ValueError(f"{name}: {complaints(error)}") from error
+
+
+def _words(axes: Any) -> str:
+    return ", ".join(repr(axis.value) for axis in axes)

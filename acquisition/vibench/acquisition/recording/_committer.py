@@ -1,0 +1,168 @@
+"""The writer's own thread: it takes batches from a queue and makes them safe, in an order that cannot lie.
+
+Order of a commit: samples and rows -> sync -> counters -> sync. Whatever moment the process or
+the power ends, a counter never counts what is not there.
+"""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ..errors import RecordingError
+from ._disk import Buffer, Disk
+
+COMMIT_INTERVAL_S = 0.5
+"""Half of the promised second; the other half is for a slow disk."""
+QUEUE_PATIENCE_S = 2.0
+"""How long a full queue is waited for before the disk is called too slow."""
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What belongs together: writes, and the counters that make them count."""
+
+    writes: tuple[tuple[int, Buffer], ...] = ()
+    """(offset, data)."""
+    counters: Mapping[int, int] = field(default_factory=dict)
+    """Value of each counter, by its offset, once the writes are safe."""
+    reservations: tuple[tuple[int, int], ...] = ()
+    """(offset, size) to be allocated before the writes."""
+    samples: int = 0
+    """Samples per channel, for the length of the queue."""
+
+
+class Committer:
+    """Writes batches behind the caller's back and reports the first failure at the next call."""
+
+    def __init__(self, disk: Disk, queue_samples: int, interval_s: float = COMMIT_INTERVAL_S) -> None:
+        self._disk = disk
+        self._queue_samples = queue_samples
+        self._interval_s = interval_s
+        self._changed = threading.Condition()
+        self._queue: deque[Batch] = deque()
+        self._waiting_samples = 0
+        self._is_closing = False
+        self._failure: OSError | None = None
+        self._is_failure_seen = False
+        self._counters: dict[int, int] = {}
+        self._written_samples = 0
+        self._committed_samples = 0
+        self._commit_due_s = time.monotonic() + interval_s
+        self._thread = threading.Thread(target=self._run, name="recording committer", daemon=True)
+        self._thread.start()
+
+    @property
+    def committed_samples(self) -> int:
+        """Samples per channel that would survive a power cut now."""
+        return self._committed_samples
+
+    @property
+    def failure(self) -> OSError | None:
+        """What the disk refused, if it did."""
+        return self._failure
+
+    def put(self, batch: Batch) -> None:
+        """Queue a batch; waits only when the queue is full.
+
+        Raises
+        ------
+        RecordingError
+            When the disk failed, or is so slow that the queue stays full.
+
+        """
+        with self._changed:
+            has_room = self._changed.wait_for(self._can_take, timeout=QUEUE_PATIENCE_S)
+            self._require_health(has_room)
+            self._queue.append(batch)
+            self._waiting_samples += batch.samples
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """Write and commit everything queued, and end the thread. Legal at any time."""
+        with self._changed:
+            self._is_closing = True
+            self._changed.notify_all()
+        self._thread.join()
+
+    def raise_unseen_failure(self) -> None:
+        """Raise a failure that no call has reported yet, so that none stays unseen."""
+        if self._failure is not None and not self._is_failure_seen:
+            self._require_health(has_room=True)
+
+    def _can_take(self) -> bool:
+        is_stopped = self._failure is not None or not self._thread.is_alive()
+        return is_stopped or self._waiting_samples <= self._queue_samples
+
+    def _require_health(self, has_room: bool) -> None:  # noqa: FBT001 - the answer of a wait
+        if self._failure is not None:
+            self._is_failure_seen = True
+            raise RecordingError(
+                f"The disk refused the recording: {self._failure}. Recording has ended; the"
+                f" {self._committed_samples} samples committed before are kept. Make room or change the disk,"
+                " and measure again."
+            ) from self._failure
+        if not self._thread.is_alive():
+            raise RecordingError(
+                "The recording has been closed, or its writer thread has died; the block was not recorded."
+                " Begin a new recording."
+            )
+        if not has_room:
+            raise RecordingError(
+                f"The disk is too slow: {self._waiting_samples} samples per channel wait to be written"
+                f" (room for {self._queue_samples}) and none left within {QUEUE_PATIENCE_S:g} s."
+                " The block was not recorded; record to a faster or a local disk."
+            )
+
+    def _run(self) -> None:
+        try:
+            while self._step():
+                pass
+        except OSError as error:
+            self._failure = error
+        finally:
+            with self._changed:
+                self._changed.notify_all()
+
+    def _step(self) -> bool:
+        batch, is_last = self._next()
+        if batch is not None:
+            self._write(batch)
+        if is_last or (self._counters and time.monotonic() >= self._commit_due_s):
+            self._commit()
+        return not is_last
+
+    def _next(self) -> tuple[Batch | None, bool]:
+        """Next batch, or None when a commit is due or everything is done; and whether it is done."""
+        with self._changed:
+            # Nothing to commit: no reason to wake before something arrives.
+            remaining_s = self._commit_due_s - time.monotonic() if self._counters else None
+            timeout_s = None if remaining_s is None else max(remaining_s, 0.0)
+            self._changed.wait_for(lambda: self._queue or self._is_closing, timeout=timeout_s)
+            if not self._queue:
+                return None, self._is_closing
+            batch = self._queue.popleft()
+            self._waiting_samples -= batch.samples
+            self._changed.notify_all()
+            return batch, False
+
+    def _write(self, batch: Batch) -> None:
+        for offset, size in batch.reservations:
+            self._disk.reserve(offset, size)
+        for offset, data in batch.writes:
+            self._disk.write(offset, data)
+        if not self._counters:
+            self._commit_due_s = time.monotonic() + self._interval_s
+        self._counters.update(batch.counters)
+        self._written_samples += batch.samples
+
+    def _commit(self) -> None:
+        if not self._counters:
+            return
+        self._disk.sync()
+        for offset, value in self._counters.items():
+            self._disk.write(offset, value.to_bytes(8, "little", signed=True))
+        self._disk.sync()
+        self._counters.clear()
+        self._committed_samples = self._written_samples

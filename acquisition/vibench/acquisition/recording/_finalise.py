@@ -1,0 +1,201 @@
+"""A recording becomes ``NAME.h5``: compressed, checked, named, and only then is ``NAME.h5.part`` let go."""
+
+import hashlib
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from ..errors import RecordingError
+from . import _layout as layout, _tables as tables
+from ._attributes import read_attributes, write_attributes
+from ._chunks import create_counts, write_chunks
+from ._counts import Counts
+from ._disk import sync_file, sync_folder
+from ._disk_room import claim_room, extend_room, release_room
+from ._fixed_text import decoded, encoded
+from ._layout import RecordingState, Table
+from ._overview import BIN_BYTES, OverviewSums, bins_of, write_overview
+from ._preallocate import HEAD_BYTES, ITEM_BYTES
+from ._tables import Columns
+
+INTERRUPTED_KIND = "interrupted"
+INTERRUPTED_REASON = "the recording program ended before it could say how the run ended"
+TIME_BYTES = 1
+"""Room for a sample of the time axis (measured: 0.1 bytes) and for what deflate adds at worst (0.03 %)."""
+INT32_SAMPLES = 2**31
+"""Longer recordings (11 h at 51.2 kS/s) number their samples with 64 bits."""
+
+
+def finalise(part: Path) -> Path:
+    """Make ``NAME.h5`` of ``NAME.h5.part``, which stays for :func:`discard`.
+
+    The caller holds the file: its writer, or a recovery.
+
+    Raises
+    ------
+    RecordingError
+        When ``NAME.h5`` exists, the disk refuses (it may be full), or what was written does not
+        read back the same. ``NAME.h5.part`` is untouched.
+
+    """
+    final = part.with_suffix("")
+    tmp = layout.tmp_of(final)
+    if final.exists():
+        raise RecordingError(f"{final} exists, and nothing is ever overwritten; move it away.")
+    room = _largest_size(part)
+    try:
+        claim_room(tmp, room, room)
+        _copy(part, tmp, room)
+        sync_file(tmp)
+        os.replace(tmp, final)  # noqa: PTH105 - the pair of os.fsync
+        sync_folder(final.parent)
+    except (OSError, RuntimeError) as error:  # HDF5 reports a full disk as either
+        # Incomplete, and made by this call; everything in it is in the .part.
+        tmp.unlink(missing_ok=True)
+        raise RecordingError(
+            f"{final} could not be written: {error}. All committed samples are safe in {part};"
+            " make room, then recover that file."
+        ) from error
+    return final
+
+
+def discard(part: Path) -> None:
+    """Delete ``NAME.h5.part`` once ``NAME.h5`` is safe."""
+    part.unlink()
+    sync_folder(part.parent)
+
+
+def _largest_size(part: Path) -> int:
+    """Bytes of the finished file if nothing could be compressed."""
+    with h5py.File(part, "r", locking=False) as source:
+        samples = int(source[layout.N_VALID][0])
+        channels = len(str(read_attributes(source)["roles"]).split())
+    bins = bins_of(samples) * (channels * BIN_BYTES + ITEM_BYTES)
+    return HEAD_BYTES + samples * (channels * ITEM_BYTES + TIME_BYTES) + bins
+
+
+def _copy(part: Path, tmp: Path, room: int) -> None:
+    with (
+        h5py.File(part, "r", locking=False) as source,
+        h5py.File(tmp, "w", libver=layout.LIBVER, locking=False) as copy,
+    ):
+        extend_room(tmp, room)
+        samples = int(source[layout.N_VALID][0])
+        _copy_file_attributes(source, copy, samples)
+        source.copy(layout.CONFIGURATION, copy)
+        time_axis = _write_time(copy, samples, float(source.attrs["sample_rate_hz"]))
+        for role in str(read_attributes(source)["roles"]).split():
+            _copy_channel(source[role], copy, role, samples, time_axis)
+        for table in layout.TABLES:
+            _write_table(copy, table, _rows(source, table, samples))
+        copy.create_group(layout.RESULTS)
+    release_room(tmp)
+    with h5py.File(tmp, "r", locking=False) as copy:
+        _check(copy)
+
+
+def _copy_file_attributes(source: h5py.File, copy: h5py.File, samples: int) -> None:
+    state = decoded(source[layout.STATE][0])
+    reason = decoded(source[layout.REASON][0])
+    if state == RecordingState.RECORDING:
+        state, reason = RecordingState.INTERRUPTED.value, INTERRUPTED_REASON
+    write_attributes(copy, {**read_attributes(source), "state": state, "reason": reason, "samples": samples})
+
+
+def _write_time(copy: h5py.File, samples: int, sample_rate_hz: float) -> h5py.Dataset:
+    """Write the time axis: sample numbers with the sample interval as scale, so that it compresses well."""
+    dtype = np.dtype(layout.COUNT_DTYPE if samples < INT32_SAMPLES else layout.COUNTER_DTYPE)
+    settings = {"chunks": (min(layout.CHUNK_SAMPLES, samples),), "compression": "gzip", "shuffle": True}
+    dataset = copy.create_dataset(layout.TIME, shape=(samples,), dtype=dtype, **(settings if samples else {}))
+    for begin in range(0, samples, layout.CHUNK_SAMPLES):
+        end = min(begin + layout.CHUNK_SAMPLES, samples)
+        dataset[begin:end] = np.arange(begin, end, dtype=dtype)
+    write_attributes(
+        dataset,
+        {
+            "units": "s",
+            "scale_factor": 1.0 / sample_rate_hz,
+            "add_offset": 0.0,
+            "long_name": "time since the first sample",
+            "axis": "T",
+        },
+    )
+    dataset.make_scale(layout.TIME)
+    return dataset
+
+
+def _copy_channel(
+    source: h5py.Dataset, copy: h5py.File, role: str, samples: int, time_axis: h5py.Dataset
+) -> None:
+    dataset = create_counts(copy, role, samples, layout.CHUNK_SAMPLES)
+    digest, overview = hashlib.sha256(), OverviewSums()
+    write_chunks(dataset, overview.watched(_hashed(_pieces(source, samples), digest)))
+    write_attributes(dataset, {**read_attributes(source), "sha256": digest.hexdigest()})
+    dataset.attrs["_FillValue"] = np.int32(layout.MISSING_COUNT)
+    dataset.dims[0].attach_scale(time_axis)
+    write_overview(copy, role, overview.overview(), float(copy.attrs["sample_rate_hz"]))
+
+
+def _pieces(dataset: h5py.Dataset, samples: int) -> Iterator[Counts]:
+    for begin in range(0, samples, layout.CHUNK_SAMPLES):
+        yield dataset[begin : min(begin + layout.CHUNK_SAMPLES, samples)]
+
+
+def _hashed(pieces: Iterator[Counts], digest: "hashlib._Hash") -> Iterator[Counts]:
+    for piece in pieces:
+        digest.update(piece.data)
+        yield piece
+
+
+def _rows(source: h5py.File, table: Table, samples: int) -> Columns:
+    columns = tables.clipped(tables.read_columns(source, table), table, samples)
+    if table is layout.EVENTS and decoded(source[layout.STATE][0]) == RecordingState.RECORDING:
+        last: tuple[str | float, ...] = (samples, time.time(), INTERRUPTED_KIND, INTERRUPTED_REASON)
+        return {
+            column.name: np.append(columns[column.name], _cell(column.dtype, value))
+            for column, value in zip(table.columns, last, strict=True)
+        }
+    return columns
+
+
+def _cell(dtype: str, value: str | float) -> np.ndarray[tuple[int], np.dtype[np.generic]]:
+    kind = np.dtype(dtype)
+    return np.array([encoded(value, kind.itemsize) if isinstance(value, str) else value], dtype=kind)
+
+
+def _write_table(copy: h5py.File, table: Table, columns: Columns) -> None:
+    group = copy.create_group(table.name)
+    rows = len(columns[table.columns[0].name])
+    scale = group.create_dataset(layout.ROW, data=np.arange(rows, dtype=layout.COUNT_DTYPE))
+    scale.make_scale(layout.ROW)
+    for column in table.columns:
+        dataset = group.create_dataset(column.name, shape=(rows,), dtype=_narrowest(columns[column.name]))
+        if rows:
+            dataset[:] = columns[column.name]
+        dataset.dims[0].attach_scale(scale)
+
+
+def _narrowest(values: np.ndarray[tuple[int], np.dtype[np.generic]]) -> np.dtype[np.generic]:
+    """Find the type that holds a column's values; text no wider than its longest, for the reader's sake."""
+    if values.dtype.kind != "S":
+        return values.dtype
+    longest = max((len(value) for value in values.tolist()), default=0)
+    dtype: np.dtype[np.generic] = h5py.string_dtype("utf-8", max(longest, 1))
+    return dtype
+
+
+def _check(copy: h5py.File) -> None:
+    """Read every sample back through HDF5 and compare with what was recorded."""
+    for role in str(read_attributes(copy)["roles"]).split():
+        dataset = copy[role]
+        digest = hashlib.sha256()
+        for piece in _pieces(dataset, len(dataset)):
+            digest.update(piece.data)
+        if digest.hexdigest() != read_attributes(dataset)["sha256"]:
+            raise RecordingError(
+                f"{role!r} does not read back from {copy.filename} as it was recorded; check disk and memory."
+            )

@@ -1,0 +1,209 @@
+"""What is known before the first sample: channels, rates, plan, bench, instruments, provenance."""
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+
+from ..errors import RecordingError
+from ..instruments import Identity
+from ._attributes import Attribute
+from ._json_text import json_text
+from ._layout import RESERVED_NAMES, ROLE_WIDTH, Origin
+from ._provenance import Provenance, collect_provenance
+
+ROLE_PATTERN = re.compile(r"[a-z][a-z0-9_]*")
+COUPLINGS = ("AC", "DC")
+OPTIONAL = ("sensitivity", "volts_per_count")
+"""Numbers that may be unknown: NaN in the file, None here."""
+UNPLANNED = -1
+"""``expected_samples`` in the file when the recording lasts until somebody stops it."""
+
+FINE_STEP = 2.0**-30
+"""Step of a channel without a converter step, as a fraction of its range.
+
+Twice the range still fits an int32, and 2^-30 lies 36 dB below a 24-bit converter's step.
+"""
+
+
+@dataclass(frozen=True)
+class ChannelHeader:
+    """One recorded channel: where it comes from and how its counts become a physical value.
+
+    ``physical = physical_per_volt * volts + physical_offset``
+    """
+
+    role: str
+    """Name of the channel in the file: ``"drive_voltage"``, ``"m0_velocity"``."""
+    physical_channel: str
+    """``"cDAQ1Mod1/ai0"``: the name the converter uses."""
+    quantity: str
+    """``"voltage"``, ``"acceleration"``, ``"velocity"``, ``"displacement"``, ``"force"``."""
+    unit: str
+    """UDUNITS text of the physical value: ``"V"``, ``"m s-2"``, ``"m s-1"``."""
+    physical_per_volt: float
+    range_v: float
+    """Full scale of the input, plus and minus [V]."""
+    volts_per_count: float | None = None
+    """Step of the converter [V]; None when it is not known: volts are then kept to 2^-30 of the range."""
+    volts_at_zero_count: float = 0.0
+    """Offset of the converter's calibration [V]."""
+    physical_offset: float = 0.0
+    coupling: str = "AC"
+    """``"AC"`` or ``"DC"``."""
+    iepe_current_a: float = 0.0
+    sensitivity: float | None = None
+    """As the calibration sheet says it, in ``sensitivity_unit``."""
+    sensitivity_unit: str = ""
+    serial: str = ""
+    calibration_date: str = ""
+    """ISO date of the sensor's calibration."""
+    delay_s: float = 0.0
+    """How late the channel shows what happened (a vibrometer's decoder, for example)."""
+    long_name: str = ""
+
+    def __post_init__(self) -> None:
+        if (
+            not ROLE_PATTERN.fullmatch(self.role)
+            or self.role in RESERVED_NAMES
+            or len(self.role) > ROLE_WIDTH
+        ):
+            raise RecordingError(
+                f"The channel name {self.role!r} is not allowed: use lower-case letters, digits and"
+                f" underscores, beginning with a letter, at most {ROLE_WIDTH}, and none of"
+                f" {', '.join(sorted(RESERVED_NAMES))}."
+            )
+        if self.coupling not in COUPLINGS:
+            raise RecordingError(
+                f"The coupling of {self.role!r} is {self.coupling!r}; allowed are {' and '.join(COUPLINGS)}."
+            )
+        _require_positive(f"range_v of {self.role!r}", self.range_v)
+        if self.volts_per_count is not None:
+            _require_positive(f"volts_per_count of {self.role!r}", self.volts_per_count)
+        if not math.isfinite(self.physical_per_volt) or self.physical_per_volt == 0.0:
+            raise RecordingError(
+                f"physical_per_volt of {self.role!r} is {self.physical_per_volt};"
+                " it must be finite and not zero."
+            )
+
+    @property
+    def step_v(self) -> float:
+        """Volts between two neighbouring stored counts."""
+        return self.range_v * FINE_STEP if self.volts_per_count is None else self.volts_per_count
+
+    @property
+    def scale_factor(self) -> float:
+        """Physical value of one count."""
+        return self.physical_per_volt * self.step_v
+
+    @property
+    def add_offset(self) -> float:
+        """Physical value of count zero."""
+        return self.physical_per_volt * self.volts_at_zero_count + self.physical_offset
+
+    def attributes(self) -> dict[str, Attribute]:
+        """Attributes of the channel's dataset: the CF names first, then the fields of this header."""
+        own = {each.name: getattr(self, each.name) for each in fields(self)}
+        del own["role"], own["unit"]
+        own["long_name"] = self.long_name or self.role.replace("_", " ")
+        absent = {name: math.nan for name in OPTIONAL if own[name] is None}
+        return {
+            "units": self.unit,
+            "scale_factor": self.scale_factor,
+            "add_offset": self.add_offset,
+            "volts_per_stored_count": self.step_v,
+            **own,
+            **absent,
+        }
+
+    @classmethod
+    def from_attributes(cls, role: str, attributes: Mapping[str, Attribute]) -> "ChannelHeader":
+        """Read back what :meth:`attributes` wrote."""
+        given = {each.name: attributes[each.name] for each in fields(cls) if each.name in attributes}
+        # NaN alone differs from itself.
+        absent = {name: None for name in OPTIONAL if given.get(name) != given.get(name)}
+        return cls(**{**given, **absent, "role": role, "unit": attributes["units"]})  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class RecordingHeader:
+    """Everything that is written before the first sample."""
+
+    channels: tuple[ChannelHeader, ...]
+    """In the order of the rows of a block."""
+    sample_rate_hz: float
+    """The rate that the hardware really runs at."""
+    expected_samples: int | None
+    """Planned length; None for a recording that lasts until somebody stops it."""
+    origin: Origin
+    plan_json: str = "{}"
+    """The measurement's plan, complete, as JSON."""
+    bench_json: str = "{}"
+    """The bench configuration, complete, as JSON."""
+    requested_sample_rate_hz: float | None = None
+    """What the plan asked for; None when that is what it got."""
+    instruments: Mapping[str, Identity] = field(default_factory=dict)
+    """Who answered, by the instrument's part in the bench (``"generator"``, ``"digitizer"``)."""
+    confirmations: Mapping[str, str | float] = field(default_factory=dict)
+    """What the operator confirmed by hand: amplifier gain, vibrometer range and filters."""
+    bench_check_json: str = "{}"
+    """What the last check of the whole bench found, and when, as JSON; ``{}`` when there was none."""
+    provenance: Provenance = field(default_factory=collect_provenance)
+
+    def __post_init__(self) -> None:
+        roles = [channel.role for channel in self.channels]
+        if not roles or len(set(roles)) != len(roles):
+            raise RecordingError(
+                f"A recording needs one or more channels with different names; given: {roles}."
+            )
+        _require_positive("sample_rate_hz", self.sample_rate_hz)
+        if self.expected_samples is not None:
+            _require_positive("expected_samples", self.expected_samples)
+        for name, text in (
+            ("plan_json", self.plan_json),
+            ("bench_json", self.bench_json),
+            ("bench_check_json", self.bench_check_json),
+        ):
+            _require_json_object(name, text)
+
+    def configuration(self) -> dict[str, str]:
+        """Texts of the group ``/configuration``, all JSON."""
+        instruments = {name: asdict(identity) for name, identity in self.instruments.items()}
+        return {
+            "plan_json": self.plan_json,
+            "bench_json": self.bench_json,
+            "instruments_json": json.dumps(instruments),
+            "confirmations_json": json_text("What the operator confirmed", self.confirmations),
+            "bench_check_json": self.bench_check_json,
+            "provenance_json": json.dumps(asdict(self.provenance)),
+        }
+
+    def attributes(self) -> dict[str, Attribute]:
+        """Attributes of the file itself, apart from format and identity."""
+        return {
+            "sample_rate_hz": float(self.sample_rate_hz),
+            "requested_sample_rate_hz": float(self.requested_sample_rate_hz or self.sample_rate_hz),
+            "expected_samples": UNPLANNED if self.expected_samples is None else self.expected_samples,
+            "origin": self.origin.value,
+            "started_utc": self.provenance.started_utc,
+            "software_version": self.provenance.packages.get("vibench", ""),
+            "software_commit": self.provenance.commit,
+            "roles": " ".join(channel.role for channel in self.channels),
+        }
+
+
+def _require_positive(name: str, value: float) -> None:
+    if not (math.isfinite(value) and value > 0):
+        raise RecordingError(f"{name} is {value}; it must be finite and greater than zero.")
+
+
+def _require_json_object(name: str, text: str) -> None:
+    try:
+        parsed = json.loads(text)
+    except ValueError as error:
+        raise RecordingError(
+            f"{name} is not JSON ({error}); give the plan's or bench's own JSON text."
+        ) from error
+    if not isinstance(parsed, dict):
+        raise RecordingError(f"{name} holds a JSON {type(parsed).__name__}; it must be an object.")

@@ -1,0 +1,86 @@
+"""Opening a file that may be anything: ours, broken, empty, cut short, or from a newer version."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import h5py
+
+from ..errors import RecordingError
+from . import _layout as layout
+from ._attributes import read_attributes
+
+
+@contextmanager
+def opened_recording(path: Path) -> Iterator[h5py.File]:
+    """Open a recording for reading, without a lock, and close it again."""
+    file = open_hdf5(path)
+    try:
+        yield file
+    finally:
+        file.close()
+
+
+def open_hdf5(path: Path) -> h5py.File:
+    """Open a recording for reading; it may still be growing.
+
+    Raises
+    ------
+    RecordingError
+        One sentence for each way in which it is not a readable recording.
+
+    """
+    _require_file(path)
+    try:
+        file = h5py.File(path, "r", locking=False)
+    except OSError as error:
+        raise RecordingError(
+            f"{path} is no readable HDF5 file ({error}). It was cut short, or is something else;"
+            " copy it again from where it was recorded."
+        ) from error
+    try:
+        _require_ours(path, file)
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+def name_now(path: Path) -> Path:
+    """Give the name that a recording has by now: one that was growing a moment ago may be finished."""
+    if path.suffix != layout.PART_SUFFIX or path.exists():
+        return path
+    final = path.with_suffix("")
+    return final if final.exists() else path
+
+
+def _require_file(path: Path) -> None:
+    if path.is_file():
+        if path.stat().st_size == 0:
+            raise RecordingError(f"{path} is empty (0 bytes). Copy it again from where it was recorded.")
+        return
+    part = layout.part_of(path)
+    if part.is_file():
+        raise RecordingError(
+            f"{path} does not exist, but {part.name} does: it is being recorded, or was interrupted."
+            f" Open {part.name} to look at it, or recover it."
+        )
+    raise RecordingError(f"{path} does not exist, or is no file.")
+
+
+def _require_ours(path: Path, file: h5py.File) -> None:
+    try:
+        attributes = read_attributes(file)
+    except (OSError, RuntimeError, ValueError) as error:
+        raise RecordingError(f"{path} is damaged: its attributes cannot be read ({error}).") from error
+    if attributes.get("format") != layout.FORMAT:
+        raise RecordingError(
+            f"{path} is an HDF5 file, but no recording of vibench: its attribute 'format' is"
+            f" {attributes.get('format', 'missing')!r}, not {layout.FORMAT!r}."
+        )
+    version = attributes.get("format_version")
+    if version != layout.FORMAT_VERSION:
+        raise RecordingError(
+            f"{path} has format version {version}; this vibench reads version {layout.FORMAT_VERSION}."
+            " Update vibench to read it."
+        )

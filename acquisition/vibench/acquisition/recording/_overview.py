@@ -1,0 +1,124 @@
+"""The smallest and largest count of every 128 samples: what a picture of the whole recording needs.
+
+Made while a recording is finished, when every sample passes by anyway, and kept in the file's group
+``overview``: a viewer then opens hours as fast as seconds. A file without it is read whole, once.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import h5py
+import numpy as np
+
+from . import _layout as layout
+from ._attributes import write_attributes
+from ._counts import Counts
+
+BIN_SAMPLES = 128
+"""A picture 1000 columns wide needs no more than 128 000 samples to be read: 10 ms for four channels."""
+LOW_SUFFIX, HIGH_SUFFIX = "_low", "_high"
+BIN_BYTES = 8
+"""Low and high of one bin, when nothing can be compressed."""
+_LARGEST = np.int32(layout.LARGEST_COUNT)
+
+
+@dataclass(frozen=True, eq=False)
+class CountOverview:
+    """Extremes of one channel's counts; a bin whose samples are all lost has the missing count twice."""
+
+    low: Counts
+    high: Counts
+
+
+def extremes(counts: Counts) -> CountOverview:
+    """Reduce consecutive counts, the first of which begins a bin."""
+    if counts.size == 0:
+        return CountOverview(counts, counts)
+    starts = np.arange(0, counts.size, BIN_SAMPLES)
+    high = np.maximum.reduceat(counts, starts)
+    low = np.minimum.reduceat(counts, starts)
+    holed = np.flatnonzero(low == layout.MISSING_COUNT)
+    if holed.size:
+        known = np.where(counts == layout.MISSING_COUNT, _LARGEST, counts)
+        found = np.minimum.reduceat(known, starts)
+        low[holed] = np.where(high[holed] == layout.MISSING_COUNT, layout.MISSING_COUNT, found[holed])
+    return CountOverview(low, high)
+
+
+class OverviewSums:
+    """Takes a channel piece by piece; every piece but the last is a whole number of bins."""
+
+    def __init__(self) -> None:
+        self._low: list[Counts] = []
+        self._high: list[Counts] = []
+
+    def watched(self, pieces: Iterator[Counts]) -> Iterator[Counts]:
+        """Hand pieces on unchanged, and take note of them."""
+        for piece in pieces:
+            self.add(piece)
+            yield piece
+
+    def add(self, piece: Counts) -> None:
+        """Take the next counts."""
+        found = extremes(piece)
+        self._low.append(found.low)
+        self._high.append(found.high)
+
+    def overview(self) -> CountOverview:
+        """Give the extremes of everything taken."""
+        nothing = [np.empty(0, dtype=layout.COUNT_DTYPE)]
+        return CountOverview(np.concatenate(self._low or nothing), np.concatenate(self._high or nothing))
+
+
+def write_overview(file: h5py.File, role: str, overview: CountOverview, sample_rate_hz: float) -> None:
+    """Keep a channel's overview beside its samples, scaled like them for readers of netCDF."""
+    group = file.require_group(layout.OVERVIEW)
+    bins = overview.low.size
+    if layout.BIN not in group:
+        axis = group.create_dataset(
+            layout.BIN, data=np.arange(bins, dtype=layout.COUNT_DTYPE), **_packed(bins)
+        )
+        bin_s = BIN_SAMPLES / sample_rate_hz
+        write_attributes(
+            axis,
+            {"units": "s", "scale_factor": bin_s, "add_offset": 0.0, "long_name": "first moment of the bin"},
+        )
+        axis.make_scale(layout.BIN)
+        write_attributes(group, {"samples_per_bin": BIN_SAMPLES})
+    for suffix, counts in ((LOW_SUFFIX, overview.low), (HIGH_SUFFIX, overview.high)):
+        dataset = group.create_dataset(role + suffix, data=counts.astype(layout.COUNT_DTYPE), **_packed(bins))
+        for name in ("scale_factor", "add_offset", "units"):
+            dataset.attrs[name] = file[role].attrs[name]
+        dataset.attrs["_FillValue"] = np.int32(layout.MISSING_COUNT)
+        dataset.dims[0].attach_scale(group[layout.BIN])
+
+
+def read_overview(file: h5py.File, role: str, samples: int) -> CountOverview | None:
+    """Read a channel's overview; None in a file that has none that fits: the samples are there anyway."""
+    group = file.get(layout.OVERVIEW)
+    if group is None or int(group.attrs.get("samples_per_bin", 0)) != BIN_SAMPLES:
+        return None
+    try:
+        low, high = group[role + LOW_SUFFIX][:], group[role + HIGH_SUFFIX][:]
+    except (OSError, KeyError):
+        return None
+    if low.size != high.size or low.size != bins_of(samples):
+        return None
+    return CountOverview(low, high)
+
+
+def bins_of(samples: int) -> int:
+    """How many bins so many samples fill, the last perhaps in part."""
+    return -(-samples // BIN_SAMPLES)
+
+
+def _packed(bins: int) -> dict[str, object]:
+    if bins == 0:
+        return {}
+    chunk = min(layout.CHUNK_SAMPLES, bins)
+    return {
+        "chunks": (chunk,),
+        "compression": "gzip",
+        "compression_opts": layout.DEFLATE_LEVEL,
+        "shuffle": True,
+    }

@@ -1,0 +1,200 @@
+"""The file before its first sample: everything known is written, and room for the rest is claimed.
+
+After this, nothing but bytes at known places is written until the recording ends: HDF5 itself has
+closed the file, so that no crash can catch it between two steps.
+"""
+
+import shutil
+import uuid
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from ..errors import RecordingError
+from . import _layout as layout
+from ._attributes import write_attributes, write_text_dataset
+from ._disk import PositionedFile, sync_folder
+from ._disk_room import claim_room
+from ._header import RecordingHeader
+from ._layout import Table
+
+MARGIN_S = 10.0
+MARGIN_FRACTION = 0.05
+"""A plan may run over by 5 % or 10 s, whichever is longer."""
+HOLD_ROOM_S = 600.0
+"""And be held this long: declared, but given by the disk only as samples come."""
+
+OPEN_ENDED_S = 24 * 3600.0
+"""Declared length of a recording without a planned end; the disk fills only as samples come."""
+RESERVE_AHEAD_S = 60.0
+"""How much room a recording claims on the disk at once when it outgrows what it has."""
+
+ROOM_FACTOR = 2
+"""While a recording is finished, it and its compressed copy lie side by side."""
+
+HEAD_BYTES = 8_000_000
+"""More than tables, attributes and configuration take together (5 MB)."""
+
+ITEM_BYTES = 4
+
+
+@dataclass(frozen=True)
+class TablePlaces:
+    """Where a table lies in the file: offset of each column and of its row counter."""
+
+    table: Table
+    columns: tuple[int, ...]
+    n_rows: int
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where everything that is written later lies in the file, as byte offsets."""
+
+    channels: tuple[int, ...]
+    n_valid: int
+    state: int
+    reason: int
+    tables: Mapping[str, TablePlaces]
+    capacity: int
+    """Samples per channel that fit."""
+    reserved: int
+    """Samples per channel for which the disk has already given room."""
+
+
+def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
+    """Create ``part`` for the recording ``path`` and claim its room on the disk.
+
+    It is made under another name first, so that a ``.part`` can be opened from its first moment on:
+    a program that is killed here leaves a ``.tmp`` without a sample in it.
+
+    Raises
+    ------
+    RecordingError
+        When a file of that name exists, the folder does not, or the disk is too full.
+
+    """
+    capacity, reserved = _lengths(header)
+    _require_room(path, reserved * ITEM_BYTES * len(header.channels))
+    channel_bytes = ITEM_BYTES * len(header.channels)
+    made = layout.tmp_of(path)
+    try:
+        claim_room(made, HEAD_BYTES + reserved * channel_bytes, HEAD_BYTES + capacity * channel_bytes)
+    except OSError as error:
+        raise RecordingError(
+            f"{part} cannot be created with {reserved * channel_bytes / 1e6:.0f} MB: {error}."
+            " Nothing was recorded; make room, or choose another folder or a shorter measurement."
+        ) from error
+    try:
+        with h5py.File(made, "w", libver=layout.LIBVER, locking=False) as file:
+            places = _write_layout(file, header, capacity, reserved)
+        _claim(made, places)
+        made.rename(part)
+        sync_folder(part.parent)
+    except OSError as error:
+        made.unlink(missing_ok=True)
+        raise RecordingError(
+            f"{part} cannot be prepared for {reserved} samples of {len(header.channels)} channels: {error}."
+            " Nothing was recorded; make room, or choose another folder or a shorter measurement."
+        ) from error
+    return places
+
+
+def _lengths(header: RecordingHeader) -> tuple[int, int]:
+    """Find the samples declared, and the samples for which the disk must have room at once."""
+    if header.expected_samples is None:
+        declared_s, ahead_s = OPEN_ENDED_S, RESERVE_AHEAD_S
+        return round(declared_s * header.sample_rate_hz), round(ahead_s * header.sample_rate_hz)
+    margin = max(MARGIN_FRACTION * header.expected_samples, MARGIN_S * header.sample_rate_hz)
+    reserved = header.expected_samples + round(margin)
+    return reserved + round(HOLD_ROOM_S * header.sample_rate_hz), reserved
+
+
+def _require_room(path: Path, needed_bytes: int) -> None:
+    if not path.parent.is_dir():
+        raise RecordingError(
+            f"The folder {path.parent} does not exist. Nothing was recorded; create it first."
+        )
+    free_bytes = shutil.disk_usage(path.parent).free
+    if free_bytes < ROOM_FACTOR * needed_bytes:
+        raise RecordingError(
+            f"{path} needs {ROOM_FACTOR * needed_bytes / 1e6:.0f} MB (the recording, and as much again"
+            f" while it is finished); the disk has {free_bytes / 1e6:.0f} MB. Nothing was recorded; make"
+            " room, or choose another folder or a shorter measurement."
+        )
+
+
+def _write_layout(file: h5py.File, header: RecordingHeader, capacity: int, reserved: int) -> Places:
+    write_attributes(
+        file,
+        {
+            "Conventions": layout.CONVENTIONS,
+            "format": layout.FORMAT,
+            "format_version": layout.FORMAT_VERSION,
+            "recording_id": uuid.uuid4().hex,
+            **header.attributes(),
+        },
+    )
+    configuration = file.create_group(layout.CONFIGURATION)
+    for name, text in header.configuration().items():
+        write_text_dataset(configuration, name, text)
+    n_valid = _filled(file, layout.N_VALID, layout.COUNTER_DTYPE, b"\0" * 8)
+    state = _filled(
+        file, layout.STATE, f"S{layout.STATE_WIDTH}", layout.RecordingState.RECORDING.value.encode()
+    )
+    reason = _filled(file, layout.REASON, f"S{layout.TEXT_WIDTH}", b"")
+    tables = {table.name: _table(file, table) for table in layout.TABLES}
+    channels = []
+    for channel in header.channels:
+        dataset = _contiguous(file, channel.role, layout.COUNT_DTYPE, capacity)
+        write_attributes(dataset, {**channel.attributes(), "sample_rate": float(header.sample_rate_hz)})
+        dataset.attrs["_FillValue"] = np.int32(layout.MISSING_COUNT)
+        channels.append(dataset.id.get_offset())
+    return Places(tuple(channels), n_valid, state, reason, tables, capacity, reserved)
+
+
+def _table(file: h5py.File, table: Table) -> TablePlaces:
+    group = file.create_group(table.name)
+    n_rows = _filled(group, layout.N_ROWS, layout.COUNTER_DTYPE, b"\0" * 8)
+    columns = [_contiguous(group, each.name, each.dtype, table.capacity) for each in table.columns]
+    return TablePlaces(table, tuple(column.id.get_offset() for column in columns), n_rows)
+
+
+def _filled(group: h5py.Group, name: str, dtype: str, raw: bytes) -> int:
+    """Create a dataset of one element with a known value; its offset comes back."""
+    dataset = _contiguous(group, name, dtype, 1)
+    dataset[0] = np.frombuffer(raw.ljust(np.dtype(dtype).itemsize, b"\0"), dtype=dtype)[0]
+    return int(dataset.id.get_offset())
+
+
+def _contiguous(group: h5py.Group, name: str, dtype: str, length: int) -> h5py.Dataset:
+    """Create a dataset that has its final place now and is not filled with zeros first."""
+    settings = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    settings.set_layout(h5py.h5d.CONTIGUOUS)
+    settings.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    settings.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+    kind = np.dtype(dtype)
+    stored = h5py.string_dtype("utf-8", kind.itemsize) if kind.kind == "S" else kind
+    identifier = h5py.h5d.create(
+        group.id,
+        name.encode(),
+        h5py.h5t.py_create(stored, logical=True),
+        h5py.h5s.create_simple((length,)),
+        settings,
+    )
+    return h5py.Dataset(identifier)
+
+
+def _claim(part: Path, places: Places) -> None:
+    """Let the disk give room for the head of the file and for the reserved samples of each channel."""
+    disk = PositionedFile(part)
+    try:
+        disk.reserve(0, min(places.channels))
+        for offset in places.channels:
+            disk.reserve(offset, places.reserved * ITEM_BYTES)
+        disk.sync()
+    finally:
+        disk.close()

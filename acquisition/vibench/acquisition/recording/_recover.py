@@ -1,0 +1,65 @@
+"""A recording whose program died becomes a finished one, with everything that was committed."""
+
+from pathlib import Path
+
+import h5py
+
+from ..errors import RecordingError
+from . import _layout as layout
+from ._attributes import read_attributes
+from ._disk import sole_use
+from ._finalise import discard, finalise
+from ._opening import opened_recording
+
+
+def recover(path: Path | str) -> Path:
+    """Finish what an interrupted recording left; returns the path of ``NAME.h5``.
+
+    ``path`` is ``NAME.h5.part`` or ``NAME.h5``. What a crash left behind is told apart by itself:
+    samples that were never compressed, a compressed copy that was never completed, or a complete
+    one whose ``.part`` was not yet deleted.
+
+    Raises
+    ------
+    RecordingError
+        When there is nothing to recover, the file is still being recorded, or is not ours.
+
+    """
+    path = Path(path)
+    final = path.with_suffix("") if path.suffix == layout.PART_SUFFIX else path
+    part = layout.part_of(final)
+    if not part.exists():
+        raise RecordingError(f"{part} does not exist, so there is nothing to recover.")
+    try:
+        _finish(part, final)
+        discard(part)
+    except RecordingError:
+        raise
+    except OSError as error:
+        raise RecordingError(
+            f"{part} cannot be recovered: {error}. Nothing is lost; see that folder and file may be written,"
+            " and try again."
+        ) from error
+    return final
+
+
+def _finish(part: Path, final: Path) -> None:
+    with sole_use(part):
+        with opened_recording(part) as source:
+            is_done = final.exists() and _holds(final, source)
+        if not is_done:
+            # Left by a crash while the copy was made; everything in it is in the .part.
+            layout.tmp_of(final).unlink(missing_ok=True)
+            finalise(part)
+
+
+def _holds(final: Path, source: h5py.File) -> bool:
+    """Whether the finished file is the copy of this very recording."""
+    with opened_recording(final) as copy:
+        same = read_attributes(copy)["recording_id"] == read_attributes(source)["recording_id"]
+    if not same:
+        raise RecordingError(
+            f"{final} is another recording than {layout.part_of(final)}, and nothing is ever overwritten."
+            " Nothing was changed; rename one of the two and try again."
+        )
+    return same

@@ -1,0 +1,171 @@
+"""Results of an analysis, kept beside the samples they came from: ``/results/NAME/``."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordingError
+from . import _layout as layout
+from ._attributes import read_attributes, read_text_dataset, write_attributes, write_text_dataset
+from ._json_text import json_text
+from ._provenance import collect_provenance
+
+REAL_SUFFIX, IMAG_SUFFIX = "_real", "_imag"
+COMPLEX_PART = "complex_part"
+"""Attribute of the two halves of a complex array; complex numbers themselves are h5py's own habit."""
+SETTINGS_JSON = "settings_json"
+RAW_SHA256 = "raw_sha256_"
+
+Setting = Any
+"""Anything JSON can hold: numbers, text, truth values, lists and objects of them."""
+
+
+@dataclass(frozen=True)
+class ResultArray:
+    """One array of a result, with its unit and the arrays that are its axes."""
+
+    values: NDArray[Any]
+    """Real or complex numbers, any shape."""
+    unit: str = "1"
+    axes: tuple[str, ...] = ()
+    """For each dimension the name of the array along it (``("frequency",)``); empty for an axis itself."""
+
+
+@dataclass(frozen=True)
+class SavedResult:
+    """A result as it is read from a recording."""
+
+    name: str
+    arrays: Mapping[str, ResultArray]
+    settings: Mapping[str, Setting]
+    saved_utc: str
+    software_version: str
+    software_commit: str
+    raw_sha256: Mapping[str, str]
+    """Checksum of each raw channel that was used."""
+
+
+def write_result(
+    file: h5py.File,
+    name: str,
+    arrays: Mapping[str, ResultArray],
+    settings: Mapping[str, Setting],
+    roles: Sequence[str],
+) -> str:
+    """Add a result; a name that exists gets ``-2``, ``-3``, ... The name that was used comes back."""
+    _require_axes(name, arrays)
+    results = file.require_group(layout.RESULTS)
+    free_name = _free_name(results, name)
+    group = results.create_group(free_name)
+    provenance = collect_provenance()
+    write_attributes(
+        group,
+        {
+            "saved_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+            "software_version": provenance.packages.get("vibench", ""),
+            "software_commit": provenance.commit,
+            **{RAW_SHA256 + role: read_attributes(file[role])["sha256"] for role in roles},
+        },
+    )
+    write_text_dataset(group, SETTINGS_JSON, json_text(f"The settings of result {name!r}", settings))
+    scalars = {key: value for key, value in settings.items() if type(value) in {int, float, str}}
+    write_attributes(group.create_group(layout.SETTINGS), scalars)
+    _write_arrays(group, arrays)
+    return free_name
+
+
+def read_results(file: h5py.File) -> dict[str, SavedResult]:
+    """Every result of a recording, by name."""
+    if layout.RESULTS not in file:
+        return {}
+    return {name: _read_result(name, group) for name, group in file[layout.RESULTS].items()}
+
+
+def _free_name(results: h5py.Group, name: str) -> str:
+    if not name or "/" in name or name.startswith("."):
+        raise RecordingError(
+            f"A result cannot be called {name!r}: give a name without '/' that does not begin with a dot."
+        )
+    if name not in results:
+        return name
+    suffix = 2
+    while f"{name}-{suffix}" in results:
+        suffix += 1
+    return f"{name}-{suffix}"
+
+
+def _require_axes(name: str, arrays: Mapping[str, ResultArray]) -> None:
+    for key, array in arrays.items():
+        shape = np.shape(array.values)
+        lengths = tuple(len(arrays[axis].values) if axis in arrays else -1 for axis in array.axes)
+        if array.axes and lengths != shape:
+            raise RecordingError(
+                f"{key!r} of result {name!r} has shape {shape}, but its axes {array.axes} have lengths"
+                f" {lengths} (-1: no such array). Nothing was saved; name one array of the right length"
+                " per dimension."
+            )
+
+
+def _write_arrays(group: h5py.Group, arrays: Mapping[str, ResultArray]) -> None:
+    axes = {axis for array in arrays.values() for axis in array.axes}
+    for key in sorted(arrays, key=lambda each: each not in axes):
+        array = arrays[key]
+        for name, values, part in _real_parts(key, np.asarray(array.values)):
+            dataset = group.create_dataset(name, data=values)
+            write_attributes(dataset, {"units": array.unit, **part})
+            if key in axes:
+                dataset.make_scale(key)
+            for dimension, axis in enumerate(array.axes):
+                dataset.dims[dimension].attach_scale(group[axis])
+
+
+def _real_parts(key: str, values: NDArray[Any]) -> list[tuple[str, NDArray[Any], dict[str, str]]]:
+    """Split a complex array into real ones that any reader understands; truth values become integers."""
+    if np.iscomplexobj(values):
+        return [
+            (key + REAL_SUFFIX, values.real, {COMPLEX_PART: "real"}),
+            (key + IMAG_SUFFIX, values.imag, {COMPLEX_PART: "imag"}),
+        ]
+    return [(key, values.astype(np.int8) if values.dtype == np.bool_ else values, {})]
+
+
+def _read_result(name: str, group: h5py.Group) -> SavedResult:
+    attributes = read_attributes(group)
+    return SavedResult(
+        name=name,
+        arrays=_read_arrays(group),
+        settings=json.loads(read_text_dataset(group, SETTINGS_JSON)),
+        saved_utc=str(attributes["saved_utc"]),
+        software_version=str(attributes["software_version"]),
+        software_commit=str(attributes["software_commit"]),
+        raw_sha256={
+            key.removeprefix(RAW_SHA256): str(value)
+            for key, value in attributes.items()
+            if key.startswith(RAW_SHA256)
+        },
+    )
+
+
+def _read_arrays(group: h5py.Group) -> dict[str, ResultArray]:
+    arrays: dict[str, ResultArray] = {}
+    for name in group:
+        if name in {SETTINGS_JSON, layout.SETTINGS}:
+            continue
+        dataset = group[name]
+        attributes = read_attributes(dataset)
+        axes = tuple(scale.name.rsplit("/", 1)[-1] for dim in dataset.dims for scale in dim.values())
+        unit = str(attributes["units"])
+        match attributes.get(COMPLEX_PART):
+            case "real":
+                key = name.removesuffix(REAL_SUFFIX)
+                values = dataset[()] + 1j * group[key + IMAG_SUFFIX][()]
+                arrays[key] = ResultArray(values, unit, axes)
+            case None:
+                arrays[name] = ResultArray(dataset[()], unit, axes)
+    return arrays

@@ -1,0 +1,264 @@
+"""Writing a recording: create it, append blocks, note what happens, finish it.
+
+::
+
+    with create_recording(path, header) as writer:
+        for block in blocks:
+            writer.append(block)
+        writer.finish(RecordingState.COMPLETE, "the plan was carried out")
+"""
+
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from ..errors import RecordingError
+from ..instruments import Block, Samples
+from . import _layout as layout
+from ._committer import COMMIT_INTERVAL_S, Batch, Committer
+from ._counts import Counts, CountScale
+from ._disk import Buffer, Disk
+from ._disk_trouble import open_disk
+from ._finalise import discard, finalise
+from ._fixed_text import encoded
+from ._header import RecordingHeader
+from ._journal import Journal, Number
+from ._layout import RecordingState
+from ._preallocate import ITEM_BYTES, MARGIN_S, RESERVE_AHEAD_S, Places, preallocate
+
+QUEUE_S = 10.0
+"""Seconds of samples that may wait for the disk; the slowest sync measured took 0.12 s."""
+GAP_PIECE_SAMPLES = 51_200
+
+ENDINGS = (RecordingState.COMPLETE, RecordingState.STOPPED, RecordingState.FAILED)
+
+
+def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWriter":
+    """Begin a recording: ``NAME.h5.part`` stands on the disk, with all that is known, before this returns.
+
+    Raises
+    ------
+    RecordingError
+        When the name is not ``NAME.h5``, a file of that name exists in any of its three forms, or
+        the disk has no room for the planned samples.
+
+    """
+    path = Path(path)
+    if path.suffix != layout.SUFFIX:
+        raise RecordingError(f"A recording is called NAME{layout.SUFFIX}; {path.name!r} was given.")
+    part = layout.part_of(path)
+    for taken in (path, part, layout.tmp_of(path)):
+        if taken.exists():
+            raise RecordingError(
+                f"{taken} exists, and nothing is ever overwritten. Nothing was recorded; choose another name"
+                " (a .part or .tmp is what an interrupted recording left: recover it first)."
+            )
+    places = preallocate(path, part, header)
+    return RecordingWriter(path, header, places, open_disk(part))
+
+
+class RecordingWriter:
+    """A recording in the making. Its methods belong to one thread; the disk has its own.
+
+    Leaving the ``with`` block finishes a recording that is not finished yet: as complete, as
+    stopped (keyboard) or as failed (any other exception).
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        header: RecordingHeader,
+        places: Places,
+        disk: Disk,
+        commit_interval_s: float = COMMIT_INTERVAL_S,
+    ) -> None:
+        self._path = path
+        self._header = header
+        self._places = places
+        self._disk = disk
+        self._scale = CountScale(header.channels)
+        self._journal = Journal(places.tables, tuple(channel.role for channel in header.channels))
+        self._committer = Committer(disk, round(QUEUE_S * header.sample_rate_hz), commit_interval_s)
+        self._samples = 0
+        self._reserved = places.reserved
+        self._is_finished = False
+
+    @property
+    def path(self) -> Path:
+        """``NAME.h5``, which exists once the recording is finished."""
+        return self._path
+
+    @property
+    def samples(self) -> int:
+        """Samples per channel handed over so far."""
+        return self._samples
+
+    @property
+    def committed_samples(self) -> int:
+        """Samples per channel that would survive a power cut now."""
+        return self._committer.committed_samples
+
+    def append(self, block: Block) -> None:
+        """Hand over the next samples. Returns at once unless the disk is seconds behind.
+
+        Samples missing between this block and the last are marked as a gap and read as NaN.
+
+        Raises
+        ------
+        RecordingError
+            When the block does not fit (shape, order, volts that are no counts, end of the room),
+            or the disk has failed. What was committed is kept.
+
+        """
+        counts = self._scale.counts(self._checked(block))
+        gap = block.first_sample - self._samples
+        end = block.first_sample + counts.shape[1]
+        self._require_capacity(end)
+        self._reserve_up_to(end)
+        if gap:
+            self._fill_gap(self._samples, block.first_sample)
+        self._samples = end
+        self._committer.put(
+            Batch(
+                writes=self._channel_writes(block.first_sample, counts),
+                counters={self._places.n_valid: end},
+                samples=counts.shape[1],
+            )
+        )
+        for overload in block.overloads:
+            self._committer.put(self._journal.overload(overload))
+
+    def log(self, kind: str, text: str, sample: int | None = None) -> None:
+        """Note an event, at a sample (the next one by default)."""
+        self._committer.put(self._journal.event(kind, text, self._samples if sample is None else sample))
+
+    def begin_segment(self, label: str, **numbers: Number) -> None:
+        """Begin a named range at the next sample; the analysis finds it by its label and numbers."""
+        self._committer.put(self._journal.begin_segment(label, numbers, self._samples))
+
+    def end_segment(self) -> None:
+        """End the open segment with the last sample handed over."""
+        self._committer.put(self._journal.end_segment(self._samples - 1))
+
+    def finish(self, state: RecordingState, reason: str = "") -> Path:
+        """End the recording and turn it into ``NAME.h5``; calling again changes nothing.
+
+        Raises
+        ------
+        RecordingError
+            When the disk failed on the way. The samples committed before are kept, in ``NAME.h5``
+            or in ``NAME.h5.part``; the text says which.
+
+        """
+        if state not in ENDINGS:
+            raise RecordingError(
+                f"A recording cannot be finished as {state.value!r}; allowed are"
+                f" {', '.join(each.value for each in ENDINGS)}."
+            )
+        if self._is_finished:
+            return self._path
+        self._is_finished = True
+        self._committer.close()
+        failure = self._committer.failure
+        if failure is not None:
+            state, reason = RecordingState.FAILED, f"{reason}; the disk refused: {failure}".removeprefix("; ")
+        part = layout.part_of(self._path)
+        try:
+            self._write_ending(state, reason)
+            finalise(part)
+        finally:
+            self._disk.close()
+        discard(part)
+        self._committer.raise_unseen_failure()
+        return self._path
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.finish(RecordingState.COMPLETE)
+            return
+        state = RecordingState.STOPPED if isinstance(error, KeyboardInterrupt) else RecordingState.FAILED
+        try:
+            self.finish(state, f"{type(error).__name__}: {error}".removesuffix(": "))
+        except RecordingError as second:
+            # The first error is the cause; this one must not hide it.
+            error.add_note(str(second))
+
+    def _checked(self, block: Block) -> Samples:
+        if self._is_finished:
+            raise RecordingError(
+                f"{self._path} is finished; the block was not recorded. Begin a new recording."
+            )
+        channels = len(self._header.channels)
+        if block.volts.ndim != 2 or block.volts.shape[0] != channels:
+            raise RecordingError(
+                f"A block of shape {block.volts.shape} was given; this recording has {channels} channels, so"
+                f" the shape must be ({channels}, samples). The block was not recorded."
+            )
+        if block.first_sample < self._samples:
+            raise RecordingError(
+                f"A block beginning at sample {block.first_sample} was given, but {self._samples} samples are"
+                " recorded already and nothing is overwritten. The block was not recorded; hand over every"
+                " block once, in order."
+            )
+        return block.volts
+
+    def _require_capacity(self, end: int) -> None:
+        if end > self._places.capacity:
+            raise RecordingError(
+                f"The recording is full: the block ends at sample {end}, and {self._places.capacity} fit"
+                f" (planned: {self._header.expected_samples}, plus a margin). The {self._samples} samples"
+                " before it are kept; plan a longer measurement, or leave its length open"
+                " (expected_samples=None)."
+            )
+
+    def _reserve_up_to(self, end: int) -> None:
+        """Keep the claim on the disk ahead of the samples, where the plan has no end or runs far over."""
+        rate_hz, planned = self._header.sample_rate_hz, self._header.expected_samples
+        ahead = round(RESERVE_AHEAD_S * rate_hz)
+        # A recording that keeps to its plan never comes here, and so never asks a full disk for more.
+        lead = ahead // 2 if planned is None else round(MARGIN_S / 2 * rate_hz)
+        if end + lead <= self._reserved or self._reserved == self._places.capacity:
+            return
+        target = min(end + ahead, self._places.capacity)
+        size = (target - self._reserved) * ITEM_BYTES
+        begin = self._reserved * ITEM_BYTES
+        self._committer.put(Batch(reservations=tuple((base + begin, size) for base in self._places.channels)))
+        self._reserved = target
+
+    def _fill_gap(self, first: int, stop: int) -> None:
+        """Mark lost samples, in pieces that need little memory."""
+        missing = np.full(GAP_PIECE_SAMPLES, layout.MISSING_COUNT, dtype=layout.COUNT_DTYPE)
+        for begin in range(first, stop, GAP_PIECE_SAMPLES):
+            counts = np.broadcast_to(
+                missing[: min(GAP_PIECE_SAMPLES, stop - begin)],
+                (len(self._header.channels), min(GAP_PIECE_SAMPLES, stop - begin)),
+            )
+            self._committer.put(Batch(writes=self._channel_writes(begin, counts), samples=counts.shape[1]))
+        self._committer.put(self._journal.gap(first, stop - 1))
+
+    def _channel_writes(self, first_sample: int, counts: Counts) -> tuple[tuple[int, Buffer], ...]:
+        return tuple(
+            (base + first_sample * ITEM_BYTES, row.data)
+            for base, row in zip(self._places.channels, counts, strict=True)
+        )
+
+    def _write_ending(self, state: RecordingState, reason: str) -> None:
+        """State last: a file that says how it ended also says why."""
+        why = encoded(reason, layout.TEXT_WIDTH).ljust(layout.TEXT_WIDTH, b"\0")
+        try:
+            self._disk.write(self._places.reason, why)
+            self._disk.sync()
+            self._disk.write(self._places.state, state.value.encode().ljust(layout.STATE_WIDTH, b"\0"))
+            self._disk.sync()
+        except OSError as error:
+            raise RecordingError(
+                f"The disk refused the end of the recording: {error}. The {self.committed_samples} samples"
+                f" committed before are in {layout.part_of(self._path)}; recover it when the disk is well."
+            ) from error

@@ -1,0 +1,55 @@
+from ._calibration import (
+    CalibrationRule as CalibrationRule,
+    calibrations as calibrations,
+    check_calibrations as check_calibrations,
+)
+from ._channel import (
+    Channel as Channel,
+    channels_of as channels_of,
+)
+from ._configuration import (
+    HIGH_Z as HIGH_Z,
+    AccelerometerConfig as AccelerometerConfig,
+    ChannelConfig as ChannelConfig,
+    DaqConfig as DaqConfig,
+    GeneratorConfig as GeneratorConfig,
+    Knob as Knob,
+    Rig as Rig,
+    Role as Role,
+    VibrometerConfig as VibrometerConfig,
+    load_rig as load_rig,
+    with_faults as with_faults,
+)
+from ._knobs import (
+    Confirm as Confirm,
+    KnobSheet as KnobSheet,
+    confirm_at_terminal as confirm_at_terminal,
+    confirm_by_sheet as confirm_by_sheet,
+    confirm_simulated as confirm_simulated,
+    save_knob_sheet as save_knob_sheet,
+)
+from ._model import (
+    ComplexArray as ComplexArray,
+    Quantity as Quantity,
+    RigModel as RigModel,
+    suspended_mass_kg as suspended_mass_kg,
+)
+from ._output import (
+    OutputConfig as OutputConfig,
+    OutputUse as OutputUse,
+)
+from ._server_token import (
+    METADATA_KEY as METADATA_KEY,
+    VARIABLE as VARIABLE,
+    given_token as given_token,
+)
+from ._specimen import (
+    specimen_of as specimen_of,
+)
+from ._virtual import (
+    LARGEST_LEVEL_ERROR as LARGEST_LEVEL_ERROR,
+    USUAL_GRID_RATE_HZ as USUAL_GRID_RATE_HZ,
+    VirtualConfig as VirtualConfig,
+    fastest_sample_rate_hz as fastest_sample_rate_hz,
+    highest_carried_hz as highest_carried_hz,
+)

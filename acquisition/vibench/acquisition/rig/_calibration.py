@@ -1,0 +1,62 @@
+"""Which calibrations have run out."""
+
+from dataclasses import dataclass
+from datetime import date
+from enum import Enum, auto
+
+from ..errors import CheckFailed
+from ._channel import channels_of
+from ._configuration import Rig
+
+
+class CalibrationRule(Enum):
+    """What a calibration that has run out does."""
+
+    ENFORCED = auto()
+    """The bench does not open."""
+    WAIVED = auto()
+    """The bench opens; the dates stand in every recording."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """One calibration and its age."""
+
+    what: str
+    calibrated: date
+    age_days: int
+    valid_days: int
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether it holds today; a date to come is a slip of the pen and does not."""
+        return 0 <= self.age_days <= self.valid_days
+
+    def __str__(self) -> str:
+        return f"{self.what} was calibrated on {self.calibrated}, {self.age_days} days ago"
+
+
+def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
+    """Every calibration of a rig: its sensors', and each input's."""
+    dates = [
+        (rig.vibrometer.model, rig.vibrometer.calibrated),
+        (rig.accelerometer.model, rig.accelerometer.calibrated),
+        *(
+            (f"{channel.physical} of {rig.daq.product}", channel.converter_calibrated)
+            for channel in channels_of(rig)
+        ),
+    ]
+    return tuple(
+        Calibration(what, calibrated, (today - calibrated).days, rig.calibration_valid_days)
+        for what, calibrated in dates
+    )
+
+
+def check_calibrations(rig: Rig, today: date) -> None:
+    """Raise CheckFailed when a calibration has run out, naming each."""
+    stale = [str(calibration) for calibration in calibrations(rig, today) if not calibration.is_valid]
+    if stale:
+        raise CheckFailed(
+            f"{'; '.join(stale)}; {rig.calibration_valid_days} days are allowed (calibration_valid_days). "
+            "Nothing was opened; have it calibrated and enter the date, or waive the rule for this run"
+        )

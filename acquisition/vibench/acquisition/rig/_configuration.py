@@ -1,0 +1,287 @@
+"""What a hardware configuration describes: the chain from generator to converter, its limits, its knobs."""
+
+from datetime import date
+from enum import StrEnum
+from math import inf
+from pathlib import Path
+from typing import Literal, Self
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+
+from ..errors import ConfigurationError
+from ..host import FrozenModel, load_toml
+from ._output import OutputConfig
+from ._virtual import VirtualConfig, fastest_sample_rate_hz
+
+HIGH_Z: Literal["high-z"] = "high-z"
+
+
+class Sourced(FrozenModel):
+    """A figure with the place it comes from, so that nobody mistakes a memory for a data sheet."""
+
+    value: PositiveFloat
+    source: str = Field(min_length=1)
+
+
+class GeneratorConfig(FrozenModel):
+    """The function generator and what its output sees."""
+
+    driver: Literal["afg1022x"] = "afg1022x"
+    resource: str = Field(pattern=r"^(USB|TCPIP|GPIB|ASRL).*::(INSTR|SOCKET)$")
+    """VISA resource name."""
+    visa_library: str = "@py"
+    """``"@py"`` for pyvisa-py, empty for the system's VISA."""
+    channel: Literal[1, 2] = 1
+    load_ohm: Literal["high-z"] | PositiveFloat = HIGH_Z
+    """Load that the generator is told to expect; its panel shows volts into this load."""
+    connected_ohm: PositiveFloat
+    """Input impedance that really hangs on the output: the amplifier's [ohm]."""
+    amplitude_limit_vpp: PositiveFloat = Field(le=20.0)
+    """The largest setting that this bench allows, peak to peak [V]."""
+    settle_s: NonNegativeFloat = 0.0
+    """Pause after each command that the instrument needs [s]."""
+
+    def terminal_factor(self) -> float:
+        """Volts at the terminal per volt on the panel: 2 when 50 ohm are set and nothing loads it."""
+        source_ohm = 50.0
+        told = inf if self.load_ohm == HIGH_Z else self.load_ohm
+        shown = 1.0 if told == inf else told / (told + source_ohm)
+        return self.connected_ohm / (self.connected_ohm + source_ohm) / shown
+
+
+class AmplifierConfig(FrozenModel):
+    """The power amplifier. Its knobs cannot be read: the operator confirms them."""
+
+    model: str
+    serial: str = ""
+    gain_db: float = Field(ge=-60, le=60)
+    """Voltage gain as the knob is set [dB]."""
+    clip_v: PositiveFloat
+    """Largest output voltage, peak [V]."""
+    current_limit_a: Sourced
+    """Setting of the current limiter, rms [A]."""
+    low_cut_hz: NonNegativeFloat = 0.0
+    """Lower -3 dB frequency, first order [Hz]; 0 for a direct-coupled amplifier."""
+    high_cut_hz: PositiveFloat
+    """Upper -3 dB frequency, first order [Hz]."""
+
+    @property
+    def gain(self) -> float:
+        """Output volts per input volt."""
+        return float(10 ** (self.gain_db / 20))
+
+
+class ShakerLimits(FrozenModel):
+    """What the shaker survives; all as peak values of a sine."""
+
+    stroke_m: Sourced
+    velocity_m_per_s: Sourced
+    acceleration_m_per_s2: Sourced
+    force_n: Sourced
+    current_a: Sourced
+
+
+class ShakerConfig(FrozenModel):
+    """An electrodynamic shaker as a coil and a suspended mass, with the fixture it carries."""
+
+    model: str
+    serial: str = ""
+    moving_mass_kg: PositiveFloat
+    fixture_mass_kg: NonNegativeFloat
+    """Everything rigid on the table except the specimen [kg]."""
+    suspension_stiffness_n_per_m: PositiveFloat
+    suspension_damping_ns_per_m: PositiveFloat
+    force_constant_n_per_a: PositiveFloat
+    coil_resistance_ohm: PositiveFloat
+    """Coil and cable [ohm]."""
+    coil_inductance_h: PositiveFloat
+    source: str = Field(min_length=1)
+    limits: ShakerLimits
+
+
+class VibrometerConfig(FrozenModel):
+    """The laser vibrometer. Range and filters are set by hand: the operator confirms them."""
+
+    model: str
+    serial: str = ""
+    decoder: str
+    range_mm_per_s_per_v: PositiveFloat
+    """Decoder range [mm/s per volt]."""
+    full_scale_v: PositiveFloat
+    """Largest output, peak [V]."""
+    bandwidth_hz: PositiveFloat
+    tracking_filter: Literal["off", "fast", "medium", "slow"] = "off"
+    delay_s: NonNegativeFloat
+    """Signal delay of the decoder [s]; the analysis takes it out of the phase."""
+    calibrated: date
+
+    @property
+    def full_scale_m_per_s(self) -> float:
+        """Largest velocity that the range can show [m/s]."""
+        return self.full_scale_v * self.range_mm_per_s_per_v * 1e-3
+
+
+class AccelerometerConfig(FrozenModel):
+    """The accelerometer on the base."""
+
+    model: str
+    serial: str = ""
+    sensitivity_v_per_m_per_s2: PositiveFloat
+    full_scale_v: PositiveFloat
+    resonance_hz: PositiveFloat
+    iepe: Literal["yes", "no"]
+    calibrated: date
+
+
+class Role(StrEnum):
+    """What a channel records; the name of its dataset."""
+
+    DRIVE_VOLTAGE = "drive_voltage"
+    AMPLIFIER_VOLTAGE = "amplifier_voltage"
+    BASE_ACCELERATION = "base_acceleration"
+    M0_VELOCITY = "m0_velocity"
+
+
+class ChannelConfig(FrozenModel):
+    """One input of the converter."""
+
+    role: Role
+    physical: str
+    """Name on the device: ``"ai0"``."""
+    range_v: PositiveFloat
+    coupling: Literal["AC", "DC"]
+    terminal: Literal["default", "pseudo_differential", "differential", "single_ended"] = "default"
+    iepe_current_a: NonNegativeFloat = 0.0
+    attenuation: PositiveFloat = 1.0
+    """Divider in front of the input: volts at the source per volt at the input."""
+    calibrated: date
+    """Date of the converter's last calibration."""
+
+
+class DaqConfig(FrozenModel):
+    """The converter."""
+
+    driver: Literal["daqmx"] = "daqmx"
+    product: str
+    device: str
+    """Device name in the driver: ``"cDAQ1Mod1"``."""
+    server: str | None = None
+    """Address of a gRPC device server, ``"host:port"``; absent for a converter on this computer."""
+    sample_rate_hz: PositiveFloat
+    """Rate to ask for; the rate that the hardware takes is read back and stored beside it."""
+    buffer_s: PositiveFloat = 10.0
+    channels: tuple[ChannelConfig, ...] = Field(min_length=1)
+    output: OutputConfig | None = None
+    """An analogue output for streamed noise; absent when there is none."""
+
+    @property
+    def output_channel(self) -> str | None:
+        """Full name of the analogue output: ``"Dev1/ao0"``; None without one."""
+        if self.output is None:
+            return None
+        return f"{self.output.device or self.device}/{self.output.physical}"
+
+    @model_validator(mode="after")
+    def _channels_differ(self) -> Self:
+        for what, values in (
+            ("role", [channel.role.value for channel in self.channels]),
+            ("physical", [channel.physical for channel in self.channels]),
+        ):
+            twice = sorted({value for value in values if values.count(value) > 1})
+            if twice:
+                raise ValueError(f"{what} {', '.join(twice)} is given twice: every channel needs its own")
+        return self
+
+
+class SpecimenConfig(FrozenModel):
+    """The specimen on the shaker, as far as it is known."""
+
+    model: Literal["gong2025"] = "gong2025"
+    contact: Literal["hertz", "linear"] = "hertz"
+    damping_time_s: PositiveFloat = 2e-5
+    """c_i = damping_time_s * k_i."""
+    gap_m: PositiveFloat = 45e-6
+    amplitude_limit_m: Sourced
+    """Largest displacement of a mass that the springs bear."""
+
+
+class Knob(FrozenModel):
+    """A setting made by hand that no instrument reports: the operator confirms it."""
+
+    instrument: str
+    setting: str
+    value: str
+
+
+class Rig(FrozenModel):
+    """A whole bench as its configuration file describes it."""
+
+    name: str = Field(min_length=1)
+    generator: GeneratorConfig
+    amplifier: AmplifierConfig
+    shaker: ShakerConfig
+    vibrometer: VibrometerConfig
+    accelerometer: AccelerometerConfig
+    daq: DaqConfig
+    specimen: SpecimenConfig
+    calibration_valid_days: PositiveInt = 730
+    check_valid_h: PositiveFloat = 12.0
+    """How long a bench check that passed allows to arm [h]."""
+    virtual: VirtualConfig | None = None
+    """Present when every instrument is simulated."""
+
+    @model_validator(mode="after")
+    def _grid_carries_the_sample_rate(self) -> Self:
+        fastest_hz = None if self.virtual is None else fastest_sample_rate_hz(self.virtual.grid_rate_hz)
+        if self.virtual is None or fastest_hz is None or self.daq.sample_rate_hz <= fastest_hz:
+            return self
+        raise ValueError(
+            f"virtual.grid_rate_hz = {self.virtual.grid_rate_hz:g} carries {fastest_hz:g} samples a second "
+            f"at most, and daq.sample_rate_hz is {self.daq.sample_rate_hz:g}; lower that, or "
+            "make the grid finer"
+        )
+
+    @property
+    def knobs(self) -> tuple[Knob, ...]:
+        """Everything that is set by hand."""
+        amplifier, vibrometer = self.amplifier, self.vibrometer
+        return (
+            Knob(instrument=amplifier.model, setting="gain", value=f"{amplifier.gain_db:g} dB"),
+            Knob(
+                instrument=amplifier.model,
+                setting="current limit",
+                value=f"{amplifier.current_limit_a.value:g} A rms",
+            ),
+            Knob(
+                instrument=vibrometer.model,
+                setting="velocity range",
+                value=f"{vibrometer.range_mm_per_s_per_v:g} mm/s/V",
+            ),
+            Knob(instrument=vibrometer.model, setting="tracking filter", value=vibrometer.tracking_filter),
+        )
+
+
+def load_rig(path: Path) -> Rig:
+    """Read a hardware configuration; raises ConfigurationError with file, key and what is allowed."""
+    rig = load_toml(path, Rig)
+    if rig.virtual is None or rig.virtual.faults is None:
+        return rig
+    return with_faults(rig, path.absolute().parent / rig.virtual.faults)
+
+
+def with_faults(rig: Rig, script: Path) -> Rig:
+    """Have a script of faults played on a virtual rig.
+
+    Raises
+    ------
+    ConfigurationError
+        When the rig is a real one, whose faults come by themselves.
+
+    """
+    if rig.virtual is None:
+        raise ConfigurationError(
+            f"{script}: the rig {rig.name!r} is a real one, and faults can be scripted on a virtual one "
+            "only. Nothing was opened; leave the script out, or name a rig with a [virtual] table"
+        )
+    scripted = rig.virtual.model_copy(update={"faults": str(script.absolute())})
+    return rig.model_copy(update={"virtual": scripted})

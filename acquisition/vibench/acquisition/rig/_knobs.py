@@ -1,0 +1,124 @@
+"""What is set by hand: the operator confirms it, and the sheet goes into every recording."""
+
+import sys
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from pydantic import AwareDatetime, Field
+
+from ..errors import CheckFailed
+from ..host import FrozenModel, load_toml
+from ._configuration import Knob
+
+# Long enough for a campaign over a day and a night; whoever comes after may have turned a knob.
+SHEET_VALID = timedelta(hours=36)
+_YES = frozenset({"y", "yes"})
+
+
+class KnobSheet(FrozenModel):
+    """Which settings somebody has seen with their own eyes, who, and when."""
+
+    operator: str = Field(min_length=1)
+    """Name, or how it was confirmed."""
+    confirmed: AwareDatetime
+    knobs: tuple[Knob, ...]
+
+
+Confirm = Callable[[tuple[Knob, ...]], KnobSheet]
+"""Asks for the knobs and returns the sheet; raises CheckFailed when one of them is not as it should be."""
+
+
+def confirm_simulated(knobs: tuple[Knob, ...]) -> KnobSheet:
+    """Confirm for a virtual rig, whose knobs stand where its configuration says."""
+    return KnobSheet(operator="simulated", confirmed=datetime.now(UTC), knobs=knobs)
+
+
+def confirm_by_asking(ask: Callable[[str], str], operator: str) -> Confirm:
+    """Ask about each knob, one question each.
+
+    Parameters
+    ----------
+    ask
+        Shows a question and returns the answer: ``input``, or a dialogue's.
+    operator
+        Who answers.
+
+    """
+
+    def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
+        for knob in knobs:
+            question = f"{knob.instrument}: is the {knob.setting} at {knob.value}? [y/n] "
+            if ask(question).strip().lower() not in _YES:
+                raise CheckFailed(
+                    f"the {knob.setting} of the {knob.instrument} was not confirmed at {knob.value}. Nothing "
+                    "was energised; set the knob, or correct the hardware configuration, and try again"
+                )
+        return KnobSheet(operator=operator, confirmed=datetime.now(UTC), knobs=knobs)
+
+    return confirm
+
+
+def confirm_at_terminal(knobs: tuple[Knob, ...]) -> KnobSheet:
+    """Ask whoever sits at the terminal; raises CheckFailed when nobody does.
+
+    An unattended program uses `confirm_by_sheet`.
+    """
+    if not sys.stdin.isatty():
+        wanted = "; ".join(_shown(knob) for knob in knobs)
+        raise CheckFailed(
+            f"these settings are made by hand and must be confirmed: {wanted}. Nobody sits at "
+            "this terminal and nothing was energised; confirm them at one, or give a valid knob sheet"
+        )
+    operator = input("Who confirms the settings made by hand? ") or "at the terminal"
+    return confirm_by_asking(input, operator)(knobs)
+
+
+def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
+    """Take an earlier confirmation for granted, as long as it is recent and about the same settings."""
+
+    def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
+        sheet = load_knob_sheet(path)
+        age = datetime.now(UTC) - sheet.confirmed
+        if not timedelta(0) <= age <= valid:
+            raise CheckFailed(
+                f"{path} was confirmed at {sheet.confirmed:%Y-%m-%d %H:%M %Z}; it is valid for {valid}. "
+                "Nothing was energised; confirm the knobs again"
+            )
+        missing = [_shown(knob) for knob in knobs if knob not in sheet.knobs]
+        if missing:
+            raise CheckFailed(
+                f"{path} does not confirm {'; '.join(missing)}. Nothing was energised; look at these "
+                "knobs and confirm them again"
+            )
+        return sheet
+
+    return confirm
+
+
+def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
+    """Keep a sheet for later runs; an older one of that name is replaced."""
+    knobs = "".join(
+        f"\n[[knobs]]\ninstrument = {_quoted(knob.instrument)}\nsetting = {_quoted(knob.setting)}\n"
+        f"value = {_quoted(knob.value)}\n"
+        for knob in sheet.knobs
+    )
+    path.write_text(
+        f"operator = {_quoted(sheet.operator)}\nconfirmed = {sheet.confirmed.isoformat()}\n{knobs}",
+        encoding="utf-8",
+    )
+
+
+def load_knob_sheet(path: Path) -> KnobSheet:
+    """Read a sheet; raises ConfigurationError with file, key and what is allowed."""
+    return load_toml(path, KnobSheet)
+
+
+def _shown(knob: Knob) -> str:
+    return f"{knob.instrument} {knob.setting} at {knob.value}"
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    printable = "".join(c if c.isprintable() else f"\\u{ord(c):04X}" for c in escaped)
+    return f'"{printable}"'

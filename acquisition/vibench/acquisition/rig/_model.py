@@ -1,0 +1,124 @@
+"""The rig as a linear chain: what a volt at the generator's terminal does to amplifier, coil and table."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._configuration import AmplifierConfig, Rig, ShakerConfig
+
+ComplexArray = NDArray[np.complex128]
+FloatArray = NDArray[np.float64]
+
+
+class Quantity(StrEnum):
+    """A quantity of the chain that has a limit."""
+
+    AMPLIFIER_VOLTAGE = "amplifier_voltage"
+    """At the amplifier's output [V]."""
+    CURRENT = "current"
+    """In the coil [A]."""
+    FORCE = "force"
+    """Of the coil on the table, force constant times current [N]."""
+    STROKE = "stroke"
+    """Displacement of the table from rest [m]."""
+    VELOCITY = "velocity"
+    """Of the table [m/s]."""
+    ACCELERATION = "acceleration"
+    """Of the table [m/s2]."""
+
+
+@dataclass(frozen=True)
+class StateSpace:
+    """A linear system s' = A s + B u; for a shaker s = (displacement, velocity, current) in SI units."""
+
+    A: FloatArray
+    """Shape (3, 3)."""
+    B: FloatArray
+    """Shape (3, 2): columns for the voltage at the coil [V] and an outside force on the table [N]."""
+
+
+@dataclass(frozen=True)
+class RigModel:
+    """Linear model of a rig, from the generator's terminal to the table, for limits before energising.
+
+    The coil and the suspended table are coupled by the force constant G (an electrodynamic
+    transducer, Beranek, Acoustics, ch. 3)::
+
+        m x'' + d x' + k x = G i          L i' + R i + G x' = u
+
+    with m the moving mass and the fixture. The amplifier is its gain between two first-order band
+    edges. Not in it: the specimen (some 10 g on more than half a kilogram, whose resonances notch and
+    raise the table's motion locally), clipping, the current limiter, the table's stops and its axial
+    resonance above 15 kHz. Those belong to the virtual rig or to the check with the rig itself.
+    """
+
+    rig: Rig
+
+    def transfer(self, quantity: Quantity, frequency_hz: ArrayLike) -> ComplexArray:
+        """Peak of ``quantity`` per volt at the generator's terminal, with phase, shape of ``frequency_hz``.
+
+        Time goes as exp(+i omega t). Zero hertz is allowed: a direct-coupled amplifier holds the table
+        deflected, one with a lower band edge does not.
+        """
+        s = np.asarray(2j * np.pi * np.asarray(frequency_hz, dtype=np.float64), dtype=np.complex128)
+        shaker = self.rig.shaker
+        voltage = amplifier_gain(self.rig.amplifier, s)
+        force_constant = shaker.force_constant_n_per_a
+        dynamic_stiffness = _dynamic_stiffness(shaker, s)
+        impedance = shaker.coil_resistance_ohm + s * shaker.coil_inductance_h
+        # Multiplied out by the dynamic stiffness, which may vanish: the current never divides by it.
+        coupled = impedance * dynamic_stiffness + s * force_constant**2
+        stroke = force_constant * voltage / coupled
+        match quantity:
+            case Quantity.AMPLIFIER_VOLTAGE:
+                result = voltage
+            case Quantity.CURRENT:
+                result = dynamic_stiffness * voltage / coupled
+            case Quantity.FORCE:
+                result = force_constant * dynamic_stiffness * voltage / coupled
+            case Quantity.STROKE:
+                result = stroke
+            case Quantity.VELOCITY:
+                result = s * stroke
+            case Quantity.ACCELERATION:
+                result = s**2 * stroke
+        return np.asarray(result, dtype=np.complex128)
+
+    def shaker_equations(self) -> StateSpace:
+        """Return the shaker alone as first-order equations, driven by voltage and by a force on the table."""
+        shaker = self.rig.shaker
+        mass = suspended_mass_kg(shaker)
+        force_constant, inductance = shaker.force_constant_n_per_a, shaker.coil_inductance_h
+        table = np.array(
+            [
+                -shaker.suspension_stiffness_n_per_m,
+                -shaker.suspension_damping_ns_per_m,
+                force_constant,
+            ]
+        )
+        coil = np.array([0.0, -force_constant, -shaker.coil_resistance_ohm])
+        return StateSpace(
+            A=np.array([[0.0, 1.0, 0.0], table / mass, coil / inductance]),
+            B=np.array([[0.0, 0.0], [0.0, 1 / mass], [1 / inductance, 0.0]]),
+        )
+
+
+def suspended_mass_kg(shaker: ShakerConfig) -> float:
+    """Everything rigid that the coil moves [kg]: moving element and fixture, without the specimen."""
+    return shaker.moving_mass_kg + shaker.fixture_mass_kg
+
+
+def amplifier_gain(amplifier: AmplifierConfig, s: ComplexArray) -> ComplexArray:
+    """Output volts per input volt at the Laplace variable ``s`` [rad/s], shape of ``s``."""
+    above = 1.0 + s / (2 * np.pi * amplifier.high_cut_hz)
+    low_cut = 2 * np.pi * amplifier.low_cut_hz
+    below = s / (s + low_cut) if low_cut > 0 else np.ones_like(s)
+    return np.asarray(amplifier.gain * below / above, dtype=np.complex128)
+
+
+def _dynamic_stiffness(shaker: ShakerConfig, s: ComplexArray) -> ComplexArray:
+    damping = shaker.suspension_damping_ns_per_m
+    stiffness = shaker.suspension_stiffness_n_per_m
+    return np.asarray(stiffness + s * damping + s**2 * suspended_mass_kg(shaker))

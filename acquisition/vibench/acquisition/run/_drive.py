@@ -1,0 +1,78 @@
+"""What makes the sound of a run: a function generator, or an analogue output for what never repeats."""
+
+from collections.abc import Iterable, Iterator
+from typing import Protocol
+
+from ..bench import RunBench
+from ..errors import ConfigurationError
+from ..plan import Measurement, Phase, Player, player_of
+from ._generator_drive import GeneratorDrive
+from ._stream_drive import StreamDrive
+
+
+class Drive(Protocol):
+    """Plays phases, one after another, while the run reads.
+
+    A drive never waits: it says how long to read before it has something to do again, and samples
+    read are the only clock. What comes next is told beforehand, since some drives write it ahead.
+    """
+
+    @property
+    def player(self) -> Player:
+        """The instrument that is heard."""
+
+    @property
+    def pause_s(self) -> float:
+        """Silence between saying what comes after all that was told, and hearing it [s]."""
+
+    @property
+    def setting_vpp(self) -> float:
+        """What is played now, as an amplitude setting, peak to peak [V]; 0 in silence."""
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether there is anything to ramp down."""
+
+    def arm(self, coming: Iterable[Phase]) -> None:
+        """Get ready before the digitizer starts: the first of ``coming`` begins with its first sample."""
+
+    def announce(self, coming: Iterable[Phase]) -> None:
+        """Say what comes after everything told before; it begins after `pause_s`."""
+
+    def perform(self, phase: Phase) -> Iterator[float]:
+        """Play a phase; yields how long to read before the next command is due [s]."""
+
+    @property
+    def can_hold(self) -> bool:
+        """Whether what is played goes on by itself while nobody tells more."""
+
+    def ramp_down(self, ramp_s: float) -> Iterator[float]:
+        """Break off what was announced, and ramp down within ``ramp_s`` [s]; yields as `perform` does."""
+
+    def cut(self) -> None:
+        """Switch off at once, with a step. Legal at any time."""
+
+    def silence(self) -> None:
+        """Be silent as soon as it goes without a step, and at once when that fails. Legal at any time."""
+
+
+def drive_for(bench: RunBench, measurement: Measurement) -> Drive:
+    """Choose what plays a measurement.
+
+    Raises
+    ------
+    ConfigurationError
+        When it needs an analogue output and the bench has none.
+
+    """
+    match player_of(measurement, bench.rig), bench.output:
+        case Player.GENERATOR, _:
+            return GeneratorDrive(bench.generator, measurement)
+        case Player.OUTPUT, None:
+            raise ConfigurationError(
+                "streamed noise needs an analogue output, and this bench has none: its function generator "
+                "repeats one waveform. Nothing was played; add [daq.output] to the hardware configuration, "
+                "or use multisine_noise with more realisations"
+            )
+        case Player.OUTPUT, output:
+            return StreamDrive(output, measurement, bench.rig.generator.terminal_factor())

@@ -1,0 +1,96 @@
+"""How a run ends: the first cause counts; silence, stop and a finished recording follow whatever fails."""
+
+from contextlib import ExitStack
+from pathlib import Path
+
+from ..errors import AcquisitionError, DataLost, InstrumentError, LimitExceeded, RecordingError
+from ..instruments import Digitizer
+from ..plan import RunState
+from ..recording import RecordingState
+from ..stopping import Cause
+from ._acquisition_loop import Recorder
+from ._drive import Drive
+from ._progress import Outcome
+
+
+class Ending:
+    """What the recording and the caller will be told about the end of a run."""
+
+    def __init__(self) -> None:
+        self.state = RunState.FAILED
+        self.reason = "the run ended without saying why"
+        self._cause: Cause | None = None
+
+    def is_finished(self) -> None:
+        """Note that the plan was carried out."""
+        self.state, self.reason = RunState.FINISHED, "the plan was carried out"
+
+    def is_stopped(self, reason: str, cause: Cause) -> None:
+        """Note that somebody ended it."""
+        self.state, self.reason, self._cause = RunState.STOPPED, reason, cause
+
+    def is_failed(self, error: Exception, reason: str) -> None:
+        """Note what went wrong; what had ended the run before stays in front."""
+        if self._cause is None:
+            self.reason, self._cause = reason, _cause_of(error)
+        else:
+            self.reason = f"{self.reason}; then: {reason}"
+        self.state = RunState.FAILED
+
+    def outcome(self, path: Path) -> Outcome:
+        """Tell how it ended."""
+        return Outcome(self.state, self.reason, path, self._cause)
+
+    def leave(self, drive: Drive, digitizer: Digitizer, recorder: Recorder) -> None:
+        """Silence, end sampling, finish the recording: each of them, whatever the others do."""
+        with ExitStack() as leaving:
+            leaving.callback(self._finish, recorder)
+            leaving.callback(self._stop_listening, digitizer)
+            leaving.callback(self._silence, drive)
+
+    def _silence(self, drive: Drive) -> None:
+        try:
+            drive.silence()
+        except AcquisitionError as failure:
+            self._add(failure)
+            raise
+
+    def _stop_listening(self, digitizer: Digitizer) -> None:
+        has_failed_already = self.state is RunState.FAILED
+        try:
+            digitizer.stop()
+        except AcquisitionError as failure:
+            self._add(failure)
+            if not has_failed_already:  # else the first failure is the cause, and must stay in front
+                raise
+
+    def _finish(self, recorder: Recorder) -> None:
+        try:
+            recorder.finish(_RECORDED_AS[self.state], self.reason)
+        except AcquisitionError as failure:
+            self._add(failure)
+            raise
+
+    def _add(self, failure: AcquisitionError) -> None:
+        if self._cause is None:
+            self._cause = _cause_of(failure)
+        self.state, self.reason = RunState.FAILED, f"{self.reason}; then: {failure}"
+
+
+def _cause_of(error: Exception) -> Cause:
+    match error:
+        case LimitExceeded():
+            return Cause.LIMIT
+        case InstrumentError() | DataLost():
+            return Cause.INSTRUMENT
+        case RecordingError():
+            return Cause.DISK
+        case _:
+            return Cause.FAULT
+
+
+_RECORDED_AS = {
+    RunState.FINISHED: RecordingState.COMPLETE,
+    RunState.STOPPED: RecordingState.STOPPED,
+    RunState.FAILED: RecordingState.FAILED,
+}

@@ -1,0 +1,181 @@
+"""A function generator as a drive: one command for each change, and a ramp as a staircase of amplitudes."""
+
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+
+import numpy as np
+
+from ..errors import AcquisitionError, ConfigurationError
+from ..excitation import LOWEST_AMPLITUDE_VPP, Play, Stream, Tone, Waveform
+from ..instruments import FunctionGenerator
+from ..plan import Measurement, Phase, Player, RunState, half_cosine, stairs
+
+QUIET_VPP = 1.25 * LOWEST_AMPLITUDE_VPP
+"""Amplitude of level 0 for a waveform that reaches full range: where ramps begin and end, safely above
+the smallest setting that the generator takes."""
+
+
+class GeneratorDrive:
+    """A `Drive` whose commands take effect when they are given: each phase is commanded as it begins."""
+
+    player = Player.GENERATOR
+    pause_s = 0.0
+    """A generator need not know what is coming."""
+    can_hold = True
+
+    def __init__(self, generator: FunctionGenerator, measurement: Measurement) -> None:
+        self._generator = generator
+        self._amplitude_vpp = measurement.excitation.amplitude_vpp
+        self._stairs = stairs(measurement)
+        self._play: Play | None = None
+        self._level = 0.0
+        self._is_on = False
+        self._setting_vpp = 0.0
+
+    @property
+    def setting_vpp(self) -> float:
+        """The amplitude setting while the output is on [V]; 0 while it is off."""
+        return self._setting_vpp if self._is_on else 0.0
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether the output is on, and above the quiet level."""
+        return self._is_on and self._level > 0.0
+
+    def arm(self, coming: Iterable[Phase]) -> None:
+        """Nothing to get ready: the output is off."""
+
+    def announce(self, coming: Iterable[Phase]) -> None:
+        """Nothing to prepare."""
+
+    def perform(self, phase: Phase) -> Iterator[float]:
+        """Give the commands of a phase; between them, yield how long to read until the next one [s]."""
+        match phase.state:
+            case RunState.CHECKING | RunState.ARMED:
+                self._sound(phase.play)
+                yield phase.duration_s
+            case RunState.RAMPING_UP:
+                self._begin(phase.play)
+                yield from self._ramp(phase.end_level, phase.duration_s)
+            case RunState.RAMPING_DOWN:
+                yield from self._ramp(phase.end_level, phase.duration_s)
+            case _:
+                self._begin(phase.play)
+                yield phase.duration_s
+
+    def ramp_down(self, ramp_s: float) -> Iterator[float]:
+        """Ramp down from the level of now, in as many stairs as any; yields how long to read on each [s]."""
+        yield from self._ramp(0.0, ramp_s)
+
+    def cut(self) -> None:
+        """Turn the output off, loud as it is."""
+        self._stop()
+
+    def silence(self) -> None:
+        """Ramp down as fast as the generator takes commands, then turn the output off, whatever happens.
+
+        For the ways out on which no samples can be counted. Some 20 commands of a few milliseconds
+        make a ramp that is short but no step.
+        """
+        try:
+            with suppress(AcquisitionError):  # a ramp that fails leaves it to stop(), which never gives up
+                self._ramp_down_blindly()
+        finally:
+            self._stop()
+
+    def _sound(self, play: Play | None) -> None:
+        """Play the check's small tone at once, without a ramp; or nothing."""
+        match play:
+            case Tone(frequency_hz, _):
+                if not self._is_on:
+                    self._setting_vpp = self._full_vpp(play)
+                    self._generator.load_sine(frequency_hz, self._setting_vpp)
+                    self._start()
+            case _:
+                if self._is_on:
+                    self._stop()
+
+    def _begin(self, play: Play | None) -> None:
+        """Change what is played, from tone to tone without a break in phase; turn the output on if need be.
+
+        Anything but a change from tone to tone must happen at level 0.
+        """
+        if play != self._play:
+            self._load(play)
+        if not self._is_on:
+            self._start()
+
+    def _load(self, play: Play | None) -> None:
+        before, self._play = self._play, play
+        match before, play:
+            case Tone() as old, Tone() as new:
+                self._change_tone(old, new)
+            case _, Tone(frequency_hz, _):
+                self._generator.load_sine(frequency_hz, self._due_vpp)
+            case _, Waveform(values, repetition_hz):
+                self._generator.load_waveform(values, repetition_hz, self._due_vpp)
+            case _, Stream() | None:
+                raise ConfigurationError(
+                    "a function generator was given a stream, which it cannot play. Its output stayed as it "
+                    "was; open the bench with an analogue output"
+                )
+        self._setting_vpp = self._due_vpp
+
+    def _change_tone(self, old: Tone, new: Tone) -> None:
+        """Lower the amplitude before the frequency changes, or raise it after: never too loud on the way."""
+        if new.level < old.level:
+            self._generator.set_amplitude(self._due_vpp)
+        if new.frequency_hz != old.frequency_hz:
+            self._generator.set_frequency(new.frequency_hz)
+        if new.level > old.level:
+            self._generator.set_amplitude(self._due_vpp)
+
+    def _ramp(self, target: float, ramp_s: float) -> Iterator[float]:
+        begin = self._level
+        for stair in range(1, self._stairs + 1):
+            self._set_level(begin + (target - begin) * half_cosine(stair / self._stairs))
+            yield ramp_s / self._stairs
+
+    def _start(self) -> None:
+        # Before the command: should it fail half-way, the output counts as on.
+        self._is_on = True
+        self._generator.start()
+
+    def _stop(self) -> None:
+        self._generator.stop()
+        self._is_on = False
+        self._level = 0.0
+
+    def _set_level(self, level: float) -> None:
+        self._level = level
+        self._setting_vpp = self._due_vpp
+        self._generator.set_amplitude(self._setting_vpp)
+
+    def _ramp_down_blindly(self) -> None:
+        if not self.is_heard:
+            return
+        top = self._level
+        for stair in range(1, self._stairs + 1):
+            self._set_level(top * half_cosine(1 - stair / self._stairs))
+
+    @property
+    def _due_vpp(self) -> float:
+        """The setting that belongs to the level [V], for what is played."""
+        planned_vpp = self._full_vpp(self._play)
+        quiet_vpp = min(planned_vpp, self._quiet_vpp())
+        return quiet_vpp + self._level * (planned_vpp - quiet_vpp)
+
+    def _full_vpp(self, play: Play | None) -> float:
+        match play:
+            case Tone(_, level):
+                return self._amplitude_vpp * level
+            case _:
+                return self._amplitude_vpp
+
+    def _quiet_vpp(self) -> float:
+        match self._play:
+            case Waveform(values):
+                # Generators stretch a waveform to their full range: their setting is then this much lower.
+                return QUIET_VPP / float(np.max(np.abs(values)))
+            case _:
+                return QUIET_VPP

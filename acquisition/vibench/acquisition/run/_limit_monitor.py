@@ -1,0 +1,217 @@
+"""The watch over the running measurement: every block against the limits of the rig."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import exp, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import LimitExceeded, Trip
+from ..instruments import Block, Overload, Samples
+from ..plan import InRunLimits, OnOverload
+from ..rig import Channel, Rig, Role, suspended_mass_kg
+from ._motion import BaseMotion, BaseTracker, SpecimenTracker
+
+RMS_S = 1.0
+"""Time over which the current's rms is formed [s]: a limiter minds heat, not peaks."""
+REACTION = 1.1
+"""How much the force on the table may pass the coil's limit: the specimen, a tenth of the moving mass,
+pushes back on the table, and that push is not the coil's."""
+SETTLING_S = 0.5
+"""For so long after its beginning [s], nothing integrated is judged: an AC-coupled input whose current has
+just been switched on drifts to its rest, which integrated twice is metres. A run is at the low level of its
+check then, and what is measured itself is judged from the first sample on."""
+_OFF = "The run was ramped down and its recording kept; lower amplitude_vpp"
+
+
+@dataclass(frozen=True)
+class _Watched:
+    """One quantity over a block, next to its limit."""
+
+    role: Role
+    """The channel that it is taken from."""
+    what: str
+    values: Samples
+    limit: float
+    unit: str
+    source: str
+
+
+class Guard:
+    """Says when the run must end.
+
+    It sits in the loop that reads the samples, with nothing between it and the generator: no window
+    and no other process has a say. Blocks must come one after the other; after a gap it begins anew.
+    """
+
+    def __init__(
+        self, rig: Rig, channels: tuple[Channel, ...], limits: InRunLimits, sample_rate_hz: float
+    ) -> None:
+        self._rig = rig
+        self._channels = channels
+        self._limits = limits
+        self._rate_hz = sample_rate_hz
+        self._next_sample = 0
+        self._begin(0)
+
+    def require_safe(self, block: Block) -> None:
+        """Raise LimitExceeded, with its `Trip`, when a block passes a limit; the run then ramps down."""
+        if not block.volts.shape[1]:
+            return
+        if block.first_sample != self._next_sample:
+            self._begin(block.first_sample)
+        self._next_sample = block.first_sample + block.volts.shape[1]
+        for watched in self._watched(block):
+            self._require(watched, block.first_sample)
+        if block.overloads and self._limits.on_overload is OnOverload.STOP:
+            raise self._overloaded(block, block.overloads[0])
+
+    def _begin(self, first_sample: int) -> None:
+        self._settled_sample = first_sample + round(SETTLING_S * self._rate_hz)
+        self._base = BaseTracker(self._rate_hz)
+        self._specimen = SpecimenTracker(self._rate_hz)
+        self._mean_square_a2 = 0.0
+
+    def _watched(self, block: Block) -> Iterator[_Watched]:
+        """Everything with a limit: what is measured comes before what follows from it."""
+        rows = {
+            channel.role: volts * channel.units_per_volt
+            for channel, volts in zip(self._channels, block.volts, strict=True)
+        }
+        acceleration, voltage = rows.get(Role.BASE_ACCELERATION), rows.get(Role.AMPLIFIER_VOLTAGE)
+        still = BaseMotion(np.zeros(block.volts.shape[1]), np.zeros(block.volts.shape[1]))
+        base = still if acceleration is None else self._base.follow(acceleration)
+        is_settled = block.first_sample >= self._settled_sample
+        if acceleration is not None:
+            yield self._acceleration(acceleration)
+        if voltage is not None:
+            yield from self._at_the_amplifier(voltage, base if is_settled else still)
+        integrated = (
+            [] if acceleration is None else [*self._at_the_base(base), self._table(acceleration, base)]
+        )
+        if Role.M0_VELOCITY in rows:
+            integrated.append(self._in_the_specimen(rows[Role.M0_VELOCITY], base, block))
+        if is_settled:
+            yield from integrated
+
+    def _acceleration(self, acceleration: Samples) -> _Watched:
+        limit = self._rig.shaker.limits.acceleration_m_per_s2
+        allowed = limit.value * self._limits.base_acceleration
+        what = "the base acceleration"
+        return _Watched(Role.BASE_ACCELERATION, what, acceleration, allowed, "m/s2", limit.source)
+
+    def _at_the_base(self, base: BaseMotion) -> Iterator[_Watched]:
+        shaker, share = self._rig.shaker.limits, self._limits
+        v, x = shaker.velocity_m_per_s, shaker.stroke_m
+        for what, values, limit, fraction, unit in (
+            ("the base velocity", base.velocity, v, share.base_velocity, "m/s"),
+            ("the stroke", base.displacement, x, share.stroke, "m"),
+        ):
+            yield _Watched(Role.BASE_ACCELERATION, what, values, limit.value * fraction, unit, limit.source)
+
+    def _table(self, acceleration: Samples, base: BaseMotion) -> _Watched:
+        """Force that moves the table: mass times acceleration, and what its suspension takes."""
+        shaker = self._rig.shaker
+        force = (
+            suspended_mass_kg(shaker) * acceleration
+            + shaker.suspension_damping_ns_per_m * base.velocity
+            + shaker.suspension_stiffness_n_per_m * base.displacement
+        )
+        limit = shaker.limits.force_n
+        return _Watched(
+            Role.BASE_ACCELERATION,
+            "the force on the table",
+            force,
+            REACTION * limit.value * self._limits.force,
+            "N",
+            f"{REACTION:g} times: {limit.source}",
+        )
+
+    def _at_the_amplifier(self, voltage: Samples, base: BaseMotion) -> Iterator[_Watched]:
+        rig, share, role = self._rig, self._limits, Role.AMPLIFIER_VOLTAGE
+        shaker = rig.shaker
+        clip_v = rig.amplifier.clip_v * share.amplifier_voltage
+        yield _Watched(
+            role, "the amplifier voltage", voltage, clip_v, "V", f"clipping of the {rig.amplifier.model}"
+        )
+        # The coil's inductance is left out, which makes the current too large, by 3 % at 1 kHz.
+        current = (voltage - shaker.force_constant_n_per_a * base.velocity) / shaker.coil_resistance_ohm
+        peak, force, limiter = shaker.limits.current_a, shaker.limits.force_n, rig.amplifier.current_limit_a
+        yield _Watched(role, "the coil current", current, peak.value * share.current, "A", peak.source)
+        yield _Watched(
+            role,
+            "the coil's force",
+            shaker.force_constant_n_per_a * current,
+            force.value * share.force,
+            "N",
+            force.source,
+        )
+        rms = np.full(1, self._rms(current))
+        yield _Watched(
+            role, "the coil current (rms)", rms, limiter.value * share.current, "A", limiter.source
+        )
+
+    def _rms(self, current: Samples) -> float:
+        share = 1 - exp(-current.size / self._rate_hz / RMS_S)
+        self._mean_square_a2 += share * (float(np.mean(current**2)) - self._mean_square_a2)
+        return sqrt(self._mean_square_a2)
+
+    def _in_the_specimen(self, velocity: Samples, base: BaseMotion, block: Block) -> _Watched:
+        limit = self._rig.specimen.amplitude_limit_m
+        stretched = self._specimen.follow(velocity, base.velocity, _blind(block))
+        allowed = limit.value * self._limits.specimen_amplitude
+        return _Watched(Role.M0_VELOCITY, "the specimen's amplitude", stretched, allowed, "m", limit.source)
+
+    def _require(self, watched: _Watched, first_sample: int) -> None:
+        peak = float(np.max(np.abs(watched.values)))
+        if peak <= watched.limit:
+            return
+        sample = first_sample + int(np.argmax(np.abs(watched.values) > watched.limit))
+        trip = Trip(
+            channel=watched.role.value,
+            quantity=watched.what.removeprefix("the "),
+            value=peak,
+            limit=watched.limit,
+            unit=watched.unit,
+            sample=sample,
+            time_s=sample / self._rate_hz,
+        )
+        raise LimitExceeded(
+            f"{watched.what} reached {peak:.4g} {watched.unit}, allowed is {watched.limit:.4g} "
+            f"{watched.unit} ({watched.source}), on {watched.role.value} at {trip.time_s:.4f} s (sample "
+            f"{sample}). {_OFF}",
+            trip,
+        )
+
+    def _overloaded(self, block: Block, overload: Overload) -> LimitExceeded:
+        roles = [channel.role.value for channel in self._channels]
+        channel = self._channels[roles.index(overload.channel)]
+        volts = block.volts[roles.index(overload.channel)]
+        is_sensor = channel.full_scale_v < channel.range_v
+        what = f"range of the {channel.sensor}" if is_sensor else f"range of {channel.physical}"
+        trip = Trip(
+            channel=overload.channel,
+            quantity=what,
+            value=float(np.max(np.abs(volts))) * abs(channel.units_per_volt),
+            limit=channel.full_scale_v * abs(channel.units_per_volt),
+            unit=channel.unit,
+            sample=overload.first_sample,
+            time_s=overload.first_sample / self._rate_hz,
+        )
+        return LimitExceeded(
+            f"{overload.channel} was overloaded at sample {overload.first_sample} ({trip.time_s:.4f} s): it "
+            f"reached {trip.value:.4g} {trip.unit}, the {what} is {trip.limit:.4g} {trip.unit}. The run was "
+            "ramped down and its recording kept; widen the range or lower amplitude_vpp",
+            trip,
+        )
+
+
+def _blind(block: Block) -> NDArray[np.bool_]:
+    """Mark the samples of a block in which the vibrometer is past its range."""
+    is_blind = np.zeros(block.volts.shape[1], dtype=np.bool_)
+    for overload in block.overloads:
+        if overload.channel == Role.M0_VELOCITY.value:
+            first = max(overload.first_sample - block.first_sample, 0)
+            is_blind[first : max(overload.last_sample - block.first_sample + 1, 0)] = True
+    return is_blind

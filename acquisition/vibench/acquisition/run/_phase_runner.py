@@ -1,0 +1,132 @@
+"""Playing phases while everything that is heard is read, kept and watched."""
+
+from collections.abc import Callable, Iterator
+
+from ..excitation import Play, Tone
+from ..instruments import Block
+from ..plan import Phase, RunState
+from ..recording import HOLD_ROOM_S
+from ..stopping import Cause, StopLevel, StopRequest, StopSwitch
+from ._acquisition_loop import BLOCK_S, Tape
+from ._drive import Drive
+from ._limit_monitor import Guard
+from ._progress import Progress
+
+HOLD_LONGEST_S = HOLD_ROOM_S
+"""How long a run may be held in all [s]: its recording has room for that."""
+
+
+class Stopped(Exception):
+    """Somebody asked the run to end."""
+
+    def __init__(self, request: StopRequest) -> None:
+        super().__init__(request.reason)
+        self.request = request
+
+
+class Performance:
+    """The part of a run in which samples pass: phases, holds, and the ramp of an early end.
+
+    After every block it looks at the limits and at the switch: it raises LimitExceeded or `Stopped`,
+    and it is up to the run to let it ramp down.
+    """
+
+    def __init__(self, drive: Drive, tape: Tape, guard: Guard, switch: StopSwitch, total_s: float) -> None:
+        self.state = RunState.CHECKING
+        self.tape = tape
+        self._drive = drive
+        self._guard = guard
+        self._switch = switch
+        self._total_s = total_s
+        self._look: Callable[[Block], None] = self._go_on
+        self._held_s = 0.0
+        self._play: Play | None = None
+
+    def perform(self, phase: Phase, into: list[Block] | None = None) -> Iterator[Progress]:
+        """Play a phase; what is heard goes ``into`` a list as well, if one is given."""
+        self._enter(phase.state)
+        self.tape.enter(phase.segment)
+        self._play = phase.play
+        for wait_s in self._drive.perform(phase):
+            yield from self._read(wait_s, into)
+
+    def ramp_down_early(
+        self, reason: str, level: StopLevel, ramp_s: Callable[[StopLevel], float]
+    ) -> Iterator[Progress]:
+        """Ramp down from wherever the run is, unwatched; a segment that is open stays incomplete.
+
+        A harder stop that is asked for on the way takes over. ``ramp_s`` tells how long each takes [s].
+        """
+        self._look = _look_away
+        self.tape.log("end", reason)
+        self.tape.cut()
+        since_s = self.tape.elapsed_s
+        if self._drive.is_heard:
+            self._enter(RunState.RAMPING_DOWN)
+        while level is not StopLevel.OFF and self._drive.is_heard:
+            for wait_s in self._drive.ramp_down(ramp_s(level)):
+                yield from self._read(wait_s)
+                if (harder := self._switch.harder_than(level)) is not None:
+                    level = harder.level
+                    self.tape.log("end", harder.reason)
+                    break
+        if level is StopLevel.OFF:
+            self._drive.cut()
+        took_s = self.tape.elapsed_s - since_s
+        self.tape.log("silence", f"{level.value}: {took_s:.3f} s after the stop was seen")
+
+    def _read(self, duration_s: float, into: list[Block] | None = None) -> Iterator[Progress]:
+        for block in self.tape.read_for(duration_s):
+            if into is not None:
+                into.append(block)
+            yield self._told(block)
+            self._look(block)
+            if self._switch.is_holding and self._look == self._go_on:
+                yield from self._held()
+
+    def _held(self) -> Iterator[Progress]:
+        """Stay where the run is, watched and recorded, until it is resumed or stopped.
+
+        What must be fed cannot stay, and the recording has room for `HOLD_LONGEST_S` in all: then it is
+        ramped down.
+        """
+        if not self._drive.can_hold:
+            reason = f"a stream from the {self._drive.player.value} cannot be held: it was ramped down"
+            raise Stopped(StopRequest.by(Cause.OPERATOR, reason))
+        before = self.state
+        self._enter(RunState.HELD)
+        while self._switch.is_holding:
+            self._held_s += BLOCK_S
+            if self._held_s > HOLD_LONGEST_S:
+                reason = f"held for {HOLD_LONGEST_S:g} s, the longest that its recording has room for"
+                raise Stopped(StopRequest.by(Cause.OPERATOR, reason))
+            block = self.tape.linger(BLOCK_S)
+            yield self._told(block)
+            self._look(block)
+        self._enter(before)
+
+    def _go_on(self, block: Block) -> None:
+        """Raise what ends the run early: a limit, or somebody's wish."""
+        self._guard.require_safe(block)
+        if (request := self._switch.request) is not None:
+            raise Stopped(request)
+
+    def _told(self, block: Block) -> Progress:
+        """Note what others want to be noted, and tell where the run stands."""
+        tape = self.tape
+        for text in self._switch.take_marks():
+            tape.log("mark", text)
+        level_vpp = self._drive.setting_vpp
+        frequency_hz = self._play.frequency_hz if isinstance(self._play, Tone) else None
+        return Progress(
+            self.state, tape.segment, block, tape.elapsed_s, self._total_s, level_vpp, frequency_hz
+        )
+
+    def _enter(self, state: RunState) -> None:
+        if state is not self.state:
+            self.state = state
+            self.tape.log("state", state.value)
+
+
+def _look_away(block: Block) -> None:
+    """Let a block pass: the run is ending already."""

@@ -1,0 +1,245 @@
+"""Carrying out a measurement: check, ramp up, settle, record, ramp down, and silence whatever happens."""
+
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from ..bench import RunBench
+from ..control import Conduct, heard
+from ..errors import AcquisitionError, LimitExceeded
+from ..instruments import Block
+from ..plan import (
+    CHECK_S,
+    Measurement,
+    Phase,
+    RunState,
+    check_amplitude_vpp,
+    check_phases,
+    duration_s,
+    known_phases,
+    phases,
+    require_within_limits,
+    shortest_ramp_s,
+)
+from ..recording import RecordingHeader, create_recording
+from ..stopping import LEVELS, Cause, StopLevel, StopRequest, StopSwitch
+from ._acquisition_loop import Recorder, Tape
+from ._controller import conductor_for
+from ._drive import Drive, drive_for
+from ._ending import Ending
+from ._header import run_header
+from ._limit_monitor import Guard
+from ._low_level_check import BenchCheck, judged, require_checkable
+from ._phase_runner import Performance, Stopped
+from ._progress import Outcome, Progress
+
+CreateRecording = Callable[[Path, RecordingHeader], Recorder]
+
+
+class Run:
+    """One measurement being carried out: iterate it, and it plays, watches and records, block by block.
+
+    `RunState` has the diagram of its states. However the run ends (plan done, cancelled, limit,
+    failed instrument, full disk, keyboard, abandoned iterator), the generator is silent afterwards
+    and the recording is finished and says why. Leave it through a ``with``, so that an abandoned
+    run ends at once::
+
+        with Run(bench, measurement, path) as run:
+            for progress in run:
+                print(progress.state, progress.elapsed_s)
+
+    Iterating raises LimitExceeded (before anything moves when the plan passes a limit, later when a
+    measured value does), CheckFailed when the bench does not answer at low level as it should, and
+    InstrumentError, DataLost or RecordingError when an instrument or the disk fails.
+    """
+
+    def __init__(
+        self,
+        bench: RunBench,
+        measurement: Measurement,
+        path: Path,
+        bench_check: BenchCheck = BenchCheck.AT_LOW_LEVEL,
+        create: CreateRecording = create_recording,
+        switch: StopSwitch | None = None,
+    ) -> None:
+        """``switch``: what others hold or end the run by; one of its own if absent."""
+        self._switch = StopSwitch() if switch is None else switch
+        self._bench = bench
+        self._measurement = measurement
+        self._path = path
+        self._bench_check = bench_check
+        self._create = create
+        self._drive: Drive  # chosen when the plan is admitted; nothing plays before
+        self._conductor: Conduct[None] | None = None
+        self._guard = Guard(bench.rig, bench.channels, measurement.limits, bench.digitizer.sample_rate_hz)
+        self._total_s = duration_s(measurement)
+        self._state = RunState.IDLE
+        self._ending = Ending()
+        self._performance: Performance | None = None
+        self._blocks = self._carry_out()
+
+    @property
+    def state(self) -> RunState:
+        """Where the run stands."""
+        return self._state if self._performance is None else self._performance.state
+
+    @property
+    def outcome(self) -> Outcome:
+        """How the run ended, once its state is one of ``ENDED``."""
+        return self._ending.outcome(self._path)
+
+    @property
+    def switch(self) -> StopSwitch:
+        """What holds or ends the run, within a block; from any thread, and from a signal handler."""
+        return self._switch
+
+    def cancel(self, reason: str = "cancelled") -> None:
+        """Ask the run to ramp down and end, as the operator would.
+
+        Without effect on a run that has ended, or is ramping down for the last time.
+        """
+        self._switch.ask(StopRequest.by(Cause.OPERATOR, reason))
+
+    def close(self) -> None:
+        """End the run if it has not ended: ramp down, silence, finish the recording."""
+        self._blocks.close()
+
+    def __iter__(self) -> Iterator[Progress]:
+        return self._blocks
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _carry_out(self) -> Generator[Progress, None, None]:
+        recorder = self._admitted()
+        tape = Tape(self._bench.digitizer, recorder)
+        self._performance = Performance(self._drive, tape, self._guard, self._switch, self._total_s)
+        try:
+            yield from self._played_or_stopped(self._performance)
+        except (GeneratorExit, LimitExceeded):
+            raise
+        except KeyboardInterrupt:
+            self._ending.is_stopped("interrupted from the keyboard", Cause.KEYBOARD)
+            raise
+        except Exception as error:
+            self._ending.is_failed(error, f"{type(error).__name__}: {error}")
+            raise
+        finally:
+            try:
+                self._ending.leave(self._drive, self._bench.digitizer, recorder)
+            finally:
+                self._performance.state = self._ending.state
+
+    def _played_or_stopped(self, performance: Performance) -> Iterator[Progress]:
+        """Play the plan; where somebody or a limit ends it, ramp down as hard as the cause asks for."""
+        try:
+            yield from self._played(performance)
+            self._ending.is_finished()
+        except Stopped as stop:
+            self._ending.is_stopped(str(stop), stop.request.cause)
+            yield from self._ramped_down_early(performance, stop.request.level)
+        except LimitExceeded as error:
+            self._ending.is_failed(error, str(error))
+            performance.tape.log_trip(error)
+            yield from self._ramped_down_early(performance, LEVELS[Cause.LIMIT])
+            raise
+        except GeneratorExit:
+            self._ending.is_stopped("the program that carried it out left it", Cause.PROGRAM)
+            deque(self._ramped_down_early(performance, LEVELS[Cause.PROGRAM]), maxlen=0)
+            raise
+
+    def _admitted(self) -> Recorder:
+        """Refuse what can be refused before anything moves; then begin the recording."""
+        self._state = RunState.CHECKING
+        try:
+            require_checkable(self._bench.channels)
+            require_within_limits(self._measurement, self._bench.rig)
+            self._drive = drive_for(self._bench, self._measurement)
+            self._conductor = conductor_for(self._bench, self._measurement)
+            self._total_s += self._before_s()
+            return self._create(self._path, run_header(self._bench, self._measurement, self._total_s))
+        except AcquisitionError as error:
+            self._ending.is_failed(error, str(error))
+            self._state = RunState.FAILED
+            raise
+
+    def _played(self, performance: Performance) -> Iterator[Progress]:
+        tape = performance.tape
+        tape.log("player", self._drive.player.value)
+        match self._bench_check:
+            case BenchCheck.AT_LOW_LEVEL:
+                self._begin(check_phases(self._measurement))
+                yield from self._checked(performance)
+                self._drive.announce(known_phases(self._measurement))
+                pause_s = self._drive.pause_s
+            case BenchCheck.RECENTLY_PASSED:
+                self._begin(known_phases(self._measurement))
+                tape.log("check", "left out: the bench was checked shortly before")
+                pause_s = 0.0
+        yield from performance.perform(Phase(RunState.ARMED, None, pause_s))
+        if self._conductor is None:
+            for phase in phases(self._measurement):
+                yield from performance.perform(phase)
+        else:
+            yield from _conducted(performance, self._conductor)
+        tape.enter(None)
+
+    def _before_s(self) -> float:
+        """Time before the first ramp [s]: what comes is told when the check has passed, and not before."""
+        match self._bench_check:
+            case BenchCheck.AT_LOW_LEVEL:
+                return CHECK_S + self._drive.pause_s
+            case BenchCheck.RECENTLY_PASSED:
+                return 0.0
+
+    def _begin(self, coming: Iterable[Phase]) -> None:
+        """Start sampling, and with it what plays by the digitizer's trigger."""
+        self._drive.arm(coming)
+        self._bench.digitizer.start()
+
+    def _checked(self, performance: Performance) -> Iterator[Progress]:
+        before: list[Block] = []
+        during: list[Block] = []
+        listening, settling, measuring = check_phases(self._measurement)
+        yield from performance.perform(listening, before)
+        yield from performance.perform(settling)
+        yield from performance.perform(measuring, during)
+        figures = judged(
+            self._bench.rig,
+            self._bench.channels,
+            heard(before).volts,
+            heard(during).volts,
+            self._bench.digitizer.sample_rate_hz,
+            check_amplitude_vpp(self._measurement.excitation.amplitude_vpp),
+        )
+        performance.tape.log("check", figures.text())
+
+    def _ramped_down_early(self, performance: Performance, level: StopLevel) -> Iterator[Progress]:
+        return performance.ramp_down_early(self._ending.reason, level, self._ramp_s)
+
+    def _ramp_s(self, level: StopLevel) -> float:
+        """How long the ramp of a stop takes [s]."""
+        planned_s = self._measurement.ramp_s
+        return planned_s if level is StopLevel.RAMP else min(planned_s, shortest_ramp_s(self._bench.rig))
+
+
+def _conducted(performance: Performance, conductor: Conduct[None]) -> Iterator[Progress]:
+    """Carry out moves one by one; what was heard during each decides the next."""
+    try:
+        move = next(conductor)
+        while True:
+            for note in move.notes:
+                performance.tape.log(note.kind, note.text)
+            blocks: list[Block] = []
+            if move.phase is not None:
+                yield from performance.perform(move.phase, blocks)
+            move = conductor.send(heard(blocks))
+    except StopIteration:
+        pass

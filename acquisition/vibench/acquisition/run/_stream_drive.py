@@ -1,0 +1,148 @@
+"""An analogue output as a drive: samples are written ahead of their time, and reading is the clock."""
+
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from math import ceil
+
+import numpy as np
+
+from ..errors import AcquisitionError
+from ..excitation import Tone
+from ..instruments import AnalogOutput
+from ..plan import Measurement, Phase, Player, half_cosine
+from ._acquisition_loop import BLOCK_S
+from ._output_synthesizer import Score
+
+BLIND_FADE_S = 0.1
+"""Fade on the ways out on which nothing is read any more: short, yet no step [s]."""
+# A duration of a whole number of blocks must not become one part more by rounding.
+_ROUNDING = 1e-9
+
+
+class StreamDrive:
+    """A `Drive` that writes every sample, ramps included, `AnalogOutput.ahead_samples` before it is played.
+
+    Output and digitizer begin at the same trigger, so what has been read has been played: the room
+    in front of the output is known without asking the device. What was written cannot be taken back,
+    so breaking off takes effect after at most that long.
+    """
+
+    player = Player.OUTPUT
+    can_hold = False
+
+    def __init__(self, output: AnalogOutput, measurement: Measurement, terminal_factor: float) -> None:
+        """``terminal_factor``: volts that the generator's terminal would show per volt of setting."""
+        self._output = output
+        self._amplitude_vpp = measurement.excitation.amplitude_vpp
+        self._full_v = 0.5 * self._amplitude_vpp * terminal_factor
+        self._score = Score(output.sample_rate_hz)
+        self._read_s = 0.0
+        self._written = 0
+        self._sounds_until = 0
+        """The first sample after the last one that is not silent."""
+        self._is_playing = False
+        self._heard_vpp = 0.0
+
+    @property
+    def pause_s(self) -> float:
+        """As long as it takes to play what is written ahead [s]."""
+        return self._output.ahead_samples / self._output.sample_rate_hz
+
+    @property
+    def setting_vpp(self) -> float:
+        """What is heard now, as a setting of the generator that would sound alike [V]."""
+        return self._heard_vpp
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether anything but silence is still to be played."""
+        return self._is_playing and self._sounds_until > self._played
+
+    def arm(self, coming: Iterable[Phase]) -> None:
+        """Write the first stretch, and wait for the digitizer's start."""
+        self._score.append(coming)
+        self._write_ahead()
+        self._output.arm()
+
+    def announce(self, coming: Iterable[Phase]) -> None:
+        """Let ``coming`` follow the silence that has been written already."""
+        assert self._score.is_over, "what was told before is shorter than what is written ahead"
+        self._score.append(coming)
+
+    def perform(self, phase: Phase) -> Iterator[float]:
+        """Write ahead while a phase, written before, is heard; yields how long to read until more fits."""
+        self._is_playing = True
+        yield from self._listened(phase.duration_s, self._full_vpp(phase) * phase.end_level)
+
+    def ramp_down(self, ramp_s: float) -> Iterator[float]:
+        """Let what is written play out, then fade; yields as `perform` does."""
+        fade_s = ramp_s if self._score.level > 0.0 else 0.0
+        written_s = self._written / self._output.sample_rate_hz - self._read_s
+        self._score.fade(ramp_s)
+        yield from self._listened(written_s, self._heard_vpp)
+        yield from self._listened(fade_s, 0.0)
+
+    def cut(self) -> None:
+        """Go to zero volts at once, whatever was written."""
+        self._is_playing = False
+        self._heard_vpp = 0.0
+        self._output.stop()
+
+    def silence(self) -> None:
+        """Fade within the shortest time, wait by writing until that has been played, then stop.
+
+        For the ways out on which no samples can be counted. A device that takes no more samples is
+        stopped at once.
+        """
+        try:
+            with suppress(AcquisitionError):  # what fails here leaves it to stop()
+                self._fade_blindly()
+        finally:
+            self.cut()
+
+    @property
+    def _played(self) -> int:
+        """Samples that have been played: as many as fit into the time read."""
+        return round(self._read_s * self._output.sample_rate_hz)
+
+    def _full_vpp(self, phase: Phase) -> float:
+        match phase.play:
+            case Tone(_, level):
+                return self._amplitude_vpp * level
+            case _:
+                return self._amplitude_vpp
+
+    def _listened(self, duration_s: float, end_vpp: float) -> Iterator[float]:
+        """Yield a duration in parts, none longer than a block, and write ahead after each."""
+        begin_vpp = self._heard_vpp
+        parts = ceil(duration_s / BLOCK_S * (1 - _ROUNDING))
+        for part in range(1, parts + 1):
+            self._heard_vpp = begin_vpp + (end_vpp - begin_vpp) * half_cosine(part / parts)
+            yield duration_s / parts
+            self._read_s += duration_s / parts
+            self._write_ahead()
+
+    def _write_ahead(self) -> None:
+        room = self._played + self._output.ahead_samples - self._written
+        if room > 0:
+            self._write(room)
+
+    def _write(self, count: int) -> None:
+        volts = self._full_v * self._score.take(count)
+        self._output.write(volts)
+        sounding = np.flatnonzero(volts)
+        if sounding.size:
+            self._sounds_until = self._written + int(sounding[-1]) + 1
+        self._written += count
+
+    def _fade_blindly(self) -> None:
+        if not self.is_heard:
+            return
+        self._score.fade(BLIND_FADE_S)
+        ahead = self._output.ahead_samples
+        # Writing waits for room: when the last silence has gone in, the fade has been played.
+        left = ceil(BLIND_FADE_S * self._output.sample_rate_hz) + ahead
+        while left > 0:
+            count = min(left, ahead // 2)
+            self._write(count)
+            left -= count

@@ -1,0 +1,51 @@
+from ._arrays import (
+    Complex as Complex,
+    Floats as Floats,
+    Table as Table,
+    Vector as Vector,
+)
+from ._clock import (
+    advance_clock as advance_clock,
+    angle_at as angle_at,
+    clock_at as clock_at,
+    time_until as time_until,
+)
+from ._compile import (
+    SOURCES as SOURCES,
+    compiled as compiled,
+    inlined as inlined,
+    lean as lean,
+)
+from ._elimination import (
+    solve_in_place as solve_in_place,
+)
+from ._orthonormal import (
+    dot as dot,
+    orthonormal_rows as orthonormal_rows,
+    orthonormalise as orthonormalise,
+)
+from ._phasor_sum import (
+    AHEAD as AHEAD,
+    fill_series as fill_series,
+    march as march,
+    series_rows as series_rows,
+    steps_ahead as steps_ahead,
+    sum_now as sum_now,
+    turn_by as turn_by,
+)
+from ._row import (
+    copy_row as copy_row,
+)
+from ._simd import (
+    Lanes as Lanes,
+    eight as eight,
+    eight_of_eight as eight_of_eight,
+    eight_of_sixteen as eight_of_sixteen,
+    eights as eights,
+    largest as largest,
+    root as root,
+    sixteen as sixteen,
+    sixteen_of_sixteen as sixteen_of_sixteen,
+    store as store,
+    total as total,
+)

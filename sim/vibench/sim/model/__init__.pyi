@@ -1,0 +1,66 @@
+from ._accuracy import (
+    Accuracy as Accuracy,
+)
+from ._against_stops import (
+    BaseAnswer as BaseAnswer,
+    base_answer as base_answer,
+)
+from ._bound_modes import (
+    JOIN as JOIN,
+    PULL as PULL,
+    RATE as RATE,
+    ROW as ROW,
+    SHAPE as SHAPE,
+    bound_motion as bound_motion,
+)
+from ._contact_law import (
+    MOST_TERMS as MOST_TERMS,
+    Hertz as Hertz,
+    HuntCrossley as HuntCrossley,
+    LinearGap as LinearGap,
+    NoContact as NoContact,
+    PowerLaw as PowerLaw,
+    RigidStops as RigidStops,
+    hertz_stiffness as hertz_stiffness,
+)
+from ._drive import (
+    Drive as Drive,
+    Harmonic as Harmonic,
+    LinearSweep as LinearSweep,
+    LogarithmicSweep as LogarithmicSweep,
+    Sampled as Sampled,
+    Sweep as Sweep,
+)
+from ._model_name import (
+    model_named as model_named,
+)
+from ._modes import (
+    COINCIDENT as COINCIDENT,
+    ModalForm as ModalForm,
+    base_transmissibility as base_transmissibility,
+    harmonic_motion as harmonic_motion,
+    modal_form as modal_form,
+    state_matrix as state_matrix,
+)
+from ._outcome import (
+    Outcome as Outcome,
+)
+from ._specimen import (
+    ALUMINIUM as ALUMINIUM,
+    PAPER_FREQUENCIES_HZ as PAPER_FREQUENCIES_HZ,
+    PAPER_MASSES as PAPER_MASSES,
+    PAPER_RADIUS_M as PAPER_RADIUS_M,
+    STEEL as STEEL,
+    Matrix as Matrix,
+    Specimen as Specimen,
+    Triple as Triple,
+    gong2025 as gong2025,
+)
+from ._state import (
+    VX as VX,
+    VY as VY,
+    VZ as VZ,
+    X as X,
+    Y as Y,
+    Z as Z,
+)

@@ -1,0 +1,8 @@
+from .rig import (
+    DiskFaults as DiskFaults,
+    VirtualRig as VirtualRig,
+    load_fault_script as load_fault_script,
+)
+from .usb import (
+    plug_in_remote as plug_in_remote,
+)

@@ -1,0 +1,199 @@
+"""Calls that move samples between a program and a task of the simulated driver."""
+
+from typing import Any
+
+import numpy as np
+from ni.protobuf.types.waveform_pb2 import DoubleAnalogWaveform
+from nidaqmx.constants import FillMode
+from nidaqmx.error_codes import DAQmxErrors
+from numpy.typing import NDArray
+
+from ._calls import NOTHING, Call, Fields, pick
+from ._errors import DaqmxRefusal
+from ._reading import READ_ALL, Reading, default_samples, read
+from ._system import DaqmxSystem
+from ._tasks import Task
+from ._timing import StartsItself
+from ._wire import packed_response
+from ._writing import require_outputs, write
+
+_SIZES = {"I16": 16, "U16": 16, "I32": 32, "U32": 32}
+
+
+class DataCalls:
+    """Reads and writes."""
+
+    def __init__(self, system: DaqmxSystem) -> None:
+        """Work on that system."""
+        self._system = system
+
+    def calls(self) -> dict[str, Call]:
+        """Give the calls by their name in the protocol."""
+        binary_reads = {f"ReadBinary{kind}": self._binary_reader(size) for kind, size in _SIZES.items()}
+        binary_writes = {f"WriteBinary{kind}": self._binary_writer(size) for kind, size in _SIZES.items()}
+        return {
+            "ReadAnalogF64": self._read,
+            "ReadAnalogScalarF64": self._read_scalar,
+            "ReadAnalogWaveforms": self._read_waveforms,
+            "ReadRaw": self._read_raw,
+            "WriteAnalogF64": self._write,
+            "WriteAnalogScalarF64": self._write_scalar,
+            "WriteAnalogWaveforms": self._write_waveforms,
+            **binary_reads,
+            **binary_writes,
+        }
+
+    def _task(self, request: Any) -> Task:
+        return self._system.task(request.task.name)
+
+    # --- reading -------------------------------------------------------------------------
+
+    def _read(self, request: Any) -> bytes:
+        task = self._task(request)
+        reading = _read_what_fits(task, request)
+        rows = _rows(task)
+        values = np.stack([task.inputs[row].to_units(reading.volts[row]) for row in rows])
+        return packed_response(reading.status, _laid_out(values, request), reading.samples)
+
+    def _read_scalar(self, request: Any) -> Fields:
+        task = self._task(request)
+        reading = _whole(read(task, 1, request.timeout))
+        row = _rows(task)[0]
+        return {"value": float(task.inputs[row].to_units(reading.volts[row])[0])}
+
+    def _read_waveforms(self, request: Any) -> Fields:
+        task = self._task(request)
+        reading = read(task, request.num_samps_per_chan, request.timeout)
+        period_s = 1 / task.rate_hz
+        waveforms = [
+            DoubleAnalogWaveform(dt=period_s, y_data=task.inputs[row].to_units(reading.volts[row]))
+            for row in _rows(task)
+        ]
+        return {"status": reading.status, "waveforms": waveforms, "samps_per_chan_read": reading.samples}
+
+    def _read_raw(self, request: Any) -> Fields:
+        task = self._task(request)
+        reading = _whole(read(task, request.num_samps_per_chan, request.timeout))
+        counts = _counts(task, reading)
+        size = 2 if task.side.bits <= _SIZES["I16"] else 4
+        raw = np.ascontiguousarray(counts.T).astype(f"<i{size}").tobytes()
+        return {"read_array": raw, "samps_read": reading.samples, "num_bytes_per_samp": size * len(counts)}
+
+    def _binary_reader(self, bits: int) -> Call:
+        def read_binary(request: Any) -> Fields:
+            task = self._task(request)
+            _require_width(task, bits)
+            reading = _read_what_fits(task, request)
+            counts = _laid_out(_counts(task, reading).astype(np.float64), request).astype(np.int64)
+            return {
+                "status": reading.status,
+                "read_array": counts.ravel().tolist(),
+                "samps_per_chan_read": reading.samples,
+            }
+
+        return read_binary
+
+    # --- writing -------------------------------------------------------------------------
+
+    def _write(self, request: Any) -> Fields:
+        task = self._task(request)
+        values = _incoming(task, request)
+        return {"samps_per_chan_written": write(task, values, _start(request), request.timeout)}
+
+    def _write_scalar(self, request: Any) -> Fields:
+        task = self._task(request)
+        require_outputs(task)
+        _check_size(task, 1, 1)
+        write(task, np.array([[request.value]]), _start(request), request.timeout)
+        return NOTHING
+
+    def _write_waveforms(self, request: Any) -> Fields:
+        task = self._task(request)
+        require_outputs(task)
+        rows = [np.array(waveform.y_data) for waveform in request.waveforms]
+        _check_size(task, sum(row.size for row in rows), rows[0].size if rows else 0)
+        return {"samps_per_chan_written": write(task, np.stack(rows), _start(request), request.timeout)}
+
+    def _binary_writer(self, bits: int) -> Call:
+        def write_binary(request: Any) -> Fields:
+            task = self._task(request)
+            _require_width(task, bits)
+            counts = _incoming(task, request)
+            volts = np.array([[channel.volts_per_count] for channel in task.outputs]) * counts
+            return {"samps_per_chan_written": write(task, volts, _start(request), request.timeout)}
+
+        return write_binary
+
+
+def _rows(task: Task) -> list[int]:
+    names = [channel.name for channel in task.inputs]
+    return [names.index(channel.name) for channel in task.find(", ".join(task.reading.channels))]
+
+
+def _read_what_fits(task: Task, request: Any) -> Reading:
+    """Read what was asked for; "all" means as much as the caller has room for."""
+    channels = max(1, len(task.channels_to_read))
+    room = request.array_size_in_samps // channels
+    wanted = request.num_samps_per_chan
+    if wanted == READ_ALL:
+        wanted = room if not task.is_running else min(room, default_samples(task))
+    if wanted > room:
+        detail = f"Room for {room} samples per channel, {wanted} requested"
+        raise DaqmxRefusal(DAQmxErrors.READ_BUFFER_TOO_SMALL, detail, samples_read=0)
+    return read(task, wanted, request.timeout)
+
+
+def _laid_out(values: NDArray[np.float64], request: Any) -> NDArray[np.float64]:
+    """One row after the other, or one scan after the other; rows keep the distance the caller's array has."""
+    if pick(request, "fill_mode") == FillMode.GROUP_BY_SCAN_NUMBER.value:
+        return values.T
+    channels, samples = values.shape
+    width = request.array_size_in_samps // channels
+    if samples == width or channels == 1:
+        return values
+    rows = np.zeros((channels, width))
+    rows[:, :samples] = values
+    return rows
+
+
+def _whole(reading: Reading) -> Reading:
+    """Check a reading for a caller that cannot take a part of it."""
+    if reading.status:
+        raise DaqmxRefusal(reading.status, samples_read=reading.samples)
+    return reading
+
+
+def _counts(task: Task, reading: Reading) -> NDArray[np.int64]:
+    rows = _rows(task)
+    steps = np.array([[task.inputs[row].volts_per_count] for row in rows])
+    largest = 2 ** (task.side.bits - 1)
+    counts: NDArray[np.float64] = np.clip(np.rint(reading.volts[rows] / steps), -largest, largest - 1)
+    return counts.astype(np.int64)
+
+
+def _require_width(task: Task, bits: int) -> None:
+    if task.side.bits > bits:
+        detail = f"{task.side.bits}-bit samples need the 32-bit call, not {bits} bits\nTask Name: {task.name}"
+        raise DaqmxRefusal(DAQmxErrors.CHANNEL_SIZE_TOO_BIG_FOR_PORT_READ_TYPE, detail)
+
+
+def _start(request: Any) -> StartsItself:
+    return StartsItself.YES if request.auto_start else StartsItself.NO
+
+
+def _check_size(task: Task, size: int, samples: int) -> None:
+    if size != samples * len(task.outputs):
+        detail = (
+            f"{size} values for {len(task.outputs)} channels of {samples} samples\nTask Name: {task.name}"
+        )
+        raise DaqmxRefusal(DAQmxErrors.WRITE_NUM_CHANS_MISMATCH, detail, samples_written=0)
+
+
+def _incoming(task: Task, request: Any) -> NDArray[np.float64]:
+    """Shape the written array into (channels, samples)."""
+    require_outputs(task)
+    values = np.array(request.write_array, dtype=np.float64)
+    samples = request.num_samps_per_chan
+    _check_size(task, values.size, samples)
+    is_by_scan = pick(request, "data_layout") == FillMode.GROUP_BY_SCAN_NUMBER.value
+    return values.reshape(samples, -1).T if is_by_scan else values.reshape(-1, samples)

@@ -1,0 +1,269 @@
+"""The devices the simulated DAQmx system has: what each can do, in one table.
+
+Sources: NI 9234 and NI USB-9234 guides (ranges, IEPE, data rates fM/256/n), NI USB-443x
+specifications (ranges, rates, IEPE), NI USB-6211 specifications. Not confirmed on a device: the
+minimum rate and the rate steps of the USB-4431, the default couplings, and the USB-6211's figures.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+from enum import Enum, auto
+
+from nidaqmx.constants import BusType, ProductCategory, TerminalConfiguration, TriggerUsage, UsageTypeAI
+
+from vibench.acquisition import ConfigurationError
+
+from ..analogue import Coupling
+
+_NI_9234_RATE_HZ = 13.1072e6 / 256
+_NI_9234_MAX_DIVISOR = 31
+_M_SERIES_TIMEBASE_HZ = 20e6
+
+_ROUNDING = 1e-12
+"""A rate read back and asked for again must not jump to the next one."""
+
+_SENSOR_MEASUREMENTS = (
+    UsageTypeAI.VOLTAGE,
+    UsageTypeAI.ACCELERATION_ACCELEROMETER_CURRENT_INPUT,
+    UsageTypeAI.VELOCITY_IEPE_SENSOR,
+    UsageTypeAI.FORCE_IEPE_SENSOR,
+    UsageTypeAI.SOUND_PRESSURE_MICROPHONE,
+)
+
+
+@dataclass(frozen=True)
+class AnyRate:
+    """Every rate in an interval is possible."""
+
+    minimum_hz: float
+    maximum_hz: float
+
+    def next_up(self, rate_hz: float) -> float:
+        """Give the rate itself."""
+        return rate_hz
+
+
+@dataclass(frozen=True)
+class DividedRate:
+    """A clock divided by a whole number: a request becomes the next higher rate there is."""
+
+    clock_hz: float
+    minimum_hz: float
+    maximum_hz: float
+
+    def next_up(self, rate_hz: float) -> float:
+        """Smallest ``clock_hz / n`` that is not below ``rate_hz``, a rounding error apart."""
+        return self.clock_hz / math.floor(self.clock_hz / rate_hz * (1 + _ROUNDING))
+
+
+Rates = AnyRate | DividedRate
+
+
+class Idle(Enum):
+    """What an output does when its generation ends."""
+
+    ZERO = auto()
+    HOLD = auto()
+
+
+class Untimed(Enum):
+    """What a task without a sample clock does."""
+
+    ON_DEMAND = auto()
+    """Converts when the program asks (successive approximation)."""
+    SAMPLE_CLOCK = auto()
+    """Runs the sample clock at its default rate (delta-sigma converters cannot do otherwise)."""
+
+
+class Overloads(Enum):
+    """Whether the device tells clipped inputs."""
+
+    DETECTED = auto()
+    NOT_DETECTED = auto()
+
+
+class Conversion(Enum):
+    """Whether the inputs of a task are converted together."""
+
+    SIMULTANEOUS = auto()
+    MULTIPLEXED = auto()
+
+
+@dataclass(frozen=True)
+class AnalogInputs:
+    """The input side of a device."""
+
+    count: int
+    ranges_v: tuple[float, ...]
+    """Full scales, ascending; each is plus and minus [V]."""
+    rates: Rates
+    bits: int
+    couplings: tuple[Coupling, ...]
+    iepe_currents_a: tuple[float, ...]
+    """Excitation currents to choose from, without 0; empty: no excitation."""
+    terminals: tuple[TerminalConfiguration, ...]
+    """The first is the default."""
+    untimed: Untimed
+    overloads: Overloads
+    conversion: Conversion
+    measurements: tuple[UsageTypeAI, ...] = (UsageTypeAI.VOLTAGE,)
+
+
+@dataclass(frozen=True)
+class AnalogOutputs:
+    """The output side of a device."""
+
+    count: int
+    range_v: float
+    rates: Rates
+    bits: int
+    idle: Idle
+    untimed: Untimed
+    terminal: TerminalConfiguration
+
+
+@dataclass(frozen=True)
+class Device:
+    """One device of the system."""
+
+    name: str
+    product_type: str
+    product_number: int
+    serial: int
+    category: ProductCategory
+    bus: BusType
+    inputs: AnalogInputs | None = None
+    outputs: AnalogOutputs | None = None
+    chassis: str = ""
+    slot: int = 0
+    modules: tuple[str, ...] = ()
+    pfi_lines: int = 0
+    trigger_usage: tuple[TriggerUsage, ...] = ()
+    calibrated: tuple[int, int, int, int, int] = (2024, 3, 14, 9, 30)
+    """Year, month, day, hour, minute of the last external calibration."""
+    calibration_interval_months: int = 12
+
+    @property
+    def clock_name(self) -> str:
+        """The device whose timing engine clocks this one: its chassis, if it sits in one."""
+        return self.chassis or self.name
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """``"Dev1/ai0"`` and so on."""
+        return tuple(f"{self.name}/ai{n}" for n in range(self.inputs.count)) if self.inputs else ()
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """``"Dev1/ao0"`` and so on."""
+        return tuple(f"{self.name}/ao{n}" for n in range(self.outputs.count)) if self.outputs else ()
+
+    @property
+    def terminals(self) -> tuple[str, ...]:
+        """Names of the terminals that signals can be routed to and from."""
+        pfi = [f"/{self.name}/PFI{n}" for n in range(self.pfi_lines)]
+        sides = [side for side, names in (("ai", self.input_names), ("ao", self.output_names)) if names]
+        inner = [
+            f"/{self.name}/{side}/{signal}" for side in sides for signal in ("SampleClock", "StartTrigger")
+        ]
+        return (*pfi, *inner)
+
+
+CDAQ1 = Device(
+    name="cDAQ1", product_type="cDAQ-9174", product_number=0x74A8, serial=0x01D0C0DE,
+    category=ProductCategory.COMPACT_DAQ_CHASSIS, bus=BusType.USB, modules=("cDAQ1Mod1",),
+    pfi_lines=2, trigger_usage=(TriggerUsage.START,),
+)  # fmt: skip
+
+NI_9234 = Device(
+    name="cDAQ1Mod1", product_type="NI 9234", product_number=0x73A1, serial=0x01D09234,
+    category=ProductCategory.C_SERIES_MODULE, bus=BusType.COMPACT_DAQ, chassis="cDAQ1", slot=1,
+    trigger_usage=(TriggerUsage.START,),
+    inputs=AnalogInputs(
+        count=4, ranges_v=(5.0,), bits=24,
+        rates=DividedRate(_NI_9234_RATE_HZ, _NI_9234_RATE_HZ / _NI_9234_MAX_DIVISOR, _NI_9234_RATE_HZ),
+        couplings=(Coupling.AC, Coupling.DC), iepe_currents_a=(0.002,),
+        terminals=(TerminalConfiguration.PSEUDO_DIFF,), untimed=Untimed.SAMPLE_CLOCK,
+        overloads=Overloads.NOT_DETECTED, conversion=Conversion.SIMULTANEOUS,
+        measurements=_SENSOR_MEASUREMENTS,
+    ),
+)  # fmt: skip
+
+USB_4431 = Device(
+    name="Dev1", product_type="USB-4431", product_number=0x73F2, serial=0x01D04431,
+    category=ProductCategory.DSA, bus=BusType.USB, pfi_lines=8, trigger_usage=(TriggerUsage.START,),
+    inputs=AnalogInputs(
+        count=4, ranges_v=(10.0,), bits=24, rates=AnyRate(1000.0, 102.4e3),
+        couplings=(Coupling.AC, Coupling.DC), iepe_currents_a=(0.0021,),
+        terminals=(TerminalConfiguration.PSEUDO_DIFF,), untimed=Untimed.SAMPLE_CLOCK,
+        overloads=Overloads.DETECTED, conversion=Conversion.SIMULTANEOUS, measurements=_SENSOR_MEASUREMENTS,
+    ),
+    outputs=AnalogOutputs(
+        count=1, range_v=3.5, rates=AnyRate(1000.0, 96e3), bits=24, idle=Idle.ZERO,
+        untimed=Untimed.SAMPLE_CLOCK, terminal=TerminalConfiguration.PSEUDO_DIFF,
+    ),
+)  # fmt: skip
+
+USB_6211 = Device(
+    name="Dev2", product_type="USB-6211", product_number=0x7270, serial=0x01D06211,
+    category=ProductCategory.M_SERIES_DAQ, bus=BusType.USB, pfi_lines=8, trigger_usage=(TriggerUsage.START,),
+    inputs=AnalogInputs(
+        count=16, ranges_v=(0.2, 1.0, 5.0, 10.0), bits=16,
+        rates=DividedRate(_M_SERIES_TIMEBASE_HZ, _M_SERIES_TIMEBASE_HZ / 2**32, 250e3),
+        couplings=(Coupling.DC,), iepe_currents_a=(),
+        terminals=(TerminalConfiguration.DIFF, TerminalConfiguration.RSE, TerminalConfiguration.NRSE),
+        untimed=Untimed.ON_DEMAND, overloads=Overloads.NOT_DETECTED, conversion=Conversion.MULTIPLEXED,
+    ),
+    outputs=AnalogOutputs(
+        count=2, range_v=10.0, bits=16, idle=Idle.HOLD, untimed=Untimed.ON_DEMAND,
+        terminal=TerminalConfiguration.RSE,
+        rates=DividedRate(_M_SERIES_TIMEBASE_HZ, _M_SERIES_TIMEBASE_HZ / 2**32, 250e3),
+    ),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """The devices of one system, by name (DAQmx ignores the case of names)."""
+
+    devices: tuple[Device, ...] = (CDAQ1, NI_9234, USB_4431, USB_6211)
+    _by_name: dict[str, Device] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Index the devices."""
+        object.__setattr__(self, "_by_name", {device.name.lower(): device for device in self.devices})
+
+    def find(self, name: str) -> Device | None:
+        """Look up a device by name; a terminal's leading slash does not matter."""
+        return self._by_name.get(name.strip("/").lower())
+
+
+def catalogue_with(product_type: str, name: str) -> Catalogue:
+    """Give the default system, in which the device of that product bears that name.
+
+    Raises
+    ------
+    ConfigurationError
+        When there is no such product, or the name is taken by another one.
+
+    """
+    devices = Catalogue().devices
+    old = next((device for device in devices if device.product_type == product_type), None)
+    if old is None:
+        known = ", ".join(device.product_type for device in devices)
+        raise ConfigurationError(
+            f"The simulated DAQ has no {product_type!r}: it has {known}; "
+            "nothing was started, choose one of these"
+        )
+    if any(device.name.lower() == name.lower() and device is not old for device in devices):
+        raise ConfigurationError(
+            f"The simulated {product_type} cannot be called {name!r}: another device is; "
+            "nothing was started, choose another name"
+        )
+    return Catalogue(tuple(_renamed(device, old.name, name) for device in devices))
+
+
+def _renamed(device: Device, old: str, new: str) -> Device:
+    modules = tuple(new if module == old else module for module in device.modules)
+    chassis = new if device.chassis == old else device.chassis
+    return replace(device, name=new if device.name == old else device.name, modules=modules, chassis=chassis)

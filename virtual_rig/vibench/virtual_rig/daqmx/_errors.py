@@ -1,0 +1,79 @@
+"""What the simulated DAQmx driver answers when it refuses: a code, a sentence, how many samples moved."""
+
+from nidaqmx.error_codes import DAQmxErrors
+
+from vibench.acquisition import InstrumentError
+
+_SENTENCES: dict[int, str] = {
+    DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE: (
+        "Samples were overwritten in the buffer before they were read, and are lost. Read more often, "
+        "read more samples at once, or make the buffer larger."
+    ),
+    DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE: (
+        "Some or all of the samples requested have not yet been acquired. Wait longer, read later, "
+        "or check the start trigger and the sample clock."
+    ),
+    DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE: (
+        "The samples requested lie past the end of the finite acquisition. Read fewer samples, "
+        "acquire more, or acquire continuously."
+    ),
+    DAQmxErrors.PAL_RESOURCE_RESERVED: (
+        "The specified resource is reserved by another task. Stop or clear that task first."
+    ),
+    DAQmxErrors.INVALID_TASK: "The task does not exist: it was cleared, or never created on this server.",
+    DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES: (
+        "The generation stopped because the next samples were not written in time and regeneration is "
+        "not allowed. Write more often, write more at once, or allow regeneration."
+    ),
+    DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE: (
+        "The task was not done when the time to wait ran out. Wait longer, or stop it."
+    ),
+    DAQmxErrors.SAMPLES_CAN_NOT_YET_BE_WRITTEN: (
+        "There was no room in the output buffer before the timeout. Wait longer, or write less at once."
+    ),
+    DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK: (
+        "The operation cannot be performed because the task has no channels. Add one first."
+    ),
+    DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING: (
+        "The operation cannot be performed while the task is running. Stop the task first."
+    ),
+    DAQmxErrors.RUNTIME_ABORTING_ROUTING: "The operation was aborted because the device was reset.",
+    DAQmxErrors.DEV_CANNOT_BE_ACCESSED: (
+        "The device cannot be accessed: it is unplugged, switched off, or was removed from the system."
+    ),
+    DAQmxErrors.INPUT_FIFO_OVERFLOW_2: (
+        "The device's own memory overflowed because the host did not fetch the samples in time."
+    ),
+}
+
+
+class DaqmxRefusal(InstrumentError):
+    """A call that the driver answers with a negative status, as the client will see it."""
+
+    def __init__(
+        self, code: int, detail: str = "", samples_read: int | None = None, samples_written: int | None = None
+    ) -> None:
+        """Name the DAQmx ``code``; ``detail`` says what was given and what is allowed."""
+        super().__init__("\n\n".join(filter(None, (sentence(code), detail, f"Status Code: {int(code)}"))))
+        self.code = int(code)
+        self.samples_read = samples_read
+        self.samples_written = samples_written
+
+
+def sentence(code: int) -> str:
+    """Say what a status code means: a sentence for the frequent ones, NI's name for the others."""
+    if code in _SENTENCES:
+        return _SENTENCES[code]
+    try:
+        name = str(DAQmxErrors(code).name)
+    except ValueError:
+        return ""
+    return name.replace("_", " ").capitalize() + "."
+
+
+def unsupported_value(property_name: str, requested: object, allowed: str) -> DaqmxRefusal:
+    """Refuse a property value, the way DAQmx reports it (-200077)."""
+    return DaqmxRefusal(
+        DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
+        f"Property: {property_name}\nRequested Value: {requested}\nPossible Values: {allowed}",
+    )

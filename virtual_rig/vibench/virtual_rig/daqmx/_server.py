@@ -1,0 +1,275 @@
+"""The simulated DAQmx system on a port: any nidaqmx program can connect to it."""
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from types import TracebackType
+from typing import Any, Self
+
+import grpc
+from nidaqmx._stubs import nidaqmx_pb2
+from nidaqmx.error_codes import DAQmxErrors
+
+from vibench.acquisition import ConfigurationError
+
+from ..analogue import AnalogueWorld
+from ._attribute_calls import SERVICE, AttributeCalls
+from ._calls import Call, Fields, SystemCalls, TaskCalls
+from ._channel_calls import ChannelCalls
+from ._data_calls import DataCalls
+from ._devices import Catalogue
+from ._errors import DaqmxRefusal
+from ._events import EventCalls, Listener
+from ._faults import Faults, Unavailable
+from ._pace import OnDemandPace, Pace
+from ._rig import Rig
+from ._system import DaqmxSystem
+from ._token import TokenRequired
+
+LOOPBACK = "127.0.0.1:0"
+"""This computer only, on a free port: the server knows no passwords."""
+
+_WORKERS = 64
+"""Every blocking read and every event listener holds one thread."""
+
+_NO_LIMIT = -1
+_OPTIONS = (
+    ("grpc.max_receive_message_length", _NO_LIMIT),
+    ("grpc.max_send_message_length", _NO_LIMIT),
+    ("grpc.so_reuseport", 0),  # a second server on the same port is an error, not a lottery
+)
+
+Handler = Callable[[Any, grpc.ServicerContext], Any]
+Metadata = tuple[tuple[str, str], ...]
+
+
+class DaqServer:
+    """A running server; leaving it clears every task and ends every thread."""
+
+    def __init__(
+        self,
+        world: AnalogueWorld,
+        pace: Pace,
+        address: str,
+        catalogue: Catalogue,
+        handlers: Iterable[grpc.GenericRpcHandler],
+        token: str | None,
+    ) -> None:
+        """See `serve`."""
+        self.faults = Faults()
+        self._refused: set[str] = set()
+        """Calls that were refused the last time they were made."""
+        self._pace = pace
+        self._rig = Rig(world, pace)
+        self._system = DaqmxSystem(self._rig, catalogue)
+        self._workers = ThreadPoolExecutor(_WORKERS, thread_name_prefix="daqmx")
+        guards = () if token is None else (TokenRequired(token),)
+        self._server = grpc.server(self._workers, options=_OPTIONS, interceptors=guards)
+        self._server.add_generic_rpc_handlers(
+            (_service(self._unary_calls(), self._listening_calls()), *handlers)
+        )
+        try:
+            port = self._server.add_insecure_port(address)
+        except RuntimeError as error:
+            raise ConfigurationError(
+                f"The simulated DAQ cannot listen on {address}: it is taken or does not exist; "
+                f"nothing was started, use another port, or port 0 for a free one"
+            ) from error
+        self.address = f"{address.rpartition(':')[0]}:{port}"
+        with self._rig.changed:
+            pace.open(self._rig)
+        self._server.start()
+
+    def __enter__(self) -> Self:
+        """Enter; the server has been running since it was made."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End it."""
+        self.close()
+
+    @property
+    def task_names(self) -> tuple[str, ...]:
+        """The tasks that exist, those of vanished clients included."""
+        with self._rig.changed:
+            return tuple(self._system.tasks)
+
+    def reset(self) -> None:
+        """Clear every task and every fault, as after switching the computer off and on."""
+        with self._rig.changed:
+            self._system.reset()
+            self.faults.clear()
+
+    def let_pass(self, duration_s: float) -> None:
+        """Let rig time pass while nobody asks for samples."""
+        with self._rig.changed:
+            self._rig.advance_to(self._rig.now_s + duration_s)
+
+    def edge(self, terminal: str) -> None:
+        """Raise a terminal, ``"/Dev1/PFI0"`` for example: what waits for it begins."""
+        with self._rig.changed:
+            self._rig.edge(terminal)
+
+    def close(self) -> None:
+        """Stop serving; legal at any time, more than once."""
+        with self._rig.changed:
+            self._system.reset()
+        self._server.stop(grace=None).wait()
+        with self._rig.changed:  # a call that was still under way may have made and begun another task
+            self._system.reset()
+        self._pace.close()
+        self._workers.shutdown(wait=True)
+
+    # --- from a request to its answer ----------------------------------------------------
+
+    def _unary_calls(self) -> dict[str, Handler]:
+        calls: dict[str, Call] = {
+            **TaskCalls(self._system).calls(),
+            **SystemCalls(self._system).calls(),
+            **ChannelCalls(self._system).calls(),
+            **DataCalls(self._system).calls(),
+            **AttributeCalls(self._system).calls(),
+        }
+        return {name: self._answer(name, call) for name, call in calls.items()}
+
+    def _listening_calls(self) -> dict[str, Handler]:
+        return {name: self._listen(name, call) for name, call in EventCalls(self._system).calls().items()}
+
+    def _answer(self, name: str, call: Call) -> Handler:
+        def handle(request: Any, context: grpc.ServicerContext) -> Fields | bytes:
+            with _refusals_reported(context), self._rig.changed:
+                self._check_faults(name)
+                if self.faults.take_restart():
+                    self._system.reset()
+                return call(request)
+
+        return handle
+
+    def _check_faults(self, name: str) -> None:
+        """Fail the call if a rule says so. The first refusal comes at once; to be refused again takes time.
+
+        A call that is let through takes none: a reader would be behind by what had passed.
+        """
+        try:
+            self.faults.check(name, self._rig.now_s)
+        except DaqmxRefusal:  # a server that is gone takes no time: nobody is there
+            if name in self._refused:
+                self._pace.stumble(self._rig)
+            self._refused.add(name)
+            raise
+        self._refused.discard(name)
+
+    def _listen(self, name: str, call: Callable[[Any, grpc.ServicerContext], Listener]) -> Handler:
+        def handle(request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
+            with _refusals_reported(context), self._rig.changed:
+                self.faults.check(name, self._rig.now_s)
+                listener = call(request, context)
+            context.send_initial_metadata(())  # the client waits for it before it goes on
+            yield from listener
+
+        return handle
+
+
+class _refusals_reported:  # noqa: N801 - reads as a verb where it is used
+    """Turns a refusal into what the client expects: status UNKNOWN, the code in the trailing metadata."""
+
+    def __init__(self, context: grpc.ServicerContext) -> None:
+        self._context = context
+
+    def __enter__(self) -> None:
+        """Nothing to prepare."""
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        match error:
+            case DaqmxRefusal():
+                self._context.set_trailing_metadata(_metadata(error))
+                self._context.abort(grpc.StatusCode.UNKNOWN, str(error))
+            case Unavailable():
+                self._context.abort(grpc.StatusCode.UNAVAILABLE, str(error))
+            case ConfigurationError():  # the world cannot do what the device could
+                refusal = DaqmxRefusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, str(error))
+                self._context.set_trailing_metadata(_metadata(refusal))
+                self._context.abort(grpc.StatusCode.UNKNOWN, str(refusal))
+            case _:
+                return
+
+
+def _metadata(refusal: DaqmxRefusal) -> Metadata:
+    entries = (
+        ("ni-error", refusal.code),
+        ("ni-samps-per-chan-read", refusal.samples_read),
+        ("ni-samps-per-chan-written", refusal.samples_written),
+    )
+    return tuple((key, str(value)) for key, value in entries if value is not None)
+
+
+def _service(unary: dict[str, Handler], listening: dict[str, Handler]) -> grpc.GenericRpcHandler:
+    handlers = {method.name: _rpc(method, unary, listening) for method in SERVICE.methods}
+    return grpc.method_handlers_generic_handler(SERVICE.full_name, handlers)
+
+
+def _rpc(method: Any, unary: dict[str, Handler], listening: dict[str, Handler]) -> grpc.RpcMethodHandler:
+    request, response = _message(method.input_type), _message(method.output_type)
+    if method.name in listening:
+        return grpc.unary_stream_rpc_method_handler(
+            listening[method.name], request.FromString, lambda message: message.SerializeToString()
+        )
+
+    def serialise(answer: Fields | bytes) -> bytes:
+        match answer:
+            case bytes():
+                return answer
+            case _:
+                return bytes(response(**answer).SerializeToString())
+
+    handler = unary.get(method.name) or _not_simulated(method.name)
+    return grpc.unary_unary_rpc_method_handler(handler, request.FromString, serialise)
+
+
+def _message(descriptor: Any) -> Any:
+    return getattr(nidaqmx_pb2, descriptor.name)
+
+
+def _not_simulated(name: str) -> Handler:
+    def handle(request: Any, context: grpc.ServicerContext) -> None:  # noqa: ARG001 - the request does not matter
+        context.abort(grpc.StatusCode.UNIMPLEMENTED, f"{name} is not part of the simulated DAQmx driver.")
+
+    return handle
+
+
+def serve(
+    world: AnalogueWorld,
+    pace: Pace | None = None,
+    address: str = LOOPBACK,
+    *,
+    catalogue: Catalogue | None = None,
+    handlers: Iterable[grpc.GenericRpcHandler] = (),
+    token: str | None = None,
+) -> DaqServer:
+    """Serve the simulated DAQmx system until the returned server is closed; use it in a ``with``.
+
+    Parameters
+    ----------
+    world
+        What the converters are wired to.
+    pace
+        How rig time passes; default: on demand.
+    address
+        ``"host:port"``; port 0 takes a free one, see `DaqServer.address`.
+    catalogue
+        The devices; default: a cDAQ with an NI 9234, a USB-4431 and a USB-6211.
+    handlers
+        Further gRPC services for the same port.
+    token
+        What every call must carry; None lets everybody in who can reach the port.
+
+    Raises
+    ------
+    ConfigurationError
+        When the address cannot be used.
+
+    """
+    return DaqServer(world, pace or OnDemandPace(), address, catalogue or Catalogue(), handlers, token)

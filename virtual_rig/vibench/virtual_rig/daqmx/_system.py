@@ -1,0 +1,143 @@
+"""The simulated DAQmx driver: its devices, tasks, scales, and who holds which device."""
+
+from collections.abc import Callable, Iterable
+
+from nidaqmx.error_codes import DAQmxErrors
+
+from ._device_attributes import PhysicalChannel, System
+from ._devices import Catalogue, Device
+from ._errors import DaqmxRefusal
+from ._names import expand
+from ._rig import Rig
+from ._scales import Scale
+from ._tasks import Task
+
+
+class DaqmxSystem:
+    """Everything one driver knows; used with the rig's lock held."""
+
+    def __init__(self, rig: Rig, catalogue: Catalogue) -> None:
+        """Begin without tasks."""
+        self.rig = rig
+        self.catalogue = catalogue
+        self.tasks: dict[str, Task] = {}
+        self.scales: dict[str, Scale] = {}
+        self._holders: dict[str, Task] = {}
+        self._unnamed = 0
+
+    @property
+    def description(self) -> System:
+        """The system as its attributes show it."""
+        return System(self.catalogue, lambda: tuple(self.tasks), lambda: tuple(self.scales))
+
+    # --- tasks ---------------------------------------------------------------------------
+
+    def create_task(self, name: str) -> Task:
+        """Create a task; an empty name is replaced by a free one (-200089 for a name in use)."""
+        if not name:
+            name = f"_unnamedTask<{self._unnamed}>"
+            self._unnamed += 1
+        if name in self.tasks:
+            raise DaqmxRefusal(DAQmxErrors.DUPLICATE_TASK, f"Task Name: {name}")
+        task = Task(name, self.rig, self)
+        self.tasks[name] = task
+        return task
+
+    def task(self, name: str) -> Task:
+        """Find a task by name (-200088 if there is none)."""
+        if name not in self.tasks:
+            raise DaqmxRefusal(DAQmxErrors.INVALID_TASK, f"Task Name: {name}")
+        return self.tasks[name]
+
+    def clear_task(self, name: str) -> None:
+        """End a task and forget it."""
+        self.task(name).abort()
+        del self.tasks[name]
+        self.rig.changed.notify_all()
+
+    def reset(self) -> None:
+        """Clear every task, also those whose client is gone, and every scale."""
+        for name in tuple(self.tasks):
+            self.clear_task(name)
+        self.scales.clear()
+
+    # --- devices -------------------------------------------------------------------------
+
+    def device(self, name: str) -> Device:
+        """Find a device by name (-200220 if there is none)."""
+        device = self.catalogue.find(name)
+        if device is None:
+            known = ", ".join(known.name for known in self.catalogue.devices)
+            raise DaqmxRefusal(DAQmxErrors.INVALID_DEVICE_ID, f"Device Specified: {name}\nDevices: {known}")
+        return device
+
+    def reset_device(self, name: str) -> None:
+        """Abort every task on a device, and on the modules in it."""
+        device = self.device(name)
+        touched = {device.name, *device.modules}
+        for task in self.tasks.values():
+            if any(used.name in touched for used in task.devices):
+                task.abort()
+
+    def physical(self, name: str) -> PhysicalChannel:
+        """One physical channel (-200220, -200170 if there is no such thing)."""
+        device = self.device(name.strip("/").partition("/")[0])
+        names = (*device.input_names, *device.output_names)
+        for known in names:
+            if known.lower() == name.lower():
+                return PhysicalChannel(device, known)
+        detail = f"Physical Channel: {name}\nPhysical Channels: {', '.join(names) or 'none'}"
+        raise DaqmxRefusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, detail)
+
+    def inputs(self, names: str) -> tuple[PhysicalChannel, ...]:
+        """Find the physical inputs in a list of names and ranges."""
+        return self._of_side(names, lambda device: device.input_names)
+
+    def outputs(self, names: str) -> tuple[PhysicalChannel, ...]:
+        """Find the physical outputs in a list of names and ranges."""
+        return self._of_side(names, lambda device: device.output_names)
+
+    def _of_side(self, names: str, side: Callable[[Device], Iterable[str]]) -> tuple[PhysicalChannel, ...]:
+        channels = tuple(self.physical(name) for name in _with_devices(expand(names)))
+        if not channels:
+            raise DaqmxRefusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, "No physical channel was given.")
+        for channel in channels:
+            if channel.name not in side(channel.device):
+                raise DaqmxRefusal(DAQmxErrors.INVALID_PHYS_CHAN_TYPE, f"Physical Channel: {channel.name}")
+        return channels
+
+    # --- scales --------------------------------------------------------------------------
+
+    def add_scale(self, scale: Scale) -> None:
+        """Keep a custom scale, in place of an older one of that name."""
+        self.scales[scale.name] = scale
+
+    def scale(self, name: str) -> Scale:
+        """Find a custom scale by name (-200378 if there is none)."""
+        if name not in self.scales:
+            raise DaqmxRefusal(DAQmxErrors.CUSTOM_SCALE_DOES_NOT_EXIST, f"Custom Scale: {name}")
+        return self.scales[name]
+
+    # --- reservations --------------------------------------------------------------------
+
+    def reserve(self, resource: str, holder: Task) -> None:
+        """Give one side of a device to a task (-50103 if another one holds it)."""
+        other = self._holders.setdefault(resource, holder)
+        if other is not holder:
+            detail = f"Resource: {resource}, held by task {other.name}\nTask Name: {holder.name}"
+            raise DaqmxRefusal(DAQmxErrors.PAL_RESOURCE_RESERVED, detail)
+
+    def release(self, holder: Task) -> None:
+        """Take back everything a task holds."""
+        self._holders = {resource: other for resource, other in self._holders.items() if other is not holder}
+
+
+def _with_devices(names: Iterable[str]) -> Iterable[str]:
+    """In ``"Dev1/ai0, ai2"`` the second channel lies on the first one's device."""
+    device = ""
+    for name in names:
+        if "/" in name.strip("/"):
+            device = name.rpartition("/")[0]
+            yield name
+        else:
+            yield f"{device}/{name}" if device else name

@@ -1,0 +1,238 @@
+"""How the phase of a generator runs with its own time: steady, swept, or modulated.
+
+Phase is in cycles, time in seconds of the generator's own clock. Frequencies are whole microhertz,
+the resolution of the instrument, so that whole seconds contribute an exact fraction of a cycle and
+nothing drifts over hours (a DDS accumulator that never overflows).
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._periodic_shape import PeriodicShape
+
+Samples = NDArray[np.float64]
+
+MICROHERTZ = 1e-6
+UHZ_PER_HZ = 1_000_000
+CURVATURE_TOLERANCE_CYCLES = 1e-6
+"""How far the phase inside a piece may bend away from a straight line."""
+FINEST_SPLIT = 256
+"""At most so many pieces of one interval; only sweeps above some 1e9 Hz/s would need more."""
+MODULATION_STEPS = 64
+"""Pieces per cycle of the modulating shape (an even number, so that a square's edges fall on one)."""
+NO_TIMES: Samples = np.empty(0)
+
+
+class PhaseCourse(Protocol):
+    """Phase as a function of time."""
+
+    def phase(self, time_s: float) -> float:
+        """Return the phase at one instant, as a fraction of a cycle."""
+
+    def stretches(self, edges_s: Samples) -> tuple[Samples, Samples]:
+        """Return start (fraction of a cycle) and span (cycles) of the phase between consecutive edges."""
+
+    def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:
+        """Return the instants inside (begin, end) at which to cut so that the phase is straight."""
+
+
+@dataclass(frozen=True)
+class SteadyPhase:
+    """A constant frequency."""
+
+    frequency_uhz: int
+    offset: float
+    """Phase at time zero [cycles, 0 <= offset < 1]."""
+
+    @classmethod
+    def through(cls, frequency_uhz: int, phase: float, time_s: float) -> "SteadyPhase":
+        """Build the course that has a given phase at a given time."""
+        since_zero = cls(frequency_uhz, 0.0).phase(time_s)
+        return cls(frequency_uhz, (phase - since_zero) % 1.0)
+
+    def phase(self, time_s: float) -> float:
+        """Return the phase at one instant [cycles, 0..1)."""
+        return float(self._fractions(np.asarray([time_s]))[0])
+
+    def _fractions(self, time_s: Samples) -> Samples:
+        whole = np.floor(time_s)
+        exact = (self.frequency_uhz % UHZ_PER_HZ) * whole.astype(np.int64) % UHZ_PER_HZ
+        within = self.frequency_uhz * MICROHERTZ * (time_s - whole)
+        return _fraction(self.offset + exact * MICROHERTZ + within)
+
+    def stretches(self, edges_s: Samples) -> tuple[Samples, Samples]:
+        """Return start and span between consecutive edges."""
+        return self._fractions(edges_s[:-1]), self.frequency_uhz * MICROHERTZ * np.diff(edges_s)
+
+    def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:  # noqa: ARG002
+        """Return none: the phase is straight."""
+        return NO_TIMES
+
+
+class Spacing(StrEnum):
+    """How a sweep moves from start to stop."""
+
+    LINEAR = "linear"
+    LOGARITHMIC = "logarithmic"
+
+
+@dataclass(frozen=True)
+class SweptPhase:
+    """A frequency that runs from start to stop, again and again, without a jump of phase."""
+
+    start_hz: float
+    stop_hz: float
+    sweep_s: float
+    spacing: Spacing
+    begin_s: float
+    """When the first sweep began."""
+    offset: float
+    """Phase at that instant [cycles]."""
+
+    def phase(self, time_s: float) -> float:
+        """Return the phase at one instant [cycles, 0..1)."""
+        return float(_fraction(self.offset + self._cycles(np.asarray([time_s])))[0])
+
+    def _cycles(self, time_s: Samples) -> Samples:
+        sweeps = np.floor((time_s - self.begin_s) / self.sweep_s)
+        within = (time_s - self.begin_s) - sweeps * self.sweep_s
+        per_sweep = self._cycles_within(np.asarray([self.sweep_s]))[0]
+        return np.asarray(sweeps * per_sweep + self._cycles_within(within))
+
+    def _cycles_within(self, time_s: Samples) -> Samples:
+        """Integrate the frequency from the start of a sweep."""
+        if self.spacing is Spacing.LINEAR or self.start_hz == self.stop_hz:
+            rate = (self.stop_hz - self.start_hz) / self.sweep_s
+            return np.asarray(time_s * (self.start_hz + 0.5 * rate * time_s))
+        growth = np.log(self.stop_hz / self.start_hz) / self.sweep_s
+        return np.asarray(self.start_hz * np.expm1(growth * time_s) / growth)
+
+    def stretches(self, edges_s: Samples) -> tuple[Samples, Samples]:
+        """Return start and span between consecutive edges."""
+        cycles = self.offset + self._cycles(edges_s)
+        return _fraction(cycles[:-1]), np.diff(cycles)
+
+    def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:
+        """Return the starts of the sweeps, and as many points between as the curvature asks for."""
+        steepest = abs(self.stop_hz - self.start_hz) / self.sweep_s
+        if self.spacing is Spacing.LOGARITHMIC:
+            steepest = (
+                max(self.start_hz, self.stop_hz) * abs(np.log(self.stop_hz / self.start_hz)) / self.sweep_s
+            )
+        turns = _grid(self.begin_s, self.sweep_s, begin_s, end_s)
+        if steepest == 0:
+            return turns
+        step = np.sqrt(8 * CURVATURE_TOLERANCE_CYCLES / steepest)
+        if step >= interval_s:
+            return turns
+        step = max(step, interval_s / FINEST_SPLIT)
+        return np.concatenate((turns, _grid(self.begin_s, float(step), begin_s, end_s)))
+
+
+@dataclass(frozen=True)
+class Modulator:
+    """The internal modulating signal: a shape between -1 and 1 at its own frequency."""
+
+    shape: PeriodicShape
+    course: SteadyPhase
+
+    def values(self, edges_s: Samples) -> tuple[Samples, Samples]:
+        """Return the signal at both ends of every piece, seen from inside the piece (jumps fall between)."""
+        return self._at(edges_s[:-1], np.diff(edges_s)), self._at(edges_s[1:], -np.diff(edges_s))
+
+    def _at(self, time_s: Samples, inwards_s: Samples) -> Samples:
+        inside = time_s + 1e-6 * inwards_s
+        start, _ = self.course.stretches(np.append(inside, inside[-1:]))
+        return self.shape.mean(start, np.zeros_like(start))
+
+    def means(self, edges_s: Samples) -> Samples:
+        """Return the exact mean of the signal over every piece."""
+        return self.shape.mean(*self.course.stretches(edges_s))
+
+    def breakpoints(self, begin_s: float, end_s: float) -> Samples:
+        """Return a grid on the modulating cycle, fixed in time."""
+        period_s = 1 / (self.course.frequency_uhz * MICROHERTZ)
+        return _grid(-self.course.offset * period_s, period_s / MODULATION_STEPS, begin_s, end_s)
+
+
+@dataclass(frozen=True)
+class FrequencyModulatedPhase:
+    """Frequency modulation; frequency-shift keying is the same with a square.
+
+    The deviation adds ``deviation * mean(signal) * duration`` to every piece; the running sum of a
+    piece starts from the modulating signal's integral, so that any two renderings agree.
+    """
+
+    carrier: SteadyPhase
+    deviation_hz: float
+    modulator: Modulator
+
+    def phase(self, time_s: float) -> float:
+        """Return the phase at one instant [cycles, 0..1)."""
+        return float(self._starts(np.asarray([time_s]))[0])
+
+    def _starts(self, time_s: Samples) -> Samples:
+        start, _ = self.carrier.stretches(np.append(time_s, time_s[-1:]))
+        modulating, _ = self.modulator.course.stretches(np.append(time_s, time_s[-1:]))
+        begin = np.zeros_like(modulating)
+        modulating_hz = self.modulator.course.frequency_uhz * MICROHERTZ
+        # The integral over whole modulating cycles is linear in time; the rest is the open cycle's.
+        cycle_mean = self.modulator.shape.mean(np.zeros(1), np.ones(1))[0]
+        open_cycle = modulating * (self.modulator.shape.mean(begin, modulating) - cycle_mean)
+        extra = self.deviation_hz * (cycle_mean * time_s + open_cycle / modulating_hz)
+        return _fraction(start + extra)
+
+    def stretches(self, edges_s: Samples) -> tuple[Samples, Samples]:
+        """Return start and span between consecutive edges."""
+        _, span = self.carrier.stretches(edges_s)
+        extra = self.deviation_hz * self.modulator.means(edges_s) * np.diff(edges_s)
+        return self._starts(edges_s[:-1]), np.maximum(span + extra, 0.0)
+
+    def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:  # noqa: ARG002
+        """Return the modulator's grid."""
+        return self.modulator.breakpoints(begin_s, end_s)
+
+
+@dataclass(frozen=True)
+class PhaseModulatedPhase:
+    """Phase modulation; phase-shift keying is the same with a square."""
+
+    carrier: SteadyPhase
+    deviation: float
+    """Largest shift [cycles]."""
+    modulator: Modulator
+
+    def phase(self, time_s: float) -> float:
+        """Return the carrier's phase at one instant: what goes on when the modulation ends."""
+        return self.carrier.phase(time_s)
+
+    def stretches(self, edges_s: Samples) -> tuple[Samples, Samples]:
+        """Return start and span between consecutive edges."""
+        start, span = self.carrier.stretches(edges_s)
+        first, last = self.modulator.values(edges_s)
+        return (
+            _fraction(start + self.deviation * first),
+            np.maximum(span + self.deviation * (last - first), 0.0),
+        )
+
+    def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:  # noqa: ARG002
+        """Return the modulator's grid."""
+        return self.modulator.breakpoints(begin_s, end_s)
+
+
+def _fraction(cycles: Samples) -> Samples:
+    """Return the fractional part, strictly below one (a tiny negative number would round up to it)."""
+    fraction = cycles - np.floor(cycles)
+    return np.asarray(np.where(fraction >= 1.0, 0.0, fraction))
+
+
+def _grid(origin_s: float, step_s: float, begin_s: float, end_s: float) -> Samples:
+    """Return all ``origin + k step`` strictly between begin and end."""
+    first = int(np.floor((begin_s - origin_s) / step_s)) + 1
+    last = int(np.ceil((end_s - origin_s) / step_s)) - 1
+    times = origin_s + step_s * np.arange(first, last + 1)
+    return np.asarray(times[(times > begin_s) & (times < end_s)])

@@ -1,0 +1,328 @@
+"""The USB test-and-measurement class in front of an instrument: messages wrapped in bulk transfers.
+
+Sources: USBTMC 1.0 (2003) and its USB488 subclass 1.0; section numbers in the docstrings are USBTMC's
+unless they say USB488. Waiting is not lived through: a transfer that would outlast the host's timeout
+fails at once.
+"""
+
+import errno
+import os
+import struct
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import IntEnum, IntFlag
+from typing import NoReturn, Protocol
+
+from ..generator import BYTE, MAKER, MODEL, ErrorCode, Reply, StatusByte
+from ._device import BULK_IN, BULK_OUT, Identification, Setup
+
+VENDOR_ID = 0x0699
+PRODUCT_ID = 0x0353
+"""Shared by AFG1022 and AFG1062."""
+HEADER = struct.Struct("<BBBxIBBxx")
+"""Message id, tag, inverted tag, length, attributes, termination character (table 1 to 4)."""
+ALIGNMENT = 4
+LONGEST_MESSAGE = 1 << 20
+"""Bytes of a message after which the instrument stalls (assumed; the longest useful has 17 kB)."""
+NEVER_MS = 2**32 - 1
+
+
+class MessageId(IntEnum):
+    """What a bulk transfer is (table 2; USB488 table 1)."""
+
+    OUT = 1
+    REQUEST_IN = 2
+    TRIGGER = 128
+
+
+class Attributes(IntFlag):
+    """Attributes of a bulk header (tables 3, 4 and 9)."""
+
+    END_OF_MESSAGE = 1
+    TERMINATION_CHARACTER = 2
+
+
+class Request(IntEnum):
+    """Class requests on the control endpoint (table 15; USB488 table 9)."""
+
+    INITIATE_ABORT_BULK_OUT = 1
+    CHECK_ABORT_BULK_OUT = 2
+    INITIATE_ABORT_BULK_IN = 3
+    CHECK_ABORT_BULK_IN = 4
+    INITIATE_CLEAR = 5
+    CHECK_CLEAR = 6
+    GET_CAPABILITIES = 7
+    INDICATOR_PULSE = 64
+    READ_STATUS_BYTE = 128
+    REN_CONTROL = 160
+    GO_TO_LOCAL = 161
+    LOCAL_LOCKOUT = 162
+
+
+class TmcStatus(IntEnum):
+    """First byte of the answer to a class request (table 16)."""
+
+    SUCCESS = 1
+    TRANSFER_NOT_IN_PROGRESS = 0x81
+
+
+_CAPABILITIES = bytes(
+    [TmcStatus.SUCCESS, 0, 0x00, 0x01, 0b100, 0b001, 0, 0, 0, 0, 0, 0, 0x00, 0x01, 0b111, 0]
+)
+"""Answer to GET_CAPABILITIES, 4.2.1.8: USBTMC 1.0 with indicator pulse and termination character;
+USB488 1.0 with 488.2, remote control and trigger. Eight reserved bytes follow."""
+
+
+class MessageDevice(Protocol):
+    """What stands behind the interface."""
+
+    serial: str
+
+    def execute(self, message: bytes) -> Reply:
+        """Carry out one complete message and return its reply."""
+
+    def report(self, code: ErrorCode) -> None:
+        """Queue an error that the interface has found."""
+
+    @property
+    def status_byte(self) -> StatusByte:
+        """The status byte without the bit for a waiting message."""
+
+
+@dataclass(frozen=True)
+class _Request:
+    """A pending REQUEST_DEV_DEP_MSG_IN."""
+
+    tag: int
+    length: int
+    terminator: bytes
+    """Empty, or the character at which the transfer shall stop."""
+
+
+@dataclass
+class _Flight:
+    """Everything on its way between host and instrument; a device clear starts a new one."""
+
+    message: bytes = b""
+    """Pieces of a message whose end has not come."""
+    reply: bytes = b""
+    """What the host has not fetched yet."""
+    late_ms: float = 0.0
+    """How long the host still has to wait for the reply."""
+    request: _Request | None = None
+    rest: bytes = b""
+    """The part of a transfer that did not fit into the host's buffer."""
+    aborting: bool = False
+    """An aborted transfer still owes its short packet."""
+    notifications: list[bytes] = field(default_factory=list)
+    stalled: set[int] = field(default_factory=set)
+
+
+class UsbTmcInstrument:
+    """An instrument at the end of a USB cable that can be pulled."""
+
+    def __init__(self, device: MessageDevice, packet_bytes: int = 64) -> None:
+        self._device = device
+        self._identification = Identification(
+            VENDOR_ID, PRODUCT_ID, MAKER, MODEL, device.serial, packet_bytes
+        )
+        self._lock = threading.RLock()
+        self._is_plugged_in = True
+        self._is_hung = False
+        self._flight = _Flight()
+
+    @property
+    def identification(self) -> Identification:
+        """What the descriptors say."""
+        return self._identification
+
+    def pull_cable(self) -> None:
+        """Take the device off the bus: every transfer fails with ENODEV. The instrument itself plays on."""
+        with self._lock:
+            self._is_plugged_in = False
+
+    def plug_cable(self) -> None:
+        """Put the cable back; whatever was in flight is gone."""
+        with self._lock:
+            self._is_plugged_in = True
+            self._flight = _Flight()
+
+    def hang(self) -> None:
+        """Let the instrument take no notice of anybody: every transfer times out, and it plays on."""
+        with self._lock:
+            self._is_hung = True
+
+    def wake(self) -> None:
+        """Let the instrument answer again; whatever was in flight is gone."""
+        with self._lock:
+            self._is_hung = False
+            self._flight = _Flight()
+
+    # Transfers
+
+    def bulk_out(self, data: bytes) -> None:
+        """Take one bulk-OUT transfer: a piece of a message, a request for a reply, or a trigger (3.2)."""
+        with self._lock:
+            self._check_cable()
+            if BULK_OUT in self._flight.stalled or len(data) < HEADER.size:
+                self._stall(BULK_OUT)
+            message_id, tag, inverse, length, attributes, terminator = HEADER.unpack_from(data)
+            if tag == 0 or tag ^ inverse != BYTE:
+                self._stall(BULK_OUT)
+            if message_id == MessageId.OUT:
+                payload = data[HEADER.size : HEADER.size + length]
+                self._take(payload, Attributes(attributes & Attributes.END_OF_MESSAGE))
+            elif message_id == MessageId.REQUEST_IN:
+                stops = bool(attributes & Attributes.TERMINATION_CHARACTER)
+                self._flight.request = _Request(tag, length, bytes([terminator]) if stops else b"")
+            elif message_id == MessageId.TRIGGER:
+                self._execute(b"*TRG")
+            else:
+                self._stall(BULK_OUT)
+
+    def bulk_in(self, length: int, timeout_ms: int) -> bytes:
+        """Hand over the reply that was asked for (3.3), or time out.
+
+        A read without a query queues -420 and times out. A reply that is late by longer than the
+        timeout stays in the instrument, that much less late.
+        """
+        with self._lock:
+            self._check_cable()
+            if BULK_IN in self._flight.stalled:
+                self._stall(BULK_IN)
+            if self._flight.rest:
+                return self._hand_over(length)
+            if self._flight.aborting:
+                self._flight.aborting = False
+                return b""
+            if self._flight.request is None:
+                _time_out()
+            if not self._flight.reply:
+                self._device.report(ErrorCode.QUERY_UNTERMINATED)
+                _time_out()
+            if self._flight.late_ms > timeout_ms and timeout_ms != NEVER_MS:
+                self._flight.late_ms -= timeout_ms
+                _time_out()
+            self._flight.late_ms = 0.0
+            self._flight.rest = self._transfer(self._flight.request)
+            self._flight.request = None
+            return self._hand_over(length)
+
+    def interrupt_in(self, length: int, timeout_ms: int) -> bytes:  # noqa: ARG002 - waiting is not lived through
+        """Hand over the status byte that a READ_STATUS_BYTE has asked for (USB488, 3.4)."""
+        with self._lock:
+            self._check_cable()
+            if not self._flight.notifications:
+                _time_out()
+            return self._flight.notifications.pop(0)[:length]
+
+    def control(self, setup: Setup, data: bytes) -> bytes:  # noqa: ARG002 - no class request carries data
+        """Answer a class request (4.2.1; USB488, 4.3)."""
+        with self._lock:
+            self._check_cable()
+            if setup.request not in Request.__members__.values():
+                raise OSError(errno.EPIPE, os.strerror(errno.EPIPE))
+            return self._answer(Request(setup.request), setup)[: setup.length]
+
+    def clear_halt(self, endpoint: int) -> None:
+        """Let a stalled endpoint work again."""
+        with self._lock:
+            self._check_cable()
+            self._flight.stalled.discard(endpoint)
+
+    # Inside
+
+    def _take(self, payload: bytes, attributes: Attributes) -> None:
+        """Collect a message; carry it out when its last piece has come."""
+        self._flight.message += payload
+        if len(self._flight.message) > LONGEST_MESSAGE:
+            self._flight.message = b""
+            self._stall(BULK_OUT)
+        if Attributes.END_OF_MESSAGE in attributes:
+            message, self._flight.message = self._flight.message, b""
+            self._execute(message)
+
+    def _execute(self, message: bytes) -> None:
+        """Carry out a message; an unread reply before it is lost, with -410 (IEEE 488.2, 6.3.2.3)."""
+        if self._flight.reply or self._flight.rest:
+            self._flight.reply = self._flight.rest = b""
+            self._flight.request = None
+            self._device.report(ErrorCode.QUERY_INTERRUPTED)
+        reply = self._device.execute(message)
+        self._flight.reply, self._flight.late_ms = reply.data, 1e3 * reply.delay_s
+
+    def _transfer(self, request: _Request) -> bytes:
+        """Wrap as much of the reply as was asked for; the last piece carries the end-of-message bit."""
+        end = min(request.length, len(self._flight.reply))
+        if request.terminator:
+            found = self._flight.reply.find(request.terminator, 0, end)
+            end = found + 1 if found >= 0 else end
+        payload, self._flight.reply = self._flight.reply[:end], self._flight.reply[end:]
+        attributes = Attributes(0) if self._flight.reply else Attributes.END_OF_MESSAGE
+        padding = bytes(-len(payload) % ALIGNMENT)
+        header = HEADER.pack(
+            MessageId.REQUEST_IN, request.tag, request.tag ^ BYTE, len(payload), attributes, 0
+        )
+        return header + payload + padding
+
+    def _hand_over(self, length: int) -> bytes:
+        transfer, self._flight.rest = self._flight.rest[:length], self._flight.rest[length:]
+        return transfer
+
+    def _answer(self, request: Request, setup: Setup) -> bytes:
+        """Return the answer to a class request; remote, local and the indicator have nothing to show."""
+        tag = setup.value & BYTE
+        success = bytes([TmcStatus.SUCCESS])
+        answers: dict[Request, Callable[[], bytes]] = {
+            Request.GET_CAPABILITIES: lambda: _CAPABILITIES + bytes(8),
+            Request.READ_STATUS_BYTE: lambda: self._status_byte(tag),
+            Request.INITIATE_ABORT_BULK_OUT: lambda: self._abort_bulk_out(tag),
+            Request.CHECK_ABORT_BULK_OUT: lambda: success + bytes(7),
+            Request.INITIATE_ABORT_BULK_IN: lambda: self._abort_bulk_in(tag),
+            Request.CHECK_ABORT_BULK_IN: lambda: success + bytes(7),
+            Request.INITIATE_CLEAR: self._clear,
+            Request.CHECK_CLEAR: lambda: success + bytes(1),
+        }
+        return answers.get(request, lambda: success)()
+
+    def _clear(self) -> bytes:
+        """Drop everything in flight (4.2.1.6)."""
+        self._flight = _Flight()
+        return bytes([TmcStatus.SUCCESS])
+
+    def _abort_bulk_out(self, tag: int) -> bytes:
+        """Drop the message that was coming in (4.2.1.2)."""
+        self._flight.message = b""
+        return bytes([TmcStatus.SUCCESS, tag])
+
+    def _abort_bulk_in(self, tag: int) -> bytes:
+        """Give up a transfer that the host no longer waits for (4.2.1.4); the reply stays."""
+        if self._flight.request is None or self._flight.request.tag != tag:
+            return bytes([TmcStatus.TRANSFER_NOT_IN_PROGRESS, 0])
+        self._flight.request = None
+        self._flight.rest = b""
+        self._flight.aborting = True
+        return bytes([TmcStatus.SUCCESS, tag])
+
+    def _status_byte(self, tag: int) -> bytes:
+        """Send the status byte through the interrupt endpoint (USB488, 4.3.1.2)."""
+        status = self._device.status_byte
+        if self._flight.reply or self._flight.rest:
+            status |= StatusByte.MESSAGE_AVAILABLE
+        self._flight.notifications.append(bytes([tag | 0x80, int(status)]))
+        return bytes([TmcStatus.SUCCESS, tag, 0])
+
+    def _check_cable(self) -> None:
+        if not self._is_plugged_in:
+            raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
+        if self._is_hung:
+            _time_out()
+
+    def _stall(self, endpoint: int) -> NoReturn:
+        self._flight.stalled.add(endpoint)
+        raise OSError(errno.EPIPE, os.strerror(errno.EPIPE))
+
+
+def _time_out() -> NoReturn:
+    raise TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT))

@@ -1,0 +1,51 @@
+"""The grid of time on which the analogue world is computed."""
+
+from dataclasses import dataclass
+
+from vibench.acquisition.rig import USUAL_GRID_RATE_HZ
+
+FULL_BAND_HZ = 25_600.0
+"""The band in which the rig's configuration gives the noise of instruments: half the fastest usual rate."""
+
+PPM = 1e-6
+
+
+@dataclass(frozen=True)
+class TimeGrid:
+    """Equal steps of rig time.
+
+    Rig time is what the converter's clock counts, so that a sample lies on a whole number of steps for
+    ever. Physical time differs by the clock's error, and the laws of physics get the physical step.
+
+    The usual grid has twice the fastest usual sample rate: whole divisors give every rate of an NI 9234,
+    its anti-alias filter has room for its transition band, and a step (9.8 us) is short against the
+    specimen's shortest period (2 ms), while contacts, which are shorter, are resolved inside a step.
+    """
+
+    rate_hz: float = USUAL_GRID_RATE_HZ
+    """Steps per second of rig time."""
+
+    @property
+    def step_s(self) -> float:
+        """One step of rig time [s]."""
+        return 1.0 / self.rate_hz
+
+    def physical_step_s(self, converter_clock_ppm: float) -> float:
+        """How long a step really takes when the converter's clock is fast by so much [s]."""
+        return self.step_s / (1.0 + converter_clock_ppm * PPM)
+
+    def rms_per_step(self, rms: float) -> float:
+        """Convert the rms of white noise in ``FULL_BAND_HZ`` to its rms on the grid."""
+        return rms * float((self.rate_hz / 2 / FULL_BAND_HZ) ** 0.5)
+
+    def step_at(self, time_s: float) -> int:
+        """Find the grid point nearest to a rig time."""
+        return round(time_s * self.rate_hz)
+
+
+USUAL_GRID = TimeGrid()
+
+
+def relative_clock_ppm(clock_ppm: float, converter_clock_ppm: float) -> float:
+    """Error of another instrument's clock as rig time, the converter's count, sees it [ppm]."""
+    return ((1.0 + clock_ppm * PPM) / (1.0 + converter_clock_ppm * PPM) - 1.0) / PPM

@@ -1,0 +1,272 @@
+"""The analogue world: everything between the generator's terminal and the samples of the converter."""
+
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibench.acquisition import ConfigurationError
+from vibench.acquisition.rig import Rig, VirtualConfig, fastest_sample_rate_hz, specimen_of
+from vibench.sim import Specimen
+
+from ..analogue import Input
+from ._analogue_output import AnalogueOutput
+from ._conversion import Conversion, converter_input
+from ._decimation import history_steps
+from ._disturbance import Disturbance, RandomDropouts
+from ._event_schedule import Appointments
+from ._input_stage import InputStage
+from ._noise import NoiseStream
+from ._plant import TRUTH_COLUMNS, Plant
+from ._sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer
+from ._time_grid import PPM, TimeGrid
+from ._wiring import OPEN_INPUT, Cable, Signal, amplifier_input, cables_of
+
+FloatArray = NDArray[np.float64]
+
+LOWEST_RATE_HZ = 500.0
+"""Slowest conversion: its filter looks back a tenth of a second."""
+HIGHEST_RATE_HZ = 250e3
+"""Fastest conversion; beyond the world's own rate it interpolates."""
+
+_STRETCH_STEPS = 8192
+"""Steps computed in one go: long enough to amortise the calls, short enough to stay in the cache."""
+
+
+class TerminalVoltage(Protocol):
+    """The generator as the amplifier sees it."""
+
+    def render(self, start_s: float, interval_s: float, count: int) -> FloatArray:
+        """Mean terminal voltage over each of ``count`` intervals [V]; calls follow each other in time."""
+
+
+class World:
+    """The simulated rig in rig time, advancing only when asked to.
+
+    Rig time is counted by the converter's clock (see `time_grid`). Two worlds of one configuration
+    agree bit for bit, whatever sizes of blocks they are read in. Safe to use from several threads;
+    `time_s` never waits, so an instrument may ask for it while it is being rendered.
+    """
+
+    def __init__(self, rig: Rig, terminal: TerminalVoltage, specimen: Specimen | None = None) -> None:
+        """``specimen`` defaults to the one the rig describes."""
+        virtual = virtual_section(rig)
+        self._grid = grid = TimeGrid(virtual.grid_rate_hz)
+        noise = partial(NoiseStream, virtual.seed)
+        self.vibrometer = Vibrometer(
+            rig.vibrometer,
+            virtual.vibrometer_noise_m_per_s_per_rthz,
+            RandomDropouts(virtual.vibrometer_dropouts_per_s, noise("laser dropouts"), grid),
+            noise("vibrometer"),
+            grid,
+        )
+        step_s = grid.physical_step_s(virtual.converter_clock_ppm)
+        self.plant = Plant(rig, specimen or specimen_of(rig), step_s)
+        self._accelerometer = Accelerometer(
+            rig.accelerometer, virtual.accelerometer_noise_m_per_s2, noise("accelerometer"), grid
+        )
+        self._terminal = terminal
+        self._gain_db = rig.amplifier.gain_db
+        self._amplifier_noise = noise("amplifier")
+        self._amplifier_noise_v = grid.rms_per_step(virtual.amplifier_noise_v)
+        self._noise = noise
+        self._converter_noise_v = virtual.converter_noise_v
+        self._plan = cables_of(rig, self.vibrometer.delay_steps)
+        self._cables = dict(self._plan)
+        self._amplifier_input = amplifier_input(rig)
+        self._outputs: dict[str, AnalogueOutput] = {}
+        self._conversions: list[Conversion] = []
+        self._history = np.zeros((len(Signal), _history_steps(grid)))
+        self._appointments = Appointments(grid)
+        self._step = 0
+        self._unspent_steps = 0.0
+        self._truth: list[FloatArray] | None = None
+        self._turn = threading.RLock()
+
+    @property
+    def time_s(self) -> float:
+        """Rig time: how far the world has been computed [s]."""
+        return self._step * self._grid.step_s
+
+    def advance(self, duration_s: float) -> None:
+        """Let rig time pass; fractions of a step add up until they are one."""
+        with self._turn:
+            wanted = self._unspent_steps + duration_s * self._grid.rate_hz
+            steps = max(round(wanted), 0)
+            self._unspent_steps = wanted - steps
+            self._compute_to(self._step + steps)
+
+    def at(self, time_s: float, action: Callable[[], None]) -> None:
+        """Let something happen at a rig time, to the step; a time that has passed is the next step."""
+        with self._turn:
+            self._appointments.make(time_s, action)
+
+    def sample(self, inputs: tuple[Input, ...], sample_rate_hz: float) -> Conversion:
+        """Begin a conversion now.
+
+        Any rate from 500 Hz to 250 kHz, and to half the grid's on a coarser grid than the usual one; whole
+        divisors of the grid's are the fast case. All inputs share one delay of 40 samples (at most the
+        grid's rate counted), as behind a delta-sigma converter.
+
+        Raises
+        ------
+        ConfigurationError
+            When the rate lies outside.
+
+        """
+        fastest_hz = fastest_sample_rate_hz(self._grid.rate_hz) or HIGHEST_RATE_HZ
+        if not LOWEST_RATE_HZ <= sample_rate_hz <= fastest_hz:
+            raise ConfigurationError(
+                f"A sample rate of {sample_rate_hz:g} Hz is not possible on the virtual rig with its "
+                f"{self._grid.rate_hz:g} steps a second: {LOWEST_RATE_HZ:g} to {fastest_hz:g} Hz is; nothing "
+                "was started, choose one of those"
+            )
+        with self._turn:
+            ratio = self._grid.rate_hz / sample_rate_hz
+            ratio = round(ratio) if abs(ratio - round(ratio)) < PPM else ratio
+            channels = tuple(
+                converter_input(
+                    InputStage(
+                        configured, self._cables.get(configured.physical_channel, OPEN_INPUT), self._grid
+                    ),
+                    ratio,
+                    self._step,
+                    self._converter_noise_v,
+                    self._noise(f"{configured.physical_channel} from step {self._step}"),
+                )
+                for configured in inputs
+            )
+            for channel in channels:
+                channel.begin(self._history, self._step - self._history.shape[1])
+            conversion = Conversion(channels, ratio, self._step, self._go_on_to, self._end)
+            self._conversions.append(conversion)
+            return conversion
+
+    def play(self, physical_channel: str, volts: FloatArray, sample_rate_hz: float) -> None:
+        """Queue samples of an analogue output behind what it still has to play; they start now if idle."""
+        with self._turn:
+            self._output(physical_channel).queue(volts, sample_rate_hz, self._step)
+
+    def unplayed(self, physical_channel: str) -> int:
+        """How many queued samples of that output have not been played yet."""
+        with self._turn:
+            return self._output(physical_channel).unplayed(self._step)
+
+    def silence(self, physical_channel: str) -> None:
+        """Drop what is queued and hold that output at zero."""
+        with self._turn:
+            self._output(physical_channel).drop()
+
+    def set_amplifier_gain_db(self, gain_db: float) -> None:
+        """Turn the amplifier's knob."""
+        with self._turn:
+            self.plant.set_gain(10 ** (gain_db / 20))
+
+    def restore_amplifier_gain(self) -> None:
+        """Turn the amplifier's knob to what the rig's configuration says."""
+        self.set_amplifier_gain_db(self._gain_db)
+
+    def disturb_vibrometer(self, duration_s: float, level: float) -> None:
+        """Let the vibrometer show ``level`` (part of full scale) from now on, for a while."""
+        with self._turn:
+            self.vibrometer.disturb(
+                Disturbance(self._step, self._step + self._grid.step_at(duration_s), level)
+            )
+
+    def connect(self, physical_channel: str) -> None:
+        """Plug the cable of an input in, as the rig describes it."""
+        self._plug(physical_channel, self._plan.get(physical_channel, OPEN_INPUT))
+
+    def disconnect(self, physical_channel: str) -> None:
+        """Pull the cable out of an input: it shows nothing, or its own excitation."""
+        self._plug(physical_channel, OPEN_INPUT)
+
+    def reverse(self, physical_channel: str) -> None:
+        """Swap the two wires of an input: it shows the opposite sign."""
+        cable = self._plan.get(physical_channel, OPEN_INPUT)
+        self._plug(physical_channel, replace(cable, attenuation=-cable.attenuation))
+
+    def keep_truth(self) -> None:
+        """Begin to write down what no instrument shows: 72 bytes a step, 7.4 MB a second."""
+        with self._turn:
+            self._truth = []
+
+    def truth(self) -> FloatArray:
+        """Hand over what was written down and go on with a clean sheet, shape (steps, 9).
+
+        Columns as in ``TRUTH_COLUMNS``; a row belongs to the end of a step.
+        """
+        with self._turn:
+            kept, self._truth = self._truth or [], []
+            return np.concatenate(kept) if kept else np.empty((0, len(TRUTH_COLUMNS)))
+
+    def _plug(self, physical_channel: str, cable: Cable) -> None:
+        with self._turn:
+            self._cables[physical_channel] = cable
+            for conversion in self._conversions:
+                conversion.plug(physical_channel, cable)
+
+    def _output(self, physical_channel: str) -> AnalogueOutput:
+        return self._outputs.setdefault(physical_channel, AnalogueOutput(self._grid))
+
+    def _go_on_to(self, step: int) -> None:
+        with self._turn:
+            self._compute_to(step)
+
+    def _end(self, conversion: Conversion) -> None:
+        with self._turn:
+            self._conversions = [other for other in self._conversions if other is not conversion]
+
+    def _compute_to(self, step: int) -> None:
+        while self._step < step:
+            self._appointments.keep(self._step)
+            stop = self._appointments.stop_before(step)
+            self._compute(min(stop - self._step, _STRETCH_STEPS))
+
+    def _compute(self, steps: int) -> None:
+        first, step_s = self._step, self._grid.step_s
+        drive = np.array(self._terminal.render(first * step_s, step_s, steps), dtype=np.float64)
+        for channel, output in self._outputs.items():
+            played = output.render(first, steps)
+            if channel == self._amplifier_input:
+                drive += played
+        noise = self._amplifier_noise_v * self._amplifier_noise.draw(first, steps)
+        motion = self.plant.move(drive, noise, steps if self._truth is not None else 0)
+        if self._truth is not None:
+            self._truth.append(motion.truth)
+        signals = np.empty((len(Signal), steps))
+        signals[Signal.DRIVE] = drive
+        signals[Signal.AMPLIFIER] = motion.amplifier_voltage
+        signals[Signal.BASE_ACCELERATION] = self._accelerometer.show(motion.base_acceleration, first)
+        signals[Signal.M0_VELOCITY] = self.vibrometer.show(motion.m0_velocity, first)
+        self._step = first + steps
+        self._remember(signals)
+        for conversion in self._conversions:
+            conversion.take(signals, first)
+
+    def _remember(self, signals: FloatArray) -> None:
+        steps, kept = signals.shape[1], self._history.shape[1]
+        if steps >= kept:
+            self._history[:] = signals[:, -kept:]
+        else:
+            self._history[:, :-steps] = self._history[:, steps:]
+            self._history[:, -steps:] = signals
+
+
+def _history_steps(grid: TimeGrid) -> int:
+    """Count the steps that the slowest conversion looks back on when it begins."""
+    return history_steps(grid.rate_hz / LOWEST_RATE_HZ, LONGEST_DELAY_S * grid.rate_hz) + 2
+
+
+def virtual_section(rig: Rig) -> VirtualConfig:
+    """Return how the rig's instruments are simulated; ConfigurationError when they are real."""
+    if rig.virtual is None:
+        raise ConfigurationError(
+            f"The rig {rig.name!r} has no [virtual] section, so its instruments are real and none was "
+            "simulated; add the section, or open the bench with the real instruments"
+        )
+    return rig.virtual
