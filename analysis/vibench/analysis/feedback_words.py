@@ -44,7 +44,7 @@ def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
 
 
 def _jump(numbers: Mapping[str, int | float | str | None]) -> NotedJump:
-    low_hz, high_hz = sorted((_number(numbers, "before_hz"), _number(numbers, "after_hz")))
+    low_hz, high_hz = sorted((_given_number(numbers, "before_hz"), _given_number(numbers, "after_hz")))
     return NotedJump(str(numbers["direction"]), low_hz, high_hz)
 
 
@@ -53,23 +53,23 @@ def _count(steps: Sequence[Mapping[str, int | float | str | None]], period: int)
 
 
 def _resonance(numbers: Mapping[str, int | float | str | None]) -> str:
-    level = f"{_number(numbers, 'asked_m_per_s2'):g} m/s²"
+    level = f"{_given_number(numbers, 'asked_m_per_s2'):g} m/s²"
     if numbers.get("frequency_hz") is None:
         return f"No phase resonance at {level}: {numbers['lock']}."
-    frequency_hz, u_hz = _number(numbers, "frequency_hz"), _number(numbers, "frequency_u_hz")
+    frequency_hz, u_hz = _given_number(numbers, "frequency_hz"), _given_number(numbers, "frequency_u_hz")
     text = f"Phase resonance at {frequency_hz:.3f} ± {2 * u_hz:.2g} Hz ({level})"
     if numbers.get("mode_hz") is None:
         return f"{text}."
-    mode_hz, mode_u_hz = _number(numbers, "mode_hz"), _number(numbers, "mode_u_hz")
-    damping = _number(numbers, "damping_ratio")
+    mode_hz, mode_u_hz = _given_number(numbers, "mode_hz"), _given_number(numbers, "mode_u_hz")
+    damping = _given_number(numbers, "damping_ratio")
     return f"{text}; natural frequency {mode_hz:.3f} ± {2 * mode_u_hz:.2g} Hz, damping ratio {damping:.3g}."
 
 
-def _number(numbers: Mapping[str, int | float | str | None], key: str) -> float:
+def _given_number(numbers: Mapping[str, int | float | str | None], key: str) -> float:
     value = numbers[key]
     assert isinstance(value, int | float), f"{key} of a note is a number"
     return float(value)
 
 
 def _whole(numbers: Mapping[str, int | float | str | None], key: str) -> int:
-    return int(_number(numbers, key))
+    return int(_given_number(numbers, key))

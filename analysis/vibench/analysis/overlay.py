@@ -157,13 +157,13 @@ def overlay(
     stage("predicting the response to sines")
     match analysis:
         case NoiseAnalysis():
-            return _noise(analysis, channels)
+            return noise_overlay(analysis, channels)
         case SweepAnalysis():
-            return _sweep(analysis, channels)
+            return sweep_overlay(analysis, channels)
         case DwellAnalysis():
-            return _dwell(analysis, channels)
+            return dwell_overlay(analysis, channels)
         case SteppedSineAnalysis():
-            return _stepped(analysis, channels)
+            return stepped_overlay(analysis, channels)
         case _:
             assert_never(analysis)
 
@@ -181,7 +181,8 @@ def _run(channels: SimulatedChannels, label: str) -> SimulatedRun:
     )
 
 
-def _noise(analysis: NoiseAnalysis, channels: SimulatedChannels) -> NoiseOverlay:
+def noise_overlay(analysis: NoiseAnalysis, channels: SimulatedChannels) -> NoiseOverlay:
+    """Estimate from simulated channels what was estimated from the recorded ones."""
     noise = analysis.excitation
     response = noise_response(channels, noise, analysis.request)
     measured, simulated = analysis.response.transmission, response.transmission
@@ -220,7 +221,8 @@ def equivalent_amplitude(analysis: NoiseAnalysis) -> tuple[float, str]:
     return float(np.sqrt(2) * rms), "a sine of the same rms base displacement"
 
 
-def _sweep(analysis: SweepAnalysis, channels: SimulatedChannels) -> SweepOverlay:
+def sweep_overlay(analysis: SweepAnalysis, channels: SimulatedChannels) -> SweepOverlay:
+    """Follow the sweep through simulated channels as through the recorded ones."""
     response, _ = measured_sweep(channels, analysis.excitation)
     measured = analysis.response
     rising = np.argsort(measured.frequency_hz)
@@ -240,7 +242,8 @@ def _sweep(analysis: SweepAnalysis, channels: SimulatedChannels) -> SweepOverlay
     )
 
 
-def _dwell(analysis: DwellAnalysis, channels: SimulatedChannels) -> DwellOverlay:
+def dwell_overlay(analysis: DwellAnalysis, channels: SimulatedChannels) -> DwellOverlay:
+    """Measure the dwell in simulated channels as in the recorded ones."""
     towards_hz = bound_frequencies_hz(analysis.facts)
     response = measured_dwell(channels, analysis.excitation, towards_hz)
     measured = analysis.response
@@ -264,7 +267,8 @@ def _dwell(analysis: DwellAnalysis, channels: SimulatedChannels) -> DwellOverlay
     )
 
 
-def _stepped(analysis: SteppedSineAnalysis, channels: SimulatedChannels) -> SteppedSineOverlay:
+def stepped_overlay(analysis: SteppedSineAnalysis, channels: SimulatedChannels) -> SteppedSineOverlay:
+    """Measure every step in simulated channels as in the recorded ones."""
     response = stepped_response(channels, analysis.excitation)
     measured = analysis.response
     return SteppedSineOverlay(

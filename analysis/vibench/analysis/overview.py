@@ -54,7 +54,7 @@ class Picture:
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class OverviewLevel:
     """Extremes of bins of one length, in a channel's unit; arrays of shape (bins,)."""
 
     bin_samples: int
@@ -67,7 +67,7 @@ class RecordingOverview:
     """A recording that can be looked at; made by `overview_of`."""
 
     recording: Recording
-    levels: dict[str, tuple[Level, ...]]
+    levels: dict[str, tuple[OverviewLevel, ...]]
     """By role; fine to coarse."""
 
     def picture(self, roles: Sequence[str], start: int, stop: int, columns: int) -> Picture:
@@ -129,9 +129,11 @@ def overview_of(recording: Recording, on_read: OnRead = ignore_reading) -> Recor
     return RecordingOverview(recording, overview_levels(recording, on_read))
 
 
-def overview_levels(recording: Recording, on_read: OnRead = ignore_reading) -> dict[str, tuple[Level, ...]]:
+def overview_levels(
+    recording: Recording, on_read: OnRead = ignore_reading
+) -> dict[str, tuple[OverviewLevel, ...]]:
     """Give the extremes of every channel, fine to coarse: what crosses from a process that made them."""
-    levels: dict[str, tuple[Level, ...]] = {}
+    levels: dict[str, tuple[OverviewLevel, ...]] = {}
     values = recording.samples * len(recording.channels)
     for number, channel in enumerate(recording.channels):
         kept = recording.read_overview(channel.role)
@@ -141,7 +143,7 @@ def overview_levels(recording: Recording, on_read: OnRead = ignore_reading) -> d
     return levels
 
 
-def kept_levels(recording: Recording, role: str) -> tuple[Level, ...]:
+def kept_levels(recording: Recording, role: str) -> tuple[OverviewLevel, ...]:
     """Give the extremes of one channel, fine to coarse, as the file keeps them; see `has_overview`.
 
     Raises
@@ -167,16 +169,16 @@ def _made(recording: Recording, role: str, before: int, values: int, on_read: On
     return sums.overview()
 
 
-def _levels(kept: CountOverview, channel: ChannelHeader) -> tuple[Level, ...]:
+def _levels(kept: CountOverview, channel: ChannelHeader) -> tuple[OverviewLevel, ...]:
     low, high = _scaled(kept.low, channel), _scaled(kept.high, channel)
     if channel.scale_factor < 0:
         low, high = high, low
-    levels = [Level(BIN_SAMPLES, low, high)]
+    levels = [OverviewLevel(BIN_SAMPLES, low, high)]
     while levels[-1].low.size > _LEAST_BINS:
         fine = levels[-1]
         starts = np.arange(0, fine.low.size, _COARSER)
         levels.append(
-            Level(
+            OverviewLevel(
                 fine.bin_samples * _COARSER,
                 np.fmin.reduceat(fine.low, starts),
                 np.fmax.reduceat(fine.high, starts),

@@ -78,21 +78,21 @@ def kept_result(compared: ComparedRecording) -> tuple[Result, tuple[Failure, ...
 def _traces(result: Result, name: str) -> Iterator[Trace]:
     match result:
         case NoiseResult(analysis=noise, laid=laid):
-            yield _transmission(name, Origin.MEASURED, noise.response.transmission)
+            yield transmission_trace(name, Origin.MEASURED, noise.response.transmission)
             if laid is not None:
-                yield _transmission(name, Origin.SIMULATED, laid.response.transmission)
+                yield transmission_trace(name, Origin.SIMULATED, laid.response.transmission)
         case SweepResult(analysis=sweep, laid=laid):
-            yield from _sweep(name, Origin.MEASURED, sweep.response)
+            yield from sweep_traces(name, Origin.MEASURED, sweep.response)
             if laid is not None:
-                yield from _sweep(name, Origin.SIMULATED, laid.response)
+                yield from sweep_traces(name, Origin.SIMULATED, laid.response)
         case DwellResult(analysis=dwell, laid=laid):
-            yield from _dwell(name, Origin.MEASURED, dwell.response)
+            yield from dwell_traces(name, Origin.MEASURED, dwell.response)
             if laid is not None:
-                yield from _dwell(name, Origin.SIMULATED, laid.response)
+                yield from dwell_traces(name, Origin.SIMULATED, laid.response)
         case SteppedSineResult(analysis=stepped, laid=laid):
-            yield from _stepped(name, Origin.MEASURED, stepped.response)
+            yield from stepped_traces(name, Origin.MEASURED, stepped.response)
             if laid is not None:
-                yield from _stepped(name, Origin.SIMULATED, laid.response)
+                yield from stepped_traces(name, Origin.SIMULATED, laid.response)
     if result.laid is not None and result.laid.prediction.frequency_hz.size > 1:
         yield from predicted_traces(name, result.laid.prediction)
 
@@ -111,7 +111,8 @@ def predicted_traces(name: str, found: Prediction) -> Iterator[Trace]:
     )
 
 
-def _transmission(name: str, origin: Origin, found: Transmission) -> Trace:
+def transmission_trace(name: str, origin: Origin, found: Transmission) -> Trace:
+    """Make a curve of an estimated transmission, with its bounds."""
     how = found.settings
     note = f"{how.estimator.value}, {found.n_eff:.3g} averages, lines {found.resolution_hz:.3g} Hz wide"
     return Trace(
@@ -125,14 +126,16 @@ def _transmission(name: str, origin: Origin, found: Transmission) -> Trace:
     )
 
 
-def _sweep(name: str, origin: Origin, found: SweepResponse) -> Iterator[Trace]:
+def sweep_traces(name: str, origin: Origin, found: SweepResponse) -> Iterator[Trace]:
+    """Make a curve of each response that a sweep measured."""
     note = f"{found.sweep_rate_hz_per_s:+.3g} Hz/s"
     yield from _responses(
         name, origin, found.frequency_hz, (found.response_i, found.response_ii, found.sd_response_ii), note
     )
 
 
-def _stepped(name: str, origin: Origin, found: SteppedResponse) -> Iterator[Trace]:
+def stepped_traces(name: str, origin: Origin, found: SteppedResponse) -> Iterator[Trace]:
+    """Make a curve of each response that a stepped sine measured."""
     """Give steps up and steps down as curves of their own: between jumps they differ."""
     if found.frequency_hz.size > 1 and np.ptp(found.frequency_hz) < SAME_HZ:
         return  # levels at one frequency are no curve over it
@@ -145,7 +148,8 @@ def _stepped(name: str, origin: Origin, found: SteppedResponse) -> Iterator[Trac
         )
 
 
-def _dwell(name: str, origin: Origin, found: DwellResponse) -> Iterator[Trace]:
+def dwell_traces(name: str, origin: Origin, found: DwellResponse) -> Iterator[Trace]:
+    """Make a point of each response that a dwell measured."""
     values = (
         np.array([found.response_i]),
         np.array([found.response_ii]),

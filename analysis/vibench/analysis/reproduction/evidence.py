@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from vibench.sim.study import Study, StudyResults
 
-Kept = TypeVar("Kept")
+Computed = TypeVar("Computed")
 Solve = Callable[[Study], StudyResults]
 """Answers a study, from its file where there is one; raises rather than to give half of it."""
 
@@ -27,7 +27,7 @@ class Evidence:
         """All that were answered so far."""
         return tuple(each for each in self._remembered.values() if isinstance(each, StudyResults))
 
-    def remembered(self, key: object, compute: Callable[[], Kept]) -> Kept:
+    def remembered(self, key: object, compute: Callable[[], Computed]) -> Computed:
         """Compute something under a key that says everything that it depends on."""
         if key not in self._remembered:
             self._remembered[key] = compute()

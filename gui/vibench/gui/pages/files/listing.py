@@ -13,10 +13,10 @@ from vibench.acquisition.campaign import (
     catalogue,
     read_journal,
 )
-from vibench.analysis.overview import Level, overview_levels
+from vibench.analysis.overview import OverviewLevel, overview_levels
 from vibench.analysis.thumbnail import Thumbnail, thumbnail
 
-Levels = dict[str, tuple[Level, ...]]
+Levels = dict[str, tuple[OverviewLevel, ...]]
 
 
 @dataclass(frozen=True)
