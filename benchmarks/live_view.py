@@ -13,8 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from vibench.analysis.live.envelope import envelope
-from vibench.analysis.live.view import LiveChannel, LiveView
+from vibench.analysis.live import LiveChannel, LiveView, envelope
 
 RATE_HZ, BLOCK, COLUMNS, SPAN_S = 51_200.0, 2560, 1000, 2.0
 FRAMES = 200

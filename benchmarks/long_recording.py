@@ -25,8 +25,9 @@ from vibench.acquisition.recording import (
     RecordingState,
     create_recording,
 )
-from vibench.analysis.measurement_analysis import analyse_recording
-from vibench.analysis.recorded_channels import BASE, DRIVE, RESPONSE
+from vibench.analysis import analyse_recording
+from vibench.analysis.live import RESPONSE
+from vibench.analysis.recordings import BASE, DRIVE
 
 RATE_HZ = 51_200
 BLOCK = 1 << 19

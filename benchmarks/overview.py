@@ -24,8 +24,8 @@ from vibench.acquisition.recording import (
     RecordingHeader,
     create_recording,
 )
-from vibench.analysis.live.envelope import envelope
-from vibench.analysis.overview import overview_of
+from vibench.analysis.live import envelope
+from vibench.analysis.live._overview import overview_of
 
 RATE_HZ = 51_200
 COLUMNS = 1000

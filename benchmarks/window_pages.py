@@ -21,9 +21,9 @@ import numpy as np
 from PySide6.QtCore import QEventLoop, QTimer
 from PySide6.QtWidgets import QApplication
 
-from vibench.analysis.comparison.trace import Origin, Response, Trace
-from vibench.analysis.simulation.answers import SimulatedPoint
-from vibench.analysis.simulation.course import SimulationCourse
+from vibench.analysis import Origin, Response, Trace
+from vibench.analysis.simulation import SimulationCourse
+from vibench.analysis.simulation._answers import SimulatedPoint
 from vibench.gui.app import application
 from vibench.gui.desk import Desk
 from vibench.gui.loop_watch import LoopWatch

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vibench.analysis.accuracy_document import accuracy_document, worst_error
-from vibench.analysis.figures.tradeoff import tradeoff_figure
+from vibench.analysis.report import accuracy_document, tradeoff_figure, worst_error
 from vibench.sim import Accuracy
 from vibench.sim.accuracy_benchmark import MOTIONS, Thoroughness, measured_trade
 

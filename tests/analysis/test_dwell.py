@@ -5,11 +5,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from vibench.analysis.drive_level import drive_level, noise_drive_level
-from vibench.analysis.dwell import dwell_response
-from vibench.analysis.errors import InvalidRequest, NotEnoughData, UnusableData
+from vibench.analysis import InvalidRequest, NotEnoughData
+from vibench.analysis.errors import UnusableData
+from vibench.analysis.sine import dwell_response
+from vibench.analysis.sine._stroboscope import stroboscope
 from vibench.analysis.spectra import spectral_density
-from vibench.analysis.stroboscope import stroboscope
+from vibench.analysis.tones import drive_level, noise_drive_level
 from vibench.sim import Harmonic, gong2025, integrate
 
 RATE = 12_800.0

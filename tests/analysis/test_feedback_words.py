@@ -8,14 +8,13 @@ import pytest
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, ResonanceTracking, SettledSine
 from vibench.acquisition.rig import load_rig
-from vibench.analysis.campaign_results import CampaignResults, SteppedSineResult
-from vibench.analysis.feedback_notes import FeedbackNote
-from vibench.analysis.feedback_words import feedback_sentences, noted_jumps
-from vibench.analysis.figures.stepped_sine import stepped_sine_figure
-from vibench.analysis.measurement_analysis import analyse_recording
-from vibench.analysis.report.figure_choice import result_figures
-from vibench.analysis.report.findings import findings
-from vibench.analysis.summary import summary
+from vibench.analysis import CampaignResults, analyse_recording, summary
+from vibench.analysis.figures import stepped_sine_figure
+from vibench.analysis.recordings import FeedbackNote
+from vibench.analysis.report import result_figures
+from vibench.analysis.report._findings import findings
+from vibench.analysis.results import SteppedSineResult
+from vibench.analysis.sine import feedback_sentences, noted_jumps
 
 ROOT = Path(__file__).parent.parent.parent
 JUMP = {"direction": "down", "before_hz": 101.25, "after_hz": 100.9375, "how": "localised"}

@@ -8,7 +8,8 @@ import pytest
 from vibench.acquisition import load_campaign
 from vibench.acquisition.plan import Measurement, SineSweep, predicted_loads
 from vibench.acquisition.rig import Quantity, load_rig
-from vibench.analysis.foresight import bands_of, base_amplitude_m, foresee
+from vibench.analysis import foresee
+from vibench.analysis.model._foresight import bands_of, base_amplitude_m
 
 ROOT = Path(__file__).resolve().parents[2]
 QUICK = {each.name: each for each in load_campaign(ROOT / "campaigns" / "quick.toml").measurements}

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.errors import InvalidRequest
-from vibench.analysis.hysteresis import hysteresis
-from vibench.analysis.jumps import jumps
-from vibench.analysis.sweep import sweep_response
+from vibench.analysis import InvalidRequest
+from vibench.analysis.sine import hysteresis, jumps
+from vibench.analysis.sine._sweep import sweep_response
 from vibench.sim import LinearSweep, gong2025, integrate, jump_frequencies, spring_of, structure_of
 
 TIME_S = 0.1 * np.arange(2000)

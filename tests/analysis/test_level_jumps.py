@@ -8,13 +8,11 @@ import pytest
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, SteppedLevel
 from vibench.acquisition.rig import load_rig
-from vibench.analysis.campaign_results import CampaignResults, SteppedSineResult
-from vibench.analysis.figures.stepped_sine import stepped_sine_figure
-from vibench.analysis.level_jumps import hysteresis_vpp, level_jumps
-from vibench.analysis.measurement_analysis import analyse_recording
-from vibench.analysis.report.findings import findings
-from vibench.analysis.stepped_response import SteppedResponse
-from vibench.analysis.summary import summary
+from vibench.analysis import CampaignResults, analyse_recording, summary
+from vibench.analysis.figures import stepped_sine_figure
+from vibench.analysis.report._findings import findings
+from vibench.analysis.results import SteppedSineResult
+from vibench.analysis.sine import SteppedResponse, hysteresis_vpp, level_jumps
 
 RIG = load_rig(Path(__file__).parents[2] / "hardware_configs" / "virtual_rig.toml")
 

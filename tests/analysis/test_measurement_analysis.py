@@ -5,15 +5,11 @@ import pytest
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import RecordingState
-from vibench.analysis.errors import NotEnoughData, UnusableData
-from vibench.analysis.measurement_analysis import (
-    DwellAnalysis,
-    NoiseAnalysis,
-    SteppedSineAnalysis,
-    SweepAnalysis,
-    analyse_recording,
-)
-from vibench.analysis.measurement_checks import Verdict
+from vibench.analysis import NotEnoughData, analyse_recording
+from vibench.analysis.errors import UnusableData
+from vibench.analysis.frequency_response import NoiseAnalysis
+from vibench.analysis.recordings import Verdict
+from vibench.analysis.sine import DwellAnalysis, SteppedSineAnalysis, SweepAnalysis
 from vibench.sim import base_transmissibility, gong2025
 
 RATE = 6400.0

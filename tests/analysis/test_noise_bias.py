@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import erf
 
-from vibench.analysis.noise_bias import noise_bias
+from vibench.analysis.tones import noise_bias
 
 
 def test_noise_alone_reaches_four_and_a_half_standard_deviations_in_a_second():

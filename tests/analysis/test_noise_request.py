@@ -5,12 +5,18 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.acquisition import Overload, open_recording
-from vibench.analysis.errors import InvalidRequest, NotEnoughData
-from vibench.analysis.measurement_analysis import analyse_recording
-from vibench.analysis.noise_request import NoiseRequest, longest_segment
-from vibench.analysis.results import Estimator
-from vibench.analysis.transmission_view import MagnitudeScale, quantities_named
-from vibench.analysis.window import Window, effective_averages, hop_samples, taper
+from vibench.analysis import (
+    Estimator,
+    InvalidRequest,
+    MagnitudeScale,
+    NoiseRequest,
+    NotEnoughData,
+    Window,
+    analyse_recording,
+    quantities_named,
+)
+from vibench.analysis.frequency_response._noise_request import longest_segment
+from vibench.analysis.signals import effective_averages, hop_samples, taper
 
 RATE = 6400.0
 

@@ -8,10 +8,10 @@ import pytest
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, StreamedNoise
 from vibench.acquisition.run._low_level_check import BenchCheck
-from vibench.analysis.confidence import phase_half_width
-from vibench.analysis.errors import NotEnoughData
-from vibench.analysis.noise_response import noise_response
-from vibench.analysis.recorded_channels import RecordedChannels
+from vibench.analysis import NotEnoughData
+from vibench.analysis.frequency_response import noise_response
+from vibench.analysis.recordings import RecordedChannels
+from vibench.analysis.signals import phase_half_width
 from vibench.sim import base_transmissibility, gong2025
 from vibench.virtual_rig.world._input_stage import AC_CUT_HZ
 
@@ -116,7 +116,7 @@ class Short:
     response_delay_s = 0.0
 
     def stretches(self, label):
-        from vibench.analysis.recorded_channels import Stretch
+        from vibench.analysis.recordings import Stretch
 
         return (Stretch(0, self.samples, {}, False),)
 

@@ -4,10 +4,17 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_recording
-from vibench.analysis.difference import logarithmic_difference
-from vibench.analysis.measurement_analysis import analyse_recording
-from vibench.analysis.overlay import DwellOverlay, NoiseOverlay, SweepOverlay, equivalent_amplitude, overlay
-from vibench.analysis.prediction import paper_amplitude_m, predicted
+from vibench.analysis import analyse_recording
+from vibench.analysis.model import (
+    DwellOverlay,
+    NoiseOverlay,
+    SweepOverlay,
+    logarithmic_difference,
+    paper_amplitude_m,
+    predicted,
+)
+from vibench.analysis.model._overlay import equivalent_amplitude
+from vibench.analysis.results import overlay
 from vibench.sim import base_transmissibility, gong2025
 
 

@@ -4,8 +4,9 @@ import pytest
 from vibench.acquisition import open_recording
 from vibench.acquisition.plan import Dwell
 from vibench.acquisition.recording import BIN_SAMPLES
-from vibench.analysis.errors import InvalidRequest
-from vibench.analysis.overview import has_overview, overview_of
+from vibench.analysis import InvalidRequest
+from vibench.analysis.live import has_overview
+from vibench.analysis.live._overview import overview_of
 
 RATE = 6400.0
 SAMPLES = 200_000

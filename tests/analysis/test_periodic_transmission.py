@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.analysis.best_linear_approximation import Scatter
-from vibench.analysis.errors import InvalidRequest, NotEnoughData, UnusableData
-from vibench.analysis.periodic_transmission import PeriodicSums, periodic_transmission
+from vibench.analysis import InvalidRequest, NotEnoughData
+from vibench.analysis.errors import UnusableData
+from vibench.analysis.frequency_response._best_linear_approximation import Scatter
+from vibench.analysis.frequency_response._periodic_transmission import PeriodicSums, periodic_transmission
 
 RATE = 5120.0
 
@@ -54,7 +55,7 @@ def test_lines_are_exact_whatever_the_clocks_and_however_fractional_the_period(o
 
 def test_taking_the_nominal_rate_instead_would_leak():
     """The guard of the test above: with 50 ppm ignored, the same lines are wrong by far more."""
-    from vibench.analysis.repetition import period_spectra
+    from vibench.analysis.frequency_response._repetition import period_spectra
 
     orders = np.arange(3, 300)
     drive = multisine(orders, np.zeros(orders.size), 1000.05, 5000)
@@ -63,7 +64,7 @@ def test_taking_the_nominal_rate_instead_would_leak():
 
 
 def test_the_measured_period_scatters_as_stated():
-    from vibench.analysis.repetition import measured_repetition
+    from vibench.analysis.frequency_response._repetition import measured_repetition
 
     rng = np.random.default_rng(2)
     orders = np.arange(10, 60)

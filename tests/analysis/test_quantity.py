@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.analysis.errors import InvalidRequest
-from vibench.analysis.quantity import Quantity, converted_signal, converted_transmission, derivative_factor
-from vibench.analysis.transmission import transmission
+from vibench.analysis import InvalidRequest, transmission
+from vibench.analysis.frequency_response import converted_transmission
+from vibench.analysis.signals import Quantity, converted_signal, derivative_factor
 
 RATE = 5120.0
 

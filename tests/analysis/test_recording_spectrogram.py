@@ -13,8 +13,8 @@ from vibench.acquisition.recording import (
     RecordingState,
     create_recording,
 )
-from vibench.analysis.errors import NotEnoughData
-from vibench.analysis.recording_spectrogram import RowSpacing, SpectrogramRequest, recording_spectrogram
+from vibench.analysis import NotEnoughData
+from vibench.analysis.live import RowSpacing, SpectrogramRequest, recording_spectrogram
 
 RATE = 4000.0
 SIGMA = 0.01

@@ -5,11 +5,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy import signal
 
-from vibench.analysis.confidence import student_half_width
-from vibench.analysis.errors import InvalidRequest
-from vibench.analysis.resonance import resonances
-from vibench.analysis.results import Estimator, Transmission, TransmissionSettings
-from vibench.analysis.transmission import transmission
+from vibench.analysis import Estimator, InvalidRequest, Transmission, resonances, transmission
+from vibench.analysis.frequency_response import TransmissionSettings
+from vibench.analysis.signals import student_half_width
 
 
 def curve(frequency_hz, value, relative=1e-4, resolution_hz=0.0, coherence=0.99):

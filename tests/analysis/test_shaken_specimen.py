@@ -8,13 +8,16 @@ import pytest
 import synthetic_recordings as synthetic
 
 from vibench.acquisition.plan import MultisineNoise, SineSweep
-from vibench.analysis.campaign_results import CampaignResults, Simulation, analyse_files
-from vibench.analysis.dwell_bracket import bracketed_gap, brackets
-from vibench.analysis.errors import NotEnoughData
-from vibench.analysis.gap_fit import fit_gap, onsets, swept_relative
-from vibench.analysis.report.findings import findings
-from vibench.analysis.shaken_specimen import shaken_specimen
-from vibench.analysis.specimen_parameters import LINEAR, Parameter, parameter_value, with_values
+from vibench.analysis import CampaignResults, NotEnoughData, Simulation, analyse_files, shaken_specimen
+from vibench.analysis.model_updating._dwell_bracket import bracketed_gap, brackets
+from vibench.analysis.model_updating._gap_fit import fit_gap, onsets, swept_relative
+from vibench.analysis.model_updating._specimen_parameters import (
+    LINEAR,
+    Parameter,
+    parameter_value,
+    with_values,
+)
+from vibench.analysis.report._findings import findings
 from vibench.sim import Sampled, base_transmissibility, gong2025, integrate
 
 TRUE = with_values(

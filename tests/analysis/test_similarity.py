@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.analysis.errors import InvalidRequest, NotEnoughData
-from vibench.analysis.similarity import Curve, LogarithmOf, similarity
+from vibench.analysis import InvalidRequest, NotEnoughData, similarity
+from vibench.analysis.model import Curve, LogarithmOf
 
 FREQUENCY_HZ = np.arange(10.0, 510.0, 5.0)
 

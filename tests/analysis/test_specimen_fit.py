@@ -6,11 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vibench.analysis.confidence import student_half_width
-from vibench.analysis.errors import InvalidRequest, NotEnoughData
-from vibench.analysis.results import Estimator, Transmission, TransmissionSettings
-from vibench.analysis.specimen_fit import fit_specimen
-from vibench.analysis.specimen_parameters import LINEAR, Parameter, parameter_value, with_values
+from vibench.analysis import Estimator, InvalidRequest, NotEnoughData, Transmission
+from vibench.analysis.frequency_response import TransmissionSettings
+from vibench.analysis.model_updating._specimen_fit import fit_specimen
+from vibench.analysis.model_updating._specimen_parameters import (
+    LINEAR,
+    Parameter,
+    parameter_value,
+    with_values,
+)
+from vibench.analysis.signals import student_half_width
 from vibench.sim import base_transmissibility, gong2025
 
 NOMINAL = gong2025()

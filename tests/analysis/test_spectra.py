@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy import signal
 
-from vibench.analysis.errors import InvalidRequest, NotEnoughData
-from vibench.analysis.peaks import peaks
-from vibench.analysis.quantity import Quantity
+from vibench.analysis import InvalidRequest, NotEnoughData
+from vibench.analysis.signals import Quantity
 from vibench.analysis.spectra import amplitude_spectrum, spectral_density
+from vibench.analysis.tones import peaks
 
 RATE = 2048.0
 

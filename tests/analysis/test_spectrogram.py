@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.errors import InvalidRequest, NotEnoughData
-from vibench.analysis.spectrogram import MOST_COLUMNS, SpectrogramSums
+from vibench.analysis import InvalidRequest, NotEnoughData
+from vibench.analysis.spectra import SpectrogramSums
+from vibench.analysis.spectra._spectrogram import MOST_COLUMNS
 
 RATE = 4000.0
 

@@ -7,10 +7,9 @@ import pytest
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.plan import StreamedNoise
-from vibench.analysis.measurement_analysis import analyse_recording
-from vibench.analysis.noise_request import NoiseRequest
-from vibench.analysis.noise_response import noise_response
-from vibench.analysis.recorded_channels import Stretch
+from vibench.analysis import NoiseRequest, analyse_recording
+from vibench.analysis.frequency_response import noise_response
+from vibench.analysis.recordings import Stretch
 
 RATE = 51_200.0
 

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from vibench.analysis.decimation import Decimator
-from vibench.analysis.drive_phase import drive_phase
-from vibench.analysis.errors import InvalidRequest, NotEnoughData, UnusableData
-from vibench.analysis.order_tracking import tracked_orders
-from vibench.analysis.sweep import SweepSums, sweep_response
+from vibench.analysis import InvalidRequest, NotEnoughData
+from vibench.analysis.errors import UnusableData
+from vibench.analysis.signals import Decimator
+from vibench.analysis.sine import SweepSums
+from vibench.analysis.sine._drive_phase import drive_phase
+from vibench.analysis.sine._sweep import sweep_response
+from vibench.analysis.tones import tracked_orders
 
 RATE = 8192.0
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_recording
-from vibench.analysis.measurement_analysis import analyse_recording
-from vibench.analysis.terminal_level import terminal_levels
+from vibench.analysis import analyse_recording
+from vibench.analysis.sine import terminal_levels
 
 
 def test_a_line_in_the_band_reads_its_own_level_re_the_drives_line(dwell_file):

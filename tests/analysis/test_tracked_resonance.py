@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from vibench.analysis.feedback_notes import FeedbackNote
-from vibench.analysis.tracked_resonance import backbone_sentence, lost_levels, tracked_resonances
+from vibench.analysis.recordings import FeedbackNote
+from vibench.analysis.sine import backbone_sentence, lost_levels, tracked_resonances
 
 
 def note(number, base, frequency_hz, **more):

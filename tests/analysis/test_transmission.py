@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy import signal
 
-from vibench.analysis.errors import InvalidRequest, NotEnoughData, UnusableData
-from vibench.analysis.results import Estimator
-from vibench.analysis.transmission import TransmissionSums, transmission
+from vibench.analysis import Estimator, InvalidRequest, NotEnoughData, transmission
+from vibench.analysis.errors import UnusableData
+from vibench.analysis.frequency_response._transmission import TransmissionSums
 
 RATE = 1024.0
 

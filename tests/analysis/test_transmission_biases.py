@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import fft, signal
 
+from vibench.analysis import transmission
 from vibench.analysis.spectra import spectral_density
-from vibench.analysis.transmission import transmission
 
 RATE = 1024.0
 SEGMENT = 256

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.results import Estimator
-from vibench.analysis.transmission import transmission
+from vibench.analysis import Estimator, transmission
 
 RATE = 1024.0
 SEGMENT = 64

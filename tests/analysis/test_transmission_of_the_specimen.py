@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.periodic_transmission import PeriodicSums
-from vibench.analysis.quantity import Quantity, converted_transmission
-from vibench.analysis.resonance import resonances
+from vibench.analysis import resonances
+from vibench.analysis.frequency_response import converted_transmission
+from vibench.analysis.frequency_response._periodic_transmission import PeriodicSums
+from vibench.analysis.signals import Quantity
 from vibench.sim import Sampled, gong2025, integrate
 
 RATE = 12_800.0

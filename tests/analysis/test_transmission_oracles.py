@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from vibench.analysis.results import Estimator
-from vibench.analysis.transmission import transmission
+from vibench.analysis import Estimator, transmission
 
 RATE = 2048
 SEGMENT = 512

@@ -13,7 +13,7 @@ import pytest
 
 from vibench.acquisition.plan import Dwell, StreamedNoise
 from vibench.acquisition.recording import RecordingState
-from vibench.analysis.campaign_results import Simulation, analyse_files
+from vibench.analysis import Simulation, analyse_files
 
 PLACE = Path(__file__).parents[1] / "analysis" / "synthetic_recordings.py"
 SECONDS = 8.0

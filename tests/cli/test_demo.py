@@ -7,7 +7,7 @@ import pytest
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import RecordingState
-from vibench.analysis.measurement_analysis import analyse_recording
+from vibench.analysis import analyse_recording
 from vibench.sim import base_transmissibility, gong2025
 
 LINEAR_HZ = (95.0, 266.0, 500.0)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from vibench.analysis.errors import InvalidRequest
+from vibench.analysis import InvalidRequest
 from vibench.cli.frequency_option import frequencies
 
 

@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 
 from vibench.acquisition import AcquisitionError
-from vibench.analysis.errors import AnalysisError
+from vibench.analysis import AnalysisError
 from vibench.sim.study import StudyError
 
 from .late_command import Place, late_commands

@@ -7,21 +7,23 @@ from typing import Annotated
 
 import typer
 
-from vibench.analysis.campaign_results import (
+from vibench.analysis import (
     CampaignResults,
+    Estimator,
     Failure,
+    MagnitudeScale,
+    NoiseRequest,
+    ShakenSpecimen,
     Simulation,
+    Watcher,
+    Window,
     analyse_files,
+    campaign_summary,
+    quantities_named,
     recordings_in,
+    shaken_specimen,
 )
-from vibench.analysis.noise_request import NoiseRequest
-from vibench.analysis.report.report import write_report
-from vibench.analysis.results import Estimator
-from vibench.analysis.shaken_specimen import ShakenSpecimen, shaken_specimen
-from vibench.analysis.summary import campaign_summary
-from vibench.analysis.transmission_view import MagnitudeScale, quantities_named
-from vibench.analysis.watcher import Watcher
-from vibench.analysis.window import Window
+from vibench.analysis.report import write_report
 
 from .output import bold, console, print_json
 from .paths import AsJson, room_for_folder, unused

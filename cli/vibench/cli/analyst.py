@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from vibench.acquisition import follow_parent
-from vibench.analysis.campaign_results import CampaignResults, analyse_files, assembled
+from vibench.analysis import CampaignResults, analyse_files, assembled
 from vibench.sim import Accuracy, Harmonic, Sampled, follow_samples, gong2025, steady_response
 
 

@@ -9,8 +9,8 @@ from vibench.acquisition import load_campaign, shipped
 from vibench.acquisition.campaign import CampaignItem, Item
 from vibench.acquisition.engine import Orders
 from vibench.acquisition.rig import load_rig
-from vibench.analysis.report.report import write_report
-from vibench.analysis.summary import campaign_summary
+from vibench.analysis import campaign_summary
+from vibench.analysis.report import write_report
 
 from .analysis_bar import analysis_bar
 from .analyst import second_process

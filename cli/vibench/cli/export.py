@@ -6,8 +6,7 @@ from typing import Annotated
 import typer
 
 from vibench.acquisition import open_recording
-from vibench.analysis.exchange.excerpt import excerpt
-from vibench.analysis.exchange.export import Format, Results, export_samples
+from vibench.analysis.exchange import Format, Results, excerpt, export_samples
 
 from .output import console
 from .transfer_bar import transfer_bar

@@ -6,12 +6,16 @@ from typing import Annotated
 
 import typer
 
-from vibench.analysis.campaign_results import CampaignResults, analyse_files, recordings_in
-from vibench.analysis.errors import InvalidRequest
-from vibench.analysis.figures.drawn import DrawnFigure, ImageKind
-from vibench.analysis.figures.paper.catalogue import PAPER_FIGURES
-from vibench.analysis.figures.paper.options import FigureOptions, FrequencyGrid
-from vibench.analysis.report.figure_choice import recording_figures, result_figures
+from vibench.analysis import CampaignResults, InvalidRequest, analyse_files, recordings_in
+from vibench.analysis.report import (
+    PAPER_FIGURES,
+    DrawnFigure,
+    FigureOptions,
+    FrequencyGrid,
+    ImageKind,
+    recording_figures,
+    result_figures,
+)
 from vibench.sim import Accuracy
 
 from .analyse import complain_about

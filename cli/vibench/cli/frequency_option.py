@@ -2,7 +2,7 @@
 
 import math
 
-from vibench.analysis.errors import InvalidRequest
+from vibench.analysis import InvalidRequest
 from vibench.sim.study import frequency_range
 
 _RANGE_PARTS = 3

@@ -7,11 +7,8 @@ from typing import Annotated
 import typer
 
 from vibench.acquisition import load_toml
-from vibench.analysis.errors import InvalidRequest
-from vibench.analysis.exchange.import_recording import import_recording
-from vibench.analysis.exchange.mapping import ImportMapping
-from vibench.analysis.exchange.source import opened_source
-from vibench.analysis.exchange.source_channel import SourceChannel
+from vibench.analysis import InvalidRequest
+from vibench.analysis.exchange import ImportMapping, SourceChannel, import_recording, opened_source
 
 from .output import console, print_json
 from .paths import AsJson

@@ -10,7 +10,7 @@ import typer
 from pydantic import ValidationError
 from rich.table import Table
 
-from vibench.analysis.errors import InvalidRequest
+from vibench.analysis import InvalidRequest
 from vibench.sim import Accuracy, Observable, Rest, ScenePlan, plan_scene
 from vibench.sim.study import Existing, Start, Study, StudyResults, doubts, software, solve_study
 

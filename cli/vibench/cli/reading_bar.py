@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-from vibench.analysis.watcher import Watcher
+from vibench.analysis import Watcher
 
 
 class ReadingBar:

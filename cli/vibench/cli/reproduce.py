@@ -8,16 +8,20 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from vibench.analysis.figures.damping_score import damping_score_figure
-from vibench.analysis.figures.drawn import ImageKind
-from vibench.analysis.figures.paper.fig03_levels import levels_figure
-from vibench.analysis.figures.paper.options import FigureOptions, FrequencyGrid
-from vibench.analysis.reproduction.case import AS_CHOSEN, Case
-from vibench.analysis.reproduction.catalogue import SECTIONS
-from vibench.analysis.reproduction.document import Picture, Reproduction, reproduction_document, verdict_text
-from vibench.analysis.reproduction.evidence import Evidence
-from vibench.analysis.reproduction.reproduce import reproduction
-from vibench.analysis.reproduction.studies import levels_asked
+from vibench.analysis.report import FigureOptions, FrequencyGrid, ImageKind, levels_figure
+from vibench.analysis.reproduction import (
+    AS_CHOSEN,
+    SECTIONS,
+    Case,
+    Evidence,
+    Picture,
+    Reproduction,
+    damping_score_figure,
+    levels_asked,
+    reproduction,
+    reproduction_document,
+    verdict_text,
+)
 from vibench.sim import Accuracy
 
 from .kept_study import kept_study

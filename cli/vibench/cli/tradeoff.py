@@ -10,9 +10,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from vibench.analysis.accuracy_document import accuracy_document, worst_error
-from vibench.analysis.errors import InvalidRequest
-from vibench.analysis.figures.tradeoff import tradeoff_figure
+from vibench.analysis import InvalidRequest
+from vibench.analysis.report import accuracy_document, tradeoff_figure, worst_error
 from vibench.sim import Accuracy
 from vibench.sim.accuracy_benchmark import MOTIONS, MotionTrade, Thoroughness, Trade, measured_trade
 

@@ -25,7 +25,7 @@ from vibench.acquisition.engine import (
 )
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import KnobSheet, Rig
-from vibench.analysis.live.view import LiveView
+from vibench.analysis.live import LiveView
 
 from .engine_line import EngineLine, Starter, Urgency
 from .live_run import live_view, warm_up

@@ -6,7 +6,7 @@ from PySide6.QtCore import QObject, Signal
 
 from vibench.acquisition.plan import Campaign, Measurement
 from vibench.acquisition.rig import Rig
-from vibench.analysis.foresight import Foresight
+from vibench.analysis import Foresight
 
 
 class Intent(QObject):

@@ -5,7 +5,7 @@ import numpy as np
 from vibench.acquisition.engine import BenchFacts
 from vibench.acquisition.plan import Campaign, Measurement, excited_band_hz, lead_in_s
 from vibench.acquisition.rig import Rig
-from vibench.analysis.live.view import LiveChannel, LiveView
+from vibench.analysis.live import LiveChannel, LiveView
 
 WHOLE_BAND_HZ = (20.0, 2000.0)
 """Looked at when the plan is not known: it was armed by somebody else."""

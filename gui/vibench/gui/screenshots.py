@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QApplication
 from vibench.acquisition import shipped
 from vibench.acquisition.engine import Attendance, EngineState, start_engine
 from vibench.acquisition.plan import Measurement
-from vibench.analysis.recording_spectrogram import RowSpacing
+from vibench.analysis.live import RowSpacing
 
 from .app import application
 from .desk import Desk

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.chaos.period import Points, shortest_period
-from vibench.analysis.chaos.verdict import MotionKind, motion_verdict
+from vibench.analysis import motion_verdict
+from vibench.analysis.chaos import MotionKind, Points
+from vibench.analysis.chaos._period import shortest_period
 from vibench.sim import Harmonic, gong2025
 from vibench.sim.motion import stroboscopic_section
 

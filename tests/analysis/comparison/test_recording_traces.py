@@ -3,12 +3,16 @@ import pickle
 import numpy as np
 import pytest
 
-from vibench.analysis.campaign_results import Simulation
-from vibench.analysis.comparison.recording_traces import compared_recording, kept_result
-from vibench.analysis.comparison.trace import Origin, Response
-from vibench.analysis.errors import NotEnoughData
-from vibench.analysis.noise_request import NoiseRequest
-from vibench.analysis.results import Estimator
+from vibench.analysis import (
+    Estimator,
+    NoiseRequest,
+    NotEnoughData,
+    Origin,
+    Response,
+    Simulation,
+    compared_recording,
+)
+from vibench.analysis.results import kept_result
 
 
 @pytest.fixture(scope="module")

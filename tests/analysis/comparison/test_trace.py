@@ -5,11 +5,10 @@ import re
 import numpy as np
 import pytest
 
-from vibench.analysis.comparison.trace import Origin, Response, Trace, sorted_trace, trace_difference
-from vibench.analysis.comparison.trace_peaks import trace_peaks
-from vibench.analysis.errors import NotEnoughData
-from vibench.analysis.figures.comparison import comparison_figure
-from vibench.analysis.figures.drawn import ImageKind
+from vibench.analysis import NotEnoughData, Origin, Response, Trace, trace_difference, trace_peaks
+from vibench.analysis.comparison import sorted_trace
+from vibench.analysis.figures import comparison_figure
+from vibench.analysis.report import ImageKind
 
 MODE_HZ, DAMPING = 266.0, 0.01
 

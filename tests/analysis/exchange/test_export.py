@@ -17,9 +17,8 @@ from vibench.acquisition.recording import (
     ResultArray,
     create_recording,
 )
-from vibench.analysis.errors import InvalidRequest, NotEnoughData
-from vibench.analysis.exchange.excerpt import excerpt
-from vibench.analysis.exchange.export import Format, Results, export_samples
+from vibench.analysis import InvalidRequest, NotEnoughData
+from vibench.analysis.exchange import Format, Results, excerpt, export_samples
 
 RATE_HZ = 51_200.0
 ROLES = ("drive_voltage", "m0_velocity")

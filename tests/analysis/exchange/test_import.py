@@ -14,13 +14,16 @@ from scipy.io import savemat, wavfile
 
 from vibench.acquisition import ConfigurationError, RecordingError, load_toml, open_recording
 from vibench.acquisition.recording import RecordingState
-from vibench.analysis.errors import AnalysisError, InvalidRequest, UnusableData
-from vibench.analysis.exchange.excerpt import excerpt
-from vibench.analysis.exchange.export import Format, export_samples
-from vibench.analysis.exchange.import_recording import import_recording
-from vibench.analysis.exchange.mapping import ImportMapping
-from vibench.analysis.exchange.source import opened_source
-from vibench.analysis.measurement_analysis import analyse_recording
+from vibench.analysis import AnalysisError, InvalidRequest, analyse_recording
+from vibench.analysis.errors import UnusableData
+from vibench.analysis.exchange import (
+    Format,
+    ImportMapping,
+    excerpt,
+    export_samples,
+    import_recording,
+    opened_source,
+)
 
 RATE_HZ = 8000.0
 SAMPLES = 60_000

@@ -3,9 +3,9 @@
 import pytest
 
 from vibench.acquisition import validated
-from vibench.analysis.errors import InvalidRequest
-from vibench.analysis.exchange.mapping import ImportMapping
-from vibench.analysis.exchange.plan_parts import laid_parts
+from vibench.analysis import InvalidRequest
+from vibench.analysis.exchange import ImportMapping
+from vibench.analysis.exchange._plan_parts import laid_parts
 
 NOISE = {
     "kind": "multisine_noise",

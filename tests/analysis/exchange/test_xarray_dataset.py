@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_recording
-from vibench.analysis.errors import InvalidRequest
-from vibench.analysis.exchange.xarray_dataset import xarray_dataset
+from vibench.analysis import InvalidRequest
+from vibench.analysis.exchange import xarray_dataset
 
 xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
 

@@ -8,15 +8,20 @@ import pytest
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep, SteppedSine, StreamedNoise
-from vibench.analysis.campaign_results import Simulation, result_of
-from vibench.analysis.figures.bench_levels import bench_levels_figure
-from vibench.analysis.figures.dwells import dwells_figure, spectrum_columns
-from vibench.analysis.figures.excitation import excitation_figure
-from vibench.analysis.figures.stepped_sine import stepped_sine_figure
-from vibench.analysis.figures.style import SIMULATED, prefixed
-from vibench.analysis.figures.sweep import sweep_figure
-from vibench.analysis.figures.transmission import transmission_figure
-from vibench.analysis.figures.transmission_levels import transmission_levels_figure
+from vibench.analysis import Simulation
+from vibench.analysis.figures import (
+    SIMULATED,
+    bench_levels_figure,
+    dwells_figure,
+    excitation_figure,
+    stepped_sine_figure,
+    sweep_figure,
+    transmission_figure,
+    transmission_levels_figure,
+)
+from vibench.analysis.figures._dwells import spectrum_columns
+from vibench.analysis.figures._style import prefixed
+from vibench.analysis.results import result_of
 
 PNG_HEAD = b"\x89PNG\r\n\x1a\n"
 

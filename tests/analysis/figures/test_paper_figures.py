@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.errors import InvalidRequest
-from vibench.analysis.figures.drawn import ImageKind
-from vibench.analysis.figures.paper.catalogue import PAPER_FIGURES
-from vibench.analysis.figures.paper.options import AMPLITUDES_M, FigureOptions
-from vibench.analysis.figures.paper.responses import responses, shade
-from vibench.analysis.similarity import LogarithmOf
+from vibench.analysis import InvalidRequest
+from vibench.analysis.model import LogarithmOf
+from vibench.analysis.paper_figures import AMPLITUDES_M, responses
+from vibench.analysis.paper_figures._responses import shade
+from vibench.analysis.report import PAPER_FIGURES, FigureOptions, ImageKind
 from vibench.sim import Accuracy
 from vibench.sim.study import solve_study
 

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.live.levels import HOLD_S, LevelMeters, LevelVerdict
+from vibench.analysis.live import LevelVerdict
+from vibench.analysis.live._levels import HOLD_S, LevelMeters
 
 RATE = 1000.0
 

@@ -3,8 +3,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vibench.analysis.errors import InvalidRequest
-from vibench.analysis.live.envelope import column_starts, envelope, zigzag
+from vibench.analysis import InvalidRequest
+from vibench.analysis.live import column_starts, envelope, zigzag
 
 
 @pytest.mark.parametrize("place", [0, 1, 51_199, 77_777, 102_397])

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from vibench.analysis.errors import InvalidRequest
-from vibench.analysis.live.spectra import LiveSpectra, SpectrumSettings
+from vibench.analysis import InvalidRequest
+from vibench.analysis.live._spectra import LiveSpectra, SpectrumSettings
 
 RATE = 10_000.0
 SETTINGS = SpectrumSettings(segment_samples=1000, averages=40)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.live.view import LiveChannel, LiveView
+from vibench.analysis.live import LiveChannel, LiveView
 
 RATE = 51_200.0
 A0 = 4e-6

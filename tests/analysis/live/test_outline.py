@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.live.envelope import envelope
-from vibench.analysis.live.outline import outline
+from vibench.analysis.live import envelope, outline
 
 RATE_HZ, COLUMNS = 51_200.0, 1000
 

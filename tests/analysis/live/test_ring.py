@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.errors import InvalidRequest
-from vibench.analysis.live.ring import Ring
+from vibench.analysis import InvalidRequest
+from vibench.analysis.live._ring import Ring
 
 
 def numbered(first, count):

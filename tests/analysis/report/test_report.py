@@ -8,10 +8,15 @@ from html.parser import HTMLParser
 import pytest
 
 from vibench.acquisition.recording import RecordingState
-from vibench.analysis.campaign_results import Simulation, analyse_files, recordings_in
-from vibench.analysis.errors import NotEnoughData
-from vibench.analysis.report.report import write_report
-from vibench.analysis.summary import campaign_summary, summary
+from vibench.analysis import (
+    NotEnoughData,
+    Simulation,
+    analyse_files,
+    campaign_summary,
+    recordings_in,
+    summary,
+)
+from vibench.analysis.report import write_report
 
 VOID = {"meta", "img", "br", "link", "hr"}
 RATE = 6400.0

@@ -5,13 +5,13 @@ import math
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.analysis.errors import InvalidRequest
-from vibench.analysis.figures.paper.options import FigureOptions
-from vibench.analysis.reproduction.case import AS_CHOSEN, Case, compared_up_to, damping, logarithm, swept_at
-from vibench.analysis.reproduction.claim import Claim, Verdict, judged
-from vibench.analysis.reproduction.evidence import Evidence
-from vibench.analysis.reproduction.expectation import Expectation, about, at_least, at_most
-from vibench.analysis.similarity import LogarithmOf
+from vibench.analysis import InvalidRequest
+from vibench.analysis.model import LogarithmOf
+from vibench.analysis.report import FigureOptions
+from vibench.analysis.reproduction import AS_CHOSEN, Case, Evidence
+from vibench.analysis.reproduction._case import compared_up_to, damping, logarithm, swept_at
+from vibench.analysis.reproduction._claim import Claim, Verdict, judged
+from vibench.analysis.reproduction._expectation import Expectation, about, at_least, at_most
 
 CASE = Case(AS_CHOSEN, FigureOptions())
 DAMPED, VERY_DAMPED = damping(3e-5), damping(5e-5)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.reproduction.curve_peaks import (
+from vibench.analysis.reproduction._curve_peaks import (
     bound_peaks,
     curve_peaks,
     linear_peaks,

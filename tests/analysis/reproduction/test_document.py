@@ -5,22 +5,24 @@ from pathlib import Path
 
 import pytest
 
-from vibench.analysis.figures.paper.options import FigureOptions
-from vibench.analysis.reproduction.case import AS_CHOSEN, Case, damping
-from vibench.analysis.reproduction.catalogue import CLAIMS, SECTIONS
-from vibench.analysis.reproduction.claim import Claim, Verdict, judged
-from vibench.analysis.reproduction.dampings import SCORED_S
-from vibench.analysis.reproduction.document import (
-    HEAD,
+from vibench.analysis.report import FigureOptions
+from vibench.analysis.reproduction import (
+    AS_CHOSEN,
+    SECTIONS,
+    Case,
+    Evidence,
     Picture,
     Reproduction,
     reproduction_document,
-    wanted_text,
 )
-from vibench.analysis.reproduction.evidence import Evidence
-from vibench.analysis.reproduction.expectation import at_least
-from vibench.analysis.reproduction.page_tables import PageTable
-from vibench.analysis.reproduction.score import DampingScore
+from vibench.analysis.reproduction._case import damping
+from vibench.analysis.reproduction._catalogue import CLAIMS
+from vibench.analysis.reproduction._claim import Claim, Verdict, judged
+from vibench.analysis.reproduction._dampings import SCORED_S
+from vibench.analysis.reproduction._document import HEAD, wanted_text
+from vibench.analysis.reproduction._expectation import at_least
+from vibench.analysis.reproduction._page_tables import PageTable
+from vibench.analysis.reproduction._score import DampingScore
 
 PAGE = Path(__file__).parents[3] / "docs" / "reproduction.md"
 CASE = Case(AS_CHOSEN, FigureOptions())

@@ -5,17 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vibench.analysis.figures.damping_score import damping_score_figure
-from vibench.analysis.figures.paper.options import FigureOptions
-from vibench.analysis.reproduction.case import AS_CHOSEN, Case
-from vibench.analysis.reproduction.catalogue import CLAIMS, SECTIONS
-from vibench.analysis.reproduction.claim import found
-from vibench.analysis.reproduction.dampings import SCORED_S
-from vibench.analysis.reproduction.document import reproduction_document
-from vibench.analysis.reproduction.evidence import Evidence
-from vibench.analysis.reproduction.page_tables import regions, regions_table
-from vibench.analysis.reproduction.reproduce import reproduction
-from vibench.analysis.reproduction.score import scores
+from vibench.analysis.report import FigureOptions
+from vibench.analysis.reproduction import (
+    AS_CHOSEN,
+    SECTIONS,
+    Case,
+    Evidence,
+    damping_score_figure,
+    reproduction,
+    reproduction_document,
+)
+from vibench.analysis.reproduction._catalogue import CLAIMS
+from vibench.analysis.reproduction._claim import found
+from vibench.analysis.reproduction._dampings import SCORED_S
+from vibench.analysis.reproduction._page_tables import regions, regions_table
+from vibench.analysis.reproduction._score import scores
 from vibench.sim import Accuracy
 from vibench.sim.study import solve_study
 

@@ -8,12 +8,19 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from vibench.analysis.simulation.accuracy_cost import MEASURED, cost_sentences
-from vibench.analysis.simulation.answers import SimulatedPoint, Trouble
-from vibench.analysis.simulation.course import SimulationCourse
-from vibench.analysis.simulation.growing import simulate
-from vibench.analysis.simulation.request import SimulationRequest
-from vibench.analysis.simulation.worker import Begin, Cancel, Ended, Grown, serve
+from vibench.analysis.simulation import (
+    Begin,
+    Cancel,
+    Ended,
+    Grown,
+    SimulationCourse,
+    SimulationRequest,
+    cost_sentences,
+    serve,
+)
+from vibench.analysis.simulation._accuracy_cost import MEASURED
+from vibench.analysis.simulation._answers import SimulatedPoint, Trouble
+from vibench.analysis.simulation._growing import simulate
 from vibench.sim import Accuracy, base_transmissibility, gong2025
 
 LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "step_hz": 50.0, "start_hz": 50.0}

@@ -18,10 +18,10 @@ from vibench.acquisition.recording import (
     RecordingState,
     create_recording,
 )
-from vibench.analysis.comparison.trace import Origin, Response, Trace
-from vibench.analysis.live.view import LiveChannel, LiveView
-from vibench.analysis.simulation.answers import SimulatedPoint, SimulatedSignal
-from vibench.analysis.simulation.course import SimulationCourse
+from vibench.analysis import Origin, Response, Trace
+from vibench.analysis.live import LiveChannel, LiveView
+from vibench.analysis.simulation import SimulationCourse
+from vibench.analysis.simulation._answers import SimulatedPoint, SimulatedSignal
 from vibench.gui.live_run import warm_up
 from vibench.gui.page_names import COMPARE, FILES, QUEUE, RUN, SIMULATE, TEST
 from vibench.gui.pages.queue.draft import with_sweep

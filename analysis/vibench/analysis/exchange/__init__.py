@@ -1,1 +1,24 @@
-"""Recordings go out to other programs, and other programs' files come in."""
+"""Recordings go out to other programs, and other programs' files come in; one module a format.
+
+Out: CSV, MATLAB 5, UFF 58, WAV, in blocks, and a labelled xarray Dataset; a file appears whole or not at
+all, and none is overwritten. In: these, HDF5 of any layout and TDMS, with a mapping that says what each
+channel means; nothing in a file is ever run. See docs/exchange.md. No analysis of samples happens here.
+
+>>> import numpy as np
+>>> from pathlib import Path
+>>> from tempfile import TemporaryDirectory
+>>> from vibench.analysis.exchange import opened_source
+>>> with TemporaryDirectory() as folder:
+...     path = Path(folder) / "bench.csv"
+...     rows = [(0.0, 0.0), (0.5, 0.2), (1.0, 0.1)]
+...     np.savetxt(path, rows, delimiter=",", header="time [s],velocity [m/s]", comments="")
+...     with opened_source(path) as source:
+...         for channel in source.channels:
+...             print(channel.name, channel.label, channel.unit, channel.sample_rate_hz)
+1 time s 2.0
+2 velocity m/s 2.0
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

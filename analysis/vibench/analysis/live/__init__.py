@@ -1,1 +1,87 @@
-"""What a running measurement shows, frame by frame: cheap, from the newest samples, in bounded memory."""
+"""Pictures of a recording in bounded memory and width: while it is made, and of any stretch afterwards.
+
+A running measurement is kept as its newest seconds: time histories, spectra, transmission, Responses I
+and II, phase portrait, levels and counted impacts, each made when it is drawn. A finished one is drawn
+from the extremes that its file keeps of every 128 samples (docs/decisions/0020-overview.md): an impact
+of three samples is in every picture. Samples come in volts or channel units; no widget is known here.
+
+>>> import numpy as np
+>>> from vibench.analysis.live import LiveChannel, LiveView
+>>> channel = LiveChannel("m0_velocity", "m/s", units_per_volt=0.1, full_scale_v=10.0)
+>>> view = LiveView([channel], 25600.0, band_hz=(10.0, 600.0))
+>>> volts = 5.0 * np.sin(2 * np.pi * 50.0 * np.arange(25600) / 25600.0)
+>>> view.add(0, volts[np.newaxis].astype(np.float32))
+>>> lanes = view.lanes(span_s=1.0, columns=4)
+>>> lanes.high.round(3).tolist()
+[[0.5, 0.5, 0.5, 0.5]]
+>>> view.levels[0].verdict.name
+'GOOD'
+"""
+
+from ..recordings import (
+    RESPONSE,
+)
+from ._envelope import (
+    column_starts,
+    envelope,
+    zigzag,
+)
+from ._levels import (
+    OVER_SHARE,
+    Level,
+    LevelVerdict,
+)
+from ._outline import (
+    outline,
+)
+from ._overview import (
+    OverviewLevel,
+    RecordingOverview,
+    has_overview,
+    kept_levels,
+    overview_levels,
+)
+from ._portrait import (
+    Portrait,
+)
+from ._recording_spectrogram import (
+    DensityPicture,
+    RowSpacing,
+    SpectrogramRequest,
+    recording_spectrogram,
+)
+from ._thumbnail import (
+    THUMBNAIL_COLUMNS,
+    Thumbnail,
+    thumbnail,
+)
+from ._view import (
+    LiveChannel,
+    LiveView,
+)
+
+__all__ = [
+    "OVER_SHARE",
+    "RESPONSE",
+    "THUMBNAIL_COLUMNS",
+    "DensityPicture",
+    "Level",
+    "LevelVerdict",
+    "LiveChannel",
+    "LiveView",
+    "OverviewLevel",
+    "Portrait",
+    "RecordingOverview",
+    "RowSpacing",
+    "SpectrogramRequest",
+    "Thumbnail",
+    "column_starts",
+    "envelope",
+    "has_overview",
+    "kept_levels",
+    "outline",
+    "overview_levels",
+    "recording_spectrogram",
+    "thumbnail",
+    "zigzag",
+]

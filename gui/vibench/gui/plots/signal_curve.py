@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.analysis.live.envelope import zigzag
-from vibench.analysis.live.outline import outline
+from vibench.analysis.live import outline, zigzag
 
 from .ink import Ink
 from .plot import Plot

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
-from vibench.analysis.comparison.trace import Origin, Response, Trace
+from vibench.analysis import Origin, Response, Trace
 from vibench.gui.pages.compare.compare_page import ComparePage
 from vibench.gui.theme import DARK
 

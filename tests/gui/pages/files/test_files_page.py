@@ -14,7 +14,7 @@ from vibench.acquisition.campaign._journal import Journal, journal_path
 from vibench.acquisition.plan import Campaign, Dwell, Measurement
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import Rig
-from vibench.analysis.thumbnail import thumbnail
+from vibench.analysis.live import thumbnail
 from vibench.gui.pages.files.files_page import FilesPage
 from vibench.gui.pages.files.listing import made_levels
 from vibench.gui.pages.files.recording_table import HEADINGS

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.simulation.accuracy_cost import MEASURED
-from vibench.analysis.simulation.answers import SimulatedPoint, SimulatedSignal, Trouble
-from vibench.analysis.simulation.request import SimulationRequest
+from vibench.analysis.simulation import SimulationRequest
+from vibench.analysis.simulation._accuracy_cost import MEASURED
+from vibench.analysis.simulation._answers import SimulatedPoint, SimulatedSignal, Trouble
 from vibench.gui.pages.simulate.simulate_page import SimulatePage
 from vibench.gui.theme import DARK
 from vibench.sim import Accuracy

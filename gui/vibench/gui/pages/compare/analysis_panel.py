@@ -3,7 +3,7 @@
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
-from vibench.analysis.comparison.options import AnalysisOptions
+from vibench.analysis import AnalysisOptions
 
 from ...forms.judged_form import JudgedForm
 

@@ -12,8 +12,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from vibench.analysis.comparison.recording_traces import ComparedRecording, compared_recording
-from vibench.analysis.comparison.trace import Trace
+from vibench.analysis import ComparedRecording, Trace, compared_recording
 
 from ...background import Job
 from ...desk import Desk

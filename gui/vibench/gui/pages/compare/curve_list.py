@@ -6,7 +6,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
-from vibench.analysis.comparison.trace import Origin, Response, Trace
+from vibench.analysis import Origin, Response, Trace
 
 from ...hint import paint_hint
 from ...plots.ink import Dash, Ink, trace

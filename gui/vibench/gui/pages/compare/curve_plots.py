@@ -7,8 +7,7 @@ import pyqtgraph as pg
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 
-from vibench.analysis.comparison.trace import Origin, Trace
-from vibench.analysis.difference import Difference
+from vibench.analysis import Difference, Origin, Trace
 
 from ...plots.axis import LOG_FREQUENCY, Axis, Scale
 from ...plots.ink import GUIDE, Dash, Ink, trace

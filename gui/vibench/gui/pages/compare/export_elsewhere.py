@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from vibench.analysis.comparison.recording_traces import ComparedRecording
-from vibench.analysis.comparison.trace import Trace
+from vibench.analysis import ComparedRecording, Trace
 
 
 def exported_elsewhere(
@@ -14,6 +13,6 @@ def exported_elsewhere(
     markers_hz: tuple[float, ...],
 ) -> Path:
     """Write what the path's ending names, and give the path written, as `exported` does."""
-    from vibench.analysis.comparison.export import exported  # noqa: PLC0415 - loading it takes most of a second
+    from vibench.analysis.report import exported  # noqa: PLC0415 - loading it takes most of a second
 
     return exported(path, traces, recordings, pair, markers_hz)

@@ -6,9 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem, QWidget
 
-from vibench.analysis.comparison.reading import readings
-from vibench.analysis.comparison.trace import Trace
-from vibench.analysis.comparison.trace_peaks import trace_peaks
+from vibench.analysis import Trace, readings, trace_peaks
 
 from ...hint import paint_hint
 

@@ -3,9 +3,7 @@
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFormLayout, QGroupBox, QLabel, QWidget
 
-from vibench.analysis.comparison.trace import Trace, trace_difference
-from vibench.analysis.difference import Difference
-from vibench.analysis.errors import AnalysisError
+from vibench.analysis import AnalysisError, Difference, Trace, trace_difference
 
 from ...forms.editor import Choice
 

@@ -14,8 +14,7 @@ from PySide6.QtWidgets import (
 
 from vibench.acquisition import RecordingError, open_recording
 from vibench.acquisition.recording import Recording, name_now
-from vibench.analysis.overview import RecordingOverview, has_overview, kept_levels
-from vibench.analysis.thumbnail import Thumbnail
+from vibench.analysis.live import RecordingOverview, Thumbnail, has_overview, kept_levels
 
 from ...background import Job
 from ...desk import Desk

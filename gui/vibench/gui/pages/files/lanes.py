@@ -9,8 +9,7 @@ from PySide6.QtGui import QKeyEvent, QPalette, QResizeEvent
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from vibench.acquisition.recording import ChannelHeader, Recording
-from vibench.analysis.live.envelope import zigzag
-from vibench.analysis.overview import RecordingOverview
+from vibench.analysis.live import RecordingOverview, zigzag
 
 from ...plots.axis import Axis
 from ...plots.ink import LIMIT, Dash, Ink, trace

@@ -13,8 +13,7 @@ from vibench.acquisition.campaign import (
     catalogue,
     read_journal,
 )
-from vibench.analysis.overview import OverviewLevel, overview_levels
-from vibench.analysis.thumbnail import Thumbnail, thumbnail
+from vibench.analysis.live import OverviewLevel, Thumbnail, overview_levels, thumbnail
 
 Levels = dict[str, tuple[OverviewLevel, ...]]
 

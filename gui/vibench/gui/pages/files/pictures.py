@@ -2,7 +2,7 @@
 
 from PySide6.QtWidgets import QTabWidget, QWidget
 
-from vibench.analysis.overview import RecordingOverview
+from vibench.analysis.live import RecordingOverview
 
 from ...background import Background
 from ...theme import Theme

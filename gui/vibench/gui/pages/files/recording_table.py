@@ -18,7 +18,7 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
-from vibench.analysis.thumbnail import THUMBNAIL_COLUMNS, Thumbnail
+from vibench.analysis.live import THUMBNAIL_COLUMNS, Thumbnail
 
 from ...faces import moment_text
 from ...hint import paint_hint

@@ -10,8 +10,8 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from vibench.acquisition.recording import Recording
-from vibench.analysis.recorded_channels import RESPONSE
-from vibench.analysis.recording_spectrogram import (
+from vibench.analysis.live import (
+    RESPONSE,
     DensityPicture,
     RowSpacing,
     SpectrogramRequest,

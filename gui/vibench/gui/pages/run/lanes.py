@@ -5,8 +5,7 @@ import pyqtgraph as pg
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from vibench.analysis.live.envelope import zigzag
-from vibench.analysis.live.view import LiveView
+from vibench.analysis.live import LiveView, zigzag
 
 from ...plots.axis import Axis
 from ...plots.ink import trace

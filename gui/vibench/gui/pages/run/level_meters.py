@@ -4,8 +4,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from vibench.analysis.live.levels import OVER_SHARE, Level, LevelVerdict
-from vibench.analysis.live.view import LiveView
+from vibench.analysis.live import OVER_SHARE, Level, LevelVerdict, LiveView
 
 from ...hint import paint_hint
 from ...theme import Theme, Tone

@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from vibench.analysis.live.portrait import Portrait
-from vibench.analysis.live.view import LiveView
+from vibench.analysis.live import LiveView, Portrait
 
 from ...plots.axis import Axis
 from ...plots.ink import trace

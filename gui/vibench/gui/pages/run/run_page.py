@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QTabW
 from vibench.acquisition.engine import EngineState
 from vibench.acquisition.plan import excited_band_hz
 from vibench.acquisition.rig import channels_of
-from vibench.analysis.foresight import Foresight
-from vibench.analysis.live.view import LiveView
+from vibench.analysis import Foresight
+from vibench.analysis.live import LiveView
 
 from ...desk import Desk
 from ...live_run import measurement_called

@@ -4,7 +4,7 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from vibench.analysis.live.view import LiveView
+from vibench.analysis.live import LiveView
 
 from ...plots.axis import LOG_FREQUENCY, Axis, Scale
 from ...plots.ink import trace

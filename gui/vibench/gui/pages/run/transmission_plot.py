@@ -2,8 +2,8 @@
 
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from vibench.analysis.foresight import Foresight
-from vibench.analysis.live.view import LiveView
+from vibench.analysis import Foresight
+from vibench.analysis.live import LiveView
 
 from ...plots.axis import FREQUENCY, Axis, Scale
 from ...plots.ink import PREDICTED, Dash, Ink, trace

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from vibench.acquisition.engine import DRIVING, EngineStatus, RunStatus
-from vibench.analysis.live.view import LiveView
+from vibench.analysis.live import LiveView
 
 from ...faces import clock
 from ...forms.editor import Choice

@@ -8,8 +8,8 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtWidgets import QGridLayout, QWidget
 
-from vibench.analysis.similarity import THRESHOLD
-from vibench.analysis.simulation.course import SimulationCourse
+from vibench.analysis import THRESHOLD
+from vibench.analysis.simulation import SimulationCourse
 
 from ...plots.axis import LOG_FREQUENCY, Axis, Scale
 from ...plots.ink import GUIDE, LIMIT, Dash, Ink, trace

@@ -12,10 +12,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from vibench.analysis.simulation.accuracy_cost import cost_sentences
-from vibench.analysis.simulation.answers import Piece
-from vibench.analysis.simulation.course import SimulationCourse
-from vibench.analysis.simulation.request import SimulationRequest
+from vibench.analysis.simulation import Piece, SimulationCourse, SimulationRequest, cost_sentences
 
 from ...desk import Desk
 from ...forms.judged_form import JudgedForm

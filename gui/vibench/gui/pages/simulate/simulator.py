@@ -6,8 +6,7 @@ from multiprocessing.context import SpawnProcess
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from vibench.analysis.simulation.request import SimulationRequest
-from vibench.analysis.simulation.worker import Begin, Cancel, Ended, Grown, Order, serve
+from vibench.analysis.simulation import Begin, Cancel, Ended, Grown, Order, SimulationRequest, serve
 
 POLL_MS = 50
 MOST_AT_ONCE = 200

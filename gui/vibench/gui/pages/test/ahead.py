@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from vibench.acquisition.plan import Measurement, Outlook, outlook
 from vibench.acquisition.rig import Rig
-from vibench.analysis.foresight import Foresight, foresee
+from vibench.analysis import Foresight, foresee
 
 
 @dataclass(frozen=True)

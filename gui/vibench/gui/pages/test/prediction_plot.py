@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vibench.analysis.foresight import Foresight
+from vibench.analysis import Foresight
 
 from ...plots.axis import FREQUENCY, Axis, Scale
 from ...plots.ink import Dash, Ink, trace

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 from vibench.acquisition import ConfigurationError, save_toml, toml_text, validated
 from vibench.acquisition.plan import Measurement, Outlook
 from vibench.acquisition.rig import Rig
-from vibench.analysis.foresight import Foresight
+from vibench.analysis import Foresight
 
 from ...desk import Desk
 from ...forms.editor import Choice

@@ -1,0 +1,116 @@
+"""Whether a series could be linear noise: surrogates with its spectrum and its values, and nothing else."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..signals import Reals
+from ._embedding import embedded, nearest_neighbours
+
+SURROGATES = 39
+"""The smallest statistic of 40 then has a chance of 1/40 = 0.025 if the series is linear noise."""
+_ITERATIONS = 200
+_SETTLED = 1e-8
+_SPECTRUM_KEPT = 0.05
+"""Relative error of a surrogate's spectrum up to which it stands for the series."""
+
+Statistic = Callable[[Reals], float]
+
+
+@dataclass(frozen=True)
+class SurrogateTest:
+    """A series against linear noise with the same spectrum and the same values."""
+
+    statistic: float
+    surrogates: tuple[float, ...]
+    spectrum_error: float
+    """Largest relative error of a surrogate's spectrum."""
+
+    @property
+    def p(self) -> float:
+        """Chance of a statistic as small as this if the series were linear noise (one-sided rank)."""
+        smaller = sum(each <= self.statistic for each in self.surrogates)
+        return (smaller + 1) / (len(self.surrogates) + 1)
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether the surrogates took over the spectrum; if not, their test says nothing."""
+        return self.spectrum_error <= _SPECTRUM_KEPT
+
+    @property
+    def rejects_linear_noise(self) -> bool:
+        """Whether the series is more than linear noise."""
+        return self.is_valid and self.p <= 1 / (len(self.surrogates) + 1)
+
+
+def surrogate(series: Reals, rng: np.random.Generator) -> tuple[Reals, float]:
+    """Make one surrogate: the series' values in an order that has its spectrum, else at random.
+
+    Schreiber and Schmitz, Phys. Rev. Lett. 77 (1996) 635 (iterated amplitude-adjusted Fourier transform).
+
+    Returns
+    -------
+    The surrogate, shape of ``series``, and the relative error of its spectrum (root mean square).
+
+    """
+    values = np.sort(series)
+    wanted = np.abs(np.fft.rfft(series - series.mean()))
+    scale = float(np.sqrt(np.mean(wanted**2)))
+    shuffled = rng.permutation(series)
+    error = np.inf
+    for _ in range(_ITERATIONS):
+        spectrum = np.fft.rfft(shuffled - shuffled.mean())
+        before = error
+        error = float(np.sqrt(np.mean((np.abs(spectrum) - wanted) ** 2))) / scale
+        if before - error < _SETTLED:
+            break
+        turned = np.fft.irfft(wanted * np.exp(1j * np.angle(spectrum)), series.size)
+        shuffled = values[np.argsort(np.argsort(turned))]
+    return shuffled, error
+
+
+def prediction_error(series: Reals, delays: int = 3) -> float:
+    """Say how badly each value is foretold by the value after the nearest past, over the scatter.
+
+    Zeroth-order nonlinear prediction: below 1 where the past decides the future, near the square root of 2
+    where it does not (Kantz and Schreiber, Nonlinear Time Series Analysis (2004), section 4.2).
+    """
+    points = embedded(series, delays)
+    found = nearest_neighbours(points, apart=delays, last=points.shape[0] - 1)
+    ahead = delays  # the value after a point that begins at index i is series[i + delays]
+    miss = series[found.point + ahead] - series[found.neighbour + ahead]
+    return float(np.sqrt(np.mean(miss**2)) / np.std(series))
+
+
+def surrogate_test(
+    series: Reals, statistic: Statistic = prediction_error, *, count: int = SURROGATES, seed: int = 0
+) -> SurrogateTest:
+    """Compare a statistic, small for determinism, with that of surrogates.
+
+    Parameters
+    ----------
+    series
+        Shape (n,), taken once per drive period.
+
+    """
+    matched = _with_matching_ends(series)
+    rng = np.random.default_rng(seed)
+    made = [surrogate(matched, rng) for _ in range(count)]
+    return SurrogateTest(
+        statistic=statistic(matched),
+        surrogates=tuple(statistic(each) for each, _ in made),
+        spectrum_error=max(error for _, error in made),
+    )
+
+
+def _with_matching_ends(series: Reals) -> Reals:
+    """Cut a few values off so that the end joins the beginning: a jump there would pass for noise."""
+    most = max(1, series.size // 10)
+    heads = series[:most]
+    tails = series[series.size - most :]
+    slopes_head = series[1 : most + 1] - heads
+    slopes_tail = np.diff(series[series.size - most - 1 :])
+    gap = np.abs(heads[:, np.newaxis] - tails) + np.abs(slopes_head[:, np.newaxis] - slopes_tail)
+    head, tail = np.unravel_index(int(np.argmin(gap)), gap.shape)
+    return series[int(head) : series.size - most + int(tail) + 1]

@@ -1,0 +1,59 @@
+"""Whether the points of a section lie on a closed curve that they run round at one frequency."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from ..signals import Reals
+
+_HARMONICS = 8
+_EXPLAINED = 0.02
+"""Part of the spread that the harmonics of one rotation may leave unexplained on a smooth closed curve."""
+_NOISE_MARGIN = 1.5
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """The best closed curve through a section's points."""
+
+    turns_per_period: float
+    """How far the points run round it in a drive period, 0 to 0.5."""
+    left_over: float
+    """Root mean square distance of the points from it, over their spread."""
+
+
+def rotation(points: Reals) -> Rotation:
+    """Fit the harmonics of one frequency to the points of a section.
+
+    Parameters
+    ----------
+    points
+        Shape (periods, coordinates).
+
+    """
+    centred = points - points.mean(axis=0)
+    count = len(centred)
+    window = np.hanning(count)[:, np.newaxis]
+    power = np.sum(np.abs(np.fft.rfft(window * centred, axis=0)) ** 2, axis=1)
+    strongest = int(np.argmax(power[1:])) + 1
+    best = minimize_scalar(
+        lambda turns: _residual(centred, turns),
+        bounds=((strongest - 1) / count, (strongest + 1) / count),
+        method="bounded",
+        options={"xatol": 1e-3 / count**1.5},
+    )
+    spread = float(np.sqrt(np.mean(centred**2)))
+    return Rotation(float(best.x), float(best.fun) / spread if spread > 0 else 0.0)
+
+
+def is_torus(found: Rotation, noise_over_spread: float) -> bool:
+    """Whether the closed curve explains all but noise."""
+    return found.left_over <= max(_EXPLAINED, _NOISE_MARGIN * noise_over_spread)
+
+
+def _residual(centred: Reals, turns: float) -> float:
+    angle = 2 * np.pi * turns * np.arange(len(centred))[:, np.newaxis] * np.arange(1, _HARMONICS + 1)
+    basis = np.hstack((np.cos(angle), np.sin(angle), np.ones((len(centred), 1))))
+    fitted, *_ = np.linalg.lstsq(basis, centred, rcond=None)
+    return float(np.sqrt(np.mean((centred - basis @ fitted) ** 2)))

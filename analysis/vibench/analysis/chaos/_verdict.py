@@ -1,0 +1,200 @@
+"""The verdict on a recorded motion: periodic, quasi-periodic, chaotic, or that the data cannot say."""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from ..errors import NotEnoughData
+from ..signals import Reals
+from ._divergence import Divergence, divergence
+from ._embedding import embedded
+from ._last_motion import begin_of_last_motion
+from ._period import Points, is_settled, shortest_period
+from ._surrogates import SurrogateTest, surrogate_test
+from ._torus import Rotation, is_torus, rotation
+from ._zero_one import FEWEST, ZeroOne, zero_one
+
+MOST_POINTS = 3000
+"""The last so many drive periods are judged: more would only cost time."""
+ABOVE_NOISE = 5.0
+"""Scatter of the points over their noise below which its shape says nothing."""
+SMALL = 0.05
+"""Scatter, as part of the orbit, up to which linear noise about a fixed point leaves a motion periodic."""
+CHAOTIC_K = 0.9
+_DELAYS = 3
+_STEPS = 8
+
+
+class MotionKind(StrEnum):
+    """How a motion under a sine repeats."""
+
+    PERIODIC = "periodic"
+    QUASI_PERIODIC = "quasi-periodic"
+    CHAOTIC = "chaotic"
+    UNDECIDED = "undecided"
+    """The data carry no verdict; `MotionVerdict.why` says what is missing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What was measured on the points; None where a question did not arise."""
+
+    drive_hz: float
+    periods: int
+    """Drive periods judged."""
+    spread: float
+    """Scatter of the points, over the size of the orbit."""
+    noise: float
+    """The same of the noise."""
+    is_settled: bool
+    rotation: Rotation | None = None
+    zero_one: ZeroOne | None = None
+    surrogates: SurrogateTest | None = None
+    divergence: Divergence | None = None
+
+    @property
+    def exponent_per_s(self) -> tuple[float, float] | None:
+        """Largest Lyapunov exponent and its standard deviation; None where the data resolve none."""
+        if self.divergence is None or not self.divergence.is_resolved:
+            return None
+        return self.divergence.exponent * self.drive_hz, self.divergence.sd_exponent * self.drive_hz
+
+
+@dataclass(frozen=True, eq=False)
+class MotionVerdict:
+    """What a motion is, and why one may say so."""
+
+    kind: MotionKind
+    why: str
+    evidence: Evidence
+    period: int | None = None
+    """Drive periods after which a periodic motion repeats."""
+
+
+def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionVerdict:
+    """Judge a motion by its points, taken once per drive period.
+
+    A motion is *periodic* when its points repeat within their noise, *quasi-periodic* when they run round
+    a closed curve, and *chaotic* only when all witnesses agree: settled, far above the noise, on no curve,
+    the 0-1 test near one on points that are not oversampled, and more than linear noise by surrogates. Each
+    of these alone passes noise for chaos; anything less is undecided. Of a motion that changes once, as when
+    a chaotic transient ends, the last part is judged if it is the longer one.
+
+    Parameters
+    ----------
+    points
+        As many drive periods as there are; the last 3000 are judged.
+    drive_hz
+        Turns exponents per period into exponents per second.
+    seed
+        Of the random frequencies and surrogates.
+
+    """
+    last = Points(points.value[-MOST_POINTS:], points.noise)
+    count = len(last.value)
+    if count < FEWEST:
+        return _undecided(
+            f"{count} drive periods were recorded clear of the ends, and {FEWEST} are needed; dwell longer",
+            Evidence(drive_hz, count, np.nan, last.noise_level, is_settled=False),
+        )
+    before = begin_of_last_motion(last)
+    if before == 0:
+        return _of_one_motion(last, drive_hz, seed)
+    rest = Points(last.value[before:], last.noise)
+    found = _of_one_motion(rest, drive_hz, seed)
+    if len(rest.value) < max(before, FEWEST):
+        return _undecided(
+            f"the motion changed {len(rest.value)} drive periods before the end, too late to judge what it "
+            "became; dwell longer",
+            found.evidence,
+        )
+    return replace(found, why=f"{found.why}; so for {len(rest.value)} drive periods, otherwise before")
+
+
+def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
+    evidence = Evidence(drive_hz, len(last.value), last.spread, last.noise_level, is_settled=is_settled(last))
+    if not evidence.is_settled:
+        return _undecided(
+            "the motion still changes: its mean or its scatter drifts; let it settle for longer",
+            evidence,
+        )
+    period = shortest_period(last)
+    if period is not None:
+        every = "drive period" if period == 1 else f"{period} drive periods"
+        why = f"the points repeat every {every} to within their noise"
+        return MotionVerdict(MotionKind.PERIODIC, why, evidence, period)
+    return _aperiodic(last, evidence, seed)
+
+
+def _undecided(why: str, evidence: Evidence) -> MotionVerdict:
+    return MotionVerdict(MotionKind.UNDECIDED, why, evidence)
+
+
+def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
+    found = rotation(points.value)
+    evidence = replace(so_far, rotation=found)
+    if evidence.spread < ABOVE_NOISE * evidence.noise:
+        if evidence.spread <= SMALL:
+            why = (
+                f"the points stay within {100 * evidence.spread:.1f} % of the orbit, hardly above their noise"
+            )
+            return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)
+        return _undecided(
+            f"the points scatter by {evidence.spread / evidence.noise:.1f} times their noise, and below "
+            f"{ABOVE_NOISE:g} times its shape says nothing; raise the level or use a finer vibrometer range",
+            evidence,
+        )
+    if is_torus(found, evidence.noise / evidence.spread):
+        why = f"the points run round a closed curve, {found.turns_per_period:.4f} turns a drive period"
+        return MotionVerdict(MotionKind.QUASI_PERIODIC, why, evidence)
+    line = np.asarray(points.value[:, int(np.argmax(np.std(points.value, axis=0)))])
+    test, noise_test = zero_one(line, seed=seed), surrogate_test(line, seed=seed)
+    parting = _parting(points)
+    return _judged(
+        replace(evidence, zero_one=test, surrogates=noise_test, divergence=parting), test, noise_test
+    )
+
+
+def _judged(evidence: Evidence, test: ZeroOne, noise_test: SurrogateTest) -> MotionVerdict:
+    if not noise_test.is_valid:
+        return _undecided(
+            f"surrogates missed the spectrum by {100 * noise_test.spectrum_error:.0f} %, so linear noise "
+            "cannot be excluded; record longer",
+            evidence,
+        )
+    if not noise_test.rejects_linear_noise:
+        return _noisy(evidence, noise_test)
+    if test.is_oversampled:
+        return _undecided(
+            f"neighbouring points resemble each other ({test.neighbour_correlation:.2f}), which the 0-1 test "
+            "takes for order; record longer",
+            evidence,
+        )
+    if test.k < CHAOTIC_K:
+        return _undecided(f"the 0-1 test says {test.k:.2f}, neither regular nor chaotic", evidence)
+    above = "" if evidence.noise == 0.0 else f"{evidence.spread / evidence.noise:.0f} times above the noise, "
+    why = (
+        f"settled, {above}on no closed curve, 0-1 test {test.k:.3f}, and more than linear noise "
+        f"(p = {noise_test.p:.3f})"
+    )
+    return MotionVerdict(MotionKind.CHAOTIC, why, evidence)
+
+
+def _noisy(evidence: Evidence, noise_test: SurrogateTest) -> MotionVerdict:
+    """Nothing but linear noise is seen: about a fixed point if it is small, else who can say."""
+    if evidence.spread > SMALL:
+        return _undecided(f"linear noise explains the points as well (p = {noise_test.p:.2f})", evidence)
+    why = (
+        f"the points scatter about one point by {100 * evidence.spread:.1f} % of the orbit like linear noise "
+        f"(p = {noise_test.p:.2f}), though by more than the vibrometer's own"
+    )
+    return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)
+
+
+def _parting(points: Points) -> Divergence | None:
+    space: Reals = embedded(points.value, _DELAYS)
+    try:
+        return divergence(space, steps=_STEPS, noise=points.noise_level)
+    except NotEnoughData:
+        return None

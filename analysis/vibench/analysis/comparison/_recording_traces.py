@@ -1,0 +1,85 @@
+"""The curves of one recording, and of what the model says of it, as a comparison shows them."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..frequency_response import Transmission
+from ..model import Prediction
+from ..signals import Reals
+from ..sine import DwellResponse, SteppedResponse, SweepResponse
+from ._trace import Origin, Response, Trace
+
+SAME_HZ = 0.01
+"""Frequencies that lie within this are one [Hz]."""
+
+
+def predicted_traces(name: str, found: Prediction) -> Iterator[Trace]:
+    """Give Responses I and II under sines."""
+    low, high = 1e6 * float(found.amplitude_m.min()), 1e6 * float(found.amplitude_m.max())
+    level = f"{low:.3g} µm" if low == high else f"{low:.3g} to {high:.3g} µm"
+    note = f"sines of A0 = {level}, {found.accuracy.value}"
+    unknown = np.full(found.frequency_hz.shape, np.nan)
+    yield Trace(
+        name, Origin.PREDICTED, Response.RESPONSE_I, found.frequency_hz, found.response_i, unknown, note
+    )
+    yield Trace(
+        name, Origin.PREDICTED, Response.RESPONSE_II, found.frequency_hz, found.response_ii, unknown, note
+    )
+
+
+def transmission_trace(name: str, origin: Origin, found: Transmission) -> Trace:
+    """Make a curve of an estimated transmission, with its bounds."""
+    how = found.settings
+    note = f"{how.estimator.value}, {found.n_eff:.3g} averages, lines {found.resolution_hz:.3g} Hz wide"
+    return Trace(
+        name,
+        origin,
+        Response.TRANSMISSION,
+        found.frequency_hz,
+        found.magnitude,
+        found.relative_sd_magnitude,
+        note,
+    )
+
+
+def sweep_traces(name: str, origin: Origin, found: SweepResponse) -> Iterator[Trace]:
+    """Make a curve of each response that a sweep measured."""
+    note = f"{found.sweep_rate_hz_per_s:+.3g} Hz/s"
+    yield from _responses(
+        name, origin, found.frequency_hz, (found.response_i, found.response_ii, found.sd_response_ii), note
+    )
+
+
+def stepped_traces(name: str, origin: Origin, found: SteppedResponse) -> Iterator[Trace]:
+    """Make a curve of each response that a stepped sine measured."""
+    """Give steps up and steps down as curves of their own: between jumps they differ."""
+    if found.frequency_hz.size > 1 and np.ptp(found.frequency_hz) < SAME_HZ:
+        return  # levels at one frequency are no curve over it
+    directions = np.array(found.direction)
+    for direction in dict.fromkeys(found.direction):
+        at = directions == direction
+        values = (found.response_i[at], found.response_ii[at], found.sd_response_ii[at])
+        yield from _responses(
+            f"{name} {direction}", origin, found.frequency_hz[at], values, f"steps {direction}"
+        )
+
+
+def dwell_traces(name: str, origin: Origin, found: DwellResponse) -> Iterator[Trace]:
+    """Make a point of each response that a dwell measured."""
+    values = (
+        np.array([found.response_i]),
+        np.array([found.response_ii]),
+        np.array([found.sd_response_ii]),
+    )
+    note = f"window of {found.window_s:.3g} s, A0 = {1e6 * found.drive.amplitude_m:.3g} µm"
+    yield from _responses(name, origin, np.array([found.drive.frequency_hz]), values, note)
+
+
+def _responses(
+    name: str, origin: Origin, frequency_hz: Reals, values: tuple[Reals, Reals, Reals], note: str
+) -> Iterator[Trace]:
+    first, second, sd_second = values
+    unknown = np.full(frequency_hz.shape, np.nan)
+    yield Trace(name, origin, Response.RESPONSE_I, frequency_hz, first, unknown, note)
+    yield Trace(name, origin, Response.RESPONSE_II, frequency_hz, second, sd_second / second, note)

@@ -1,0 +1,129 @@
+"""A curve that can be laid over others: motion of m0 over motion of the base, against frequency.
+
+Transmissions of noise, Responses I and II of sweeps, steps and dwells, and predictions of them all are
+ratios of displacements, so they share one axis. What each of them is stands in its name: a transmission
+of a colliding specimen is not its Response I.
+"""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from ..errors import NotEnoughData
+from ..live import column_starts, envelope
+from ..model import Difference, logarithmic_difference
+from ..signals import Reals
+
+
+class Origin(StrEnum):
+    """Where a curve comes from."""
+
+    MEASURED = "measured"
+    SIMULATED = "simulated"
+    """The specimen under the recorded base motion, through the same estimator."""
+    PREDICTED = "predicted"
+    """The specimen under sines."""
+
+
+class Response(StrEnum):
+    """What a curve tells of the motion."""
+
+    TRANSMISSION = "transmission"
+    RESPONSE_I = "Response I"
+    RESPONSE_II = "Response II"
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """One curve; arrays of shape (points,), frequencies ascending."""
+
+    source: str
+    """Name of the recording or of the prediction."""
+    origin: Origin
+    response: Response
+    frequency_hz: Reals
+    magnitude: Reals
+    """Displacement of m0 over displacement of the base; NaN where there is none."""
+    relative_sd: Reals
+    """Of the magnitude; NaN where nothing is known of it."""
+    note: str = ""
+    """What else is to be known: averages, window, accuracy."""
+
+    @property
+    def name(self) -> str:
+        """``"sweep_weak, Response II, measured"``."""
+        return f"{self.source}, {self.response.value}, {self.origin.value}"
+
+    @property
+    def lower(self) -> Reals:
+        """Magnitude less two standard deviations, on a logarithmic scale; a tenth of it at the least."""
+        return np.asarray(self.magnitude * np.exp(-self._reach))
+
+    @property
+    def upper(self) -> Reals:
+        """Magnitude and two standard deviations, on a logarithmic scale; ten times it at the most."""
+        return np.asarray(self.magnitude * np.exp(self._reach))
+
+    def band(self, columns: int) -> tuple[Reals, Reals, Reals]:
+        """Give frequencies, lowest and highest bounds in at most so many columns: areas are slow to draw."""
+        starts = column_starts(self.frequency_hz.size, columns)
+        low, _ = envelope(self.lower, columns)
+        _, high = envelope(self.upper, columns)
+        return self.frequency_hz[starts], np.asarray(low, np.float64), np.asarray(high, np.float64)
+
+    @property
+    def _reach(self) -> Reals:
+        """Bounds that reach further say that nothing is known, and would only fill the picture."""
+        return np.minimum(2 * self.relative_sd, np.log(10.0))
+
+    def at(self, frequency_hz: Reals) -> "Trace":
+        """Read the curve at other frequencies, straight between points in both logarithms; NaN outside."""
+        known = np.isfinite(self.magnitude) & (self.magnitude > 0)
+        if not known.any():
+            return replace(
+                self,
+                frequency_hz=frequency_hz,
+                magnitude=np.full(frequency_hz.shape, np.nan),
+                relative_sd=np.full(frequency_hz.shape, np.nan),
+            )
+        place, given = np.log(frequency_hz), np.log(self.frequency_hz[known])
+        magnitude = np.interp(place, given, np.log(self.magnitude[known]), left=np.nan, right=np.nan)
+        spread = np.interp(place, given, self.relative_sd[known], left=np.nan, right=np.nan)
+        return replace(self, frequency_hz=frequency_hz, magnitude=np.exp(magnitude), relative_sd=spread)
+
+
+def sorted_trace(trace: Trace) -> Trace:
+    """Bring the points into ascending order, each frequency once: sweeps downwards come the other way."""
+    frequency_hz, first = np.unique(trace.frequency_hz, return_index=True)
+    return replace(
+        trace,
+        frequency_hz=frequency_hz,
+        magnitude=trace.magnitude[first],
+        relative_sd=trace.relative_sd[first],
+    )
+
+
+def trace_difference(trace: Trace, reference: Trace) -> Difference:
+    """Say how far a curve lies above another, at its own frequencies within both.
+
+    Raises
+    ------
+    NotEnoughData
+        When the two have no frequency in common.
+
+    """
+    low = max(trace.frequency_hz[0], reference.frequency_hz[0])
+    high = min(trace.frequency_hz[-1], reference.frequency_hz[-1])
+    shared = (trace.frequency_hz >= low) & (trace.frequency_hz <= high) & np.isfinite(trace.magnitude)
+    if not shared.any():
+        raise NotEnoughData(
+            f"{trace.name} and {reference.name} have no frequency in common; compare curves that overlap"
+        )
+    place = trace.frequency_hz[shared]
+    other = reference.at(place)
+    return logarithmic_difference(
+        place,
+        (trace.magnitude[shared], np.nan_to_num(trace.relative_sd[shared])),
+        (other.magnitude, np.nan_to_num(other.relative_sd)),
+    )

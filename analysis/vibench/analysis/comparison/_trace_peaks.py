@@ -1,0 +1,77 @@
+"""The peaks of a curve, placed between its points, with the width at half power where it is seen."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from ..signals import Reals
+from ._trace import Trace
+
+_LEAST_RISE_DB = 3.0
+"""A peak stands above the valley beside it by at least so much ..."""
+_LEAST_RISE_SD = 8.0
+"""... and by so many standard deviations: the ends of a thousand points of noise are 6.5 apart."""
+_HALF_POWER = 1 / np.sqrt(2)
+_PER_NEPER_DB = 20 / np.log(10)
+
+
+@dataclass(frozen=True)
+class TracePeak:
+    """One peak of a curve."""
+
+    frequency_hz: float
+    """Of the parabola through the highest point and its neighbours, in logarithms."""
+    magnitude: float
+    relative_sd: float
+    """Of the magnitude; NaN where nothing is known of it."""
+    half_power_width_hz: float | None
+    """Where the curve falls by 3 dB on both sides; None where a neighbour comes first."""
+
+    @property
+    def damping_ratio(self) -> float | None:
+        """Half the width over the frequency: the damping ratio of a single linear mode."""
+        width_hz = self.half_power_width_hz
+        return None if width_hz is None else 0.5 * width_hz / self.frequency_hz
+
+
+def trace_peaks(trace: Trace, most: int = 6) -> tuple[TracePeak, ...]:
+    """Find the highest peaks, in the order of frequency."""
+    known = np.isfinite(trace.magnitude) & (trace.magnitude > 0)
+    frequency_hz, height = trace.frequency_hz[known], np.log(trace.magnitude[known])
+    if height.size < 3:
+        return ()
+    spread = np.nan_to_num(trace.relative_sd[known])
+    least = _LEAST_RISE_DB / _PER_NEPER_DB
+    places, found = find_peaks(height, prominence=least)
+    clear = found["prominences"] > np.maximum(least, _LEAST_RISE_SD * spread[places])
+    highest = sorted(places[clear], key=lambda place: -height[place])[:most]
+    return tuple(_peak(frequency_hz, height, trace.relative_sd[known], int(p)) for p in sorted(highest))
+
+
+def _peak(frequency_hz: Reals, height: Reals, spread: Reals, place: int) -> TracePeak:
+    x, y = np.log(frequency_hz[place - 1 : place + 2]), height[place - 1 : place + 2]
+    bend, slope, top = np.polyfit(x - x[1], y, 2)
+    offset = float(np.clip(-slope / (2 * bend), x[0] - x[1], x[2] - x[1])) if bend < 0 else 0.0
+    peak = float(top + slope * offset + bend * offset**2)
+    return TracePeak(
+        frequency_hz=float(np.exp(x[1] + offset)),
+        magnitude=float(np.exp(peak)),
+        relative_sd=float(spread[place]),
+        half_power_width_hz=_width_hz(frequency_hz, height, place, peak + float(np.log(_HALF_POWER))),
+    )
+
+
+def _width_hz(frequency_hz: Reals, height: Reals, place: int, level: float) -> float | None:
+    ends = []
+    for step in (-1, 1):
+        here = place
+        while 0 <= here + step < height.size and height[here + step] > level:
+            if height[here + step] > height[place]:
+                return None
+            here += step
+        if not 0 <= here + step < height.size:
+            return None
+        share = (height[here] - level) / (height[here] - height[here + step])
+        ends.append(frequency_hz[here] + share * (frequency_hz[here + step] - frequency_hz[here]))
+    return float(abs(ends[1] - ends[0]))

@@ -1,0 +1,23 @@
+from ._excerpt import (
+    excerpt as excerpt,
+)
+from ._export import (
+    Format as Format,
+    Results as Results,
+    export_samples as export_samples,
+)
+from ._import_recording import (
+    import_recording as import_recording,
+)
+from ._mapping import (
+    ImportMapping as ImportMapping,
+)
+from ._source import (
+    opened_source as opened_source,
+)
+from ._source_channel import (
+    SourceChannel as SourceChannel,
+)
+from ._xarray_dataset import (
+    xarray_dataset as xarray_dataset,
+)

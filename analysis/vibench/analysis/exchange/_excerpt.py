@@ -1,0 +1,99 @@
+"""What is exported: some channels of a recording, from one moment to another, read in blocks."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from vibench.acquisition.recording import ChannelHeader, RecordedBlock, Recording
+
+from ..errors import InvalidRequest, NotEnoughData
+from ..signals import Reals
+
+BLOCK_SAMPLES = 51_200
+"""One chunk of the file: 0.4 MB a channel in memory."""
+
+Watcher = Callable[[int], None]
+"""Told how many values were written since it was last called."""
+
+
+def unwatched(_values: int) -> None:
+    """Watch nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Excerpt:
+    """Channels and samples of a recording; made by :func:`excerpt`."""
+
+    recording: Recording
+    channels: tuple[ChannelHeader, ...]
+    start: int
+    stop: int
+    """One past the last sample."""
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """Names of the channels."""
+        return tuple(each.role for each in self.channels)
+
+    @property
+    def samples(self) -> int:
+        """Per channel."""
+        return self.stop - self.start
+
+    @property
+    def values(self) -> int:
+        """Of all channels together: what a watcher counts up to."""
+        return self.samples * len(self.channels)
+
+    @property
+    def name(self) -> str:
+        """The recording's, without suffixes."""
+        return self.recording.path.name.removesuffix(".part").removesuffix(".h5")
+
+    def blocks(self) -> Iterator[RecordedBlock]:
+        """Go through all channels together, a block at a time."""
+        return self.recording.blocks(self.roles, BLOCK_SAMPLES, self.start, self.stop)
+
+    def channel_blocks(self, role: str) -> Iterator[Reals]:
+        """Go through one channel, a block at a time [its physical unit]."""
+        for block in self.recording.blocks((role,), BLOCK_SAMPLES, self.start, self.stop):
+            yield block.values[0]
+
+
+def excerpt(
+    recording: Recording,
+    roles: Sequence[str] = (),
+    from_s: float | None = None,
+    to_s: float | None = None,
+) -> Excerpt:
+    """Choose channels (all when none is named) and a stretch of time since the first sample.
+
+    Raises
+    ------
+    RecordingError
+        When there is no such channel.
+    InvalidRequest
+        When the stretch lies outside the recording, or a channel is named twice.
+    NotEnoughData
+        When the recording holds no samples.
+
+    """
+    wanted = tuple(roles) or recording.roles
+    if len(set(wanted)) != len(wanted):
+        raise InvalidRequest(f"the channels {', '.join(wanted)} were asked for; name each channel once")
+    if recording.samples == 0:
+        raise NotEnoughData(
+            f"{recording.path.name} holds no samples ({recording.state.value}): none to export"
+        )
+    rate = recording.sample_rate_hz
+    start = 0 if from_s is None else round(from_s * rate)
+    stop = recording.samples if to_s is None else round(to_s * rate)
+    if not 0 <= start < stop <= recording.samples:
+        raise InvalidRequest(
+            f"{_moment(from_s, 'the beginning')} to {_moment(to_s, 'the end')} was asked for; "
+            f"{recording.path.name} goes from 0 to {recording.duration_s:.9g} s; give a stretch inside"
+        )
+    return Excerpt(recording, tuple(recording.channel(role) for role in wanted), start, stop)
+
+
+def _moment(time_s: float | None, otherwise: str) -> str:
+    return otherwise if time_s is None else f"{time_s:g} s"

@@ -1,0 +1,123 @@
+"""HDF5 of any layout as a source: netCDF-4, MATLAB 7.3 and instrument makers' own are HDF5 too."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from ..errors import UnusableData
+from ..signals import Reals
+from ._source_channel import SourceChannel
+
+FEWEST_SAMPLES = 2
+EXACT_KINDS = {"i": 4, "u": 2}
+"""Integers of at most so many bytes fit the recording's own."""
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a channel's numbers lie."""
+
+    path: str
+    row: int | None
+    """Row or column of a table; None for a dataset of one dimension."""
+    has_time_first: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Hdf5Source:
+    """Datasets of one dimension, and rows or columns of those with two: ``"/data#1"``, counted from one.
+
+    CF's ``scale_factor``, ``add_offset`` and ``_FillValue`` are applied. Data in other files
+    (external links and storage, virtual datasets) are left alone.
+    """
+
+    file: h5py.File
+    places: Mapping[SourceChannel, _Place]
+
+    @property
+    def channels(self) -> tuple[SourceChannel, ...]:
+        """In the order of their names."""
+        return tuple(self.places)
+
+    def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
+        """Read a stretch."""
+        place = self.places[channel]
+        dataset = self.file[place.path]
+        match place:
+            case _Place(row=None):
+                raw = dataset[start:stop]
+            case _Place(row=row, has_time_first=True):
+                raw = dataset[start:stop, row]
+            case _Place(row=row):
+                raw = dataset[row, start:stop]
+        values = np.asarray(raw, dtype=np.float64) * _number(dataset, "scale_factor", 1.0)
+        values += _number(dataset, "add_offset", 0.0)
+        if "_FillValue" in dataset.attrs:
+            values[raw == dataset.attrs["_FillValue"]] = np.nan
+        return values
+
+
+@contextmanager
+def opened_hdf5(path: Path) -> Iterator[Hdf5Source]:
+    """Open a file; UnusableData when it is not HDF5."""
+    try:
+        file = h5py.File(path, "r", locking=False)
+    except OSError as error:
+        raise UnusableData(f"{path.name} is no HDF5 file ({error}); copy or export it again") from error
+    with file:
+        yield Hdf5Source(file, dict(_places(file)))
+
+
+def _places(file: h5py.File) -> Iterator[tuple[SourceChannel, _Place]]:
+    datasets: list[h5py.Dataset] = []
+    file.visititems(lambda _, item: datasets.append(item) if _holds_samples(item) else None)
+    for dataset in datasets:
+        if dataset.ndim == 1:
+            yield _channel(dataset, dataset.name, dataset.shape[0]), _Place(dataset.name, None)
+            continue
+        has_time_first = dataset.shape[0] >= dataset.shape[1]
+        samples, rows = dataset.shape if has_time_first else dataset.shape[::-1]
+        for row in range(rows):
+            name = dataset.name if rows == 1 else f"{dataset.name}#{row + 1}"
+            yield _channel(dataset, name, samples), _Place(dataset.name, row, has_time_first)
+
+
+def _holds_samples(item: h5py.HLObject) -> bool:
+    return (
+        isinstance(item, h5py.Dataset)
+        and item.dtype.kind in "iuf"
+        and item.ndim in {1, 2}
+        and min(item.shape) > 0
+        and max(item.shape) >= FEWEST_SAMPLES
+        and not item.is_virtual
+        and item.external is None
+    )
+
+
+def _channel(dataset: h5py.Dataset, name: str, samples: int) -> SourceChannel:
+    scale = abs(_number(dataset, "scale_factor", 1.0))
+    is_exact = dataset.dtype.itemsize <= EXACT_KINDS.get(dataset.dtype.kind, 0)
+    is_exact = is_exact and _number(dataset, "add_offset", 0.0) == 0.0
+    unit = next(
+        (_text(dataset, each) for each in ("units", "unit", "Units", "Unit") if each in dataset.attrs), ""
+    )
+    return SourceChannel(
+        name=name,
+        samples=samples,
+        label=name.rsplit("/", 1)[-1],
+        unit=unit,
+        step=scale if is_exact else None,
+    )
+
+
+def _number(dataset: h5py.Dataset, name: str, otherwise: float) -> float:
+    return float(np.ravel(dataset.attrs[name])[0]) if name in dataset.attrs else otherwise
+
+
+def _text(dataset: h5py.Dataset, name: str) -> str:
+    value = np.ravel(dataset.attrs[name])[0]
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)

@@ -1,0 +1,221 @@
+"""Somebody else's file becomes a recording, with what it means, where it came from and its checksum."""
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+from itertools import pairwise
+from math import ceil, log2
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vibench.acquisition import Block, Overload
+from vibench.acquisition.recording import (
+    ChannelHeader,
+    RecordingHeader,
+    RecordingState,
+    RecordingWriter,
+    collect_provenance,
+    create_recording,
+)
+
+from ..errors import InvalidRequest
+from ..signals import Flags, Reals
+from ._excerpt import BLOCK_SAMPLES, Watcher, unwatched
+from ._mapping import ChannelMapping, ImportMapping
+from ._plan_parts import LaidPart, laid_parts
+from ._source import Source, find_channel, opened_source
+from ._source_channel import SourceChannel
+
+RATE_TOLERANCE = 1e-4
+"""How far a mapping's sample rate may lie from the file's: clocks differ less."""
+NEAR_FULL_SCALE = 0.95
+"""Share of the full scale from which a sample counts as overloaded, as at the bench."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Wanted:
+    """One channel to import: what the mapping and the file say of it."""
+
+    mapped: ChannelMapping
+    source: SourceChannel
+
+
+def import_recording(path: Path, mapping: ImportMapping, out: Path, watcher: Watcher = unwatched) -> Path:
+    """Make the recording ``out`` from a file, a block at a time.
+
+    Values that are no finite numbers count as lost samples, of all channels. The stored "volts" are the
+    numbers of the file: integers of up to 31 bits are kept exactly, others to 2^-30 of the next power of
+    two above their largest.
+
+    Raises
+    ------
+    InvalidRequest
+        When mapping and file do not fit together.
+    UnusableData
+        When the file is damaged.
+    RecordingError
+        When ``out`` exists or cannot be written. Nothing is left of a failed import.
+
+    """
+    with opened_source(path) as source:
+        wanted = tuple(_Wanted(each, find_channel(source, each.source, path)) for each in mapping.channels)
+        samples = _common_length(wanted, path)
+        rate = _sample_rate_hz(wanted, mapping, path)
+        parts = laid_parts(mapping, rate, samples)
+        header = RecordingHeader(
+            channels=tuple(_header(source, each, samples) for each in wanted),
+            sample_rate_hz=rate,
+            expected_samples=samples,
+            origin=mapping.origin,
+            plan_json=mapping.measurement.model_dump_json(),
+            bench_json=json.dumps(_bench(path, mapping, wanted)),
+            confirmations=mapping.confirmations,
+            provenance=replace(
+                collect_provenance(),
+                started_utc=mapping.started_utc.astimezone(UTC).isoformat(timespec="microseconds"),
+            ),
+        )
+        writer = create_recording(out, header)
+        try:
+            _write(writer, source, wanted, parts, samples, watcher)
+        except BaseException:
+            # Half an import is worth nothing: the file it came from is still there.
+            writer.finish(RecordingState.FAILED, "the import was not completed")
+            out.unlink(missing_ok=True)
+            raise
+        return writer.finish(RecordingState.COMPLETE, f"imported from {path.name}")
+
+
+def _common_length(wanted: Sequence[_Wanted], path: Path) -> int:
+    lengths = {each.source.samples for each in wanted}
+    if len(lengths) > 1:
+        said = ", ".join(f"{each.source.name} {each.source.samples}" for each in wanted)
+        raise InvalidRequest(
+            f"the channels of {path.name} differ in their numbers of samples ({said}), and those of a "
+            "recording share one clock; choose channels of one length"
+        )
+    return lengths.pop()
+
+
+def _sample_rate_hz(wanted: Sequence[_Wanted], mapping: ImportMapping, path: Path) -> float:
+    """Give the mapping's rate, or the file's where it has none."""
+    said = {each.source.sample_rate_hz for each in wanted} - {None}
+    given = mapping.sample_rate_hz
+    if given is None and len(said) != 1:
+        why = "does not say its sample rate exactly" if not said else "says several sample rates"
+        raise InvalidRequest(f"{path.name} {why}; give sample_rate_hz in the mapping")
+    rate = given if given is not None else next(each for each in said if each is not None)
+    far = [each for each in said if each is not None and abs(each - rate) > RATE_TOLERANCE * rate]
+    if far:
+        raise InvalidRequest(
+            f"{path.name} says {far[0]:.9g} samples/s, and the mapping {rate:.9g}; correct the mapping, "
+            "or leave its sample_rate_hz out"
+        )
+    return rate
+
+
+def _header(source: Source, each: _Wanted, samples: int) -> ChannelHeader:
+    mapped, found = each.mapped, each.source
+    quantity, unit = mapped.kind
+    full_scale = mapped.full_scale or found.full_scale
+    return ChannelHeader(
+        role=mapped.role,
+        physical_channel=found.name,
+        quantity=quantity,
+        unit=unit,
+        physical_per_volt=mapped.scale,
+        physical_offset=mapped.offset,
+        range_v=_power_of_two_above(_peak(source, found, samples)) if full_scale is None else full_scale,
+        volts_per_count=found.step,
+        coupling=mapped.coupling,
+        sensitivity=mapped.sensitivity,
+        sensitivity_unit=mapped.sensitivity_unit,
+        serial=mapped.serial,
+        calibration_date="" if mapped.calibration_date is None else mapped.calibration_date.isoformat(),
+        delay_s=mapped.delay_s,
+        long_name=mapped.long_name or found.label,
+    )
+
+
+def _peak(source: Source, channel: SourceChannel, samples: int) -> float:
+    peak = 0.0
+    for start in range(0, samples, BLOCK_SAMPLES):
+        values = np.abs(source.read(channel, start, min(start + BLOCK_SAMPLES, samples)))
+        peak = max(peak, float(values[np.isfinite(values)].max(initial=0.0)))
+    return peak
+
+
+def _power_of_two_above(peak: float) -> float:
+    return 2.0 ** ceil(log2(peak)) if peak > 0 else 1.0
+
+
+def _bench(path: Path, mapping: ImportMapping, wanted: Sequence[_Wanted]) -> dict[str, Any]:
+    """Say what is known of the bench, and where the samples came from."""
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    bench: dict[str, Any] = {
+        "name": f"imported from {path.name}",
+        "imported": {
+            "file": path.name,
+            "bytes": path.stat().st_size,
+            "sha256": digest,
+            "imported_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+            "mapping": mapping.model_dump(mode="json"),
+            "channels": [asdict(each.source) for each in wanted],
+        },
+    }
+    if mapping.specimen is not None:
+        bench["specimen"] = mapping.specimen.model_dump(mode="json", exclude_none=True)
+    if mapping.calibration_valid_days is not None:
+        bench["calibration_valid_days"] = mapping.calibration_valid_days
+    return bench
+
+
+def _write(
+    writer: RecordingWriter,
+    source: Source,
+    wanted: Sequence[_Wanted],
+    parts: Sequence[LaidPart],
+    samples: int,
+    watcher: Watcher,
+) -> None:
+    starts = {each.start: each.segment for each in parts}
+    stops = {each.stop for each in parts}
+    edges = {*range(0, samples, BLOCK_SAMPLES), *starts, *(stop for stop in stops if stop < samples), samples}
+    ordered = sorted(edges)
+    for start, stop in pairwise(ordered):
+        if start in stops:
+            writer.end_segment()
+        if start in starts:
+            writer.begin_segment(starts[start].label, **starts[start].numbers)
+        values = np.stack([source.read(each.source, start, stop) for each in wanted])
+        for block in _blocks(values, start, wanted):
+            writer.append(block)
+        watcher(values.size)
+    if samples in stops:
+        writer.end_segment()
+
+
+def _blocks(values: Reals, first: int, wanted: Sequence[_Wanted]) -> Iterator[Block]:
+    """Cut out what is no number in any channel, and mark what lies near full scale."""
+    for start, stop in _runs(np.all(np.isfinite(values), axis=0)):
+        kept = np.ascontiguousarray(values[:, start:stop])
+        yield Block(first + start, kept, tuple(_overloads(kept, first + start, wanted)))
+
+
+def _overloads(values: Reals, first: int, wanted: Sequence[_Wanted]) -> Iterator[Overload]:
+    for row, each in zip(values, wanted, strict=True):
+        full_scale = each.mapped.full_scale or each.source.full_scale
+        if full_scale is not None:
+            for start, stop in _runs(np.abs(row) >= NEAR_FULL_SCALE * full_scale):
+                yield Overload(each.mapped.role, first + start, first + stop - 1)
+
+
+def _runs(flags: Flags) -> list[tuple[int, int]]:
+    """Ranges (start, stop) in which the flags hold."""
+    changes = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
+    return [(int(start), int(stop)) for start, stop in changes.reshape(-1, 2)]

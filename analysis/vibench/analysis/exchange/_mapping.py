@@ -1,0 +1,126 @@
+"""What somebody else's file means: which of its channels is which, and what was played, as a TOML file."""
+
+from datetime import date
+from typing import Literal, Self
+
+from pydantic import AwareDatetime, Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+
+from vibench.acquisition import FrozenModel
+from vibench.acquisition.plan import Measurement
+from vibench.acquisition.recording import ROLE_PATTERN, Origin
+
+from ..recordings import BASE, DRIVE, RESPONSE
+
+KNOWN_ROLES = {
+    DRIVE: ("voltage", "V"),
+    "amplifier_voltage": ("voltage", "V"),
+    BASE: ("acceleration", "m s-2"),
+    RESPONSE: ("velocity", "m s-1"),
+}
+"""Quantity and unit that the analysis takes these channels to have."""
+
+
+class ChannelMapping(FrozenModel):
+    """One channel: ``value = scale * number in the file + offset``, in ``unit``."""
+
+    source: str = Field(min_length=1)
+    """Its name in the file, as `vibench import FILE` lists it."""
+    role: str = Field(pattern=f"^{ROLE_PATTERN.pattern}$")
+    """Its name in the recording: ``drive_voltage``, ``base_acceleration``, ``m0_velocity``, or any other."""
+    quantity: str = ""
+    unit: str = ""
+    """UDUNITS text of the value; known for the three channels that an analysis needs."""
+    scale: float = 1.0
+    offset: float = 0.0
+    full_scale: PositiveFloat | None = None
+    """What the input could bear, as a number in the file; values near it are marked as overloads."""
+    coupling: Literal["AC", "DC"] = "DC"
+    sensitivity: PositiveFloat | None = None
+    sensitivity_unit: str = ""
+    serial: str = ""
+    calibration_date: date | None = None
+    delay_s: float = 0.0
+    """How late the channel shows what happened [s]."""
+    long_name: str = ""
+
+    @model_validator(mode="after")
+    def _has_a_scale(self) -> Self:
+        if self.scale == 0:
+            raise ValueError(
+                f"the scale of {self.role} is 0, which leaves nothing of it; give unit per number"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _has_the_unit_of_its_role(self) -> Self:
+        if self.role not in KNOWN_ROLES:
+            if not (self.quantity and self.unit):
+                raise ValueError(
+                    f"{self.role} needs a quantity and a unit; they are known of {', '.join(KNOWN_ROLES)}"
+                )
+            return self
+        for given, needed in zip((self.quantity, self.unit), KNOWN_ROLES[self.role], strict=True):
+            if given not in {"", needed}:
+                raise ValueError(
+                    f"{self.role} is in {needed!r}, and {given!r} was given; convert it by scale"
+                )
+        return self
+
+    @property
+    def kind(self) -> tuple[str, str]:
+        """Quantity and unit, from its role when they were left out."""
+        return KNOWN_ROLES.get(self.role, (self.quantity, self.unit))
+
+
+class Part(FrozenModel):
+    """Where in the file a part of the plan lies [s since its first sample]."""
+
+    start_s: NonNegativeFloat
+    stop_s: PositiveFloat
+
+    @model_validator(mode="after")
+    def _rises(self) -> Self:
+        if self.stop_s <= self.start_s:
+            raise ValueError(
+                f"stop_s = {self.stop_s:g} is not after start_s = {self.start_s:g}; count both from the start"
+            )
+        return self
+
+
+class SpecimenFacts(FrozenModel):
+    """What was on the shaker, where it was not the paper's."""
+
+    contact: Literal["hertz", "linear"] | None = None
+    damping_time_s: PositiveFloat | None = None
+    gap_m: PositiveFloat | None = None
+
+
+class ImportMapping(FrozenModel):
+    """Everything an analysis must know that the file does not say."""
+
+    started_utc: AwareDatetime
+    """When it was measured, with its time zone: ``2026-03-01T12:00:00Z``."""
+    sample_rate_hz: PositiveFloat | None = None
+    """Needed where the file does not say it exactly: HDF5, universal files."""
+    origin: Origin = Origin.REAL
+    measurement: Measurement
+    """What was played, as in a campaign; a name, an excitation, notes."""
+    begins_s: NonNegativeFloat = 0.0
+    """When the first thing was played, its settling included [s since the first sample]."""
+    parts: tuple[Part, ...] = ()
+    """Where each part of the plan was recorded, when it is not simply one after the other."""
+    channels: tuple[ChannelMapping, ...] = Field(min_length=1)
+    specimen: SpecimenFacts | None = None
+    calibration_valid_days: PositiveInt | None = None
+    confirmations: dict[str, str | float] = Field(default_factory=dict)
+    """What else is known, for the report."""
+
+    @model_validator(mode="after")
+    def _roles_differ(self) -> Self:
+        roles = [each.role for each in self.channels]
+        twice = sorted({role for role in roles if roles.count(role) > 1})
+        if twice:
+            raise ValueError(
+                f"{', '.join(twice)} is given more than once; each channel needs a role of its own"
+            )
+        return self

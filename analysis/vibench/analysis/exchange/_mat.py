@@ -1,0 +1,109 @@
+"""Samples and what is known of them as a MATLAB 5 file: a struct for each channel, and one of facts."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.io import savemat
+
+from vibench.acquisition.recording import ChannelHeader
+
+from ..errors import InvalidRequest
+from ..signals import Reals
+from ._excerpt import Excerpt, Watcher, unwatched
+from ._facts_document import facts_document
+
+LARGEST_BYTES = 2**31
+"""A MATLAB 5 file counts the bytes of a variable with 31 bits, and many a reader those of the file."""
+VALUE_BYTES = 8
+LONGEST_NAME = 63
+"""Of a MATLAB variable; longer names of channels are cut."""
+
+
+def require_small(excerpt: Excerpt) -> None:
+    """InvalidRequest when the samples, and their times, do not fit a MATLAB 5 file."""
+    columns = len(excerpt.channels) + 1
+    size = excerpt.samples * columns * VALUE_BYTES
+    if size >= LARGEST_BYTES:
+        longest_s = LARGEST_BYTES // (columns * VALUE_BYTES) / excerpt.recording.sample_rate_hz
+        raise InvalidRequest(
+            f"{excerpt.samples} samples of {len(excerpt.channels)} channels make {size / 2**30:.1f} GiB, and "
+            f"a MATLAB 5 file ends at 2 GiB; export at most {longest_s:.0f} s of them, fewer channels, or "
+            f"let MATLAB read {excerpt.recording.path.name} itself with ncread"
+        )
+
+
+def write_mat(excerpt: Excerpt, path: Path, results: Mapping[str, Any], watcher: Watcher = unwatched) -> None:
+    """Write one variable after the other, so that one channel at a time is in memory.
+
+    Raises
+    ------
+    InvalidRequest
+        When it would be larger than the format allows.
+
+    """
+    require_small(excerpt)
+    with path.open("xb") as file:
+        _save(file, {"recording": _facts(excerpt)})
+        if results:
+            _save(file, {"results": results})
+        _save(file, {"time_s": excerpt.recording.time_s(excerpt.start, excerpt.stop)[:, np.newaxis]})
+        for channel in excerpt.channels:
+            values = _whole(excerpt, channel.role, watcher)
+            _save(file, {channel.role[:LONGEST_NAME]: _channel(channel, values)})
+
+
+def _save(file: Any, variables: dict[str, Any]) -> None:
+    savemat(file, variables, long_field_names=True, oned_as="column")
+
+
+def _whole(excerpt: Excerpt, role: str, watcher: Watcher) -> Reals:
+    values = np.empty(excerpt.samples)
+    done = 0
+    for block in excerpt.channel_blocks(role):
+        values[done : done + block.size] = block
+        done += block.size
+        watcher(block.size)
+    return values
+
+
+def _channel(channel: ChannelHeader, values: Reals) -> dict[str, Any]:
+    known = {name: value for name, value in asdict(channel).items() if value is not None}
+    del known["unit"]
+    return {
+        "values": values,
+        "units": channel.unit,
+        "scale_factor": channel.scale_factor,
+        "add_offset": channel.add_offset,
+        **known,
+    }
+
+
+def _facts(excerpt: Excerpt) -> dict[str, Any]:
+    """Numbers and texts as they are; everything nested as the JSON that ``jsondecode`` reads."""
+    facts = facts_document(excerpt)
+    del facts["segments"]
+    plain = {name: value for name, value in facts.items() if type(value) in {str, int, float}}
+    nested = {f"{name}_json": json.dumps(value) for name, value in facts.items() if name not in plain}
+    return {**plain, **nested, "segments": _segments(excerpt)}
+
+
+def _segments(excerpt: Excerpt) -> dict[str, Any]:
+    """Columns of the segments that the excerpt touches, as indices of its own arrays, counted from one."""
+    touched = [
+        each
+        for each in excerpt.recording.segments
+        if each.stop > max(excerpt.start, each.start) and each.start < excerpt.stop
+    ]
+    first = [max(each.start, excerpt.start) - excerpt.start + 1 for each in touched]
+    last = [min(each.stop, excerpt.stop) - excerpt.start for each in touched]
+    return {
+        "label": np.array([each.label for each in touched], dtype=object),
+        "first": np.array(first, dtype=float),
+        "last": np.array(last, dtype=float),
+        "is_complete": np.array([each.is_complete for each in touched], dtype=bool),
+        "numbers_json": np.array([json.dumps(dict(each.numbers)) for each in touched], dtype=object),
+    }

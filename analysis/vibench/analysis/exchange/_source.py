@@ -1,0 +1,144 @@
+"""What an import asks of a file, whoever wrote it: its channels, and their numbers in any stretch."""
+
+import struct
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from ..errors import InvalidRequest, UnusableData
+from ..signals import Reals
+from ._csv_source import opened_csv
+from ._hdf5_source import opened_hdf5
+from ._mat_source import opened_mat
+from ._source_channel import SourceChannel
+from ._tdms_source import opened_tdms
+from ._uff_source import opened_uff
+from ._wav_source import opened_wav
+
+
+class Source(Protocol):
+    """An open file."""
+
+    @property
+    def channels(self) -> tuple[SourceChannel, ...]:
+        """Everything in it that can be a channel of a recording."""
+
+    def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
+        """Give numbers as the file means them, lost ones as NaN, shape (stop - start,)."""
+
+
+_READERS: dict[str, Callable[[Path], AbstractContextManager[Source]]] = {
+    ".uff": opened_uff,
+    ".unv": opened_uff,
+    ".h5": opened_hdf5,
+    ".hdf5": opened_hdf5,
+    ".mat": opened_mat,
+    ".nc": opened_hdf5,
+    ".tdms": opened_tdms,
+    ".wav": opened_wav,
+    ".csv": opened_csv,
+    ".txt": opened_csv,
+}
+
+
+DAMAGE = (
+    OSError,
+    EOFError,
+    RuntimeError,
+    KeyError,
+    IndexError,
+    ValueError,
+    TypeError,
+    ArithmeticError,
+    MemoryError,
+    UnboundLocalError,
+    struct.error,
+)
+"""What h5py, npTDMS and scipy raise when the inside of a file is not what its outside promised."""
+
+
+@contextmanager
+def opened_source(path: Path) -> Iterator[Source]:
+    """Open a file by its suffix. Nothing in it is ever run: no pickles, no macros.
+
+    Raises
+    ------
+    InvalidRequest
+        When there is no such file, or no reader for its suffix.
+    UnusableData
+        When it is not what its suffix says, or holds nothing that can be a channel.
+
+    """
+    if not path.is_file():
+        raise InvalidRequest(f"{path} does not exist, or is no file; give the path of a file to import")
+    reader = _READERS.get(path.suffix.lower())
+    if reader is None:
+        raise InvalidRequest(
+            f"{path.name} cannot be imported: {path.suffix or 'a name without suffix'} is none of "
+            f"{', '.join(_READERS)}; export it as one of these, and import that"
+        )
+    with ExitStack() as stack:
+        with _readable(path):
+            source = stack.enter_context(reader(path))
+            if not source.channels:
+                raise UnusableData(
+                    f"{path.name} holds no time samples of real numbers; spectra and pictures cannot be read"
+                )
+        yield _CheckedSource(path, source)
+
+
+@dataclass(frozen=True)
+class _CheckedSource:
+    """A source whose every failure is a sentence."""
+
+    path: Path
+    source: Source
+
+    @property
+    def channels(self) -> tuple[SourceChannel, ...]:
+        return self.source.channels
+
+    def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
+        # Converting a signalling NaN is no error: it is a lost sample like any other NaN.
+        with _readable(self.path), np.errstate(invalid="ignore"):
+            values = self.source.read(channel, start, stop)
+        if values.shape != (stop - start,):
+            raise UnusableData(
+                f"{self.path.name} gives {values.size} of the {stop - start} numbers of {channel.name} from "
+                f"sample {start} on; copy or export it again"
+            )
+        return values
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except (InvalidRequest, UnusableData):
+        raise
+    except DAMAGE as error:
+        raise UnusableData(
+            f"{path.name} is damaged, or not what its suffix says ({error}); copy or export it again"
+        ) from error
+
+
+def find_channel(source: Source, wanted: str, path: Path) -> SourceChannel:
+    """Give the channel of that name, or the only one of that label.
+
+    Raises
+    ------
+    InvalidRequest
+        When there is none, or more than one; the sentence lists what there is.
+
+    """
+    found = [each for each in source.channels if each.name == wanted]
+    found = found or [each for each in source.channels if each.label == wanted]
+    if len(found) == 1:
+        return found[0]
+    many = "several channels" if found else "no channel"
+    held = ", ".join(repr(each.name) + (f" ({each.label})" if each.label else "") for each in source.channels)
+    raise InvalidRequest(f"{path.name} has {many} {wanted!r}; it has {held}")

@@ -1,0 +1,78 @@
+"""National Instruments' TDMS as a source, read by npTDMS."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InvalidRequest, UnusableData
+from ..signals import Reals
+from ._source_channel import SourceChannel
+
+SIGNATURE = b"TDSm"
+"""First bytes of every segment (NI, TDMS File Format Internal Structure)."""
+INTERVAL, UNIT = "wf_increment", "unit_string"
+"""Properties that NI's software writes."""
+
+
+@dataclass(frozen=True, eq=False)
+class TdmsSource:
+    """Channels named ``"group/channel"``, scaled as the file says."""
+
+    found: Mapping[SourceChannel, Any]
+
+    @property
+    def channels(self) -> tuple[SourceChannel, ...]:
+        """In the order of the file."""
+        return tuple(self.found)
+
+    def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
+        """Read a stretch."""
+        return np.asarray(self.found[channel][start:stop], dtype=np.float64)
+
+
+@contextmanager
+def opened_tdms(path: Path) -> Iterator[TdmsSource]:
+    """Open a file.
+
+    Raises
+    ------
+    InvalidRequest
+        When npTDMS is not installed.
+    UnusableData
+        When it is not TDMS.
+
+    """
+    try:
+        from nptdms import TdmsFile  # noqa: PLC0415 - an optional extra
+    except ImportError as error:
+        raise InvalidRequest(
+            f"{path.name} needs npTDMS to be read, which is not installed: pip install 'vibench[exchange]'"
+        ) from error
+    # Ours to open: npTDMS does not close what it finds damaged.
+    with path.open("rb") as raw:
+        if raw.read(len(SIGNATURE)) != SIGNATURE:  # npTDMS would find nothing, and say nothing
+            raise UnusableData(f"{path.name} is no TDMS file; copy it again, with its .tdms suffix")
+        raw.seek(0)
+        file = TdmsFile.open(raw)
+        yield TdmsSource(
+            {_channel(each): each for group in file.groups() for each in group.channels() if _is_real(each)}
+        )
+
+
+def _is_real(channel: Any) -> bool:
+    return len(channel) > 1 and channel.dtype.kind in "iuf"
+
+
+def _channel(channel: Any) -> SourceChannel:
+    interval_s = float(channel.properties.get(INTERVAL, 0.0))
+    return SourceChannel(
+        name=f"{channel.group_name}/{channel.name}",
+        samples=len(channel),
+        label=channel.name,
+        sample_rate_hz=1 / interval_s if interval_s > 0 else None,
+        unit=str(channel.properties.get(UNIT, "")),
+    )

@@ -1,0 +1,92 @@
+"""A recording, or a part of it, as a labelled Dataset for notebooks."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibench.acquisition.recording import ChannelHeader, Recording
+
+from ..errors import InvalidRequest
+from ._excerpt import excerpt
+
+if TYPE_CHECKING:
+    import xarray
+
+BETWEEN = -1
+"""Number of the segment of a sample that lies in none."""
+
+
+def xarray_dataset(
+    recording: Recording,
+    roles: Sequence[str] = (),
+    from_s: float | None = None,
+    to_s: float | None = None,
+) -> "xarray.Dataset":
+    """Give channels in their physical units over ``time`` [s since the first sample], in memory.
+
+    Lost samples are NaN. ``segment`` is the number of the segment that a sample lies in, -1 between them;
+    the attribute ``segments_json`` says what each of them is. A finished file larger than memory is better
+    opened where it lies: ``xarray.open_dataset(path, engine="h5netcdf")``.
+
+    Parameters
+    ----------
+    recording
+        Open; it may be closed afterwards.
+    roles
+        Channels; all when none is named.
+    from_s, to_s
+        Stretch of time [s]; the whole recording if absent.
+
+    Raises
+    ------
+    InvalidRequest
+        When xarray is not installed, or the stretch lies outside the recording.
+
+    """
+    try:
+        import xarray  # noqa: PLC0415 - an optional extra
+    except ImportError as error:
+        raise InvalidRequest("xarray is not installed; pip install 'vibench[exchange]'") from error
+    chosen = excerpt(recording, roles, from_s, to_s)
+    time_s = recording.time_s(chosen.start, chosen.stop)
+    return xarray.Dataset(
+        {
+            each.role: ("time", recording.read(each.role, chosen.start, chosen.stop), _attributes(each))
+            for each in chosen.channels
+        },
+        coords={
+            "time": ("time", time_s, {"units": "s", "long_name": "time since the first sample"}),
+            "segment": ("time", _numbers_of_segments(recording, chosen.start, chosen.stop)),
+        },
+        attrs={
+            "recording": chosen.name,
+            "recording_id": recording.recording_id,
+            "sample_rate_hz": recording.sample_rate_hz,
+            "started_utc": recording.started_utc,
+            "origin": recording.origin.value,
+            "state": recording.state.value,
+            "segments_json": _said_of_segments(recording),
+        },
+    )
+
+
+def _attributes(channel: ChannelHeader) -> dict[str, str | float]:
+    known = {name: value for name, value in asdict(channel).items() if value not in {None, ""}}
+    del known["role"], known["unit"]
+    return {"units": channel.unit, "long_name": channel.role.replace("_", " "), **known}
+
+
+def _numbers_of_segments(recording: Recording, start: int, stop: int) -> NDArray[np.int16]:
+    """Say for each sample which of the recording's segments it lies in."""
+    numbers = np.full(stop - start, BETWEEN, dtype=np.int16)
+    for number, each in enumerate(recording.segments):
+        numbers[max(each.start - start, 0) : max(each.stop - start, 0)] = number
+    return numbers
+
+
+def _said_of_segments(recording: Recording) -> str:
+    return json.dumps([{"label": each.label, **each.numbers} for each in recording.segments])

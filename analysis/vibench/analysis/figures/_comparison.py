@@ -1,0 +1,168 @@
+"""Curves laid over one another, as they are compared in the window, for paper: always light."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..comparison import Origin, Trace, trace_difference, trace_peaks
+from ..errors import InvalidRequest
+from ..model import Difference
+from ..tables import Table, table
+from ._drawn import DrawnFigure
+from ._style import BOUNDS, LEVELS, MEASURED, frequency_axis, legend_above, magnitude_axis, new_figure, styled
+
+_HEIGHT_IN = 4.6
+_DIFFERENCE_IN = 1.4
+_STYLES = {Origin.MEASURED: "-", Origin.SIMULATED: "--", Origin.PREDICTED: ":"}
+_LONE = 1
+"""A curve of one point is drawn as a mark."""
+_SINGLE_BAND = 0.2
+
+
+def comparison_figure(
+    name: str,
+    traces: Sequence[Trace],
+    pair: tuple[Trace, Trace] | None = None,
+    markers_hz: Sequence[float] = (),
+) -> DrawnFigure:
+    """Draw curves with their bounds, the difference of two of them, and markers.
+
+    Parameters
+    ----------
+    name
+        Becomes the files' name.
+    pair
+        The curve and its reference, whose difference is drawn below.
+
+    Raises
+    ------
+    InvalidRequest
+        When there is no curve.
+    NotEnoughData
+        When the pair has no frequency in common.
+
+    """
+    if not traces:
+        raise InvalidRequest("a figure of no curves was asked for; choose one or more")
+    difference = None if pair is None else trace_difference(*pair)
+    with styled():
+        rows = 1 if difference is None else 2
+        figure = new_figure(_HEIGHT_IN + (rows - 1) * _DIFFERENCE_IN)
+        panels = figure.subplots(rows, 1, sharex=True, height_ratios=(3.2, 1.0)[:rows], squeeze=False)[:, 0]
+        top: Axes = panels[0]
+        for number, trace in enumerate(traces):
+            _curve(top, trace, LEVELS[number % len(LEVELS)])
+        magnitude_axis(top)
+        top.set_ylim(*_heights(traces))
+        top.set_ylabel("|x / U|  (m0 over base)")
+        if difference is not None and pair is not None:
+            _difference(panels[1], difference)
+        for marker_hz in markers_hz:
+            for axes in panels:
+                axes.axvline(marker_hz, color=BOUNDS, linewidth=0.8, linestyle="-.")
+        panels[-1].set_xlabel("frequency [Hz]")
+        frequency_axis(top, *_span(traces))
+        legend_above(figure, [top], columns=2)
+        figure.align_ylabels()
+    return DrawnFigure(
+        name=name,
+        title="Comparison",
+        caption=comparison_caption(traces, pair),
+        figure=figure,
+        tables=comparison_tables(name, traces, pair),
+    )
+
+
+def _curve(axes: Axes, trace: Trace, colour: str) -> None:
+    lone = trace.frequency_hz.size <= _LONE
+    known = np.isfinite(trace.relative_sd)
+    if known.any() and not lone:
+        axes.fill_between(
+            trace.frequency_hz, trace.lower, trace.upper, color=colour, alpha=0.18, linewidth=0, where=known
+        )
+    axes.plot(
+        trace.frequency_hz,
+        trace.magnitude,
+        color=colour,
+        linestyle="none" if lone else _STYLES[trace.origin],
+        marker="o" if lone else None,
+        markersize=5,
+        linewidth=1.0,
+        label=trace.name,
+        gid=trace.name,
+    )
+
+
+def _difference(axes: Axes, difference: Difference) -> None:
+    axes.plot(difference.frequency_hz, difference.decibel, color=MEASURED, linewidth=0.8)
+    axes.axhline(0, color=BOUNDS, linewidth=0.6)
+    axes.set_ylabel("difference\n[dB]")
+
+
+def _heights(traces: Sequence[Trace]) -> tuple[float, float]:
+    """Let the curves fill the picture, not their bounds."""
+    known = np.concatenate([each.magnitude[np.isfinite(each.magnitude)] for each in traces])
+    positive = known[known > 0]
+    return (float(positive.min()) / 2, 2 * float(positive.max())) if positive.size else (0.1, 10.0)
+
+
+def _span(traces: Sequence[Trace]) -> tuple[float, float]:
+    low = min(float(each.frequency_hz[0]) for each in traces)
+    high = max(float(each.frequency_hz[-1]) for each in traces)
+    return (low, high) if high > low else (low * (1 - _SINGLE_BAND), high * (1 + _SINGLE_BAND))
+
+
+def comparison_caption(traces: Sequence[Trace], pair: tuple[Trace, Trace] | None) -> str:
+    """Say what each curve is, with its numbers."""
+    said = [f"{each.name}: {each.note}." if each.note else f"{each.name}." for each in traces]
+    said.append("Shaded: two standard deviations.")
+    if pair is not None:
+        difference = trace_difference(*pair)
+        said.append(
+            f"Difference of {pair[0].name} over {pair[1].name}: median {difference.median_abs_db:.2g} dB, "
+            f"root mean square {difference.rms_db:.2g} dB."
+        )
+    return " ".join(said)
+
+
+def comparison_tables(
+    name: str, traces: Sequence[Trace], pair: tuple[Trace, Trace] | None = None
+) -> tuple[Table, ...]:
+    """Give every curve, the difference, and the peaks, with units in the headings."""
+    found = [
+        table(
+            f"{name}_{number}_{_file_word(trace)}",
+            frequency_hz=trace.frequency_hz,
+            magnitude_displacement_over_displacement=trace.magnitude,
+            relative_standard_deviation=trace.relative_sd,
+        )
+        for number, trace in enumerate(traces, start=1)
+    ]
+    peaks = [(trace.name, peak) for trace in traces for peak in trace_peaks(trace)]
+    if peaks:
+        found.append(
+            table(
+                f"{name}_peaks",
+                curve=[label for label, _ in peaks],
+                frequency_hz=[each.frequency_hz for _, each in peaks],
+                magnitude=[each.magnitude for _, each in peaks],
+                half_power_width_hz=[each.half_power_width_hz or np.nan for _, each in peaks],
+            )
+        )
+    if pair is not None:
+        difference = trace_difference(*pair)
+        found.append(
+            table(
+                f"{name}_difference",
+                frequency_hz=difference.frequency_hz,
+                difference_db=difference.decibel,
+                standard_errors=difference.standard_errors,
+            )
+        )
+    return tuple(found)
+
+
+def _file_word(trace: Trace) -> str:
+    kept = (each if each.isalnum() or each in "-_" else "_" for each in trace.name.replace(", ", "_"))
+    return "".join(kept)

@@ -1,1 +1,0 @@
-"""The figures of the paper, drawn from our own studies; one file a figure."""

@@ -1,0 +1,67 @@
+"""Response over drive against frequency, from noise and multisines, with bounds on every line.
+
+Estimators h1, h2, hv and drive-referenced from averaged spectra; for periodic noise the best linear
+approximation, which tells noise from nonlinear distortion (Pintelon & Schoukens, System Identification,
+2nd ed., section 4.3). Resonances are fitted with frequency, damping and their uncertainties.
+Displacement over displacement unless a view says otherwise. No sweep, dwell or model is known here.
+"""
+
+from ._distortion import (
+    Distortion,
+    distortion,
+    is_even_line,
+)
+from ._noise_request import (
+    NoiseRequest,
+)
+from ._noise_response import (
+    DEFAULT_REQUEST,
+    Noise,
+    NoiseAnalysis,
+    NoiseResponse,
+    noise_response,
+)
+from ._periodic_transmission import (
+    PeriodicTransmission,
+)
+from ._resonance import (
+    Resonance,
+    resonances,
+)
+from ._results import (
+    Estimator,
+    Transmission,
+    TransmissionSettings,
+    converted_transmission,
+)
+from ._transmission import (
+    transmission,
+    transmission_of,
+)
+from ._transmission_view import (
+    MagnitudeScale,
+    quantities_named,
+)
+
+__all__ = [
+    "DEFAULT_REQUEST",
+    "Distortion",
+    "Estimator",
+    "MagnitudeScale",
+    "Noise",
+    "NoiseAnalysis",
+    "NoiseRequest",
+    "NoiseResponse",
+    "PeriodicTransmission",
+    "Resonance",
+    "Transmission",
+    "TransmissionSettings",
+    "converted_transmission",
+    "distortion",
+    "is_even_line",
+    "noise_response",
+    "quantities_named",
+    "resonances",
+    "transmission",
+    "transmission_of",
+]

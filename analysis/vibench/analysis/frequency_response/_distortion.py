@@ -1,0 +1,57 @@
+"""How nonlinear the specimen was under noise that repeats: what its scatter and its quiet lines say."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..signals import Flags, Reals
+from ._periodic_transmission import DetectionLines, PeriodicTransmission
+
+
+@dataclass(frozen=True)
+class Distortion:
+    """Noise and nonlinear distortion of a transmission, each in parts of it; medians over the lines."""
+
+    noise_share: float
+    """Standard deviation that noise gives one realisation, over the transmission's magnitude."""
+    distortion_share: float | None
+    """What realisations scatter beyond it; None when there was one only."""
+    odd_m_per_s: float | None
+    """Rms response on the odd lines that were not driven, noise taken off; None when there are none."""
+    even_m_per_s: float | None
+    """The same on even lines."""
+    detection_noise_m_per_s: float | None
+    """Rms of what noise leaves on the quiet lines."""
+
+
+def distortion(periodic: PeriodicTransmission) -> Distortion:
+    """Sum up what a periodic transmission says of noise and of distortion.
+
+    The quiet lines hold whatever is not linear between the drive voltage and the response: amplifier and
+    shaker as well as the specimen.
+    """
+    magnitude = periodic.transmission.magnitude
+    varied = periodic.distortion_variance
+    quiet = periodic.detection
+    is_even = is_even_line(quiet)
+    return Distortion(
+        noise_share=float(np.median(np.sqrt(periodic.noise_variance) / magnitude)),
+        distortion_share=None if varied is None else float(np.median(np.sqrt(varied) / magnitude)),
+        odd_m_per_s=_rms_without_noise(quiet, ~is_even),
+        even_m_per_s=_rms_without_noise(quiet, is_even),
+        detection_noise_m_per_s=_rms(quiet.noise_amplitude),
+    )
+
+
+def is_even_line(lines: DetectionLines) -> Flags:
+    """Lines on which only even distortion can lie."""
+    return np.asarray(lines.order % 2 == 0)
+
+
+def _rms_without_noise(lines: DetectionLines, chosen: Flags) -> float | None:
+    power = lines.response_amplitude[chosen] ** 2 - lines.noise_amplitude[chosen] ** 2
+    return float(np.sqrt(max(float(np.mean(power)), 0.0))) if power.size else None
+
+
+def _rms(values: Reals) -> float | None:
+    return float(np.sqrt(np.mean(values**2))) if values.size else None

@@ -1,0 +1,125 @@
+"""What an analyst asks of a noise measurement: estimator, resolution or averages, and how it is shown."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import InvalidRequest, NotEnoughData
+from ..signals import DEFAULT_CONFIDENCE, Window, hop_samples, taper
+from ._results import Estimator
+from ._transmission_view import TransmissionView
+
+_SEGMENT_S = 4.0
+"""Segment of streamed noise: a quarter of a hertz between lines resolves a bandwidth of 1 Hz."""
+_LEAST_SEGMENTS = 8
+"""Nobody asked: a short record gets shorter segments rather than fewer averages than this."""
+_PROXY_SAMPLES = 4096
+"""Length of the window that overlaps are judged on; their correlations do not depend on it."""
+
+
+@dataclass(frozen=True)
+class NoiseRequest:
+    """How to estimate a transmission; the defaults suit the paper's specimen.
+
+    At most one of resolution, segment length and averages can be chosen: the other two follow.
+    """
+
+    estimator: Estimator = Estimator.DRIVE
+    noise_ratio: float | None = None
+    """For hv: noise density of m0's velocity over that of the base's acceleration [s2]."""
+    resolution_hz: float | None = None
+    """Noise bandwidth of a line; the segment becomes as long as that needs."""
+    segment_s: float | None = None
+    averages: float | None = None
+    """Independent averages; the segments become as long as they leave."""
+    window: Window = Window.HANN
+    overlap: float = 0.5
+    confidence: float = DEFAULT_CONFIDENCE
+    view: TransmissionView = field(default_factory=TransmissionView)
+
+    def __post_init__(self) -> None:
+        lengths = {
+            "a resolution": self.resolution_hz,
+            "a segment length": self.segment_s,
+            "a number of averages": self.averages,
+        }
+        given = {name: value for name, value in lengths.items() if value is not None}
+        if len(given) > 1:
+            raise InvalidRequest(f"{' and '.join(given)} were given; give one, the others follow from it")
+        for name, value in given.items():
+            if not (np.isfinite(value) and value > 0):
+                raise InvalidRequest(f"{name} of {value:g} was asked for; it must be more than 0")
+        if self.averages is not None and self.averages <= 1:
+            raise InvalidRequest(f"{self.averages:g} averages were asked for; a coherence needs more than 1")
+        if self.estimator is Estimator.HV and self.noise_ratio is None:
+            raise InvalidRequest(
+                "hv was asked for without a noise ratio; give the noise density of the response over that of "
+                "the base, or use the drive-referenced estimator"
+            )
+        if self.estimator is not Estimator.HV and self.noise_ratio is not None:
+            raise InvalidRequest(f"a noise ratio has no meaning for {self.estimator.value}; only hv uses it")
+        if self.noise_ratio is not None and not (np.isfinite(self.noise_ratio) and self.noise_ratio >= 0):
+            raise InvalidRequest(
+                f"the noise ratio is {self.noise_ratio:g}; it is a finite number, zero or more"
+            )
+        if not 0 < self.confidence < 1:
+            raise InvalidRequest(
+                f"a confidence of {self.confidence:g} was asked for; it lies between 0 and 1"
+            )
+        hop_samples(_PROXY_SAMPLES, self.overlap)
+
+    @property
+    def cuts_segments(self) -> bool:
+        """Whether it asks for something that only averages over segments have."""
+        chosen = (self.resolution_hz, self.segment_s, self.averages)
+        return any(each is not None for each in chosen) or (self.window, self.overlap) != (
+            NoiseRequest.window,
+            NoiseRequest.overlap,
+        )
+
+    def segment_samples(self, samples: int, sample_rate_hz: float) -> int:
+        """Choose the length of a segment for a record of so many samples.
+
+        Raises
+        ------
+        NotEnoughData
+            When the record does not hold two segments of the length asked for.
+
+        """
+        chosen = self._wished(samples, sample_rate_hz)
+        if samples < chosen + hop_samples(chosen, self.overlap):
+            raise NotEnoughData(
+                f"{samples / sample_rate_hz:.3g} s of noise were recorded, less than two segments of the "
+                f"{chosen / sample_rate_hz:.3g} s asked for: ask for a coarser resolution, or measure longer"
+            )
+        return chosen
+
+    def _wished(self, samples: int, sample_rate_hz: float) -> int:
+        if self.resolution_hz is not None:
+            return max(2, int(np.ceil(_bandwidth_lines(self.window) * sample_rate_hz / self.resolution_hz)))
+        if self.segment_s is not None:
+            return max(2, round(self.segment_s * sample_rate_hz))
+        if self.averages is not None:
+            return longest_segment(samples, self.averages, self.window, self.overlap)
+        return min(round(_SEGMENT_S * sample_rate_hz), 2 * samples // (_LEAST_SEGMENTS + 1))
+
+
+def longest_segment(samples: int, averages: float, window: Window, overlap: float) -> int:
+    """Give the longest segment that still leaves so many independent averages of a whole record.
+
+    K segments are worth at least K / (1 + 2 sum_j rho_j^2) (see `effective_averages`), and N samples hold
+    K segments of N / (1 + (K - 1) (1 - overlap)).
+    """
+    values = taper(window, _PROXY_SAMPLES)
+    hop = hop_samples(_PROXY_SAMPLES, overlap)
+    energy = float(values @ values)
+    lags = range(hop, _PROXY_SAMPLES, hop)
+    shared = sum((float(values[:-lag] @ values[lag:]) / energy) ** 2 for lag in lags)
+    segments = int(np.ceil(averages * (1 + 2 * shared)))
+    return max(2, int(samples / (1 + (segments - 1) * (1 - overlap))))
+
+
+def _bandwidth_lines(window: Window) -> float:
+    """Noise bandwidth of a window in lines: 1.5 for Hann."""
+    values = taper(window, _PROXY_SAMPLES)
+    return float(values.size * (values @ values) / np.sum(values) ** 2)

@@ -1,0 +1,280 @@
+"""What a noise measurement shows: the transmission from base to m0, with bounds and resonances."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vibench.acquisition.plan import (
+    MultisineNoise,
+    OddMultisine,
+    StreamedNoise,
+)
+
+from ..errors import InvalidRequest, NotEnoughData
+from ..recordings import Channels, Check, RecordingFacts, Stretch, only_stretch
+from ..signals import Complexes, Flags, Quantity, Reals, relative_sd, student_half_width
+from ..spectra import DensitySums
+from ..tones import NoiseDriveLevel, noise_drive_level
+from ._estimators import coherence, least_squares
+from ._noise_request import NoiseRequest
+from ._periodic_transmission import PeriodicSums, PeriodicTransmission
+from ._repetition import period_spectra
+from ._resonance import Resonance, resonances
+from ._results import Estimator, Transmission, converted_transmission
+from ._transmission import TransmissionSums
+
+Noise = MultisineNoise | OddMultisine | StreamedNoise
+
+
+_BLOCK = 1 << 19
+"""Samples of a record that are looked at together."""
+
+
+_LEVEL_SEGMENT_S = 1.0
+
+
+DEFAULT_REQUEST = NoiseRequest()
+
+
+_LEAST_PERIODS = 2
+
+
+@dataclass(frozen=True)
+class NoiseResponse:
+    """Transmission of base displacement to m0's displacement, and what was found in it."""
+
+    transmission: Transmission
+    """The estimate to use: by default referenced to the drive voltage, so that noise biases it nowhere."""
+    h1: Transmission
+    h2: Transmission
+    resonances: tuple[Resonance, ...]
+    base_level: NoiseDriveLevel
+    periodic: PeriodicTransmission | None
+    """Where the scatter comes from; None for noise that does not repeat."""
+    used_s: float
+    """Length of what was averaged [s]."""
+    left_out: int
+    """Realisations or segments that were cut short or touch lost or overloaded samples."""
+    lost_samples: int
+    """Samples inside the noise that were lost."""
+    overloaded_samples: int
+    """Samples inside the noise at which a channel was near its full scale."""
+
+
+def noise_response(
+    channels: Channels, noise: Noise, request: NoiseRequest = DEFAULT_REQUEST
+) -> NoiseResponse:
+    """Estimate the transmission of a noise measurement from everything usable in it.
+
+    Raises
+    ------
+    NotEnoughData
+        When no realisation, or less than two segments, is left.
+    InvalidRequest
+        When segments are chosen for noise that repeats: its periods are the segments.
+
+    """
+    match noise:
+        case StreamedNoise():
+            return _streamed(channels, noise, request)
+        case MultisineNoise() | OddMultisine():
+            return _repeated(channels, noise, request)
+
+
+def _repeated(
+    channels: Channels, noise: MultisineNoise | OddMultisine, request: NoiseRequest
+) -> NoiseResponse:
+    if request.cuts_segments:
+        raise InvalidRequest(
+            f"this noise repeats every {1 / noise.repetition_hz:g} s: its periods are its segments, without "
+            f"window, and give a line every {noise.repetition_hz:g} Hz; resolution, segment, averages, "
+            "window and overlap can be chosen for streamed noise only"
+        )
+    rate = channels.sample_rate_hz
+    sums = PeriodicSums(rate, noise.repetition_hz, confidence=request.confidence)
+    level = DensitySums(
+        rate, segment_samples=round(rate * min(_LEVEL_SEGMENT_S, _LEAST_PERIODS / noise.repetition_hz))
+    )
+    means: list[Complexes] = []
+    stretches = channels.stretches("realisation")
+    used = 0
+    bad = _Unusable()
+    for stretch in stretches:
+        data = _usable(channels, stretch, rate / noise.repetition_hz, bad)
+        if data is None:
+            continue
+        sums.add(*data)
+        level.add(data[1])
+        used += data.shape[1]
+        means.append(_mean_spectra(data, rate / noise.repetition_hz))
+    if not means:
+        raise NotEnoughData(
+            f"none of the {noise.realisations} planned realisations of noise holds two whole periods of "
+            f"{1 / noise.repetition_hz:g} s without a fault{bad.text}; measure again"
+        )
+    periodic = sums.transmission(
+        delay_s=channels.response_delay_s, band_hz=(noise.band_start_hz, noise.band_stop_hz)
+    )
+    order = np.rint(periodic.transmission.frequency_hz / noise.repetition_hz).astype(int)
+    motion = np.stack([each[:, order] for each in means])
+
+    def by(estimator: Estimator) -> Transmission:
+        if estimator is Estimator.DRIVE:
+            return as_displacements(periodic.transmission)
+        return _least_squares(
+            periodic.transmission, motion, estimator, channels.response_delay_s, request.noise_ratio
+        )
+
+    chosen = by(request.estimator)
+    return NoiseResponse(
+        transmission=chosen,
+        h1=by(Estimator.H1),
+        h2=by(Estimator.H2),
+        resonances=_resonances(chosen),
+        base_level=noise_drive_level(level.density(), low_hz=noise.band_start_hz, high_hz=noise.band_stop_hz),
+        periodic=periodic,
+        used_s=used / rate,
+        left_out=len(stretches) - len(means),
+        lost_samples=bad.lost,
+        overloaded_samples=bad.overloaded,
+    )
+
+
+@dataclass
+class _Unusable:
+    """Counts samples that no estimate may touch."""
+
+    lost: int = 0
+    overloaded: int = 0
+
+    def valid(self, data: Reals, overloaded: Flags) -> Flags:
+        """Which samples may be used; the others are counted."""
+        lost = np.isnan(data).any(axis=0)
+        self.lost += int(np.count_nonzero(lost))
+        self.overloaded += int(np.count_nonzero(overloaded & ~lost))
+        return np.asarray(~(lost | overloaded))
+
+    @property
+    def text(self) -> str:
+        """What was found, to end a sentence with; empty when nothing was."""
+        found = ((self.lost, "lost"), (self.overloaded, "near full scale"))
+        said = " and ".join(f"{count} samples {what}" for count, what in found if count)
+        return f" ({said})" if said else ""
+
+
+def _usable(channels: Channels, stretch: Stretch, period_samples: float, bad: _Unusable) -> Reals | None:
+    """Read a realisation that holds two whole periods or more and no fault; else None."""
+    shortfall = 1e-3
+    periods = int(stretch.samples / period_samples + shortfall)
+    if periods < _LEAST_PERIODS:
+        return None
+    data = channels.read(stretch.start, stretch.stop)
+    valid = bad.valid(data, channels.overloaded(stretch.start, stretch.stop))
+    return data if valid.all() else None
+
+
+def _mean_spectra(data: Reals, nominal_period: float) -> Complexes:
+    """Spectra of base and response averaged over the periods, shape (2, lines).
+
+    The nominal period will do for the magnitudes h1 and h2 are formed of: 20 ppm lose 2e-5 of a line.
+    """
+    periods = int(data.shape[1] / nominal_period + 1e-3)
+    return np.stack([period_spectra(each, nominal_period, periods).mean(axis=0) for each in data[1:]])
+
+
+def _least_squares(
+    like: Transmission, motion: Complexes, estimator: Estimator, delay_s: float, noise_ratio: float | None
+) -> Transmission:
+    """h1, h2 or hv over realisations; ``motion`` has the shape (realisations, 2, lines)."""
+    s_xx = np.sum(np.abs(motion[:, 0]) ** 2, axis=0)
+    s_yy = np.sum(np.abs(motion[:, 1]) ** 2, axis=0)
+    s_xy = np.sum(np.conj(motion[:, 0]) * motion[:, 1], axis=0)
+    value = least_squares(estimator, s_xx, s_yy, s_xy, noise_ratio)
+    agreement = coherence(s_xx, s_yy, s_xy)
+    spread = relative_sd(np.maximum(agreement, np.finfo(float).tiny), like.n_eff)
+    result = replace(
+        like,
+        value=value,
+        coherence=agreement,
+        relative_sd_magnitude=spread,
+        sd_phase_rad=spread,
+        half_width=student_half_width(spread, like.n_eff, like.settings.confidence),
+        settings=replace(like.settings, estimator=estimator, noise_ratio=noise_ratio, delay_s=0.0),
+    )
+    return as_displacements(result.without_delay(delay_s))
+
+
+def _streamed(channels: Channels, noise: StreamedNoise, request: NoiseRequest) -> NoiseResponse:
+    rate = channels.sample_rate_hz
+    stretch = only_stretch(channels, "noise")
+    segment = request.segment_samples(stretch.samples, rate)
+    if segment < round(rate / noise.band_start_hz):
+        raise NotEnoughData(
+            f"{stretch.samples / rate:.3g} s of noise leave segments of {segment / rate:.3g} s, and one "
+            f"must hold a period of {noise.band_start_hz:g} Hz: ask for fewer averages, or measure longer"
+        )
+    sums = TransmissionSums(
+        rate,
+        segment_samples=segment,
+        window=request.window,
+        overlap=request.overlap,
+        estimator=Estimator.DRIVE,
+        confidence=request.confidence,
+    )
+    level = DensitySums(rate, segment_samples=min(round(_LEVEL_SEGMENT_S * rate), segment))
+    bad = _Unusable()
+    for first in range(stretch.start, stretch.stop, _BLOCK):
+        last = min(first + _BLOCK, stretch.stop)
+        data = channels.read(first, last)
+        valid = bad.valid(data, channels.overloaded(first, last))
+        if not valid.all():
+            data = np.where(valid, data, 0.0)
+        # What drives, what stands below and what stands above the fraction bar come in another order here.
+        sums.add(data[[1, 2, 0]], valid)
+        level.add(data[1], valid)
+    band = (noise.band_start_hz, noise.band_stop_hz)
+
+    def by(estimator: Estimator) -> Transmission:
+        noise_ratio = request.noise_ratio if estimator is Estimator.HV else None
+        found = sums.by(estimator, noise_ratio).without_delay(channels.response_delay_s)
+        return as_displacements(found.between(*band))
+
+    chosen = by(request.estimator)
+    return NoiseResponse(
+        transmission=chosen,
+        h1=by(Estimator.H1),
+        h2=by(Estimator.H2),
+        resonances=_resonances(chosen),
+        base_level=noise_drive_level(level.density(), low_hz=band[0], high_hz=band[1]),
+        periodic=None,
+        used_s=stretch.samples / rate,
+        left_out=chosen.segments_excluded,
+        lost_samples=bad.lost,
+        overloaded_samples=bad.overloaded,
+    )
+
+
+def as_displacements(transmission: Transmission) -> Transmission:
+    """Turn m0 velocity over base acceleration into displacement over displacement."""
+    return converted_transmission(
+        transmission,
+        drive=(Quantity.ACCELERATION, Quantity.DISPLACEMENT),
+        response=(Quantity.VELOCITY, Quantity.DISPLACEMENT),
+    )
+
+
+def _resonances(transmission: Transmission) -> tuple[Resonance, ...]:
+    low, high = float(transmission.frequency_hz[0]), float(transmission.frequency_hz[-1])
+    return resonances(transmission, low_hz=low, high_hz=high)
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseAnalysis:
+    """A noise measurement: transmission base to m0."""
+
+    facts: RecordingFacts
+    checks: tuple[Check, ...]
+    excitation: Noise
+    response: NoiseResponse
+    request: NoiseRequest
+    """What was asked for."""

@@ -1,0 +1,247 @@
+"""Transmission from periodic noise: noise told apart from nonlinear distortion, lines without leakage.
+
+The drive is a multisine played for whole periods, in several realisations of its random phases. The scatter
+between periods is noise; what the scatter between realisations has beyond it is distortion (the
+robust method of Pintelon & Schoukens, System Identification, 2nd ed., section 4.3, the drive as reference).
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from ..errors import InvalidRequest, NotEnoughData
+from ..signals import DEFAULT_CONFIDENCE, Complexes, Flags, Integers, Reals, Window, coherence_significance
+from ._best_linear_approximation import BestLinearApproximation, Scatter, best_linear_approximation
+from ._repetition import Repetition, driven_lines, measured_repetition, period_spectra
+from ._results import Estimator, Transmission, TransmissionSettings
+
+EVERYTHING = (0.0, float("inf"))
+"""The band that keeps all driven lines."""
+
+
+@dataclass(frozen=True)
+class DetectionLines:
+    """Lines that were not driven, inside the driven band: what is on them, the specimen made."""
+
+    order: Integers
+    """Multiple of the repetition frequency, shape (lines,): even ones show even, odd ones odd distortion."""
+    frequency_hz: Reals
+    response_amplitude: Reals
+    """Rms over realisations of the response's amplitude [unit of the response]."""
+    noise_amplitude: Reals
+    """The part of it that noise explains (standard deviation of the mean over periods)."""
+
+
+@dataclass(frozen=True)
+class PeriodicTransmission:
+    """Best linear approximation of response over drive, and where its scatter comes from."""
+
+    transmission: Transmission
+    noise_variance: Reals
+    """Complex variance of one realisation's estimate that noise explains [(unit of the value)^2]."""
+    distortion_variance: Reals | None
+    """What realisations scatter beyond it; None when there was one realisation only."""
+    scatter: Scatter
+    realisations: int
+    repetitions: tuple[Repetition, ...]
+    """The measured period of every realisation, in converter samples."""
+    detection: DetectionLines
+
+
+@dataclass(frozen=True)
+class _Realisation:
+    """Mean spectra of one realisation, shape (lines,), and the scatter of its periods."""
+
+    repetition: Repetition
+    drive: Complexes
+    base: Complexes
+    response: Complexes
+    covariance: Complexes
+    """Of the means of (base, response) over the periods, shape (2, 2, lines)."""
+
+
+class PeriodicSums:
+    """Takes one realisation after the other and keeps their mean spectra only.
+
+    Parameters
+    ----------
+    sample_rate_hz
+        Nominal rate of the converter; its clock is the one frequencies are stated in.
+    repetition_hz
+        Nominal repetition frequency of the drive; the true one is measured.
+
+    """
+
+    def __init__(
+        self, sample_rate_hz: float, repetition_hz: float, *, confidence: float = DEFAULT_CONFIDENCE
+    ) -> None:
+        if not 0 < repetition_hz < sample_rate_hz / 4:
+            raise InvalidRequest(
+                f"repetition_hz is {repetition_hz:g}; it must lie above 0 and below a quarter of the "
+                f"sample rate, {sample_rate_hz / 4:g} Hz"
+            )
+        self._sample_rate_hz = sample_rate_hz
+        self._repetition_hz = repetition_hz
+        self._confidence = confidence
+        self._realisations: list[_Realisation] = []
+
+    def add(self, drive: Reals, base: Reals, response: Reals) -> None:
+        """Take the settled samples of one realisation, each of shape (samples,).
+
+        Parameters
+        ----------
+        drive
+            The clean reference: the recorded generator voltage.
+        base, response
+            What stands below and above the fraction bar.
+
+        Raises
+        ------
+        NotEnoughData
+            For fewer than two periods.
+
+        """
+        if not drive.size == base.size == response.size:
+            sizes = f"{drive.size}, {base.size} and {response.size}"
+            raise InvalidRequest(f"drive, base and response hold {sizes} samples; they must be equally long")
+        repetition = measured_repetition(drive, self._sample_rate_hz / self._repetition_hz)
+        spectra = [
+            period_spectra(x, repetition.period_samples, repetition.periods) for x in (drive, base, response)
+        ]
+        motion = np.stack(spectra[1:])
+        deviation = motion - motion.mean(axis=1, keepdims=True)
+        freedom = repetition.periods * (repetition.periods - 1)
+        covariance = np.einsum("ipk,jpk->ijk", np.conj(deviation), deviation) / freedom
+        self._realisations.append(
+            _Realisation(
+                repetition,
+                spectra[0].mean(axis=0),
+                motion[0].mean(axis=0),
+                motion[1].mean(axis=0),
+                covariance,
+            )
+        )
+
+    def transmission(
+        self, *, delay_s: float = 0.0, band_hz: tuple[float, float] = EVERYTHING
+    ) -> PeriodicTransmission:
+        """Give the transmission of the realisations added so far.
+
+        Parameters
+        ----------
+        delay_s
+            By how much the response channel lags the base channel (vibrometer decoder, filters);
+            removed from the phase.
+        band_hz
+            Lowest and highest line to keep: a held waveform also drives images far above its band.
+
+        """
+        if not self._realisations:
+            raise NotEnoughData("no realisation was added; give at least one")
+        lines = min(one.drive.size for one in self._realisations)
+        drive = np.stack([one.drive[:lines] for one in self._realisations])
+        base = np.stack([one.base[:lines] for one in self._realisations])
+        response = np.stack([one.response[:lines] for one in self._realisations])
+        covariance = np.mean([one.covariance[:, :, :lines] for one in self._realisations], axis=0)
+        period = float(np.mean([one.repetition.period_samples for one in self._realisations]))
+        frequency_hz = np.arange(lines, dtype=np.float64) * (self._sample_rate_hz / period)
+        driven = driven_lines(drive) & _within(frequency_hz, band_hz, self._sample_rate_hz / period)
+        periods = self._realisations[0].repetition.periods
+        estimate = best_linear_approximation(
+            drive[:, driven], base[:, driven], response[:, driven], covariance[:, :, driven], periods
+        )
+        return PeriodicTransmission(
+            transmission=self._transmission(frequency_hz[driven], estimate, period).without_delay(delay_s),
+            noise_variance=estimate.noise_variance,
+            distortion_variance=estimate.distortion_variance,
+            scatter=estimate.scatter,
+            realisations=len(self._realisations),
+            repetitions=tuple(one.repetition for one in self._realisations),
+            detection=_detection(frequency_hz, driven, response, covariance[1, 1].real),
+        )
+
+    def _transmission(
+        self, frequency_hz: Reals, estimate: BestLinearApproximation, period: float
+    ) -> Transmission:
+        quantile = float(stats.t.ppf((1 + self._confidence) / 2, 2 * (estimate.averages - 1)))
+        return Transmission(
+            frequency_hz=frequency_hz,
+            value=estimate.value,
+            coherence=estimate.coherence,
+            n_eff=float(estimate.averages),
+            relative_sd_magnitude=estimate.relative_sd,
+            sd_phase_rad=estimate.relative_sd,
+            half_width=quantile * estimate.relative_sd,
+            coherence_significance=coherence_significance(estimate.averages, self._confidence),
+            resolution_hz=0.0,
+            segments_used=sum(one.repetition.periods for one in self._realisations),
+            segments_excluded=0,
+            settings=TransmissionSettings(
+                estimator=Estimator.DRIVE,
+                sample_rate_hz=self._sample_rate_hz,
+                segment_samples=round(period),
+                window=Window.BOXCAR.value,
+                overlap=0.0,
+                confidence=self._confidence,
+            ),
+        )
+
+
+def periodic_transmission(
+    realisations: Iterable[tuple[Reals, Reals, Reals]],
+    sample_rate_hz: float,
+    *,
+    repetition_hz: float,
+    delay_s: float = 0.0,
+    band_hz: tuple[float, float] = EVERYTHING,
+    confidence: float = DEFAULT_CONFIDENCE,
+) -> PeriodicTransmission:
+    """Estimate response over base motion from realisations of a multisine, with honest bounds.
+
+    Parameters
+    ----------
+    realisations
+        (drive, base, response) samples of each; may be read from a file one by one.
+    sample_rate_hz, repetition_hz
+        Nominal; the true repetition is measured on the drive of every realisation.
+    delay_s
+        By how much the response channel lags the base channel.
+    band_hz
+        Lowest and highest line to keep: a held waveform also drives images far above its band.
+
+    Returns
+    -------
+    Lines at the driven multiples of the repetition frequency. The bounds are Student's with
+    2 (realisations - 1) degrees of freedom, so that they also hold for two or three realisations.
+
+    """
+    sums = PeriodicSums(sample_rate_hz, repetition_hz, confidence=confidence)
+    for drive, base, response in realisations:
+        sums.add(drive, base, response)
+    return sums.transmission(delay_s=delay_s, band_hz=band_hz)
+
+
+def _within(frequency_hz: Reals, band_hz: tuple[float, float], spacing_hz: float) -> Flags:
+    """Lines in a band; its edges move with the generator's clock, so a tenth of a line is granted."""
+    margin_hz = 0.1 * spacing_hz
+    kept = (frequency_hz >= band_hz[0] - margin_hz) & (frequency_hz <= band_hz[1] + margin_hz)
+    if not np.any(kept):
+        raise InvalidRequest(
+            f"no line lies between {band_hz[0]:g} and {band_hz[1]:g} Hz; "
+            f"the lines are {spacing_hz:g} Hz apart, up to {frequency_hz[-1]:g} Hz"
+        )
+    return kept
+
+
+def _detection(frequency_hz: Reals, driven: Flags, response: Complexes, variance: Reals) -> DetectionLines:
+    strong = np.flatnonzero(driven)
+    inside = np.arange(strong[0], strong[-1] + 1)
+    quiet = inside[~driven[inside]]
+    return DetectionLines(
+        order=quiet,
+        frequency_hz=frequency_hz[quiet],
+        response_amplitude=np.sqrt(np.mean(np.abs(response[:, quiet]) ** 2, axis=0)),
+        noise_amplitude=np.sqrt(variance[quiet]),
+    )

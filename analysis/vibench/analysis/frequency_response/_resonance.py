@@ -1,0 +1,251 @@
+"""Resonances of a transmission: frequency, damping and quality factor, with their uncertainties."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.signal import find_peaks
+
+from ..errors import InvalidRequest
+from ..signals import Complexes, Reals
+from ._results import Transmission
+
+_REACH_BANDWIDTHS = 2.0
+"""The fit uses lines within so many half-power bandwidths of the peak."""
+_LEAST_LINES = 8
+"""Two pole and at most ten linear parameters need more reals than that: eight lines are sixteen."""
+_LEAST_RISE = 3.0
+"""A peak stands above the valley beside it by at least so many standard deviations of the difference."""
+_SMALLEST_RELATIVE_SD = 1e-6
+"""Keeps the weights finite where a noise-free simulation states no spread at all."""
+_RESOLVED_LINES = 4.0
+"""Noise bandwidths that a half-power bandwidth must hold, else the window smears the peak by over 2 %."""
+_LARGEST_SD_UNRESOLVED = 0.1
+"""A peak too narrow for the lines is believed only where they are known to a tenth: else it is one of the
+ripples on top of a broad hill."""
+_LARGEST_DAMPING = 0.5
+_BACKGROUND_DEGREES = (1, 2, 3)
+"""Tried in turn: broad peaks see more of their neighbours than a straight line can follow."""
+_WELL_FITTED = 1.2
+"""Reduced chi-square at which the background is good enough: a higher degree would only widen the spreads."""
+_LARGEST_RELATIVE_SD_DAMPING = 0.5
+"""Past it the damping is not significantly above zero: a ripple of noisy lines, and no resonance."""
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """One resonance, from a local fit of a single mode on a smooth background."""
+
+    frequency_hz: float
+    """Undamped natural frequency of the mode."""
+    sd_frequency_hz: float
+    damping_ratio: float
+    sd_damping_ratio: float
+    peak_frequency_hz: float
+    """Where the fitted magnitude is largest."""
+    peak_magnitude: float
+    sd_peak_magnitude: float
+    reduced_chi_square: float
+    """Misfit over what the stated spreads explain; the spreads above are widened when it is above 1."""
+    lines_used: int
+    is_resolved: bool
+    """Whether the lines are fine enough for this bandwidth; if not, damping is overestimated."""
+
+    @property
+    def quality_factor(self) -> float:
+        """1 / (2 damping ratio)."""
+        return 0.5 / self.damping_ratio
+
+    @property
+    def sd_quality_factor(self) -> float:
+        """Standard deviation of the quality factor."""
+        return self.quality_factor * self.sd_damping_ratio / self.damping_ratio
+
+    @property
+    def half_power_bandwidth_hz(self) -> float:
+        """2 damping ratio times frequency."""
+        return 2 * self.damping_ratio * self.frequency_hz
+
+    @property
+    def sd_half_power_bandwidth_hz(self) -> float:
+        """Standard deviation of the half-power bandwidth."""
+        return self.half_power_bandwidth_hz * self.sd_damping_ratio / self.damping_ratio
+
+
+def resonances(transmission: Transmission, *, low_hz: float, high_hz: float) -> tuple[Resonance, ...]:
+    """Find and fit the resonances of a transmission in a band, in the order of frequency.
+
+    Each significant peak is fitted, weighted by the stated spreads, with
+    H(w) = R / (w0^2 - w^2 + 2 i zeta w0 w) + b0 + b1 (w - w0) + ..., complex R, b0, b1: one mode on what
+    its neighbours leave there, a straight line or, where that does not do, up to a cubic. The pole is
+    found by variable projection (Golub & Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432). A peak that
+    noise explains is left out.
+
+    Raises
+    ------
+    InvalidRequest
+        When fewer than eight lines lie in the band.
+
+    """
+    band = transmission.between(low_hz, high_hz)
+    if band.frequency_hz.size < _LEAST_LINES:
+        raise InvalidRequest(
+            f"{band.frequency_hz.size} lines lie between {low_hz:g} and {high_hz:g} Hz; a fit needs at least "
+            f"{_LEAST_LINES}"
+        )
+    found = []
+    for line, width in _significant_peaks(band):
+        fit = _refitted(band, _fitted(band, line, width))
+        if fit is not None and low_hz <= fit.frequency_hz <= high_hz:
+            found.append(fit)
+    return tuple(_distinct(found))
+
+
+def _significant_peaks(band: Transmission) -> list[tuple[int, int]]:
+    """Lines of peaks, and their half-power widths in lines."""
+    spread = np.maximum(np.nan_to_num(band.relative_sd_magnitude, posinf=1e9), _SMALLEST_RELATIVE_SD)
+    size = _smoothed(np.nan_to_num(np.log(np.maximum(band.magnitude, 1e-300)), nan=-700.0), spread)
+    significant = np.nan_to_num(band.coherence) > band.coherence_significance
+    # A rise of ln(magnitude) by less than this is noise, whatever the line.
+    lines, about = find_peaks(size, prominence=0.0)
+    result = []
+    for line, rise in zip(lines, about["prominences"], strict=True):
+        if significant[line] and rise > _LEAST_RISE * np.sqrt(2) * spread[line]:
+            result.append((int(line), _half_power_lines(size, int(line))))
+    return result
+
+
+def _smoothed(size: Reals, spread: Reals) -> Reals:
+    """Average over the few lines that bring typical noise below a hundredth; a noise-free curve stays."""
+    lines = min(int((np.median(spread) / 0.02) ** 2) // 2 * 2 + 1, 9)
+    if lines <= 1:
+        return size
+    padded = np.pad(size, lines // 2, mode="edge")
+    return np.convolve(padded, np.full(lines, 1 / lines), mode="valid")
+
+
+def _half_power_lines(size: Reals, line: int) -> int:
+    """Lines from the peak to where the magnitude has fallen by 3 dB, the nearer side."""
+    level = size[line] - 0.5 * np.log(2)
+    below = np.flatnonzero(size < level)
+    return int(np.min(np.abs(below - line))) if below.size else size.size // 2
+
+
+def _fitted(band: Transmission, line: int, half_width: int) -> Resonance | None:
+    reach = max(int(np.ceil(2 * _REACH_BANDWIDTHS * half_width)), _LEAST_LINES // 2)
+    part = slice(max(0, line - reach), line + reach + 1)
+    frequency_hz, value = band.frequency_hz[part], band.value[part]
+    spread = np.maximum(band.relative_sd_magnitude[part], _SMALLEST_RELATIVE_SD) * np.abs(value)
+    usable = np.isfinite(spread) & np.isfinite(value) & (spread > 0)
+    if np.count_nonzero(usable) < _LEAST_LINES:
+        return None
+    frequency_hz, value, spread = frequency_hz[usable], value[usable], spread[usable]
+    centre_hz = float(band.frequency_hz[line])
+    data = (frequency_hz, value, spread, centre_hz)
+    found: Resonance | None = None
+    for degree in _BACKGROUND_DEGREES:
+        found = _fitted_on(band, data, half_width, degree) or found
+        if found is None or found.reduced_chi_square < _WELL_FITTED:
+            break
+    return found
+
+
+def _fitted_on(
+    band: Transmission, data: tuple[Reals, Complexes, Reals, float], half_width: int, degree: int
+) -> Resonance | None:
+    """Fit one mode on a background of one degree."""
+    frequency_hz, value, spread, centre_hz = data
+    spacing_hz = float(np.median(np.diff(frequency_hz)))
+    start = np.array([0.0, np.log(max(half_width, 0.5) * spacing_hz / centre_hz)])
+    span = (frequency_hz[-1] - frequency_hz[0]) / centre_hz
+
+    def misfit(pole: Reals) -> Reals:
+        natural_hz, damping = centre_hz * float(np.exp(pole[0])), float(np.exp(pole[1]))
+        basis = _basis(frequency_hz, natural_hz, damping, degree) / spread[:, None]
+        target = value / spread
+        coefficients = np.linalg.lstsq(basis, target, rcond=None)[0]
+        left = target - basis @ coefficients
+        return np.concatenate((left.real, left.imag))
+
+    bounds = ([-span, np.log(1e-6)], [span, np.log(_LARGEST_DAMPING)])
+    start = np.clip(start, np.asarray(bounds[0]) + 1e-9, np.asarray(bounds[1]) - 1e-9)
+    result = least_squares(misfit, start, bounds=bounds, x_scale=[0.01, 1.0], xtol=1e-12, ftol=1e-12)
+    jacobian = np.asarray(result.jac, dtype=np.float64)
+    return _resonance(band, result.x, jacobian, result.fun, data, degree)
+
+
+def _refitted(band: Transmission, first: Resonance | None) -> Resonance | None:
+    """Fit once more over the bandwidth found: the first width was read off single, noisy lines."""
+    if first is None:
+        return None
+    line = int(np.argmin(np.abs(band.frequency_hz - first.frequency_hz)))
+    spacing_hz = float(np.median(np.diff(band.frequency_hz)))
+    return _fitted(band, line, round(0.5 * first.half_power_bandwidth_hz / spacing_hz)) or first
+
+
+def _basis(frequency_hz: Reals, natural_hz: float, damping: float, degree: int) -> Complexes:
+    """One mode and the powers of a background, each scaled to order one; shape (lines, degree + 2)."""
+    ratio = frequency_hz / natural_hz
+    mode = 2 * damping / (1 - ratio**2 + 2j * damping * ratio)
+    powers = [np.asarray((ratio - 1) ** power, dtype=np.complex128) for power in range(degree + 1)]
+    return np.stack((mode, *powers), axis=1)
+
+
+def _resonance(
+    band: Transmission,
+    pole: Reals,
+    jacobian: Reals,
+    left: Reals,
+    data: tuple[Reals, Complexes, Reals, float],
+    degree: int,
+) -> Resonance | None:
+    frequency_hz, value, spread, centre_hz = data
+    natural_hz, damping = centre_hz * float(np.exp(pole[0])), float(np.exp(pole[1]))
+    at_a_bound = damping > 0.99 * _LARGEST_DAMPING or not frequency_hz[0] <= natural_hz <= frequency_hz[-1]
+    curvature = jacobian.T @ jacobian
+    if at_a_bound or np.linalg.cond(curvature) > 1e14:
+        return None
+    # Two reals of the pole, and two for every complex coefficient.
+    freedom = max(1, left.size - 2 - 2 * (degree + 2))
+    chi_square = float(left @ left) / freedom
+    covariance = np.linalg.inv(curvature) * max(1.0, chi_square)
+    sd_log_frequency, sd_log_damping = np.sqrt(np.diag(covariance))
+    if sd_log_damping > _LARGEST_RELATIVE_SD_DAMPING:
+        return None
+    basis = _basis(frequency_hz, natural_hz, damping, degree)
+    coefficients = np.linalg.lstsq(basis / spread[:, None], value / spread, rcond=None)[0]
+    fine_hz = np.linspace(frequency_hz[0], frequency_hz[-1], 2001)
+    curve = np.abs(_basis(fine_hz, natural_hz, damping, degree) @ coefficients)
+    top = int(np.argmax(curve))
+    # The peak's height follows the residue: it is known as well as the damping, and as the lines at it.
+    near = int(np.argmin(np.abs(frequency_hz - fine_hz[top])))
+    is_resolved = 2 * damping * natural_hz > _RESOLVED_LINES * band.resolution_hz
+    if not is_resolved and spread[near] > _LARGEST_SD_UNRESOLVED * np.abs(value[near]):
+        return None
+    lines_within = max(1.0, 2 * damping * natural_hz / float(np.median(np.diff(frequency_hz))))
+    sd_peak = spread[near] * np.sqrt(max(1.0, chi_square) / lines_within)
+    return Resonance(
+        frequency_hz=natural_hz,
+        sd_frequency_hz=float(natural_hz * sd_log_frequency),
+        damping_ratio=damping,
+        sd_damping_ratio=float(damping * sd_log_damping),
+        peak_frequency_hz=float(fine_hz[top]),
+        peak_magnitude=float(curve[top]),
+        sd_peak_magnitude=float(sd_peak),
+        reduced_chi_square=chi_square,
+        lines_used=frequency_hz.size,
+        is_resolved=is_resolved,
+    )
+
+
+def _distinct(found: list[Resonance]) -> list[Resonance]:
+    """Two ripples of one resonance give the same pole; keep the fit that knows it better."""
+    kept: list[Resonance] = []
+    for each in sorted(found, key=lambda one: one.sd_damping_ratio / one.damping_ratio):
+        half = 0.5 * each.half_power_bandwidth_hz
+        if all(
+            abs(each.frequency_hz - other.frequency_hz) > max(half, 0.5 * other.half_power_bandwidth_hz)
+            for other in kept
+        ):
+            kept.append(each)
+    return sorted(kept, key=lambda one: one.frequency_hz)

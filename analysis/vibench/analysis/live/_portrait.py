@@ -1,0 +1,111 @@
+"""Phase portrait and Poincaré points of the newest periods."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import fft
+
+from ..signals import Reals
+from ._drive_tone import drive_tone, drive_turns
+from ._ring import Window
+from ._sine_response import displacement_of, look_samples
+
+SHOWN_PERIODS = 20
+_EDGE_PERIODS = 25
+"""Periods at either end of the stretch that integration and the drive's phase need."""
+POINTS_A_PERIOD = 120
+"""Of the drawn orbit: at 20 periods 2400 points, which take a painter about a millisecond."""
+MOST_POINTS = 3000
+"""Poincaré points that are kept; the oldest go first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Portrait:
+    """The orbit of the newest periods, and the motion once a drive period."""
+
+    drive_hz: float
+    orbit_displacement_m: Reals
+    orbit_velocity_m_per_s: Reals
+    """Shape (samples,)."""
+    strobe_displacement_m: Reals
+    strobe_velocity_m_per_s: Reals
+    """Where the drive, a cosine, begins a period; shape (periods,)."""
+    strobe_sample: Reals
+    """When, in samples since the run began."""
+
+
+def portrait(
+    window: Window, drive_row: int, response_row: int, sample_rate_hz: float, *, delay_s: float = 0.0
+) -> Portrait | None:
+    """Draw the newest periods; None when no sine is playing, or too few samples are there.
+
+    Parameters
+    ----------
+    window
+        Samples in physical units, about `portrait_samples` of them.
+    delay_s
+        By how much the response channel lags the drive channel.
+
+    """
+    look = look_samples(sample_rate_hz)
+    drive = np.asarray(window.values[drive_row], dtype=np.float64)
+    tone = drive_tone(drive[-look:], sample_rate_hz) if drive.size >= look else None
+    if tone is None or not np.isfinite(window.values[[drive_row, response_row]]).all():
+        return None
+    count = portrait_samples(tone.frequency_hz, sample_rate_hz)
+    if drive.size < count:
+        return None
+    velocity = np.asarray(window.values[response_row, -count:], dtype=np.float64)
+    displacement = displacement_of(velocity, sample_rate_hz, tone.frequency_hz)
+    edge = (count - displacement.size) // 2
+    turns = drive_turns(drive[-count:], sample_rate_hz, tone.frequency_hz) + delay_s * sample_rate_hz
+    turns = turns[(turns >= edge) & (turns <= edge + displacement.size - 1)]
+    stride = max(1, int(sample_rate_hz / tone.frequency_hz / POINTS_A_PERIOD))
+    place = np.arange(displacement.size)
+    settled = velocity[edge : edge + displacement.size]
+    return Portrait(
+        drive_hz=tone.frequency_hz,
+        orbit_displacement_m=displacement[::stride],
+        orbit_velocity_m_per_s=settled[::stride],
+        strobe_displacement_m=np.interp(turns - edge, place, displacement),
+        strobe_velocity_m_per_s=np.interp(turns - edge, place, settled),
+        strobe_sample=turns + (window.stop_sample - count),
+    )
+
+
+def portrait_samples(frequency_hz: float, sample_rate_hz: float) -> int:
+    """How many samples a portrait is made of."""
+    wanted = (SHOWN_PERIODS + 2 * _EDGE_PERIODS) * sample_rate_hz / frequency_hz
+    return fft.next_fast_len(int(np.ceil(wanted)), real=True)
+
+
+class PoincareSection:
+    """Collects the points of portraits that overlap, each point once."""
+
+    def __init__(self, most: int = MOST_POINTS) -> None:
+        self._most = most
+        self._displacement_m = np.empty(0)
+        self._velocity_m_per_s = np.empty(0)
+        self._newest = -np.inf
+
+    def add(self, found: Portrait) -> None:
+        """Keep the points that were not there before: those half a period or more past the newest."""
+        if found.strobe_sample.size == 0:
+            return
+        spacing = float(np.min(np.diff(found.strobe_sample))) if found.strobe_sample.size > 1 else 1.0
+        fresh = found.strobe_sample > self._newest + 0.5 * spacing
+        self._displacement_m = np.append(self._displacement_m, found.strobe_displacement_m[fresh])
+        self._velocity_m_per_s = np.append(self._velocity_m_per_s, found.strobe_velocity_m_per_s[fresh])
+        self._displacement_m = self._displacement_m[-self._most :]
+        self._velocity_m_per_s = self._velocity_m_per_s[-self._most :]
+        self._newest = max(self._newest, float(found.strobe_sample[-1]))
+
+    @property
+    def displacement_m(self) -> Reals:
+        """Shape (points,)."""
+        return self._displacement_m
+
+    @property
+    def velocity_m_per_s(self) -> Reals:
+        """Shape (points,)."""
+        return self._velocity_m_per_s

@@ -1,0 +1,130 @@
+"""Responses I and II of the newest stretch of a sine or a slow sweep, point by point as it goes."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import fft
+
+from ..signals import Quantity, Reals, converted_signal
+from ._drive_tone import amplitudes_at, drive_tone
+from ._ring import Window
+
+_BAND_BELOW = 0.3
+"""Displacement is kept down to this part of the drive frequency: half orders pass, drift does not."""
+_BAND_ABOVE_HZ = 10_000.0
+_LOOK_S = 0.5
+"""Stretch in which the drive's frequency is looked for: five periods of 10 Hz."""
+_STRETCH_PERIODS = 25
+"""... and at least 0.1 s of motion, without the ends that integration disturbs."""
+_STRETCH_S = 0.1
+_EDGE_PERIODS = 6 / _BAND_BELOW
+_LEAST_KEPT = 0.9
+"""Part of its amplitude that the drive keeps along a stretch, unless it is ramped down."""
+_STEEPEST_POWER = 2
+"""A sweep's setting follows at most the square of its frequency: constant displacement."""
+
+
+@dataclass(frozen=True)
+class SinePoint:
+    """What one stretch says."""
+
+    time_s: float
+    """Middle of the stretch, since the first sample of the run."""
+    frequency_hz: float
+    drive_amplitude_m: float
+    """A0, of the base displacement at the drive frequency."""
+    lower: float
+    upper: float
+    """Extremes of the response velocity [m/s]."""
+    response_i: float
+    """Largest abs(x) over A0."""
+    response_ii: float
+    """Amplitude of x at the drive frequency over A0."""
+
+
+def stretch_samples(frequency_hz: float, sample_rate_hz: float) -> int:
+    """How many samples one point is made of, the ends included that integration disturbs."""
+    wanted_s = max(_STRETCH_S, _STRETCH_PERIODS / frequency_hz) + 2 * _EDGE_PERIODS / frequency_hz
+    return fft.next_fast_len(int(np.ceil(wanted_s * sample_rate_hz)), real=True)
+
+
+def look_samples(sample_rate_hz: float) -> int:
+    """How many samples show which frequency is playing."""
+    return fft.next_fast_len(round(_LOOK_S * sample_rate_hz), real=True)
+
+
+def sine_point(window: Window, rows: tuple[int, int, int], sample_rate_hz: float) -> SinePoint | None:
+    """Make a point of the newest samples.
+
+    None when they hold no sine, are too few, some were lost, or the drive is ramped down: m0 then rings
+    on over a base that is hardly there.
+
+    Parameters
+    ----------
+    window
+        Samples in physical units; more than are needed do no harm.
+    rows
+        Which channels are drive, base acceleration and response velocity.
+
+    """
+    look = look_samples(sample_rate_hz)
+    newest = np.asarray(window.values[list(rows), -look:], dtype=np.float64)
+    if newest.shape[1] < look or not np.isfinite(newest).all():
+        return None
+    tone = drive_tone(newest[0], sample_rate_hz)
+    if tone is None:
+        return None
+    count = stretch_samples(tone.frequency_hz, sample_rate_hz)
+    stretch = np.asarray(window.values[list(rows), -count:], dtype=np.float64)
+    if stretch.shape[1] < count or not np.isfinite(stretch).all():
+        return None
+    if _is_ramped_down(stretch[0], sample_rate_hz):
+        return None
+    middle_s = (window.stop_sample - 0.5 * count) / sample_rate_hz
+    point = _point(stretch, sample_rate_hz, tone.frequency_hz)
+    return None if point is None else replace(point, time_s=middle_s)
+
+
+def _is_ramped_down(drive: Reals, sample_rate_hz: float) -> bool:
+    """Tell whether the drive falls along a stretch, by more than a sweep downwards lets it."""
+    quarter = drive.size // 4
+    first, last = (drive_tone(each, sample_rate_hz) for each in (drive[:quarter], drive[-quarter:]))
+    if first is None or last is None:
+        return first is not None
+    swept = min(1.0, last.frequency_hz / first.frequency_hz) ** _STEEPEST_POWER
+    return last.amplitude < _LEAST_KEPT * swept * first.amplitude
+
+
+def _point(stretch: Reals, sample_rate_hz: float, near_hz: float) -> SinePoint | None:
+    """Take frequency, amplitudes and extremes from the same stretch: in a sweep they move together."""
+    tone = drive_tone(stretch[0], sample_rate_hz)
+    frequency_hz = near_hz if tone is None else tone.frequency_hz
+    omega = 2 * np.pi * frequency_hz
+    _, base, response = amplitudes_at(frequency_hz, stretch, sample_rate_hz)
+    displacement = displacement_of(stretch[2], sample_rate_hz, frequency_hz)
+    edge = (stretch.shape[1] - displacement.size) // 2
+    velocity = stretch[2, edge : edge + displacement.size]
+    amplitude_m = float(abs(base)) / omega**2
+    if displacement.size == 0 or amplitude_m == 0.0:
+        return None
+    return SinePoint(
+        time_s=0.0,
+        frequency_hz=frequency_hz,
+        drive_amplitude_m=amplitude_m,
+        lower=float(velocity.min()),
+        upper=float(velocity.max()),
+        response_i=float(np.max(np.abs(displacement))) / amplitude_m,
+        response_ii=float(abs(response)) / omega / amplitude_m,
+    )
+
+
+def displacement_of(velocity: Reals, sample_rate_hz: float, frequency_hz: float) -> Reals:
+    """Integrate a velocity around a drive frequency; both ends, which that disturbs, are left out."""
+    return converted_signal(
+        velocity,
+        sample_rate_hz,
+        given=Quantity.VELOCITY,
+        wanted=Quantity.DISPLACEMENT,
+        low_hz=_BAND_BELOW * frequency_hz,
+        high_hz=min(_BAND_ABOVE_HZ, 0.5 * sample_rate_hz),
+    ).settled

@@ -1,0 +1,194 @@
+"""Spectra and transmission of the newest seconds of a run, kept up to date segment by segment."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from ..errors import InvalidRequest
+from ..frequency_response import (
+    Estimator,
+    Transmission,
+    TransmissionSettings,
+    converted_transmission,
+    transmission_of,
+)
+from ..signals import (
+    DEFAULT_CONFIDENCE,
+    Flags,
+    Quantity,
+    Reals,
+    Window,
+    effective_averages,
+    hop_samples,
+    taper,
+)
+from ..spectra import SpectralAverages
+from ._ring import Values
+
+_LEAST_SEGMENTS = 2
+"""The coherence of a single segment is 1, whatever it holds."""
+
+
+@dataclass(frozen=True)
+class SpectrumSettings:
+    """How the newest samples are averaged."""
+
+    segment_samples: int = 8192
+    """At 51.2 kS/s: lines 6.25 Hz apart."""
+    averages: int = 24
+    """Segments; older ones are forgotten."""
+    overlap: float = 0.5
+
+    def __post_init__(self) -> None:
+        if self.segment_samples < 2 or self.averages < _LEAST_SEGMENTS:
+            raise InvalidRequest(
+                f"{self.averages} segments of {self.segment_samples} samples were asked for; "
+                "give 2 or more of both"
+            )
+        hop_samples(self.segment_samples, self.overlap)
+
+
+@dataclass(frozen=True, eq=False)
+class LiveSpectrum:
+    """Root of the spectral density of every channel."""
+
+    frequency_hz: Reals
+    amplitude_density: Reals
+    """Shape (channels, lines) [unit of the channel / sqrt(Hz)]."""
+    n_eff: float
+    """Independent averages."""
+
+
+DEFAULT_SETTINGS = SpectrumSettings()
+
+
+class LiveSpectra:
+    """Takes samples as they come, transforms each segment once, and averages the newest ones (Welch).
+
+    A segment that touches a lost sample is passed over. Work per block is one Fourier transform of
+    each channel and segment that became whole.
+    """
+
+    def __init__(
+        self, channels: int, sample_rate_hz: float, settings: SpectrumSettings = DEFAULT_SETTINGS
+    ) -> None:
+        self._rate_hz = sample_rate_hz
+        self._settings = settings
+        self._hop = hop_samples(settings.segment_samples, settings.overlap)
+        self._taper = taper(Window.HANN, settings.segment_samples)
+        self._short_taper = self._taper.astype(np.float32)
+        lines = settings.segment_samples // 2 + 1
+        self._spectra: NDArray[np.complex64] = np.zeros(
+            (settings.averages, channels, lines), dtype=np.complex64
+        )
+        self._power: NDArray[np.float32] = np.zeros((settings.averages, channels, lines), dtype=np.float32)
+        self._is_used: Flags = np.zeros(settings.averages, dtype=np.bool_)
+        self._carry = np.empty((channels, 0), dtype=np.float32)
+        self._segments = 0
+
+    @property
+    def segments(self) -> int:
+        """How many segments became whole since the run began: changes when there is something new."""
+        return self._segments
+
+    def add(self, values: Values) -> None:
+        """Take the next samples, shape (channels, samples)."""
+        data = np.concatenate((self._carry, values), axis=1)
+        size = self._settings.segment_samples
+        whole = max(0, (data.shape[1] - size) // self._hop + 1)
+        # After a long wait only the newest segments count.
+        for number in range(max(0, whole - self._settings.averages), whole):
+            self._take(data[:, number * self._hop : number * self._hop + size])
+        self._carry = data[:, whole * self._hop :].copy()
+
+    def _take(self, segment: Values) -> None:
+        place = self._segments % self._settings.averages
+        self._segments += 1
+        self._is_used[place] = bool(np.isfinite(segment).all())
+        if self._is_used[place]:
+            found = fft.rfft(segment * self._short_taper, axis=-1)
+            self._spectra[place], self._power[place] = found, found.real**2 + found.imag**2
+
+    def spectrum(self) -> LiveSpectrum | None:
+        """Give the spectral density of every channel; None before the first whole segment."""
+        used = self._used()
+        if not used.any():
+            return None
+        power = np.mean(self._power[used], axis=0).astype(np.float64)
+        scale = np.full(power.shape[-1], 2 / (self._rate_hz * float(self._taper @ self._taper)))
+        scale[0] /= 2
+        if self._settings.segment_samples % 2 == 0:
+            scale[-1] /= 2
+        return LiveSpectrum(
+            frequency_hz=self._frequency_hz(),
+            amplitude_density=np.sqrt(power * scale),
+            n_eff=effective_averages(self._taper, self._hop, used),
+        )
+
+    def transmission(
+        self,
+        rows: Sequence[int],
+        *,
+        low_hz: float,
+        high_hz: float,
+        delay_s: float = 0.0,
+        confidence: float = DEFAULT_CONFIDENCE,
+    ) -> Transmission | None:
+        """Give displacement over displacement, with coherence and bounds; None before two segments.
+
+        Parameters
+        ----------
+        rows
+            Which channels are the base acceleration, the response velocity and, for an estimate
+            that noise on both does not bias, the drive voltage.
+        low_hz, high_hz
+            The band that is looked at.
+        delay_s
+            By how much the response channel lags the base channel.
+
+        """
+        used = self._used()
+        if int(np.count_nonzero(used)) < _LEAST_SEGMENTS:
+            return None
+        estimator = Estimator.DRIVE if len(rows) == 3 else Estimator.H1
+        settings = TransmissionSettings(
+            estimator=estimator,
+            sample_rate_hz=self._rate_hz,
+            segment_samples=self._settings.segment_samples,
+            window=Window.HANN.value,
+            overlap=self._settings.overlap,
+            confidence=confidence,
+        )
+        highest = int(high_hz * self._settings.segment_samples / self._rate_hz) + 2
+        found = transmission_of(self._averages(used, rows, highest), settings).between(low_hz, high_hz)
+        return converted_transmission(
+            found.without_delay(delay_s),
+            drive=(Quantity.ACCELERATION, Quantity.DISPLACEMENT),
+            response=(Quantity.VELOCITY, Quantity.DISPLACEMENT),
+        )
+
+    def _averages(self, used: Flags, rows: Sequence[int], lines: int) -> SpectralAverages:
+        chosen = self._spectra[:, :, :lines][used][:, list(rows)]
+        products = np.einsum("kif,kjf->ijf", np.conj(chosen), chosen) / chosen.shape[0]
+        return SpectralAverages(
+            products=products.astype(np.complex128),
+            segments_used=chosen.shape[0],
+            segments_excluded=min(self._segments, used.size) - chosen.shape[0],
+            n_eff=effective_averages(self._taper, self._hop, used),
+            segment_samples=self._settings.segment_samples,
+            window=Window.HANN,
+            overlap=self._settings.overlap,
+            window_sum=float(np.sum(self._taper)),
+            window_energy=float(self._taper @ self._taper),
+        )
+
+    def _used(self) -> Flags:
+        """Which places hold a segment that counts, oldest first as far as their distances matter."""
+        known = np.arange(self._is_used.size) < self._segments
+        return np.asarray(self._is_used & known)
+
+    def _frequency_hz(self) -> Reals:
+        return np.asarray(fft.rfftfreq(self._settings.segment_samples, 1 / self._rate_hz))

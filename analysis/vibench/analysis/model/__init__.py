@@ -1,0 +1,85 @@
+"""The model beside the measurement: predicted responses to sines, and the same test simulated.
+
+The specimen is simulated under the base motion that was recorded and goes through the estimators of the
+measurement; the difference is in dB, and in standard errors of both. A plan's responses and collisions
+are predicted before it is played. Similarity of two curves: eqs. 6 and 7 of Gong et al. 2025, whose
+logarithm is a named option. Nothing is fitted here.
+"""
+
+from ._difference import (
+    Difference,
+    logarithmic_difference,
+)
+from ._foresight import (
+    Foresight,
+    foresee,
+)
+from ._overlay import (
+    DwellOverlay,
+    NoiseOverlay,
+    SimulatedRun,
+    Simulation,
+    SteppedSineOverlay,
+    SweepOverlay,
+    dwell_overlay,
+    noise_overlay,
+    stepped_overlay,
+    sweep_overlay,
+)
+from ._prediction import (
+    PAPER_RESONANCES_HZ,
+    PAPER_TERMINAL_RESONANCES_HZ,
+    PREDICTION_S,
+    WINDOW_S,
+    Prediction,
+    linear_transmission,
+    paper_amplitude_m,
+    predicted,
+)
+from ._similarity import (
+    THRESHOLD,
+    Curve,
+    LogarithmOf,
+    Similarity,
+    similarity,
+)
+from ._simulated_channels import (
+    SimulatedChannels,
+    SimulatedSpecimen,
+    played_impacts,
+    simulated_specimen,
+)
+
+__all__ = [
+    "PAPER_RESONANCES_HZ",
+    "PAPER_TERMINAL_RESONANCES_HZ",
+    "PREDICTION_S",
+    "THRESHOLD",
+    "WINDOW_S",
+    "Curve",
+    "Difference",
+    "DwellOverlay",
+    "Foresight",
+    "LogarithmOf",
+    "NoiseOverlay",
+    "Prediction",
+    "Similarity",
+    "SimulatedChannels",
+    "SimulatedRun",
+    "SimulatedSpecimen",
+    "Simulation",
+    "SteppedSineOverlay",
+    "SweepOverlay",
+    "dwell_overlay",
+    "foresee",
+    "linear_transmission",
+    "logarithmic_difference",
+    "noise_overlay",
+    "paper_amplitude_m",
+    "played_impacts",
+    "predicted",
+    "similarity",
+    "simulated_specimen",
+    "stepped_overlay",
+    "sweep_overlay",
+]

@@ -1,0 +1,48 @@
+"""How far a measurement lies from its simulation: in dB, and in standard errors of both."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..signals import Flags, Reals
+
+_PER_NEPER_DB = 20 / np.log(10)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Measured over simulated magnitude; arrays of shape (points,)."""
+
+    frequency_hz: Reals
+    decibel: Reals
+    standard_errors: Reals
+    """ln(measured / simulated) over the standard deviation of both; infinite where neither has any."""
+
+    def where(self, kept: Flags) -> "Difference":
+        """Keep some of the points."""
+        return Difference(self.frequency_hz[kept], self.decibel[kept], self.standard_errors[kept])
+
+    @property
+    def median_abs_db(self) -> float:
+        """Half of the points differ by less."""
+        return float(np.nanmedian(np.abs(self.decibel)))
+
+    @property
+    def rms_db(self) -> float:
+        """Root mean square of the difference."""
+        return float(np.sqrt(np.nanmean(self.decibel**2)))
+
+    @property
+    def share_within_two(self) -> float:
+        """Part of the points within two standard errors; 0.95 when nothing but the stated scatter differs."""
+        return float(np.mean(np.abs(self.standard_errors) <= 2))
+
+
+def logarithmic_difference(
+    frequency_hz: Reals, measured: tuple[Reals, Reals], simulated: tuple[Reals, Reals]
+) -> Difference:
+    """Compare magnitudes; each pair is (magnitude, relative standard deviation)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        nepers = np.log(measured[0] / simulated[0])
+        spread = np.hypot(measured[1], simulated[1])
+        return Difference(frequency_hz, _PER_NEPER_DB * nepers, np.asarray(nepers / spread))

@@ -1,0 +1,129 @@
+"""The specimen simulated under the base motion that was recorded, in the shape of a recording."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibench.acquisition.plan import Measurement
+from vibench.acquisition.recording import Recording
+from vibench.sim import Accuracy, Sampled, Specimen, follow_samples
+
+from ..errors import UnusableData
+from ..recordings import BASE, Channels, RecordedChannels, Stretch
+from ..signals import Flags, Integers, Reals
+from ._base_motion import RecordedBaseMotion, recorded_base_motion
+
+_PIECE_S = 5.0
+"""Simulated at a time: bounds the memory of a long recording."""
+_OVERLAP = 48
+"""Samples on either side of a piece: a spline forgets its ends by a factor of 0.27 per sample (1e-27)."""
+_VX = 3
+_STATE = 6
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedSpecimen:
+    """What the specimen did under a recorded base motion."""
+
+    specimen: Specimen
+    accuracy: Accuracy
+    base: RecordedBaseMotion
+    velocity: Reals
+    """Of m0 on the recording's sample grid, without sensor delay or noise, shape (samples,) [m/s]."""
+    impacts: Integers
+    """Contacts that began up to each sample, shape (samples,)."""
+
+    def impacts_between(self, start: int, stop: int) -> int:
+        """Count the contacts that began between two samples."""
+        return int(self.impacts[stop - 1] - self.impacts[start])
+
+
+def simulated_specimen(
+    recording: Recording,
+    measurement: Measurement,
+    specimen: Specimen,
+    accuracy: Accuracy = Accuracy.STANDARD,
+) -> SimulatedSpecimen:
+    """Shake a specimen, from rest, by the base motion of a whole recording, at its full sample rate.
+
+    Nothing is decimated: an interval between samples costs a fraction of a microsecond.
+
+    Raises
+    ------
+    UnusableData
+        When samples were lost, or the simulation did not reach the end.
+
+    """
+    base = recorded_base_motion(recording, measurement)
+    velocity, impacts = shaken(specimen, base.displacement_m, base.sample_rate_hz, accuracy)
+    return SimulatedSpecimen(specimen, accuracy, base, velocity, impacts)
+
+
+def shaken(
+    specimen: Specimen, displacement_m: Reals, sample_rate_hz: float, accuracy: Accuracy
+) -> tuple[Reals, Integers]:
+    """Give m0's velocity at every sample of the base's displacement, and the impacts up to every sample."""
+    count = displacement_m.size
+    velocity = np.zeros(count)
+    impacts = np.zeros(count, dtype=np.int64)
+    state = np.zeros(_STATE)
+    piece = round(_PIECE_S * sample_rate_hz)
+    for first in range(0, count - 1, piece):
+        last = min(first + piece, count - 1)
+        before, behind = min(_OVERLAP, first), min(_OVERLAP, count - 1 - last)
+        part = Sampled(displacement_m[first - before : last + 1 + behind], sample_rate_hz)
+        path = follow_samples(specimen, part, accuracy, state, first=before, last=before + last - first)
+        if not path.reached_end:
+            raise UnusableData(
+                f"the simulation under the recorded base motion became meaningless after "
+                f"{(first + len(path.states)) / sample_rate_hz:.3g} s: the base moves too much"
+            )
+        velocity[first : last + 1] = path.states[:, _VX]
+        impacts[first + 1 : last + 1] = path.impacts
+        state = path.states[-1]
+    return velocity, np.cumsum(impacts)
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedChannels:
+    """Drive and base as they were recorded, the response as simulated: the same estimator takes both."""
+
+    recorded: RecordedChannels
+    simulated: SimulatedSpecimen
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """Of all channels."""
+        return self.recorded.sample_rate_hz
+
+    @property
+    def samples(self) -> int:
+        """Samples per channel."""
+        return self.recorded.samples
+
+    @property
+    def response_delay_s(self) -> float:
+        """The simulated response has no delay; the recorded base may have one."""
+        return -self.recorded.recording.channel(BASE).delay_s
+
+    def stretches(self, label: str) -> tuple[Stretch, ...]:
+        """Give the named parts of the record."""
+        return self.recorded.stretches(label)
+
+    def read(self, start: int, stop: int) -> Reals:
+        """Give drive, base acceleration and simulated velocity, shape (3, samples)."""
+        data = self.recorded.read(start, stop)
+        data[2] = self.simulated.velocity[start:stop]
+        return data
+
+    def overloaded(self, start: int, stop: int) -> Flags:
+        """Where the recording was overloaded: what is compared must rest on the same samples."""
+        return self.recorded.overloaded(start, stop)
+
+
+def played_impacts(channels: Channels, simulated: SimulatedSpecimen, label: str) -> tuple[int, float]:
+    """Count impacts inside the stretches of one label, and give the time those took [s]."""
+    rate = channels.sample_rate_hz
+    stretches = channels.stretches(label)
+    count = sum(simulated.impacts_between(each.start, each.stop) for each in stretches)
+    return count, sum(each.samples for each in stretches) / rate

@@ -1,0 +1,15 @@
+"""The specimen that is really on the shaker, fitted to the recordings of one campaign.
+
+Damping and frequencies come from the weakest noise, the gap from where sweeps begin to collide or from
+two dwells that bracket it. Every value has its bounds; what could not be told is said.
+"""
+
+from ._shaken_specimen import (
+    ShakenSpecimen,
+    shaken_specimen,
+)
+
+__all__ = [
+    "ShakenSpecimen",
+    "shaken_specimen",
+]

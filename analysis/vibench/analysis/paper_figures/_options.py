@@ -1,0 +1,76 @@
+"""What the paper leaves open in its figures, named and kept with every one of them."""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+from vibench.sim import Accuracy
+from vibench.sim.study import frequency_range
+
+from ..errors import InvalidRequest
+from ..model import THRESHOLD, LogarithmOf
+
+AMPLITUDES_M = (1e-6, 5e-6, 10e-6, 50e-6)
+"""The paper's four cases, weak to strong (its section 3.1; Figs. 3, 6 and 7)."""
+CASES = ("Case 1", "Case 2", "Case 3", "Case 4")
+LOWEST_HZ = 5.0
+
+
+class FrequencyGrid(StrEnum):
+    """How closely the frequencies lie; the paper does not say."""
+
+    COARSE = "coarse"
+    """Every 5 Hz: about what the paper's curves look like."""
+    FINE = "fine"
+    """Every 1 Hz: shows each jump."""
+
+    @property
+    def step_hz(self) -> float:
+        """Distance of neighbouring frequencies."""
+        return {FrequencyGrid.COARSE: 5.0, FrequencyGrid.FINE: 1.0}[self]
+
+
+@dataclass(frozen=True)
+class FigureOptions:
+    """Named choices that the paper leaves open."""
+
+    damping_time_s: float = 2e-5
+    """c_i = damping time * k_i."""
+    gap_m: float = 45e-6
+    accuracy: Accuracy = Accuracy.STANDARD
+    grid: FrequencyGrid = FrequencyGrid.COARSE
+    highest_hz: float = 600.0
+    similarity_highest_hz: float = 500.0
+    """Upper end of the grid on which models are compared: the rates depend on it."""
+    logarithm_of: LogarithmOf = LogarithmOf.MILLIMETRES
+    threshold: float = THRESHOLD
+    duration_s: float = 30.0
+    window_s: float = 5.0
+    """The paper's: 30 s from rest, the last 5 s observed."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.damping_time_s < math.inf:
+            raise InvalidRequest(
+                f"a damping time of {self.damping_time_s} s is not allowed; give zero or a positive one"
+            )
+        if not 0.0 < self.gap_m < math.inf:
+            raise InvalidRequest(f"a gap of {self.gap_m} m is not allowed; give a positive one")
+
+    @property
+    def frequencies_hz(self) -> tuple[float, ...]:
+        """Grid of a response curve."""
+        return frequency_range(LOWEST_HZ, self.highest_hz, self.grid.step_hz)
+
+    @property
+    def similarity_frequencies_hz(self) -> tuple[float, ...]:
+        """Grid on which models are compared."""
+        return frequency_range(LOWEST_HZ, self.similarity_highest_hz, self.grid.step_hz)
+
+    @property
+    def sentence(self) -> str:
+        """Say the options under a figure."""
+        return (
+            f"Options: c = {self.damping_time_s:.3g} s · k, gap {1e6 * self.gap_m:g} µm, "
+            f"{self.accuracy.value} accuracy, every {self.grid.step_hz:g} Hz, {self.duration_s:g} s from "
+            f"rest, the last {self.window_s:g} s observed."
+        )

@@ -1,0 +1,127 @@
+"""The three channels that every analysis uses: drive, base and response, from a recording or a simulation."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from vibench.acquisition.recording import Recording
+
+from ..errors import NotEnoughData, UnusableData
+from ..signals import Flags, Reals
+
+DRIVE, BASE, RESPONSE = "drive_voltage", "base_acceleration", "m0_velocity"
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Consecutive samples that belong together in an analysis."""
+
+    start: int
+    stop: int
+    """One past the last sample."""
+    numbers: dict[str, int | float | str]
+    """What the plan says of it: ``realisation``, ``frequency_hz`` ..."""
+    is_complete: bool
+
+    @property
+    def samples(self) -> int:
+        """How many."""
+        return self.stop - self.start
+
+
+class Channels(Protocol):
+    """What an estimator needs to know, whoever made the samples."""
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """Of all channels."""
+
+    @property
+    def samples(self) -> int:
+        """Valid samples per channel."""
+
+    @property
+    def response_delay_s(self) -> float:
+        """By how much the response channel lags the base channel."""
+
+    def stretches(self, label: str) -> tuple[Stretch, ...]:
+        """Give the named parts of the record, in the order of time."""
+
+    def read(self, start: int, stop: int) -> Reals:
+        """Give drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
+
+    def overloaded(self, start: int, stop: int) -> Flags:
+        """Say at which samples one of the channels was near its full scale, shape (samples,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedChannels:
+    """The channels of a recording; lost samples read as NaN."""
+
+    recording: Recording
+
+    def __post_init__(self) -> None:
+        missing = [role for role in (DRIVE, BASE, RESPONSE) if role not in self.recording.roles]
+        if missing:
+            raise UnusableData(
+                f"there is no channel {', '.join(missing)}; the recording has "
+                f"{', '.join(self.recording.roles)}, and an analysis needs {DRIVE}, {BASE} and {RESPONSE}"
+            )
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """Of all channels."""
+        return self.recording.sample_rate_hz
+
+    @property
+    def samples(self) -> int:
+        """Valid samples per channel."""
+        return self.recording.samples
+
+    @property
+    def response_delay_s(self) -> float:
+        """By how much the response channel lags the base channel."""
+        return self.recording.channel(RESPONSE).delay_s - self.recording.channel(BASE).delay_s
+
+    def stretches(self, label: str) -> tuple[Stretch, ...]:
+        """Give the named parts of the record that hold samples."""
+        return tuple(
+            Stretch(each.start, each.stop, dict(each.numbers), each.is_complete)
+            for each in self.recording.segments
+            if each.label == label and each.stop > each.start
+        )
+
+    def read(self, start: int, stop: int) -> Reals:
+        """Give drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
+        return np.stack([self.recording.read(role, start, stop) for role in (DRIVE, BASE, RESPONSE)])
+
+    def overloaded(self, start: int, stop: int) -> Flags:
+        """Say at which samples one of the channels was near its full scale, shape (samples,)."""
+        marks = np.zeros(stop - start, dtype=np.bool_)
+        for each in self.recording.overloads:
+            if each.channel in (DRIVE, BASE, RESPONSE):
+                marks[max(0, each.first_sample - start) : max(0, each.last_sample + 1 - start)] = True
+        return marks
+
+
+def only_stretch(channels: Channels, label: str) -> Stretch:
+    """Give the one stretch that a sweep or dwell was recorded as; NotEnoughData when there is none."""
+    found = channels.stretches(label)
+    if not found:
+        raise NotEnoughData(
+            f"the recording ended before its {label} began, so there is nothing to analyse; measure again"
+        )
+    return found[0]
+
+
+def read_whole(channels: Channels, stretch: Stretch) -> Reals:
+    """Read a stretch that must have no hole; UnusableData when samples were lost inside it."""
+    data = channels.read(stretch.start, stretch.stop)
+    lost = int(np.count_nonzero(np.isnan(data[0])))
+    if lost:
+        raise UnusableData(
+            f"{lost} of {stretch.samples} samples were lost inside this stretch, and its motion cannot be "
+            "followed across a hole; measure again"
+        )
+    return data

@@ -1,0 +1,123 @@
+"""What to know before trusting a recording: each check passes, or says what to look at."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import date
+from enum import StrEnum
+
+from vibench.acquisition.recording import RecordingState
+
+from ._channels import DRIVE
+from ._facts import RecordingFacts
+
+
+class Verdict(StrEnum):
+    """How a check came out."""
+
+    PASSED = "passed"
+    NOTE = "note"
+    """Nothing is wrong, but a reader should know."""
+    WARNING = "warning"
+    """The result may be wrong, or is less than was planned."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that was looked at."""
+
+    what: str
+    verdict: Verdict
+    text: str
+
+
+_LEAST_SHARE_OF_RANGE = 1e-3
+"""A channel below a thousandth of its range is recorded with little of the converter."""
+_SAME_RATE = 1e-9
+_LEVEL_TOLERANCE = 0.05
+"""Overshoot of the recorded drive over its setting that noise and the converter's filter explain."""
+
+
+def measurement_checks(facts: RecordingFacts) -> tuple[Check, ...]:
+    """Look at how a recording ended, at overloads, lost samples, levels, rates and calibrations."""
+    return (
+        _ending(facts),
+        _stretches(facts),
+        _overloads(facts),
+        _lost(facts),
+        *_drive(facts),
+        *_ranges(facts),
+        _rates(facts),
+        _calibrations(facts),
+        _bench_check(facts),
+    )
+
+
+def _ending(facts: RecordingFacts) -> Check:
+    planned = "" if facts.planned_s is None else f" of {facts.planned_s:.1f} s planned"
+    why = f": {facts.reason}" if facts.reason else ""
+    text = f"{facts.state.value}{why}; {facts.duration_s:.1f} s recorded{planned}"
+    verdict = Verdict.PASSED if facts.state is RecordingState.COMPLETE else Verdict.WARNING
+    return Check("How it ended", verdict, text)
+
+
+def _stretches(facts: RecordingFacts) -> Check:
+    text = f"{facts.whole_stretches} of {facts.planned_stretches} planned parts were recorded whole"
+    whole = facts.whole_stretches >= facts.planned_stretches
+    return Check("Parts", Verdict.PASSED if whole else Verdict.WARNING, text)
+
+
+def _overloads(facts: RecordingFacts) -> Check:
+    if not facts.overload_s:
+        return Check("Overloads", Verdict.PASSED, "no input came near its full scale")
+    parts = [f"{role} for {seconds:.3g} s" for role, seconds in facts.overload_s.items()]
+    text = f"near full scale: {', '.join(parts)}; peaks may be cut, so Response I is a lower bound"
+    return Check("Overloads", Verdict.WARNING, text)
+
+
+def _lost(facts: RecordingFacts) -> Check:
+    if facts.lost_samples == 0:
+        return Check("Lost samples", Verdict.PASSED, "none")
+    text = f"{facts.lost_samples} samples were lost; what touches them is left out"
+    return Check("Lost samples", Verdict.WARNING, text)
+
+
+def _drive(facts: RecordingFacts) -> Iterator[Check]:
+    setting_v = facts.measurement.excitation.highest_amplitude_vpp / 2
+    reached_v = facts.level(DRIVE).peak
+    is_high = reached_v > setting_v * (1 + _LEVEL_TOLERANCE)
+    text = f"peak {reached_v:.4g} V recorded for a setting of {2 * setting_v:g} V peak to peak"
+    yield Check("Drive level", Verdict.NOTE if is_high else Verdict.PASSED, text)
+
+
+def _ranges(facts: RecordingFacts) -> Iterator[Check]:
+    weak = [each for each in facts.channels if each.share_of_range < _LEAST_SHARE_OF_RANGE]
+    for each in weak:
+        text = f"{each.header.role} used {100 * each.share_of_range:.2g} % of its range; a smaller range fits"
+        yield Check("Range", Verdict.NOTE, text)
+
+
+def _rates(facts: RecordingFacts) -> Check:
+    actual, wanted = facts.sample_rate_hz, facts.requested_sample_rate_hz
+    same = abs(actual - wanted) <= _SAME_RATE * wanted
+    text = f"{actual:.6g} samples/s" + ("" if same else f", where {wanted:.6g} were asked for")
+    return Check("Sample rate", Verdict.PASSED if same else Verdict.NOTE, text)
+
+
+def _calibrations(facts: RecordingFacts) -> Check:
+    valid_days = int(facts.bench.get("calibration_valid_days", 0))
+    measured = date.fromisoformat(facts.started_utc[:10])
+    dated = [each.header for each in facts.channels if each.header.calibration_date]
+    if not dated or not valid_days:
+        return Check("Calibration", Verdict.NOTE, "the recording names no calibration dates")
+    ages = {each.role: (measured - date.fromisoformat(each.calibration_date)).days for each in dated}
+    stale = [f"{role} ({days} days)" for role, days in ages.items() if not 0 <= days <= valid_days]
+    if stale:
+        text = f"run out on the day of the measurement: {', '.join(stale)}; {valid_days} days are allowed"
+        return Check("Calibration", Verdict.WARNING, text)
+    return Check("Calibration", Verdict.PASSED, f"all channels within {valid_days} days")
+
+
+def _bench_check(facts: RecordingFacts) -> Check:
+    if not facts.check:
+        return Check("Bench check", Verdict.NOTE, "the recording holds no check of the bench")
+    return Check("Bench check", Verdict.PASSED, facts.check)

@@ -1,0 +1,128 @@
+"""What a recording says about itself: what was measured, with what, and how it ended."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from vibench.acquisition import Identity
+from vibench.acquisition.plan import Measurement
+from vibench.acquisition.recording import Origin, Recording, RecordingState
+from vibench.sim import Specimen, gong2025
+
+from ..errors import UnusableData
+from ._channel_levels import ChannelLevel, OnRead, channel_levels, ignore_reading
+from ._feedback_notes import FeedbackNote, feedback_notes
+
+
+@dataclass(frozen=True, eq=False)
+class RecordingFacts:
+    """Everything but the result."""
+
+    name: str
+    path: Path
+    state: RecordingState
+    reason: str
+    origin: Origin
+    started_utc: str
+    recording_id: str
+    duration_s: float
+    planned_s: float | None
+    sample_rate_hz: float
+    requested_sample_rate_hz: float
+    measurement: Measurement
+    bench: Mapping[str, Any]
+    instruments: Mapping[str, Identity]
+    confirmations: Mapping[str, str | float]
+    provenance: Mapping[str, Any]
+    channels: tuple[ChannelLevel, ...]
+    overload_s: Mapping[str, float]
+    """Time each channel spent near its full scale, by role; channels that never did are left out."""
+    lost_samples: int
+    planned_stretches: int
+    whole_stretches: int
+    check: str
+    """What the check of the bench found before the run; empty when it was left out."""
+    bench_check: Mapping[str, Any]
+    """The last check of the whole bench before it, as the recording has it; may be empty."""
+    feedback: tuple[FeedbackNote, ...] = ()
+    """What a measurement with feedback found while it ran; empty for any other."""
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the instruments were simulated."""
+        return self.origin is Origin.SIMULATED
+
+    def level(self, role: str) -> ChannelLevel:
+        """Give one channel's level."""
+        return next(each for each in self.channels if each.header.role == role)
+
+
+def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> RecordingFacts:
+    """Collect what a recording says about itself; ``on_read`` is told how far its samples are read.
+
+    Raises
+    ------
+    UnusableData
+        When its plan is not one that this version knows.
+    NotEnoughData
+        When it holds no samples.
+
+    """
+    measurement = plan_of(recording)
+    rate = recording.sample_rate_hz
+    overload_s: dict[str, float] = {}
+    for each in recording.overloads:
+        seconds = (each.last_sample - each.first_sample + 1) / rate
+        overload_s[each.channel] = overload_s.get(each.channel, 0.0) + seconds
+    steps = {id(step.segment): step.segment for step in measurement.excitation.steps()}
+    labels = {segment.label for segment in steps.values()}
+    played = [each for each in recording.segments if each.label in labels]
+    return RecordingFacts(
+        name=recording.path.name.removesuffix(".part").removesuffix(".h5"),
+        path=recording.path,
+        state=recording.state,
+        reason=recording.reason,
+        origin=recording.origin,
+        started_utc=recording.started_utc,
+        recording_id=recording.recording_id,
+        duration_s=recording.duration_s,
+        planned_s=None if recording.expected_samples is None else recording.expected_samples / rate,
+        sample_rate_hz=rate,
+        requested_sample_rate_hz=recording.requested_sample_rate_hz,
+        measurement=measurement,
+        bench=recording.bench,
+        instruments=recording.instruments,
+        confirmations=recording.confirmations,
+        provenance=recording.provenance,
+        channels=channel_levels(recording, on_read),
+        overload_s=overload_s,
+        lost_samples=sum(each.last_sample - each.first_sample + 1 for each in recording.gaps),
+        planned_stretches=len(steps),
+        whole_stretches=sum(each.is_complete for each in played),
+        check=" ".join(each.text for each in recording.events if each.kind == "check"),
+        bench_check=recording.bench_check,
+        feedback=feedback_notes(recording),
+    )
+
+
+def plan_of(recording: Recording) -> Measurement:
+    """Read the plan that stands in a recording; UnusableData when this version does not know it."""
+    try:
+        return Measurement.model_validate(recording.plan)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise UnusableData(
+            f"the plan in {recording.path.name} is not one this version of vibench can read "
+            f"({place or 'plan'}: {first['msg']}); read the samples with h5py, or update vibench"
+        ) from error
+
+
+def specimen_of(bench: Mapping[str, Any]) -> Specimen:
+    """Give the specimen that the bench configuration describes; the paper's where it says nothing."""
+    said = bench.get("specimen", {})
+    chosen = {key: said[key] for key in ("damping_time_s", "gap_m", "contact") if key in said}
+    return gong2025(**chosen)

@@ -1,0 +1,104 @@
+"""A comparison as files: a figure, its numbers, or the full report of its recordings."""
+
+from collections.abc import Sequence
+from enum import StrEnum
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+
+from ..comparison import Trace, trace_difference
+from ..errors import InvalidRequest
+from ..figures import comparison_figure
+from ..results import CampaignResults, ComparedRecording, kept_result
+from ..tables import Table, write_csv
+from ._report import write_report
+
+Pair = tuple[Trace, Trace]
+
+
+class ExportKind(StrEnum):
+    """What a comparison can become; the word is the file's suffix."""
+
+    PNG = "png"
+    SVG = "svg"
+    PDF = "pdf"
+    CSV = "csv"
+    HTML = "html"
+    """The report of the recordings."""
+
+
+def exported(
+    path: Path,
+    traces: Sequence[Trace],
+    recordings: Sequence[ComparedRecording],
+    pair: Pair | None = None,
+    markers_hz: Sequence[float] = (),
+) -> Path:
+    """Write what the path's suffix names; a name that is taken becomes ``NAME-2``. Gives the path written.
+
+    Raises
+    ------
+    InvalidRequest
+        When the suffix names nothing that a comparison can become, or there is nothing to write.
+
+    """
+    try:
+        kind = ExportKind(path.suffix.removeprefix(".").lower())
+    except ValueError as unknown:
+        allowed = ", ".join(f".{each.value}" for each in ExportKind)
+        raise InvalidRequest(f"{path.name!r} was given; its ending must be one of {allowed}") from unknown
+    target = unused(path)
+    match kind:
+        case ExportKind.HTML:
+            _report(target, recordings)
+        case ExportKind.CSV:
+            write_csv(comparison_table(target.stem, traces, pair), target)
+        case ExportKind.PNG:
+            target.write_bytes(comparison_figure(target.stem, traces, pair, markers_hz).png)
+        case ExportKind.SVG:
+            target.write_bytes(comparison_figure(target.stem, traces, pair, markers_hz).svg)
+        case ExportKind.PDF:
+            target.write_bytes(comparison_figure(target.stem, traces, pair, markers_hz).pdf)
+    return target
+
+
+def _report(target: Path, recordings: Sequence[ComparedRecording]) -> None:
+    if not recordings:
+        raise InvalidRequest("a report of no recordings was asked for; add a recording to the comparison")
+    kept = [kept_result(each) for each in recordings]
+    failures = tuple(failure for _, failed in kept for failure in failed)
+    write_report(CampaignResults(target.stem, tuple(result for result, _ in kept), failures), target)
+
+
+def comparison_table(name: str, traces: Sequence[Trace], pair: Pair | None) -> Table:
+    """Lay all curves side by side; headings name the curve and the unit."""
+    if not traces:
+        raise InvalidRequest("numbers of no curves were asked for; choose one or more")
+    columns: list[tuple[str, tuple[float | str, ...]]] = []
+    for each in traces:
+        columns += [
+            (f"frequency [Hz] ({each.name})", _cells(each.frequency_hz)),
+            (f"|x / U| [1] ({each.name})", _cells(each.magnitude)),
+            (f"relative standard deviation [1] ({each.name})", _cells(each.relative_sd)),
+        ]
+    if pair is not None:
+        difference = trace_difference(*pair)
+        said = f"{pair[0].name} over {pair[1].name}"
+        columns += [
+            (f"frequency [Hz] ({said})", _cells(difference.frequency_hz)),
+            (f"difference [dB] ({said})", _cells(difference.decibel)),
+        ]
+    return Table(name, tuple(columns))
+
+
+def _cells(values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> tuple[float | str, ...]:
+    return tuple(float(value) if np.isfinite(value) else "" for value in values)
+
+
+def unused(path: Path) -> Path:
+    """Give the first of ``NAME.svg``, ``NAME-2.svg``, ... that no file has."""
+    if not path.exists():
+        return path
+    numbered = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in count(2))
+    return next(each for each in numbered if not each.exists())

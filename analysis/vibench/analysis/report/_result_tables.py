@@ -1,0 +1,202 @@
+"""The tables of a report: resonances, collisions, dwells and the lines of their spectra."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from ..figures import verdict_text
+from ..frequency_response import Resonance
+from ..model import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
+from ..recordings import specimen_of
+from ..results import CampaignResults, DwellResult, NoiseResult, SweepResult
+from ..sine import Edge
+
+_NEAR = 0.08
+"""Two resonances are set beside each other when they lie within 8 %: the modes lie at least 9 % apart."""
+ABSENT = "–"
+_SMALLEST_BIAS = 1e-3
+"""Below this a bias says only that noise plays no part."""
+_PAPER_COLLISION = "about 240 to 290 Hz"
+"""Gong et al. 2025, section 5: the grey area of the sweep."""
+
+
+@dataclass(frozen=True)
+class ReportTable:
+    """Text in rows and columns, with a sentence under it."""
+
+    title: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str
+
+
+def result_tables(results: CampaignResults) -> tuple[ReportTable, ...]:
+    """Build every table for which there are results."""
+    tables = []
+    if results.noise:
+        tables.append(resonance_table(results.noise))
+    if results.sweeps:
+        tables.append(collision_table(results.sweeps))
+    if results.dwells:
+        tables.append(dwell_table(results.dwells))
+        tables.append(line_table(results.dwells))
+    return tuple(tables)
+
+
+def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:
+    """Set measured, simulated, modelled and published resonances side by side."""
+    return ReportTable(
+        "Resonances of the transmission",
+        (
+            "noise",
+            "measured [Hz]",
+            "damping ratio [%]",
+            "peak |x/U|",
+            "simulated [Hz]",
+            "model [Hz]",
+            "paper [Hz]",
+        ),
+        tuple(row for each in noise for row in _resonance_rows(each)),
+        "± is two standard deviations. Simulated: under the recorded base motion, the same estimator. Model: "
+        "undamped natural frequency, without contact or (terminal) with m1 stuck to m2. Paper: Gong et al. "
+        "2025, section 5.",
+    )
+
+
+def _resonance_rows(result: NoiseResult) -> Iterator[tuple[str, ...]]:
+    level = f"{result.analysis.excitation.amplitude_vpp:g} Vpp"
+    specimen = specimen_of(result.analysis.facts.bench)
+    free = [(float(each), "") for each in specimen.natural_frequencies_hz]
+    bound = [(float(each), " (terminal)") for each in specimen.bound_frequencies_hz]
+    paper = [(each, "") for each in PAPER_RESONANCES_HZ] + [
+        (each, " (terminal)") for each in PAPER_TERMINAL_RESONANCES_HZ
+    ]
+    simulated = () if result.laid is None else result.laid.response.resonances
+    found = result.analysis.response.resonances
+    if not found:
+        yield level, "none above its uncertainty", *([ABSENT] * 5)
+    for each in found:
+        beside = _nearest_resonance(each.frequency_hz, simulated)
+        yield (
+            level,
+            f"{each.frequency_hz:.2f} ± {2 * each.sd_frequency_hz:.2g}",
+            f"{100 * each.damping_ratio:.3g} ± {200 * each.sd_damping_ratio:.2g}",
+            f"{each.peak_magnitude:.3g} ± {2 * each.sd_peak_magnitude:.2g}",
+            ABSENT if beside is None else f"{beside.frequency_hz:.2f} ± {2 * beside.sd_frequency_hz:.2g}",
+            _nearest(each.frequency_hz, [*free, *bound], ".1f"),
+            _nearest(each.frequency_hz, paper, ".0f"),
+        )
+
+
+def _nearest_resonance(frequency_hz: float, among: Sequence[Resonance]) -> Resonance | None:
+    near = [each for each in among if abs(each.frequency_hz - frequency_hz) < _NEAR * frequency_hz]
+    return min(near, key=lambda each: abs(each.frequency_hz - frequency_hz), default=None)
+
+
+def _nearest(frequency_hz: float, among: Sequence[tuple[float, str]], form: str) -> str:
+    value, note = min(among, key=lambda each: abs(each[0] - frequency_hz))
+    if abs(value - frequency_hz) > _NEAR * frequency_hz:
+        return ABSENT
+    return f"{value:{form}}{note}"
+
+
+def collision_table(sweeps: Sequence[SweepResult]) -> ReportTable:
+    """Say where each sweep collided, measured, simulated and published."""
+    return ReportTable(
+        "Where the masses collide in a sweep",
+        ("sweep", "measured from", "measured to", "simulated from", "simulated to", "paper"),
+        tuple(row for each in sweeps for row in _collision_rows(each)),
+        "Bounds hold the edge: between the last interval that is clearly the one and the first that is "
+        "clearly the other. Which state a sweep stays in depends on its direction and on how it began.",
+    )
+
+
+def _collision_rows(result: SweepResult) -> Iterator[tuple[str, ...]]:
+    plan = result.analysis.excitation
+    name = f"{plan.amplitude_vpp:g} Vpp, {plan.start_hz:g} to {plan.stop_hz:g} Hz"
+    measured = result.analysis.collisions.regions
+    simulated = () if result.laid is None else result.laid.collisions.regions
+    if not measured and not simulated:
+        yield name, "no collision", ABSENT, ABSENT, ABSENT, _PAPER_COLLISION
+    for number in range(max(len(measured), len(simulated))):
+        cells = [name]
+        for regions in (measured, simulated):
+            if number < len(regions):
+                region = regions[number]
+                cells.append(_edge(region.start, "start of sweep" if region.reaches_start else ""))
+                cells.append(_edge(region.stop, "end of sweep" if region.reaches_stop else ""))
+            else:
+                cells += [ABSENT, ABSENT]
+        yield (*cells, _PAPER_COLLISION)
+
+
+def _edge(edge: Edge, instead: str) -> str:
+    return instead or f"{edge.frequency_hz:.1f} ({edge.lower_hz:.1f} to {edge.upper_hz:.1f}) Hz"
+
+
+def dwell_table(dwells: Sequence[DwellResult]) -> ReportTable:
+    """Say both responses of every dwell, measured and simulated."""
+    return ReportTable(
+        "Dwells: responses over the last seconds",
+        (
+            "dwell",
+            "A0 [µm]",
+            "Response I",
+            "noise bias of I",
+            "Response II",
+            "motion",
+            "simulated I",
+            "simulated II",
+            "impacts per s (sim.)",
+        ),
+        tuple(_dwell_row(each) for each in dwells),
+        "Response I: largest |x| over the window, over A0; in chaos one draw from a scatter. Response II: "
+        "component at the drive frequency, over A0; ± two standard deviations.",
+    )
+
+
+def _dwell_row(result: DwellResult) -> tuple[str, ...]:
+    found, laid = result.analysis.response, result.laid
+    plan = result.analysis.excitation
+    amplitude_m = found.drive.amplitude_m
+    is_small = abs(found.noise_bias_i) < _SMALLEST_BIAS
+    bias = f"below {_SMALLEST_BIAS:g}" if is_small else f"{found.noise_bias_i:.1g}"
+    return (
+        f"{plan.amplitude_vpp:g} Vpp, {plan.frequency_hz:g} Hz",
+        f"{1e6 * amplitude_m:.4g} ± {200 * found.drive.sd_amplitude_m / amplitude_m:.1g} %",
+        f"{found.response_i:.4g}",
+        bias,
+        f"{found.response_ii:.4g} ± {2 * found.sd_response_ii:.1g}",
+        verdict_text(result.analysis.motion.verdict),
+        ABSENT if laid is None else f"{laid.response.response_i:.4g}",
+        ABSENT
+        if laid is None
+        else f"{laid.response.response_ii:.4g} ± {2 * laid.response.sd_response_ii:.1g}",
+        ABSENT if laid is None else f"{laid.run.impact_rate_hz:.0f}",
+    )
+
+
+def line_table(dwells: Sequence[DwellResult]) -> ReportTable:
+    """Say how much of each dwell's motion lies at orders of the drive and in the terminal bands."""
+    rows = []
+    for each in dwells:
+        plan = each.analysis.excitation
+        name = f"{plan.amplitude_vpp:g} Vpp, {plan.frequency_hz:g} Hz"
+        beside = {} if each.laid is None else {band.towards_hz: band.decibel for band in each.laid.terminal}
+        for line in each.analysis.response.lines:
+            if line.amplitude_m > 2 * line.sd_amplitude_m:
+                size = f"{1e6 * line.amplitude_m:.3g} ± {2e6 * line.sd_amplitude_m:.1g}"
+                place = f"{line.frequency_hz:.2f}"
+                rows.append((name, line.label, place, size, f"{line.decibel:.1f}", ABSENT))
+        for band in each.analysis.terminal:
+            what = f"band around {band.towards_hz:.0f} Hz"
+            place = f"{band.low_hz:.0f} to {band.high_hz:.0f}"
+            size = f"{1e6 * band.rms_m:.3g} rms ± {200 * band.relative_sd:.1g} %"
+            simulated = f"{beside[band.towards_hz]:.1f}" if band.towards_hz in beside else ABSENT
+            rows.append((name, what, place, size, f"{band.decibel:.1f}", simulated))
+    return ReportTable(
+        "Dwells: lines and terminal bands of the displacement",
+        ("dwell", "what", "frequency [Hz]", "displacement [µm]", "re drive line [dB]", "simulated [dB]"),
+        tuple(rows),
+        "Lines below two standard deviations are left out. Chaos fills bands, not lines: a band's figure is "
+        "its rms over the rms of the line at the drive frequency.",
+    )

@@ -1,0 +1,25 @@
+from ._case import (
+    AS_CHOSEN as AS_CHOSEN,
+    Case as Case,
+)
+from ._catalogue import (
+    SECTIONS as SECTIONS,
+)
+from ._damping_score import (
+    damping_score_figure as damping_score_figure,
+)
+from ._document import (
+    Picture as Picture,
+    Reproduction as Reproduction,
+    reproduction_document as reproduction_document,
+    verdict_text as verdict_text,
+)
+from ._evidence import (
+    Evidence as Evidence,
+)
+from ._reproduce import (
+    reproduction as reproduction,
+)
+from ._studies import (
+    levels_asked as levels_asked,
+)

@@ -1,0 +1,78 @@
+"""A case: one reading of everything that the paper leaves open, under a name."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from ..model import LogarithmOf
+from ..paper_figures import FigureOptions
+
+SWEEP_AMPLITUDE_M = 5e-6
+"""Base amplitude of the sweep of Fig. 13(d): the one that the paper sets beside 1.5 V."""
+EQUAL_PARTS = "power:3+5+7"
+AS_CHOSEN = "the defaults"
+
+
+@dataclass(frozen=True)
+class Case:
+    """Options under which claims are measured."""
+
+    name: str
+    options: FigureOptions
+    sweep_amplitude_m: float = SWEEP_AMPLITUDE_M
+    sum_model: str = EQUAL_PARTS
+    """The model n = 3+5+7, and how its terms share the force."""
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """One option changed."""
+
+    name: str
+    apply: Callable[[Case], Case]
+
+    def of(self, case: Case) -> Case:
+        """Give the case with the option changed, under the option's name."""
+        return replace(self.apply(case), name=self.name)
+
+
+def damping(damping_time_s: float) -> Alternative:
+    """Change c_i / k_i."""
+    return Alternative(
+        f"c = {damping_time_s:.3g} s · k",
+        lambda case: replace(case, options=replace(case.options, damping_time_s=damping_time_s)),
+    )
+
+
+def gapped(gap_m: float) -> Alternative:
+    """Change the clearance; the paper's has a tolerance of 15 um."""
+    return Alternative(
+        f"gap {1e6 * gap_m:g} µm", lambda case: replace(case, options=replace(case.options, gap_m=gap_m))
+    )
+
+
+def logarithm(of: LogarithmOf) -> Alternative:
+    """Change what the logarithm of eq. 6 is taken of."""
+    return Alternative(
+        f"log10 of the response [{of.value}]",
+        lambda case: replace(case, options=replace(case.options, logarithm_of=of)),
+    )
+
+
+def compared_up_to(highest_hz: float) -> Alternative:
+    """Change the upper end of the frequencies at which models are compared."""
+    return Alternative(
+        f"models compared up to {highest_hz:g} Hz",
+        lambda case: replace(case, options=replace(case.options, similarity_highest_hz=highest_hz)),
+    )
+
+
+def swept_at(amplitude_m: float) -> Alternative:
+    """Change the base amplitude of the sweep."""
+    return Alternative(
+        f"sweep of {1e6 * amplitude_m:g} µm", lambda case: replace(case, sweep_amplitude_m=amplitude_m)
+    )
+
+
+def summed(model: str) -> Alternative:
+    """Change how the three terms of the sum share the force."""
+    return Alternative(f"the sum as {model}", lambda case: replace(case, sum_model=model))

@@ -1,0 +1,104 @@
+"""A claim of the paper as data, and what is found of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+
+from ..errors import InvalidRequest
+from ._case import Alternative, Case
+from ._evidence import Evidence
+from ._expectation import Expectation
+
+Measure = Callable[[Evidence, Case], tuple[float, ...]]
+"""Measures the numbers of a claim under a case: one for each expectation, NaN where there is none."""
+
+
+class Verdict(StrEnum):
+    """What is found of a claim."""
+
+    HOLDS = "holds"
+    """Under the defaults."""
+    HOLDS_UNDER = "holds under"
+    """Not under the defaults, but under a named option."""
+    FAILS = "does not hold"
+    """Under none of the options that were tried."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Something that the paper says and that can be measured."""
+
+    key: str
+    """Short name, unique."""
+    place: str
+    """Where the paper says it."""
+    says: str
+    measured_by: str
+    """How we measure it, in one sentence."""
+    wanted: tuple[Expectation, ...]
+    """All of them must be met."""
+    measure: Measure
+    alternatives: tuple[Alternative, ...] = ()
+    """Options tried where the defaults do not uphold it, in this order."""
+    remark: str = ""
+    """What a reader should know where it does not hold; without numbers, which the page measures."""
+    is_scored: bool = True
+    """Whether it is measured again at every damping of the score; not where that would take too long."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The numbers of a claim under one case."""
+
+    case: Case
+    values: tuple[float, ...]
+    is_met: bool
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """A claim with all that was found of it: the defaults first, then the options tried."""
+
+    claim: Claim
+    findings: tuple[Finding, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Say whether the claim holds, and how."""
+        if self.findings[0].is_met:
+            return Verdict.HOLDS
+        return Verdict.FAILS if self.met_under is None else Verdict.HOLDS_UNDER
+
+    @property
+    def met_under(self) -> Finding | None:
+        """The first finding that upholds the claim."""
+        return next((each for each in self.findings if each.is_met), None)
+
+
+def found(claim: Claim, evidence: Evidence, case: Case) -> Finding:
+    """Measure a claim under one case.
+
+    Raises
+    ------
+    InvalidRequest
+        When the measure gives another count of numbers than the claim wants.
+
+    """
+    values = claim.measure(evidence, case)
+    if len(values) != len(claim.wanted):
+        raise InvalidRequest(
+            f"the claim {claim.key!r} wants {len(claim.wanted)} numbers and {len(values)} were measured; "
+            "give one for each"
+        )
+    is_met = all(wanted.is_met_by(value) for wanted, value in zip(claim.wanted, values, strict=True))
+    return Finding(case, values, is_met)
+
+
+def judged(claim: Claim, evidence: Evidence, case: Case) -> Judgement:
+    """Measure a claim under a case; where it is not upheld, under each of its alternatives until one does."""
+    findings = [found(claim, evidence, case)]
+    for alternative in claim.alternatives:
+        if findings[-1].is_met:
+            break
+        findings.append(found(claim, evidence, alternative.of(case)))
+    return Judgement(claim, tuple(findings))

@@ -1,0 +1,63 @@
+"""Judge all claims, at the defaults and over the dampings, and say what they were judged on."""
+
+import json
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from vibench.sim.study import PACKAGES, software
+
+from ..paper_figures import FigureOptions
+from ._case import AS_CHOSEN, Case
+from ._claim import Claim, judged
+from ._document import Reproduction
+from ._evidence import Evidence
+from ._page_tables import rates_table, regions_table
+from ._score import scores
+
+_MINUTE_S = 60.0
+Told = Callable[[str], None]
+"""Told what is measured next."""
+
+
+def ignore_steps(step: str) -> None:
+    """Watch nothing."""
+
+
+def reproduction(
+    sections: Mapping[str, tuple[Claim, ...]],
+    evidence: Evidence,
+    options: FigureOptions,
+    on_step: Told = ignore_steps,
+) -> Reproduction:
+    """Judge every claim under the options given, under its alternatives where it fails, and by damping."""
+    case = Case(AS_CHOSEN, options)
+    judgements = {}
+    for heading, claims in sections.items():
+        found = []
+        for claim in claims:
+            on_step(claim.key)
+            found.append(judged(claim, evidence, case))
+        judgements[heading] = tuple(found)
+    on_step("score by damping")
+    by_damping = scores([claim for claims in sections.values() for claim in claims], evidence, case)
+    return Reproduction(
+        sections=judgements,
+        scores=by_damping,
+        tables=(regions_table(evidence, case), rates_table(evidence, case)),
+        options=options.sentence.replace("Options:", "Defaults:"),
+        made_with=_made_with(evidence),
+    )
+
+
+def _made_with(evidence: Evidence) -> str:
+    """Say how much was computed, by what; taken from the studies, however often they were gone on with."""
+    studies = evidence.studies
+    points = sum(each.study.grid.size for each in studies)
+    taken_s = sum(float(np.nansum(each.values("taken"))) for each in studies)
+    versions = json.loads(software())
+    named = ", ".join(f"{name} {versions[name]}" for name in PACKAGES)
+    return (
+        f"Computed from {points} simulated points in {len(studies)} studies, "
+        f"{taken_s / _MINUTE_S:.0f} minutes of one core, with {named}."
+    )

@@ -1,0 +1,60 @@
+"""Recordings and campaigns analysed, each by the excitation that its plan names.
+
+A recording becomes a noise, sweep, dwell or stepped-sine result, with the model laid over it or not; one
+that cannot be analysed says why and stops no other. A result is also one JSON document, every number
+with its unit in its name and its uncertainty beside it, and the curves of a comparison.
+"""
+
+from ._campaign_results import (
+    CampaignResults,
+    DwellResult,
+    Failure,
+    NoiseResult,
+    Overlay,
+    Result,
+    SteppedSineResult,
+    SweepResult,
+    analyse_files,
+    assembled,
+    overlay,
+    recordings_in,
+    result_of,
+)
+from ._compared_recording import (
+    ComparedRecording,
+    compared_recording,
+    kept_result,
+)
+from ._measurement_analysis import (
+    UNWATCHED,
+    RecordingAnalysis,
+    analyse_recording,
+)
+from ._summary import (
+    campaign_summary,
+    summary,
+)
+
+__all__ = [
+    "UNWATCHED",
+    "CampaignResults",
+    "ComparedRecording",
+    "DwellResult",
+    "Failure",
+    "NoiseResult",
+    "Overlay",
+    "RecordingAnalysis",
+    "Result",
+    "SteppedSineResult",
+    "SweepResult",
+    "analyse_files",
+    "analyse_recording",
+    "assembled",
+    "campaign_summary",
+    "compared_recording",
+    "kept_result",
+    "overlay",
+    "recordings_in",
+    "result_of",
+    "summary",
+]

@@ -1,0 +1,102 @@
+"""From one recording to its result, by what was played."""
+
+from vibench.acquisition.plan import (
+    Dwell,
+    HeldDwell,
+    HeldSweep,
+    MultisineNoise,
+    OddMultisine,
+    ResonanceTracking,
+    SettledSine,
+    SineSweep,
+    SteppedLevel,
+    SteppedSine,
+    StreamedNoise,
+)
+from vibench.acquisition.recording import Recording
+
+from ..errors import AnalysisError
+from ..frequency_response import DEFAULT_REQUEST, NoiseAnalysis, NoiseRequest, noise_response
+from ..recordings import (
+    Channels,
+    RecordedChannels,
+    RecordingFacts,
+    Unwatched,
+    WatchedChannels,
+    Watcher,
+    measurement_checks,
+    recording_facts,
+    require_moving_channels,
+)
+from ..sine import (
+    DwellAnalysis,
+    SteppedSineAnalysis,
+    SweepAnalysis,
+    bound_frequencies_hz,
+    collisions,
+    dwell_motion,
+    measured_dwell,
+    measured_sweep,
+    settled_envelope,
+    smooth_jumps,
+    stepped_response,
+    terminal_levels,
+)
+
+UNWATCHED = Unwatched()
+
+
+RecordingAnalysis = NoiseAnalysis | SweepAnalysis | DwellAnalysis | SteppedSineAnalysis
+
+
+def analyse_recording(
+    recording: Recording, request: NoiseRequest = DEFAULT_REQUEST, watcher: Watcher = UNWATCHED
+) -> RecordingAnalysis:
+    """Analyse a recording, complete or not, by the excitation that its plan names.
+
+    Parameters
+    ----------
+    recording
+        Finished, interrupted or still growing: what it held when it was opened is analysed.
+    request
+        How the transmission of noise is estimated; other excitations take no notice.
+    watcher
+        Told how far it is.
+
+    Raises
+    ------
+    AnalysisError
+        With one sentence that names the file, when nothing in it is usable.
+
+    """
+    name = recording.path.name
+    watcher.begin(name, "looking at every channel")
+    facts = recording_facts(recording, watcher.read)
+    watcher.begin(name, "analysing")
+    try:
+        return _analysed(facts, WatchedChannels(RecordedChannels(recording), watcher), request)
+    except AnalysisError as error:
+        ended = f"{facts.state.value}" + (f": {facts.reason}" if facts.reason else "")
+        raise type(error)(f"{recording.path.name} ({ended}): {error}") from error
+
+
+def _analysed(facts: RecordingFacts, channels: Channels, request: NoiseRequest) -> RecordingAnalysis:
+    checks = measurement_checks(facts)
+    require_moving_channels(facts.channels)
+    match facts.measurement.excitation:
+        case MultisineNoise() | OddMultisine() | StreamedNoise() as noise:
+            return NoiseAnalysis(facts, checks, noise, noise_response(channels, noise, request), request)
+        case SineSweep() | HeldSweep() as sweep:
+            response, picture = measured_sweep(channels, sweep)
+            colliding = collisions(response)
+            return SweepAnalysis(
+                facts, checks, sweep, response, colliding, smooth_jumps(response, colliding), picture
+            )
+        case Dwell() | HeldDwell() as dwell:
+            towards_hz = bound_frequencies_hz(facts)
+            found = measured_dwell(channels, dwell, towards_hz)
+            terminal = terminal_levels(found, towards_hz)
+            motion = dwell_motion(channels, found)
+            return DwellAnalysis(facts, checks, dwell, found, settled_envelope(found), terminal, motion)
+        case SteppedSine() | SteppedLevel() | SettledSine() | ResonanceTracking() as stepped:
+            return SteppedSineAnalysis(facts, checks, stepped, stepped_response(channels, stepped))

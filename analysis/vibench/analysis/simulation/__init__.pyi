@@ -1,0 +1,20 @@
+from ._accuracy_cost import (
+    cost_sentences as cost_sentences,
+)
+from ._answers import (
+    Piece as Piece,
+)
+from ._course import (
+    SimulationCourse as SimulationCourse,
+)
+from ._request import (
+    SimulationRequest as SimulationRequest,
+)
+from ._worker import (
+    Begin as Begin,
+    Cancel as Cancel,
+    Ended as Ended,
+    Grown as Grown,
+    Order as Order,
+    serve as serve,
+)

@@ -1,0 +1,117 @@
+"""A simulation as far as it has come: curves, exponents and similarity of what is there."""
+
+import numpy as np
+
+from ..comparison import Origin, Response, Trace
+from ..errors import AnalysisError
+from ..model import Curve, Similarity, similarity
+from ..signals import Reals
+from ._answers import Piece, SimulatedPoint, SimulatedSignal, Trouble
+
+
+class SimulationCourse:
+    """Takes the pieces as they come, in any order."""
+
+    def __init__(self, amplitude_m: float, points: int, note: str) -> None:
+        self._amplitude_m = amplitude_m
+        self._points = points
+        self._note = note
+        self._found: dict[str, dict[float, SimulatedPoint]] = {}
+        self._signals: dict[str, SimulatedSignal] = {}
+        self._troubles: list[str] = []
+
+    def add(self, pieces: tuple[Piece, ...]) -> None:
+        """Take what has come."""
+        for piece in pieces:
+            match piece:
+                case SimulatedPoint():
+                    self._found.setdefault(piece.model, {})[piece.frequency_hz] = piece
+                case SimulatedSignal():
+                    self._signals[piece.model] = piece
+                case Trouble():
+                    self._troubles.append(piece.sentence)
+
+    @property
+    def asked(self) -> int:
+        """Points that were asked for."""
+        return self._points
+
+    @property
+    def done(self) -> int:
+        """Points that have an answer, good or bad."""
+        return sum(len(each) for each in self._found.values()) + len(self._troubles)
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """Those of which something is known."""
+        return tuple(dict.fromkeys((*self._signals, *self._found)))
+
+    @property
+    def signals(self) -> tuple[SimulatedSignal, ...]:
+        """Time signals, one a model."""
+        return tuple(self._signals.values())
+
+    @property
+    def largest_signal_m(self) -> float:
+        """Furthest that a time signal goes from rest."""
+        reached = [np.max(np.abs((each.displacement_m, each.relative_m))) for each in self.signals]
+        return float(max(reached, default=0.0))
+
+    @property
+    def smallest_and_largest_response(self) -> tuple[float, float]:
+        """Range of all responses so far; zeros before the first."""
+        points = [point for found in self._found.values() for point in found.values()]
+        known = [v for p in points for v in (p.response_i, p.response_ii) if v is not None and v > 0]
+        return (min(known), max(known)) if known else (0.0, 0.0)
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        """What could not be computed."""
+        return tuple(self._troubles)
+
+    def column(self, model: str, name: str) -> tuple[Reals, Reals]:
+        """Give frequencies and one quantity of a model, NaN where it is not known."""
+        points = [self._found[model][key] for key in sorted(self._found.get(model, {}))]
+        values = [getattr(point, name) for point in points]
+        frequency_hz = np.array([point.frequency_hz for point in points], dtype=np.float64)
+        return frequency_hz, np.array([np.nan if v is None else v for v in values], dtype=np.float64)
+
+    def collision_bands_hz(self, model: str) -> tuple[tuple[float, float], ...]:
+        """Stretches of neighbouring points at which the masses strike."""
+        frequency_hz, impacts = self.column(model, "impacts")
+        striking = np.flatnonzero(impacts > 0)
+        groups = np.split(striking, np.flatnonzero(np.diff(striking) > 1) + 1) if striking.size else []
+        return tuple((float(frequency_hz[each[0]]), float(frequency_hz[each[-1]])) for each in groups)
+
+    def traces(self) -> tuple[Trace, ...]:
+        """Give Responses I and II of every model, to be laid over recordings."""
+        return tuple(
+            Trace(
+                f"model {model}",
+                Origin.PREDICTED,
+                response,
+                *self.column(model, name),
+                np.full(len(self._found[model]), np.nan),
+                self._note,
+            )
+            for model in self.models
+            if model in self._found
+            for response, name in ((Response.RESPONSE_I, "response_i"), (Response.RESPONSE_II, "response_ii"))
+        )
+
+    def similarity(self) -> Similarity | None:
+        """Compare Response I of the second model with the first's, where both are known; None before."""
+        if len(self._found) < 2:
+            return None
+        first, second = (model for model in self.models if model in self._found)
+        both = sorted(self._found[first].keys() & self._found[second].keys())
+        frequency_hz = np.array(both, dtype=np.float64)
+        curves = []
+        for model in (first, second):
+            values = [self._found[model][key].response_i for key in both]
+            response = np.array([np.nan if v is None else v for v in values], dtype=np.float64)
+            curves.append(Curve(frequency_hz, response, self._amplitude_m))
+        try:
+            return similarity(curves[0], curves[1])
+        except AnalysisError:
+            return None

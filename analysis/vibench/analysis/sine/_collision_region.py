@@ -1,0 +1,186 @@
+"""Where in a sweep the masses collide: found from what no order of the drive explains."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InvalidRequest
+from ..signals import Flags, Reals
+from ._sweep import SweepResponse
+
+_NOISE_FACTOR = 4.0
+"""Residual over noise: an interval's rms of hundreds of samples scatters by a few percent only."""
+_DISTORTION = 0.02
+"""Residual over order 1 that a smooth motion may have: harmonics above the third of amplifier and shaker."""
+_SMOOTH_AT_MOST = 0.1
+"""A tenth of order 1 unexplained is no smooth motion, whatever the quietest intervals of a sweep show."""
+_QUIET_QUANTILE = 0.1
+_CLEARLY = 2.0
+"""Residual over threshold that leaves no doubt."""
+_VOTE_S = 1.0
+"""A collision lasts: an interval counts when most of its neighbourhood of this length agrees."""
+_MERGE_S = 3.0
+"""Quiet stretches shorter than this do not part a region: motion between impacts may settle briefly."""
+
+
+@dataclass(frozen=True)
+class Edge:
+    """One end of a collision region, between two bounds."""
+
+    frequency_hz: float
+    time_s: float
+    lower_hz: float
+    upper_hz: float
+    """The edge lies between these: between the last interval that is clearly the one and the first
+    that is clearly the other. Ring-down after the last impact widens it."""
+
+
+@dataclass(frozen=True)
+class CollisionRegion:
+    """A stretch of the sweep in which the masses collide."""
+
+    start: Edge
+    """In the order of time; its frequency is the higher one in a sweep downwards."""
+    stop: Edge
+    reaches_start: bool
+    """Whether the sweep began inside the region, so that ``start`` is the sweep's end and no edge."""
+    reaches_stop: bool
+
+    @property
+    def low_hz(self) -> float:
+        """Lower end [Hz]."""
+        return min(self.start.frequency_hz, self.stop.frequency_hz)
+
+    @property
+    def high_hz(self) -> float:
+        """Upper end [Hz]."""
+        return max(self.start.frequency_hz, self.stop.frequency_hz)
+
+
+@dataclass(frozen=True)
+class Collisions:
+    """All collision regions of a sweep, in the order of time, and what they were judged by."""
+
+    regions: tuple[CollisionRegion, ...]
+    residual_rms: Reals
+    """Velocity that no order explains, shape (intervals,) [m/s]."""
+    threshold: Reals
+    """What a smooth motion may leave, shape (intervals,) [m/s]."""
+    is_colliding: Flags
+    """Intervals that lie in a region, shape (intervals,)."""
+    noise_rms: float
+    """Noise that the threshold allows for [m/s]."""
+
+
+def collisions(sweep: SweepResponse) -> Collisions:
+    """Find where the motion stops being a smooth, slowly varying sine.
+
+    Impacts break the motion: they leave velocity that no order of the drive explains. An interval
+    collides when this residual is above 4 times the noise and above 2 % of order 1. The noise is the
+    larger of what the sixth difference of the samples shows and of the quietest tenth of the sweep
+    (as far as that may be smooth at all). Single intervals, such as drop-outs of the laser, are
+    outvoted by their neighbourhood.
+    """
+    residual = sweep.velocity.residual_rms
+    fundamental = np.abs(sweep.velocity.order(1.0))
+    noise = _noise(sweep, residual, fundamental)
+    threshold = np.hypot(_NOISE_FACTOR * noise, _DISTORTION * fundamental)
+    above = residual > threshold
+    votes = max(1, round(_VOTE_S / sweep.interval_s))
+    if votes >= above.size:
+        raise InvalidRequest(
+            f"the sweep has {above.size} intervals of {sweep.interval_s:g} s; finding collisions needs "
+            f"more than {votes}"
+        )
+    runs = _merged(_runs(_majority(above, votes)), round(_MERGE_S / sweep.interval_s))
+    trimmed = [_trimmed(above, first, last, votes) for first, last in runs]
+    inside = np.zeros(above.size, dtype=np.bool_)
+    for first, last in trimmed:
+        inside[first : last + 1] = True
+    return Collisions(
+        regions=tuple(_region(sweep, residual / threshold, first, last) for first, last in trimmed),
+        residual_rms=residual,
+        threshold=threshold,
+        is_colliding=inside,
+        noise_rms=noise,
+    )
+
+
+def _noise(sweep: SweepResponse, residual: Reals, fundamental: Reals) -> float:
+    quiet = float(np.quantile(residual, _QUIET_QUANTILE))
+    smooth = _SMOOTH_AT_MOST * float(np.median(fundamental))
+    return max(sweep.noise_rms, min(quiet, smooth / _NOISE_FACTOR))
+
+
+def _majority(above: Flags, votes: int) -> Flags:
+    """Ask each interval's neighbourhood; at the ends of the sweep it is one-sided."""
+    total = np.concatenate(([0], np.cumsum(above)))
+    place = np.arange(above.size)
+    low, high = np.maximum(place - votes // 2, 0), np.minimum(place + votes // 2 + 1, above.size)
+    return np.asarray(2 * (total[high] - total[low]) > high - low)
+
+
+def _runs(flags: Flags) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _merged(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
+    merged: list[tuple[int, int]] = []
+    for first, last in runs:
+        if merged and first - merged[-1][1] <= gap:
+            merged[-1] = (merged[-1][0], last)
+        else:
+            merged.append((first, last))
+    return merged
+
+
+def _trimmed(above: Flags, first: int, last: int, votes: int) -> tuple[int, int]:
+    """Move the ends of a run, which the vote blurs, to the split that misjudges the fewest intervals."""
+    half = votes // 2 + 1
+    begin = _best_split(above, max(0, first - half), min(first + half, last))
+    end = (
+        above.size
+        - 1
+        - _best_split(
+            above[::-1],
+            above.size - 1 - min(above.size - 1, last + half),
+            above.size - 1 - max(last - half, begin),
+        )
+    )
+    return begin, max(begin, end)
+
+
+def _best_split(above: Flags, low: int, high: int) -> int:
+    """First interval of a region: as few flags before it and as few gaps after it as possible."""
+    part = above[low : high + 1]
+    before = np.concatenate(([0], np.cumsum(part)[:-1]))
+    after = np.cumsum(~part[::-1])[::-1]
+    return low + int(np.argmin(before + after))
+
+
+def _region(sweep: SweepResponse, excess: Reals, first: int, last: int) -> CollisionRegion:
+    clear = np.flatnonzero(excess[first : last + 1] > _CLEARLY) + first
+    if clear.size == 0:
+        clear = np.array([(first + last) // 2])
+    end = excess.size - 1
+    return CollisionRegion(
+        start=_edge(sweep, first, first - 1, int(clear[0])),
+        stop=_edge(sweep, last, last + 1, int(clear[-1])),
+        reaches_start=first == 0,
+        reaches_stop=last == end,
+    )
+
+
+def _edge(sweep: SweepResponse, edge: int, outside: int, inside: int) -> Edge:
+    """Bounds from the middle of the nearest quiet interval to that of the nearest clearly colliding one."""
+    end = sweep.frequency_hz.size - 1
+    quiet_hz = float(sweep.frequency_hz[min(max(outside, 0), end)])
+    clear_hz = float(sweep.frequency_hz[inside])
+    half_hz = 0.5 * abs(sweep.sweep_rate_hz_per_s) * sweep.interval_s
+    return Edge(
+        frequency_hz=float(sweep.frequency_hz[edge]),
+        time_s=float(sweep.time_s[edge]),
+        lower_hz=min(quiet_hz, clear_hz) - half_hz,
+        upper_hz=max(quiet_hz, clear_hz) + half_hz,
+    )

@@ -1,0 +1,243 @@
+"""What a dwell shows at one frequency: Responses I and II, spectrum, lines, and how the motion repeats."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InvalidRequest, NotEnoughData
+from ..signals import Complexes, ConvertedSignal, Quantity, Reals, converted_signal
+from ..spectra import AmplitudeSpectrum, amplitude_spectrum, spectral_density
+from ..tones import (
+    ALL_ORDERS,
+    DriveLevel,
+    TrackedOrders,
+    cycles_needed,
+    drive_level,
+    noise_bias,
+    order_label,
+    peaks,
+    steady_phase,
+    tracked_orders,
+)
+
+_LOWEST_ORDER = 0.1
+"""Displacement is kept down to this part of the drive frequency, where drift and hum begin to matter."""
+_BAND_ABOVE = 0.33
+"""... and up to this part of the sample rate."""
+_SCATTER_BLOCKS = 10
+_NOISE_BAND = (0.2, 0.4)
+"""Part of the sample rate where a vibrometer shows its own noise: no mode and no impact reaches there."""
+_NOISE_SEGMENT = 4096
+_EXPLAINED = 1.5
+"""Residual over noise up to which the orders are the whole motion."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of a displacement spectrum."""
+
+    label: str
+    """``"order 1"``, ``"order 3/2"``, ``"peak towards 201 Hz"``."""
+    frequency_hz: float
+    amplitude_m: float
+    sd_amplitude_m: float
+    """Spread over tenths of the window for orders, floor of the spectrum for peaks."""
+    decibel: float
+    """Re the line at the drive frequency."""
+
+
+@dataclass(frozen=True)
+class DwellResponse:
+    """One dwell, analysed over its window."""
+
+    drive: DriveLevel
+    window_s: float
+    response_i: float
+    """Largest |x| over the window, divided by the drive amplitude."""
+    noise_bias_i: float
+    """By how much noise is expected to have lifted it."""
+    response_ii: float
+    """Amplitude of x at the drive frequency, divided by the drive amplitude."""
+    sd_response_ii: float
+    phase_rad: float
+    """Of x ahead of the base displacement at the drive frequency, the channels' delay removed."""
+    sd_phase_rad: float
+    orders: tuple[float, ...]
+    order_displacement: Complexes
+    """Complex amplitudes of x at the orders; phase re the drive voltage's cosine [m]."""
+    noise_density: float
+    """Of the velocity channel [m/s per root hertz]."""
+    noise_displacement_m: float
+    """What that is in displacement, root mean square within its band [m]."""
+    displacement: ConvertedSignal
+    """x over the record [m]; its settled part holds the window."""
+    spectrum: AmplitudeSpectrum
+    """Displacement amplitudes over the window [m]."""
+    lines: tuple[Line, ...]
+
+
+def dwell_response(
+    drive: Reals,
+    base: Reals,
+    response: Reals,
+    sample_rate_hz: float,
+    *,
+    near_hz: float,
+    window_s: float = 5.0,
+    towards_hz: tuple[float, ...] = (),
+    orders: tuple[float, ...] = ALL_ORDERS,
+    delay_s: float = 0.0,
+) -> DwellResponse:
+    """Analyse the last seconds of a dwell.
+
+    Parameters
+    ----------
+    drive, base, response
+        Drive voltage, base acceleration [m/s2], response velocity [m/s], shape (samples,). Give more than
+        the window, if there is more: integration disturbs about a quarter of a second at each end.
+    near_hz
+        Drive frequency, within 20 %; the true one is measured on the drive.
+    window_s
+        Length of the window, ending where the settled part of the displacement ends [s].
+    towards_hz
+        Frequencies, such as those of the bound modes, near which (10 %) the largest peak is listed.
+    delay_s
+        By how much the response channel lags the base channel [s].
+
+    Raises
+    ------
+    NotEnoughData
+        When the record without its disturbed ends is shorter than the window.
+    UnusableData
+        When the drive channel holds no sine there.
+
+    """
+    displacement = converted_signal(
+        response,
+        sample_rate_hz,
+        given=Quantity.VELOCITY,
+        wanted=Quantity.DISPLACEMENT,
+        low_hz=_LOWEST_ORDER * near_hz,
+        high_hz=_BAND_ABOVE * sample_rate_hz,
+    )
+    window = _window(displacement, window_s)
+    level = drive_level(drive[window], base[window], sample_rate_hz, near_hz=near_hz)
+    phase = steady_phase(base[window].size, level.frequency_hz / sample_rate_hz, level.phase_rad)
+    motion = displacement.samples[window]
+    whole, parts = _whole_and_parts(response[window], phase, orders)
+    base_whole, base_parts = _whole_and_parts(base[window], phase, orders)
+    omega = 2 * np.pi * level.frequency_hz
+    turn = 1j * omega * np.exp(1j * omega * delay_s)
+    ratio = complex(turn * whole.order(1.0)[0] / base_whole.order(1.0)[0])
+    each = turn * parts.order(1.0) / base_parts.order(1.0) / ratio
+    scatter = float(np.std(each, ddof=1)) / np.sqrt(2 * each.size)
+    noise_density, noise_m, independent = _noise(response, displacement, window_s)
+    spectrum = amplitude_spectrum(response[window], sample_rate_hz)
+    spectrum = spectrum.converted(Quantity.VELOCITY, Quantity.DISPLACEMENT)
+    return DwellResponse(
+        drive=level,
+        window_s=window_s,
+        response_i=float(np.max(np.abs(motion))) / level.amplitude_m,
+        noise_bias_i=noise_bias(_clean(motion, phase, noise_m, orders), noise_m, independent)
+        / level.amplitude_m,
+        response_ii=abs(ratio),
+        sd_response_ii=abs(ratio) * scatter,
+        phase_rad=float(np.angle(ratio)),
+        sd_phase_rad=scatter,
+        orders=orders,
+        order_displacement=whole.value[:, 0] / (1j * omega * np.asarray(orders)),
+        noise_density=noise_density,
+        noise_displacement_m=noise_m,
+        displacement=displacement,
+        spectrum=spectrum,
+        lines=_order_lines(whole, parts, level.frequency_hz)
+        + _peak_lines(spectrum, towards_hz, abs(whole.order(1.0)[0]) / omega),
+    )
+
+
+def _window(displacement: ConvertedSignal, window_s: float) -> slice:
+    length = round(window_s * displacement.sample_rate_hz)
+    stop = displacement.samples.size - displacement.edge_samples
+    if length < 1:
+        raise InvalidRequest(f"window_s is {window_s:g}; it is more than 0")
+    if stop - length < displacement.edge_samples:
+        have_s = displacement.settled.size / displacement.sample_rate_hz
+        raise NotEnoughData(
+            f"a window of {window_s:g} s was asked for, but without the ends that integration disturbs "
+            f"{have_s:.3g} s are left; ask for less or record longer"
+        )
+    return slice(stop - length, stop)
+
+
+def _whole_and_parts(
+    samples: Reals, phase: Reals, orders: tuple[float, ...]
+) -> tuple[TrackedOrders, TrackedOrders]:
+    """Fit over the window, and over its tenths, whose scatter holds all that moves, chaos included.
+
+    A window that is too short for ten parts is cut into fewer.
+    """
+    cycles = float(phase[-1] - phase[0]) / (2 * np.pi)
+    blocks = max(2, min(_SCATTER_BLOCKS, int(cycles / (1.05 * cycles_needed(orders)))))
+    whole = tracked_orders(samples, phase, interval_samples=samples.size, orders=orders)
+    parts = tracked_orders(samples, phase, interval_samples=samples.size // blocks, orders=orders)
+    return whole, parts
+
+
+def _noise(response: Reals, displacement: ConvertedSignal, window_s: float) -> tuple[float, float, float]:
+    """Density of the velocity's noise, rms of it in displacement, and how often that renews itself."""
+    rate = displacement.sample_rate_hz
+    density = spectral_density(response, rate, segment_samples=min(_NOISE_SEGMENT, response.size // 2))
+    quiet = (density.frequency_hz > _NOISE_BAND[0] * rate) & (density.frequency_hz < _NOISE_BAND[1] * rate)
+    level = float(np.sqrt(np.median(density.density[quiet])))
+    low, high = displacement.low_hz, displacement.high_hz
+    # White velocity noise integrated once: density ~ 1/f^2, with rms frequency sqrt(low high).
+    rms_m = level / (2 * np.pi) * np.sqrt(1 / low - 1 / high)
+    return level, float(rms_m), 2 * np.sqrt(low * high) * window_s
+
+
+def _clean(motion: Reals, phase: Reals, noise_m: float, orders: tuple[float, ...]) -> Reals:
+    """Motion without its noise where the orders explain all but noise; else as recorded.
+
+    Noise added once more to a record that holds it lifts its maximum less than it did the first time.
+    """
+    fit = tracked_orders(motion, phase, interval_samples=motion.size, orders=orders)
+    if fit.residual_rms[0] > _EXPLAINED * noise_m:
+        return motion
+    turned = np.exp(1j * np.outer(orders, phase))
+    return np.asarray(np.real(fit.value[:, 0] @ turned))
+
+
+def _order_lines(whole: TrackedOrders, parts: TrackedOrders, drive_hz: float) -> tuple[Line, ...]:
+    reference = abs(whole.order(1.0)[0])
+    lines = []
+    for index, order in enumerate(whole.orders):
+        omega = 2 * np.pi * drive_hz * order
+        size = float(whole.amplitude[index, 0])
+        spread = float(np.std(parts.value[index], ddof=1)) / np.sqrt(2 * parts.residual_rms.size)
+        lines.append(
+            Line(
+                order_label(order),
+                drive_hz * order,
+                size / omega,
+                spread / omega,
+                _decibel(size / order, reference),
+            )
+        )
+    return tuple(lines)
+
+
+def _peak_lines(
+    spectrum: AmplitudeSpectrum, towards_hz: tuple[float, ...], reference_m: float
+) -> tuple[Line, ...]:
+    lines = []
+    for target in towards_hz:
+        for peak in peaks(spectrum, low_hz=0.9 * target, high_hz=1.1 * target, count=1):
+            label = f"peak towards {target:g} Hz"
+            level = _decibel(peak.amplitude, reference_m)
+            lines.append(Line(label, peak.frequency_hz, peak.amplitude, peak.floor, level))
+    return tuple(lines)
+
+
+def _decibel(amplitude: float, reference: float) -> float:
+    with np.errstate(divide="ignore"):
+        return float(20 * np.log10(amplitude / reference))

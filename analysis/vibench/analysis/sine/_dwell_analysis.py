@@ -1,0 +1,88 @@
+"""From one recording to its result, by what was played."""
+
+from dataclasses import dataclass
+
+from vibench.acquisition.plan import (
+    Dwell,
+    HeldDwell,
+)
+
+from ..errors import NotEnoughData
+from ..recordings import (
+    Channels,
+    Check,
+    RecordingFacts,
+    only_stretch,
+    read_whole,
+    specimen_of,
+)
+from ..signals import Envelope, envelope
+from ._dwell import DwellResponse, dwell_response
+from ._dwell_motion import DwellMotion
+from ._terminal_level import TerminalLevel
+
+WINDOW_S = 5.0
+"""The paper's window: the last 5 s of a dwell."""
+
+
+_DWELL_EDGE_PERIODS = 121
+"""Drive periods that integration disturbs, both ends together."""
+
+
+_SHORTEST_WINDOW_PERIODS = 50
+
+
+_TIME_BINS = 1200
+
+
+@dataclass(frozen=True, eq=False)
+class DwellAnalysis:
+    """A dwell: time signal, spectrum, responses and lines."""
+
+    facts: RecordingFacts
+    checks: tuple[Check, ...]
+    excitation: Dwell | HeldDwell
+    response: DwellResponse
+    displacement: Envelope
+    """x over the dwell [m], without the ends that integration disturbs."""
+    terminal: tuple[TerminalLevel, ...]
+    """How much of the motion went to the bands of the bound modes."""
+    motion: DwellMotion
+    """How it repeats."""
+
+
+def bound_frequencies_hz(facts: RecordingFacts) -> tuple[float, ...]:
+    """Frequencies of the specimen with m1 stuck to m2: where strong collisions move the motion to."""
+    return tuple(float(each) for each in specimen_of(facts.bench).bound_frequencies_hz)
+
+
+def measured_dwell(
+    channels: Channels, dwell: Dwell | HeldDwell, towards_hz: tuple[float, ...]
+) -> DwellResponse:
+    """Analyse the last 5 s of a dwell, or what there is of them."""
+    stretch = only_stretch(channels, "dwell")
+    drive, base, response = read_whole(channels, stretch)
+    rate = channels.sample_rate_hz
+    clear_s = stretch.samples / rate - _DWELL_EDGE_PERIODS / dwell.frequency_hz
+    if clear_s < _SHORTEST_WINDOW_PERIODS / dwell.frequency_hz:
+        raise NotEnoughData(
+            f"{stretch.samples / rate:.3g} s of the dwell were recorded; without the ends that integration "
+            f"disturbs too little is left at {dwell.frequency_hz:g} Hz: measure longer"
+        )
+    return dwell_response(
+        drive,
+        base,
+        response,
+        rate,
+        near_hz=dwell.frequency_hz,
+        window_s=min(WINDOW_S, clear_s),
+        towards_hz=towards_hz,
+        delay_s=channels.response_delay_s,
+    )
+
+
+def settled_envelope(response: DwellResponse) -> Envelope:
+    """Give x over the dwell as a plot shows it."""
+    motion = response.displacement
+    start_s = motion.edge_samples / motion.sample_rate_hz
+    return envelope(motion.settled, motion.sample_rate_hz, bins=_TIME_BINS, start_s=start_s)

@@ -1,0 +1,129 @@
+"""Responses I and II at every frequency of a stepped sine."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibench.acquisition.plan import (
+    RESONANCE_LABEL,
+    STEP_LABEL,
+    ResonanceTracking,
+    SettledSine,
+    SteppedLevel,
+    SteppedSine,
+)
+
+from ..errors import NotEnoughData
+from ..recordings import (
+    Channels,
+    Check,
+    RecordingFacts,
+    Stretch,
+)
+from ..signals import Reals
+from ._dwell import DwellResponse, dwell_response
+
+Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking
+"""What is recorded frequency by frequency, or level by level."""
+
+
+_EDGE_PERIODS = 60.0
+"""Drive periods that integration disturbs at each end; read beyond the step, where there is more."""
+
+
+@dataclass(frozen=True)
+class SteppedResponse:
+    """One value for each step, in the order played; arrays of shape (steps,)."""
+
+    frequency_hz: Reals
+    """As measured on the drive."""
+    direction: tuple[str, ...]
+    """``"up"`` or ``"down"``."""
+    amplitude_vpp: Reals
+    """Setting of the generator [V]; NaN where it was not a plan's but feedback's."""
+    drive_amplitude_m: Reals
+    response_i: Reals
+    noise_bias_i: Reals
+    response_ii: Reals
+    sd_response_ii: Reals
+    phase_rad: Reals
+    left_out: int
+    """Steps that were cut short or lost samples."""
+
+
+def stepped_response(channels: Channels, plan: Steps) -> SteppedResponse:
+    """Analyse every whole step as a dwell of its own.
+
+    Raises
+    ------
+    NotEnoughData
+        When no step was recorded whole.
+
+    """
+    stretches = channels.stretches(step_label(plan))
+    whole = [each for each in stretches if each.is_complete]
+    pairs = [(each, found) for each in whole if (found := _step(channels, each, plan)) is not None]
+    if not pairs:
+        raise NotEnoughData(
+            f"none of the steps of {plan.record_s:g} s was recorded whole, so there is no response to show; "
+            "measure again"
+        )
+    steps = [found for _, found in pairs]
+    return SteppedResponse(
+        frequency_hz=np.array([each.drive.frequency_hz for each in steps]),
+        direction=tuple(str(stretch.numbers.get("direction", "up")) for stretch, _ in pairs),
+        amplitude_vpp=np.array([_setting_vpp(stretch, plan) for stretch, _ in pairs]),
+        drive_amplitude_m=np.array([each.drive.amplitude_m for each in steps]),
+        response_i=np.array([each.response_i for each in steps]),
+        noise_bias_i=np.array([each.noise_bias_i for each in steps]),
+        response_ii=np.array([each.response_ii for each in steps]),
+        sd_response_ii=np.array([each.sd_response_ii for each in steps]),
+        phase_rad=np.array([each.phase_rad for each in steps]),
+        left_out=len(stretches) - len(steps),
+    )
+
+
+def step_label(plan: Steps) -> str:
+    """Say what the segments of a plan's steps are called."""
+    return RESONANCE_LABEL if isinstance(plan, ResonanceTracking) else STEP_LABEL
+
+
+def _setting_vpp(stretch: Stretch, plan: Steps) -> float:
+    match plan:
+        case SteppedLevel():
+            return float(stretch.numbers["amplitude_vpp"])
+        case SteppedSine():
+            return plan.amplitude_vpp
+        case SettledSine() | ResonanceTracking():
+            return float("nan")
+
+
+def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | None:
+    near_hz = float(stretch.numbers["frequency_hz"])
+    rate = channels.sample_rate_hz
+    edge = int(np.ceil(_EDGE_PERIODS / near_hz * rate)) + 1
+    start, stop = max(0, stretch.start - edge), min(channels.samples, stretch.stop + edge)
+    data = channels.read(start, stop)
+    if np.isnan(data).any():
+        return None
+    longest_s = (stop - start - 2 * edge) / rate
+    drive, base, response = data
+    return dwell_response(
+        drive,
+        base,
+        response,
+        rate,
+        near_hz=near_hz,
+        window_s=min(plan.record_s, longest_s),
+        delay_s=channels.response_delay_s,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class SteppedSineAnalysis:
+    """A stepped sine: responses at every frequency, or at every level."""
+
+    facts: RecordingFacts
+    checks: tuple[Check, ...]
+    excitation: Steps
+    response: SteppedResponse

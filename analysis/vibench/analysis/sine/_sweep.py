@@ -1,0 +1,245 @@
+"""What a sine sweep shows: envelope, responses and phase against the frequency really played."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from math import ceil
+
+import numpy as np
+
+from ..errors import InvalidRequest, NotEnoughData
+from ..signals import Decimator, Quantity, Reals, converted_signal, decimation_factor
+from ..tones import ALL_ORDERS, ORDERS, TrackedOrders, cycles_needed, noise_bias, tracked_orders
+from ._drive_phase import DrivePhase, drive_phase
+
+_SAMPLES_PER_CYCLE = 24
+"""At the highest drive frequency: a maximum read from samples is then at most 0.9 % low in one cycle."""
+_BAND_BELOW = 0.25
+"""Displacement is kept down to this part of the lowest drive frequency: half orders pass, drift does not."""
+_BAND_ABOVE = 0.3
+"""... and up to this part of the decimated rate, where the decimation is still flat at the band's edge."""
+_ROOM = 1.1
+"""Intervals are longer than orders need by this much: the first one may begin a little below the band."""
+_DRIVE, _BASE, _RESPONSE = range(3)
+_NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
+"""Sixth difference, of unit gain for white noise: it removes what is smooth and leaves the noise."""
+
+
+@dataclass(frozen=True)
+class SweepResponse:
+    """A sweep, interval by interval; arrays of shape (intervals,) unless said otherwise."""
+
+    time_s: Reals
+    """Middle of each interval, from the first sample of the sweep."""
+    frequency_hz: Reals
+    """Instantaneous drive frequency there, measured on the recorded drive."""
+    upper: Reals
+    lower: Reals
+    """Largest and smallest value of the recorded response at the full sample rate [m/s]."""
+    drive_amplitude_m: Reals
+    """Base displacement A0 at the drive frequency, from the recorded acceleration [m]."""
+    sd_drive_amplitude_m: Reals
+    velocity: TrackedOrders
+    """The response's velocity at orders of the drive [m/s]."""
+    harmonics: TrackedOrders
+    """Displacement at orders 1/3 to 5 [m], in longer intervals: `harmonics_hz` says where."""
+    harmonics_hz: Reals
+    """Drive frequency in the middle of each of these, shape (longer intervals,)."""
+    peak_displacement_m: Reals
+    """Largest |x| in the interval [m]."""
+    response_i: Reals
+    """Largest |x| over the drive amplitude."""
+    noise_bias_i: Reals
+    """By how much noise is expected to have lifted Response I."""
+    response_ii: Reals
+    """Amplitude of x at the drive frequency over the drive amplitude."""
+    sd_response_ii: Reals
+    phase_rad: Reals
+    """Phase of x ahead of the base displacement at the drive frequency, the channels' delay removed."""
+    noise_rms: float
+    """Noise of the velocity channel within the band of ``velocity.residual_rms`` [m/s]."""
+    interval_s: float
+
+    @property
+    def sweep_rate_hz_per_s(self) -> float:
+        """Mean rate of the sweep; negative downwards."""
+        return float(np.polyfit(self.time_s, self.frequency_hz, 1)[0])
+
+
+class SweepSums:
+    """Takes a sweep block by block; keeps decimated channels and extremes, a sixth or so of the record.
+
+    Parameters
+    ----------
+    sample_rate_hz
+        Of the blocks.
+    low_hz, high_hz
+        Ends of the sweep, in this order whichever way it ran.
+    interval_s
+        Length of one interval; half orders need two cycles of half the drive frequency.
+
+    """
+
+    def __init__(
+        self,
+        sample_rate_hz: float,
+        *,
+        low_hz: float,
+        high_hz: float,
+        interval_s: float = 0.1,
+        orders: tuple[float, ...] = ORDERS,
+    ) -> None:
+        if not 0 < low_hz < high_hz < sample_rate_hz / 4:
+            raise InvalidRequest(
+                f"the sweep is said to span {low_hz:g} to {high_hz:g} Hz; give them in ascending order, "
+                f"above 0 and below {sample_rate_hz / 4:g} Hz, a quarter of the sample rate"
+            )
+        self._factor = decimation_factor(sample_rate_hz, _SAMPLES_PER_CYCLE * high_hz)
+        self._rate_hz = sample_rate_hz / self._factor
+        self._interval = max(1, round(interval_s * self._rate_hz))
+        self._low_hz, self._high_hz, self._orders = low_hz, high_hz, orders
+        self._decimator = Decimator(3, self._factor)
+        self._parts: list[Reals] = []
+        self._carry = np.empty(0)
+        self._extremes: list[Reals] = []
+
+    def add(self, block: Reals) -> None:
+        """Take the next samples: rows drive voltage, base acceleration, response velocity."""
+        if block.shape[0] != 3:
+            raise InvalidRequest(f"a block has {block.shape[0]} rows; a sweep takes drive, base and response")
+        self._parts.append(self._decimator.add(block))
+        full = self._interval * self._factor
+        data = np.concatenate((self._carry, block[_RESPONSE]))
+        count = data.size // full
+        whole = data[: count * full].reshape(count, full)
+        noise = np.zeros((count, full - _NOISE_DIFFERENCE.size + 1))
+        for tap, weight in enumerate(_NOISE_DIFFERENCE):
+            noise += weight * whole[:, tap : tap + noise.shape[1]]
+        self._extremes.append(
+            np.stack((whole.max(axis=1), whole.min(axis=1), np.sqrt(np.mean(noise**2, axis=1))))
+        )
+        self._carry = data[count * full :].copy()
+
+    def response(self, *, delay_s: float = 0.0) -> SweepResponse:
+        """Analyse everything added; the sums take no more blocks afterwards.
+
+        Parameters
+        ----------
+        delay_s
+            By how much the response channel lags the base channel [s].
+
+        """
+        self._parts.append(self._decimator.finish())
+        data = np.concatenate(self._parts, axis=1)
+        upper, lower, noise = np.concatenate(self._extremes or [np.empty((3, 0))], axis=1)
+        if upper.size == 0:
+            raise NotEnoughData("the sweep is shorter than one interval; use shorter intervals")
+        phase = drive_phase(data[_DRIVE], self._rate_hz, low_hz=self._low_hz, high_hz=self._high_hz)
+        track = partial(
+            tracked_orders, phase_rad=phase.phase_rad, interval_samples=self._interval, orders=self._orders
+        )
+        velocity, base = track(data[_RESPONSE]), track(data[_BASE])
+        frequency_hz = _means(phase.frequency_hz[: upper.size * self._interval], self._interval)
+        noise_density = float(np.median(noise)) / np.sqrt(self._rate_hz * self._factor / 2)
+        return self._scaled(
+            data[_RESPONSE],
+            velocity,
+            base,
+            (upper, lower),
+            frequency_hz,
+            self._harmonics(data[_RESPONSE], phase),
+            noise_density,
+            delay_s,
+        )
+
+    def _harmonics(self, response: Reals, phase: DrivePhase) -> tuple[TrackedOrders, Reals]:
+        """Displacement at many orders, in intervals that are long enough to tell them apart."""
+        cycles = self._low_hz * self._interval / self._rate_hz
+        longer = self._interval * max(1, ceil(_ROOM * cycles_needed(ALL_ORDERS) / cycles))
+        longer = min(longer, response.size)
+        tracked = tracked_orders(response, phase.phase_rad, interval_samples=longer, orders=ALL_ORDERS)
+        count = tracked.residual_rms.size
+        frequency_hz = _means(phase.frequency_hz[: count * longer], longer)
+        omega = 2 * np.pi * frequency_hz * np.asarray(ALL_ORDERS)[:, np.newaxis]
+        scaled = replace(tracked, value=tracked.value / (1j * omega), sd=tracked.sd / omega)
+        return scaled, frequency_hz
+
+    def _scaled(
+        self,
+        response: Reals,
+        velocity: TrackedOrders,
+        base: TrackedOrders,
+        extremes: tuple[Reals, Reals],
+        frequency_hz: Reals,
+        harmonics: tuple[TrackedOrders, Reals],
+        noise_density: float,
+        delay_s: float,
+    ) -> SweepResponse:
+        omega = 2 * np.pi * frequency_hz
+        fundamental = self._orders.index(1.0)
+        amplitude_m = np.abs(base.order(1.0)) / omega**2
+        low_hz, high_hz = _BAND_BELOW * self._low_hz, _BAND_ABOVE * self._rate_hz
+        displacement = converted_signal(
+            response,
+            self._rate_hz,
+            given=Quantity.VELOCITY,
+            wanted=Quantity.DISPLACEMENT,
+            low_hz=low_hz,
+            high_hz=high_hz,
+        )
+        count = frequency_hz.size
+        intervals = displacement.samples[: count * self._interval].reshape(count, self._interval)
+        peak_m = np.max(np.abs(intervals), axis=1)
+        noise_m = noise_density / (2 * np.pi) * np.sqrt(1 / low_hz - 1 / high_hz)
+        independent = 2 * np.sqrt(low_hz * high_hz) * self._interval / self._rate_hz
+        bias_m = np.array([noise_bias(each, noise_m, independent) for each in intervals])
+        ratio = 1j * omega * velocity.order(1.0) / base.order(1.0) * np.exp(1j * omega * delay_s)
+        relative = np.hypot(
+            velocity.sd[fundamental] / velocity.amplitude[fundamental],
+            base.sd[fundamental] / base.amplitude[fundamental],
+        )
+        return SweepResponse(
+            time_s=(np.arange(count, dtype=np.float64) + 0.5) * (self._interval / self._rate_hz),
+            frequency_hz=frequency_hz,
+            upper=extremes[0],
+            lower=extremes[1],
+            drive_amplitude_m=amplitude_m,
+            sd_drive_amplitude_m=base.sd[fundamental] / omega**2,
+            velocity=velocity,
+            harmonics=harmonics[0],
+            harmonics_hz=harmonics[1],
+            peak_displacement_m=peak_m,
+            response_i=peak_m / amplitude_m,
+            noise_bias_i=bias_m / amplitude_m,
+            response_ii=np.abs(ratio),
+            sd_response_ii=np.abs(ratio) * relative,
+            phase_rad=np.angle(ratio),
+            noise_rms=noise_density * np.sqrt(self._rate_hz / 2),
+            interval_s=self._interval / self._rate_hz,
+        )
+
+
+def _means(values: Reals, length: int) -> Reals:
+    return np.asarray(values.reshape(-1, length).mean(axis=1))
+
+
+def sweep_response(
+    drive: Reals,
+    base: Reals,
+    response: Reals,
+    sample_rate_hz: float,
+    *,
+    low_hz: float,
+    high_hz: float,
+    interval_s: float = 0.1,
+    delay_s: float = 0.0,
+) -> SweepResponse:
+    """Analyse a sweep held in memory: drive [V], base acceleration [m/s2], response velocity [m/s].
+
+    See `SweepSums` for the parameters and for a sweep too long for memory.
+    """
+    sums = SweepSums(sample_rate_hz, low_hz=low_hz, high_hz=high_hz, interval_s=interval_s)
+    piece = 1 << 19
+    for first in range(0, drive.size, piece):
+        part = slice(first, first + piece)
+        sums.add(np.stack((drive[part], base[part], response[part])))
+    return sums.response(delay_s=delay_s)

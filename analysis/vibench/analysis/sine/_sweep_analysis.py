@@ -1,0 +1,73 @@
+"""From one recording to its result, by what was played."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibench.acquisition.plan import (
+    HeldSweep,
+    SineSweep,
+)
+
+from ..errors import NotEnoughData
+from ..recordings import (
+    Channels,
+    Check,
+    RecordingFacts,
+    only_stretch,
+)
+from ..spectra import Spectrogram, SpectrogramSums
+from ._collision_region import Collisions
+from ._jumps import Jump, jumps
+from ._sweep import SweepResponse, SweepSums
+
+_BLOCK = 1 << 20
+
+
+_RESPONSE = 2
+
+
+_SPECTROGRAM_ORDER = 3.2
+"""A spectrogram shows the drive's third harmonic at the sweep's end."""
+
+
+@dataclass(frozen=True, eq=False)
+class SweepAnalysis:
+    """A sweep: envelope, responses and where the masses collide."""
+
+    facts: RecordingFacts
+    checks: tuple[Check, ...]
+    excitation: SineSweep | HeldSweep
+    response: SweepResponse
+    collisions: Collisions
+    jumps: tuple[Jump, ...]
+    """Of Response II, between a smooth motion and another."""
+    spectrogram: Spectrogram
+    """Of the recorded velocity."""
+
+
+def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, ...]:
+    """Find the jumps of Response II that have a smooth motion on one side."""
+    return jumps(response.time_s, response.frequency_hz, response.response_ii, ~colliding.is_colliding)
+
+
+def measured_sweep(channels: Channels, sweep: SineSweep | HeldSweep) -> tuple[SweepResponse, Spectrogram]:
+    """Analyse what there is of a sweep, whichever way it ran, and picture its velocity."""
+    stretch = only_stretch(channels, "sweep")
+    ends = sorted((sweep.start_hz, sweep.stop_hz))
+    rate = channels.sample_rate_hz
+    sums = SweepSums(rate, low_hz=ends[0], high_hz=ends[1])
+    highest_hz = min(_SPECTROGRAM_ORDER * ends[1], 0.5 * rate)
+    picture = SpectrogramSums(rate, stretch.samples, highest_hz=highest_hz)
+    for first in range(stretch.start, stretch.stop, _BLOCK):
+        last = min(first + _BLOCK, stretch.stop)
+        block = channels.read(first, last)
+        if np.isnan(block).any():
+            lost_s = (first - stretch.start) / channels.sample_rate_hz
+            raise NotEnoughData(
+                f"samples were lost after {lost_s:.3g} s of the sweep, and its phase cannot be followed "
+                "across a hole; measure again"
+            )
+        sums.add(block)
+        picture.add(block[_RESPONSE])
+    return sums.response(delay_s=channels.response_delay_s), picture.spectrogram()

@@ -1,0 +1,116 @@
+"""Amplitude and phase of a signal at multiples of the drive frequency, interval by interval."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from ..errors import InvalidRequest, UnusableData
+from ..signals import Complexes, Reals
+
+ORDERS = (0.5, 1.0, 1.5, 2.0, 3.0)
+"""Impacting systems answer at half orders as well as at whole ones."""
+ALL_ORDERS = (1 / 3, 0.5, 2 / 3, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0)
+"""With thirds and high harmonics: they need intervals of twelve drive cycles."""
+_BATCH_INTERVALS = 256
+"""Intervals solved at once: some ten megabytes."""
+
+
+def order_label(order: float) -> str:
+    """Write an order as a reader says it: ``"order 1/3"``, ``"order 2"``."""
+    return f"order {Fraction(order).limit_denominator(12)}"
+
+
+def cycles_needed(orders: tuple[float, ...]) -> float:
+    """Drive cycles that an interval must hold to tell these orders apart."""
+    return 2 / float(min(np.diff((0.0, *sorted(orders)))))
+
+
+@dataclass(frozen=True)
+class TrackedOrders:
+    """Components of a signal at orders of the drive; signal = Re(sum value_k exp(i k phase)) + residual."""
+
+    orders: tuple[float, ...]
+    value: Complexes
+    """Complex amplitude (peak) at the middle of each interval, shape (orders, intervals)."""
+    sd: Reals
+    """Standard deviation of the magnitude from the residual, taken as white; shape (orders, intervals)."""
+    residual_rms: Reals
+    """Root mean square of what no order explains, shape (intervals,)."""
+
+    @property
+    def amplitude(self) -> Reals:
+        """|value|, shape (orders, intervals)."""
+        return np.abs(self.value)
+
+    def order(self, number: float) -> Complexes:
+        """Complex amplitudes of one order, shape (intervals,)."""
+        if number not in self.orders:
+            raise InvalidRequest(f"order {number:g} was not tracked; tracked are {self.orders}")
+        chosen: Complexes = self.value[self.orders.index(number)]
+        return chosen
+
+
+def tracked_orders(
+    samples: Reals, phase_rad: Reals, *, interval_samples: int, orders: tuple[float, ...] = ORDERS
+) -> TrackedOrders:
+    """Fit all orders at once to each interval of a signal, by least squares.
+
+    One order at a time would be biased by the others whenever an interval is not a whole number of
+    *subharmonic* periods. A constant and a linear change of order 1 are fitted too, so that a sweep
+    through a resonance leaves no residual.
+
+    Parameters
+    ----------
+    samples, phase_rad
+        The signal and the drive's phase at the same instants, shape (samples,); what is left over
+        after the last whole interval is not used.
+    interval_samples
+        Must hold at least two periods of the smallest distance between orders.
+
+    """
+    count = samples.size // interval_samples
+    if count == 0:
+        raise InvalidRequest(
+            f"the signal has {samples.size} samples, less than one interval of {interval_samples}"
+        )
+    turns = abs(float(phase_rad[count * interval_samples - 1] - phase_rad[0])) / (2 * np.pi) / count
+    needed = cycles_needed(orders)
+    if turns < needed:
+        raise InvalidRequest(
+            f"an interval of {interval_samples} samples holds {turns:.1f} drive cycles; orders "
+            f"{2 / needed:g} apart need at least {needed:g}: use longer intervals or fewer orders"
+        )
+    signal = samples[: count * interval_samples].reshape(count, interval_samples)
+    phase = phase_rad[: count * interval_samples].reshape(count, interval_samples)
+    parts = [
+        _fit(signal[first : first + _BATCH_INTERVALS], phase[first : first + _BATCH_INTERVALS], orders)
+        for first in range(0, count, _BATCH_INTERVALS)
+    ]
+    value, sd, residual = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+    return TrackedOrders(orders, value, sd, residual)
+
+
+def _fit(signal: Reals, phase: Reals, orders: tuple[float, ...]) -> tuple[Complexes, Reals, Reals]:
+    samples = signal.shape[1]
+    angles = phase[np.newaxis] * np.asarray(orders)[:, np.newaxis, np.newaxis]
+    ramp = np.linspace(-1.0, 1.0, samples)
+    first = np.stack((ramp * np.cos(phase), ramp * np.sin(phase), np.ones_like(phase)))
+    basis = np.concatenate((np.cos(angles), np.sin(angles), first)).transpose(1, 0, 2)
+    normal = basis @ basis.transpose(0, 2, 1)
+    target = basis @ signal[:, :, np.newaxis]
+    try:
+        inverse = np.linalg.inv(normal)
+    except np.linalg.LinAlgError as singular:
+        raise UnusableData(
+            "the drive phase stands still in an interval, so orders cannot be told apart there; "
+            "cut the record to where the drive runs"
+        ) from singular
+    solution = (inverse @ target)[:, :, 0]
+    residual = signal - np.einsum("ik,iks->is", solution, basis)
+    variance = np.sum(residual**2, axis=1) / max(1, samples - basis.shape[1])
+    count = len(orders)
+    value = solution[:, :count] - 1j * solution[:, count : 2 * count]
+    diagonal = np.einsum("ikk->ik", inverse)
+    spread = np.sqrt(variance[:, np.newaxis] * (diagonal[:, :count] + diagonal[:, count : 2 * count]) / 2)
+    return value.T, spread.T, np.sqrt(np.mean(residual**2, axis=1))
