@@ -24,13 +24,12 @@ from PySide6.QtWidgets import QApplication
 from vibench.analysis import Origin, Response, Trace
 from vibench.analysis.simulation import SimulationCourse
 from vibench.analysis.simulation._answers import SimulatedPoint
-from vibench.gui.app import application
-from vibench.gui.desk import Desk
-from vibench.gui.loop_watch import LoopWatch
-from vibench.gui.pages.compare.compare_page import ComparePage
-from vibench.gui.pages.files.files_page import FilesPage
-from vibench.gui.pages.simulate.simulate_page import SimulatePage
-from vibench.gui.settings import Settings
+from vibench.gui.page import Desk, Settings
+from vibench.gui.pages.compare import ComparePage
+from vibench.gui.pages.files import FilesPage
+from vibench.gui.pages.simulate import SimulatePage
+from vibench.gui.window._app import application
+from vibench.gui.window._loop_watch import LoopWatch
 
 SIZE = (1400, 900)
 SPANS_S = (600.0, 60.0, 6.0, 2.4, 0.6, 0.06)

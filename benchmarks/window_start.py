@@ -18,11 +18,11 @@ ROOT = Path(__file__).resolve().parent.parent
 STARTED = """
 import sys, time
 from pathlib import Path
-from vibench.gui.app import application
-from vibench.gui.desk import Desk
-from vibench.gui.pages.catalogue import PAGES
-from vibench.gui.settings import Settings
-from vibench.gui.window import Window
+from vibench.gui.window._app import application
+from vibench.gui.page import Desk
+from vibench.gui.window._page_catalogue import PAGES
+from vibench.gui.page import Settings
+from vibench.gui.window._window import Window
 app = application(["vibench"])
 window = Window(Desk(Settings(Path(sys.argv[1]))), PAGES)
 window.show()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from vibench.cli.__main__ import main
+from vibench.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}

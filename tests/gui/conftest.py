@@ -8,12 +8,11 @@ import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QColor, QImage, QPainter
 
-from vibench.gui.app import application
-from vibench.gui.desk import Desk
-from vibench.gui.loop_watch import BOUND_S
-from vibench.gui.pages.catalogue import PAGES
-from vibench.gui.settings import Settings
-from vibench.gui.window import Window
+from vibench.gui.page import Desk, Settings
+from vibench.gui.window._app import application
+from vibench.gui.window._loop_watch import BOUND_S
+from vibench.gui.window._page_catalogue import PAGES
+from vibench.gui.window._window import Window
 
 YARDSTICK_S = 0.0054
 """What `yardstick` takes where the bound was set; a slower processor is given as much more."""

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from vibench.gui.theme import DARK, LIGHT
+from vibench.gui.widgets import DARK, LIGHT
 
 FIELDS = (QLineEdit, QAbstractSpinBox, QComboBox)
 NAMED_BY_TEXT = (QAbstractButton, QLabel)

@@ -3,8 +3,9 @@
 import pytest
 from PySide6.QtWidgets import QLabel, QPushButton
 
-from vibench.gui.banner import Banner, Face
-from vibench.gui.theme import DARK, LIGHT, Tone
+from vibench.gui.widgets import DARK, LIGHT, Tone
+from vibench.gui.window import Face
+from vibench.gui.window._banner import Banner
 
 READABLE = 4.5
 

@@ -12,13 +12,12 @@ from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QLineEdit, QMe
 from vibench.acquisition import open_recording
 from vibench.acquisition.engine import Attendance, EngineState, start_engine
 from vibench.acquisition.plan import Measurement
-from vibench.gui.desk import Desk
-from vibench.gui.orders import ABORT_KEY
-from vibench.gui.page_names import COMPARE, FILES, RUN, TEST
-from vibench.gui.pages.catalogue import PAGES
-from vibench.gui.pages.rig.rig_choice import PACES
-from vibench.gui.settings import Settings
-from vibench.gui.window import Window
+from vibench.gui.page import Desk, Settings
+from vibench.gui.page._orders import ABORT_KEY
+from vibench.gui.pages.rig._rig_choice import PACES
+from vibench.gui.widgets import COMPARE, FILES, RUN, TEST
+from vibench.gui.window._page_catalogue import PAGES
+from vibench.gui.window._window import Window
 
 CONTROL = Qt.KeyboardModifier.ControlModifier
 ALT = Qt.KeyboardModifier.AltModifier

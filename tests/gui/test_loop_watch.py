@@ -4,7 +4,7 @@ from time import thread_time
 
 import pytest
 
-from vibench.gui.loop_watch import BOUND_S, LoopWatch
+from vibench.gui.window._loop_watch import BOUND_S, LoopWatch
 
 
 def work_for(duration_s):

@@ -3,12 +3,10 @@
 import pytest
 from PySide6.QtCore import Qt
 
-from vibench.gui.desk import Desk
-from vibench.gui.page_names import RIG, TEST
-from vibench.gui.pages.catalogue import PAGES
-from vibench.gui.settings import Settings
-from vibench.gui.theme import DARK
-from vibench.gui.window import Window
+from vibench.gui.page import Desk, Settings
+from vibench.gui.widgets import DARK, RIG, TEST
+from vibench.gui.window._page_catalogue import PAGES
+from vibench.gui.window._window import Window
 
 
 def test_every_page_can_be_shown_by_its_key(window, qtbot):

@@ -8,11 +8,10 @@ from PySide6.QtCore import QTimer
 from vibench.acquisition.engine import EngineState
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
-from vibench.gui.app import application
-from vibench.gui.desk import Desk
-from vibench.gui.pages.catalogue import PAGES
-from vibench.gui.settings import Settings
-from vibench.gui.window import Window
+from vibench.gui.page import Desk, Settings
+from vibench.gui.window._app import application
+from vibench.gui.window._page_catalogue import PAGES
+from vibench.gui.window._window import Window
 
 DWELL = {"kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "settle_s": 0.2, "duration_s": 600}
 PLAN = {

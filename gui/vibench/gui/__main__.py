@@ -15,10 +15,10 @@ def main(arguments: list[str] | None = None) -> int:
     # The same binding for all, and one thread for linear algebra: the matrices are small.
     os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from .open_window import open_window  # noqa: PLC0415
+    from .window import open_window  # noqa: PLC0415
 
     if options.screenshots is not None:
-        from .screenshots import make_screenshots  # noqa: PLC0415
+        from .window import make_screenshots  # noqa: PLC0415
 
         return make_screenshots(options.bench, options.screenshots)
     return open_window(options.bench, options.settings)

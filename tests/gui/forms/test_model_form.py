@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QLabel
 
 from vibench.acquisition import load_campaign
 from vibench.acquisition.plan import KINDS, Measurement
-from vibench.gui.forms.model_form import ModelForm
+from vibench.gui.forms import ModelForm
 
 CAMPAIGNS = Path(__file__).resolve().parents[3] / "campaigns"
 MEASUREMENTS = {

@@ -15,8 +15,7 @@ from vibench.acquisition.recording import (
     RecordingState,
     create_recording,
 )
-from vibench.gui.desk import Desk
-from vibench.gui.settings import Settings
+from vibench.gui.page import Desk, Settings
 
 RATE_HZ = 6400.0
 SAMPLES = 64_000

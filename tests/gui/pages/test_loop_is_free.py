@@ -22,11 +22,10 @@ from vibench.analysis import Origin, Response, Trace
 from vibench.analysis.live import LiveChannel, LiveView
 from vibench.analysis.simulation import SimulationCourse
 from vibench.analysis.simulation._answers import SimulatedPoint, SimulatedSignal
-from vibench.gui.live_run import warm_up
-from vibench.gui.page_names import COMPARE, FILES, QUEUE, RUN, SIMULATE, TEST
-from vibench.gui.pages.queue.draft import with_sweep
-from vibench.gui.screenshots import SHOWN, SHOWN_TOO
-from vibench.gui.theme import DARK, LIGHT
+from vibench.gui.engine_link._live_run import warm_up
+from vibench.gui.pages.queue._draft import with_sweep
+from vibench.gui.widgets import COMPARE, DARK, FILES, LIGHT, QUEUE, RUN, SIMULATE, TEST
+from vibench.gui.window._screenshots import SHOWN, SHOWN_TOO
 
 RATE_HZ, LONG_S, STEPS = 51_200.0, 20.0, 200
 LONG_CHANNELS = (

@@ -7,12 +7,12 @@ import sys
 import pytest
 
 WIDTHS = """
-from vibench.gui.app import application
+from vibench.gui.window._app import application
 application([])
-from vibench.gui.plots.axis import TIME, Axis
-from vibench.gui.plots.ink import Ink
-from vibench.gui.plots.plot import Plot
-from vibench.gui.theme import LIGHT
+from vibench.gui.plots import TIME, Axis
+from vibench.gui.plots import Ink
+from vibench.gui.plots import Plot
+from vibench.gui.widgets import LIGHT
 plot = Plot("a plot", TIME, Axis("Height", "m"), LIGHT)
 plot.resize(400, 300)
 plot.setXRange(0, 10, padding=0)

@@ -3,10 +3,9 @@
 import pytest
 from PySide6.QtGui import QColor
 
-from vibench.gui.plots.axis import LOG_FREQUENCY, TIME, Axis, thinned
-from vibench.gui.plots.ink import trace
-from vibench.gui.plots.plot import Plot
-from vibench.gui.theme import LIGHT
+from vibench.gui.plots import LOG_FREQUENCY, TIME, Axis, Plot, trace
+from vibench.gui.plots._axis import thinned
+from vibench.gui.widgets import LIGHT
 
 
 @pytest.fixture

@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 
-from vibench.gui.plots.axis import TIME, Axis
-from vibench.gui.plots.ink import trace
-from vibench.gui.plots.plot import Plot
-from vibench.gui.plots.signal_curve import SignalCurve
-from vibench.gui.theme import LIGHT
+from vibench.gui.plots import TIME, Axis, Plot, SignalCurve, trace
+from vibench.gui.widgets import LIGHT
 
 RATE_HZ = 51200.0
 

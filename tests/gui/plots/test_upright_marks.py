@@ -2,10 +2,8 @@
 
 import pytest
 
-from vibench.gui.plots.axis import LOG_FREQUENCY, TIME, Axis
-from vibench.gui.plots.ink import Dash, Ink
-from vibench.gui.plots.plot import Plot
-from vibench.gui.theme import LIGHT
+from vibench.gui.plots import LOG_FREQUENCY, TIME, Axis, Dash, Ink, Plot
+from vibench.gui.widgets import LIGHT
 
 RED = Ink(lambda _theme: "#ff0000", filled=1.0)
 LINE = Ink(lambda _theme: "#ff0000", Dash.SOLID)

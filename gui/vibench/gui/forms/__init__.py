@@ -1,1 +1,32 @@
-"""Forms made from plan models: a field for every value, with its unit, its limits and its complaint."""
+"""Forms made from the pydantic models of a plan: one field for every value.
+
+Labels, units, limits and explanations come from the model's fields; the model itself judges
+what was typed. An editor for each type of value; quantities are typed with units ("45 µm").
+It knows no particular model.
+"""
+
+from ._editor import (
+    Choice,
+)
+from ._field_edge import (
+    LineField,
+)
+from ._judged_form import (
+    JudgedForm,
+)
+from ._model_form import (
+    Loc,
+    ModelForm,
+)
+from ._quantity_edit import (
+    QuantityEdit,
+)
+
+__all__ = [
+    "Choice",
+    "JudgedForm",
+    "LineField",
+    "Loc",
+    "ModelForm",
+    "QuantityEdit",
+]

@@ -7,8 +7,8 @@ import pytest
 from PySide6.QtCore import Qt
 
 from vibench.analysis import Origin, Response, Trace
-from vibench.gui.pages.compare.compare_page import ComparePage
-from vibench.gui.theme import DARK
+from vibench.gui.pages.compare import ComparePage
+from vibench.gui.widgets import DARK
 
 
 def mode(source, scale=1.0, low_hz=50.0, high_hz=600.0):

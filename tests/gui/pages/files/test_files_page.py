@@ -15,10 +15,10 @@ from vibench.acquisition.plan import Campaign, Dwell, Measurement
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import Rig
 from vibench.analysis.live import thumbnail
-from vibench.gui.pages.files.files_page import FilesPage
-from vibench.gui.pages.files.listing import made_levels
-from vibench.gui.pages.files.recording_table import HEADINGS
-from vibench.gui.theme import DARK
+from vibench.gui.pages.files import FilesPage
+from vibench.gui.pages.files._listing import made_levels
+from vibench.gui.pages.files._recording_table import HEADINGS
+from vibench.gui.widgets import DARK
 
 IMPACT_S = 40_002 / 6400.0
 

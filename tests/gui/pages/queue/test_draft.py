@@ -4,7 +4,7 @@ import pytest
 
 from vibench.acquisition import ConfigurationError, load_campaign, save_toml
 from vibench.acquisition.plan import Axis, Measurement, Range
-from vibench.gui.pages.queue.draft import moved_up, with_measurement, with_sweep, without
+from vibench.gui.pages.queue._draft import moved_up, with_measurement, with_sweep, without
 
 DWELL = Measurement.model_validate(
     {

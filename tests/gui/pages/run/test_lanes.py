@@ -2,9 +2,9 @@
 
 import pytest
 
-from vibench.gui.pages.run.channel_words import channel_axis
-from vibench.gui.pages.run.lanes import Lanes
-from vibench.gui.theme import LIGHT
+from vibench.gui.pages.run._channel_words import channel_axis
+from vibench.gui.pages.run._lanes import Lanes
+from vibench.gui.widgets import LIGHT
 
 FOUR = (
     ("drive_voltage", "V"),

@@ -6,8 +6,8 @@ import pytest
 from vibench.analysis.simulation import SimulationRequest
 from vibench.analysis.simulation._accuracy_cost import MEASURED
 from vibench.analysis.simulation._answers import SimulatedPoint, SimulatedSignal, Trouble
-from vibench.gui.pages.simulate.simulate_page import SimulatePage
-from vibench.gui.theme import DARK
+from vibench.gui.pages.simulate import SimulatePage
+from vibench.gui.widgets import DARK
 from vibench.sim import Accuracy
 
 LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "start_hz": 50.0, "step_hz": 10.0}

@@ -1,1 +1,10 @@
-"""Recordings as they are listed, opened and looked at."""
+"""The Files page: recordings of a folder, listed and looked at.
+
+A table with state and thumbnail of each recording, its channels over time at any zoom, and a
+spectrogram. Folders and levels are read in another process; `_listing` is loaded there, without
+widgets.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

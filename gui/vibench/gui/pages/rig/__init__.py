@@ -1,1 +1,9 @@
-"""The Rig page: which bench, is it there, is it well."""
+"""The Rig page: which bench, is it there, is it well.
+
+The hardware configuration is chosen, knobs that no instrument reports are confirmed, the bench
+is opened and checked; findings are written with units and prefixes.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,1 +1,9 @@
-"""The scene as a form, and its answer as it grows."""
+"""The Simulate page: a scene as a form, and its answer as it grows.
+
+One process computes for as long as the window lives; what nobody wants any more is dropped.
+Responses, exponents, similarity and motion are drawn while they come in.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

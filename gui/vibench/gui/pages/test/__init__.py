@@ -1,1 +1,10 @@
-"""The Test page: what will be played, and what it will do."""
+"""The Test page: what will be played, and what it will do.
+
+A form of one measurement, the signal in time and spectrum, predicted loads beside the limits of
+the rig, and the predicted response of the specimen. Preview and prediction are worked out in
+another process; `_ahead` is loaded there, without widgets.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,27 @@
+"""The connection between the window and the engine's process.
+
+`Bridge` asks for status and samples at every tick, keeps what was answered last and sends
+commands; one thread without Qt waits for answers, so that the window never does. The window's
+heartbeat goes out here: an engine that misses it ramps down (docs/engine.md).
+A `LiveView` of the newest samples is kept for each run.
+"""
+
+from ._bridge import (
+    Bridge,
+)
+from ._engine_line import (
+    Starter,
+)
+from ._live_run import (
+    measurement_called,
+)
+from ._sign_of_life import (
+    SignOfLife,
+)
+
+__all__ = [
+    "Bridge",
+    "SignOfLife",
+    "Starter",
+    "measurement_called",
+]

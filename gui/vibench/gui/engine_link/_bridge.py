@@ -1,0 +1,277 @@
+"""The bridge between window and engine: what the engine says comes in, what a person wants goes out."""
+
+from collections.abc import Callable
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from vibench.acquisition import AcquisitionError, StopLevel
+from vibench.acquisition.campaign import Existing
+from vibench.acquisition.engine import (
+    DRIVING,
+    ArmedPlan,
+    BenchFacts,
+    EngineClient,
+    EngineGone,
+    EngineMessage,
+    EngineState,
+    EngineStatus,
+    Glance,
+    start_engine,
+)
+from vibench.acquisition.plan import Campaign
+from vibench.acquisition.rig import KnobSheet, Rig
+from vibench.analysis.live import LiveView
+
+from ..widgets import Notice, NoticeKind, notice_of
+from ._engine_line import EngineLine, Starter, Urgency
+from ._live_run import live_view, warm_up
+
+CATCH_UP_S = 2.0
+"""Older samples than this are not asked for after a pause: the picture shows now, the file holds all."""
+
+PIECE_S = 0.2
+"""Samples that are taken in at once; a frame of a real instrument's brings a quarter of that."""
+
+BEAT_S = 0.04
+"""The engine is not told more often than this that the window lives; it waits for half a second."""
+
+Glimpse = tuple[EngineStatus, Glance | None]
+
+
+class Bridge(QObject):
+    """The one place where the window and the engine meet.
+
+    Everything known is what the engine said last. `tick`, called by the window's timer, fetches
+    answers and asks again: this is also how the engine knows that the window is alive.
+    """
+
+    noticed = Signal(object)
+    """A `Notice` from the engine, or about it."""
+    armed = Signal(object)
+    """The `ArmedPlan` after `arm` was granted."""
+    recording_ended = Signal(object)
+    """Path of a recording that has just come to its end."""
+
+    def __init__(self, start: Starter = start_engine, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._start = start
+        self._line: EngineLine | None = None
+        self._status: EngineStatus | None = None
+        self._view: LiveView | None = None
+        self._view_run = 0
+        self._rig: Rig | None = None
+        self._campaign: Campaign | None = None
+        self._heard = 0
+        self._ended: frozenset[str] = frozenset()
+        self._is_looking = False
+        self._beaten_s = 0.0
+
+    @property
+    def status(self) -> EngineStatus | None:
+        """What the engine said last; None while there is none."""
+        return self._status
+
+    @property
+    def state(self) -> EngineState:
+        """Where the engine stands; closed while there is none."""
+        return EngineState.CLOSED if self._status is None else self._status.state
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether the drive may be on."""
+        return self.state in DRIVING
+
+    @property
+    def view(self) -> LiveView | None:
+        """The newest samples of the run; None before the first run."""
+        return self._view
+
+    @property
+    def rig(self) -> Rig | None:
+        """The rig whose bench was opened last."""
+        return self._rig
+
+    @property
+    def campaign(self) -> Campaign | None:
+        """What was armed last."""
+        return self._campaign
+
+    @property
+    def engine_pid(self) -> int | None:
+        """The engine's process."""
+        return None if self._line is None else self._line.pid
+
+    def tick(self) -> None:
+        """Fetch what has come, and ask again."""
+        if self._line is None:
+            return
+        self.beat()
+        self._line.drain()
+        if not self._is_looking and self._line is not None:
+            self._is_looking = True
+            self._line.ask(Urgency.LOOK, self._look_question(), self._looked, self._look_refused)
+
+    def beat(self) -> None:
+        """Tell the engine that the window is alive, when it has not been told for a while.
+
+        It may be called while something is painted: no answer is fetched, so nothing is changed.
+        """
+        now_s = monotonic()
+        pulse = None if self._line is None else self._line.pulse
+        if pulse is not None and now_s - self._beaten_s > BEAT_S:
+            self._beaten_s = now_s
+            pulse.beat()
+
+    def open(self, rig: Rig, confirmations: KnobSheet | None) -> None:
+        """Open the bench of a rig, with an engine of its own if there is none yet."""
+        if self._line is None:
+            self._line = EngineLine(self._start)
+        self._rig = rig
+        self._order(lambda client: _open(client, rig, confirmations))
+
+    def close_bench(self) -> None:
+        """Close the bench."""
+        self._order(lambda client: client.close_bench())
+
+    def check(self, folder: Path) -> None:
+        """Check the bench; ``folder`` is where recordings will go."""
+        self._order(lambda client: client.check(folder))
+
+    def arm(self, campaign: Campaign, folder: Path, existing: Existing = Existing.REFUSE) -> None:
+        """Get ready to carry out a campaign; `armed` or a notice follows."""
+
+        def keep(plan: ArmedPlan) -> None:
+            self._campaign = campaign
+            self.armed.emit(plan)
+
+        self._order(lambda client: client.arm(campaign, folder, existing), keep)
+
+    def disarm(self) -> None:
+        """Take back what was armed."""
+        self._order(lambda client: client.disarm())
+
+    def start(self) -> None:
+        """Carry out what is armed."""
+        self._order(lambda client: client.start())
+
+    def stop(self, level: StopLevel, reason: str) -> None:
+        """Hold or end what runs; goes before everything else that waits."""
+        if self._line is not None:
+            self._line.ask(Urgency.STOP, lambda client: client.stop(level, reason), _done, self._refused)
+
+    def resume(self) -> None:
+        """Go on after a hold."""
+        self._order(lambda client: client.resume())
+
+    def mark(self, text: str) -> None:
+        """Note an event in the recording."""
+        self._order(lambda client: client.mark(text))
+
+    def close(self) -> None:
+        """Let the engine ramp down and end."""
+        line, self._line = self._line, None
+        if line is not None:
+            line.close()
+        self._status = None
+
+    def _order(
+        self, question: Callable[[EngineClient], Any], on_answer: Callable[[Any], None] | None = None
+    ) -> None:
+        if self._line is None:
+            self.noticed.emit(
+                Notice(
+                    NoticeKind.WARNING, "No bench is open.", next_step="Open one on the Rig page (Ctrl+1)."
+                )
+            )
+            return
+        self._line.ask(Urgency.ORDER, question, on_answer or _done, self._refused)
+
+    def _look_question(self) -> Callable[[EngineClient], Glimpse]:
+        view, run, status = self._view, self._view_run, self._status
+        rate_hz = 0.0 if status is None or status.bench is None else status.bench.sample_rate_hz
+
+        def look(client: EngineClient) -> Glimpse:
+            now = client.status()
+            since = view.next_sample if view is not None and now.run_id == run else 0
+            if now.samples <= since or rate_hz == 0.0:
+                return now, None
+            return now, client.look(since, round(CATCH_UP_S * rate_hz))
+
+        return look
+
+    def _looked(self, glimpse: Glimpse) -> None:
+        self._status, glance = glimpse
+        if glance is None or self._status.bench is None or glance.volts.shape[1] == 0:
+            self._is_looking = False
+        else:
+            self._begin_taking(self._status, self._status.bench, glance)
+        self._tell(self._status)
+
+    def _begin_taking(self, status: EngineStatus, bench: BenchFacts, glance: Glance) -> None:
+        if self._view is None or glance.run_id != self._view_run:
+            name = "" if status.run is None else status.run.name
+            self._view = live_view(bench, self._rig, self._campaign, name)
+            self._view_run = glance.run_id
+        size = max(1, round(PIECE_S * bench.sample_rate_hz))
+        self._take(self._view, glance.first_sample, glance.volts, size)
+
+    def _take(self, view: LiveView, first_sample: int, volts: NDArray[np.float32], size: int) -> None:
+        """Take in a piece: all that comes after a pause, or from a fast simulation, is too much at once."""
+        view.add(first_sample, volts[:, :size])
+        rest = volts[:, size:]
+        if rest.shape[1] == 0:
+            self._is_looking = False
+        else:
+            self.beat()
+            QTimer.singleShot(0, self, lambda: self._take(view, first_sample + size, rest, size))
+
+    def _tell(self, status: EngineStatus) -> None:
+        for message in status.messages:
+            if message.number > self._heard:
+                self._heard = message.number
+                self.noticed.emit(_notice(message))
+        ended = frozenset(
+            row.file for row in status.rows if row.file and row.state not in ("queued", "running")
+        )
+        for file in sorted(ended - self._ended):
+            self.recording_ended.emit(Path(file))
+        self._ended = ended
+
+    def _refused(self, error: AcquisitionError) -> None:
+        if isinstance(error, EngineGone):
+            self._gone(error)
+        else:
+            self.noticed.emit(notice_of(error))
+
+    def _look_refused(self, error: AcquisitionError) -> None:
+        self._is_looking = False
+        self._refused(error)
+
+    def _gone(self, error: EngineGone) -> None:
+        """Forget an engine that has ended: whatever is shown of it would be out of date."""
+        if self._line is None:
+            return
+        line, self._line = self._line, None
+        self._status, self._heard, self._ended = None, 0, frozenset()
+        line.leave()
+        self.noticed.emit(notice_of(error, "Look at the bench, then open it again on the Rig page."))
+
+
+def _open(client: EngineClient, rig: Rig, confirmations: KnobSheet | None) -> None:
+    """Open a bench, and meanwhile load what the first picture of a run needs: no frame has time for that."""
+    client.open(rig, confirmations)
+    warm_up()
+
+
+def _done(_: object) -> None:
+    """Take note that an order was carried out: the status shows what it did."""
+
+
+def _notice(message: EngineMessage) -> Notice:
+    kind = NoticeKind(message.kind.value)
+    return Notice(kind, message.what, message.done, message.next_step, message.code)

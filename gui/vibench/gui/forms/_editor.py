@@ -1,0 +1,202 @@
+"""One editor for every kind of value that a plan may hold."""
+
+import json
+from collections.abc import Callable
+from enum import Enum
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Protocol, Union, get_args, get_origin
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QPaintEvent, QWheelEvent
+from PySide6.QtWidgets import QComboBox, QWidget
+
+from ._field_edge import LineField, draw_edge
+from ._field_facts import FieldFacts
+from ._quantity_edit import QuantityEdit
+
+
+class Editor(Protocol):
+    """A widget that holds one value of a plan, in the plain types of a file."""
+
+    @property
+    def widget(self) -> QWidget:
+        """What is put into the form."""
+
+    def content(self) -> Any:
+        """Say what a file would say; None for nothing."""
+
+    def show_content(self, content: Any) -> None:
+        """Show what a file says."""
+
+    @property
+    def complaint(self) -> str:
+        """What is wrong before the plan is even asked."""
+
+
+_LEFT_OPEN = "left open"
+"""Stands in a field that may be empty, while it is."""
+
+
+class QuantityEditor:
+    """A number with its unit."""
+
+    def __init__(
+        self, facts: FieldFacts, kind: type[float] | type[int], changed: Callable[..., None], empty: str
+    ) -> None:
+        self._edit = QuantityEdit(facts.unit, kind)
+        self._edit.lineEdit().setPlaceholderText(empty)
+        self._edit.changed.connect(changed)
+
+    @property
+    def widget(self) -> QWidget:
+        """The field."""
+        return self._edit
+
+    @property
+    def complaint(self) -> str:
+        """What is wrong with the text."""
+        return self._edit.complaint
+
+    def content(self) -> float | int | None:
+        """Give the number."""
+        return self._edit.value()
+
+    def show_content(self, content: Any) -> None:
+        """Show a number."""
+        self._edit.set_value(content)
+
+
+class Choice(QComboBox):
+    """A choice that a turning wheel changes only while it has the focus."""
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the box, then its edge."""
+        super().paintEvent(event)
+        draw_edge(self)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Scrolling a form must change nothing."""
+        if self.hasFocus():
+            super().wheelEvent(event)
+        else:
+            event.ignore()
+
+
+class ChoiceEditor:
+    """One of a few values."""
+
+    def __init__(self, values: tuple[Any, ...], changed: Callable[..., None]) -> None:
+        self._values = values
+        self._box = Choice()
+        self._box.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        for value in values:
+            self._box.addItem(str(value).replace("_", " "))
+        self._box.currentIndexChanged.connect(changed)
+
+    @property
+    def widget(self) -> QWidget:
+        """The box."""
+        return self._box
+
+    @property
+    def complaint(self) -> str:
+        """Nothing can be wrong."""
+        return ""
+
+    def content(self) -> Any:
+        """Give the chosen value."""
+        return self._values[self._box.currentIndex()]
+
+    def show_content(self, content: Any) -> None:
+        """Choose a value."""
+        if content in self._values:
+            self._box.setCurrentIndex(self._values.index(content))
+
+
+class TextEditor:
+    """A word or a sentence."""
+
+    def __init__(self, changed: Callable[..., None]) -> None:
+        self._line = LineField()
+        self._line.editingFinished.connect(changed)
+
+    @property
+    def widget(self) -> QWidget:
+        """The line."""
+        return self._line
+
+    @property
+    def complaint(self) -> str:
+        """The plan itself judges a text."""
+        return ""
+
+    def content(self) -> str:
+        """Give the text."""
+        return self._line.text()
+
+    def show_content(self, content: Any) -> None:
+        """Show a text."""
+        self._line.setText("" if content is None else str(content))
+
+
+class ListEditor:
+    """Numbers or anything else that a file would hold, as a line of text: ``95, 266, 500``."""
+
+    def __init__(self, changed: Callable[..., None]) -> None:
+        self._line = LineField()
+        self._line.setPlaceholderText("none; or for example 95, 266, 500")
+        self._line.editingFinished.connect(changed)
+        self._complaint = ""
+
+    @property
+    def widget(self) -> QWidget:
+        """The line."""
+        return self._line
+
+    @property
+    def complaint(self) -> str:
+        """What cannot be read."""
+        self.content()
+        return self._complaint
+
+    def content(self) -> Any:
+        """Give the values."""
+        self._complaint = ""
+        try:
+            return json.loads(f"[{self._line.text()}]")
+        except json.JSONDecodeError as error:
+            self._complaint = (
+                f"{self._line.text()!r} is not a list ({error.msg}); write for example 95, 266, 500"
+            )
+            return []
+
+    def show_content(self, content: Any) -> None:
+        """Show values."""
+        self._line.setText(json.dumps(list(content or ()))[1:-1])
+
+
+def unwrapped(annotation: Any) -> tuple[Any, bool]:
+    """Take ``Annotated`` and ``| None`` off a type; says whether None is allowed."""
+    while get_origin(annotation) is Annotated:
+        annotation = get_args(annotation)[0]
+    if get_origin(annotation) in (Union, UnionType):
+        parts = [part for part in get_args(annotation) if part is not NoneType]
+        if len(parts) == 1 and len(parts) < len(get_args(annotation)):
+            return unwrapped(parts[0])[0], True
+    return annotation, False
+
+
+def value_editor(annotation: Any, facts: FieldFacts, changed: Callable[..., None]) -> Editor:
+    """Choose the editor for a plain value."""
+    plain, may_be_missing = unwrapped(annotation)
+    if plain in (float, int):
+        return QuantityEditor(facts, plain, changed, _LEFT_OPEN if may_be_missing else "")
+    if get_origin(plain) is Literal:
+        return ChoiceEditor(get_args(plain), changed)
+    if isinstance(plain, type) and issubclass(plain, Enum):
+        return ChoiceEditor(tuple(member.value for member in plain), changed)
+    if get_origin(plain) in (tuple, list):
+        return ListEditor(changed)
+    if plain is str:
+        return TextEditor(changed)
+    raise TypeError(f"{facts.name} is a {annotation}, and no form can edit that; add an editor for it")

@@ -1,0 +1,254 @@
+"""A form for a plan model: a row a field, groups for models inside, a choice for kinds."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QCheckBox, QFormLayout, QGroupBox, QLabel, QVBoxLayout, QWidget
+
+from ._editor import ChoiceEditor, Editor, unwrapped, value_editor
+from ._field_facts import FieldFacts, field_facts
+
+Loc = tuple[int | str, ...]
+
+
+@dataclass(eq=False)
+class _Row:
+    editor: Editor
+    complaint: QLabel
+
+
+class ModelForm(QWidget):
+    """Holds the content of a plan as a file would; the plan itself judges it."""
+
+    changed = Signal()
+
+    def __init__(
+        self, model: type[BaseModel], hidden: frozenset[str] = frozenset(), parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.model = model
+        self._fixed: dict[str, Any] = {}
+        self._rows: dict[str, _Row] = {}
+        self._layout = QFormLayout(self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+        self._layout.setRowWrapPolicy(QFormLayout.RowWrapPolicy.DontWrapRows)
+        self._layout.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        for name, field in model.model_fields.items():
+            if name in hidden:
+                continue
+            plain, _ = unwrapped(field.annotation)
+            if get_origin(plain) is Literal and len(get_args(plain)) == 1:
+                self._fixed[name] = get_args(plain)[0]
+            else:
+                self._add(name, field)
+
+    @property
+    def editors(self) -> dict[str, Editor]:
+        """The editor of every field, by its name."""
+        return {name: row.editor for name, row in self._rows.items()}
+
+    def content(self) -> dict[str, Any]:
+        """Say what a file would say; values that are not given are left out."""
+        given = {name: row.editor.content() for name, row in self._rows.items()}
+        return {**self._fixed, **{name: value for name, value in given.items() if value is not None}}
+
+    def show_content(self, content: Mapping[str, Any]) -> None:
+        """Show what a file says; what it does not say is shown as the plan's own default."""
+        blocked = self.blockSignals(True)
+        for name, row in self._rows.items():
+            row.editor.show_content(content.get(name, _default(self.model.model_fields[name])))
+        self.blockSignals(blocked)
+        self.changed.emit()
+
+    def complain(self, complaints: Mapping[Loc, str]) -> None:
+        """Put complaints at their fields; those of models inside go further in."""
+        for name, row in self._rows.items():
+            own = {loc: text for loc, text in complaints.items() if loc and loc[0] == name}
+            inner = {_after_kind(row.editor, loc[1:]): text for loc, text in own.items()}
+            text = row.editor.complaint or "; ".join(
+                text for loc, text in inner.items() if not _is_inside(row, loc)
+            )
+            row.complaint.setText(text)
+            row.complaint.setVisible(bool(text))
+            if isinstance(row.editor, GroupEditor):
+                row.editor.complain({loc: text for loc, text in inner.items() if loc})
+
+    @property
+    def unread(self) -> tuple[str, ...]:
+        """What was typed and cannot even be read, in this form and those inside."""
+        found: list[str] = []
+        for row in self._rows.values():
+            if isinstance(row.editor, GroupEditor):
+                found += row.editor.form.unread
+            elif row.editor.complaint:
+                found.append(row.editor.complaint)
+        return tuple(found)
+
+    def _tell(self, *_: object) -> None:
+        self.changed.emit()
+
+    def _add(self, name: str, field: FieldInfo) -> None:
+        facts = field_facts(name, field)
+        editor = editor_for(field, facts, self._tell)
+        complaint = QLabel()
+        complaint.setProperty("rank", "complaint")
+        complaint.setWordWrap(True)
+        complaint.hide()
+        complaint.setAccessibleName(f"Complaint about {facts.label}")
+        widget = editor.widget
+        widget.setToolTip(facts.tooltip)
+        widget.setAccessibleName(facts.spoken)
+        widget.setAccessibleDescription(facts.tooltip)
+        if isinstance(editor, GroupEditor):
+            self._layout.addRow(widget)
+        else:
+            label = QLabel(facts.label)
+            label.setBuddy(widget)
+            label.setToolTip(facts.tooltip)
+            self._layout.addRow(label, widget)
+        self._layout.addRow(complaint)
+        self._rows[name] = _Row(editor, complaint)
+
+
+class GroupEditor:
+    """A model inside a model; where it may be missing, a tick says whether it is there."""
+
+    def __init__(
+        self, facts: FieldFacts, kinds: tuple[type[BaseModel], ...], changed: Callable[..., None]
+    ) -> None:
+        self._box = QGroupBox(facts.label)
+        self._changed = changed
+        self._layout = QVBoxLayout(self._box)
+        self._kinds = kinds
+        self._kind: ChoiceEditor | None = None
+        self._memory: dict[str, Any] = {}
+        if len(kinds) > 1:
+            self._kind = ChoiceEditor(tuple(_kind_of(kind) for kind in kinds), self._turn)
+            self._kind.widget.setAccessibleName(f"Kind of {facts.label.lower()}")
+            self._kind.widget.setToolTip(f"What kind of {facts.label.lower()} it is")
+            self._layout.addWidget(self._kind.widget)
+        self._form = self._new_form(kinds[0])
+
+    @property
+    def widget(self) -> QWidget:
+        """The box around the fields."""
+        return self._box
+
+    @property
+    def form(self) -> ModelForm:
+        """The fields."""
+        return self._form
+
+    @property
+    def kind_choice(self) -> QWidget | None:
+        """Where the kind is chosen, when there are several."""
+        return None if self._kind is None else self._kind.widget
+
+    @property
+    def complaint(self) -> str:
+        """Complaints stand at the fields."""
+        return ""
+
+    def content(self) -> Any:
+        """Say what a file would say."""
+        return self._form.content()
+
+    def show_content(self, content: Any) -> None:
+        """Show what a file says, in the form of its kind."""
+        values = _as_content(content) or {}
+        if self._kind is not None and "kind" in values:
+            self._kind.show_content(values["kind"])
+        self._form.show_content(values)
+
+    def complain(self, complaints: Mapping[Loc, str]) -> None:
+        """Hand complaints on."""
+        self._form.complain(complaints)
+
+    def _turn(self, *_: object) -> None:
+        """Change the kind; fields of the same name keep their values."""
+        assert self._kind is not None
+        self._memory.update(self._form.content())
+        chosen = self._kind.content()
+        model = next(kind for kind in self._kinds if _kind_of(kind) == chosen)
+        self._layout.removeWidget(self._form)
+        self._form.hide()
+        self._form.deleteLater()
+        self._form = self._new_form(model)
+        known = {name: value for name, value in self._memory.items() if name in model.model_fields}
+        self._form.show_content({name: value for name, value in known.items() if name not in _DRAWN})
+        self._changed()
+
+    def _new_form(self, model: type[BaseModel]) -> ModelForm:
+        form = ModelForm(model)
+        form.changed.connect(self._changed)
+        self._layout.addWidget(form)
+        return form
+
+
+class OptionalGroupEditor(GroupEditor):
+    """A model that may be missing."""
+
+    def __init__(
+        self, facts: FieldFacts, kinds: tuple[type[BaseModel], ...], changed: Callable[..., None]
+    ) -> None:
+        super().__init__(facts, kinds, changed)
+        self._there = QCheckBox(f"Give {facts.label.lower()}")
+        self._there.setAccessibleName(f"Give {facts.label.lower()}")
+        self._there.setToolTip(facts.tooltip)
+        self._layout.insertWidget(0, self._there)
+        self._there.toggled.connect(self._form.setVisible)
+        self._there.toggled.connect(lambda _there: changed())
+        self._form.hide()
+
+    def content(self) -> Any:
+        """Say what a file would say, None when it is not there."""
+        return super().content() if self._there.isChecked() else None
+
+    def show_content(self, content: Any) -> None:
+        """Show it, or that it is missing."""
+        self._there.setChecked(content is not None)
+        if content is not None:
+            super().show_content(content)
+
+
+_DRAWN = frozenset({"excited_lines", "detection_lines"})
+"""Values that a plan fills in for itself; they do not outlive the values they were drawn from."""
+
+
+def editor_for(field: FieldInfo, facts: FieldFacts, changed: Callable[..., None]) -> Editor:
+    """Choose the editor of a field, models included."""
+    plain, may_be_missing = unwrapped(field.annotation)
+    kinds = tuple(unwrapped(part)[0] for part in get_args(plain)) or (plain,)
+    if all(isinstance(kind, type) and issubclass(kind, BaseModel) for kind in kinds):
+        make = OptionalGroupEditor if may_be_missing else GroupEditor
+        return make(facts, kinds, changed)
+    return value_editor(field.annotation, facts, changed)
+
+
+def _kind_of(model: type[BaseModel]) -> str:
+    return str(model.model_fields["kind"].default)
+
+
+def _default(field: FieldInfo) -> Any:
+    if field.is_required():
+        return None
+    return _as_content(field.get_default(call_default_factory=True, validated_data={}))
+
+
+def _as_content(value: Any) -> Any:
+    return value.model_dump(mode="json", exclude_none=True) if isinstance(value, BaseModel) else value
+
+
+def _after_kind(editor: Editor, loc: Loc) -> Loc:
+    """Pydantic names the kind inside the place of an error; a form does not."""
+    if isinstance(editor, GroupEditor) and editor.kind_choice is not None and loc:
+        return loc[1:]
+    return loc
+
+
+def _is_inside(row: _Row, loc: Loc) -> bool:
+    return isinstance(row.editor, GroupEditor) and bool(loc)

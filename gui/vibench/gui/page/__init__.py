@@ -1,0 +1,35 @@
+"""What the pages of the window share.
+
+`Page` is their base class; `Desk` hands each of them the bridge, settings, background work and
+signals to the window. `Intent` holds rig, test and campaign as they are being made, none of them
+sent yet; `Orders` carries out what keys, menus and buttons ask for.
+Pages know each other by name only.
+"""
+
+from ._desk import (
+    Desk,
+)
+from ._orders import (
+    Orders,
+)
+from ._page import (
+    Page,
+)
+from ._settings import (
+    Remembered,
+    Settings,
+    default_settings_path,
+)
+from ._side_and_picture import (
+    SideAndPicture,
+)
+
+__all__ = [
+    "Desk",
+    "Orders",
+    "Page",
+    "Remembered",
+    "Settings",
+    "SideAndPicture",
+    "default_settings_path",
+]

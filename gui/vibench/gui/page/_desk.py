@@ -1,0 +1,71 @@
+"""What all pages share: the bridge, what is meant, settings, background work, and the way to the window."""
+
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Signal
+
+from vibench.acquisition.engine import start_engine
+
+from ..background import Background
+from ..engine_link import Bridge, Starter
+from ..widgets import LIGHT, THEMES, Notice, Theme
+from ._intent import Intent
+from ._settings import Remembered, Settings
+
+WORKERS = 2
+"""One for previews, which must be quick, and one for whatever takes long."""
+
+
+class Desk(QObject):
+    """Handed to every page; pages know each other by name only."""
+
+    noticed = Signal(object)
+    """A `Notice` for the message strip."""
+    page_wanted = Signal(str)
+    """Name of a page to show."""
+    recording_wanted = Signal(object)
+    """Path of a recording that somebody wants to look at; Files opens it."""
+    recording_made = Signal(object)
+    """Path of a recording that has just been finished."""
+    comparison_wanted = Signal(object)
+    """Paths of recordings to lay over one another; Compare takes them."""
+    prediction_made = Signal(object)
+    """Curves of a prediction to lay over recordings; Compare takes them."""
+    theme_changed = Signal(object)
+    """The `Theme` from now on."""
+
+    def __init__(
+        self, settings: Settings, start: Starter = start_engine, parent: QObject | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.settings = settings
+        self.intent = Intent(self)
+        self.bridge = Bridge(start, self)
+        self.bridge.noticed.connect(self.noticed)
+        self.bridge.recording_ended.connect(self.recording_made)
+        self.background = Background(WORKERS, self)
+        self._theme = THEMES.get(settings.text(Remembered.THEME), LIGHT)
+
+    @property
+    def theme(self) -> Theme:
+        """Colours to draw in."""
+        return self._theme
+
+    def choose_theme(self, theme: Theme) -> None:
+        """Draw in other colours from now on, and next time."""
+        self._theme = theme
+        self.settings.keep_text(Remembered.THEME, theme.name)
+        self.theme_changed.emit(theme)
+
+    @property
+    def folder(self) -> Path:
+        """Where recordings go and are looked for."""
+        return Path(self.settings.text(Remembered.FOLDER, str(Path.home() / "vibench")))
+
+    def choose_folder(self, folder: Path) -> None:
+        """Put recordings elsewhere from now on."""
+        self.settings.keep_text(Remembered.FOLDER, str(folder))
+
+    def say(self, notice: Notice) -> None:
+        """Put a message on the strip."""
+        self.noticed.emit(notice)

@@ -1,0 +1,3 @@
+from ._compare_page import (
+    ComparePage as ComparePage,
+)

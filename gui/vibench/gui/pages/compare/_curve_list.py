@@ -1,0 +1,125 @@
+"""The list of curves: which are shown, which are compared, and what each of them is."""
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPen, QPixmap
+from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
+
+from vibench.analysis import Origin, Response, Trace
+
+from ...plots import Dash, Ink, trace
+from ...widgets import Theme, paint_hint
+
+_DASHES = {Origin.MEASURED: Dash.SOLID, Origin.SIMULATED: Dash.DASHED, Origin.PREDICTED: Dash.DASH_DOTTED}
+_SHOWN_FIRST = {Response.TRANSMISSION, Response.RESPONSE_I}
+"""Of a sweep's two responses the first is shown at once: both lie on one another where nothing collides."""
+_SWATCH = (28, 12)
+
+
+class CurveList(QListWidget):
+    """Curves with a tick for those in the picture; colours follow the source, dashes the origin."""
+
+    changed = Signal()
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Curves")
+        self.setSelectionMode(QListWidget.SelectionMode.ExtendedSelection)
+        self.setWordWrap(True)
+        self._theme = theme
+        self._traces: list[Trace] = []
+        self.itemChanged.connect(lambda _item: self.changed.emit())
+
+    @property
+    def traces(self) -> tuple[Trace, ...]:
+        """All of them."""
+        return tuple(self._traces)
+
+    def shown(self) -> tuple[tuple[Trace, Ink], ...]:
+        """Those that are ticked, with the ink they are drawn in."""
+        return tuple(
+            (each, self.ink(each))
+            for row, each in enumerate(self._traces)
+            if self.item(row).checkState() is Qt.CheckState.Checked
+        )
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Say what will be here."""
+        super().paintEvent(event)
+        if not self._traces:
+            words = "No curves yet: add recordings, or simulate and lay over."
+            paint_hint(QPainter(self.viewport()), self.viewport().rect(), words, self._theme.muted)
+
+    def ink(self, curve: Trace) -> Ink:
+        """Colour of its source, dash of its origin."""
+        sources = list(dict.fromkeys(each.source for each in self._traces))
+        return trace(sources.index(curve.source), _DASHES[curve.origin])
+
+    def replace_source(self, source: str, curves: tuple[Trace, ...]) -> None:
+        """Put curves of a source in the place of those it had."""
+        ticked = {each.name for each, _ in self.shown()}
+        known = {each.name for each in self._traces}
+        others = [each for each in self._traces if not _is_of(each, source)]
+        place = next((n for n, each in enumerate(self._traces) if _is_of(each, source)), len(others))
+        place = min(place, len(others))
+        self._traces = [*others[:place], *curves, *others[place:]]
+        self._list(lambda each: each.name in ticked or (each.name not in known and _is_first(each)))
+
+    def remove_chosen(self) -> tuple[str, ...]:
+        """Take the chosen curves away; gives the sources that have none left."""
+        before = {each.source for each in self._traces}
+        ticked = {each.name for each, _ in self.shown()}
+        rows = {index.row() for index in self.selectedIndexes()}
+        self._traces = [each for row, each in enumerate(self._traces) if row not in rows]
+        self._list(lambda each: each.name in ticked)
+        return tuple(before - {each.source for each in self._traces})
+
+    def tick(self, name: str, state: Qt.CheckState) -> None:
+        """Show or hide a curve."""
+        for row, each in enumerate(self._traces):
+            if each.name == name:
+                self.item(row).setCheckState(state)
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw the swatches in other colours."""
+        self._theme = theme
+        blocked = self.blockSignals(True)
+        for row, each in enumerate(self._traces):
+            self.item(row).setIcon(_swatch(self.ink(each), theme))
+        self.blockSignals(blocked)
+
+    def _list(self, is_ticked: Callable[[Trace], bool]) -> None:
+        blocked = self.blockSignals(True)
+        self.clear()
+        for each in self._traces:
+            item = QListWidgetItem(each.name)
+            item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
+            wanted = is_ticked(each)
+            item.setCheckState(Qt.CheckState.Checked if wanted else Qt.CheckState.Unchecked)
+            item.setToolTip(each.note)
+            item.setIcon(_swatch(self.ink(each), self._theme))
+            self.addItem(item)
+        self.blockSignals(blocked)
+        self.changed.emit()
+
+
+def _is_of(each: Trace, source: str) -> bool:
+    """Tell whether a curve is a recording's; steps up and down of one are two sources with one beginning."""
+    return each.source == source or each.source in (f"{source} up", f"{source} down")
+
+
+def _is_first(each: Trace) -> bool:
+    return each.response in _SHOWN_FIRST
+
+
+def _swatch(ink: Ink, theme: Theme) -> QPixmap:
+    ratio = QGuiApplication.primaryScreen().devicePixelRatio()
+    picture = QPixmap(QSize(*_SWATCH) * ratio)
+    picture.setDevicePixelRatio(ratio)
+    picture.fill(QColor(theme.base))
+    painter = QPainter(picture)
+    painter.setPen(QPen(QColor(ink.colour(theme)), 2, ink.dash.value))
+    painter.drawLine(1, _SWATCH[1] // 2, _SWATCH[0] - 1, _SWATCH[1] // 2)
+    painter.end()
+    return picture

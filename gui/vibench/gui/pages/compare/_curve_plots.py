@@ -1,0 +1,129 @@
+"""Two plots over one frequency axis: the curves with their bounds, and the difference of two of them."""
+
+from math import log10
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
+
+from vibench.analysis import Difference, Origin, Trace
+
+from ...plots import GUIDE, LOG_FREQUENCY, Axis, Dash, Ink, Plot, Scale, trace
+from ...widgets import Theme
+
+MAGNITUDE = Axis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
+DIFFERENCE = Axis("Difference", "dB")
+_MARKER = Ink(lambda theme: theme.accent)
+_BAND, _BAND_COLUMNS = 0.16, 300
+_DOTS = {Origin.MEASURED: 10, Origin.SIMULATED: 6, Origin.PREDICTED: 4}
+
+
+class CurvePlots(QWidget):
+    """The picture of a comparison, with two markers that can be moved."""
+
+    markers_moved = Signal()
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.magnitudes = Plot("Curves over frequency", LOG_FREQUENCY, MAGNITUDE, theme).with_hint(
+            "Add recordings, or lay a prediction of the Simulate page over them: "
+            "their curves appear here, and their peaks below."
+        )
+        self.differences = Plot("Difference over frequency", LOG_FREQUENCY, DIFFERENCE, theme).with_hint(
+            "Choose a curve and what it is compared with, at the left."
+        )
+        self.differences.always_numbered().setXLink(self.magnitudes)
+        # One frequency axis for both: the lower one's.
+        self.magnitudes.across.show_nothing()
+        splitter = QSplitter(Qt.Orientation.Vertical)
+        splitter.setAccessibleName("Curves and their difference")
+        splitter.addWidget(self.magnitudes)
+        splitter.addWidget(self.differences)
+        splitter.setSizes([500, 170])
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(splitter)
+        self._marker_hz: list[float] = [100.0, 300.0]
+        self._are_marked = False
+        self._lines: list[tuple[pg.InfiniteLine, pg.InfiniteLine]] = []
+
+    @property
+    def markers_hz(self) -> tuple[float, ...]:
+        """Frequencies of the markers, none when they are hidden."""
+        return tuple(sorted(self._marker_hz)) if self._are_marked else ()
+
+    def show_curves(self, curves: tuple[tuple[Trace, Ink], ...], difference: Difference | None) -> None:
+        """Draw anew."""
+        for plot in (self.magnitudes, self.differences):
+            plot.wipe()
+        for curve, ink in curves:
+            self._draw(curve, ink)
+        self.differences.level(GUIDE, 0.0)
+        if difference is not None:
+            line = self.differences.curve(trace(0))
+            line.setData(difference.frequency_hz, difference.decibel, connect="finite")
+        self._add_markers()
+
+    def show_markers(self, are_shown: bool) -> None:  # noqa: FBT001 - as Qt's own toggled(bool)
+        """Show or hide the markers; they come into what is in sight."""
+        self._are_marked = are_shown
+        low, high = self.magnitudes.getViewBox().viewRange()[0]
+        if are_shown and not all(low <= log10(each) <= high for each in self._marker_hz):
+            self._marker_hz = [10 ** (low + (high - low) * share) for share in (1 / 3, 2 / 3)]
+        self._place_markers()
+
+    def put_marker(self, number: int, frequency_hz: float) -> None:
+        """Move a marker."""
+        self._marker_hz[number] = frequency_hz
+        self._place_markers()
+
+    def show_everything(self) -> None:
+        """Let the axes follow the curves."""
+        for plot in (self.magnitudes, self.differences):
+            plot.show_everything()
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self.magnitudes.retheme(theme)
+        self.differences.retheme(theme)
+
+    def _draw(self, curve: Trace, ink: Ink) -> None:
+        lone = curve.frequency_hz.size == 1
+        if lone:
+            self.magnitudes.dots(ink, curve.name, size=_DOTS[curve.origin]).setData(
+                curve.frequency_hz, curve.magnitude
+            )
+            return
+        if np.isfinite(curve.relative_sd).any():
+            shade = Ink(ink.colour, Dash.SOLID, _BAND)
+            self.magnitudes.band(shade).set_data(*curve.band(_BAND_COLUMNS))
+        line = self.magnitudes.curve(ink, curve.name)
+        line.setData(curve.frequency_hz, curve.magnitude, connect="finite")
+
+    def _add_markers(self) -> None:
+        self._lines = []
+        for number in range(2):
+            pair = tuple(
+                plot.upright(_MARKER, self._marker_hz[number]) for plot in (self.magnitudes, self.differences)
+            )
+            for line in pair:
+                line.setMovable(True)
+                line.sigPositionChanged.connect(
+                    lambda moved, number=number: self._moved(number, moved.value())
+                )
+            self._lines.append((pair[0], pair[1]))
+        self._place_markers()
+
+    def _place_markers(self) -> None:
+        for number, pair in enumerate(self._lines):
+            for line in pair:
+                line.setVisible(self._are_marked)
+                line.setValue(log10(self._marker_hz[number]))
+        self.markers_moved.emit()
+
+    def _moved(self, number: int, place: float) -> None:
+        if not self._are_marked or abs(log10(self._marker_hz[number]) - place) < 1e-12:
+            return
+        self._marker_hz[number] = 10**place
+        self._place_markers()

@@ -1,0 +1,100 @@
+"""Numbers beside the picture: the peaks of every curve, and the curves' values at the markers."""
+
+from math import isfinite
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QPainter, QPaintEvent
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem, QWidget
+
+from vibench.analysis import Trace, readings, trace_peaks
+
+from ...widgets import paint_hint
+
+PEAK_HEADINGS = ("Curve", "Peak at (Hz)", "|x / U|", "±", "Width at -3 dB (Hz)", "Damping ratio (%)")
+
+
+class NumberTable(QTableWidget):
+    """A table to read and to copy; Ctrl+C takes the chosen cells, with tabs between them."""
+
+    def __init__(self, name: str, hint: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._hint = hint
+        self.setAccessibleName(name)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setAlternatingRowColors(True)
+        self.setTabKeyNavigation(False)
+        self.verticalHeader().hide()
+        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+
+    def show_rows(self, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+        """Show other numbers."""
+        self.setColumnCount(len(headings))
+        self.setRowCount(len(rows))
+        self.setHorizontalHeaderLabels(list(headings))
+        # Names take what is left: numbers stand together at the right.
+        self.horizontalHeader().setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        for row, cells in enumerate(rows):
+            for column, cell in enumerate(cells):
+                item = QTableWidgetItem(cell)
+                if column:
+                    item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+                self.setItem(row, column, item)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Say the hint where there is no row."""
+        super().paintEvent(event)
+        if self.rowCount() == 0:
+            colour = self.palette().placeholderText().color()
+            paint_hint(QPainter(self.viewport()), self.viewport().rect(), self._hint, colour)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Copy."""
+        if event.matches(QKeySequence.StandardKey.Copy):
+            QGuiApplication.clipboard().setText(self.chosen_text())
+            event.accept()
+            return
+        super().keyPressEvent(event)
+
+    def chosen_text(self) -> str:
+        """Give the chosen cells, rows by lines."""
+        chosen = sorted((index.row(), index.column(), index.data() or "") for index in self.selectedIndexes())
+        rows: dict[int, list[str]] = {}
+        for row, _, text in chosen:
+            rows.setdefault(row, []).append(text)
+        return "\n".join("\t".join(cells) for cells in rows.values())
+
+
+def peak_rows(curves: tuple[Trace, ...]) -> list[tuple[str, ...]]:
+    """Write the peaks of curves."""
+    return [
+        (
+            each.name,
+            f"{peak.frequency_hz:.2f}",
+            f"{peak.magnitude:.4g}",
+            _number(2 * peak.relative_sd * peak.magnitude, ".2g"),
+            "–" if peak.half_power_width_hz is None else f"{peak.half_power_width_hz:.3g}",
+            "–" if peak.damping_ratio is None else f"{100 * peak.damping_ratio:.3g}",
+        )
+        for each in curves
+        for peak in trace_peaks(each)
+    ]
+
+
+def marker_headings(markers_hz: tuple[float, ...]) -> tuple[str, ...]:
+    """Write where the markers stand."""
+    at = tuple(f"|x / U| at {each:.2f} Hz" for each in markers_hz)
+    return ("Curve", *at, *(("Second over first (dB)",) if len(at) == 2 else ()))
+
+
+def marker_rows(curves: tuple[Trace, ...], markers_hz: tuple[float, ...]) -> list[tuple[str, ...]]:
+    """Read curves at the markers."""
+    if not markers_hz:
+        return []
+    return [
+        (each.name, *(_number(value, ".4g") for value in each.magnitudes), _number(each.decibel, "+.2f"))
+        for each in readings(curves, markers_hz)
+    ]
+
+
+def _number(value: float, form: str) -> str:
+    return f"{value:{form}}" if isfinite(value) else "–"

@@ -1,0 +1,3 @@
+from ._files_page import (
+    FilesPage as FilesPage,
+)

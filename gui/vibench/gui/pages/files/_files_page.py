@@ -1,0 +1,288 @@
+"""Files: recordings of a folder, listed with state and picture, and opened at any zoom."""
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QHBoxLayout,
+    QLabel,
+    QSplitter,
+    QVBoxLayout,
+    QWidget,
+)
+
+from vibench.acquisition import RecordingError, open_recording
+from vibench.acquisition.recording import Recording, name_now
+from vibench.analysis.live import RecordingOverview, Thumbnail, has_overview, kept_levels
+
+from ...background import Job
+from ...forms import LineField
+from ...page import Desk, Page, Remembered
+from ...widgets import COMPARE, FILES, Notice, NoticeKind, Theme, notice_of, push_button
+from ._campaign_choice import CampaignChoice
+from ._file_words import facts_text
+from ._listing import Levels, Listing, listed, made_levels, thumbnails
+from ._pictures import Pictures
+from ._recording_table import RecordingTable
+
+
+class FilesPage(Page):
+    """A browser above, the chosen recording below."""
+
+    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+        super().__init__(desk, parent)
+        self.table = RecordingTable(desk.theme)
+        self.pictures = Pictures(desk.theme, desk.background)
+        self.lanes = self.pictures.lanes
+        self.campaigns = CampaignChoice()
+        self.campaigns.chosen.connect(self.table.show_only)
+        self._opened: Recording | None = None
+        self._listing: Job | None = None
+        self._making: Job | None = None
+        self._wanted: Path | None = None
+        self._build()
+        self.table.selectionModel().selectionChanged.connect(lambda *_: self._open_chosen())
+        desk.recording_wanted.connect(self.open_path)
+        desk.recording_made.connect(lambda _path: self.list_folder())
+
+    @property
+    def is_done(self) -> bool:
+        """Ticked once a recording is open."""
+        return self._opened is not None
+
+    def entered(self) -> None:
+        """List the folder anew, for files may have come; arrows choose among them."""
+        self.list_folder()
+        self.table.setFocus()
+
+    def left(self) -> None:
+        """Keep how the page is divided."""
+        self.desk.settings.keep_state(Remembered.SPLITTERS, self._splitter.saveState(), FILES)
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self.pictures.retheme(theme)
+        self.table.recordings.retheme(theme)
+
+    def list_folder(self) -> None:
+        """Look at the files of the folder, elsewhere."""
+        folder = self.desk.folder
+        self._folder_line.setText(str(folder))
+        if self._listing is not None:
+            self._listing.drop()
+        self._listing = self.desk.background.ask(listed, self._listed, self._failed, folder)
+
+    def open_path(self, path: Path) -> None:
+        """Show a recording, whatever folder it lies in."""
+        self.desk.page_wanted.emit(FILES)
+        self._wanted = path
+        if path.parent != self.desk.folder and self.desk.folder not in path.parents:
+            self._go_to(path.parent)
+        self.table.choose(path)
+        self._open(path)
+
+    def _listed(self, found: Listing) -> None:
+        entries = found.recordings
+        self.campaigns.offer(found.campaigns)
+        # A list that comes late must not take back what somebody has chosen meanwhile.
+        chosen = self.table.chosen_paths() if self._wanted is None else (self._wanted,)
+        self._wanted = None
+        self.table.recordings.show_entries(entries)
+        count = f"{len(entries)} recording{'s' if len(entries) != 1 else ''}"
+        self._count.setText(count)
+        missing = self.table.recordings.missing_pictures()
+        if missing:
+            self.desk.background.ask(thumbnails, self._pictured, self._failed, missing)
+        if chosen:
+            # What grew when it was chosen may have got its final name since.
+            self.table.choose(*map(name_now, chosen))
+        elif entries and self._opened is None:
+            self.table.selectRow(0)
+
+    def _pictured(self, found: dict[Path, Thumbnail | None]) -> None:
+        self.table.recordings.show_thumbnails(found)
+
+    def _failed(self, error: BaseException) -> None:
+        self.desk.say(notice_of(error))
+
+    def _open_chosen(self) -> None:
+        paths = self.table.chosen_paths()
+        self._compare.setEnabled(bool(paths))
+        if paths and (self._opened is None or self._opened.path != paths[0]):
+            self._open(paths[0])
+
+    def _open(self, path: Path) -> None:
+        """Open a recording; one without an overview is read elsewhere first."""
+        if self._making is not None:
+            self._making.drop()
+            self._making = None
+        self._close()
+        try:
+            recording = open_recording(path)
+        except RecordingError as error:
+            self._title.setText(path.name)
+            self._facts.setText(str(error))
+            self.desk.say(notice_of(error))
+            return
+        self._opened = recording
+        self._title.setText(recording.path.name)
+        if recording.path != path:
+            # It was finished since it was listed.
+            self._wanted = recording.path
+            self.list_folder()
+        if recording.samples == 0:
+            self._show({})
+        elif has_overview(recording):
+            self._take_next(recording, {})
+        else:
+            self._facts.setText("Reading all samples, for this file keeps no overview…")
+            self._making = self.desk.background.ask(made_levels, self._show, self._failed, path)
+
+    def _take_next(self, recording: Recording, levels: Levels) -> None:
+        """Take one channel's overview at a time: all of a long recording's would hold the window up."""
+        if recording is not self._opened:
+            return
+        role = recording.roles[len(levels)]
+        levels[role] = kept_levels(recording, role)
+        self.lanes.prepare(recording.channel(role))
+        if len(levels) == len(recording.roles):
+            self._show(levels)
+        else:
+            QTimer.singleShot(0, lambda: self._take_next(recording, levels))
+
+    def _show(self, levels: Levels) -> None:
+        self._making = None
+        if self._opened is None:
+            return
+        self._facts.setText(facts_text(self._opened))
+        self.pictures.show_recording(RecordingOverview(self._opened, levels))
+        self._say_view()
+
+    def _close(self) -> None:
+        self.pictures.show_recording(None)
+        if self._opened is not None:
+            self._opened.close()
+            self._opened = None
+
+    def _say_view(self) -> None:
+        if self._opened is None:
+            return
+        low_s, high_s = self.lanes.view_s
+        text = f"In sight: {low_s:.6g} to {high_s:.6g} s"
+        if self._markers.isChecked():
+            early_s, late_s = self.lanes.markers_s
+            between_s = late_s - early_s
+            rate = f" = 1 / {1 / between_s:.5g} Hz" if between_s > 0 else ""
+            text += f"      Markers: {early_s:.6g} s, {late_s:.6g} s, {between_s:.6g} s apart{rate}"
+        self._view.setText(text)
+
+    def _choose_folder(self) -> None:
+        chosen = QFileDialog.getExistingDirectory(self, "Folder with recordings", str(self.desk.folder))
+        if chosen:
+            self._go_to(Path(chosen))
+
+    def _typed_folder(self) -> None:
+        folder = Path(self._folder_line.text()).expanduser()
+        if folder == self.desk.folder:
+            return
+        if folder.is_dir():
+            self._go_to(folder)
+        else:
+            self.desk.say(
+                Notice(
+                    NoticeKind.WARNING,
+                    f"{folder} is no folder.",
+                    "The list is as it was.",
+                    "Type another one, or choose it.",
+                )
+            )
+            self._folder_line.setText(str(self.desk.folder))
+
+    def _go_to(self, folder: Path) -> None:
+        self.desk.choose_folder(folder)
+        self.list_folder()
+
+    def _hand_to_compare(self) -> None:
+        paths = self.table.chosen_paths()
+        if paths:
+            self.desk.comparison_wanted.emit(paths)
+            self.desk.page_wanted.emit(COMPARE)
+
+    def _build(self) -> None:
+        self._splitter = QSplitter(Qt.Orientation.Vertical)
+        self._splitter.setAccessibleName("List and recording")
+        self._splitter.addWidget(self._browser())
+        self._splitter.addWidget(self._viewer())
+        self._splitter.setSizes([200, 600])
+        self._splitter.setStretchFactor(1, 1)
+        self._splitter.setChildrenCollapsible(False)
+        layout = QVBoxLayout(self)
+        layout.addWidget(self._splitter)
+        kept = self.desk.settings.state(Remembered.SPLITTERS, FILES)
+        if not kept.isEmpty():
+            self._splitter.restoreState(kept)
+        self.lanes.range_changed.connect(self._say_view)
+        self.lanes.markers_moved.connect(self._say_view)
+
+    def _browser(self) -> QWidget:
+        browser = QWidget()
+        browser.setAccessibleName("Browser")
+        bar = QHBoxLayout()
+        label = QLabel("F&older")
+        self._folder_line = LineField(str(self.desk.folder))
+        self._folder_line.setAccessibleName("Folder of the recordings")
+        self._folder_line.editingFinished.connect(self._typed_folder)
+        label.setBuddy(self._folder_line)
+        search_label = QLabel("Sea&rch")
+        search = LineField()
+        search.setAccessibleName("Search in the list")
+        search.setPlaceholderText("name, state, excitation…")
+        search.setClearButtonEnabled(True)
+        search.textChanged.connect(self.table.search)
+        search_label.setBuddy(search)
+        bar.addWidget(label)
+        bar.addWidget(self._folder_line, 3)
+        bar.addWidget(push_button("&Choose…", "Choose another folder", self._choose_folder))
+        bar.addWidget(self.campaigns, 1)
+        bar.addWidget(search_label)
+        bar.addWidget(search, 1)
+        self._count = QLabel("")
+        self._count.setProperty("rank", "second")
+        bar.addWidget(self._count)
+        self._compare = push_button(
+            "Co&mpare", "Lay the chosen recordings over others", self._hand_to_compare
+        )
+        self._compare.setEnabled(False)
+        bar.addWidget(self._compare)
+        layout = QVBoxLayout(browser)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addLayout(bar)
+        layout.addWidget(self.table)
+        return browser
+
+    def _viewer(self) -> QWidget:
+        viewer = QWidget()
+        viewer.setAccessibleName("Recording")
+        self._title = QLabel("No recording is open")
+        self._title.setProperty("rank", "title")
+        self._facts = QLabel("Choose one in the list above.")
+        self._facts.setProperty("rank", "second")
+        self._facts.setWordWrap(True)
+        bar = QHBoxLayout()
+        self._view = QLabel("")
+        self._markers = push_button("Mar&kers", "Show two markers to measure between", lambda: None)
+        self._markers.setCheckable(True)
+        self._markers.toggled.connect(self.lanes.show_markers)
+        bar.addWidget(self._view, 1)
+        bar.addWidget(self._markers)
+        bar.addWidget(push_button("Show &all", "Show the whole recording (Home)", self.lanes.show_all))
+        bar.addWidget(push_button("Zoom &in", "Show less, closer (+)", lambda: self.lanes.zoom(0.5)))
+        bar.addWidget(push_button("Zoom o&ut", "Show more (-)", lambda: self.lanes.zoom(2.0)))
+        layout = QVBoxLayout(viewer)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self._title)
+        layout.addWidget(self._facts)
+        layout.addWidget(self.pictures, 1)
+        layout.addLayout(bar)
+        return viewer

@@ -1,0 +1,292 @@
+"""A recording as lanes, one a channel: any zoom, drawn from what is in sight."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QKeyEvent, QPalette, QResizeEvent
+from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+
+from vibench.acquisition.recording import ChannelHeader, Recording
+from vibench.analysis.live import RecordingOverview, zigzag
+
+from ...plots import LIMIT, Axis, Dash, Ink, Plot, trace
+from ...widgets import Theme
+from ._file_words import role_text, unit_text
+
+LEAST_SAMPLES = 8
+"""The closest look."""
+_STEP, _ZOOM = 0.2, 0.6
+_LEFT_EM, _TIME_AXIS_EM, _LEAST_EM = 5, 3, 3
+MARKER = Ink(lambda theme: theme.accent)
+SEGMENT = Ink(lambda theme: theme.muted, Dash.DOTTED)
+_MOST_KEPT = 12
+"""Lanes: to make one takes as long as to draw ten."""
+_LABEL_AT = 0.1
+"""Names of segments stand at the foot of the first lane: above is the name of the channel."""
+_NAMED_SHARE = 0.08
+"""Part of the recording that a segment must fill for its name to find room."""
+
+
+@dataclass(eq=False)
+class _Lane:
+    role: str
+    plot: Plot
+    curve: pg.PlotDataItem
+    markers: tuple[pg.InfiniteLine, ...] = ()
+
+
+class RecordingLanes(QWidget):
+    """Lanes over one time axis. Wheel and + - zoom, arrows move, Home shows all, drag moves."""
+
+    range_changed = Signal()
+    markers_moved = Signal()
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Lanes of the recording")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._theme = theme
+        self._overview: RecordingOverview | None = None
+        self._lanes: list[_Lane] = []
+        self._kept: dict[tuple[str, str], _Lane] = {}
+        self._marker_s = [0.0, 0.0]
+        self._are_marked = False
+        self._layout = QVBoxLayout(self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+        self._layout.setSpacing(2)
+        # Several changes of the range come with one move: the picture is made once, after them.
+        self._later = QTimer(self, interval=0, singleShot=True)
+        self._later.timeout.connect(self._draw)
+
+    def prepare(self, channel: ChannelHeader) -> None:
+        """Have a lane for a channel ready: to make all lanes at once would hold the window up."""
+        self._lane_of(channel)
+
+    def show_recording(self, overview: RecordingOverview | None) -> None:
+        """Show another recording whole, or none."""
+        for lane in self._lanes:
+            self._layout.removeWidget(lane.plot)
+            lane.plot.hide()
+        self._lanes = []
+        self._overview = overview
+        if overview is None or overview.recording.samples == 0:
+            return
+        self._lanes = [self._lane_of(channel) for channel in overview.recording.channels]
+        for number, lane in enumerate(self._lanes):
+            self._begin(lane, number, overview.recording)
+        self._forget_others()
+        self._mark_segments(overview)
+        self._mark_overloads(overview)
+        duration_s = overview.recording.duration_s
+        self._marker_s = [duration_s / 3, 2 * duration_s / 3]
+        self.show_markers(self._are_marked)
+        self._share_height()
+        self.show_all()
+        self._draw()
+
+    @property
+    def view_s(self) -> tuple[float, float]:
+        """What is in sight, in seconds since the first sample."""
+        if not self._lanes or self._overview is None:
+            return (0.0, 0.0)
+        low, high = self._lanes[0].plot.getViewBox().viewRange()[0]
+        return (max(0.0, float(low)), min(float(high), self._overview.recording.duration_s))
+
+    @property
+    def markers_s(self) -> tuple[float, float]:
+        """Moments of the two markers, the earlier first."""
+        early, late = sorted(self._marker_s)
+        return early, late
+
+    @property
+    def plots(self) -> tuple[Plot, ...]:
+        """One for each channel."""
+        return tuple(lane.plot for lane in self._lanes)
+
+    def show_all(self) -> None:
+        """Show the whole recording."""
+        if self._overview is not None:
+            self.show_range(0.0, self._overview.recording.duration_s)
+
+    def show_range(self, low_s: float, high_s: float) -> None:
+        """Show a stretch."""
+        if self._lanes:
+            self._lanes[0].plot.setXRange(low_s, high_s, padding=0.0)
+
+    def zoom(self, factor: float) -> None:
+        """Show ``factor`` times as much, around the middle."""
+        low_s, high_s = self.view_s
+        half_s = 0.5 * factor * (high_s - low_s)
+        middle_s = 0.5 * (low_s + high_s)
+        self.show_range(middle_s - half_s, middle_s + half_s)
+
+    def move(self, share: float) -> None:  # type: ignore[override] # a view moves in time
+        """Show what is a share of the view later."""
+        low_s, high_s = self.view_s
+        step_s = share * (high_s - low_s)
+        self.show_range(low_s + step_s, high_s + step_s)
+
+    def show_markers(self, are_shown: bool) -> None:  # noqa: FBT001 - as Qt's own toggled(bool)
+        """Show or hide the two markers."""
+        self._are_marked = are_shown
+        low_s, high_s = self.view_s
+        if are_shown and not all(low_s <= each <= high_s for each in self._marker_s) and high_s > low_s:
+            self._marker_s = [low_s + (high_s - low_s) / 3, low_s + 2 * (high_s - low_s) / 3]
+        for lane in self._lanes:
+            for marker, moment_s in zip(lane.markers, self._marker_s, strict=True):
+                marker.setVisible(are_shown)
+                marker.setValue(moment_s)
+        self.markers_moved.emit()
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self._theme = theme
+        for lane in self._kept.values():
+            lane.plot.retheme(theme)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Draw for the new width."""
+        super().resizeEvent(event)
+        self._share_height()
+        self._later.start()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Move and zoom by keys."""
+        match event.key():
+            case Qt.Key.Key_Left:
+                self.move(-_STEP)
+            case Qt.Key.Key_Right:
+                self.move(_STEP)
+            case Qt.Key.Key_Plus | Qt.Key.Key_Equal | Qt.Key.Key_Up:
+                self.zoom(_ZOOM)
+            case Qt.Key.Key_Minus | Qt.Key.Key_Down:
+                self.zoom(1 / _ZOOM)
+            case Qt.Key.Key_Home | Qt.Key.Key_A:
+                self.show_all()
+            case _:
+                super().keyPressEvent(event)
+                return
+        event.accept()
+
+    def _lane_of(self, channel: ChannelHeader) -> _Lane:
+        """Give the lane of a channel, as it was left by another recording, or a new one."""
+        kind = (channel.role, channel.unit)
+        if kind not in self._kept:
+            unit = unit_text(channel.unit)
+            plot = Plot(f"{role_text(channel.role)} over time", Axis("Time", "s"), Axis(unit), self._theme)
+            plot.setMouseEnabled(x=True, y=False)
+            plot.setFocusProxy(self)
+            left = _LEFT_EM * self.fontMetrics().height()
+            plot.getPlotItem().getAxis("left").setWidth(left)
+            title = QLabel(role_text(channel.role), plot)
+            title.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+            title.setBackgroundRole(QPalette.ColorRole.Base)
+            title.setAutoFillBackground(True)
+            title.move(left + self.fontMetrics().height(), 2)
+            plot.getViewBox().sigXRangeChanged.connect(self._ranged)
+            self._kept[kind] = _Lane(channel.role, plot, plot.curve(trace(0)))
+        return self._kept[kind]
+
+    def _begin(self, lane: _Lane, number: int, recording: Recording) -> None:
+        """Make a lane ready for a recording: its place, its limits, nothing drawn yet."""
+        plot, is_last = lane.plot, number == len(recording.channels) - 1
+        plot.wipe()
+        lane.curve = plot.curve(trace(number))
+        lane.markers = self._new_markers(plot)
+        em = self.fontMetrics().height()
+        plot.setMinimumHeight(_LEAST_EM * em + (_TIME_AXIS_EM * em if is_last else 0))
+        plot.across.setStyle(showValues=is_last)
+        plot.across.showLabel(is_last)
+        box = plot.getViewBox()
+        box.setXLink(None)
+        least_s = LEAST_SAMPLES / recording.sample_rate_hz
+        box.setLimits(xMin=0.0, xMax=recording.duration_s, minXRange=least_s)
+        box.enableAutoRange(x=False, y=False)
+        if number:
+            box.setXLink(self._lanes[0].plot.getViewBox())
+        self._layout.addWidget(plot, 1)
+        plot.show()
+
+    def _forget_others(self) -> None:
+        """Let lanes go that neither this recording nor, perhaps, the next one needs."""
+        for kind, lane in list(self._kept.items()):
+            if len(self._kept) > _MOST_KEPT and lane not in self._lanes:
+                del self._kept[kind]
+                lane.plot.deleteLater()
+
+    def _new_markers(self, plot: Plot) -> tuple[pg.InfiniteLine, ...]:
+        made = []
+        for number in range(2):
+            marker = plot.upright(MARKER, 0.0)
+            marker.setMovable(True)
+            marker.setVisible(False)
+            marker.sigPositionChanged.connect(lambda line, number=number: self._moved(number, line.value()))
+            made.append(marker)
+        return tuple(made)
+
+    def _moved(self, number: int, moment_s: float) -> None:
+        if not self._are_marked or self._marker_s[number] == moment_s:
+            return
+        self._marker_s[number] = moment_s
+        for lane in self._lanes:
+            lane.markers[number].setValue(moment_s)
+        self.markers_moved.emit()
+
+    def _mark_segments(self, overview: RecordingOverview) -> None:
+        """Draw a line where each segment begins; long ones are named in the first lane."""
+        recording = overview.recording
+        begun_s = [each.first_sample / recording.sample_rate_hz for each in recording.segments]
+        for lane in self._lanes:
+            lane.plot.rules(SEGMENT).show_at(begun_s)
+        for segment, at_s in zip(recording.segments, begun_s, strict=True):
+            if segment.stop - segment.start > _NAMED_SHARE * recording.samples:
+                label = segment.label.replace("_", " ")
+                self._lanes[0].plot.upright(SEGMENT, at_s, label, _LABEL_AT)
+
+    def _mark_overloads(self, overview: RecordingOverview) -> None:
+        rate_hz = overview.recording.sample_rate_hz
+        for lane in self._lanes:
+            lane.plot.stripes(LIMIT).show_bands(
+                (each.first_sample / rate_hz, (each.last_sample + 1) / rate_hz)
+                for each in overview.recording.overloads
+                if each.channel == lane.role
+            )
+
+    def _share_height(self) -> None:
+        """Give all lanes the same height; the last has the time axis on top of it."""
+        axis = _TIME_AXIS_EM * self.fontMetrics().height()
+        lane = max(1, (self.height() - axis) // max(1, len(self._lanes)))
+        for place in range(len(self._lanes)):
+            self._layout.setStretch(place, lane + (axis if place == len(self._lanes) - 1 else 0))
+        # At once: a layout that comes after the first picture has everything painted twice.
+        self._layout.activate()
+
+    def _ranged(self, view: pg.ViewBox, _range: object) -> None:
+        if not self._lanes or view is not self._lanes[0].plot.getViewBox():
+            return
+        self._later.start()
+        self.range_changed.emit()
+
+    def _draw(self) -> None:
+        if self._overview is None or not self._lanes:
+            return
+        rate_hz = self._overview.recording.sample_rate_hz
+        low_s, high_s = self.view_s
+        start, stop = int(low_s * rate_hz), int(np.ceil(high_s * rate_hz)) + 1
+        # A few more columns than pixels: with fewer, a pixel between two columns would stay empty.
+        columns = max(100, int(1.02 * self._lanes[0].plot.lines_across) + 2)
+        picture = self._overview.picture([lane.role for lane in self._lanes], start, stop, columns)
+        for row, lane in enumerate(self._lanes):
+            low, high = picture.low[row], picture.high[row]
+            if picture.samples_per_column > 1:
+                lane.curve.setData(np.repeat(picture.time_s, 2), zigzag(low, high), connect="finite")
+            else:
+                lane.curve.setData(picture.time_s, low, connect="finite")
+            known = low[np.isfinite(low)], high[np.isfinite(high)]
+            if known[0].size:
+                bottom, top = float(known[0].min()), float(known[1].max())
+                height = (top - bottom) or 1e-9
+                # Room above for the lane's name, which must not lie on the signal.
+                lane.plot.setYRange(bottom - 0.06 * height, top + 0.3 * height, padding=0.0)

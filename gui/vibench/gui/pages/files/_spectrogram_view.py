@@ -1,0 +1,207 @@
+"""The spectrogram of what is in sight of a recording, worked out elsewhere."""
+
+from math import log10
+from pathlib import Path
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QRectF
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from vibench.acquisition.recording import Recording
+from vibench.analysis.live import (
+    RESPONSE,
+    DensityPicture,
+    RowSpacing,
+    SpectrogramRequest,
+    recording_spectrogram,
+)
+
+from ...background import Background, Latest
+from ...forms import Choice
+from ...plots import FREQUENCY, LOG_FREQUENCY, TIME, Plot
+from ...widgets import Theme
+from ._file_words import role_text, unit_text
+
+_WAIT_MS = 250
+"""How long a view stands still before it is worked out."""
+_HIGHEST_HZ = (500.0, 1000.0, 2000.0, 5000.0, 20_000.0)
+_USUAL = 2
+_BAR_EM = 4
+"""Room for the numbers and the label of the scale of colours."""
+_SHOWN_DB = 80.0
+"""From the strongest line down: the range of colours."""
+
+
+class SpectrogramView(QWidget):
+    """Frequency over time; colours are spectral densities in decibels."""
+
+    def __init__(self, theme: Theme, background: Background, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Spectrogram")
+        self.channel, self.spacing, self.highest = Choice(), Choice(), Choice()
+        for spacing in RowSpacing:
+            self.spacing.addItem(spacing.value)
+        for highest_hz in _HIGHEST_HZ:
+            self.highest.addItem(f"{highest_hz:g} Hz")
+        self.highest.setCurrentIndex(_USUAL)
+        self.said = QLabel("")
+        self.said.setProperty("rank", "second")
+        self._theme = theme
+        self._view_s = (0.0, 0.0)
+        self._recording: Recording | None = None
+        self._asked: SpectrogramRequest | None = None
+        self._latest = Latest(background, recording_spectrogram, self._show, self._fail, _WAIT_MS, self)
+        self._plots = {
+            RowSpacing.LINEAR: Plot("Spectrogram", TIME, FREQUENCY, theme),
+            RowSpacing.LOGARITHMIC: Plot("Spectrogram, logarithmic", TIME, LOG_FREQUENCY, theme),
+        }
+        self._images = {spacing: _Image(plot) for spacing, plot in self._plots.items()}
+        self._lay_out()
+        for choice in (self.channel, self.spacing, self.highest):
+            choice.currentIndexChanged.connect(lambda _index: self._ask())
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a picture is still to come."""
+        return self._latest.is_busy
+
+    @property
+    def plot(self) -> Plot:
+        """The axes in use."""
+        return self._plots[self._spacing]
+
+    @property
+    def image(self) -> "_Image":
+        """The picture in use."""
+        return self._images[self._spacing]
+
+    def show_recording(self, recording: Recording | None) -> None:
+        """Picture another recording from now on, or none."""
+        self._recording = recording
+        self._latest.drop()
+        for image in self._images.values():
+            image.clear("Choose a recording in the list above.")
+        roles = () if recording is None else recording.roles
+        if roles != tuple(self.channel.itemData(row) for row in range(self.channel.count())):
+            blocked = self.channel.blockSignals(True)
+            self.channel.clear()
+            for role in roles:
+                self.channel.addItem(role_text(role), role)
+            self.channel.setCurrentIndex(roles.index(RESPONSE) if RESPONSE in roles else len(roles) - 1)
+            self.channel.blockSignals(blocked)
+
+    def show_view(self, low_s: float, high_s: float) -> None:
+        """Picture this stretch, when the picture is in sight."""
+        self._view_s = (low_s, high_s)
+        self._ask()
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        for plot in self._plots.values():
+            plot.retheme(theme)
+        for image in self._images.values():
+            image.retheme(theme)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Work out what nobody wanted while it was out of sight."""
+        super().showEvent(event)
+        self._ask()
+
+    @property
+    def _spacing(self) -> RowSpacing:
+        return list(RowSpacing)[self.spacing.currentIndex()]
+
+    def _ask(self) -> None:
+        for spacing, plot in self._plots.items():
+            plot.setVisible(spacing is self._spacing)
+        recording = self._recording
+        low_s, high_s = self._view_s
+        if not self.isVisible() or recording is None or not high_s > low_s or self.channel.count() == 0:
+            return
+        rate_hz = recording.sample_rate_hz
+        asked = SpectrogramRequest(
+            path=Path(recording.path),
+            role=str(self.channel.currentData()),
+            start=int(low_s * rate_hz),
+            stop=int(np.ceil(high_s * rate_hz)),
+            highest_hz=_HIGHEST_HZ[self.highest.currentIndex()],
+            spacing=self._spacing,
+        )
+        self.said.setText("working it out…")
+        self._latest.ask(asked)
+
+    def _show(self, found: DensityPicture) -> None:
+        self._images[found.request.spacing].show_picture(found)
+        self.said.setText(
+            f"Hann windows of {1e3 * found.segment_s:.3g} ms, lines {found.resolution_hz:.3g} Hz wide, "
+            f"every sample used"
+        )
+
+    def _fail(self, error: BaseException) -> None:
+        self.image.clear(str(error))
+        self.said.setText("")
+
+    def _lay_out(self) -> None:
+        bar = QHBoxLayout()
+        for text, choice, tip in (
+            ("Channel", self.channel, "The channel whose frequencies are shown"),
+            ("Frequencies", self.spacing, "How the upright axis is laid out"),
+            ("up to", self.highest, "Where the upright axis ends"),
+        ):
+            label = QLabel(text)
+            label.setBuddy(choice)
+            choice.setAccessibleName(f"Spectrogram: {text.lower()}")
+            choice.setToolTip(tip)
+            bar.addWidget(label)
+            bar.addWidget(choice)
+        bar.addWidget(self.said, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 4, 0, 0)
+        layout.addLayout(bar)
+        for plot in self._plots.values():
+            layout.addWidget(plot, 1)
+
+
+class _Image:
+    """A picture in a plot, with its scale of colours beside it."""
+
+    def __init__(self, plot: Plot) -> None:
+        self._plot = plot
+        self.item = pg.ImageItem(axisOrder="row-major")
+        plot.addItem(self.item)
+        plot.setMouseEnabled(x=False, y=False)
+        self.bar = pg.ColorBarItem(colorMap=pg.colormap.get("viridis"), interactive=False, width=14)
+        self.bar.setImageItem(self.item, insert_in=plot.getPlotItem())
+        self.bar.axis.setWidth(_BAR_EM * plot.fontMetrics().height())
+        self.clear("Choose a recording in the list above.")
+
+    def clear(self, hint: str) -> None:
+        """Show nothing, and say why."""
+        self.item.clear()
+        self.bar.hide()
+        self._plot.with_hint(hint)
+        self._plot.viewport().update()
+
+    def show_picture(self, found: DensityPicture) -> None:
+        """Draw it, in colours from the strongest line down."""
+        low, high = found.frequency_hz
+        is_log = found.request.spacing is RowSpacing.LOGARITHMIC
+        bottom, top = (log10(low), log10(high)) if is_log else (low, high)
+        left, right = found.time_s
+        self.item.setImage(found.decibel, autoLevels=False)
+        self.item.setRect(QRectF(left, bottom, right - left, top - bottom))
+        known = found.decibel[np.isfinite(found.decibel)]
+        strongest = float(np.max(known)) if known.size else 0.0
+        self.bar.setLevels((strongest - _SHOWN_DB, strongest))
+        self.bar.axis.setLabel(f"dB re 1 ({unit_text(found.unit)})²/Hz")
+        self.bar.show()
+        self._plot.with_hint("")
+        self._plot.setXRange(left, right, padding=0.0)
+        self._plot.setYRange(max(bottom, 0.0), top, padding=0.0)
+
+    def retheme(self, theme: Theme) -> None:
+        """Write the scale in other colours."""
+        self.bar.axis.setPen(pg.mkPen(theme.line))
+        self.bar.axis.setTextPen(pg.mkPen(theme.text))

@@ -1,0 +1,3 @@
+from ._queue_page import (
+    QueuePage as QueuePage,
+)

@@ -1,0 +1,285 @@
+"""The Queue page: a campaign as a table, its estimated end, and how each of its recordings stands."""
+
+import tomllib
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QGridLayout,
+    QGroupBox,
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from vibench.acquisition import (
+    ConfigurationError,
+    all_shipped,
+    load_campaign,
+    save_toml,
+    toml_text,
+    validated,
+)
+from vibench.acquisition.campaign import Existing
+from vibench.acquisition.engine import EngineState, EngineStatus
+from vibench.acquisition.plan import Axis, Campaign, Range
+
+from ...background import Latest
+from ...forms import Choice
+from ...page import Desk, Orders, Page, Remembered
+from ...widgets import Notice, NoticeKind, ReadTable, clock, notice_of
+from ._campaign_outlook import CampaignOutlook, campaign_outlook
+from ._draft import moved_up, with_measurement, with_sweep, without
+from ._row_words import point_rows
+from ._sweep_form import SweepForm
+
+LOOK_MS = 50
+"""How long a campaign stands unchanged before it is looked at."""
+
+
+class QueuePage(Page):
+    """Edits the campaign that is armed here, and shows the one that runs."""
+
+    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+        super().__init__(desk, parent)
+        self._orders = Orders(desk, self)
+        self.choice = Choice()
+        self.entries = ReadTable(
+            "Entries of the campaign",
+            ("entry", "what", "recordings", "takes"),
+            "Take over a campaign above, or add the test of the Test page, once or as a sweep.",
+            wide=1,
+        )
+        self.rows = ReadTable(
+            "Recordings of the campaign",
+            ("", "recording", "how it stands"),
+            "Each recording of the campaign is listed here, with how it stands.",
+        )
+        self.sweep = SweepForm()
+        self.summary = QLabel()
+        self.summary.setWordWrap(True)
+        self.summary.setAccessibleName("Summary of the campaign")
+        self.progress = QProgressBar()
+        self.progress.setAccessibleName("Progress of the campaign")
+        self.progress.setRange(0, 1000)
+        self.progress.setFormat("not running")
+        self.arm_button = self._button("Arm the ca&mpaign…", "Say in words what will happen", self._arm)
+        self.arm_button.setProperty("rank", "first")
+        self.resume_button = self._button(
+            "Arm what is missin&g…", "Keep what is complete in its folder, make the rest", self._arm_missing
+        )
+        self.hold_button = self._button("Pause", "Stay where the run is; the drive stays on", self._hold)
+        self._looking = Latest(
+            desk.background, campaign_outlook, self._looked, self._look_failed, LOOK_MS, self
+        )
+        self._lay_out()
+        self._connect()
+        self._restore()
+
+    @property
+    def is_done(self) -> bool:
+        """Every recording of the campaign is there."""
+        status = self.desk.bridge.status
+        rows = () if status is None else status.rows
+        return len(rows) > 1 and all(row.state in ("recorded", "kept") for row in rows)
+
+    def refresh(self) -> None:
+        """Show how the recordings stand."""
+        status = self.desk.bridge.status
+        state = self.desk.bridge.state
+        campaign = self.desk.intent.campaign
+        for button in (self.arm_button, self.resume_button):
+            button.setEnabled(state is EngineState.READY and campaign is not None)
+        self.hold_button.setEnabled(state in (EngineState.RUNNING, EngineState.HELD))
+        self.hold_button.setText("Go on" if state is EngineState.HELD else "Pause")
+        self.rows.show_rows(point_rows(campaign, () if status is None else status.rows, state))
+        self._show_progress(status)
+
+    def left(self) -> None:
+        """Keep the campaign for next time."""
+        campaign = self.desk.intent.campaign
+        self.desk.settings.keep_text(Remembered.CAMPAIGN, "" if campaign is None else toml_text(campaign))
+
+    def open_file(self, path: Path) -> None:
+        """Take over the campaign of a file."""
+        try:
+            self.desk.intent.choose_campaign(load_campaign(path))
+        except ConfigurationError as error:
+            self.desk.say(notice_of(error))
+
+    def _show_progress(self, status: EngineStatus | None) -> None:
+        run = None if status is None else status.run
+        if run is None:
+            self.progress.setValue(0)
+            self.progress.setFormat("not running")
+            return
+        left_s = max(0.0, run.campaign_total_s - run.campaign_elapsed_s)
+        end = datetime.now().astimezone() + timedelta(seconds=left_s)
+        self.progress.setValue(round(1000 * run.campaign_elapsed_s / max(run.campaign_total_s, 1e-9)))
+        self.progress.setFormat(f"{run.number} of {run.count}, {clock(left_s)} left, ends about {end:%H:%M}")
+
+    def _show_campaign(self) -> None:
+        campaign, rig = self.desk.intent.campaign, self.desk.intent.rig
+        if campaign is None:
+            self._looking.drop()
+            self.entries.show_rows(())
+            self.summary.setText("No campaign yet: open one, or add the test of the Test page.")
+            return
+        self.summary.setText(f"{campaign.name}: …")
+        self._looking.ask((campaign, rig))
+
+    def _looked(self, seen: CampaignOutlook) -> None:
+        campaign = self.desk.intent.campaign
+        if campaign is None:
+            return
+        row = self.entries.currentRow()
+        self.entries.show_rows(seen.rows)
+        self.entries.selectRow(min(row, len(seen.rows) - 1))
+        size = "" if seen.size_bytes is None else f"   ·   {seen.size_bytes / 1e9:.2f} GB"
+        end = datetime.now().astimezone() + timedelta(seconds=seen.duration_s)
+        self.summary.setText(
+            f"{campaign.name}: {len(seen.names)} recordings   ·   takes {clock(seen.duration_s)}   ·   "
+            f"started now, it ends about {end:%H:%M}{size}   ·   in {self.desk.folder / campaign.name}"
+        )
+
+    def _look_failed(self, error: BaseException) -> None:
+        self.desk.say(notice_of(error))
+
+    def _add_test(self) -> None:
+        measurement = self.desk.intent.measurement
+        if measurement is None:
+            self._warn("The test is not complete.", "Correct what is marked on the Test page (Ctrl+2).")
+        else:
+            self.desk.intent.choose_campaign(with_measurement(self.desk.intent.campaign, measurement))
+
+    def _add_sweep(self, axis: Axis, values: Range) -> None:
+        measurement = self.desk.intent.measurement
+        if measurement is None:
+            self._warn("The test is not complete.", "Correct what is marked on the Test page (Ctrl+2).")
+            return
+        try:
+            campaign = with_sweep(self.desk.intent.campaign, measurement, axis, values)
+        except ConfigurationError as error:
+            self.desk.say(notice_of(error))
+        else:
+            self.desk.intent.choose_campaign(campaign)
+
+    def _remove(self) -> None:
+        campaign, number = self.desk.intent.campaign, self.entries.currentRow()
+        if campaign is not None and number >= 0:
+            self.desk.intent.choose_campaign(without(campaign, number))
+
+    def _move_up(self) -> None:
+        campaign, number = self.desk.intent.campaign, self.entries.currentRow()
+        if campaign is not None and number > 0:
+            self.desk.intent.choose_campaign(moved_up(campaign, number))
+            self.entries.setCurrentCell(number - 1, 0)
+
+    def _arm(self) -> None:
+        self._orders.arm_campaign(Existing.REFUSE)
+
+    def _arm_missing(self) -> None:
+        self._orders.arm_campaign(Existing.RESUME)
+
+    def _hold(self) -> None:
+        self._orders.hold_or_resume()
+
+    def _open(self) -> None:
+        given, _ = QFileDialog.getOpenFileName(
+            self, "Open a campaign", str(self.desk.folder), "Campaigns (*.toml)"
+        )
+        if given:
+            self.open_file(Path(given))
+
+    def _save(self) -> None:
+        campaign = self.desk.intent.campaign
+        if campaign is None:
+            self._warn("There is no campaign to save.", "Add a test first.")
+            return
+        wish = str(self.desk.folder / f"{campaign.name}.toml")
+        given, _ = QFileDialog.getSaveFileName(self, "Save the campaign", wish, "Campaigns (*.toml)")
+        if given:
+            try:
+                save_toml(campaign, Path(given))
+            except ConfigurationError as error:
+                self.desk.say(notice_of(error))
+
+    def _take(self, row: int) -> None:
+        if row > 0:
+            self.open_file(all_shipped("campaigns")[row - 1])
+
+    def _restore(self) -> None:
+        kept = self.desk.settings.text(Remembered.CAMPAIGN)
+        if kept:
+            try:
+                campaign = validated(tomllib.loads(kept), Campaign, "the last campaign")
+            except (ConfigurationError, tomllib.TOMLDecodeError) as error:
+                self.desk.say(notice_of(error, "It was left out; open or make another one."))
+            else:
+                self.desk.intent.choose_campaign(campaign)
+        self._show_campaign()
+
+    def _warn(self, what: str, next_step: str) -> None:
+        self.desk.say(Notice(NoticeKind.WARNING, what, next_step=next_step))
+
+    def _connect(self) -> None:
+        self.desk.intent.campaign_changed.connect(self._show_campaign)
+        self.desk.intent.rig_changed.connect(self._show_campaign)
+        self.choice.activated.connect(self._take)
+        self.sweep.wanted.connect(self._add_sweep)
+        self.sweep.refused.connect(lambda text: self._warn(text, "Correct the sweep."))
+
+    def _button(self, text: str, tip: str, act: object) -> QPushButton:
+        button = QPushButton(text)
+        button.setToolTip(tip)
+        button.clicked.connect(act)
+        return button
+
+    def _lay_out(self) -> None:
+        title = QLabel("Queue")
+        title.setProperty("rank", "title")
+        self.choice.setAccessibleName("Known campaigns")
+        self.choice.setToolTip("Campaigns that come with vibench")
+        self.choice.addItem("take over a campaign…")
+        for path in all_shipped("campaigns"):
+            self.choice.addItem(path.stem.replace("_", " "))
+        files = QGridLayout()
+        files.addWidget(self._button("Open…", "Open a campaign from a TOML file", self._open), 0, 0)
+        files.addWidget(self._button("Save as…", "Save the campaign as a TOML file", self._save), 0, 1)
+        edits = QHBoxLayout()
+        for text, tip, act in (
+            ("&Add the test", "Add the test of the Test page", self._add_test),
+            ("Move &up", "Move the chosen entry up", self._move_up),
+            ("&Remove", "Remove the chosen entry", self._remove),
+        ):
+            edits.addWidget(self._button(text, tip, act))
+        left = QVBoxLayout()
+        left.addWidget(title)
+        left.addWidget(self.choice)
+        left.addLayout(files)
+        left.addWidget(_boxed("Campaign", self.entries, edits), 1)
+        left.addWidget(self.sweep)
+        right = QVBoxLayout()
+        right.addWidget(self.summary)
+        orders = QHBoxLayout()
+        for button in (self.arm_button, self.resume_button, self.hold_button):
+            orders.addWidget(button)
+        right.addLayout(orders)
+        right.addWidget(self.progress)
+        right.addWidget(_boxed("Recordings", self.rows), 1)
+        layout = QHBoxLayout(self)
+        layout.addLayout(left, 1)
+        layout.addLayout(right, 1)
+
+
+def _boxed(title: str, table: QWidget, below: QHBoxLayout | None = None) -> QGroupBox:
+    box = QGroupBox(title)
+    layout = QVBoxLayout(box)
+    layout.addWidget(table)
+    if below is not None:
+        layout.addLayout(below)
+    return box

@@ -1,0 +1,47 @@
+"""Campaigns in rows of words."""
+
+from collections.abc import Sequence
+
+from vibench.acquisition.engine import DRIVING, EngineState, RowStatus
+from vibench.acquisition.plan import Campaign, duration_s
+
+from ...widgets import clock
+
+SYMBOLS = {
+    "queued": "○",
+    "running": "▶",
+    "recorded": "✔",
+    "kept": "✔",
+    "stopped": "■",
+    "failed": "✖",
+}
+
+
+def entry_rows(campaign: Campaign) -> list[tuple[str, str, str, str]]:
+    """One row a test and a sweep: name, what, how many recordings, how long."""
+    rows = [
+        (
+            each.name,
+            f"{each.excitation.kind.replace('_', ' ')}, {each.excitation.amplitude_vpp:g} Vpp",
+            str(each.repeats),
+            clock(each.repeats * duration_s(each)),
+        )
+        for each in campaign.measurements
+    ]
+    for sweep in campaign.sweeps:
+        points = sweep.points()
+        kind = str(sweep.measurement.get("excitation", {}).get("kind", "")).replace("_", " ")
+        takes = sum(duration_s(point.measurement) for point in points)
+        rows.append((sweep.name, f"sweep of {kind}", str(len(points)), clock(takes)))
+    return rows
+
+
+def point_rows(
+    campaign: Campaign | None, rows: Sequence[RowStatus], state: EngineState
+) -> list[tuple[str, str, str]]:
+    """How each recording stands: the engine's rows where it has them, else what is planned."""
+    names = () if campaign is None else campaign.recording_names()
+    known = {row.name: row for row in rows}
+    if state in DRIVING or state is EngineState.ARMED or (names and set(names) == set(known)):
+        return [(SYMBOLS.get(row.state, "·"), row.name, f"{row.state}  {row.reason}".strip()) for row in rows]
+    return [("○", name, "planned") for name in names]

@@ -1,0 +1,3 @@
+from ._rig_page import (
+    RigPage as RigPage,
+)

@@ -1,0 +1,217 @@
+"""The Rig page: choose a configuration, see the instruments, confirm the knobs, open, check."""
+
+from pathlib import Path
+
+from PySide6.QtWidgets import (
+    QGroupBox,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QScrollArea,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+
+from vibench.acquisition import BenchReport, InstrumentList, Verdict, list_rig_instruments, shipped
+from vibench.acquisition.engine import EngineState, EngineStatus
+
+from ...page import Desk, Orders, Page, Remembered
+from ...widgets import ReadTable, moment_text, notice_of
+from ._finding_words import expected_text, finding_name, measured_text
+from ._knob_sheet import KnobSheetForm
+from ._rig_choice import RigChoice
+
+FIRST_STEPS = (
+    "A first measurement takes three keys: Alt+O opens this bench, Ctrl+Return arms the test of the Test "
+    "page and says in words what will happen, F5 starts it. It ends by itself; Files and Compare show what "
+    "was recorded. F1 lists all keys."
+)
+VERDICTS = {Verdict.OK: "✔ ok", Verdict.WARN: "⚠ look", Verdict.FAIL: "✖ fail"}
+
+
+class RigPage(Page):
+    """The first step: from a file to a bench that is open and well."""
+
+    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+        super().__init__(desk, parent)
+        self._orders = Orders(desk, self)
+        self.choice = RigChoice()
+        self.knobs = KnobSheetForm()
+        self.about = QLabel()
+        self.about.setWordWrap(True)
+        self.about.setProperty("rank", "second")
+        self.open_button = self._button("&Open bench", "Open every instrument; the generator stays silent")
+        self.open_button.setProperty("rank", "first")
+        self.close_button = self._button("Close bench", "Silence everything and close the instruments")
+        self.check_button = self._button(
+            "Check bench  (F6)", "A small sine for some seconds: noise, gains, clocks"
+        )
+        self.find_button = self._button("Find instruments", "List every instrument that can be seen")
+        self.instruments = ReadTable(
+            "Instruments",
+            ("part", "what answered"),
+            "Who answers is listed here once a bench is open.",
+        )
+        self.findings = ReadTable(
+            "Findings of the check",
+            ("", "finding", "measured", "expected"),
+            "Noise, gains, clocks and the answer to a small sine, each beside what is expected of it.",
+        )
+        self.verdict = QLabel()
+        self.verdict.setWordWrap(True)
+        self.first_steps = QLabel(FIRST_STEPS)
+        self.first_steps.setWordWrap(True)
+        self.first_steps.setProperty("rank", "second")
+        self._lay_out()
+        self._connect()
+        self._choose_first()
+
+    @property
+    def is_done(self) -> bool:
+        """The bench is open, and no check has forbidden to use it."""
+        status = self.desk.bridge.status
+        if status is None or status.bench is None:
+            return False
+        return status.check is None or status.check.verdict is not Verdict.FAIL
+
+    def refresh(self) -> None:
+        """Show what is open and what the check has found."""
+        status = self.desk.bridge.status
+        state = self.desk.bridge.state
+        may_open = state in (EngineState.CLOSED, EngineState.FAULT)
+        knobs_missing = self._rig_needs_knobs() and self.knobs.sheet() is None
+        self.open_button.setEnabled(may_open and self.choice.rig is not None and not knobs_missing)
+        self.close_button.setEnabled(state in (EngineState.READY, EngineState.ARMED, EngineState.FAULT))
+        self.check_button.setEnabled(state is EngineState.READY)
+        self.choice.setEnabled(may_open)
+        self.knobs.setEnabled(may_open)
+        if status is not None and status.bench is not None:
+            self.instruments.show_rows([(part, reply) for part, reply in status.bench.identities.items()])
+        self._show_check(status)
+
+    def entered(self) -> None:
+        """Put the focus where the next step is."""
+        if self.open_button.isEnabled():
+            self.open_button.setFocus()
+
+    def open_bench(self) -> None:
+        """Open the chosen bench."""
+        rig = self.choice.rig
+        if rig is not None:
+            self.instruments.show_rows([])
+            self.desk.bridge.open(rig, self.knobs.sheet())
+
+    def _show_check(self, status: EngineStatus | None) -> None:
+        report: BenchReport | None = None if status is None else status.check
+        if status is not None and status.state is EngineState.CHECKING:
+            self.verdict.setText("◍ Checking: a small sine plays for some seconds")
+        elif report is None:
+            self.verdict.setText(
+                "Not checked yet. F6 plays two per cent of the allowed level for some seconds."
+            )
+            self.findings.show_rows([])
+        else:
+            worst = VERDICTS[report.verdict]
+            assert status is not None
+            at = moment_text(status.checked_utc)
+            self.verdict.setText(f"{worst}   ·   {len(report.findings)} findings   ·   {at}")
+            order = (Verdict.FAIL, Verdict.WARN, Verdict.OK)
+            found = sorted(report.findings, key=lambda each: order.index(each.verdict))
+            self.findings.show_rows(
+                [
+                    (VERDICTS[each.verdict], finding_name(each), measured_text(each), expected_text(each))
+                    for each in found
+                ]
+            )
+
+    def _rig_needs_knobs(self) -> bool:
+        rig = self.choice.rig
+        return rig is not None and rig.virtual is None
+
+    def _chosen(self) -> None:
+        rig = self.choice.rig
+        self.knobs.show_rig(rig)
+        if rig is None:
+            self.about.setText("This file cannot be used; see the message above.")
+        else:
+            chain = (rig.generator.resource, rig.amplifier.model, rig.shaker.model, rig.vibrometer.model)
+            kind = "Every instrument is simulated." if rig.virtual is not None else "Real instruments."
+            self.about.setText(f"{rig.name}. {kind} {' → '.join(chain)} → {rig.daq.product}")
+            self.desk.settings.keep_text(Remembered.BENCH, str(self.choice.path))
+        self.desk.intent.choose_rig(rig, self.choice.path)
+
+    def _choose_first(self) -> None:
+        otherwise = str(shipped("hardware_configs/virtual_rig.toml"))
+        self.choice.choose(Path(self.desk.settings.text(Remembered.BENCH, otherwise)))
+
+    def _find(self) -> None:
+        rig = self.choice.rig
+        if rig is None:
+            return
+        self.find_button.setEnabled(False)
+        self.instruments.show_rows([("looking", "some seconds; a simulated rig is switched on for it")])
+        self.desk.background.ask(list_rig_instruments, self._found, self._not_found, rig)
+
+    def _found(self, found: InstrumentList) -> None:
+        self.find_button.setEnabled(True)
+        rows = [("VISA", resource) for resource in found.visa_resources]
+        rows += [("DAQ", f"{each.name}: {each.product}, serial {each.serial}") for each in found.daq_devices]
+        rows += [("remark", remark) for remark in found.remarks]
+        self.instruments.show_rows(rows or [("none", "no instrument answers: look at cables and power")])
+
+    def _not_found(self, error: BaseException) -> None:
+        self.find_button.setEnabled(True)
+        self.instruments.show_rows([])
+        self.desk.say(notice_of(error))
+
+    def _close(self) -> None:
+        self.desk.bridge.close_bench()
+        self.instruments.show_rows([])
+
+    def _connect(self) -> None:
+        self.choice.chosen.connect(self._chosen)
+        self.choice.refused.connect(lambda error: self.desk.say(notice_of(error)))
+        self.open_button.clicked.connect(self.open_bench)
+        self.close_button.clicked.connect(self._close)
+        self.check_button.clicked.connect(self._orders.check)
+        self.find_button.clicked.connect(self._find)
+
+    def _button(self, text: str, tip: str) -> QPushButton:
+        button = QPushButton(text)
+        button.setToolTip(tip)
+        return button
+
+    def _lay_out(self) -> None:
+        left = QVBoxLayout()
+        title = QLabel("Rig")
+        title.setProperty("rank", "title")
+        left.addWidget(title)
+        left.addWidget(self.choice)
+        left.addWidget(self.about)
+        left.addWidget(self.knobs)
+        for button in (self.open_button, self.check_button, self.find_button, self.close_button):
+            left.addWidget(button)
+        left.addSpacing(self.fontMetrics().height())
+        left.addWidget(self.first_steps)
+        left.addStretch(1)
+        column = QWidget()
+        column.setLayout(left)
+        scroll = QScrollArea()
+        scroll.setWidget(column)
+        scroll.setWidgetResizable(True)
+        scroll.setFrameShape(QScrollArea.Shape.NoFrame)
+        scroll.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
+        right = QVBoxLayout()
+        right.addWidget(self._boxed("Instruments", self.instruments), 1)
+        right.addWidget(self._boxed("Check", self.verdict, self.findings), 3)
+        layout = QHBoxLayout(self)
+        layout.addWidget(scroll, 2)
+        layout.addLayout(right, 3)
+
+    def _boxed(self, title: str, *widgets: QWidget) -> QGroupBox:
+        box = QGroupBox(title)
+        layout = QVBoxLayout(box)
+        for widget in widgets:
+            layout.addWidget(widget)
+        return box

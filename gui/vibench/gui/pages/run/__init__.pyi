@@ -1,0 +1,3 @@
+from ._run_page import (
+    RunPage as RunPage,
+)

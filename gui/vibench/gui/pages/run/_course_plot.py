@@ -1,0 +1,103 @@
+"""Responses against the frequency really played, with the prediction and its collision regions beneath."""
+
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from vibench.analysis import Foresight
+from vibench.analysis.live import LiveView
+
+from ...plots import FREQUENCY, PREDICTED, Axis, Dash, Ink, Plot, Scale, trace
+from ...widgets import Theme
+
+
+class CoursePlot(QWidget):
+    """Response I and II of a sine or a sweep as it goes."""
+
+    title = "Response over frequency"
+    tab = "Responses"
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        up = Axis("Response I, II", "x / A0", scale=Scale.LOGARITHMIC)
+        self.plot = Plot("Response over frequency", FREQUENCY, up, theme).with_legend()
+        self.plot.with_hint("A point every tenth of a second of a dwell or a sweep; the prediction beneath.")
+        self._stripes = self.plot.stripes(Ink(lambda theme: theme.traces[3], filled=0.15))
+        self._predicted = self.plot.curve(PREDICTED, "I, simulated")
+        self._linear = self.plot.curve(trace(2, Dash.DOTTED), "linear, simulated")
+        self._first = self.plot.dots(trace(3), "I, measured", 3)
+        self._second = self.plot.dots(trace(0), "II, measured", 3)
+        self._shown = 0
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self.plot)
+
+    def show_view(self, view: LiveView) -> None:
+        """Draw all points so far."""
+        course = view.course()
+        if len(course.time_s) == self._shown:
+            return
+        self._shown = len(course.time_s)
+        self._first.setData(course.frequency_hz, course.response_i)
+        self._second.setData(course.frequency_hz, course.response_ii)
+
+    def show_foresight(self, seen: Foresight | None) -> None:
+        """Lay a prediction beneath, or none."""
+        self._stripes.show_bands(() if seen is None else seen.collision_bands_hz)
+        if seen is None:
+            self._predicted.clear()
+            self._linear.clear()
+            return
+        found = seen.prediction
+        self._predicted.setData(found.frequency_hz, found.response_i)
+        self._linear.setData(found.frequency_hz, found.linear)
+
+    def clear(self) -> None:
+        """Forget the last run."""
+        self._shown = 0
+        self._first.clear()
+        self._second.clear()
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self.plot.retheme(theme)
+
+
+class SweepEnvelopePlot(QWidget):
+    """Extremes of m0's velocity against the frequency really played."""
+
+    title = "Sweep envelope"
+    tab = "Envelope"
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.plot = Plot("Sweep envelope", FREQUENCY, Axis("m0 velocity", "mm/s", 1e3), theme).with_legend()
+        self.plot.with_hint("Largest and smallest velocity of m0 while a sweep passes by.")
+        self._stripes = self.plot.stripes(Ink(lambda theme: theme.traces[3], filled=0.15))
+        self._upper = self.plot.curve(trace(3), "largest")
+        self._lower = self.plot.curve(trace(0), "smallest")
+        self._shown = 0
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self.plot)
+
+    def show_view(self, view: LiveView) -> None:
+        """Draw all points so far, in the order of time."""
+        course = view.course()
+        if len(course.time_s) == self._shown:
+            return
+        self._shown = len(course.time_s)
+        self._upper.setData(course.frequency_hz, course.upper)
+        self._lower.setData(course.frequency_hz, course.lower)
+
+    def show_foresight(self, seen: Foresight | None) -> None:
+        """Show where collisions are predicted."""
+        self._stripes.show_bands(() if seen is None else seen.collision_bands_hz)
+
+    def clear(self) -> None:
+        """Forget the last run."""
+        self._shown = 0
+        self._upper.clear()
+        self._lower.clear()
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self.plot.retheme(theme)

@@ -1,0 +1,208 @@
+"""The Run page: arm, start, watch; every picture is of the newest samples."""
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
+
+from vibench.acquisition.engine import EngineState
+from vibench.acquisition.plan import excited_band_hz
+from vibench.acquisition.rig import channels_of
+from vibench.analysis import Foresight
+from vibench.analysis.live import LiveView
+
+from ...engine_link import measurement_called
+from ...page import Desk, Orders, Page
+from ...widgets import FILES, Theme
+from ._arm_card import ArmCard
+from ._course_plot import CoursePlot, SweepEnvelopePlot
+from ._lanes import Lanes
+from ._portrait_plot import PortraitPlot
+from ._spectrum_plot import SpectrumPlot
+from ._transmission_plot import TransmissionPlot
+from ._watch_card import WatchCard
+
+LEFT_LETTERS = 44
+"""Width of the column on the left: it must not move when its words change."""
+_TONES = frozenset({"dwell", "sine_sweep", "stepped_sine"})
+
+
+class RunPage(Page):
+    """Viewer of the engine's run: it keeps nothing but what is on the screen."""
+
+    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+        super().__init__(desk, parent)
+        theme = desk.theme
+        self._orders = Orders(desk, self)
+        self._view: LiveView | None = None
+        self._ended: Path | None = None
+        self._drawn: tuple[int, int, int, float] | None = None
+        self.arm_card = ArmCard()
+        self.watch_card = WatchCard(theme)
+        self.lanes = Lanes(theme)
+        self.transmission = TransmissionPlot(theme)
+        self.spectrum = SpectrumPlot(theme)
+        self.course = CoursePlot(theme)
+        self.envelope = SweepEnvelopePlot(theme)
+        self.portrait = PortraitPlot(theme)
+        self.left_tabs, self.right_tabs = QTabWidget(), QTabWidget()
+        self.look_button = QPushButton("Look at the recording")
+        self.look_button.setToolTip("Show the last recording on the Files page")
+        self.summary = QLabel()
+        self.summary.setWordWrap(True)
+        self.summary.setAccessibleName("How the last run ended")
+        self._lay_out()
+        self._connect()
+        self._show_channels()
+
+    @property
+    def is_done(self) -> bool:
+        """Something was recorded since the window opened."""
+        return self._ended is not None
+
+    def refresh(self) -> None:
+        """Draw the newest samples, unless the picture is frozen."""
+        status = self.desk.bridge.status
+        measurement = self.desk.intent.measurement
+        test = (
+            ""
+            if measurement is None
+            else f"{measurement.name} ({measurement.excitation.kind.replace('_', ' ')})"
+        )
+        reason = "" if measurement is not None else "The test is not complete; see the Test page (Ctrl+2)."
+        self.arm_card.show_status(status, test, reason)
+        self.watch_card.show_status(status)
+        view = self.desk.bridge.view
+        if view is None or self.watch_card.freeze.isChecked():
+            return
+        if view is not self._view:
+            self._begin(view)
+        tabs_shown = (self.left_tabs.currentIndex(), self.right_tabs.currentIndex())
+        wanted = (view.next_sample, *tabs_shown, self.watch_card.span_s)
+        if wanted == self._drawn:
+            return
+        self._drawn = wanted
+        self.watch_card.show_view(view)
+        self.lanes.show_view(view, self.watch_card.span_s)
+        for tabs in (self.left_tabs, self.right_tabs):
+            shown = tabs.currentWidget()
+            assert isinstance(
+                shown, TransmissionPlot | SpectrumPlot | CoursePlot | SweepEnvelopePlot | PortraitPlot
+            )
+            shown.show_view(view)
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        for part in (self.lanes, self.watch_card, *self._pictures):
+            part.retheme(theme)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Space freezes, M marks; both are left to fields and buttons that use them themselves."""
+        match event.key():
+            case Qt.Key.Key_Space:
+                self.watch_card.freeze.toggle()
+            case Qt.Key.Key_M if event.modifiers() == Qt.KeyboardModifier.NoModifier:
+                self.watch_card.wish_mark()
+            case _:
+                super().keyPressEvent(event)
+
+    @property
+    def _pictures(
+        self,
+    ) -> tuple[TransmissionPlot, SpectrumPlot, CoursePlot, SweepEnvelopePlot, PortraitPlot]:
+        return (self.transmission, self.spectrum, self.course, self.envelope, self.portrait)
+
+    def _begin(self, view: LiveView) -> None:
+        """Another run: clear the pictures, lay its prediction beneath, show what suits its excitation."""
+        self._view = view
+        status = self.desk.bridge.status
+        name = "" if status is None or status.run is None else status.run.name
+        measurement = measurement_called(self.desk.bridge.campaign, name)
+        foresight = self.desk.intent.foresight
+        if foresight is not None and (
+            measurement is None or foresight.measurement.excitation != measurement.excitation
+        ):
+            foresight = None
+        for picture in self._pictures:
+            picture.clear()
+        self._show_foresight(foresight)
+        if measurement is not None:
+            for plot in (self.course.plot, self.envelope.plot, self.transmission.magnitude):
+                # What the check plays before the run lies outside, and would make the band small.
+                plot.setXRange(*excited_band_hz(measurement.excitation), padding=0.03)
+        is_tone = measurement is not None and measurement.excitation.kind in _TONES
+        self.left_tabs.setCurrentWidget(self.course if is_tone else self.transmission)
+        self.right_tabs.setCurrentWidget(self.portrait if is_tone else self.spectrum)
+
+    def _show_foresight(self, seen: Foresight | None) -> None:
+        self.transmission.show_foresight(seen)
+        self.course.show_foresight(seen)
+        self.envelope.show_foresight(seen)
+
+    def _recorded(self, path: Path) -> None:
+        self._ended = path
+        status = self.desk.bridge.status
+        rows = () if status is None else status.rows
+        told = next((f"{row.state}: {row.reason}" for row in rows if row.file == str(path)), "")
+        self.summary.setText(f"Last run: {path.name}, {told}")
+        self.look_button.show()
+
+    def _show_channels(self) -> None:
+        """Have the lanes before the first sample: to make them in a run would cost it a moment."""
+        rig = self.desk.intent.rig
+        if rig is not None:
+            self.lanes.show_channels(tuple((each.role.value, each.unit) for each in channels_of(rig)))
+
+    def _look(self) -> None:
+        if self._ended is not None:
+            self.desk.recording_wanted.emit(self._ended)
+            self.desk.page_wanted.emit(FILES)
+
+    def _mark(self, text: str) -> None:
+        if self.desk.bridge.state in (EngineState.RUNNING, EngineState.HELD):
+            self.desk.bridge.mark(text)
+
+    def _connect(self) -> None:
+        self.arm_card.arm_wanted.connect(self._orders.arm_test)
+        self.arm_card.start_wanted.connect(self._orders.start)
+        self.arm_card.cancel_wanted.connect(self.desk.bridge.disarm)
+        self.arm_card.hold_wanted.connect(self._orders.hold_or_resume)
+        self.watch_card.mark_wanted.connect(self._mark)
+        self.look_button.clicked.connect(self._look)
+        self.desk.recording_made.connect(self._recorded)
+        self.desk.intent.rig_changed.connect(self._show_channels)
+
+    def _lay_out(self) -> None:
+        title = QLabel("Run")
+        title.setProperty("rank", "title")
+        left = QWidget()
+        column = QVBoxLayout(left)
+        for widget in (title, self.arm_card, self.watch_card, self.summary, self.look_button):
+            column.addWidget(widget)
+        column.addStretch(1)
+        self.look_button.hide()
+        for tabs, name, pictures in (
+            (self.left_tabs, "Pictures on the left", (self.transmission, self.course, self.envelope)),
+            (self.right_tabs, "Pictures on the right", (self.spectrum, self.portrait)),
+        ):
+            tabs.setAccessibleName(name)
+            tabs.setDocumentMode(True)
+            for picture in pictures:
+                picture.setAccessibleName(picture.title)
+                tabs.setTabToolTip(tabs.addTab(picture, picture.tab), picture.title)
+        below = QSplitter(Qt.Orientation.Horizontal)
+        below.addWidget(self.left_tabs)
+        below.addWidget(self.right_tabs)
+        below.setSizes([500, 500])
+        right = QSplitter(Qt.Orientation.Vertical)
+        right.addWidget(self.lanes)
+        right.addWidget(below)
+        right.setSizes([600, 400])
+        right.setStretchFactor(0, 3)
+        right.setStretchFactor(1, 2)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        left.setFixedWidth(LEFT_LETTERS * self.fontMetrics().averageCharWidth())
+        layout.addWidget(left, 0)
+        layout.addWidget(right, 1)

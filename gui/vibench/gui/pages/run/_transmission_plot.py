@@ -1,0 +1,67 @@
+"""The transmission so far, with bounds, its coherence below, and the prediction dashed beneath."""
+
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from vibench.analysis import Foresight
+from vibench.analysis.live import LiveView
+
+from ...plots import FREQUENCY, PREDICTED, Axis, Dash, Ink, Plot, Scale, trace
+from ...widgets import Theme
+
+
+class TransmissionPlot(QWidget):
+    """|x / U| over frequency."""
+
+    title = "Transmission from base to m0"
+    tab = "Transmission"
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        up = Axis("|x / U|", scale=Scale.LOGARITHMIC)
+        self.magnitude = Plot("Transmission from base to m0", FREQUENCY, up, theme).with_legend()
+        self.magnitude.with_hint("Response of m0 over motion of the base, with bounds, while a test runs.")
+        self.coherence = Plot("Coherence", FREQUENCY, Axis("Coherence", short="γ²"), theme)
+        self._band = self.magnitude.band(Ink(lambda theme: theme.traces[0], filled=0.25))
+        self._predicted = self.magnitude.curve(PREDICTED, "I under sines, simulated")
+        self._linear = self.magnitude.curve(trace(2, Dash.DOTTED), "linear, simulated")
+        self._measured = self.magnitude.curve(trace(0), "measured, 95 % bounds")
+        self._coherence = self.coherence.curve(trace(0))
+        self.coherence.setYRange(0, 1, padding=0.02)
+        self.coherence.setXLink(self.magnitude)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(1)
+        # One frequency axis for both: the lower one's.
+        self.magnitude.across.show_nothing()
+        layout.addWidget(self.magnitude, 2)
+        layout.addWidget(self.coherence, 1)
+
+    def show_view(self, view: LiveView) -> None:
+        """Draw what is known by now."""
+        found = view.transmission()
+        if found is None:
+            return
+        self._measured.setData(found.frequency_hz, found.magnitude)
+        self._band.set_data(found.frequency_hz, found.magnitude_lower, found.magnitude_upper)
+        self._coherence.setData(found.frequency_hz, found.coherence)
+
+    def show_foresight(self, seen: Foresight | None) -> None:
+        """Lay a prediction beneath, or none."""
+        if seen is None:
+            self._predicted.clear()
+            self._linear.clear()
+            return
+        found = seen.prediction
+        self._predicted.setData(found.frequency_hz, found.response_i)
+        self._linear.setData(found.frequency_hz, found.linear)
+
+    def clear(self) -> None:
+        """Forget the last run."""
+        for curve in (self._measured, self._coherence):
+            curve.clear()
+        self._band.set_data([], [], [])
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self.magnitude.retheme(theme)
+        self.coherence.retheme(theme)

@@ -1,0 +1,3 @@
+from ._simulate_page import (
+    SimulatePage as SimulatePage,
+)

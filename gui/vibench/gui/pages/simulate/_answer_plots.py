@@ -1,0 +1,137 @@
+"""Four pictures of a simulation: responses, exponents, similarity, and the motion itself."""
+
+from collections.abc import Callable
+from functools import partial
+from math import log10
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtWidgets import QGridLayout, QWidget
+
+from vibench.analysis import THRESHOLD
+from vibench.analysis.simulation import SimulationCourse
+
+from ...plots import GUIDE, LIMIT, LOG_FREQUENCY, Axis, Dash, Ink, Plot, Scale, trace
+from ...widgets import Theme
+
+RESPONSE = Axis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
+EXPONENT = Axis("Largest Lyapunov exponent", "1/s", short="Exponent (1/s)")
+DIFFERENCE = Axis("Difference of log Response I", short="Difference", scale=Scale.LOGARITHMIC)
+TIME = Axis("Time, to the end of the run", "ms", factor=1e3)
+DISPLACEMENT = Axis("Displacement", "µm", factor=1e6)
+_COLLIDING = Ink(lambda theme: theme.muted, filled=0.14)
+_EDGE = Ink(lambda theme: theme.muted, Dash.DOTTED)
+_HINTS = (
+    "Responses I and II of every model, as they are found.",
+    "The motion of the masses at the frequency given under Signal.",
+    "Largest Lyapunov exponents: choose them under Exponent in the scene.",
+    "How far the two models differ, where both are known.",
+)
+_SMALLEST = 1e-6
+"""Equal curves have no logarithm: they are drawn at the foot of the axis."""
+
+
+class AnswerPlots(QWidget):
+    """Drawn anew from the course of a simulation, as often as it grows."""
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.responses = Plot("Responses over frequency", LOG_FREQUENCY, RESPONSE, theme)
+        self.exponents = Plot("Exponent over frequency", LOG_FREQUENCY, EXPONENT, theme)
+        self.likeness = Plot("Difference of the two models over frequency", LOG_FREQUENCY, DIFFERENCE, theme)
+        self.motion = Plot("Motion over time", TIME, DISPLACEMENT, theme)
+        layout = QGridLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        for number, (plot, hint) in enumerate(zip(self.plots, _HINTS, strict=True)):
+            plot.with_legend().with_hint(hint)
+            layout.addWidget(plot, number // 2, number % 2)
+            layout.setRowStretch(number // 2, 1)
+            layout.setColumnStretch(number % 2, 1)
+
+    @property
+    def plots(self) -> tuple[Plot, ...]:
+        """All four, row by row."""
+        return (self.responses, self.motion, self.exponents, self.likeness)
+
+    def show_course(self, course: SimulationCourse | None) -> None:
+        """Draw what is there."""
+        for step in self.steps(course):
+            step()
+
+    def steps(self, course: SimulationCourse | None) -> list[Callable[[], None]]:
+        """Draw what is there picture by picture: together they take longer than a frame has."""
+        draws = (self._responses, self._motion, self._exponents, self._likeness)
+        return [partial(_draw_anew, plot, draw, course) for plot, draw in zip(self.plots, draws, strict=True)]
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        for plot in self.plots:
+            plot.retheme(theme)
+
+    def _responses(self, course: SimulationCourse) -> None:
+        for number, model in enumerate(course.models):
+            self._responses_of(course, model, number)
+        low, high = course.smallest_and_largest_response
+        if high > 0.0:
+            self.responses.setYRange(log10(low) - 0.1, log10(high) + 0.1, padding=0.0)
+
+    def _responses_of(self, course: SimulationCourse, model: str, number: int) -> None:
+        if number == 0:
+            bands_hz = course.collision_bands_hz(model)
+            self.responses.stripes(_COLLIDING).show_bands(bands_hz)
+            self.responses.rules(_EDGE).show_at(low_hz for low_hz, _ in bands_hz[1:])
+            if bands_hz:
+                self.responses.upright(_EDGE, bands_hz[0][0], f"impacts, {model}")
+        for name, label, dash in (
+            ("response_i", "Response I", Dash.SOLID),
+            ("response_ii", "Response II", Dash.DOTTED),
+        ):
+            frequency_hz, values = course.column(model, name)
+            if frequency_hz.size:
+                line = self.responses.curve(trace(number, dash), f"{label}, {model}")
+                _draw(line, frequency_hz, values)
+
+    def _exponents(self, course: SimulationCourse) -> None:
+        for number, model in enumerate(course.models):
+            frequency_hz, values = course.column(model, "lyapunov_per_s")
+            if np.isfinite(values).any():
+                _draw(self.exponents.curve(trace(number), model), frequency_hz, values)
+                if number == 0:
+                    self.exponents.level(GUIDE, 0.0)
+
+    def _motion(self, course: SimulationCourse) -> None:
+        for number, signal in enumerate(course.signals):
+            time_s = signal.time_s - signal.time_s[0]
+            line = self.motion.curve(trace(number), f"x, {signal.model}, {signal.frequency_hz:g} Hz")
+            line.setData(time_s, signal.displacement_m)
+            line = self.motion.curve(trace(number, Dash.DOTTED), f"p = y - z, {signal.model}")
+            line.setData(time_s, signal.relative_m)
+        if course.signals:
+            gap_m = course.signals[0].gap_m
+            for stop_m in (gap_m, -gap_m):
+                self.motion.level(LIMIT, stop_m, "stop")
+            reach_m = max(gap_m, course.largest_signal_m)
+            self.motion.setYRange(-1.1 * reach_m, 1.1 * reach_m, padding=0.0)
+
+    def _likeness(self, course: SimulationCourse) -> None:
+        found = course.similarity()
+        if found is None:
+            return
+        name = f"{100 * found.rate:.0f} % similar ({100 * found.low:.0f} to {100 * found.high:.0f} %)"
+        shown = np.maximum(found.difference, _SMALLEST)
+        _draw(self.likeness.curve(trace(2), name), found.frequency_hz, shown)
+        self.likeness.level(LIMIT, THRESHOLD, "limit")
+
+
+def _draw_anew(plot: Plot, draw: Callable[[SimulationCourse], None], course: SimulationCourse | None) -> None:
+    plot.wipe()
+    if course is not None:
+        draw(course)
+
+
+def _draw(
+    line: pg.PlotDataItem,
+    frequency_hz: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]",
+    values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]",
+) -> None:
+    line.setData(frequency_hz, values, connect="finite")

@@ -1,0 +1,177 @@
+"""Simulate: a scene as a form, its cost beside it, and curves that grow while they are computed."""
+
+import os
+from collections.abc import Callable
+
+from PySide6.QtWidgets import (
+    QGroupBox,
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QVBoxLayout,
+    QWidget,
+)
+
+from vibench.analysis.simulation import Piece, SimulationCourse, SimulationRequest, cost_sentences
+
+from ...forms import JudgedForm
+from ...page import Desk, Page, SideAndPicture
+from ...widgets import COMPARE, SIMULATE, Notice, NoticeKind, Theme, push_button
+from ._answer_plots import AnswerPlots
+from ._simulator import Simulator
+
+
+class SimulatePage(Page):
+    """The form on the left; the answer on the right, as far as it has come."""
+
+    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+        super().__init__(desk, parent)
+        self.form: JudgedForm[SimulationRequest] = JudgedForm(SimulationRequest, "simulation")
+        self.plots = AnswerPlots(desk.theme)
+        self.simulator = Simulator(self)
+        self._course: SimulationCourse | None = None
+        self._is_stale = False
+        self._undrawn: list[Callable[[], None]] = []
+        self._build()
+        self.form.changed.connect(self._say_cost)
+        self.simulator.grown.connect(self._grow)
+        self.simulator.ended.connect(self._end)
+        self.simulator.died.connect(self._die)
+        self.destroyed.connect(self.simulator.close)
+        self._say_cost()
+        self._say_progress("Nothing has been simulated yet.")
+
+    @property
+    def course(self) -> SimulationCourse | None:
+        """What has been found so far."""
+        return self._course
+
+    @property
+    def is_done(self) -> bool:
+        """Ticked once there is a whole answer."""
+        return self._course is not None and not self.simulator.is_busy and self._course.done > 0
+
+    def refresh(self) -> None:
+        """Draw what has come since the last time, a picture a tick."""
+        if self._is_stale and not self._undrawn:
+            self._is_stale = False
+            self._undrawn = self.plots.steps(self._course)
+        if self._undrawn:
+            self._undrawn.pop(0)()
+
+    def left(self) -> None:
+        """Keep how the page is divided."""
+        self._parts.keep()
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self.plots.retheme(theme)
+
+    def begin(self) -> None:
+        """Simulate what the form says."""
+        request = self.form.value
+        if request is None:
+            return
+        note = (
+            f"A0 = {1e6 * request.amplitude_m:g} µm, gap {1e6 * request.gap_m:g} µm, damping time "
+            f"{request.damping_time_s:g} s, {request.duration_s:g} s from rest, {request.accuracy.value}"
+        )
+        self._course = SimulationCourse(request.amplitude_m, request.points, note)
+        self._is_stale = True
+        self.simulator.begin(request)
+        self._say_progress("Simulating; the first answer waits for the program to be made ready…")
+
+    def cancel(self) -> None:
+        """Stop at once; what has been found stays."""
+        self.simulator.cancel()
+        self._say_progress("Cancelled; what had been found is shown.")
+
+    def _grow(self, pieces: tuple[Piece, ...]) -> None:
+        if self._course is not None:
+            self._course.add(pieces)
+            self._is_stale = True
+            self._say_progress("Simulating…")
+
+    def _end(self) -> None:
+        self._is_stale = True
+        troubles = () if self._course is None else self._course.troubles
+        self._say_progress("Complete." if not troubles else f"Complete but for {len(troubles)} points.")
+        if troubles:
+            self.desk.say(Notice(NoticeKind.WARNING, troubles[0], details="\n".join(troubles[1:])))
+
+    def _die(self, what: str) -> None:
+        self.desk.say(
+            Notice(NoticeKind.FAULT, what, "What had been found is shown.", "Simulate again.", "SIMULATOR")
+        )
+        self._say_progress("The simulation broke off.")
+
+    def _say_cost(self) -> None:
+        request = self.form.value
+        self._begin.setEnabled(request is not None)
+        if request is None:
+            self._cost.setText("The form says what is not allowed.")
+            return
+        self._cost.setText("\n".join(cost_sentences(request, os.cpu_count() or 1)))
+
+    def _say_progress(self, text: str) -> None:
+        is_busy = self.simulator.is_busy
+        done, asked = (0, 1) if self._course is None else (self._course.done, self._course.asked)
+        self._bar.setMaximum(asked)
+        self._bar.setValue(done)
+        self._bar.setFormat("no points yet" if self._course is None else "%v of %m points")
+        self._state.setText(text)
+        self._cancel.setEnabled(is_busy)
+        self._compare.setEnabled(self._course is not None and bool(self._course.traces()))
+
+    def _hand_to_compare(self) -> None:
+        if self._course is not None:
+            self.desk.prediction_made.emit(self._course.traces())
+            self.desk.page_wanted.emit(COMPARE)
+
+    def _build(self) -> None:
+        self._parts = SideAndPicture(self.desk, SIMULATE, self._side(), self._answer())
+        layout = QVBoxLayout(self)
+        layout.addWidget(self._parts)
+
+    def _side(self) -> QWidget:
+        scene = QGroupBox("Scene")
+        QVBoxLayout(scene).addWidget(self.form)
+        cost = QGroupBox("Cost and error of this accuracy")
+        self._cost = QLabel("")
+        self._cost.setWordWrap(True)
+        self._cost.setAccessibleName("Cost and error of this accuracy")
+        QVBoxLayout(cost).addWidget(self._cost)
+        self._begin = push_button("&Simulate", "Compute what the form says, in another process", self.begin)
+        self._begin.setProperty("rank", "first")
+        self._cancel = push_button("&Cancel", "Stop at once; what has been found stays", self.cancel)
+        row = QHBoxLayout()
+        row.addWidget(self._begin, 1)
+        row.addWidget(self._cancel)
+        side = QWidget()
+        layout = QVBoxLayout(side)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scene)
+        layout.addWidget(cost)
+        layout.addLayout(row)
+        layout.addStretch(1)
+        return side
+
+    def _answer(self) -> QWidget:
+        self._bar = QProgressBar()
+        self._bar.setAccessibleName("Points simulated")
+        self._bar.setFormat("%v of %m points")
+        self._bar.setMinimumWidth(self._bar.fontMetrics().horizontalAdvance("20000 of 20000 points  "))
+        self._state = QLabel("")
+        self._compare = push_button(
+            "&Lay over recordings", "Put these curves on the Compare page", self._hand_to_compare
+        )
+        row = QHBoxLayout()
+        row.addWidget(self._state, 1)
+        row.addWidget(self._bar)
+        row.addWidget(self._compare)
+        answer = QWidget()
+        layout = QVBoxLayout(answer)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self.plots, 1)
+        layout.addLayout(row)
+        return answer

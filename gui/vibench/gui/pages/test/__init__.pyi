@@ -1,0 +1,3 @@
+from ._test_page import (
+    TestPage as TestPage,
+)

@@ -1,0 +1,60 @@
+"""The limits: what the test is predicted to do, beside what the rig survives."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QTableWidgetItem, QWidget
+
+from vibench.acquisition.plan import LimitCheck, Side
+
+from ...plots import SHARE_ROLE, BarDelegate
+from ...widgets import ReadTable
+
+_USED = 0
+_SIGNS = {Side.AT_MOST: "≤", Side.AT_LEAST: "≥"}
+_UNITS = {"m s-2": "m/s²", "m/s2": "m/s²", "m s-1": "m/s"}
+
+
+class LimitTable(ReadTable):
+    """One row a limit, the most used first."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(
+            "Predicted loads and limits", ("used", "quantity", "predicted", "limit"), wide=1, parent=parent
+        )
+        self.setItemDelegateForColumn(_USED, BarDelegate(self))
+
+    def show_checks(self, checks: tuple[LimitCheck, ...]) -> None:
+        """Show what was held against the rig."""
+        self.show_rows(
+            [
+                (
+                    f"{100 * check.use:.1f} %",
+                    f"{_mark(check)}{_short(check.what)}",
+                    f"{check.value:.3g} {_unit(check.unit)}",
+                    f"{_SIGNS[check.side]} {check.limit:.3g} {_unit(check.unit)}",
+                )
+                for check in checks
+            ]
+        )
+        for row, check in enumerate(checks):
+            for column in range(self.columnCount()):
+                item = self.item(row, column)
+                if isinstance(item, QTableWidgetItem):
+                    remedy = "" if check.is_kept else f"\nTo do: {check.remedy}"
+                    item.setToolTip(f"{check.what}\nLimit from: {check.source}{remedy}")
+                    item.setData(SHARE_ROLE, float(check.use) if column == _USED else None)
+                    if column == _USED:
+                        item.setTextAlignment(Qt.AlignmentFlag.AlignCenter)
+
+
+def _mark(check: LimitCheck) -> str:
+    if check.is_kept:
+        return ""
+    return "✖ " if check.forbids else "⚠ "
+
+
+def _short(what: str) -> str:
+    return what.removeprefix("the ").replace("(at ", "(").replace("(about, at ", "(about, ").replace("_", " ")
+
+
+def _unit(unit: str) -> str:
+    return _UNITS.get(unit, unit)

@@ -1,0 +1,52 @@
+"""The signal as it will be played, in time and spectrum."""
+
+import numpy as np
+from PySide6.QtWidgets import QHBoxLayout, QWidget
+
+from vibench.acquisition.plan import Outlook
+
+from ...plots import LOG_FREQUENCY, TIME, Axis, Plot, Scale, SignalCurve, trace
+from ...widgets import Theme
+
+_FLOOR = 1e-5
+"""Lines this far below the highest are numerical dust."""
+_LEAST_HZ = 1.0
+"""Nothing below is of interest: no shaker moves there."""
+_LEAST_LINES = 9
+"""Of text: less says nothing."""
+
+
+class PreviewPlots(QWidget):
+    """Two plots side by side; a zoom into the time signal shows its samples."""
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.time = Plot("Signal at the generator, in time", TIME, Axis("Generator", "V"), theme)
+        self.spectrum = Plot(
+            "Spectrum of the signal",
+            LOG_FREQUENCY,
+            Axis("Amplitude", "V", scale=Scale.LOGARITHMIC),
+            theme,
+        )
+        for plot in (self.time, self.spectrum):
+            plot.setMinimumHeight(_LEAST_LINES * self.fontMetrics().height())
+        self._signal = SignalCurve(self.time, trace(0))
+        self._lines = self.spectrum.curve(trace(0))
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self.time, 1)
+        layout.addWidget(self.spectrum, 1)
+
+    def show_outlook(self, seen: Outlook) -> None:
+        """Draw another signal."""
+        self.time.show_everything()
+        self._signal.set_samples(seen.volts, seen.sample_rate_hz)
+        floor_v = _FLOOR * float(np.max(seen.spectrum_v))
+        self.spectrum.show_everything()
+        shown = seen.spectrum_hz >= min(_LEAST_HZ, float(seen.spectrum_hz[-1]))
+        self._lines.setData(seen.spectrum_hz[shown], np.maximum(seen.spectrum_v[shown], floor_v))
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self.time.retheme(theme)
+        self.spectrum.retheme(theme)

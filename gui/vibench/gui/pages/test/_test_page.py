@@ -1,0 +1,253 @@
+"""The Test page: a form of what will be played, and beside it exactly what that is and does."""
+
+import tomllib
+from pathlib import Path
+
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QGridLayout,
+    QGroupBox,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QSizePolicy,
+    QSplitter,
+    QVBoxLayout,
+    QWidget,
+)
+
+from vibench.acquisition import ConfigurationError, save_toml, toml_text, validated
+from vibench.acquisition.plan import Measurement, Outlook
+from vibench.acquisition.rig import Rig
+from vibench.analysis import Foresight
+
+from ...background import Latest
+from ...forms import Choice
+from ...page import Desk, Orders, Page, Remembered
+from ...widgets import Notice, NoticeKind, Theme, notice_of
+from ._ahead import Ahead, foreseen, looked_ahead
+from ._library import NamedTest, load_test, own_tests, shipped_tests
+from ._limit_table import LimitTable
+from ._prediction_plot import PredictionPlot
+from ._preview_plots import PreviewPlots
+from ._summary import summary_text
+from ._test_form import TestForm
+
+LOOK_MS, FORESEE_MS = 200, 900
+"""How long a test stands unchanged before it is previewed, and before it is simulated."""
+
+
+class TestPage(Page):
+    """Edits the test that Arm will arm."""
+
+    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+        super().__init__(desk, parent)
+        self._orders = Orders(desk, self)
+        self._outlook: Outlook | None = None
+        self._tests: tuple[NamedTest, ...] = ()
+        self.choice = Choice()
+        self.form = TestForm()
+        self.summary = QLabel("")
+        self.summary.setWordWrap(True)
+        self.summary.setAccessibleName("Summary of the test")
+        self.plots = PreviewPlots(desk.theme)
+        self.limits = LimitTable()
+        self.prediction = PredictionPlot(desk.theme)
+        self.prediction_note = QLabel()
+        self.prediction_note.setWordWrap(True)
+        self.prediction_note.setProperty("rank", "second")
+        self.arm_button = QPushButton("A&rm the test…  (Ctrl+Return)")
+        self.arm_button.setProperty("rank", "first")
+        self.arm_button.setToolTip("Show in words what will happen; nothing plays before Start")
+        self._looking = Latest(desk.background, looked_ahead, self._looked, self._look_failed, LOOK_MS, self)
+        self._foreseeing = Latest(
+            desk.background, foreseen, self._foreseen, self._foresight_failed, FORESEE_MS, self
+        )
+        self._lay_out()
+        self._connect()
+        self._list_tests()
+        self._restore()
+
+    @property
+    def is_done(self) -> bool:
+        """The test is complete and keeps every limit."""
+        return self._outlook is not None and self._outlook.is_allowed
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a preview or a prediction is still to come."""
+        return self._looking.is_busy or self._foreseeing.is_busy
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self.plots.retheme(theme)
+        self.prediction.retheme(theme)
+
+    def left(self) -> None:
+        """Keep the test for next time."""
+        measurement = self.form.measurement
+        if measurement is not None:
+            self.desk.settings.keep_text(Remembered.TEST, toml_text(measurement))
+
+    def _changed(self) -> None:
+        measurement, rig = self.form.measurement, self.desk.intent.rig
+        self.desk.intent.choose_measurement(measurement)
+        self._outlook = None
+        if measurement is None or rig is None:
+            self._looking.drop()
+            self._foreseeing.drop()
+            what = self.form.complaint or "Choose a rig first (Ctrl+1)."
+            self.summary.setText(f"✖ {what}")
+            return
+        self._look_at(measurement, rig)
+
+    def _look_at(self, measurement: Measurement, rig: Rig) -> None:
+        self.summary.setText("…")
+        self._looking.ask(Ahead(measurement, rig))
+        self.prediction_note.setText("◌ simulating; the first time compiles the simulation, up to a minute")
+        self._foreseeing.ask(Ahead(measurement, rig))
+
+    def _looked(self, seen: Outlook) -> None:
+        self._outlook = seen
+        self.summary.setText(summary_text(seen))
+        self.plots.show_outlook(seen)
+        self.limits.show_checks(seen.checks)
+
+    def _look_failed(self, error: BaseException) -> None:
+        self.summary.setText(f"✖ {error}")
+
+    def _foreseen(self, seen: Foresight) -> None:
+        self.desk.intent.foresee(seen)
+        self.prediction.show_foresight(seen)
+        bands = ", ".join(f"{low:.0f}–{high:.0f} Hz" for low, high in seen.collision_bands_hz)
+        collides = f"Collides at {bands}." if bands else "No collision is predicted."
+        self.prediction_note.setText(
+            f"Simulated ({seen.model}), {seen.lead.value}, base amplitude from {seen.basis}. {collides}"
+        )
+
+    def _foresight_failed(self, error: BaseException) -> None:
+        self.prediction.show_foresight(None)
+        self.prediction_note.setText(f"No prediction: {error}")
+
+    def _list_tests(self) -> None:
+        self._tests = (*own_tests(self._own_folder), *shipped_tests())
+        self.choice.blockSignals(True)
+        self.choice.clear()
+        self.choice.addItem("take over a test…")
+        for test in self._tests:
+            self.choice.addItem(test.label)
+        self.choice.blockSignals(False)
+
+    @property
+    def _own_folder(self) -> Path:
+        return self.desk.folder / "tests"
+
+    def _take(self, row: int) -> None:
+        if row > 0:
+            self.form.show_measurement(self._tests[row - 1].measurement)
+
+    def _restore(self) -> None:
+        kept = self.desk.settings.text(Remembered.TEST)
+        self.form.show_measurement(_kept_test(kept) or self._tests[0].measurement)
+
+    def _save(self) -> None:
+        measurement = self.form.measurement
+        if measurement is None:
+            self.desk.say(
+                Notice(NoticeKind.WARNING, "The test is not complete.", next_step=self.form.complaint)
+            )
+            return
+        wish = str(self._own_folder / f"{measurement.name}.toml")
+        given, _ = QFileDialog.getSaveFileName(self, "Save the test", wish, "Tests (*.toml)")
+        if given:
+            self.save_as(measurement, Path(given))
+
+    def save_as(self, measurement: Measurement, path: Path) -> None:
+        """Keep a test under a name; it is listed from now on if it lies in the folder of tests."""
+        try:
+            save_toml(measurement, path)
+        except ConfigurationError as error:
+            self.desk.say(notice_of(error))
+        else:
+            self.desk.say(Notice(NoticeKind.INFO, f"The test was saved as {path}."))
+            self._list_tests()
+
+    def _open(self) -> None:
+        given, _ = QFileDialog.getOpenFileName(self, "Open a test", str(self._own_folder), "Tests (*.toml)")
+        if given:
+            self.open_file(Path(given))
+
+    def open_file(self, path: Path) -> None:
+        """Take over the test of a file."""
+        try:
+            self.form.show_measurement(load_test(path))
+        except ConfigurationError as error:
+            self.desk.say(notice_of(error))
+
+    def _connect(self) -> None:
+        self.choice.activated.connect(self._take)
+        self.form.changed.connect(self._changed)
+        self.desk.intent.rig_changed.connect(self._changed)
+        self.arm_button.clicked.connect(self._orders.arm_test)
+
+    def _lay_out(self) -> None:
+        title = QLabel("Test")
+        title.setProperty("rank", "title")
+        self.choice.setAccessibleName("Known tests")
+        self.choice.setToolTip("Tests that come with vibench, and your own")
+        files = QHBoxLayout()
+        for text, tip, act in (
+            ("Open…", "Open a test from a TOML file", self._open),
+            ("Save as…", "Save this test as a TOML file", self._save),
+        ):
+            button = QPushButton(text)
+            button.setToolTip(tip)
+            button.clicked.connect(act)
+            files.addWidget(button)
+        left = QWidget()
+        column = QVBoxLayout(left)
+        column.addWidget(title)
+        column.addWidget(self.choice)
+        column.addLayout(files)
+        column.addWidget(self.form, 1)
+        column.addWidget(self.arm_button)
+        grid = QWidget()
+        cells = QGridLayout(grid)
+        cells.addWidget(self.summary, 0, 0, 1, 2)
+        cells.addWidget(_boxed("What will be played", self.plots), 1, 0, 1, 2)
+        cells.addWidget(_boxed("Against the limits", self.limits), 2, 0)
+        cells.addWidget(
+            _boxed("What the specimen is predicted to do", self.prediction, self.prediction_note), 2, 1
+        )
+        for row in (1, 2):
+            cells.setRowStretch(row, 1)
+        for table in (self.limits, self.prediction):
+            # Neither asks for more height than the preview: they share what is there.
+            table.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
+        splitter = QSplitter()
+        splitter.addWidget(left)
+        splitter.addWidget(grid)
+        splitter.setStretchFactor(1, 1)
+        splitter.setChildrenCollapsible(False)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(splitter)
+
+
+def _kept_test(text: str) -> Measurement | None:
+    """Read what was kept; a test of an older version that is not allowed any more is left alone."""
+    if not text:
+        return None
+    try:
+        return validated(tomllib.loads(text), Measurement, "the last test")
+    except (ConfigurationError, tomllib.TOMLDecodeError):
+        return None
+
+
+def _boxed(title: str, *widgets: QWidget) -> QGroupBox:
+    box = QGroupBox(title)
+    layout = QVBoxLayout(box)
+    for widget in widgets:
+        layout.addWidget(widget)
+    layout.setStretch(0, 1)
+    return box

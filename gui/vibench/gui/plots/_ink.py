@@ -1,0 +1,65 @@
+"""What lines, dots and areas of a plot are drawn with: told anew at every change of theme."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+import pyqtgraph as pg
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor, QPen
+
+from ..widgets import Colour, Theme
+
+
+class Dash(Enum):
+    """How a line is drawn."""
+
+    SOLID = Qt.PenStyle.SolidLine
+    DASHED = Qt.PenStyle.DashLine
+    DOTTED = Qt.PenStyle.DotLine
+    DASH_DOTTED = Qt.PenStyle.DashDotLine
+
+
+@dataclass(frozen=True)
+class Ink:
+    """Which colour of a theme, and which dash: told anew at every change of theme."""
+
+    colour: Callable[[Theme], Colour]
+    dash: Dash = Dash.SOLID
+    filled: float = 0.0
+    """Opacity of an area, 0 to 1."""
+
+
+def trace(number: int, dash: Dash = Dash.SOLID) -> Ink:
+    """Ink of the trace with this number."""
+    return Ink(lambda theme: theme.traces[number % len(theme.traces)], dash)
+
+
+PREDICTED = Ink(lambda theme: theme.predicted, Dash.DASHED)
+LIMIT = Ink(lambda theme: "#b3261e" if theme.name == "light" else "#ff8a80", Dash.DASHED)
+GUIDE = Ink(lambda theme: theme.line, Dash.DOTTED)
+SIGNS = {Dash.SOLID: "━━━", Dash.DASHED: "╍╍╍", Dash.DOTTED: "┉┉┉", Dash.DASH_DOTTED: "━╸╺"}
+
+
+def straight_pen(ink: Ink, theme: Theme, ratio: float) -> QPen:
+    """Give the pen of a straight line, as wide as a pixel of the layout: so many of the screen."""
+    pen: QPen = pg.mkPen(ink.colour(theme), width=ratio, style=ink.dash.value)
+    return pen
+
+
+def curve_pen(ink: Ink, theme: Theme, ratio: float) -> QPen:
+    """Give the pen of a curve, one pixel of the screen wide; `logical_line` draws it wider.
+
+    Its dashes are as long on a fine screen as on a coarse one.
+    """
+    pen: QPen = pg.mkPen(ink.colour(theme), width=1, style=ink.dash.value)
+    if ink.dash is not Dash.SOLID and ratio > 1.0:
+        pen.setDashPattern([ratio * part for part in pen.dashPattern()])
+    return pen
+
+
+def shade_of(ink: Ink, theme: Theme) -> QColor:
+    """Give the colour of an area."""
+    colour: QColor = pg.mkColor(ink.colour(theme))
+    colour.setAlphaF(ink.filled or 0.25)
+    return colour

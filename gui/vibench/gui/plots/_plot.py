@@ -1,0 +1,297 @@
+"""A plot as all pages draw it: labelled axes, thin pens, a legend that follows the theme."""
+
+from collections.abc import Callable
+from math import log10
+
+import pyqtgraph as pg
+from PySide6.QtCore import QEvent, QRectF, Qt
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QPainter, QResizeEvent
+from PySide6.QtWidgets import QWidget
+
+from ..widgets import Theme, paint_hint
+from ._axis import Axis, AxisItem, Blankness, Scale
+from ._band import Band
+from ._grid import Grid
+from ._ink import SIGNS, Ink, curve_pen, shade_of, straight_pen
+from ._legend import LegendEntry, LegendLine
+from ._logical_line import LogicalLine
+from ._steady_range import steady_range
+from ._upright_marks import Rules, Stripes
+
+# Antialiasing halves the frame rate, and OpenGL draws grey areas on machines without it.
+pg.setConfigOptions(antialias=False, useOpenGL=False)
+
+
+_DOT = "●"
+_FIRST = -1000
+_RIGHT_EM = 0.6
+"""Room for half of the last number across."""
+_UP_EM = 5
+"""Room for the upright axis: the same in all plots, so that those above one another are aligned."""
+
+
+class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
+    """One pair of axes. Values are given as they are; logarithms are taken here.
+
+    With the focus on it: A shows everything, L changes the upright axis between linear and logarithmic,
+    Ctrl+C copies the picture.
+    """
+
+    def __init__(
+        self, name: str, across: Axis, up: Axis, theme: Theme, parent: QWidget | None = None
+    ) -> None:
+        self.across = AxisItem("bottom", across)
+        self.up = AxisItem("left", up)
+        # Menus that nobody can open would take half of the time of making a plot.
+        super().__init__(parent=parent, axisItems={"bottom": self.across, "left": self.up}, enableMenu=False)
+        self.setAccessibleName(name)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        for unseen in ("top", "right"):
+            # They would write a label anew, that nobody sees, at every change of the range.
+            self.getPlotItem().getAxis(unseen).unlinkFromView()
+        for axis in (self.across, self.up):
+            # Before the grid, which is drawn at their ticks.
+            axis.setZValue(_FIRST)
+        # A number that does not fit below the upper end of its axis would be cut in two.
+        self.up.setStyle(hideOverlappingLabels=True)
+        self.getPlotItem().layout.setContentsMargins(1, 1, round(_RIGHT_EM * self.fontMetrics().height()), 1)
+        # A width that followed the numbers would be known after painting, and everything painted again.
+        self.up.setWidth(_UP_EM * self.fontMetrics().height())
+        self.getPlotItem().hideButtons()
+        self._grid = Grid(self.across, self.up)
+        self.addItem(self._grid, ignoreBounds=True)
+        self.getPlotItem().setLogMode(across.scale is Scale.LOGARITHMIC, up.scale is Scale.LOGARITHMIC)
+        self._scales = [across.scale, up.scale]
+        self._inked: list[tuple[Ink, Callable[[Theme], None]]] = []
+        self._legend: LegendLine | None = None
+        self._legend_entries: list[tuple[Ink, str, str]] = []
+        self._curves: list[pg.PlotDataItem] = []
+        self._hint, self._is_empty = "", False
+        self._blanked: tuple[AxisItem, ...] = (self.across, self.up)
+        self._theme = theme
+        self._follows = False
+        self.getViewBox().sigRangeChangedManually.connect(self._let_be)
+        self.retheme(theme)
+
+    def with_legend(self) -> "Plot":
+        """Show names of the curves that have one, above the axes."""
+        self._legend = LegendLine(self)
+        self._relegend()
+        return self
+
+    def with_hint(self, text: str) -> "Plot":
+        """Say this while no curve has a point."""
+        self._hint = text
+        self._look_for_points()
+        return self
+
+    def always_numbered(self) -> "Plot":
+        """Keep the numbers across where there is no curve: another plot, above, has the same axis."""
+        self._blanked = (self.up,)
+        self.across.blank(Blankness.WRITTEN)
+        return self
+
+    def curve(self, ink: Ink, name: str = "") -> pg.PlotDataItem:
+        """Add a line; ``setData(x, y)`` draws it."""
+        item = LogicalLine()
+        item.setSkipFiniteCheck(False)
+        self._add(item)
+        if name:
+            self._legend_entries.append((ink, SIGNS[ink.dash], name))
+        self._ink(ink, lambda theme: item.setPen(curve_pen(ink, theme, self.devicePixelRatioF())))
+        self._relegend()
+        return item
+
+    def dots(self, ink: Ink, name: str = "", size: int = 4) -> pg.PlotDataItem:
+        """Add points without a line."""
+        item = pg.PlotDataItem(pen=None, symbol="o", symbolSize=size, symbolPen=None)
+        self._add(item)
+        if name:
+            self._legend_entries.append((ink, _DOT, name))
+        self._ink(ink, lambda theme: item.setSymbolBrush(pg.mkBrush(ink.colour(theme))))
+        self._relegend()
+        return item
+
+    def band(self, ink: Ink) -> Band:
+        """Add an area between two lines, for uncertainties and envelopes."""
+        band = Band()
+        self.addItem(band.item)
+        self._ink(ink, lambda theme: band.paint(shade_of(ink, theme)))
+        return band
+
+    def stripes(self, ink: Ink) -> Stripes:
+        """Add upright stripes: where something happens, or is predicted to."""
+        item = Stripes(self._across)
+        self.addItem(item, ignoreBounds=True)
+        self._ink(ink, lambda theme: item.dress(shade_of(ink, theme)))
+        return item
+
+    def rules(self, ink: Ink) -> Rules:
+        """Add upright lines without labels."""
+        item = Rules(self._across)
+        self.addItem(item, ignoreBounds=True)
+        self._ink(ink, lambda theme: item.dress(straight_pen(ink, theme, self.devicePixelRatioF())))
+        return item
+
+    def upright(self, ink: Ink, value: float, label: str = "", label_at: float = 0.92) -> pg.InfiniteLine:
+        """Add an upright line at a value; its label stands at a share of the height."""
+        return self._line(ink, self._across(value), 90, label, label_at)
+
+    def level(self, ink: Ink, value: float, label: str = "") -> pg.InfiniteLine:
+        """Add a level line at a value."""
+        shown = log10(value) if self._scales[1] is Scale.LOGARITHMIC else value
+        return self._line(ink, shown, 0, label, 0.92)
+
+    def wipe(self) -> None:
+        """Take every curve, band and line away, for others."""
+        self.getPlotItem().clear()
+        self.addItem(self._grid, ignoreBounds=True)
+        self._inked.clear()
+        self._legend_entries.clear()
+        self._curves.clear()
+        self._look_for_points()
+        self._relegend()
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self._theme = theme
+        self.setBackground(theme.base)
+        self._grid.dress(theme)
+        for axis in (self.across, self.up):
+            axis.setPen(pg.mkPen(theme.line, width=self.devicePixelRatioF()))
+            axis.setTextPen(pg.mkPen(theme.text))
+        for _, paint in self._inked:
+            paint(theme)
+        self._relegend()
+
+    @property
+    def lines_across(self) -> int:
+        """How many upright lines fill the picture; on a fine screen each is some of its pixels wide."""
+        return int(self.getViewBox().width())
+
+    def show_everything(self) -> None:
+        """Let the axes follow the data."""
+        self.getPlotItem().enableAutoRange()
+
+    def keep_in_view(
+        self, across: tuple[float, float] | None = None, up: tuple[float, float] | None = None
+    ) -> None:
+        """Let the axes follow these extremes, but only when they must: a quiet axis costs nothing to draw."""
+        if not any(self.getViewBox().autoRangeEnabled()) and not self._follows:
+            return
+        self._follows = True
+        shown = self.getViewBox().viewRange()
+        if across is not None and (wanted := steady_range(tuple(shown[0]), across)) is not None:
+            self.setXRange(*wanted, padding=0)
+        if up is not None and (wanted := steady_range(tuple(shown[1]), up)) is not None:
+            self.setYRange(*wanted, padding=0)
+
+    def event(self, event: QEvent) -> bool:
+        """Come to a screen with other pixels: straight lines are given its width."""
+        if event.type() == QEvent.Type.DevicePixelRatioChange and getattr(self, "_theme", None) is not None:
+            self.retheme(self._theme)
+        return bool(super().event(event))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Give the legend the lines it needs for the new width."""
+        super().resizeEvent(event)
+        # pyqtgraph calls this before the widget is whole, and when it is no more.
+        if getattr(self, "_legend", None) is not None and self.plotItem is not None:
+            self._place_legend()
+
+    def drawForeground(self, painter: QPainter, rect: QRectF) -> None:
+        """Say the hint where there is nothing else to see."""
+        super().drawForeground(painter, rect)
+        # A curve that is cleared says nothing.
+        self._look_for_points()
+        if self._is_empty:
+            painter.resetTransform()
+            inside = self.mapFromScene(self.getViewBox().sceneBoundingRect()).boundingRect()
+            paint_hint(painter, inside, self._hint, self._theme.muted)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Act on A, L and Ctrl+C, while the plot has the focus."""
+        match event.key(), event.modifiers():
+            case Qt.Key.Key_A, Qt.KeyboardModifier.NoModifier:
+                self.show_everything()
+            case Qt.Key.Key_L, Qt.KeyboardModifier.NoModifier:
+                self._turn_scale()
+            case Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier:
+                QGuiApplication.clipboard().setPixmap(self.grab())
+            case _:
+                # To the page: what it does with a key it does while a plot has the focus too.
+                event.ignore()
+                return
+        event.accept()
+
+    def _let_be(self, *_: object) -> None:
+        """Follow the data no more: somebody looks at a part of the picture."""
+        self._follows = False
+
+    def _turn_scale(self) -> None:
+        up = Scale.LINEAR if self._scales[1] is Scale.LOGARITHMIC else Scale.LOGARITHMIC
+        self._scales[1] = up
+        self.getPlotItem().setLogMode(y=up is Scale.LOGARITHMIC)
+        self.show_everything()
+
+    def _across(self, value: float) -> float:
+        return log10(value) if self._scales[0] is Scale.LOGARITHMIC else value
+
+    def _line(self, ink: Ink, position: float, angle: float, label: str, at: float) -> pg.InfiniteLine:
+        options = {"position": at, "movable": False}
+        item = pg.InfiniteLine(position, angle, label=label or None, labelOpts=options if label else None)
+        self.addItem(item, ignoreBounds=True)
+
+        def paint(theme: Theme) -> None:
+            item.setPen(straight_pen(ink, theme, self.devicePixelRatioF()))
+            if label:
+                item.label.setColor(ink.colour(theme))
+                item.label.fill = pg.mkBrush(theme.base)
+
+        self._ink(ink, paint)
+        return item
+
+    def _ink(self, ink: Ink, paint: Callable[[Theme], None]) -> None:
+        self._inked.append((ink, paint))
+        paint(self._theme)
+
+    def _add(self, item: pg.PlotDataItem) -> None:
+        self._curves.append(item)
+        self.addItem(item)
+        item.sigPlotChanged.connect(self._look_for_points)
+        self._look_for_points()
+
+    def _look_for_points(self, *_: object) -> None:
+        """Write the hint, and no numbers, where there is nothing that they could be about.
+
+        Best known before anything is painted: what is found out in painting has to be painted again.
+        """
+        self._is_empty = bool(self._hint) and not any(_has_points(each) for each in self._curves)
+        for axis in self._blanked:
+            axis.blank(Blankness.BLANK if self._is_empty else Blankness.WRITTEN)
+
+    def _relegend(self) -> None:
+        """Write the legend anew: its colours follow the theme."""
+        if self._legend is None:
+            return
+        self._legend.setStyleSheet(f"background: {self._theme.base}; color: {self._theme.text}")
+        self._legend.show_entries(
+            tuple(
+                LegendEntry(sign, ink.colour(self._theme), name) for ink, sign, name in self._legend_entries
+            )
+        )
+        self._place_legend()
+
+    def _place_legend(self) -> None:
+        """Put the legend into the row above the axes, which pyqtgraph keeps for a title."""
+        if self._legend is None:
+            return
+        left = self.fontMetrics().height()
+        width = max(1, self.width() - 2 * left)
+        height = self._legend.height_for(width)
+        self._legend.setGeometry(left, 0, width, height)
+        self.getPlotItem().layout.setRowFixedHeight(0, height)
+
+
+def _has_points(item: pg.PlotDataItem) -> bool:
+    return item.xData is not None and len(item.xData) > 0

@@ -1,0 +1,9 @@
+"""Small widgets and words that every part of the window uses.
+
+Colour themes and style sheets, buttons, tables to read, hints in empty areas, notices to the
+person, page names, and times as they are written on labels. It knows neither pages nor engine.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,37 @@
+from ._clock import (
+    clock as clock,
+    moment_text as moment_text,
+)
+from ._hint import (
+    paint_hint as paint_hint,
+)
+from ._notice import (
+    Notice as Notice,
+    NoticeKind as NoticeKind,
+    notice_of as notice_of,
+)
+from ._page_names import (
+    COMPARE as COMPARE,
+    FILES as FILES,
+    QUEUE as QUEUE,
+    RIG as RIG,
+    RUN as RUN,
+    SIMULATE as SIMULATE,
+    TEST as TEST,
+)
+from ._push_button import (
+    push_button as push_button,
+)
+from ._read_table import (
+    ReadTable as ReadTable,
+)
+from ._theme import (
+    DARK as DARK,
+    LIGHT as LIGHT,
+    THEMES as THEMES,
+    Colour as Colour,
+    Theme as Theme,
+    Tone as Tone,
+    palette as palette,
+    style_sheet as style_sheet,
+)

@@ -1,0 +1,13 @@
+from ._banner import (
+    CLOSED as CLOSED,
+    Face as Face,
+)
+from ._open_window import (
+    open_window as open_window,
+)
+from ._screenshots import (
+    make_screenshots as make_screenshots,
+)
+from ._status_line import (
+    StatusField as StatusField,
+)

@@ -1,0 +1,79 @@
+"""The state of the rig, by symbol, word and colour, with STOP beside it: on every page, always."""
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QAccessible, QAccessibleEvent
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
+
+from ..widgets import Tone
+
+
+@dataclass(frozen=True)
+class Face:
+    """What the banner shows of a state."""
+
+    symbol: str
+    word: str
+    tone: Tone
+    detail: str = ""
+    """What changes while the state stays: a clock, a level."""
+
+
+CLOSED = Face("○", "NO BENCH", Tone.CALM, "Open one on the Rig page")
+
+
+class Banner(QFrame):
+    """One face at a time; a change of its word is announced to screen readers."""
+
+    stop_wanted = Signal()
+    """Ramp down smoothly, as the plan says; pressed a second time: at once."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("banner")
+        self.setAccessibleName("State of the rig")
+        self._face = CLOSED
+        self._label = QLabel()
+        self._label.setObjectName("face")
+        self._detail = QLabel()
+        self._detail.setAccessibleName("Details of the state")
+        self._detail.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self._stop = QPushButton("■ STOP  (Esc)")
+        self._stop.setObjectName("stop")
+        self._stop.setAccessibleName("Stop")
+        self._stop.setToolTip(
+            "A click ramps the drive down as the plan says; Esc, as fast as the shaker bears.\n"
+            "This is not an emergency stop: in an emergency, switch the amplifier off."
+        )
+        self._stop.clicked.connect(self.stop_wanted)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(10, 6, 10, 6)
+        layout.addWidget(self._label)
+        layout.addWidget(self._detail, 1)
+        layout.addWidget(self._stop)
+        self._paint()
+
+    @property
+    def face(self) -> Face:
+        """What is shown."""
+        return self._face
+
+    def show_face(self, face: Face) -> None:
+        """Show a state; nothing is repainted while nothing changes."""
+        if face == self._face:
+            return
+        announced = face.word != self._face.word
+        self._face = face
+        self._paint()
+        if announced:
+            QAccessible.updateAccessibility(QAccessibleEvent(self._label, QAccessible.Event.Alert))
+
+    def _paint(self) -> None:
+        face = self._face
+        self._label.setText(f"{face.symbol}  {face.word}")
+        self._label.setAccessibleName(f"State: {face.word}")
+        self._detail.setText(face.detail)
+        if self._label.property("tone") != face.tone.value:
+            self._label.setProperty("tone", face.tone.value)
+            self._label.style().polish(self._label)

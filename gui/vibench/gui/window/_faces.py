@@ -1,0 +1,95 @@
+"""What the banner and the status line show of what the engine says."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from vibench.acquisition.engine import EngineState, EngineStatus, RunStatus
+
+from ..widgets import Tone, clock
+from ._banner import CLOSED, Face
+from ._status_line import StatusField
+
+_FACES = {
+    EngineState.CLOSED: CLOSED,
+    EngineState.OPENING: Face("◌", "OPENING", Tone.CALM, "Looking for the instruments"),
+    EngineState.READY: Face("●", "READY", Tone.GOOD),
+    EngineState.ARMED: Face("▲", "ARMED", Tone.CAUTION),
+    EngineState.RUNNING: Face("▶", "RUNNING", Tone.ACTIVE),
+    EngineState.HELD: Face("❚❚", "HELD", Tone.CAUTION),
+    EngineState.RAMPING_DOWN: Face("▼", "RAMPING DOWN", Tone.CAUTION),
+    EngineState.CHECKING: Face("◍", "CHECKING", Tone.ACTIVE, "A small sine plays for some seconds"),
+    EngineState.FAULT: Face("✖", "FAULT", Tone.DANGER, "Silent; open the bench again on the Rig page"),
+}
+
+
+_BYTES_PER_SAMPLE = 4
+
+
+_LITTLE_ROOM_S = 3600.0
+
+
+def face_of(status: EngineStatus | None) -> Face:
+    """Give the state a symbol, a word and what changes in it."""
+    if status is None:
+        return CLOSED
+    return replace(_FACES[status.state], detail=_detail(status))
+
+
+def _detail(status: EngineStatus) -> str:
+    """Say what changes while the state stays."""
+    match status.state:
+        case EngineState.READY if status.bench is not None:
+            return (
+                f"{status.bench.rig_name}, simulated" if status.bench.is_simulated else status.bench.rig_name
+            )
+        case EngineState.ARMED if status.armed is not None:
+            return f"F5 starts the drive; disarms itself in {status.armed.expires_in_s:.0f} s"
+        case EngineState.HELD:
+            return f"The drive stays on   ·   {run_text(status.run)}"
+        case EngineState.RUNNING | EngineState.RAMPING_DOWN:
+            return run_text(status.run)
+        case state:
+            return _FACES[state].detail
+
+
+def run_text(run: RunStatus | None) -> str:
+    """Say where a run stands."""
+    if run is None:
+        return "Beginning"
+    parts = [f"{run.name} ({run.number} of {run.count})" if run.count > 1 else run.name]
+    parts.append(run.run_state.value.replace("_", " "))
+    parts.append(f"{clock(run.elapsed_s)} of {clock(run.total_s)}")
+    parts.append(f"{run.amplitude_vpp:.3g} Vpp")
+    if run.frequency_hz is not None:
+        parts.append(f"{run.frequency_hz:.2f} Hz")
+    return "   ·   ".join(parts)
+
+
+def status_fields(
+    status: EngineStatus | None, frames_per_s: float, longest_wait_s: float
+) -> tuple[dict[StatusField, str], frozenset[StatusField]]:
+    """Fill the status line, and say which fields ask for a look."""
+    frames = f"{frames_per_s:.0f} fps, latency {1e3 * longest_wait_s:.0f} ms"
+    if status is None or status.bench is None:
+        return {StatusField.RIG: "no bench", StatusField.FRAMES: frames}, frozenset()
+    bench = status.bench
+    marked = set()
+    if status.lost_blocks:
+        marked.add(StatusField.OVERRUNS)
+    if status.overloads:
+        marked.add(StatusField.CLIPPED)
+    room_s = status.disk_free_bytes / (bench.sample_rate_hz * len(bench.channels) * _BYTES_PER_SAMPLE)
+    disk = ""
+    if status.disk_free_bytes:
+        disk = f"disk {status.disk_free_bytes / 1e9:.0f} GB = {room_s / 3600:.0f} h"
+        if room_s < _LITTLE_ROOM_S:
+            marked.add(StatusField.DISK)
+    texts = {
+        StatusField.RIG: f"{bench.rig_name}, {bench.sample_rate_hz / 1e3:g} kS/s × {len(bench.channels)}",
+        StatusField.OVERRUNS: f"overruns {status.lost_blocks}",
+        StatusField.CLIPPED: f"clipped {status.overloads}",
+        StatusField.DISK: disk,
+        StatusField.FILE: "" if status.run is None else f"file {Path(status.run.file).name}",
+        StatusField.FRAMES: frames,
+    }
+    return texts, frozenset(marked)

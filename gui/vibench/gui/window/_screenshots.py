@@ -1,0 +1,201 @@
+"""Pictures of every page, light and dark, in several sizes, made by the window while it measures."""
+
+import gc
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import monotonic
+
+import numpy as np
+from PySide6.QtCore import QEventLoop, QTimer
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QApplication
+
+from vibench.acquisition import shipped
+from vibench.acquisition.engine import Attendance, EngineState, start_engine
+from vibench.acquisition.plan import Measurement
+from vibench.analysis.live import RowSpacing
+
+from ..page import Desk, Remembered, Settings
+from ..pages.compare import ComparePage
+from ..pages.files import FilesPage
+from ..pages.queue import QueuePage
+from ..pages.simulate import SimulatePage
+from ..pages.test import TestPage
+from ..widgets import COMPARE, FILES, QUEUE, RUN, SIMULATE, TEST, THEMES, Theme
+from ._app import application
+from ._page_catalogue import PAGES
+from ._window import Window
+
+SIZE = (1280, 800)
+OTHER_SIZES = ((1280, 720), (1920, 1080))
+"""The smallest that everything must fit into, and a usual one; their pictures lie in folders of their own."""
+PATIENCE_S = 180.0
+STILL_MS = 1200
+"""Until the status line shows what a page in sight costs, and no more what it cost to get there."""
+_SMALLEST_FILE = 0
+SHOWN = Measurement.model_validate(
+    {
+        "name": "sweep",
+        "ramp_s": 0.3,
+        "ramp_step_s": 0.03,
+        "excitation": {
+            "kind": "sine_sweep",
+            "amplitude_vpp": 1.5,
+            "start_hz": 150,
+            "stop_hz": 350,
+            "duration_s": 20,
+            "settle_s": 0.5,
+            "hold": "displacement",
+        },
+    }
+)
+"""The paper's sweep through the impacting region, ten times as fast."""
+SHOWN_AT_S = 17.0
+SHOWN_TOO = Measurement.model_validate(
+    {
+        "name": "dwell",
+        "ramp_s": 0.3,
+        "ramp_step_s": 0.03,
+        "excitation": {"kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "duration_s": 3},
+    }
+)
+CAMPAIGN = "campaigns/paper.toml"
+
+
+def make_screenshots(bench: Path | None, folder: Path) -> int:
+    """Measure with a window, and picture its pages; gives the exit code of the process."""
+    application(["vibench"])
+    with TemporaryDirectory(prefix="vibench_") as scratch:
+        settings = Settings(Path(scratch) / "window.ini")
+        if bench is not None:
+            settings.keep_text(Remembered.BENCH, str(bench.resolve()))
+        # Unattended: to change the theme and to write pictures takes longer than an attended run waits.
+        desk = Desk(settings, partial(start_engine, Attendance.UNATTENDED))
+        desk.choose_folder(Path(scratch) / "recordings")
+        window = Window(desk, PAGES)
+        # As in `vibench.gui.window`: pictures are to show what a person would see.
+        gc.freeze()
+        window.resize(*SIZE)
+        window.show()
+        try:
+            _open_and_check(window)
+            _measure(window, SHOWN_TOO, lambda: None)
+            _measure(window, SHOWN, lambda: _picture(window, (RUN,), folder))
+            _fill(window)
+            _picture(window, tuple(name for name in window.pages if name != RUN), folder)
+            _picture_spectrogram(window, folder)
+            for width, height in OTHER_SIZES:
+                window.resize(width, height)
+                _picture(window, tuple(window.pages), folder / f"{width}x{height}")
+        finally:
+            window.close()
+    return 0
+
+
+def _open_and_check(window: Window) -> None:
+    bridge, rig = window.desk.bridge, window.desk.intent.rig
+    assert rig is not None
+    bridge.open(rig, None)
+    _wait(lambda: bridge.state is EngineState.READY)
+    window.orders.check()
+    _wait(lambda: bridge.status is not None and bridge.status.check is not None)
+
+
+def _measure(window: Window, measurement: Measurement, during: Callable[[], None]) -> None:
+    """Arm and start; ``during`` happens when so much of the run is over that the masses collide."""
+    bridge, test = window.desk.bridge, window.pages[TEST]
+    assert isinstance(test, TestPage)
+    test.form.show_measurement(measurement)
+    _wait(lambda: not test.is_busy and bridge.state is EngineState.READY)
+    window.orders.arm_test()
+    _wait(lambda: bridge.state is EngineState.ARMED)
+    window.orders.start()
+    _wait(lambda: bridge.state is EngineState.RUNNING)
+    _wait(lambda: _elapsed_s(window) > SHOWN_AT_S or bridge.state is EngineState.READY)
+    during()
+    _wait(lambda: bridge.state is EngineState.READY)
+
+
+def _elapsed_s(window: Window) -> float:
+    status = window.desk.bridge.status
+    return 0.0 if status is None or status.run is None else status.run.elapsed_s
+
+
+def _fill(window: Window) -> None:
+    """Simulate what the form says at first, lay it over what was measured, and take over a campaign."""
+    compare, simulation, queue = (window.pages[name] for name in (COMPARE, SIMULATE, QUEUE))
+    assert isinstance(compare, ComparePage)
+    assert isinstance(simulation, SimulatePage)
+    assert isinstance(queue, QueuePage)
+    simulation.begin()
+    compare.add_recordings(tuple(sorted(window.desk.folder.glob("sweep*.h5"))))
+    queue.open_file(shipped(CAMPAIGN))
+    _wait(lambda: not simulation.simulator.is_busy and not compare.is_busy)
+    for path in window.desk.folder.glob("sweep*.h5"):
+        window.desk.recording_wanted.emit(path)
+    if simulation.course is not None:
+        compare.add_prediction(simulation.course.traces())
+
+
+def _picture(window: Window, pages: tuple[str, ...], folder: Path) -> None:
+    """Save each page in each theme."""
+    first = window.desk.theme
+    for page in pages:
+        window.show_page(page)
+        _save(window, folder, page.lower())
+    _themed(window, first)
+
+
+def _picture_spectrogram(window: Window, folder: Path) -> None:
+    """Save the other picture of the Files page, small: noise makes large files."""
+    files = window.pages[FILES]
+    assert isinstance(files, FilesPage)
+    window.resize(*OTHER_SIZES[0])
+    window.show_page(FILES)
+    files.pictures.setCurrentWidget(files.pictures.spectrogram)
+    files.pictures.spectrogram.spacing.setCurrentText(RowSpacing.LOGARITHMIC.value)
+    _pass_ms(STILL_MS)
+    _wait(lambda: not files.pictures.spectrogram.is_busy)
+    _save(window, folder, "files_spectrogram")
+    files.pictures.setCurrentWidget(files.lanes)
+
+
+def _save(window: Window, folder: Path, name: str) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for theme in THEMES.values():
+        _themed(window, theme)
+        window.loop_watch.begin()
+        _pass_ms(STILL_MS)
+        _write(window.grab().toImage(), folder / f"{name}_{theme.name}.png")
+
+
+def _write(picture: QImage, path: Path) -> None:
+    """Write 32 shades of each colour: no eye sees it, and the file is half as large."""
+    picture = picture.convertToFormat(QImage.Format.Format_RGB32)
+    shades = np.frombuffer(picture.constBits(), np.uint8) & 0xF8
+    small = QImage(
+        (shades | shades >> 5).tobytes(), picture.width(), picture.height(), picture.bytesPerLine(),
+        QImage.Format.Format_RGB32,
+    )  # fmt: skip
+    small.save(str(path), None, _SMALLEST_FILE)
+
+
+def _themed(window: Window, theme: Theme) -> None:
+    if window.desk.theme is not theme:
+        window.desk.choose_theme(theme)
+        _wait(lambda: window.is_themed)
+
+
+def _wait(is_so: Callable[[], bool]) -> None:
+    give_up_s = monotonic() + PATIENCE_S
+    while not is_so() and monotonic() < give_up_s:
+        QApplication.processEvents(QEventLoop.ProcessEventsFlag.AllEvents, 20)
+
+
+def _pass_ms(duration_ms: int) -> None:
+    """Let the window live for a while."""
+    loop = QEventLoop()
+    QTimer.singleShot(duration_ms, loop.quit)
+    loop.exec()

@@ -1,0 +1,199 @@
+"""The frame: banner and STOP, messages, the rail of pages, the status line."""
+
+from collections.abc import Callable
+from functools import partial
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import (
+    QApplication,
+    QHBoxLayout,
+    QMainWindow,
+    QMessageBox,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from ..engine_link import SignOfLife
+from ..page import Desk, Orders, Page, Remembered
+from ..widgets import RUN, Theme, palette, style_sheet
+from ._abort_key import AbortKey
+from ._banner import Banner
+from ._faces import face_of, status_fields
+from ._frame_count import FrameCount
+from ._loop_watch import LoopWatch
+from ._menus import build_menus
+from ._message_strip import MessageStrip
+from ._page_catalogue import PageEntry
+from ._rail import Rail
+from ._status_line import StatusField, StatusLine
+
+TICK_MS = 50
+"""Twenty pictures a second: more cost a core, fewer look jerky."""
+
+
+class Window(QMainWindow):
+    """Holds the pages; what they show, and what the banner shows, comes from the engine at every tick."""
+
+    def __init__(self, desk: Desk, entries: tuple[PageEntry, ...]) -> None:
+        super().__init__()
+        self.desk = desk
+        self.setWindowTitle("vibench")
+        self.banner = Banner()
+        self.strip = MessageStrip()
+        self.status_line = StatusLine()
+        ordered = sorted(entries, key=lambda entry: entry.number)
+        self.pages: dict[str, Page] = {entry.name: entry.make(desk) for entry in ordered}
+        self.rail = Rail(tuple(self.pages))
+        self.rail.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._stack = QStackedWidget()
+        self._unthemed: list[Callable[[], None]] = []
+        for name, page in self.pages.items():
+            page.setAccessibleName(f"{name} page")
+            self._stack.addWidget(page)
+        self._lay_out()
+        self.orders = Orders(desk, self)
+        build_menus(self, desk, self.orders, tuple(self.pages), self._reset_layout)
+        self._connect()
+        self._restore()
+        self._timer = QTimer(self, interval=TICK_MS)
+        self._timer.timeout.connect(self.tick)
+        self._timer.start()
+        self._frames = FrameCount()
+        self.loop_watch = LoopWatch(lambda: f"{self.rail.chosen_name} page", self)
+
+    @property
+    def page(self) -> Page:
+        """The page in sight."""
+        page = self._stack.currentWidget()
+        assert isinstance(page, Page)
+        return page
+
+    def show_page(self, name: str) -> None:
+        """Bring a page into sight."""
+        page = self.pages.get(name)
+        if page is None or page is self._stack.currentWidget():
+            return
+        self.page.left()
+        self._stack.setCurrentWidget(page)
+        self.rail.choose(name)
+        self.desk.settings.keep_text(Remembered.PAGE, name)
+        page.entered()
+        page.refresh()
+
+    def tick(self) -> None:
+        """Show what is true now, and let the engine know that somebody looks."""
+        self.desk.bridge.tick()
+        status = self.desk.bridge.status
+        self.banner.show_face(face_of(status))
+        self.status_line.show_fields(
+            *status_fields(status, self._frames.counted(), self.loop_watch.longest_s)
+        )
+        self.status_line.explain(StatusField.FRAMES, self.loop_watch.text)
+        self.page.refresh()
+        self.rail.show_done({name: page.is_done for name, page in self.pages.items()})
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Ask first while something runs; then let the engine end, and keep the shape of the window."""
+        if self.desk.bridge.is_driving and not self._may_close():
+            event.ignore()
+            return
+        self._timer.stop()
+        self.loop_watch.stop()
+        self.desk.bridge.close()
+        self.page.left()
+        self.desk.settings.keep_state(Remembered.GEOMETRY, self.saveGeometry())
+        self.desk.background.close()
+        super().closeEvent(event)
+
+    def _may_close(self) -> bool:
+        """Ask whether to stop what runs; the drive goes on meanwhile, and Esc aborts it."""
+        answer = QMessageBox.question(
+            self,
+            "A measurement is running",
+            "Ramp down, keep the recording, and close the window?",
+            QMessageBox.StandardButton.Yes | QMessageBox.StandardButton.Cancel,
+            QMessageBox.StandardButton.Cancel,
+        )
+        return answer == QMessageBox.StandardButton.Yes
+
+    def _lay_out(self) -> None:
+        body = QHBoxLayout()
+        body.setContentsMargins(0, 0, 0, 0)
+        body.setSpacing(0)
+        body.addWidget(self.rail)
+        body.addWidget(self._stack, 1)
+        middle = QWidget()
+        layout = QVBoxLayout(middle)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(self.banner)
+        layout.addWidget(self.strip)
+        layout.addLayout(body, 1)
+        layout.addWidget(self.status_line)
+        self.setCentralWidget(middle)
+
+    def _connect(self) -> None:
+        self.rail.chosen.connect(self.show_page)
+        self.desk.page_wanted.connect(self.show_page)
+        self.desk.noticed.connect(self.strip.say)
+        self.desk.theme_changed.connect(self._retheme)
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)
+        self.abort_key = AbortKey(application, self)
+        self.sign_of_life = SignOfLife(application, self.desk.bridge, self)
+        self.abort_key.pressed.connect(self.orders.abort)
+        self.banner.stop_wanted.connect(self.orders.stop)
+        self.desk.bridge.armed.connect(lambda _plan: self.show_page(RUN))
+        self.desk.bridge.armed.connect(lambda _plan: self.strip.give_way())
+
+    def _restore(self) -> None:
+        self.resize(1280, 800)
+        geometry = self.desk.settings.state(Remembered.GEOMETRY)
+        if not geometry.isEmpty():
+            self.restoreGeometry(geometry)
+        first = next(iter(self.pages))
+        wanted = self.desk.settings.text(Remembered.PAGE, first)
+        name = wanted if wanted in self.pages else first
+        self._stack.setCurrentWidget(self.pages[name])
+        self.rail.choose(name)
+        self._prepare_theme(self.desk.theme)
+        while self._unthemed:
+            self._unthemed.pop(0)()
+
+    def _retheme(self, theme: Theme) -> None:
+        """Put on other colours: the frame at once, then page by page, so that nobody has to wait."""
+        self._prepare_theme(theme)
+        QTimer.singleShot(0, self, self._theme_next)
+
+    def _prepare_theme(self, theme: Theme) -> None:
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)
+        application.setPalette(palette(theme))
+        sheet = style_sheet(theme)
+        # A style sheet for the whole application would hold the window up for a third of a second.
+        for part in (self.banner, self.strip, self.rail, self.status_line):
+            part.setStyleSheet(sheet)
+        pages = sorted(self.pages.values(), key=lambda each: each is not self._stack.currentWidget())
+        self._unthemed = [
+            step
+            for page in pages
+            for step in (partial(page.retheme, theme), partial(page.setStyleSheet, sheet))
+        ]
+
+    @property
+    def is_themed(self) -> bool:
+        """Whether every page has its colours."""
+        return not self._unthemed
+
+    def _theme_next(self) -> None:
+        if self._unthemed:
+            self._unthemed.pop(0)()
+            self.desk.bridge.beat()
+            QTimer.singleShot(0, self, self._theme_next)
+
+    def _reset_layout(self) -> None:
+        self.desk.settings.forget_layout()
+        self.showNormal()
+        self.resize(1280, 800)
