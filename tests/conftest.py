@@ -40,8 +40,8 @@ def pytest_report_header() -> str:
 LONGEST = (
     "tests/cli/test_demo.py",
     "tests/sim/chain/test_integrate.py",
-    "tests/sim/growth/test_lyapunov_spectrum.py",
-    "tests/sim/growth/test_tangent.py",
+    "tests/sim/exponents/test_lyapunov_spectrum.py",
+    "tests/sim/exponents/test_tangent.py",
     "tests/cli/test_killed_campaign.py",
     "tests/gui/pages/compare/test_compare_page.py",
 )

@@ -26,7 +26,7 @@ from vibench.acquisition.rig._knobs import confirm_by_asking
 from vibench.virtual_rig import VirtualRig
 from vibench.virtual_rig.generator import Panel, Quirks
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 CONFIGS = ROOT / "hardware_configs"
 _serials = itertools.count(1)
 

@@ -19,7 +19,7 @@ from vibench.virtual_rig import VirtualRig
 from vibench.virtual_rig.generator import Panel, Quirks
 from vibench.virtual_rig.usb._remote import RemoteUsbDevice
 
-SHIPPED = load_rig(Path(__file__).parents[2] / "hardware_configs" / "virtual_rig.toml")
+SHIPPED = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 RIG = SHIPPED.model_copy(
     update={
         "generator": SHIPPED.generator.model_copy(update={"resource": "USB0::0x0699::0x0353::C060606::INSTR"})

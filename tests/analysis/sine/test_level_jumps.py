@@ -14,7 +14,7 @@ from vibench.analysis.report._findings import findings
 from vibench.analysis.results import SteppedSineResult
 from vibench.analysis.sine import SteppedResponse, hysteresis_vpp, level_jumps
 
-RIG = load_rig(Path(__file__).parents[2] / "hardware_configs" / "virtual_rig.toml")
+RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 
 
 @pytest.fixture(scope="module")

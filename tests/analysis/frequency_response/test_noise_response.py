@@ -15,7 +15,7 @@ from vibench.analysis.signals import phase_half_width
 from vibench.sim import base_transmissibility, gong2025
 from vibench.virtual_rig.world._input_stage import AC_CUT_HZ
 
-STREAMING = Path(__file__).parents[2] / "hardware_configs" / "virtual_rig_streaming.toml"
+STREAMING = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig_streaming.toml"
 WEAK_VPP, STRONG_VPP = 0.067, 7.0
 # The weak one long enough for its lines to be finer than the narrowest resonance, of 1.1 Hz.
 DURATION_S = {WEAK_VPP: 18.0, STRONG_VPP: 30.0}

@@ -17,7 +17,7 @@ from vibench.virtual_rig.analogue import Coupling, Input
 from vibench.virtual_rig.rig._fault_kinds import DISK_FAULTS
 from vibench.virtual_rig.rig._fault_script import FaultScript, PlayedFault
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 NIGHT = ROOT / "hardware_configs" / "faults" / "night.toml"
 STEP_S = 1 / 102_400
 _serials = itertools.count(1)

@@ -8,7 +8,7 @@ from vibench.acquisition import list_instruments
 from vibench.acquisition.rig import load_rig
 from vibench.virtual_rig import VirtualRig
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ NOISE_M_PER_S = 2e-5
 @pytest.fixture(scope="module")
 def synthetic():
     """The tests are no package: a module beside this file is loaded by its path."""
-    place = Path(__file__).with_name("synthetic_recordings.py")
+    place = Path(__file__).parents[1] / "synthetic_recordings.py"
     spec = importlib.util.spec_from_file_location("synthetic_recordings", place)
     module = importlib.util.module_from_spec(spec)
     sys.modules.setdefault(spec.name, module)

@@ -11,7 +11,7 @@ from vibench.acquisition.rig import Quantity, load_rig
 from vibench.analysis import foresee
 from vibench.analysis.model._foresight import bands_of, base_amplitude_m
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 QUICK = {each.name: each for each in load_campaign(ROOT / "campaigns" / "quick.toml").measurements}
 RIG = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
 

@@ -9,7 +9,7 @@ from vibench.analysis.report import accuracy_document, tradeoff_figure, worst_er
 from vibench.sim import Accuracy
 from vibench.sim.accuracy_benchmark import MOTIONS, Thoroughness, measured_trade
 
-PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
+PAGE = Path(__file__).parents[3] / "docs" / "accuracy.md"
 
 
 @pytest.fixture(scope="module")

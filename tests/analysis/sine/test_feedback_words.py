@@ -16,7 +16,7 @@ from vibench.analysis.report._findings import findings
 from vibench.analysis.results import SteppedSineResult
 from vibench.analysis.sine import feedback_sentences, noted_jumps
 
-ROOT = Path(__file__).parent.parent.parent
+ROOT = Path(__file__).parents[3]
 JUMP = {"direction": "down", "before_hz": 101.25, "after_hz": 100.9375, "how": "localised"}
 STEP = {"segment": "step", "motion": "periodic", "period": 1, "level": "within tolerance"}
 
