@@ -23,13 +23,13 @@ from PySide6.QtWidgets import QApplication
 
 from vibench.analysis import Origin, Response, Trace
 from vibench.analysis.simulation import SimulationCourse
-from vibench.analysis.simulation._answers import SimulatedPoint
+from vibench.analysis.simulation._request import SimulatedPoint
 from vibench.gui.page import Desk, Settings
 from vibench.gui.pages.compare import ComparePage
 from vibench.gui.pages.files import FilesPage
 from vibench.gui.pages.simulate import SimulatePage
-from vibench.gui.window._app import application
 from vibench.gui.window._loop_watch import LoopWatch
+from vibench.gui.window._open_window import application
 
 SIZE = (1400, 900)
 SPANS_S = (600.0, 60.0, 6.0, 2.4, 0.6, 0.06)

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 STARTED = """
 import sys, time
 from pathlib import Path
-from vibench.gui.window._app import application
+from vibench.gui.window._open_window import application
 from vibench.gui.page import Desk
 from vibench.gui.window._page_catalogue import PAGES
 from vibench.gui.page import Settings

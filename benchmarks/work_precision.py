@@ -23,10 +23,10 @@ from scipy.integrate import solve_ivp
 
 from vibench.sim import Accuracy, PowerLaw
 from vibench.sim.accuracy_benchmark import MOTIONS
+from vibench.sim.accuracy_benchmark._figures import Regime
 from vibench.sim.accuracy_benchmark._independent_solution import independent_state, state_error
 from vibench.sim.accuracy_benchmark._measuring import settled_state
 from vibench.sim.accuracy_benchmark._plain_equations import Place, law_of, numbers_of, rates_at
-from vibench.sim.accuracy_benchmark._regimes import Regime
 from vibench.sim.scene._followed_run import FollowedRun
 from vibench.sim.study import software
 

@@ -4,7 +4,7 @@ import json
 import sys
 
 from vibench.acquisition.campaign import Estimate
-from vibench.cli.estimate_text import estimate_text
+from vibench.cli.measure import estimate_text
 
 from .killed_campaign import short_points, slow_rig
 

@@ -9,7 +9,7 @@ from vibench.acquisition.engine import EngineState
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
 from vibench.gui.page import Desk, Settings
-from vibench.gui.window._app import application
+from vibench.gui.window._open_window import application
 from vibench.gui.window._page_catalogue import PAGES
 from vibench.gui.window._window import Window
 

@@ -12,11 +12,11 @@ from vibench.acquisition.rig import load_rig
 from vibench.analysis import campaign_summary
 from vibench.analysis.report import write_report
 
-from .analysis_bar import analysis_bar
 from .analyst import second_process
 from .measure import STOPPED_EXIT_CODE, the_bench
 from .output import bold, console, write_json
 from .paths import unused
+from .progress_bars import analysis_bar
 
 
 def demo(

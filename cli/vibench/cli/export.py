@@ -9,7 +9,7 @@ from vibench.acquisition import open_recording
 from vibench.analysis.exchange import Format, Results, excerpt, export_samples
 
 from .output import console
-from .transfer_bar import transfer_bar
+from .progress_bars import transfer_bar
 
 
 def export(

@@ -19,9 +19,9 @@ from vibench.analysis.report import (
 from vibench.sim import Accuracy
 
 from .analyse import complain_about
-from .kept_study import kept_study
 from .output import bold, console
 from .paths import room_for_folder
+from .study import kept_study
 
 ALL = "all"
 EXPERIMENT = (12, 13, 14)

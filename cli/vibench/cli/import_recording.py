@@ -12,7 +12,7 @@ from vibench.analysis.exchange import ImportMapping, SourceChannel, import_recor
 
 from .output import console, print_json
 from .paths import AsJson
-from .transfer_bar import transfer_bar
+from .progress_bars import transfer_bar
 
 
 def import_file(

@@ -1,21 +1,96 @@
-"""`vibench measure`: carry out a campaign, one recording a measurement."""
+"""`vibench measure`: carry out a campaign, one recording a measurement.
+
+What a campaign will take, as a person or a program reads it.
+
+Options that say who is told of faults and of the end of a campaign.
+"""
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from dataclasses import asdict
+from datetime import timedelta
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from vibench.acquisition import CheckRule, ConfigurationError, load_campaign
-from vibench.acquisition.campaign import AfterFailure, ChangedBench, Existing, Item, estimate
+from vibench.acquisition import CheckRule, ConfigurationError, load_campaign, load_toml
+from vibench.acquisition.campaign import (
+    AfterFailure,
+    ChangedBench,
+    CommandMessenger,
+    Estimate,
+    Existing,
+    Item,
+    MailMessenger,
+    MailSettings,
+    Messenger,
+    estimate,
+)
 from vibench.acquisition.engine import Attendance, Desk, Engine, Orders, Work, hosted
 from vibench.acquisition.rig import Rig
 
 from .engine_bars import Watching
-from .estimate_text import Form, tell_estimate
-from .messengers import MailPath, NotifyCommand, messengers_of
+from .output import console, print_json
 from .paths import BenchPath, FaultsPath, rig_at
+
+
+class Form(StrEnum):
+    """Who reads it."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+def tell_estimate(expected: Estimate, form: Form) -> None:
+    """Say how many recordings, how long and how large, and whether the disk has room for them."""
+    match form:
+        case Form.JSON:
+            print_json(asdict(expected) | {"needed_bytes": expected.needed_bytes, "fits": expected.fits})
+        case Form.TEXT:
+            console.print(estimate_text(expected), markup=False)
+
+
+def estimate_text(expected: Estimate) -> str:
+    """Put an estimate into a few lines."""
+    length = timedelta(seconds=round(expected.duration_s))
+    kept = f" ({expected.kept} kept)" if expected.kept else ""
+    room = f"about {expected.total_bytes / 1e6:.0f} MB; {expected.free_bytes / 1e6:.0f} MB are free"
+    count = "1 recording" if expected.recordings == 1 else f"{expected.recordings} recordings"
+    lines = [f"{count}{kept}, {length} (h:min:s) of rig time, {room}"]
+    if expected.rest_s:
+        lines.append(f"{timedelta(seconds=round(expected.rest_s))} of it are silence between recordings")
+    if expected.lead_in_s:
+        lead_in = timedelta(seconds=round(expected.lead_in_s))
+        lines.append(f"{lead_in} of it lead to points along their chains")
+    if not expected.fits:
+        lines.append("The disk may be full before the end: make room, or record elsewhere")
+    return "\n".join(lines)
+
+
+NotifyCommand = Annotated[
+    str | None,
+    typer.Option(
+        "--notify",
+        metavar="COMMAND",
+        help="Run at every fault and at the end, the reason as JSON on its standard input; no shell.",
+    ),
+]
+MailPath = Annotated[
+    Path | None, typer.Option("--mail", metavar="MAIL.toml", help="Send mail at every fault and at the end.")
+]
+
+
+def messengers_of(notify: str | None, mail: Path | None) -> tuple[Messenger, ...]:
+    """Give the ways to reach somebody that were asked for; raises ConfigurationError."""
+    found: list[Messenger] = []
+    if notify is not None:
+        found.append(CommandMessenger.of(notify))
+    if mail is not None:
+        found.append(MailMessenger(load_toml(mail.expanduser(), MailSettings)))
+    return tuple(found)
+
 
 STOPPED_EXIT_CODE = 3
 """Not everything was recorded, and nothing failed: somebody stopped it."""

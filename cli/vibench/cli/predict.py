@@ -18,8 +18,8 @@ from .frequency_option import frequencies
 from .interruption import told_to_stop
 from .output import console, print_json, print_warnings
 from .paths import AsJson
+from .progress_bars import study_bar
 from .study import STOPPED_EXIT_CODE, Cluster, Workers
-from .study_bar import study_bar
 
 AUTO: Literal["auto"] = "auto"
 _SHOWN = 24

@@ -24,10 +24,9 @@ from vibench.analysis.reproduction import (
 )
 from vibench.sim import Accuracy
 
-from .kept_study import kept_study
 from .output import bold, console
 from .paths import room_for_folder
-from .study import Workers
+from .study import Workers, kept_study
 
 PAGE = "reproduction.md"
 IMAGES = "images"

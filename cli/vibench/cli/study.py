@@ -1,5 +1,9 @@
-"""`vibench study`: every combination of what a TOML file lists, predicted into one HDF5 file."""
+"""`vibench study`: every combination of what a TOML file lists, predicted into one HDF5 file.
 
+A study that is kept in a folder under a name of its own, and goes on where it was stopped.
+"""
+
+import hashlib
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +15,7 @@ from vibench.sim.study import Existing, Study, StudyResults, doubts, solve_study
 from .interruption import told_to_stop
 from .output import console, print_json, print_warnings
 from .paths import AsJson
-from .study_bar import study_bar
+from .progress_bars import study_bar
 
 STOPPED_EXIT_CODE = 3
 """Not everything was computed, and nothing failed: somebody stopped it."""
@@ -75,3 +79,22 @@ def tell(results: StudyResults, out: Path) -> None:
         console.print(f"  {place}: {why}", markup=False)
     if len(failures) > SHOWN_FAILURES:
         console.print(f"  and {len(failures) - SHOWN_FAILURES} more; see `message` in the file")
+
+
+_DIGEST = 16
+
+
+def kept_study(study: Study, folder: Path, workers: int | None) -> StudyResults:
+    """Solve a study, or what is missing of it: its file is named by everything that it asks."""
+    folder.mkdir(parents=True, exist_ok=True)
+    digest = hashlib.sha256(study.model_dump_json().encode()).hexdigest()[:_DIGEST]
+    with told_to_stop() as is_stopped, study_bar(study.grid.size) as watcher:
+        results = solve_study(
+            study, folder / f"{digest}.h5", Existing.RESUME, workers, watcher=watcher, cancelled=is_stopped
+        )
+    if not results.is_complete:
+        typer.echo(
+            f"stopped after {results.kept} of {study.grid.size} points; the same command goes on", err=True
+        )
+        raise typer.Exit(STOPPED_EXIT_CODE)
+    return results

@@ -21,8 +21,7 @@ from vibench.acquisition import (
 )
 from vibench.acquisition.bench import rig_digest
 from vibench.acquisition.check import require_fresh
-from vibench.acquisition.check._admission import why_not
-from vibench.acquisition.check._archive import archive_path, keep
+from vibench.acquisition.check._admission import archive_path, keep, why_not
 from vibench.acquisition.plan import Dwell, Measurement
 
 NOW = datetime(2026, 5, 4, 12, 0, tzinfo=UTC)

@@ -9,7 +9,7 @@ import pytest
 from vibench.acquisition import BenchReport, InstrumentLost, StopSwitch, Verdict, open_bench
 from vibench.acquisition.bench import Bounds
 from vibench.acquisition.check._bench_report import check_bench
-from vibench.acquisition.check._sine_fit import clock_ratio, fit_sine
+from vibench.acquisition.check._loop import clock_ratio, fit_sine
 from vibench.acquisition.errors import CheckStopped
 from vibench.acquisition.rig import load_rig
 from vibench.acquisition.stopping import Cause, StopRequest

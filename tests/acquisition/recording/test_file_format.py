@@ -8,7 +8,7 @@ import pytest
 
 from vibench.acquisition import Overload, open_recording
 from vibench.acquisition.recording import ResultArray, create_recording
-from vibench.acquisition.recording._chunks import create_counts, write_chunks
+from vibench.acquisition.recording._finalise import create_counts, write_chunks
 
 SAMPLES = 120_000
 

@@ -8,7 +8,7 @@ from vibench.acquisition import ConfigurationError
 from vibench.acquisition.excitation import Stream, Tone, Waveform
 from vibench.acquisition.excitation._streamed_noise import GaussianBand
 from vibench.acquisition.plan import Phase, RunState
-from vibench.acquisition.run._output_synthesizer import RELEASE_S, Score
+from vibench.acquisition.run._stream_drive import RELEASE_S, Score
 
 RATE_HZ = 5120.0
 NOISE = Stream(GaussianBand(50.0, 600.0, seed=3))

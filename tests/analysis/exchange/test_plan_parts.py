@@ -5,7 +5,7 @@ import pytest
 from vibench.acquisition import validated
 from vibench.analysis import InvalidRequest
 from vibench.analysis.exchange import ImportMapping
-from vibench.analysis.exchange._plan_parts import laid_parts
+from vibench.analysis.exchange._import_recording import laid_parts
 
 NOISE = {
     "kind": "multisine_noise",

@@ -6,8 +6,11 @@ from hypothesis import given, settings, strategies as st
 
 from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.frequency_response._best_linear_approximation import Scatter
-from vibench.analysis.frequency_response._periodic_transmission import PeriodicSums, periodic_transmission
+from vibench.analysis.frequency_response._periodic_transmission import (
+    PeriodicSums,
+    Scatter,
+    periodic_transmission,
+)
 
 RATE = 5120.0
 

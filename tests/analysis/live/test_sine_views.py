@@ -7,7 +7,7 @@ from vibench.analysis.live._drive_tone import drive_tone, drive_turns
 from vibench.analysis.live._portrait import PoincareSection, portrait, portrait_samples
 from vibench.analysis.live._ring import Window
 from vibench.analysis.live._sine_response import SinePoint, look_samples, sine_point, stretch_samples
-from vibench.analysis.live._sweep_trace import SweepTrace
+from vibench.analysis.live._view import SweepTrace
 
 RATE = 51_200.0
 A0 = 4e-6

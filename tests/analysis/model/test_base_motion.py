@@ -7,8 +7,12 @@ from vibench.acquisition import open_recording
 from vibench.acquisition.excitation._stepped_sine import FrequencyGrid
 from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep, SteppedSine
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.model._base_motion import advanced, lowest_frequency_hz, recorded_base_motion
-from vibench.analysis.model._simulated_channels import shaken
+from vibench.analysis.model._simulated_channels import (
+    advanced,
+    lowest_frequency_hz,
+    recorded_base_motion,
+    shaken,
+)
 from vibench.analysis.recordings._facts import plan_of
 from vibench.sim import Accuracy, Sampled, gong2025, integrate
 

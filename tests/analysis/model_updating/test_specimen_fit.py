@@ -8,10 +8,10 @@ import pytest
 
 from vibench.analysis import Estimator, InvalidRequest, NotEnoughData, Transmission
 from vibench.analysis.frequency_response import TransmissionSettings
-from vibench.analysis.model_updating._specimen_fit import fit_specimen
-from vibench.analysis.model_updating._specimen_parameters import (
+from vibench.analysis.model_updating._specimen_fit import (
     LINEAR,
     Parameter,
+    fit_specimen,
     parameter_value,
     with_values,
 )

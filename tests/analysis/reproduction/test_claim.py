@@ -10,8 +10,7 @@ from vibench.analysis.model import LogarithmOf
 from vibench.analysis.report import FigureOptions
 from vibench.analysis.reproduction import AS_CHOSEN, Case, Evidence
 from vibench.analysis.reproduction._case import compared_up_to, damping, logarithm, swept_at
-from vibench.analysis.reproduction._claim import Claim, Verdict, judged
-from vibench.analysis.reproduction._expectation import Expectation, about, at_least, at_most
+from vibench.analysis.reproduction._claim import Claim, Expectation, Verdict, about, at_least, at_most, judged
 
 CASE = Case(AS_CHOSEN, FigureOptions())
 DAMPED, VERY_DAMPED = damping(3e-5), damping(5e-5)

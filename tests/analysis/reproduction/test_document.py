@@ -15,12 +15,10 @@ from vibench.analysis.reproduction import (
     Reproduction,
     reproduction_document,
 )
-from vibench.analysis.reproduction._case import damping
+from vibench.analysis.reproduction._case import SCORED_S, damping
 from vibench.analysis.reproduction._catalogue import CLAIMS
-from vibench.analysis.reproduction._claim import Claim, Verdict, judged
-from vibench.analysis.reproduction._dampings import SCORED_S
+from vibench.analysis.reproduction._claim import Claim, Verdict, at_least, judged
 from vibench.analysis.reproduction._document import HEAD, wanted_text
-from vibench.analysis.reproduction._expectation import at_least
 from vibench.analysis.reproduction._page_tables import PageTable
 from vibench.analysis.reproduction._score import DampingScore
 

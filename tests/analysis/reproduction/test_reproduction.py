@@ -15,9 +15,9 @@ from vibench.analysis.reproduction import (
     reproduction,
     reproduction_document,
 )
+from vibench.analysis.reproduction._case import SCORED_S
 from vibench.analysis.reproduction._catalogue import CLAIMS
 from vibench.analysis.reproduction._claim import found
-from vibench.analysis.reproduction._dampings import SCORED_S
 from vibench.analysis.reproduction._page_tables import regions, regions_table
 from vibench.analysis.reproduction._score import scores
 from vibench.sim import Accuracy

@@ -19,8 +19,8 @@ from vibench.analysis.simulation import (
     serve,
 )
 from vibench.analysis.simulation._accuracy_cost import MEASURED
-from vibench.analysis.simulation._answers import SimulatedPoint, Trouble
-from vibench.analysis.simulation._growing import simulate
+from vibench.analysis.simulation._request import SimulatedPoint, Trouble
+from vibench.analysis.simulation._worker import simulate
 from vibench.sim import Accuracy, base_transmissibility, gong2025
 
 LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "step_hz": 50.0, "start_hz": 50.0}

@@ -8,7 +8,7 @@ import pytest
 from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.sine import dwell_response
-from vibench.analysis.sine._stroboscope import stroboscope
+from vibench.analysis.sine._dwell_motion import stroboscope
 from vibench.analysis.spectra import spectral_density
 from vibench.analysis.tones import drive_level, noise_drive_level
 from vibench.sim import Harmonic, gong2025, integrate

@@ -10,8 +10,7 @@ from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.signals import Decimator
 from vibench.analysis.sine import SweepSums
-from vibench.analysis.sine._drive_phase import drive_phase
-from vibench.analysis.sine._sweep import sweep_response
+from vibench.analysis.sine._sweep import drive_phase, sweep_response
 from vibench.analysis.tones import tracked_orders
 
 RATE = 8192.0

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.acquisition import ConfigurationError
-from vibench.gui.forms._quantity_text import parsed_quantity, quantity_text
+from vibench.gui.forms._quantity_edit import parsed_quantity, quantity_text
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from vibench.acquisition.recording import (
 from vibench.analysis import Origin, Response, Trace
 from vibench.analysis.live import LiveChannel, LiveView
 from vibench.analysis.simulation import SimulationCourse
-from vibench.analysis.simulation._answers import SimulatedPoint, SimulatedSignal
+from vibench.analysis.simulation._request import SimulatedPoint, SimulatedSignal
 from vibench.gui.engine_link._live_run import warm_up
 from vibench.gui.pages.queue._draft import with_sweep
 from vibench.gui.widgets import COMPARE, DARK, FILES, LIGHT, QUEUE, RUN, SIMULATE, TEST

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 WIDTHS = """
-from vibench.gui.window._app import application
+from vibench.gui.window._open_window import application
 application([])
 from vibench.gui.plots import TIME, Axis
 from vibench.gui.plots import Ink

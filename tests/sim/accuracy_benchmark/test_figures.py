@@ -4,7 +4,7 @@ import pytest
 
 from vibench.sim import Accuracy
 from vibench.sim.accuracy_benchmark import LevelFigures, MotionTrade
-from vibench.sim.accuracy_benchmark._regimes import Motion, Regime
+from vibench.sim.accuracy_benchmark._figures import Motion, Regime
 
 
 def trade(*state_errors, regime=Regime.PERIODIC):

@@ -5,9 +5,9 @@ import pytest
 
 from vibench.sim import Accuracy, integrate
 from vibench.sim.accuracy_benchmark import MOTIONS, Thoroughness
+from vibench.sim.accuracy_benchmark._figures import Motion, Regime
 from vibench.sim.accuracy_benchmark._independent_solution import independent_state, state_error
 from vibench.sim.accuracy_benchmark._measuring import SOLVERS, measured_motion, settled_state
-from vibench.sim.accuracy_benchmark._regimes import Motion, Regime
 from vibench.sim.model import modal_form
 
 SHORT = Thoroughness(span_s=0.05, solver_span_s=0.01)

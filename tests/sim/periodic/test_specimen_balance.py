@@ -1,9 +1,9 @@
 import pytest
 
 from vibench.sim import Harmonic, gong2025, steady_response
+from vibench.sim.periodic._balance_branch import balance_specimen
 from vibench.sim.periodic._balance_solver import BalanceOptions
 from vibench.sim.periodic._harmonic_balance import BalanceEnd
-from vibench.sim.periodic._specimen_balance import balance_specimen
 
 SPECIMEN = gong2025(damping_time_s=3e-5)
 

@@ -12,11 +12,10 @@ from vibench.sim.scene import FixedDuration, Given
 from vibench.sim.study import MemoryStore, PointState, Study, ThreadExecutor, run_study, solve_study
 from vibench.sim.study._columns import CONTINUES, PHASE
 from vibench.sim.study._errors import InvalidStudy
-from vibench.sim.study._executor import Reply
+from vibench.sim.study._executor import Reply, solve_timed
 from vibench.sim.study._results import results_of
 from vibench.sim.study._run import StudyEnd
 from vibench.sim.study._study import GivenStart
-from vibench.sim.study._timing import solve_timed
 
 
 class UnreliableExecutor:

@@ -22,12 +22,11 @@ from vibench.sim.study import (
 )
 from vibench.sim.study._columns import COLUMNS, IDENTITY, NUMBERS, SESSION
 from vibench.sim.study._disk import SoleWriter
-from vibench.sim.study._file_making import make_file
+from vibench.sim.study._expansion import scene_identity
 from vibench.sim.study._layout import STATE
 from vibench.sim.study._results import results_of
 from vibench.sim.study._run import StudyEnd
-from vibench.sim.study._scene_identity import scene_identity
-from vibench.sim.study._store import FileStore
+from vibench.sim.study._store import FileStore, make_file
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,7 @@ from vibench.acquisition.recording._disk_room import claim_room
 from vibench.acquisition.rig import load_rig, with_faults
 from vibench.virtual_rig import DiskFaults, VirtualRig, load_fault_script
 from vibench.virtual_rig.analogue import Coupling, Input
-from vibench.virtual_rig.rig._fault_kinds import DISK_FAULTS
-from vibench.virtual_rig.rig._fault_script import FaultScript, PlayedFault
+from vibench.virtual_rig.rig._fault_script import DISK_FAULTS, FaultScript, PlayedFault
 
 ROOT = Path(__file__).parents[3]
 NIGHT = ROOT / "hardware_configs" / "faults" / "night.toml"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.virtual_rig.world._analogue_filter import RunningFilter, first_order, resonant
+from vibench.virtual_rig.world._sensors import RunningFilter, first_order, resonant
 
 STEP_S = 1 / 102_400
 

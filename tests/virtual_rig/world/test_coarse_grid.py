@@ -10,8 +10,8 @@ from vibench.acquisition.plan import Dwell, Measurement, require_within_limits
 from vibench.acquisition.rig import Rig, highest_carried_hz, load_rig, specimen_of
 from vibench.acquisition.rig._virtual import COARSEST_GRID_RATE_HZ, WATCHED_HZ, level_error
 from vibench.virtual_rig.world import World
-from vibench.virtual_rig.world._analogue_filter import RunningFilter, resonant
 from vibench.virtual_rig.world._plant import TRUTH_COLUMNS, Plant
+from vibench.virtual_rig.world._sensors import RunningFilter, resonant
 from vibench.virtual_rig.world._time_grid import TimeGrid
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")

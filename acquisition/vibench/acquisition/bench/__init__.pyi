@@ -3,13 +3,6 @@ from ._bench import (
     Reality as Reality,
     open_bench as open_bench,
 )
-from ._finding import (
-    BenchReport as BenchReport,
-    Bounds as Bounds,
-    Finding as Finding,
-    Verdict as Verdict,
-    judged as judged,
-)
 from ._instrument_list import (
     InstrumentList as InstrumentList,
     list_instruments as list_instruments,
@@ -19,8 +12,13 @@ from ._protocol import (
     RunBench as RunBench,
 )
 from ._result import (
+    BenchReport as BenchReport,
+    Bounds as Bounds,
     CheckResult as CheckResult,
+    Finding as Finding,
+    Verdict as Verdict,
     ago as ago,
+    judged as judged,
     rig_digest as rig_digest,
 )
 from ._rig_power import (

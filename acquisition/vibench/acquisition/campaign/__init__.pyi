@@ -23,12 +23,10 @@ from ._journal_point import (
     PointState as PointState,
     read_journal as read_journal,
 )
-from ._mail import (
-    MailMessenger as MailMessenger,
-    MailSettings as MailSettings,
-)
 from ._notice import (
     CommandMessenger as CommandMessenger,
+    MailMessenger as MailMessenger,
+    MailSettings as MailSettings,
     Messenger as Messenger,
 )
 from ._opening import (
@@ -42,10 +40,8 @@ from ._point_outcome import (
     ChangedBench as ChangedBench,
     Existing as Existing,
     Item as Item,
-    ignore_item as ignore_item,
-)
-from ._reason_code import (
     Why as Why,
+    ignore_item as ignore_item,
 )
 from ._reconnecting_bench import (
     KeptBench as KeptBench,

@@ -16,10 +16,9 @@ from typing import Self
 from ..errors import RecordingError
 from ..plan import Campaign, Point
 from ._bench_identity import BenchIdentity
-from ._journal_database import connected, require_version, sentences
+from ._journal_database import SCHEMA, VERSION, connected, require_version, sentences
 from ._journal_point import JournalPoint, PointState, points_of
-from ._journal_tables import SCHEMA, VERSION
-from ._reason_code import Why
+from ._point_outcome import Why
 
 JOURNAL_SUFFIX = ".campaign.sqlite"
 

@@ -8,9 +8,8 @@ from pathlib import Path
 
 from ..errors import RecordingError
 from ..plan import Measurement
-from ._journal_database import opened_to_look, require_version, sentences
-from ._journal_tables import POINTS
-from ._reason_code import Why
+from ._journal_database import POINTS, opened_to_look, require_version, sentences
+from ._point_outcome import Why
 
 
 class PointState(StrEnum):

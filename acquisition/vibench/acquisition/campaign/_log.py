@@ -1,14 +1,23 @@
-"""The log of a campaign: one JSON document a line, for programs and for the morning after."""
+"""The log of a campaign: one JSON document a line, for programs and for the morning after.
+
+One line that says where a campaign stands, again and again, for ``tail -f`` on another terminal.
+"""
 
 import json
+from collections import Counter
+from collections.abc import Sequence
 from contextlib import suppress
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from time import monotonic
 from types import TracebackType
 from typing import Self
 
 from ..errors import RecordingError
-from ._event import Happening
+from ..plan import measured_s
+from ._event import Event, Happening
+from ._journal_point import JournalPoint, PointState
+from ._point_outcome import CampaignProgress
 
 LOG_SUFFIX = ".log.jsonl"
 
@@ -53,3 +62,64 @@ class CampaignLog:
 def _ends_a_line(path: Path) -> bool:
     content = path.read_bytes()[-1:]
     return content in (b"", b"\n")
+
+
+STATUS_SUFFIX = ".status"
+LINE_EVERY_S = 5.0
+"""While nothing else happens [s]: a night makes half a megabyte."""
+
+
+class StatusLine:
+    """Appends a line whenever something happens, and every few seconds while a point runs."""
+
+    def __init__(
+        self, path: Path, campaign: str, points: Sequence[JournalPoint], rest_s: float = 0.0
+    ) -> None:
+        """``rest_s`` lies between two points."""
+        self._path = path
+        self._campaign = campaign
+        self._counts = Counter(done=sum(point.state is PointState.DONE for point in points))
+        left_s = [measured_s(each.measurement) for each in points if each.state is not PointState.DONE]
+        self._left_s = sum(left_s) + rest_s * max(0, len(left_s) - 1)
+        self._begun = monotonic()
+        self._made_s = 0.0
+        """Rig time behind the point that runs."""
+        self._point_s = 0.0
+        self._written = -LINE_EVERY_S
+        self._where = ""
+
+    def __call__(self, happening: Happening) -> None:
+        """Write what has happened."""
+        match happening.event:
+            case Event.POINT_DONE:
+                self._counts["done"] += 1
+                self._made_s, self._point_s = self._made_s + self._point_s, 0.0
+            case Event.RESTING:
+                self._made_s += float(happening.facts["rest_s"])
+            case Event.FAULT if "point" in happening.facts:
+                self._counts["failed attempts"] += 1
+        self._write(happening.text)
+
+    def progress(self, stand: CampaignProgress) -> None:
+        """Note a block; write a line when the last one is old."""
+        run = stand.run
+        self._point_s = run.elapsed_s
+        self._where = f"{stand.number}/{stand.count} {stand.name}"
+        if monotonic() - self._written >= LINE_EVERY_S:
+            state = run.state.value.replace("_", " ")
+            self._write(f"{state}, {run.elapsed_s:.0f} of {run.total_s:.0f} s")
+
+    def _write(self, what: str) -> None:
+        self._written = monotonic()
+        counts = ", ".join(f"{number} {word}" for word, number in self._counts.items())
+        utc = datetime.now(UTC).isoformat(timespec="seconds")
+        line = f"{utc} {self._campaign} {self._where}: {what} ({counts}, about {self._left()} left)\n"
+        # A full disk must not end a measurement for the sake of this line.
+        with suppress(OSError), self._path.open("a", encoding="utf-8") as file:
+            file.write(line)
+
+    def _left(self) -> timedelta:
+        """Time left, at the pace of this session; before there is one, at the rig's own."""
+        made_s = self._made_s + self._point_s
+        pace = (monotonic() - self._begun) / made_s if made_s > 1.0 else 1.0
+        return timedelta(seconds=round(max(0.0, self._left_s - made_s) * pace))

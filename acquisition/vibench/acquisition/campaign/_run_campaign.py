@@ -9,10 +9,9 @@ from ..errors import RecordingError
 from ..plan import Campaign
 from ..recording import sole_use
 from ..stopping import StopSwitch, stop_on_signal
-from ._attempts import Attempts, Reopen
-from ._cooling_pause import Rest
+from ._attempts import Attempts, Reopen, Rest
 from ._event import Happening, Listener, ignore_happening
-from ._log import LOG_SUFFIX, CampaignLog
+from ._log import LOG_SUFFIX, STATUS_SUFFIX, CampaignLog, StatusLine
 from ._notice import Messenger, Notifier
 from ._opening import make_folder, opened_journal, require_all_within_limits, require_new
 from ._point_outcome import (
@@ -26,7 +25,6 @@ from ._point_outcome import (
     ignore_item,
 )
 from ._runner import Course
-from ._status_line import STATUS_SUFFIX, StatusLine
 
 
 def run_campaign(

@@ -13,8 +13,16 @@ from ._attempts import Attempts
 from ._event import Event, Happening, Listener
 from ._journal import Journal
 from ._journal_point import JournalPoint, PointState
-from ._point_outcome import After, AfterFailure, CampaignItem, CampaignProgress, DonePoint, Finished, Item
-from ._reason_code import why_of
+from ._point_outcome import (
+    After,
+    AfterFailure,
+    CampaignItem,
+    CampaignProgress,
+    DonePoint,
+    Finished,
+    Item,
+    why_of,
+)
 
 
 class Course:

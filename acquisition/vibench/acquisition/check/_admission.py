@@ -1,18 +1,140 @@
-"""May this bench be armed? Only on a check that is recent, passed, and of the same configuration."""
+"""May this bench be armed? Only on a check that is recent, passed, and of the same configuration.
 
+The last check of each rig, kept in the user's state folder: one JSON file a rig.
+
+What has changed since the last check of the same bench: gains in decibels, the clock in ppm.
+"""
+
+import hashlib
+import os
+import re
+import tempfile
 from collections.abc import Callable
 from datetime import UTC, datetime
+from math import inf, log10
 from pathlib import Path
 from typing import assert_never
 
-from ..bench import Bench, BenchReport, CheckResult, Reality, Verdict, rig_digest
-from ..errors import CheckFailed
+from pydantic import ValidationError
+
+from ..bench import (
+    Bench,
+    BenchReport,
+    Bounds,
+    CheckResult,
+    Finding,
+    Reality,
+    Verdict,
+    ago,
+    judged,
+    rig_digest,
+)
+from ..errors import CheckFailed, RecordingError
+from ..host import state_folder
 from ..rig import Rig
 from ..stopping import StopSwitch
-from ._archive import keep, last_result
 from ._bench_report import check_bench
-from ._drift import drift
 from ._rule import CheckRule
+
+FOLDER = "bench_checks"
+_HASH_DIGITS = 8
+
+
+def archive_path(rig_name: str) -> Path:
+    """Name the file of a rig: its name as far as files allow it, and a hash of the whole of it."""
+    plain = re.sub(r"[^A-Za-z0-9]+", "_", rig_name).strip("_")[:48]
+    digest = hashlib.sha256(rig_name.encode()).hexdigest()[:_HASH_DIGITS]
+    return state_folder() / FOLDER / f"{plain}-{digest}.json"
+
+
+def last_result(rig_name: str) -> CheckResult | None:
+    """Give the last check of a rig; None when there is none, or none that this version can read."""
+    try:
+        return CheckResult.model_validate_json(archive_path(rig_name).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, ValidationError):
+        return None
+
+
+def keep(result: CheckResult) -> Path:
+    """Keep a result in the place of the last one; whoever reads meanwhile finds one of the two, whole.
+
+    Raises
+    ------
+    RecordingError
+        When the state folder cannot be written.
+
+    """
+    try:
+        path = archive_path(result.rig)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        descriptor, name = tempfile.mkstemp(prefix=path.name, suffix=".tmp", dir=path.parent)
+        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+            file.write(result.model_dump_json(indent=2))
+        Path(name).replace(path)
+    except OSError as error:
+        raise RecordingError(
+            f"The result of the bench check cannot be kept in {error.filename} ({error.strerror}). The bench "
+            "is as it was; make its folder writable, or name another one in VIBENCH_STATE_DIR"
+        ) from error
+    return path
+
+
+DRIFT_DB = Bounds(0.5, 3.0)
+"""Of a gain, from one check to the next on an unchanged configuration."""
+CLOCK_PPM = Bounds(20.0, inf)
+"""Of the ratio of two clocks: oscillators age by some ppm a year."""
+SUFFIX = " since last time"
+_DECIBELS, _PPM = "dB", "ppm"
+_ADVICE = (
+    "nothing in the configuration has changed: look for a knob, a cable, a loose sensor or a dying amplifier"
+)
+
+
+def drift(now: BenchReport, last: CheckResult, at: datetime) -> tuple[Finding, ...]:
+    """Compare every level of a check with the same of the last one.
+
+    The sine is equally loud in both, since the configuration is the same: whoever calls has seen to that.
+    """
+    before = {finding.name: finding for finding in last.findings}
+    since = f"since {ago(at - last.checked)}"
+    found = [
+        _changed(finding, before[finding.name], since) for finding in now.findings if finding.name in before
+    ]
+    return tuple(finding for finding in found if finding is not None)
+
+
+def _changed(now: Finding, before: Finding, since: str) -> Finding | None:
+    if now.number is None or before.number is None or SUFFIX in now.name:
+        return None
+    match _quantity(now):
+        case "gain in dB":
+            return _judged(now.name, now.number - before.number, _DECIBELS, DRIFT_DB, since)
+        case "level" if now.number > 0 and before.number > 0:
+            change_db = 20 * log10(now.number / before.number)
+            return _judged(now.name, change_db, _DECIBELS, DRIFT_DB, since)
+        case "clock":
+            return _judged(now.name, now.number - before.number, _PPM, CLOCK_PPM, since)
+        case _:
+            return None
+
+
+def _quantity(finding: Finding) -> str:
+    if finding.name in ("drive over setting", "base acceleration") or finding.name.endswith("hears the sine"):
+        return "level"
+    return {"amplifier gain": "gain in dB", "drive's clock": "clock"}.get(finding.name, "")
+
+
+def _judged(name: str, change: float, unit: str, bounds: Bounds, since: str) -> Finding:
+    finding = judged(
+        f"{name}{SUFFIX}",
+        change,
+        unit,
+        f"0 {unit} within {bounds.well:g} {unit}",
+        bounds.verdict(abs(change)),
+        _ADVICE,
+    )
+    return finding.model_copy(update={"value": f"{change:+.2f} {unit} {since}"})
+
 
 Clock = Callable[[], datetime]
 

@@ -23,8 +23,6 @@ _SETTLE_S = 1.5
 _LISTEN_S = 2.0
 _BYTES_PER_SAMPLE = 4
 _SECONDS_PER_HOUR = 3600.0
-
-
 NOISE_SHARE = Bounds(1e-3, 2e-2)
 """rms of a silent channel, of its full scale."""
 OFFSET_SHARE = Bounds(1e-2, 1e-1)

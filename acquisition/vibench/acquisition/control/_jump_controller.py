@@ -1,4 +1,7 @@
-"""Localising one jump: back to before it, on the branch it was left from, and halving the way to it."""
+"""Localising one jump: back to before it, on the branch it was left from, and halving the way to it.
+
+Letting a motion die by lowering its drive and bringing it back: the way out of a stubborn branch.
+"""
 
 import json
 from collections.abc import Sequence
@@ -6,12 +9,32 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from ..excitation import SEARCH_LABEL, Segment, SettledSine
+from ..plan import RunState
 from ._control_action import Conduct
-from ._decay_motion import let_die
 from ._jump_search import LocatedJump, Side, Visit, is_on_branch, located, side
 from ._record import recorded
 from ._settle import Settled, Settler, shortened
+from ._sine_loop import SinePlay
 from ._start import glided
+
+RUNGS = 12
+RUNG = 1.2
+"""Factor of one rung: the lowest setting is a ninth of the one of now."""
+_RUNG_S = 0.1
+_LOWEST_S = 0.5
+
+
+def let_die(play: SinePlay) -> Conduct[None]:
+    """Lower the setting rung by rung, wait, and raise it to what it was."""
+    now = play.played
+    for rung in range(1, RUNGS + 1):
+        play.change(now.frequency_hz, play.bounded_vpp(now.setting_vpp / RUNG**rung))
+        yield from play.listen(RunState.SETTLING, _RUNG_S)
+    yield from play.listen(RunState.SETTLING, _LOWEST_S)
+    for rung in range(RUNGS - 1, -1, -1):
+        play.change(now.frequency_hz, play.bounded_vpp(now.setting_vpp / RUNG**rung))
+        yield from play.listen(RunState.SETTLING, _RUNG_S)
+
 
 _MOST_BRACKETS = 4
 """How often the search begins anew where the motion left its branch earlier than the last time."""

@@ -1,4 +1,7 @@
-"""The Tektronix AFG1022: every setting read back, and an output that goes off whatever happens."""
+"""The Tektronix AFG1022: every setting read back, and an output that goes off whatever happens.
+
+Keeping the first error in front: what fails while cleaning up after it becomes a note on it.
+"""
 
 import statistics
 import time
@@ -6,18 +9,26 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Self
 
-from ..errors import InstrumentError, InstrumentLost
+from ..errors import AcquisitionError, InstrumentError, InstrumentLost
 from ..instruments import Identity, Samples
 from ..rig import GeneratorConfig, Knob
-from ._afg1022_channel import Afg1022Channel, Playing
+from ._afg1022_channel import Afg1022Channel, Playing, agree_on_load
 from ._afg1022_limits import Shape, amplitude_range_vpp, check_amplitude, check_frequency
-from ._afg1022_load import agree_on_load
 from ._afg1022_modes import SweepSupport, arm_burst, end_burst, probe_sweep, set_phase, trigger
 from ._arbitrary_codes import arbitrary_codes
-from ._notes import noted
 from ._scpi import ScpiPort
 from ._verified_settings import VerifiedSettings
 from ._visa_link import Link, open_link
+
+
+@contextmanager
+def noted(error: BaseException) -> Iterator[None]:
+    """Clean up after ``error``: a further failure of an instrument is added to it as a note."""
+    try:
+        yield
+    except AcquisitionError as failure:
+        error.add_note(f"While cleaning up: {failure}")
+
 
 MAKER = "TEKTRONIX"
 MODEL = "AFG1022"

@@ -1,4 +1,9 @@
-"""A converter behind NI-DAQmx: continuous, hardware-timed, without a gap, and never left reserved."""
+"""A converter behind NI-DAQmx: continuous, hardware-timed, without a gap, and never left reserved.
+
+Who a converter is: product, serial number and the version of the driver it was reached through.
+
+Where in a block an input was past its range.
+"""
 
 from contextlib import ExitStack
 from typing import Self
@@ -12,10 +17,58 @@ from ..errors import ConfigurationError, InstrumentError, SettingRefused
 from ..instruments import Block, Identity, Overload, Samples
 from ..rig import Channel, DaqConfig, Rig, channels_of
 from ._daqmx_errors import NOT_OFFERED, daqmx_call
-from ._daqmx_identity import daqmx_identity
 from ._daqmx_inputs import InputScaling, add_input
 from ._daqmx_session import DaqmxSession, daqmx_session
-from ._overload_ranges import overload_ranges
+
+
+def daqmx_identity(session: DaqmxSession, device_name: str) -> Identity:
+    """Ask the driver about a device by its name, ``"cDAQ1Mod1"``; raises what the DAQmx client raises."""
+    system = session.system()
+    device = system.devices[device_name]
+    product, serial = str(device.product_type), f"{device.serial_num:08X}"
+    version = system.driver_version
+    driver = f"NI-DAQmx {version.major_version}.{version.minor_version}.{version.update_version}"
+    reply = f"{device_name}: {product}, {serial}, {driver}"
+    return Identity("National Instruments", product, serial, driver, reply)
+
+
+# Vibrometers and converters distort before they clip: hardware reference 4.
+OVERLOAD_FRACTION = 0.95
+# A delta-sigma converter's filter rings about so long after a clip: shorter pauses are no recovery.
+_RECOVERY_SAMPLES = 64
+
+
+def overload_ranges(
+    volts: Samples, roles: tuple[str, ...], full_scales_v: tuple[float, ...], first_sample: int
+) -> tuple[Overload, ...]:
+    """Stretches of a block where a channel reaches 95 % of its full scale.
+
+    Parameters
+    ----------
+    volts
+        Shape (channels, samples) [V] at the converter's input.
+    roles, full_scales_v
+        One for each channel.
+    first_sample
+        Position of the block in the run.
+
+    """
+    found: list[Overload] = []
+    peaks_v = np.max(np.abs(volts), axis=1, initial=0.0)
+    for role, row, peak_v, full_scale_v in zip(roles, volts, peaks_v, full_scales_v, strict=True):
+        if peak_v < OVERLOAD_FRACTION * full_scale_v:
+            continue
+        past = np.flatnonzero(np.abs(row) >= OVERLOAD_FRACTION * full_scale_v)
+        if past.size:
+            breaks = np.flatnonzero(np.diff(past) > _RECOVERY_SAMPLES)
+            firsts = past[np.concatenate(([0], breaks + 1))]
+            lasts = past[np.concatenate((breaks, [past.size - 1]))]
+            found += [
+                Overload(role, first_sample + int(first), first_sample + int(last))
+                for first, last in zip(firsts, lasts, strict=True)
+            ]
+    return tuple(found)
+
 
 # A read is cut into pieces of this length, so that no single call waits long and none needs the whole buffer.
 LONGEST_READ_S = 2.0

@@ -14,9 +14,8 @@ from nidaqmx.task.channels import AOChannel
 from ..errors import DataLost, InstrumentError, InstrumentLost, LimitExceeded, SettingRefused
 from ..instruments import Identity, IdleOutput, Samples
 from ..rig import OutputConfig
-from ._daqmx import DaqmxDigitizer
+from ._daqmx import DaqmxDigitizer, daqmx_identity
 from ._daqmx_errors import daqmx_call
-from ._daqmx_identity import daqmx_identity
 
 _WRITE_TIMEOUT_S = 10.0
 # The last of them is what the output holds; some devices want more than one.

@@ -3,9 +3,6 @@ from ._announcement import (
     announced_engines as announced_engines,
     the_engine as the_engine,
 )
-from ._campaign_request import (
-    Orders as Orders,
-)
 from ._client import (
     EngineClient as EngineClient,
 )
@@ -27,10 +24,13 @@ from ._lock import (
 from ._request_handler import (
     Desk as Desk,
 )
+from ._requests import (
+    Orders as Orders,
+)
 from ._sample_buffer import (
     Glance as Glance,
 )
-from ._serving import (
+from ._server import (
     hosted as hosted,
 )
 from ._start import (

@@ -13,8 +13,7 @@ from ..stopping import Cause
 from ._engine import Engine
 from ._job_queue import Work
 from ._request_handler import Desk
-from ._server import LOOPBACK, spoken
-from ._serving import hosted
+from ._server import LOOPBACK, hosted, spoken
 from ._state import Attendance
 
 FORGOTTEN_S = 60.0

@@ -18,8 +18,8 @@ from ..rig import KnobSheet, Rig
 from ..stopping import StopLevel
 from . import _requests as ask
 from ._address import EngineAddress
-from ._campaign_request import Orders
 from ._errors import EngineError, EngineGone
+from ._requests import Orders
 from ._sample_buffer import Glance
 from ._state import Visit
 from ._status import ArmedPlan, EngineStatus, RowStatus

@@ -1,4 +1,7 @@
-"""The engine: it owns a bench, and shows everybody what it does with it."""
+"""The engine: it owns a bench, and shows everybody what it does with it.
+
+An open bench in the words of the protocol.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,11 +25,30 @@ from ..check import check_and_keep, require_fresh
 from ..errors import AcquisitionError, CheckStopped, InstrumentLost
 from ..rig import Confirm, Rig
 from ..stopping import StopSwitch, stop_on_signal
-from ._campaign_request import Orders
-from ._facts import bench_facts
 from ._lock import BenchLock
 from ._published_state import Shown
+from ._requests import Orders
 from ._state import Attendance, EngineState
+from ._status import BenchFacts, ChannelFacts
+
+
+def bench_facts(bench: Bench) -> BenchFacts:
+    """Say which bench is open."""
+    return BenchFacts(
+        rig_name=bench.rig.name,
+        is_simulated=bench.rig.virtual is not None,
+        identities={part: identity.reply for part, identity in bench.identities.items()},
+        channels=tuple(
+            ChannelFacts(
+                role=channel.role.value,
+                unit=channel.unit,
+                units_per_volt=channel.units_per_volt,
+                full_scale_v=channel.full_scale_v,
+            )
+            for channel in bench.channels
+        ),
+        sample_rate_hz=bench.digitizer.sample_rate_hz,
+    )
 
 
 class Engine:

@@ -1,7 +1,12 @@
-"""What viewers may see of an engine: written by its own thread, read by any other, never waited for."""
+"""What viewers may see of an engine: written by its own thread, read by any other, never waited for.
+
+What has happened, kept for viewers: the newest messages, numbered.
+"""
 
 import shutil
 import threading
+from collections import deque
+from datetime import UTC, datetime
 from pathlib import Path
 from time import monotonic
 
@@ -9,12 +14,77 @@ import numpy as np
 
 from ..bench import BenchReport
 from ..campaign import CampaignItem, CampaignProgress, Item
+from ..errors import AcquisitionError
 from ..instruments import Block
 from ..plan import Campaign, RunState, measured_s
-from ._messages import Messages
 from ._sample_buffer import Recent
 from ._state import Attendance, EngineState
-from ._status import ArmedPlan, BenchFacts, ChannelFacts, ChannelLevel, EngineStatus, RowStatus, RunStatus
+from ._status import (
+    ArmedPlan,
+    BenchFacts,
+    ChannelFacts,
+    ChannelLevel,
+    EngineMessage,
+    EngineStatus,
+    MessageKind,
+    RowStatus,
+    RunStatus,
+)
+
+KEPT = 100
+
+
+class Messages:
+    """The newest messages of an engine."""
+
+    def __init__(self) -> None:
+        self._kept: deque[EngineMessage] = deque(maxlen=KEPT)
+        self._count = 0
+
+    @property
+    def kept(self) -> tuple[EngineMessage, ...]:
+        """The newest, oldest first."""
+        return tuple(self._kept)
+
+    def info(self, what: str) -> None:
+        """Note something that needs no answer."""
+        self._add(MessageKind.INFO, what, "", "", "")
+
+    def warn(self, what: str, done: str = "", next_step: str = "") -> None:
+        """Note something to be looked at."""
+        self._add(MessageKind.WARNING, what, done, next_step, "")
+
+    def fault(self, error: BaseException) -> None:
+        """Note an error; ours say in this order what happened, what was done, and what to do next."""
+        match error:
+            case AcquisitionError():
+                what, done, next_step = told_apart(str(error))
+            case _:
+                what = f"{type(error).__name__}: {error}"
+                done, next_step = "The drive was silenced.", "This is a fault of the program: report it."
+        self._add(MessageKind.FAULT, what, done, next_step, type(error).__name__)
+
+    def _add(self, kind: MessageKind, what: str, done: str, next_step: str, code: str) -> None:
+        self._count += 1
+        utc = datetime.now(UTC).isoformat(timespec="seconds")
+        self._kept.append(
+            EngineMessage(
+                number=self._count, utc=utc, kind=kind, what=what, done=done, next_step=next_step, code=code
+            )
+        )
+
+
+def told_apart(text: str) -> tuple[str, str, str]:
+    """Split "What happened. What was done; what to do next" into its parts; missing ones are empty."""
+    what, _, rest = text.partition(". ")
+    done, _, next_step = rest.partition("; ")
+    return (f"{what.rstrip('.')}.", _sentence(done), _sentence(next_step))
+
+
+def _sentence(clause: str) -> str:
+    clause = clause.strip().rstrip(".")
+    return f"{clause[0].upper()}{clause[1:]}." if clause else ""
+
 
 DISK_INTERVAL_S = 2.0
 """How often the room on the disk is looked at [s]."""

@@ -1,20 +1,90 @@
-"""The engine's desk: every request is answered at once, from any thread, and none touches an instrument."""
+"""The engine's desk: every request is answered at once, from any thread, and none touches an instrument.
 
+Arming: a campaign is refused with reasons, or put into words that an experimenter can check.
+
+Confirming knobs with a sheet that was filled in before, in a window or a file.
+"""
+
+from datetime import timedelta
 from pathlib import Path
 from threading import Lock
 from time import monotonic
 
-from ..rig import KnobSheet, Rig
+from ..bench import Bench
+from ..campaign import planned_recordings
+from ..check import CheckRule, require_on_record
+from ..errors import CheckFailed
+from ..plan import LimitCheck, require_within_limits
+from ..rig import Confirm, Knob, KnobSheet, Rig
+from ..run import drive_for
 from ..stopping import Cause, StopLevel, StopRequest, StopSwitch
-from ._arming import ARMED_S, armed_plan
-from ._campaign_request import Orders
 from ._engine import Engine
 from ._errors import EngineError
 from ._job_queue import Work
+from ._requests import Orders
 from ._sample_buffer import Glance
-from ._sheet import confirmed_by
 from ._state import DRIVING, SOUNDING, VIEWER_PATIENCE_S, Attendance, EngineState
 from ._status import ArmedPlan, EngineStatus
+
+ARMED_S = 60.0
+"""An armed engine disarms itself after this long [s]."""
+
+
+def armed_plan(bench: Bench, orders: Orders) -> ArmedPlan:
+    """Hold a campaign against bench and folder; nothing is played and nothing written.
+
+    Raises
+    ------
+    AcquisitionError
+        With every reason why it cannot be carried out.
+
+    """
+    if orders.check is CheckRule.FRESH:
+        require_on_record(bench)
+    checks: list[tuple[str, LimitCheck]] = []
+    campaign, folder = orders.campaign, orders.folder
+    points = campaign.points()
+    for name, measurement in ((point.name, point.measurement) for point in points):
+        checks += [(name, check) for check in require_within_limits(measurement, bench.rig)]
+        drive_for(bench, measurement)  # refuses what nothing on this bench can play
+    planned = planned_recordings(campaign, folder, orders.existing)
+    missing = [each for each in planned if not each.is_complete]
+    tightest, closest = max(checks, key=lambda named: named[1].use)
+    loudest = max(point.measurement.excitation.highest_amplitude_vpp for point in points)
+    kinds = ", ".join(dict.fromkeys(point.measurement.excitation.kind for point in points))
+    size_mb = campaign.size_bytes(bench.digitizer.sample_rate_hz, len(bench.channels)) / 1e6
+    length = timedelta(seconds=round(campaign.duration_s))
+    bound = f"{closest.limit:.4g} {closest.unit}"
+    kept = len(planned) - len(missing)
+    return ArmedPlan(
+        campaign=campaign.name,
+        folder=str(folder),
+        lines=(
+            f"What: {len(missing)} recordings ({kinds})" + (f", {kept} kept from before" if kept else ""),
+            f"Level: at most {loudest:g} Vpp at the generator",
+            f"Limits: {closest.what} comes closest, {closest.use:.0%} of {bound} in {tightest}",
+            f"How long: {length} (h:min:s), ramps and checks included",
+            f"Saved in: {folder}, at most {size_mb:.0f} MB while recording",
+        ),
+        expires_in_s=ARMED_S,
+    )
+
+
+def confirmed_by(sheet: KnobSheet | None) -> Confirm:
+    """Accept what is on the sheet, and nothing else."""
+
+    def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
+        seen = () if sheet is None else sheet.knobs
+        missing = [f"{knob.instrument}: {knob.setting} at {knob.value}" for knob in knobs if knob not in seen]
+        if sheet is None or missing:
+            raise CheckFailed(
+                f"settings made by hand are not confirmed ({'; '.join(missing)}). Nothing was energised; "
+                "look at each knob, confirm it, and open the bench again"
+            )
+        return sheet
+
+    return confirm
+
 
 STALL_S = 0.2
 """A look after this process's own viewers that comes so late tells of a stall of this process [s]."""

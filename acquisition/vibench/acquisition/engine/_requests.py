@@ -1,14 +1,32 @@
-"""What can be asked of an engine. Each is answered at once from what the engine holds; nothing waits."""
+"""What can be asked of an engine. Each is answered at once from what the engine holds; nothing waits.
 
+What an engine is to carry out, and how.
+"""
+
+from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, NonNegativeInt, PositiveInt, TypeAdapter
 
+from ..campaign import AfterFailure, ChangedBench, Existing
+from ..check import CheckRule
 from ..host import FrozenModel
+from ..plan import Campaign
 from ..rig import KnobSheet, Rig
 from ..stopping import StopLevel
-from ._campaign_request import Orders
 from ._state import Visit
+
+
+class Orders(FrozenModel):
+    """A campaign, and how it is to be carried out."""
+
+    campaign: Campaign
+    folder: Path
+    """Where its recordings go."""
+    existing: Existing = Existing.REFUSE
+    after_failure: AfterFailure = AfterFailure.STOP
+    changed_bench: ChangedBench = ChangedBench.REFUSE
+    check: CheckRule = CheckRule.FRESH
 
 
 class Hello(FrozenModel):

@@ -1,21 +1,102 @@
-"""The engine's door: loopback, a token, and one thread a connection, which alone may wait for its viewer."""
+"""The engine's door: loopback, a token, and one thread a connection, which alone may wait for its viewer.
+
+From a request as it came over the wire to the answer that goes back.
+
+The engine's watchman: looks after attendance while the engine's own thread is at work.
+
+An engine with its door open: others find it, ask it, and are looked after, while inside.
+"""
 
 import hmac
 import json
 import secrets
 import socket
-from contextlib import suppress
-from threading import Thread
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager, suppress
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
+from ..errors import AcquisitionError
+from ..stopping import Cause, StopRequest
 from . import _requests as ask
 from ._address import EngineAddress
-from ._answers import DONE, answered, refused
+from ._announcement import announced
 from ._errors import EngineError
 from ._request_handler import Desk
+from ._sample_buffer import Glance
 from ._state import Visit
-from ._wire import WireError, receive, send
+from ._wire import Message, WireError, receive, send
+
+DONE = Message(b'{"ok": true}')
+
+
+def answered(desk: Desk, message: Message) -> Message:
+    """Do what a message asks for; what is refused comes back as one sentence."""
+    try:
+        request = ask.REQUEST.validate_json(message.text)
+        return _answer(desk, request)
+    except ValidationError as error:
+        detail = error.errors()[0]
+        where = ".".join(str(part) for part in detail["loc"])
+        return refused(
+            f"what was asked is not understood ({where}: {detail['msg']}); nothing was done", error
+        )
+    except AcquisitionError as error:
+        return refused(str(error), error)
+
+
+def refused(sentence: str, error: Exception) -> Message:
+    """Say no."""
+    return Message(json.dumps({"refused": sentence, "kind": type(error).__name__}).encode())
+
+
+def _answer(desk: Desk, request: ask.Request) -> Message:
+    match request:
+        case ask.Status(known_rows=known):
+            status = desk.status()
+            is_known = status.rows_number == known
+            return _model(status.model_copy(update={"rows": ()}) if is_known else status)
+        case ask.Look(since_sample=since, most=most):
+            return _glance(desk.look(since, most))
+        case ask.Arm(orders=orders):
+            return _model(desk.arm(orders))
+        case _:
+            _ORDERS[type(request)](desk, request)
+            return DONE
+
+
+_ORDERS: Mapping[type, Callable[[Desk, Any], None]] = {
+    ask.Hello: lambda _desk, _order: None,
+    ask.Beat: lambda _desk, _order: None,
+    ask.Open: lambda desk, order: desk.open(order.rig, order.confirmations),
+    ask.Close: lambda desk, _order: desk.close(),
+    ask.Check: lambda desk, order: desk.check(Path(order.folder)),
+    ask.Disarm: lambda desk, _order: desk.disarm(),
+    ask.Start: lambda desk, _order: desk.start(),
+    ask.Stop: lambda desk, order: desk.stop(StopRequest(Cause.OPERATOR, order.level, order.reason)),
+    ask.Resume: lambda desk, _order: desk.resume(),
+    ask.Mark: lambda desk, order: desk.mark(order.text),
+    ask.Shutdown: lambda desk, _order: desk.shutdown(Cause.OPERATOR, "the engine was told to end"),
+}
+"""What is done, and answered with no more than that it was."""
+
+
+def _model(model: BaseModel) -> Message:
+    return Message(model.model_dump_json().encode())
+
+
+def _glance(glance: Glance) -> Message:
+    facts = {
+        "run_id": glance.run_id,
+        "first_sample": glance.first_sample,
+        "sample_rate_hz": glance.sample_rate_hz,
+        "shape": glance.volts.shape,
+    }
+    return Message(json.dumps(facts).encode(), glance.volts.astype("<f4").tobytes())
+
 
 LOOPBACK = "127.0.0.1"
 GREETING_S = 5.0
@@ -82,3 +163,36 @@ class Server:
 def spoken(address: EngineAddress) -> str:
     """Put an address into one line of JSON, as an engine's process says it to the one that started it."""
     return json.dumps(address.model_dump())
+
+
+INTERVAL_S = 0.05
+"""How often attendance is looked at [s]."""
+
+
+class Watch:
+    """Lets a desk look after its engine at every `INTERVAL_S`, until closed."""
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._closing = Event()
+        self._thread = Thread(target=self._run, name="engine watch", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop watching."""
+        self._closing.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        while not self._closing.wait(INTERVAL_S):
+            self._desk.look_after()
+
+
+@contextmanager
+def hosted(desk: Desk, what: str, host: str = LOOPBACK) -> Iterator[Server]:
+    """Serve a desk; ``what`` is shown to those who look for an engine."""
+    with ExitStack() as inside:
+        server = inside.enter_context(closing(Server(desk, host)))
+        inside.enter_context(closing(Watch(desk)))
+        inside.enter_context(announced(server.address, what))
+        yield server

@@ -4,17 +4,13 @@ from ._follow_parent import (
 from ._shipped import (
     all_shipped as all_shipped,
     shipped as shipped,
-)
-from ._state_folder import (
     state_folder as state_folder,
 )
 from ._toml_file import (
     FrozenModel as FrozenModel,
     complaints as complaints,
     load_toml as load_toml,
-    validated as validated,
-)
-from ._toml_text import (
     save_toml as save_toml,
     toml_text as toml_text,
+    validated as validated,
 )

@@ -44,11 +44,7 @@ from ._axis import (
 from ._band import (
     excited_band_hz,
 )
-from ._campaign import (
-    BYTES_PER_SAMPLE,
-    Campaign,
-    load_campaign,
-)
+from ._campaign import BYTES_PER_SAMPLE, Campaign, Retryable, RetryPolicy, load_campaign
 from ._drive_source import (
     Player,
     player_of,
@@ -59,27 +55,11 @@ from ._limits import (
     require_within_limits,
     shortest_ramp_s,
 )
-from ._loads import (
-    predicted_loads,
-)
-from ._measurement import (
-    InRunLimits,
-    Measurement,
-    OnOverload,
-)
+from ._loads import needed_vpp, predicted_loads
+from ._measurement import InRunLimits, Measurement, OnOverload, Point
 from ._measurement_preview import (
     Outlook,
     outlook,
-)
-from ._needed_setting import (
-    needed_vpp,
-)
-from ._point import (
-    Point,
-)
-from ._retry import (
-    Retryable,
-    RetryPolicy,
 )
 from ._run_state import (
     RunState,

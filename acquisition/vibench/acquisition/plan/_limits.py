@@ -18,9 +18,8 @@ from ..rig import (
     suspended_mass_kg,
 )
 from ._drive_source import Player, player_of
-from ._loads import predicted_loads
+from ._loads import needed_vpp, predicted_loads
 from ._measurement import Measurement, OnOverload
-from ._needed_setting import needed_vpp
 from ._specimen_loads import predicted_specimen_loads
 
 RAMP_PERIODS = 3.0

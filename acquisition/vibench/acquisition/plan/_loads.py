@@ -1,4 +1,7 @@
-"""What a plan will do to the rig, before anything moves: peaks through the rig's linear model."""
+"""What a plan will do to the rig, before anything moves: peaks through the rig's linear model.
+
+The generator's setting that a level of the base needs, by the rig's linear model.
+"""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -109,3 +112,12 @@ def of_source(transfer: Transfer, source: SampleSource) -> Load:
     band_hz = np.linspace(source.band_start_hz, source.band_stop_hz, BAND_POINTS, dtype=np.float64)
     gain = float(np.sqrt(np.mean(np.abs(transfer(band_hz)) ** 2)))
     return Load(gain, gain / source.crest_factor, "streamed noise")
+
+
+def needed_vpp(rig: Rig, acceleration: float, frequency_hz: float) -> float:
+    """Give the setting, peak to peak [V], at which the base's acceleration has an amplitude [m/s2].
+
+    The specimen is not in the model: where it pushes back, more or less is needed.
+    """
+    per_volt = abs(complex(RigModel(rig).transfer(Quantity.ACCELERATION, frequency_hz)))
+    return 2 * acceleration / (per_volt * rig.generator.terminal_factor())

@@ -1,5 +1,9 @@
-"""The plan of one measurement: what is played, how it is ramped, when the run must end itself."""
+"""The plan of one measurement: what is played, how it is ramped, when the run must end itself.
 
+A point: one recording that a campaign wants, and the chain of points that it belongs to.
+"""
+
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Self
 
@@ -67,3 +71,14 @@ class Measurement(FrozenModel):
                 f"{self.ramp_s:g} s; give at most {self.ramp_s / fewest:g}"
             )
         return self
+
+
+@dataclass(frozen=True)
+class Point:
+    """One recording of a campaign."""
+
+    name: str
+    """Of its recording, without ``.h5``; different from every other point's."""
+    measurement: Measurement
+    chain: str = ""
+    """Points of one chain follow each other on one branch; empty for a point that stands alone."""

@@ -12,8 +12,7 @@ from pydantic import Field, PositiveFloat, PositiveInt, ValidationError, model_v
 from ..excitation import MOST_LEAD_INS, Direction, Dwell, LeadIn
 from ..host import FrozenModel, complaints
 from ._axis import Values, values_of
-from ._measurement import Measurement, Name
-from ._point import Point
+from ._measurement import Measurement, Name, Point
 
 MOST_POINTS = 10_000
 """Of one sweep; more is a mistake rather than a plan."""

@@ -1,12 +1,35 @@
-"""Scalar HDF5 attributes that old readers understand: numbers, and UTF-8 text of fixed length."""
+"""Scalar HDF5 attributes that old readers understand: numbers, and UTF-8 text of fixed length.
 
+Text in a fixed number of UTF-8 bytes: what every HDF5 reader can show, unlike variable-length strings.
+
+Values as JSON text that any language can read back: no NaN, no infinities.
+"""
+
+import json
 from collections.abc import Mapping
+from typing import Any
 
 import h5py
 import numpy as np
 
 from ..errors import RecordingError
-from ._fixed_text import decoded, encoded
+
+ELLIPSIS = "…"
+
+
+def encoded(text: str, width: int) -> bytes:
+    """UTF-8 bytes of ``text``, at most ``width`` of them; what does not fit gives way to an ellipsis."""
+    raw = text.replace("\0", "").encode("utf-8", "replace")
+    if len(raw) <= width:
+        return raw
+    room = width - len(ELLIPSIS.encode())
+    return (raw[:room].decode("utf-8", "ignore") + ELLIPSIS).encode()
+
+
+def decoded(raw: bytes) -> str:
+    """Text of a fixed-length field, without its padding."""
+    return bytes(raw).rstrip(b"\0").decode("utf-8", "replace")
+
 
 Attribute = str | int | float
 
@@ -55,3 +78,27 @@ def _write_text(target: h5py.HLObject, name: str, text: str) -> None:
         )
     dtype = h5py.string_dtype("utf-8", max(len(raw), 1))
     target.attrs.create(name, np.array(raw, dtype=dtype), dtype=dtype)
+
+
+def json_text(what: str, values: Mapping[str, Any]) -> str:
+    """Write a mapping as JSON; numbers and arrays of numpy become plain ones.
+
+    Raises
+    ------
+    RecordingError
+        When a value is nothing that JSON can hold; ``what`` names the mapping in the sentence.
+
+    """
+    try:
+        return json.dumps(dict(values), allow_nan=False, default=_plain)
+    except (TypeError, ValueError) as error:
+        raise RecordingError(
+            f"{what} cannot be kept as JSON: {error}. Give text, finite numbers, truth values, None,"
+            " or lists and mappings of them."
+        ) from error
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    raise TypeError(f"a {type(value).__name__} was given")

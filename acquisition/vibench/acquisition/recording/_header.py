@@ -8,8 +8,7 @@ from dataclasses import asdict, dataclass, field, fields
 
 from ..errors import RecordingError
 from ..instruments import Identity
-from ._attributes import Attribute
-from ._json_text import json_text
+from ._attributes import Attribute, json_text
 from ._layout import RESERVED_NAMES, ROLE_WIDTH, Origin
 from ._provenance import Provenance, collect_provenance
 

@@ -14,12 +14,10 @@ import numpy as np
 from ..errors import RecordingError
 from ..instruments import Identity, Overload, Samples
 from . import _layout as layout, _tables as tables
-from ._attributes import read_attributes, read_text_dataset
+from ._attributes import decoded, json_text, read_attributes, read_text_dataset
 from ._counts import Counts
 from ._disk import is_being_recorded
-from ._fixed_text import decoded
 from ._header import ChannelHeader
-from ._json_text import json_text
 from ._layout import Origin, RecordingState
 from ._opening import name_now, open_hdf5
 from ._overview import CountOverview, read_overview

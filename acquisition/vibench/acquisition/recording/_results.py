@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from . import _layout as layout
-from ._attributes import read_attributes, read_text_dataset, write_attributes, write_text_dataset
-from ._json_text import json_text
+from ._attributes import json_text, read_attributes, read_text_dataset, write_attributes, write_text_dataset
 from ._provenance import collect_provenance
 
 REAL_SUFFIX, IMAG_SUFFIX = "_real", "_imag"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..instruments import Overload
 from . import _layout as layout
-from ._fixed_text import decoded
+from ._attributes import decoded
 from ._journal import Number
 from ._layout import Table
 

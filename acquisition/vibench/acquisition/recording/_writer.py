@@ -17,12 +17,12 @@ import numpy as np
 from ..errors import RecordingError
 from ..instruments import Block, Samples
 from . import _layout as layout
+from ._attributes import encoded
 from ._committer import COMMIT_INTERVAL_S, Batch, Committer
 from ._counts import Counts, CountScale
 from ._disk import Buffer, Disk
 from ._disk_trouble import open_disk
 from ._finalise import discard, finalise
-from ._fixed_text import encoded
 from ._header import RecordingHeader
 from ._journal import Journal, Number
 from ._layout import RecordingState

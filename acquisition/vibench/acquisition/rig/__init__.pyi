@@ -32,24 +32,20 @@ from ._model import (
     ComplexArray as ComplexArray,
     Quantity as Quantity,
     RigModel as RigModel,
+    specimen_of as specimen_of,
     suspended_mass_kg as suspended_mass_kg,
 )
 from ._output import (
     OutputConfig as OutputConfig,
     OutputUse as OutputUse,
 )
-from ._server_token import (
-    METADATA_KEY as METADATA_KEY,
-    VARIABLE as VARIABLE,
-    given_token as given_token,
-)
-from ._specimen import (
-    specimen_of as specimen_of,
-)
 from ._virtual import (
     LARGEST_LEVEL_ERROR as LARGEST_LEVEL_ERROR,
+    METADATA_KEY as METADATA_KEY,
     USUAL_GRID_RATE_HZ as USUAL_GRID_RATE_HZ,
+    VARIABLE as VARIABLE,
     VirtualConfig as VirtualConfig,
     fastest_sample_rate_hz as fastest_sample_rate_hz,
+    given_token as given_token,
     highest_carried_hz as highest_carried_hz,
 )

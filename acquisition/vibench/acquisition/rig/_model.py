@@ -1,10 +1,15 @@
-"""The rig as a linear chain: what a volt at the generator's terminal does to amplifier, coil and table."""
+"""The rig as a linear chain: what a volt at the generator's terminal does to amplifier, coil and table.
+
+The specimen of a rig as the simulation knows it.
+"""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from vibench.sim import Specimen, gong2025
 
 from ._configuration import AmplifierConfig, Rig, ShakerConfig
 
@@ -122,3 +127,9 @@ def _dynamic_stiffness(shaker: ShakerConfig, s: ComplexArray) -> ComplexArray:
     damping = shaker.suspension_damping_ns_per_m
     stiffness = shaker.suspension_stiffness_n_per_m
     return np.asarray(stiffness + s * damping + s**2 * suspended_mass_kg(shaker))
+
+
+def specimen_of(rig: Rig) -> Specimen:
+    """Make the specimen that a rig describes."""
+    config = rig.specimen
+    return gong2025(damping_time_s=config.damping_time_s, gap_m=config.gap_m, contact=config.contact)

@@ -1,11 +1,26 @@
-"""What a hardware configuration says of simulated instruments, where real ones just are as they are."""
+"""What a hardware configuration says of simulated instruments, where real ones just are as they are.
 
+The word that lets a client in to a virtual rig that is served beyond its own computer.
+"""
+
+import os
 from math import pi, sqrt
 from typing import Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
 
 from ..host import FrozenModel
+
+METADATA_KEY = "vibench-token"
+"""Where a gRPC call carries it."""
+VARIABLE = "VIBENCH_RIG_TOKEN"
+"""Where our own programs find it: the environment, never a command line that others can read."""
+
+
+def given_token() -> str:
+    """Token from the environment; empty where none is needed."""
+    return os.environ.get(VARIABLE, "")
+
 
 USUAL_GRID_RATE_HZ = 102_400.0
 """Steps per second on which the analogue world is computed, unless the configuration says otherwise."""

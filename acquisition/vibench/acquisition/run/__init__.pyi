@@ -5,7 +5,7 @@ from ._drive import (
     Drive as Drive,
     drive_for as drive_for,
 )
-from ._progress import (
+from ._ending import (
     Outcome as Outcome,
     Progress as Progress,
 )

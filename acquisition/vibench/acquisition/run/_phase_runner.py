@@ -9,8 +9,8 @@ from ..recording import HOLD_ROOM_S
 from ..stopping import Cause, StopLevel, StopRequest, StopSwitch
 from ._acquisition_loop import BLOCK_S, Tape
 from ._drive import Drive
+from ._ending import Progress
 from ._limit_monitor import Guard
-from ._progress import Progress
 
 HOLD_LONGEST_S = HOLD_ROOM_S
 """How long a run may be held in all [s]: its recording has room for that."""

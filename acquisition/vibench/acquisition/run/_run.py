@@ -1,4 +1,9 @@
-"""Carrying out a measurement: check, ramp up, settle, record, ramp down, and silence whatever happens."""
+"""Carrying out a measurement: check, ramp up, settle, record, ramp down, and silence whatever happens.
+
+Whether a measurement is conducted by what is heard, and by whom.
+
+What a recording says before its first sample, taken from the bench and the plan.
+"""
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -7,33 +12,99 @@ from types import TracebackType
 from typing import Self
 
 from ..bench import RunBench
-from ..control import Conduct, heard
-from ..errors import AcquisitionError, LimitExceeded
+from ..control import Conduct, conduct, heard
+from ..errors import AcquisitionError, ConfigurationError, LimitExceeded
+from ..excitation import AbstractFeedback
 from ..instruments import Block
 from ..plan import (
     CHECK_S,
     Measurement,
     Phase,
+    Player,
     RunState,
     check_amplitude_vpp,
     check_phases,
     duration_s,
     known_phases,
     phases,
+    player_of,
     require_within_limits,
     shortest_ramp_s,
 )
-from ..recording import RecordingHeader, create_recording
+from ..recording import ChannelHeader, Origin, RecordingHeader, create_recording
+from ..rig import Channel, KnobSheet
 from ..stopping import LEVELS, Cause, StopLevel, StopRequest, StopSwitch
 from ._acquisition_loop import Recorder, Tape
-from ._controller import conductor_for
 from ._drive import Drive, drive_for
-from ._ending import Ending
-from ._header import run_header
+from ._ending import Ending, Outcome, Progress
 from ._limit_monitor import Guard
 from ._low_level_check import BenchCheck, judged, require_checkable
 from ._phase_runner import Performance, Stopped
-from ._progress import Outcome, Progress
+
+
+def conductor_for(bench: RunBench, measurement: Measurement) -> Conduct[None] | None:
+    """Give who conducts a measurement; None for one whose course is known.
+
+    Raises
+    ------
+    ConfigurationError
+        When the bench cannot do it: before anything plays.
+
+    """
+    if not isinstance(measurement.excitation, AbstractFeedback):
+        return None
+    if player_of(measurement, bench.rig) is Player.OUTPUT:
+        raise ConfigurationError(
+            f"{measurement.name} is decided while it plays, and an analogue output is written ahead of its "
+            "time. Nothing was played; let daq.output play streams only, and connect the function generator"
+        )
+    return conduct(measurement, bench.rig, bench.channels, bench.digitizer.sample_rate_hz)
+
+
+def run_header(bench: RunBench, measurement: Measurement, planned_s: float) -> RecordingHeader:
+    """Describe the recording of ``planned_s`` that a run of ``measurement`` on ``bench`` is going to make."""
+    rig = bench.rig
+    steps = bench.digitizer.volts_per_count
+    sample_rate_hz = bench.digitizer.sample_rate_hz
+    return RecordingHeader(
+        channels=tuple(_channel(channel, step) for channel, step in zip(bench.channels, steps, strict=True)),
+        sample_rate_hz=sample_rate_hz,
+        expected_samples=round(planned_s * sample_rate_hz),
+        origin=Origin.REAL if rig.virtual is None else Origin.SIMULATED,
+        plan_json=measurement.model_dump_json(),
+        bench_json=rig.model_dump_json(),
+        requested_sample_rate_hz=rig.daq.sample_rate_hz,
+        instruments=bench.identities,
+        confirmations=_confirmations(bench.confirmations),
+        bench_check_json="{}" if bench.last_check is None else bench.last_check.model_dump_json(),
+    )
+
+
+def _channel(channel: Channel, volts_per_count: float | None) -> ChannelHeader:
+    calibrated = channel.sensor_calibrated or channel.converter_calibrated
+    return ChannelHeader(
+        role=channel.role.value,
+        physical_channel=channel.physical,
+        quantity=channel.quantity,
+        unit=channel.unit,
+        physical_per_volt=channel.units_per_volt,
+        range_v=channel.range_v,
+        volts_per_count=volts_per_count,
+        coupling=channel.coupling,
+        iepe_current_a=channel.iepe_current_a,
+        sensitivity=1 / channel.units_per_volt,
+        sensitivity_unit=f"V/({channel.unit})",
+        serial=channel.serial,
+        calibration_date=calibrated.isoformat(),
+        delay_s=channel.delay_s,
+        long_name=f"{channel.role.value.replace('_', ' ')} ({channel.sensor})",
+    )
+
+
+def _confirmations(sheet: KnobSheet) -> dict[str, str]:
+    knobs = {f"{knob.instrument} {knob.setting}": knob.value for knob in sheet.knobs}
+    return {"operator": sheet.operator, "confirmed": sheet.confirmed.isoformat(), **knobs}
+
 
 CreateRecording = Callable[[Path, RecordingHeader], Recorder]
 

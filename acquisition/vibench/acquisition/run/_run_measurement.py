@@ -7,8 +7,8 @@ from ..bench import RunBench
 from ..plan import Measurement
 from ..recording import create_recording
 from ..stopping import StopSwitch, stop_on_signal
+from ._ending import Outcome, Progress
 from ._low_level_check import BenchCheck
-from ._progress import Outcome, Progress
 from ._run import CreateRecording, Run
 
 

@@ -8,11 +8,7 @@ curve, far above the noise; otherwise undecided. The largest exponent from data:
 from ._period import (
     Points,
 )
-from ._verdict import (
-    MotionKind,
-    MotionVerdict,
-    motion_verdict,
-)
+from ._verdict import MotionKind, MotionVerdict, motion_verdict
 
 __all__ = [
     "MotionKind",

@@ -8,9 +8,6 @@ readings at markers and differences of curves; how recordings are analysed for i
 from ._options import (
     AnalysisOptions,
 )
-from ._reading import (
-    readings,
-)
 from ._recording_traces import (
     dwell_traces,
     predicted_traces,
@@ -25,9 +22,7 @@ from ._trace import (
     sorted_trace,
     trace_difference,
 )
-from ._trace_peaks import (
-    trace_peaks,
-)
+from ._trace_peaks import readings, trace_peaks
 
 __all__ = [
     "AnalysisOptions",

@@ -1,11 +1,20 @@
-"""Samples as comma-separated text: one row a sample, headings with units, nothing before them."""
+"""Samples as comma-separated text: one row a sample, headings with units, nothing before them.
+
+Columns of text as a source: commas, semicolons, tabs or blanks between them, read whole.
+"""
 
 import csv
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
+from ..signals import Reals
 from ._excerpt import Excerpt, Watcher, unwatched
+from ._source_channel import SourceChannel, TableSource
 
 TIME_FORMAT = "%.9f"
 """Nanoseconds since the recording's first sample."""
@@ -26,3 +35,78 @@ def write_csv_samples(excerpt: Excerpt, path: Path, watcher: Watcher = unwatched
             cells = np.column_stack((time_s, block.values.T))
             file.write(row * samples % tuple(cells.ravel().tolist()))
             watcher(block.values.size)
+
+
+LONGEST_HEAD = 200
+"""Lines in which the numbers must have begun."""
+DELIMITERS = (";", "\t", ",", None)
+"""In the order in which they are tried; None stands for blanks. A comma beside another is a decimal one."""
+UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
+UNEVEN = 1e-3
+"""How far a sample may lie from its place on an even axis of time, in sample intervals."""
+
+
+@contextmanager
+def opened_csv(path: Path) -> Iterator[TableSource]:
+    """Open a file whose columns are ``"1"``, ``"2"``, ... or what the line above them calls them.
+
+    ValueError when no line of numbers begins within the first 200, or a later line has others.
+    """
+    head, first, delimiter = _beginning(path)
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        lines = (_with_points(line, delimiter) for line in islice(file, first, None))
+        table = np.loadtxt(lines, delimiter=delimiter, ndmin=2, comments=None)
+    labels = _labels(head, delimiter, table.shape[1])
+    rate = _sample_rate_hz(labels[0], table[:, 0])
+    yield TableSource(
+        {
+            SourceChannel(
+                str(number), len(table), UNIT.sub("", label).strip(), rate, _unit(label)
+            ): np.ascontiguousarray(column)
+            for number, (label, column) in enumerate(zip(labels, table.T, strict=True), start=1)
+        }
+    )
+
+
+def _beginning(path: Path) -> tuple[list[str], int, str | None]:
+    """Find the lines before the numbers, how many they are, and what stands between the numbers."""
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        head: list[str] = []
+        for number, line in enumerate(islice(file, LONGEST_HEAD)):
+            delimiter = next((each for each in DELIMITERS if each is None or each in line), None)
+            if _are_numbers(_with_points(line, delimiter).split(delimiter)):
+                return head, number, delimiter
+            head.append(line)
+    raise ValueError(f"no line of numbers among its first {LONGEST_HEAD}")
+
+
+def _with_points(line: str, delimiter: str | None) -> str:
+    return line if delimiter == "," else line.replace(",", ".")
+
+
+def _are_numbers(cells: Sequence[str]) -> bool:
+    try:
+        return bool([float(each) for each in cells])
+    except ValueError:
+        return False
+
+
+def _labels(head: Sequence[str], delimiter: str | None, columns: int) -> list[str]:
+    found = [each.strip().strip('"') for each in head[-1].split(delimiter)] if head else []
+    return found if len(found) == columns else [""] * columns
+
+
+def _unit(label: str) -> str:
+    found = UNIT.search(label)
+    return "" if found is None else found[1]
+
+
+def _sample_rate_hz(label: str, values: Reals) -> float | None:
+    """Take the rate from a first column that is called time and is even; None otherwise."""
+    if not label.lower().startswith("time") or _unit(label) not in {"s", ""} or len(values) < 2:
+        return None
+    interval_s = (values[-1] - values[0]) / (len(values) - 1)
+    if not interval_s > 0:
+        return None
+    even_s = values[0] + interval_s * np.arange(len(values))
+    return float(1 / interval_s) if np.all(np.abs(values - even_s) < UNEVEN * interval_s) else None

@@ -11,13 +11,13 @@ import numpy as np
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals import Reals
-from ._csv_source import opened_csv
+from ._csv import opened_csv
 from ._hdf5_source import opened_hdf5
-from ._mat_source import opened_mat
+from ._mat import opened_mat
 from ._source_channel import SourceChannel
 from ._tdms_source import opened_tdms
-from ._uff_source import opened_uff
-from ._wav_source import opened_wav
+from ._uff import opened_uff
+from ._wav import opened_wav
 
 
 class Source(Protocol):
@@ -43,8 +43,6 @@ _READERS: dict[str, Callable[[Path], AbstractContextManager[Source]]] = {
     ".csv": opened_csv,
     ".txt": opened_csv,
 }
-
-
 DAMAGE = (
     OSError,
     EOFError,

@@ -1,6 +1,12 @@
-"""One channel of somebody else's file."""
+"""One channel of somebody else's file.
 
+A table held in memory as a source: what formats give that cannot be read in stretches.
+"""
+
+from collections.abc import Mapping
 from dataclasses import dataclass
+
+from ..signals import Reals
 
 
 @dataclass(frozen=True)
@@ -19,3 +25,19 @@ class SourceChannel:
     """Distance of neighbouring values when they come from integers, so that they are kept exactly."""
     full_scale: float | None = None
     """Largest value the file can hold, where that is the converter's range."""
+
+
+@dataclass(frozen=True, eq=False)
+class TableSource:
+    """Channels with all their numbers."""
+
+    numbers: Mapping[SourceChannel, Reals]
+
+    @property
+    def channels(self) -> tuple[SourceChannel, ...]:
+        """In the order of the file."""
+        return tuple(self.numbers)
+
+    def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
+        """Give a stretch."""
+        return self.numbers[channel][start:stop]

@@ -11,9 +11,7 @@ from ._distortion import (
     distortion,
     is_even_line,
 )
-from ._noise_request import (
-    NoiseRequest,
-)
+from ._noise_request import MagnitudeScale, NoiseRequest, quantities_named
 from ._noise_response import (
     DEFAULT_REQUEST,
     Noise,
@@ -21,9 +19,7 @@ from ._noise_response import (
     NoiseResponse,
     noise_response,
 )
-from ._periodic_transmission import (
-    PeriodicTransmission,
-)
+from ._periodic_transmission import PeriodicTransmission
 from ._resonance import (
     Resonance,
     resonances,
@@ -37,10 +33,6 @@ from ._results import (
 from ._transmission import (
     transmission,
     transmission_of,
-)
-from ._transmission_view import (
-    MagnitudeScale,
-    quantities_named,
 )
 
 __all__ = [

@@ -24,18 +24,10 @@ from ._results import Estimator, Transmission, converted_transmission
 from ._transmission import TransmissionSums
 
 Noise = MultisineNoise | OddMultisine | StreamedNoise
-
-
 _BLOCK = 1 << 19
 """Samples of a record that are looked at together."""
-
-
 _LEVEL_SEGMENT_S = 1.0
-
-
 DEFAULT_REQUEST = NoiseRequest()
-
-
 _LEAST_PERIODS = 2
 
 

@@ -35,11 +35,14 @@ from ._outline import (
     outline,
 )
 from ._overview import (
+    THUMBNAIL_COLUMNS,
     OverviewLevel,
     RecordingOverview,
+    Thumbnail,
     has_overview,
     kept_levels,
     overview_levels,
+    thumbnail,
 )
 from ._portrait import (
     Portrait,
@@ -50,15 +53,7 @@ from ._recording_spectrogram import (
     SpectrogramRequest,
     recording_spectrogram,
 )
-from ._thumbnail import (
-    THUMBNAIL_COLUMNS,
-    Thumbnail,
-    thumbnail,
-)
-from ._view import (
-    LiveChannel,
-    LiveView,
-)
+from ._view import LiveChannel, LiveView
 
 __all__ = [
     "OVER_SHARE",

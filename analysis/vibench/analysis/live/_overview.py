@@ -2,14 +2,18 @@
 
 Wide stretches are drawn from the extremes of bins that the file keeps, narrow ones from the samples
 themselves; nothing in between is skipped, so an impact of three samples is in every picture.
+
+A whole recording in a hundred columns: what a list of recordings shows beside a name.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibench.acquisition import RecordingError, open_recording
 from vibench.acquisition.recording import (
     BIN_SAMPLES,
     CHUNK_SAMPLES,
@@ -21,6 +25,7 @@ from vibench.acquisition.recording import (
 )
 
 from ..errors import InvalidRequest
+from ..recordings import RESPONSE
 from ..signals import Reals
 from ._envelope import Samples, column_starts, envelope
 from ._outline import outline
@@ -191,3 +196,38 @@ def _scaled(counts: Counts, channel: ChannelHeader) -> NDArray[np.float32]:
     values = counts * np.float64(channel.scale_factor) + channel.add_offset
     values[counts == MISSING_COUNT] = np.nan
     return values.astype(np.float32)
+
+
+THUMBNAIL_COLUMNS = 120
+READ_WHOLE_SAMPLES = 50_000_000
+"""Values that are read for the thumbnail of a file without an overview: about a second."""
+
+
+@dataclass(frozen=True, eq=False)
+class Thumbnail:
+    """The response of a whole recording, in few columns; each between -1 and 1."""
+
+    low: NDArray[np.float32]
+    high: NDArray[np.float32]
+
+
+def thumbnail(path: Path) -> Thumbnail | None:
+    """Draw a recording small; None where there is nothing to draw, or it would take too long."""
+    try:
+        with open_recording(path) as recording:
+            if recording.samples == 0 or not _is_quickly_seen(recording):
+                return None
+            role = RESPONSE if RESPONSE in recording.roles else recording.roles[-1]
+            picture = overview_of(recording).picture((role,), 0, recording.samples, THUMBNAIL_COLUMNS)
+    except RecordingError:
+        return None
+    known = np.isfinite(picture.low[0]) & np.isfinite(picture.high[0])
+    if not known.any():
+        return None
+    low, high = (np.asarray(each[0], dtype=np.float32) for each in (picture.low, picture.high))
+    largest = max(float(np.max(np.abs(low[known]))), float(np.max(np.abs(high[known]))))
+    return Thumbnail(low / largest, high / largest) if largest > 0 else None
+
+
+def _is_quickly_seen(recording: Recording) -> bool:
+    return has_overview(recording) or recording.samples * len(recording.roles) <= READ_WHOLE_SAMPLES

@@ -1,7 +1,10 @@
-"""One run as it is watched: samples go in, and every picture of a frame is asked for when it is drawn."""
+"""One run as it is watched: samples go in, and every picture of a frame is asked for when it is drawn.
+
+The course of a sine or a sweep so far: responses and extremes against the frequency really played.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +18,53 @@ from ._levels import Level, LevelMeters
 from ._outline import outline
 from ._portrait import PoincareSection, Portrait, portrait, portrait_samples
 from ._ring import Ring
-from ._sine_response import look_samples, sine_point, stretch_samples
+from ._sine_response import SinePoint, look_samples, sine_point, stretch_samples
 from ._spectra import DEFAULT_SETTINGS, LiveSpectra, LiveSpectrum, SpectrumSettings
-from ._sweep_trace import SweepCourse, SweepTrace
+
+MOST_POINTS = 36_000
+"""An hour at ten points a second; the oldest go first."""
+_COLUMNS = tuple(each.name for each in fields(SinePoint))
+
+
+@dataclass(frozen=True, eq=False)
+class SweepCourse:
+    """All points so far, in the order of time; arrays of shape (points,)."""
+
+    time_s: Reals
+    frequency_hz: Reals
+    drive_amplitude_m: Reals
+    lower: Reals
+    upper: Reals
+    response_i: Reals
+    response_ii: Reals
+
+
+class SweepTrace:
+    """Keeps points as they come, in memory that was claimed at the beginning."""
+
+    def __init__(self, most: int = MOST_POINTS) -> None:
+        self._most = most
+        self._rows = np.empty((len(_COLUMNS), 2 * most))
+        self._begin = self._end = 0
+
+    @property
+    def points(self) -> int:
+        """How many are kept."""
+        return self._end - self._begin
+
+    def add(self, point: SinePoint) -> None:
+        """Keep one more."""
+        if self._end == self._rows.shape[1]:
+            self._rows[:, : self.points] = self._rows[:, self._begin : self._end].copy()
+            self._begin, self._end = 0, self.points
+        self._rows[:, self._end] = [getattr(point, name) for name in _COLUMNS]
+        self._end += 1
+        self._begin = max(self._begin, self._end - self._most)
+
+    def course(self) -> SweepCourse:
+        """Give all points."""
+        return SweepCourse(*self._rows[:, self._begin : self._end].copy())
+
 
 HELD_S = 10.0
 _POINT_EVERY_S = 0.1

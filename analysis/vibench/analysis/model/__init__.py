@@ -43,12 +43,7 @@ from ._similarity import (
     Similarity,
     similarity,
 )
-from ._simulated_channels import (
-    SimulatedChannels,
-    SimulatedSpecimen,
-    played_impacts,
-    simulated_specimen,
-)
+from ._simulated_channels import SimulatedChannels, SimulatedSpecimen, played_impacts, simulated_specimen
 
 __all__ = [
     "PAPER_RESONANCES_HZ",

@@ -32,11 +32,7 @@ from ._prediction import Prediction, paper_amplitude_m, predicted
 from ._simulated_channels import SimulatedChannels, SimulatedSpecimen, played_impacts
 
 PREDICTION_STEP_HZ = 2.0
-
-
 _FINE_STEP_HZ = 0.25
-
-
 _HIGHEST_PREDICTED_HZ = 700.0
 """Above the highest mode (500 Hz) the curves fall smoothly; predicting there shows nothing."""
 

@@ -24,10 +24,7 @@ from ._responses import (
     drive_at,
     responses,
 )
-from ._time_signal import (
-    TimeSignal,
-    time_signal,
-)
+from ._time_signal import TimeSignal, time_signal
 
 __all__ = [
     "AMPLITUDES_M",

@@ -6,8 +6,7 @@ from ..figures import MEASURED, SIMULATED, DrawnFigure, legend_above, new_figure
 from ..tables import table
 from ._options import FigureOptions
 from ._responses import draw_linear, drive_at, finish, responses, specimen_of
-from ._signal_panels import draw_outline, draw_spectrum
-from ._time_signal import time_signal
+from ._time_signal import draw_outline, draw_spectrum, time_signal
 
 _AMPLITUDE_M, _SHOWN_HZ = 5e-6, 200.0
 

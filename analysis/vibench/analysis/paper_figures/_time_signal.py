@@ -1,11 +1,16 @@
-"""A simulated dwell as the paper shows it: 30 s of motion, and the spectrum of the last 5 s."""
+"""A simulated dwell as the paper shows it: 30 s of motion, and the spectrum of the last 5 s.
+
+Panels of a time signal and of its spectrum, shared by the figures that show dwells.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from vibench.sim import Harmonic, Specimen, integrate
 
+from ..figures import COLLIDING, MEASURED, TERMINAL, magnitude_axis
 from ..signals import Envelope, Reals, envelope
 from ._options import FigureOptions
 
@@ -35,3 +40,32 @@ def time_signal(specimen: Specimen, drive: Harmonic, options: FigureOptions) -> 
         frequency_hz=np.arange(count // 2 + 1, dtype=np.float64) * (_RATE_HZ / count),
         amplitude=np.asarray(spectrum),
     )
+
+
+_SPECTRUM_HZ = 600.0
+_DECADES = 5.0
+
+
+def draw_outline(axes: Axes, signal: TimeSignal, options: FigureOptions) -> None:
+    """Draw the envelope over time, with the window that is observed in grey."""
+    found = signal.outline
+    axes.axvspan(options.duration_s - options.window_s, options.duration_s, color=COLLIDING, zorder=0)
+    axes.fill_between(found.time_s, found.lower, found.upper, color=MEASURED, linewidth=0)
+    axes.set_xlim(0, options.duration_s)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("x / A0")
+
+
+def draw_spectrum(axes: Axes, signal: TimeSignal, specimen: Specimen, drive_hz: float) -> None:
+    """Draw the spectrum of the window, with the terminal resonances and the drive marked."""
+    for bound_hz in specimen.bound_frequencies_hz:
+        axes.axvline(float(bound_hz), color=TERMINAL, linestyle=":", linewidth=1.0)
+    axes.axvline(drive_hz, color="#9a9a9a", linestyle="--", linewidth=0.8)
+    shown = signal.frequency_hz <= _SPECTRUM_HZ
+    axes.plot(signal.frequency_hz[shown], signal.amplitude[shown], color=MEASURED, linewidth=0.8)
+    magnitude_axis(axes)
+    top = float(np.max(signal.amplitude[shown]))
+    axes.set_ylim(top * 10**-_DECADES, 3 * top)
+    axes.set_xlim(0, _SPECTRUM_HZ)
+    axes.set_xlabel("frequency [Hz]")
+    axes.set_ylabel("|x| / A0")

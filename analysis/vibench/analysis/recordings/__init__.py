@@ -5,12 +5,7 @@ Facts are what was measured, with what, and how it ended, with what feedback not
 say what to look at before trusting it. The format: docs/recording-format.md. Nothing is estimated here.
 """
 
-from ._channel_faults import (
-    require_moving_channels,
-)
-from ._channel_levels import (
-    ChannelLevel,
-)
+from ._channel_levels import ChannelLevel, require_moving_channels
 from ._channels import (
     BASE,
     DRIVE,
@@ -18,6 +13,9 @@ from ._channels import (
     Channels,
     RecordedChannels,
     Stretch,
+    Unwatched,
+    WatchedChannels,
+    Watcher,
     only_stretch,
     read_whole,
 )
@@ -26,19 +24,7 @@ from ._checks import (
     Verdict,
     measurement_checks,
 )
-from ._facts import (
-    RecordingFacts,
-    recording_facts,
-    specimen_of,
-)
-from ._feedback_notes import (
-    FeedbackNote,
-)
-from ._watcher import (
-    Unwatched,
-    WatchedChannels,
-    Watcher,
-)
+from ._facts import FeedbackNote, RecordingFacts, recording_facts, specimen_of
 
 __all__ = [
     "BASE",

@@ -14,8 +14,7 @@ from ..figures import DrawnFigure
 from ..recordings import RecordingFacts, Verdict
 from ..results import CampaignResults, Failure, Result
 from ._figure_choice import recording_figures, result_figures
-from ._findings import findings
-from ._limits import limits
+from ._findings import findings, limits
 from ._recording_section import (
     CHANNEL_HEADINGS,
     Rows,

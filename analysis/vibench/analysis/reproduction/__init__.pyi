@@ -16,10 +16,8 @@ from ._document import (
 )
 from ._evidence import (
     Evidence as Evidence,
+    levels_asked as levels_asked,
 )
 from ._reproduce import (
     reproduction as reproduction,
-)
-from ._studies import (
-    levels_asked as levels_asked,
 )

@@ -6,13 +6,10 @@ from vibench.sim import PowerSpring, first_order_states, gong2025, spring_of, st
 
 from ..model import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
 from ..signals import Reals
-from ._case import Case
-from ._claim import Claim
+from ._case import DAMPINGS, Case
+from ._claim import Claim, about, at_least, at_most
 from ._curve_peaks import curve_peaks, nearest, two_highest
-from ._dampings import DAMPINGS
-from ._evidence import Evidence
-from ._expectation import about, at_least, at_most
-from ._studies import CONTINUOUS, STRONG_M, WEAK_M, level
+from ._evidence import CONTINUOUS, STRONG_M, WEAK_M, Evidence, level
 
 AGREES = 0.1
 """Relative: the paper's own measure of similar (its eq. 6) is looser."""
@@ -87,8 +84,6 @@ def _is_near(solutions: Reals, response: float) -> bool:
 _AT_RESONANCES = tuple(about(f"peak at {each:g} Hz", "Hz", each, _GRID_HZ) for each in PAPER_RESONANCES_HZ)
 _BENT = "The force of n = 5 acts at every p, so that a resonance at which p nears the gap is bent upwards."
 _NO_THIRD = at_most("next peak over the second", "", 0.5)
-
-
 BALANCE_CLAIMS = (
     Claim(
         key="continuous-weak-balance",

@@ -6,12 +6,9 @@ from vibench.sim import LinearSweep, Observable, Outcome, integrate
 
 from ..paper_figures import AMPLITUDES_M, Responses, responses
 from ..signals import Flags, Reals
-from ._case import Case, gapped, swept_at
-from ._claim import Claim
-from ._dampings import DAMPINGS
-from ._evidence import Evidence
-from ._expectation import about, at_least, at_most
-from ._studies import MODERATE_M, PIECE_WISE, level, model_study, specimen_under
+from ._case import DAMPINGS, Case, gapped, swept_at
+from ._claim import Claim, about, at_least, at_most
+from ._evidence import MODERATE_M, PIECE_WISE, Evidence, level, model_study, specimen_under
 
 FIG_5_HIGHER_M = 7e-6
 SWEEP_START_HZ, SWEEP_STOP_HZ, SWEEP_S = 150.0, 350.0, 200.0

@@ -1,10 +1,17 @@
-"""What claims are measured on: studies, signals and sweeps, each computed once."""
+"""What claims are measured on: studies, signals and sweeps, each computed once.
 
-from collections.abc import Callable
+The studies that claims are measured on: each model at the paper's amplitudes, once.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from vibench.sim.study import Study, StudyResults
+from vibench.sim import Observable, Specimen, gong2025
+from vibench.sim.study import Kept, Study, StudyResults
+
+from ..paper_figures import AMPLITUDES_M, Responses, responses
+from ._case import Case
 
 Computed = TypeVar("Computed")
 Solve = Callable[[Study], StudyResults]
@@ -32,3 +39,53 @@ class Evidence:
         if key not in self._remembered:
             self._remembered[key] = compute()
         return self._remembered[key]  # type: ignore[return-value]
+
+
+PIECE_WISE, CONTINUOUS = "hertz", "power:5"
+WEAK_M, MODERATE_M, HIGHER_M, STRONG_M = AMPLITUDES_M
+WITH_EXPONENTS = (PIECE_WISE, CONTINUOUS)
+"""Models whose exponents the paper shows at all four amplitudes (Fig. 10)."""
+
+
+def specimen_under(case: Case) -> Specimen:
+    """Give the paper's specimen at a case's damping and gap."""
+    return gong2025(case.options.damping_time_s, case.options.gap_m)
+
+
+def level(evidence: Evidence, case: Case, amplitude_m: float, model: str = PIECE_WISE) -> Responses:
+    """Give the curves of a model at one of the paper's amplitudes."""
+    return responses(evidence.study(levels_asked(case, model)), amplitude=amplitude_m)
+
+
+def levels_asked(case: Case, model: str = PIECE_WISE) -> Study:
+    """Give the study of a model at all four amplitudes."""
+    return model_study(case, model, AMPLITUDES_M, with_exponents(model))
+
+
+def with_exponents(model: str) -> tuple[Kept, ...]:
+    """Say what is observed of a model at the four amplitudes."""
+    both: tuple[Kept, ...] = (Observable.RESPONSE, Observable.LYAPUNOV)
+    return both if model in WITH_EXPONENTS else both[:1]
+
+
+def model_study(
+    case: Case,
+    model: str,
+    amplitudes_m: Sequence[float],
+    observe: tuple[Kept, ...],
+    damping_time_s: float | None = None,
+) -> Study:
+    """One model over the case's grid, at the case's damping unless another is given."""
+    options = case.options
+    chosen = options.damping_time_s if damping_time_s is None else damping_time_s
+    return Study(
+        models=(model,),
+        amplitudes_m=tuple(amplitudes_m),
+        gaps_m=(options.gap_m,),
+        damping_times_s=(chosen,),
+        frequencies_hz=options.frequencies_hz,
+        observe=observe,
+        accuracy=options.accuracy,
+        duration_s=options.duration_s,
+        window_s=options.window_s,
+    )

@@ -4,12 +4,19 @@ import numpy as np
 
 from ..paper_figures import AMPLITUDES_M, responses
 from ..signals import Reals
-from ._case import Case
-from ._claim import Claim
-from ._dampings import DAMPINGS
-from ._evidence import Evidence
-from ._expectation import at_least, at_most
-from ._studies import CONTINUOUS, MODERATE_M, PIECE_WISE, STRONG_M, WEAK_M, level, model_study, with_exponents
+from ._case import DAMPINGS, Case
+from ._claim import Claim, at_least, at_most
+from ._evidence import (
+    CONTINUOUS,
+    MODERATE_M,
+    PIECE_WISE,
+    STRONG_M,
+    WEAK_M,
+    Evidence,
+    level,
+    model_study,
+    with_exponents,
+)
 
 SEVERE_PER_S = 100.0
 """Section 3.1: "more than 100"."""

@@ -10,10 +10,9 @@ from vibench.sim import gong2025
 from ..paper_figures import AMPLITUDES_M
 from ..signals import Flags, Reals
 from ._case import Case
-from ._evidence import Evidence
+from ._evidence import PIECE_WISE, Evidence, level
 from ._score import DampingScore
 from ._similarity_claims import EXTREME_ORDERS, FIRST, ORDERS, SECOND, rates
-from ._studies import PIECE_WISE, level
 
 SI_READING_S = 0.01
 """c_i = 0.01 k_i, as the paper prints it, in SI units."""

@@ -6,13 +6,10 @@ from vibench.sim import Observable
 
 from ..model import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
 from ..paper_figures import GAPS_M, clearance_studies, responses
-from ._case import Case
-from ._claim import Claim
+from ._case import DAMPINGS, Case
+from ._claim import Claim, Expectation, about, at_most
 from ._curve_peaks import bound_peaks, curve_peaks, linear_peaks, nearest, two_highest
-from ._dampings import DAMPINGS
-from ._evidence import Evidence
-from ._expectation import Expectation, about, at_most
-from ._studies import PIECE_WISE, STRONG_M, WEAK_M, level, model_study, specimen_under
+from ._evidence import PIECE_WISE, STRONG_M, WEAK_M, Evidence, level, model_study, specimen_under
 
 _STRONGER_M = 100e-6
 _WHOLE_HZ = 1.0

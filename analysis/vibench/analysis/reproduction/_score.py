@@ -5,11 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._case import Case, damping
+from ._case import SCORED_S, Case, damping
 from ._claim import Claim, found
-from ._dampings import SCORED_S
-from ._evidence import Evidence
-from ._studies import MODERATE_M, WEAK_M, level
+from ._evidence import MODERATE_M, WEAK_M, Evidence, level
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,9 @@ from vibench.sim import gong2025, spring_of
 from ..model import Curve, LogarithmOf, similarity
 from ..paper_figures import AMPLITUDES_M
 from ..signals import Reals
-from ._case import EQUAL_PARTS, Alternative, Case, compared_up_to, logarithm, summed
-from ._claim import Claim
-from ._dampings import DAMPINGS
-from ._evidence import Evidence
-from ._expectation import about, at_least, at_most
-from ._studies import PIECE_WISE, level, model_study, with_exponents
+from ._case import DAMPINGS, EQUAL_PARTS, Alternative, Case, compared_up_to, logarithm, summed
+from ._claim import Claim, about, at_least, at_most
+from ._evidence import PIECE_WISE, Evidence, level, model_study, with_exponents
 
 CUBIC, FIFTH, SEVENTH, SUM = "power:3", "power:5", "power:7", EQUAL_PARTS
 ORDERS = (CUBIC, FIFTH, SEVENTH, SUM)

@@ -5,12 +5,9 @@ import numpy as np
 from ..model import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
 from ..paper_figures import AMPLITUDES_M, TimeSignal, drive_at, time_signal
 from ..signals import Reals
-from ._case import Case
-from ._claim import Claim
-from ._dampings import DAMPINGS
-from ._evidence import Evidence
-from ._expectation import about, at_least, at_most
-from ._studies import MODERATE_M, STRONG_M, WEAK_M, level, specimen_under
+from ._case import DAMPINGS, Case
+from ._claim import Claim, about, at_least, at_most
+from ._evidence import MODERATE_M, STRONG_M, WEAK_M, Evidence, level, specimen_under
 
 SHOWN_HZ = 260.0
 _HALF_BAND_HZ = 10.0

@@ -33,8 +33,6 @@ from ..sine import (
 from ._measurement_analysis import UNWATCHED, RecordingAnalysis, analyse_recording
 
 Overlay = NoiseOverlay | SweepOverlay | DwellOverlay | SteppedSineOverlay
-
-
 Stage = Callable[[str], None]
 """Told, in a few words, what is being computed."""
 

@@ -44,8 +44,6 @@ from ..sine import (
 )
 
 UNWATCHED = Unwatched()
-
-
 RecordingAnalysis = NoiseAnalysis | SweepAnalysis | DwellAnalysis | SteppedSineAnalysis
 
 

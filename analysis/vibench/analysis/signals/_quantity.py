@@ -46,8 +46,6 @@ class ConvertedSignal:
 
 _TRANSITION = 0.5
 """Width of a band edge, as a fraction of its frequency; narrower edges ring longer."""
-
-
 _EDGE_PERIODS = 6
 """Periods of the lower band edge after which its ringing is below 1e-3 of the disturbance."""
 

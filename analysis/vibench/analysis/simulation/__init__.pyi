@@ -1,13 +1,11 @@
 from ._accuracy_cost import (
     cost_sentences as cost_sentences,
 )
-from ._answers import (
-    Piece as Piece,
-)
 from ._course import (
     SimulationCourse as SimulationCourse,
 )
 from ._request import (
+    Piece as Piece,
     SimulationRequest as SimulationRequest,
 )
 from ._worker import (

@@ -6,7 +6,7 @@ from ..comparison import Origin, Response, Trace
 from ..errors import AnalysisError
 from ..model import Curve, Similarity, similarity
 from ..signals import Reals
-from ._answers import Piece, SimulatedPoint, SimulatedSignal, Trouble
+from ._request import Piece, SimulatedPoint, SimulatedSignal, Trouble
 
 
 class SimulationCourse:

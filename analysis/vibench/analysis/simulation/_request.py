@@ -1,5 +1,9 @@
-"""What a person asks of the simulation: one specimen, one drive over frequency, up to two models."""
+"""What a person asks of the simulation: one specimen, one drive over frequency, up to two models.
 
+What comes back of a simulation, piece by piece, small enough to cross from the process that computes.
+"""
+
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Self
 
@@ -9,6 +13,45 @@ from vibench.acquisition import FrozenModel
 from vibench.sim import Accuracy, Observable
 from vibench.sim.study import Study, frequency_range
 
+from ..signals import Reals
+
+
+@dataclass(frozen=True)
+class SimulatedPoint:
+    """One model at one frequency; None where it was not asked for, or not found."""
+
+    model: str
+    frequency_hz: float
+    response_i: float | None
+    response_ii: float | None
+    impacts: int
+    motion: str
+    lyapunov_per_s: float | None
+    error_estimate: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedSignal:
+    """The end of a run, sampled; arrays of shape (samples,)."""
+
+    model: str
+    frequency_hz: float
+    time_s: Reals
+    displacement_m: Reals
+    """x, of m0."""
+    relative_m: Reals
+    """p = y - z, between the stops."""
+    gap_m: float
+
+
+@dataclass(frozen=True)
+class Trouble:
+    """A scene that could not be computed, in one sentence."""
+
+    sentence: str
+
+
+Piece = SimulatedPoint | SimulatedSignal | Trouble
 MOST_POINTS = 20_000
 """Of both models together: a picture shows no more, and an afternoon computes no more."""
 

@@ -1,14 +1,130 @@
-"""The process that simulates for a window: it computes one request after another, and can be told to stop."""
+"""The process that simulates for a window: it computes one request after another, and can be told to stop.
+
+A simulation that tells its answers as they come, and stops when it is told to.
+"""
 
 import os
 import signal
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
-from ._answers import Piece, Trouble
-from ._growing import simulate
-from ._request import SimulationRequest
+import numpy as np
+
+from vibench.sim import Harmonic, Outcome, Prediction, integrate
+from vibench.sim.study import (
+    MESSAGE,
+    MemoryStore,
+    PointAnswer,
+    PointState,
+    Start,
+    Study,
+    ThreadExecutor,
+    prediction_at,
+    run_study,
+)
+
+from ._request import Piece, SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
+
+Tell = Callable[[tuple[Piece, ...]], None]
+Cancelled = Callable[[], bool]
+SIGNAL_PERIODS = 12
+SAMPLES_PER_PERIOD = 400
+
+
+class _TellingStore(MemoryStore):
+    """Keeps answers in memory, and tells each one once."""
+
+    def __init__(self, study: Study, tell: Tell) -> None:
+        super().__init__(study)
+        self._study = study
+        self._tell = tell
+
+    def keep(self, answers: Sequence[PointAnswer]) -> None:
+        """Keep and tell."""
+        super().keep(answers)
+        self._tell(tuple(self._pieces(answers)))
+
+    def _pieces(self, answers: Sequence[PointAnswer]) -> Iterator[Piece]:
+        study = self._study
+        for answer in answers:
+            place = study.grid.place(answer.number)
+            model, frequency_hz = study.models[place[0]], study.frequencies_hz[place[-1]]
+            if answer.state is PointState.FAILED:
+                said = bytes(self.arrays[MESSAGE][answer.number]).decode()
+                yield Trouble(f"{model} at {frequency_hz:g} Hz: {said}")
+                continue
+            amplitude_m = study.amplitudes_m[place[-3]]
+            found = prediction_at(
+                self.arrays, answer.number, frequency_hz, amplitude_m, study.accuracy, Start.REST.value
+            )
+            yield simulated_point(model, found)
+
+
+def simulate(
+    request: SimulationRequest, tell: Tell, cancelled: Cancelled, workers: int | None = None
+) -> None:
+    """Compute what is asked for, the time signals first; returns early when cancelled.
+
+    ``cancelled`` is asked several times a second; scenes under way, parts of a second each, are ended.
+    """
+    for model in request.models if request.signal_hz is not None else ():
+        if cancelled():
+            return
+        tell((simulated_signal(request, model, request.signal_hz or 0.0),))
+    study = request.study
+    executor = ThreadExecutor(workers)
+    try:
+        run_study(study, executor, _TellingStore(study, tell), cancelled=cancelled)
+    finally:
+        executor.close()
+
+
+def simulated_signal(
+    request: SimulationRequest, model: str, frequency_hz: float
+) -> SimulatedSignal | Trouble:
+    """Follow the specimen from rest, and give the last periods."""
+    study = request.study
+    specimen = study.structure.specimen(model, request.damping_time_s, request.gap_m)
+    drive = Harmonic(frequency_hz, request.amplitude_m)
+    shown_s = min(SIGNAL_PERIODS / frequency_hz, 0.5 * request.duration_s)
+    lead_s = request.duration_s - shown_s
+    lead = integrate(specimen, drive, lead_s, request.accuracy)
+    if lead.outcome is not Outcome.REACHED_END:
+        return Trouble(f"{model} at {frequency_hz:g} Hz: {lead.outcome.text}")
+    end = integrate(
+        specimen,
+        drive,
+        shown_s,
+        request.accuracy,
+        lead.final_state,
+        SAMPLES_PER_PERIOD * frequency_hz,
+        start_time_s=lead_s,
+    )
+    states = np.asarray(end.states)
+    return SimulatedSignal(
+        model=model,
+        frequency_hz=frequency_hz,
+        time_s=np.asarray(end.time_s),
+        displacement_m=states[:, 0],
+        relative_m=states[:, 1] - states[:, 2],
+        gap_m=request.gap_m,
+    )
+
+
+def simulated_point(model: str, found: Prediction) -> SimulatedPoint:
+    """Take from a prediction what a picture shows."""
+    return SimulatedPoint(
+        model=model,
+        frequency_hz=found.frequency_hz,
+        response_i=found.response_i,
+        response_ii=found.response_ii,
+        impacts=found.impacts,
+        motion=str(found.motion),
+        lyapunov_per_s=found.lyapunov_per_s,
+        error_estimate=found.error_estimate,
+    )
 
 
 @dataclass(frozen=True)

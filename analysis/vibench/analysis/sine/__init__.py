@@ -21,14 +21,7 @@ from ._dwell_analysis import (
     measured_dwell,
     settled_envelope,
 )
-from ._dwell_motion import (
-    DwellMotion,
-    dwell_motion,
-)
-from ._feedback_words import (
-    feedback_sentences,
-    noted_jumps,
-)
+from ._dwell_motion import DwellMotion, dwell_motion
 from ._hysteresis import (
     Hysteresis,
     hysteresis,
@@ -49,10 +42,7 @@ from ._stepped_response import (
     step_label,
     stepped_response,
 )
-from ._sweep import (
-    SweepResponse,
-    SweepSums,
-)
+from ._sweep import SweepResponse, SweepSums
 from ._sweep_analysis import (
     SweepAnalysis,
     measured_sweep,
@@ -65,7 +55,9 @@ from ._terminal_level import (
 from ._tracked_resonance import (
     TrackedResonance,
     backbone_sentence,
+    feedback_sentences,
     lost_levels,
+    noted_jumps,
     tracked_resonances,
 )
 

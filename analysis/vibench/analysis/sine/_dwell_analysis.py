@@ -23,15 +23,9 @@ from ._terminal_level import TerminalLevel
 
 WINDOW_S = 5.0
 """The paper's window: the last 5 s of a dwell."""
-
-
 _DWELL_EDGE_PERIODS = 121
 """Drive periods that integration disturbs, both ends together."""
-
-
 _SHORTEST_WINDOW_PERIODS = 50
-
-
 _TIME_BINS = 1200
 
 

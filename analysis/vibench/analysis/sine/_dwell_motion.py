@@ -1,13 +1,105 @@
-"""How the motion of a dwell repeats: its points at the drive's phase, and the verdict on them."""
+"""How the motion of a dwell repeats: its points at the drive's phase, and the verdict on them.
+
+The motion once per drive period: Poincare points, and the orbit they lie on.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..chaos import MotionVerdict, Points, motion_verdict
+from ..errors import InvalidRequest, NotEnoughData
 from ..recordings import Channels, only_stretch, read_whole
+from ..signals import REACH, Quantity, Reals, converted_signal, interpolated
+from ..tones import fitted_sine
 from ._dwell import DwellResponse
-from ._stroboscope import BAND_ABOVE, Section, stroboscope
+
+_LOWEST_ORDER = 0.1
+"""Both signals are kept down to this part of the drive frequency."""
+BAND_ABOVE = 0.25
+"""... and up to this part of the sample rate, whose cosine edge ends within what interpolation trusts."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """Displacement and velocity at one phase of every drive period, and between."""
+
+    drive_hz: float
+    phase_rad: float
+    """Drive phase at which the points were taken; the drive is a cosine."""
+    displacement_m: Reals
+    velocity_m_per_s: Reals
+    """Shape (periods,)."""
+    orbit_displacement_m: Reals
+    orbit_velocity_m_per_s: Reals
+    """The phase portrait: shape (samples,), over the same stretch."""
+    time_s: Reals
+    """Of the points, from the first sample of the record; shape (periods,)."""
+    sd_timing_s: float
+    """How far the phase clock may be off at the ends of the record."""
+
+
+def stroboscope(
+    drive: Reals,
+    response: Reals,
+    sample_rate_hz: float,
+    *,
+    near_hz: float,
+    phase_rad: float = 0.0,
+    delay_s: float = 0.0,
+) -> Section:
+    """Sample the motion at one phase of the recorded drive, between its samples.
+
+    A nominal drive frequency would not do: 50 ppm between the clocks slide by half a period of 100 Hz
+    in 100 s and smear the points.
+
+    Parameters
+    ----------
+    drive, response
+        Drive voltage and response velocity [m/s], shape (samples,).
+    near_hz
+        Drive frequency, within 20 %.
+    phase_rad
+        Where in the period to look.
+    delay_s
+        By how much the response channel lags the drive channel [s].
+
+    """
+    if drive.shape != response.shape:
+        raise InvalidRequest(f"drive {drive.shape} and response {response.shape} must be equally long")
+    sine = fitted_sine(drive, sample_rate_hz, near_hz)
+    band = {"low_hz": _LOWEST_ORDER * near_hz, "high_hz": BAND_ABOVE * sample_rate_hz}
+    displacement = converted_signal(
+        response, sample_rate_hz, given=Quantity.VELOCITY, wanted=Quantity.DISPLACEMENT, **band
+    )
+    velocity = converted_signal(
+        response, sample_rate_hz, given=Quantity.VELOCITY, wanted=Quantity.VELOCITY, **band
+    )
+    first = max(displacement.edge_samples, REACH)
+    last = response.size - 1 - first
+    per_sample = sine.frequency_hz / sample_rate_hz
+    offset = (sine.phase_rad - phase_rad) / (2 * np.pi)
+    delay = delay_s * sample_rate_hz
+    turns = np.arange(
+        np.ceil((first - delay) * per_sample + offset), np.floor((last - delay) * per_sample + offset) + 1
+    )
+    if turns.size == 0:
+        raise NotEnoughData(
+            f"the record of {drive.size / sample_rate_hz:g} s holds no drive period clear of its ends; "
+            "record longer"
+        )
+    positions = (turns - offset) / per_sample + delay
+    inside = slice(first, last + 1)
+    return Section(
+        drive_hz=sine.frequency_hz,
+        phase_rad=phase_rad,
+        displacement_m=interpolated(displacement.samples, positions),
+        velocity_m_per_s=interpolated(velocity.samples, positions),
+        orbit_displacement_m=displacement.samples[inside],
+        orbit_velocity_m_per_s=velocity.samples[inside],
+        time_s=positions / sample_rate_hz,
+        sd_timing_s=sine.sd_phase_rad / (2 * np.pi * sine.frequency_hz),
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,8 +25,6 @@ from ._dwell import DwellResponse, dwell_response
 
 Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking
 """What is recorded frequency by frequency, or level by level."""
-
-
 _EDGE_PERIODS = 60.0
 """Drive periods that integration disturbs at each end; read beyond the step, where there is more."""
 

@@ -22,11 +22,7 @@ from ._jumps import Jump, jumps
 from ._sweep import SweepResponse, SweepSums
 
 _BLOCK = 1 << 20
-
-
 _RESPONSE = 2
-
-
 _SPECTROGRAM_ORDER = 3.2
 """A spectrogram shows the drive's third harmonic at the sweep's end."""
 

@@ -5,13 +5,7 @@ question. Functions, arguments and answers must be importable and picklable, and
 free of Qt widgets: every process that calls them imports them.
 """
 
-from ._background import (
-    Background,
-    Job,
-)
-from ._latest import (
-    Latest,
-)
+from ._background import Background, Job, Latest
 
 __all__ = [
     "Background",

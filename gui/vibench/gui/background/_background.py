@@ -1,4 +1,7 @@
-"""Work that takes longer than a frame: done in another process, asked after by a timer."""
+"""Work that takes longer than a frame: done in another process, asked after by a timer.
+
+Background work of which only the newest question counts: one at a time, none out of date.
+"""
 
 import os
 from collections.abc import Callable
@@ -7,7 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, Generic, ParamSpec, TypeVar
 
 from PySide6.QtCore import QObject, QTimer
 
@@ -144,3 +147,62 @@ class Background(QObject):
                 job.on_answer(job.future.result())
             else:
                 job.on_error(error)
+
+
+Question = TypeVar("Question")
+
+
+class Latest(QObject, Generic[Question, Answer]):
+    """Asks when a question has stood for a moment; never more than one question is out."""
+
+    def __init__(
+        self,
+        background: Background,
+        function: Callable[[Question], Answer],
+        on_answer: Callable[[Answer], None],
+        on_error: Callable[[BaseException], None],
+        wait_ms: int,
+        parent: QObject,
+    ) -> None:
+        super().__init__(parent)
+        self._background, self._function = background, function
+        self._on_answer, self._on_error = on_answer, on_error
+        self._wanted: Question | None = None
+        self._job: Job | None = None
+        self._timer = QTimer(self, singleShot=True, interval=wait_ms)
+        self._timer.timeout.connect(self._ask)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether an answer to the newest question is still to come."""
+        return self._wanted is not None or self._job is not None
+
+    def ask(self, question: Question) -> None:
+        """Ask this, in place of whatever was asked before."""
+        self._wanted = question
+        self._timer.start()
+
+    def drop(self) -> None:
+        """Ask nothing; what is being worked out is not wanted any more."""
+        self._wanted = None
+        self._timer.stop()
+        if self._job is not None:
+            self._job.is_wanted = False
+
+    def _ask(self) -> None:
+        if self._wanted is None or self._job is not None:
+            return
+        question, self._wanted = self._wanted, None
+        self._job = self._background.ask(self._function, self._answered, self._failed, question)
+
+    def _answered(self, answer: Answer) -> None:
+        self._job = None
+        if self._wanted is None:
+            self._on_answer(answer)
+        self._ask()
+
+    def _failed(self, error: BaseException) -> None:
+        self._job = None
+        if self._wanted is None:
+            self._on_error(error)
+        self._ask()

@@ -6,17 +6,12 @@ heartbeat goes out here: an engine that misses it ramps down (docs/engine.md).
 A `LiveView` of the newest samples is kept for each run.
 """
 
-from ._bridge import (
-    Bridge,
-)
+from ._bridge import Bridge, SignOfLife
 from ._engine_line import (
     Starter,
 )
 from ._live_run import (
     measurement_called,
-)
-from ._sign_of_life import (
-    SignOfLife,
 )
 
 __all__ = [

@@ -1,4 +1,7 @@
-"""The bridge between window and engine: what the engine says comes in, what a person wants goes out."""
+"""The bridge between window and engine: what the engine says comes in, what a person wants goes out.
+
+A sign of life for the engine while the window paints: that may take longer than it waits.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,7 +10,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QEvent, QObject, QTimer, Signal
+from PySide6.QtWidgets import QApplication
 
 from vibench.acquisition import AcquisitionError, StopLevel
 from vibench.acquisition.campaign import Existing
@@ -275,3 +279,22 @@ def _done(_: object) -> None:
 def _notice(message: EngineMessage) -> Notice:
     kind = NoticeKind(message.kind.value)
     return Notice(kind, message.what, message.done, message.next_step, message.code)
+
+
+class SignOfLife(QObject):
+    """Tells the engine, at every picture that is painted, that the window has not frozen.
+
+    It acts in the window's own thread, and only when that gets something done: a frozen window is
+    as silent with it as without it.
+    """
+
+    def __init__(self, application: QApplication, bridge: Bridge, parent: QObject) -> None:
+        super().__init__(parent)
+        self._bridge = bridge
+        application.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Look at what is painted, and let everything pass."""
+        if event.type() is QEvent.Type.Paint:
+            self._bridge.beat()
+        return super().eventFilter(watched, event)

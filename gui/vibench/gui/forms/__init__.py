@@ -11,16 +11,8 @@ from ._editor import (
 from ._field_edge import (
     LineField,
 )
-from ._judged_form import (
-    JudgedForm,
-)
-from ._model_form import (
-    Loc,
-    ModelForm,
-)
-from ._quantity_edit import (
-    QuantityEdit,
-)
+from ._model_form import JudgedForm, Loc, ModelForm
+from ._quantity_edit import QuantityEdit
 
 __all__ = [
     "Choice",

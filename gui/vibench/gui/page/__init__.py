@@ -12,16 +12,11 @@ from ._desk import (
 from ._orders import (
     Orders,
 )
-from ._page import (
-    Page,
-)
+from ._page import Page, SideAndPicture
 from ._settings import (
     Remembered,
     Settings,
     default_settings_path,
-)
-from ._side_and_picture import (
-    SideAndPicture,
 )
 
 __all__ = [

@@ -5,13 +5,7 @@ largest sample of every column of pixels, so that no impact is lost.
 It knows nothing of what is drawn.
 """
 
-from ._axis import (
-    FREQUENCY,
-    LOG_FREQUENCY,
-    TIME,
-    Axis,
-    Scale,
-)
+from ._axis import FREQUENCY, LOG_FREQUENCY, TIME, Axis, Scale
 from ._bar_delegate import (
     SHARE_ROLE,
     BarDelegate,
@@ -24,9 +18,7 @@ from ._ink import (
     Ink,
     trace,
 )
-from ._plot import (
-    Plot,
-)
+from ._plot import Plot
 from ._signal_curve import (
     SignalCurve,
 )

@@ -1,4 +1,7 @@
-"""A plot as all pages draw it: labelled axes, thin pens, a legend that follows the theme."""
+"""A plot as all pages draw it: labelled axes, thin pens, a legend that follows the theme.
+
+Axes that follow the data without trembling.
+"""
 
 from collections.abc import Callable
 from math import log10
@@ -9,14 +12,35 @@ from PySide6.QtGui import QGuiApplication, QKeyEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from ..widgets import Theme, paint_hint
-from ._axis import Axis, AxisItem, Blankness, Scale
+from ._axis import Axis, AxisItem, Blankness, Grid, Scale
 from ._band import Band
-from ._grid import Grid
 from ._ink import SIGNS, Ink, curve_pen, shade_of, straight_pen
 from ._legend import LegendEntry, LegendLine
 from ._logical_line import LogicalLine
-from ._steady_range import steady_range
 from ._upright_marks import Rules, Stripes
+
+ROOM = 0.15
+"""Empty share of the range at either end after a change."""
+LEAST_USED = 0.5
+"""Share of the range that the data must fill, or it is drawn larger."""
+
+Range = tuple[float, float]
+
+
+def steady_range(shown: Range, data: Range) -> Range | None:
+    """Give the range to change to, or None while the data is inside and fills enough of what is shown."""
+    low, high = data
+    size = high - low
+    is_inside = shown[0] <= low and high <= shown[1]
+    if is_inside and size >= LEAST_USED * (shown[1] - shown[0]):
+        return None
+    if size <= 0.0:
+        # A dead signal: some room around it, whatever its unit.
+        half = 0.5 * abs(low) or 1e-3
+        wanted = (low - half, high + half)
+        return None if is_inside and shown[1] - shown[0] <= 8 * half else wanted
+    return low - ROOM * size, high + ROOM * size
+
 
 # Antialiasing halves the frame rate, and OpenGL draws grey areas on machines without it.
 pg.setConfigOptions(antialias=False, useOpenGL=False)

@@ -20,11 +20,7 @@ _FACES = {
     EngineState.CHECKING: Face("◍", "CHECKING", Tone.ACTIVE, "A small sine plays for some seconds"),
     EngineState.FAULT: Face("✖", "FAULT", Tone.DANGER, "Silent; open the bench again on the Rig page"),
 }
-
-
 _BYTES_PER_SAMPLE = 4
-
-
 _LITTLE_ROOM_S = 3600.0
 
 

@@ -1,14 +1,77 @@
-"""The menus: everything that a key or a click can do, in words."""
+"""The menus: everything that a key or a click can do, in words.
+
+Esc and Pause abort from anywhere in the window, from modal dialogs and open menus too.
+
+The keys, as F1 lists them.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QFileDialog, QMainWindow, QMessageBox
+from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtGui import QAction, QKeyEvent, QKeySequence
+from PySide6.QtWidgets import QApplication, QFileDialog, QMainWindow, QMessageBox
 
 from ..page import Desk, Orders
 from ..widgets import DARK, LIGHT, Theme
-from ._key_list import key_text
+
+ABORT_KEYS = frozenset({Qt.Key.Key_Escape, Qt.Key.Key_Pause})
+
+
+class AbortKey(QObject):
+    """Hears every key press of the application before any widget does.
+
+    A shortcut is not heard while a modal dialog is open; a filter on the application is. The key goes
+    on to whoever has the focus, so that Esc still closes a dialog.
+    """
+
+    pressed = Signal()
+
+    def __init__(self, application: QApplication, parent: QObject) -> None:
+        super().__init__(parent)
+        self._last_seen: tuple[int, int] | None = None
+        application.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Listen, and let everything pass."""
+        if event.type() is QEvent.Type.KeyRelease:
+            self._last_seen = None
+        elif event.type() in (QEvent.Type.KeyPress, QEvent.Type.ShortcutOverride):
+            assert isinstance(event, QKeyEvent)
+            if event.key() in ABORT_KEYS and not event.isAutoRepeat() and self._is_new(event):
+                self.pressed.emit()
+        return super().eventFilter(watched, event)
+
+    def _is_new(self, event: QKeyEvent) -> bool:
+        """One press comes by several times: as an override, at the window, and at its widget."""
+        seen = (event.timestamp(), event.key())
+        is_new = seen != self._last_seen
+        self._last_seen = seen
+        return is_new
+
+
+KEYS: tuple[tuple[str, str], ...] = (
+    ("Esc, Pause", "abort: ramp down as fast as the shaker bears, from anywhere"),
+    ("Ctrl+1 … Ctrl+7", "show a page"),
+    ("F1", "this list"),
+    ("F5", "start what is armed"),
+    ("F6", "check the bench"),
+    ("Ctrl+Return", "arm"),
+    ("Space", "freeze the picture (Run page); the recording goes on"),
+    ("M", "mark an event in the recording (Run page)"),
+    ("A, L", "autoscale, logarithmic axis (in a plot)"),
+    ("Ctrl+T", "light or dark"),
+    ("Ctrl+C", "copy the message, or the picture of a plot"),
+    ("Ctrl+Q", "quit"),
+)
+"""No bare letter ever starts an output."""
+
+
+def key_text() -> str:
+    """Lay the keys out as rows of a table, for rich text."""
+    rows = "".join(f"<tr><td><b>{key}</b>&nbsp;&nbsp;</td><td>{what}</td></tr>" for key, what in KEYS)
+    return f"<table>{rows}</table>"
+
 
 EMERGENCY = "STOP is not an emergency stop: in an emergency, switch the amplifier off."
 

@@ -1,15 +1,44 @@
-"""From nothing to a window on the screen, and from its end to the end of the process."""
+"""From nothing to a window on the screen, and from its end to the end of the process.
+
+The application around the window: style, font, settings.
+"""
 
 import gc
 import sys
 from pathlib import Path
 
-from PySide6.QtCore import QTimer
+import matplotlib as mpl
+from PySide6.QtCore import QCoreApplication, Qt, QTimer
+from PySide6.QtGui import QFont, QFontDatabase
+from PySide6.QtWidgets import QApplication, QStyleFactory
 
 from ..page import Desk, Remembered, Settings, default_settings_path
-from ._app import application
 from ._page_catalogue import PAGES
 from ._window import Window
+
+FONT_FILES = ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf", "DejaVuSansMono.ttf")
+FONT_POINTS = 10
+
+
+def application(arguments: list[str]) -> QApplication:
+    """Make the one application of this process: Fusion, and the same font on every machine."""
+    existing = QCoreApplication.instance()
+    if existing is None:
+        QApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
+        existing = QApplication(arguments)
+    assert isinstance(existing, QApplication)
+    existing.setApplicationName("vibench")
+    existing.setStyle(QStyleFactory.create("Fusion"))
+    existing.setFont(_font())
+    return existing
+
+
+def _font() -> QFont:
+    """DejaVu Sans, which has every sign that we write; matplotlib brings its file along."""
+    folder = Path(mpl.get_data_path()) / "fonts" / "ttf"
+    for name in FONT_FILES:
+        QFontDatabase.addApplicationFont(str(folder / name))
+    return QFont("DejaVu Sans", FONT_POINTS)
 
 
 def open_window(bench: Path | None, settings: Path | None) -> int:

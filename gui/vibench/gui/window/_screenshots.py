@@ -24,7 +24,7 @@ from ..pages.queue import QueuePage
 from ..pages.simulate import SimulatePage
 from ..pages.test import TestPage
 from ..widgets import COMPARE, FILES, QUEUE, RUN, SIMULATE, TEST, THEMES, Theme
-from ._app import application
+from ._open_window import application
 from ._page_catalogue import PAGES
 from ._window import Window
 

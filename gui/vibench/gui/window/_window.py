@@ -1,7 +1,12 @@
-"""The frame: banner and STOP, messages, the rail of pages, the status line."""
+"""The frame: banner and STOP, messages, the rail of pages, the status line.
 
+How many pictures a second are drawn, as told by those of the last second.
+"""
+
+from collections import deque
 from collections.abc import Callable
 from functools import partial
+from time import monotonic
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QCloseEvent
@@ -18,16 +23,32 @@ from PySide6.QtWidgets import (
 from ..engine_link import SignOfLife
 from ..page import Desk, Orders, Page, Remembered
 from ..widgets import RUN, Theme, palette, style_sheet
-from ._abort_key import AbortKey
 from ._banner import Banner
 from ._faces import face_of, status_fields
-from ._frame_count import FrameCount
 from ._loop_watch import LoopWatch
-from ._menus import build_menus
+from ._menus import AbortKey, build_menus
 from ._message_strip import MessageStrip
 from ._page_catalogue import PageEntry
 from ._rail import Rail
 from ._status_line import StatusField, StatusLine
+
+SPAN_S = 1.0
+
+
+class FrameCount:
+    """Counts frames as they are drawn."""
+
+    def __init__(self) -> None:
+        self._drawn_s: deque[float] = deque()
+
+    def counted(self) -> float:
+        """Count one more, and give the frames of the last second [1/s]."""
+        now_s = monotonic()
+        self._drawn_s.append(now_s)
+        while now_s - self._drawn_s[0] > SPAN_S:
+            self._drawn_s.popleft()
+        return len(self._drawn_s) / SPAN_S
+
 
 TICK_MS = 50
 """Twenty pictures a second: more cost a core, fewer look jerky."""

@@ -14,19 +14,10 @@ periodic - hertz, 130 Hz, 20 µm
 periodic - linear_gap, 130 Hz, 20 µm
 """
 
-from ._figures import (
-    LEAST_GAIN,
-    LevelFigures,
-    MotionTrade,
-    SolverFigures,
-    Trade,
-)
+from ._figures import LEAST_GAIN, MOTIONS, LevelFigures, MotionTrade, SolverFigures, Trade
 from ._measuring import (
     Thoroughness,
     measured_trade,
-)
-from ._regimes import (
-    MOTIONS,
 )
 
 __all__ = [

@@ -17,10 +17,9 @@ from ..kernels import Floats
 from ..model import Accuracy
 from ..motion import integrate, smallest_period, state_scales, steady_response, stroboscopic_section
 from ..study import software
-from ._figures import LevelFigures, MotionTrade, SolverFigures, Trade
+from ._figures import MOTIONS, LevelFigures, Motion, MotionTrade, Regime, SolverFigures, Trade
 from ._independent_solution import independent_state, state_error
 from ._plain_equations import Place, law_of, numbers_of, rates_at
-from ._regimes import MOTIONS, Motion, Regime
 
 LEVELS = tuple(Accuracy)
 Solver = Literal["DOP853", "LSODA", "Radau"]

@@ -100,8 +100,6 @@ ARGUMENT, POINT, TRIAL, SPARE, CURVATURE = range(STAGES, WORK_ROWS)
 """Rows of a workspace after the stages, as in `vibench.sim.contact`; the last is a curvature
 long.
 """
-
-
 YIELDING, POWER = range(2)
 """How a cell's force acts: by stops that give way, or everywhere."""
 

@@ -53,8 +53,6 @@ PRESSED = 0.7
 NEAR = 0.1
 """A hair before the exit, over the last w and the square root of the tolerance: what is left out there, the
 third power of it, is far less than the tolerance."""
-
-
 LOG_ROWS = 256
 LOGGED, DEEPEST, STAGES_ONLY = range(3)
 """Places of a log's first row: how many steps' ends are in the rows below; the largest w so far; 1 when no

@@ -22,73 +22,29 @@ from ..kernels import Table, Vector, inlined, lean
 from ..slots import Parameters
 
 W, R, CX, CZ, CVX, CVZ, T = range(7)
-
-
 WIDTH = 8
-
-
 STAGES = 12
-
-
 WORK_ROWS = STAGES + 4
 """Rows of a workspace: the stages, an argument, the accepted point, the trial, a spare."""
-
-
 ARGUMENT, POINT, TRIAL, SPARE = range(STAGES, WORK_ROWS)
-
-
 _A = [[float(value) for value in row] for row in _dop.A[:STAGES, :STAGES]]
-
-
 A21 = _A[1][0]
-
-
 A31, A32 = _A[2][:2]
-
-
 A41, A43 = _A[3][0], _A[3][2]
-
-
 A51, A53, A54 = _A[4][0], _A[4][2], _A[4][3]
-
-
 A61, A64, A65 = _A[5][0], _A[5][3], _A[5][4]
-
-
 A71, A74, A75, A76 = _A[6][0], _A[6][3], _A[6][4], _A[6][5]
-
-
 A81, A84, A85, A86, A87 = _A[7][0], _A[7][3], _A[7][4], _A[7][5], _A[7][6]
-
-
 A91, A94, A95, A96, A97, A98 = _A[8][0], *_A[8][3:8]
-
-
 A101, A104, A105, A106, A107, A108, A109 = _A[9][0], *_A[9][3:9]
-
-
 A111, A114, A115, A116, A117, A118, A119, A1110 = _A[10][0], *_A[10][3:10]
-
-
 A121, A124, A125, A126, A127, A128, A129, A1210, A1211 = _A[11][0], *_A[11][3:11]
-
-
 _B = [float(value) for value in _dop.B]
-
-
 B1, B6, B7, B8, B9, B10, B11, B12 = _B[0], *_B[5:12]
-
-
 ERROR_5: NDArray[np.float64] = np.ascontiguousarray(_dop.E5[:STAGES])
-
-
 ERROR_3: NDArray[np.float64] = np.ascontiguousarray(_dop.E3[:STAGES])
-
-
 BLEND = 0.01
 """Weight of the third-order estimate in DOP853's error."""
-
-
 LARGEST_SQUARE = 1e300
 """A squared error beyond this is one that no step may have."""
 

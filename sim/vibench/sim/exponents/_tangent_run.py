@@ -28,8 +28,6 @@ CHECKS = 32
 """How often at most a run asks whether it has lasted long enough."""
 ALMOST = 1e-9
 """A duration this close to a whole number of intervals is taken for it."""
-
-
 Enough = Callable[[Floats], bool]
 """Asked on the way, with the growth of the intervals so far, shape (n, m): may the run end here?"""
 CYCLES = 2.0

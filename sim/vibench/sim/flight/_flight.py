@@ -36,8 +36,6 @@ GRID_TURN = LONGEST_TURN
 """Grid step as the fastest rate times its length [rad]: half as long is slower by a seventh."""
 RUN_OF_STEPS = 512
 """Grid steps between two fresh exponentials: keeps the products' rounding below 1e-13."""
-
-
 CLEAR, TOUCHES, OUT_OF_RANGE, DEPARTS = range(4)
 """How a flight ends; the last: it has surely left the rigid stop on which m1 stood, and goes on."""
 

@@ -15,8 +15,6 @@ from ..model import VX, VY, VZ, Specimen, X, Y, Z
 
 WIDE = 8
 """Numbers of the motion."""
-
-
 P, AT_X, AT_Z, P_RATE, X_RATE, Z_RATE, COSINE, SINE = range(WIDE)
 
 

@@ -7,16 +7,11 @@ variational equation, which also tell folds, period doublings and Neimark-Sacker
 `RestoringForce` of p, the rest a linear structure condensed to p (Krack and Gross 2019).
 """
 
-from ._balance_branch import (
-    balance_branch,
-)
+from ._balance_branch import balance_branch
 from ._condensation import (
     structure_of,
 )
-from ._first_order_balance import (
-    first_order_states,
-    jump_frequencies,
-)
+from ._first_order_balance import first_order_states, jump_frequencies
 from ._floquet import (
     multipliers,
 )

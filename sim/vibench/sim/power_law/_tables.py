@@ -79,8 +79,6 @@ def _shares() -> Table:
 
 
 SHARES: Table = _shares()
-
-
 INSTANTS: Vector = np.concatenate([[0.0], POINTS_AT, [1.0]])
 """At which a watched step is known: its start, its points, its end."""
 

@@ -23,9 +23,7 @@ from ._scene import (
     Rest,
     Scene,
 )
-from ._solve import (
-    solve_scene,
-)
+from ._solve import solve_scene
 
 __all__ = [
     "AutomaticDuration",

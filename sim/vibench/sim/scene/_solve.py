@@ -1,24 +1,115 @@
-"""The answer to a scene: what was seen, and how far to trust it. SI units."""
+"""The answer to a scene: what was seen, and how far to trust it. SI units.
+
+How far the steps of contacts have moved the responses: measured against stricter steps. SI units.
+
+A motion is followed twice from the state in which a run ended, as before and with a far smaller tolerance.
+One that repeats is followed until both have forgotten where they began: their responses then differ by the
+error itself. One that never repeats forgets nothing but itself; what counts is what each drive period adds.
+
+Amplitudes of the motion of m0 over frequency, from samples over whole drive periods. SI units.
+"""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..exponents import LyapunovEstimate, Precision, largest_exponent
 from ..kernels import Floats
 from ..model import Accuracy, Outcome
-from ._fixed_run import Pace, SceneRun, pace_of, run_for
-from ._followed_run import FollowedRun
-from ._integration_error import error_of_repeating, error_per_period
-from ._line_spectrum import spectrum_of
+from ._fixed_run import Pace, SceneRun, pace_of, run_for, run_until_settled
+from ._followed_run import FollowedRun, Watch
 from ._linear_motion import LinearMotion, linear_motion
-from ._observed_window import states_of, whole_periods
+from ._observed_window import ObservedWindow, samples_between, states_of, whole_periods
 from ._plan import forgotten_s, plan_of
 from ._prediction import Method, MotionKind, Prediction, State
 from ._scatter import WindowScatter, response_ensemble, window_scatter
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
-from ._settled_run import run_until_settled
+
+STRICTER = 1e-2
+"""Tolerance of the comparison over that of the run."""
+STRICTEST = 1e-12
+"""Smaller tolerances are rounding."""
+FORGETTING = 4.0
+"""Forgetting times that a motion which repeats is followed before it is compared."""
+LOOKS = 8
+"""Periods of it, or drive periods of a motion that does not repeat, that are compared."""
+
+
+def error_of_repeating(run: FollowedRun, accuracy: Accuracy, period: int, forgetting_s: float) -> float:
+    """Relative error of the responses of a motion that repeats, the largest of the four; NaN if lost."""
+    cycle_s = period / run.drive.frequency_hz
+    wait_s = cycle_s * np.ceil(FORGETTING * forgetting_s / cycle_s)
+    found = []
+    for tolerance in _tolerances(accuracy):
+        twin = run.apart(tolerance)
+        twin.follow(run.time_s + wait_s)
+        found.append(_responses(twin, LOOKS * cycle_s))
+    return float(np.max(np.abs(found[0] - found[1]) / np.abs(found[1])))
+
+
+def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
+    """Relative error that a drive period adds to a motion's responses, the largest seen; NaN if lost."""
+    loose, strict = _tolerances(accuracy)
+    cycle_s = 1.0 / run.drive.frequency_hz
+    on = run.apart(loose)
+    seen, missed = [], []
+    for _ in range(LOOKS):
+        twin = on.apart(strict)
+        seen.append(_responses(on, cycle_s))
+        missed.append(np.abs(seen[-1] - _responses(twin, cycle_s)))
+    return float(np.max(np.max(missed, axis=0) / np.max(np.abs(seen), axis=0)))
+
+
+def _tolerances(accuracy: Accuracy) -> tuple[float, float]:
+    return accuracy.tolerance, max(STRICTER * accuracy.tolerance, STRICTEST)
+
+
+def _responses(run: FollowedRun, length_s: float) -> Floats:
+    """Largest x and p and both lines over a stretch, shape (4,); NaN if the run was lost."""
+    seen = run.follow(run.time_s + length_s, Watch.PEAKS_AND_LINES)
+    if run.outcome is not Outcome.REACHED_END:
+        return np.full(4, np.nan)
+    scale = 2.0 / length_s
+    return np.array([seen.peak_x_m, seen.peak_p_m, scale * abs(seen.area_x), scale * abs(seen.area_p)])
+
+
+LEAST_RATE_HZ = 20_000.0
+"""Samples a second, at least: contacts are ten times slower than that, and m0 hardly feels them."""
+HIGHEST = 0.25
+"""Highest frequency kept, over the sample rate: what is folded back there has passed m0 twice."""
+
+
+@dataclass(frozen=True, eq=False)
+class LineSpectrum:
+    """Amplitudes of x, unweighted, so that the drive's line and its multiples are exact."""
+
+    frequency_hz: Floats
+    """Shape (lines,)."""
+    amplitude_m: Floats
+    """Shape (lines,)."""
+
+
+def spectrum_of(window: ObservedWindow) -> LineSpectrum:
+    """Follow a window once more, stretch by stretch as before, and take the spectrum of its whole periods.
+
+    Samples change nothing: it is the same motion to the last digit, even in chaos.
+    """
+    run, periods = window.begins.apart(), window.line_periods
+    frequency = run.drive.frequency_hz
+    per_period = math.ceil(LEAST_RATE_HZ / frequency)
+    rate, count = per_period * frequency, per_period * periods
+    followed = [
+        run.follow(stretch.end_s, samples=samples_between(rate, stretch.start_s, stretch.end_s))
+        for stretch in window.stretches
+    ]
+    states = states_of(followed)[-count:]
+    amplitudes = np.abs(np.fft.rfft(states[:, 0])) * 2.0 / count
+    amplitudes[0] *= 0.5
+    frequencies = np.arange(len(amplitudes), dtype=np.float64) * (frequency / periods)
+    is_kept = frequencies <= HIGHEST * rate
+    return LineSpectrum(frequencies[is_kept], amplitudes[is_kept])
+
 
 SAFETY = 2.0
 """Error that is stated over the error that was measured."""

@@ -1,11 +1,23 @@
-"""A run between stops: flight, contact, flight, ... up to an instant. SI units."""
+"""A run between stops: flight, contact, flight, ... up to an instant. SI units.
+
+Samples of a run at given instants, taken so that they change nothing of it. SI units.
+"""
 
 import math
 
 import numpy as np
 
 from ..collision import CollisionTables, carry_through_collision, collide, tally_collision
-from ..contact import HELD, LEFT, NOT_FINITE, advance_contact, carry_through_steps, gap_of, tally_contact
+from ..contact import (
+    HELD,
+    LEFT,
+    LOG_COLUMNS,
+    NOT_FINITE,
+    advance_contact,
+    carry_through_steps,
+    gap_of,
+    tally_contact,
+)
 from ..flight import (
     CLEAR,
     DEPARTS,
@@ -37,9 +49,51 @@ from ..slots import (
     Record,
 )
 from ..sticking import HeldTables, closed_for, departure, hold, place_held, tally_held
-from ._sampling import sample_contact, sample_flight
 from ._touch import strike
 from ._workspace import Room
+
+
+@lean
+def sample_flight(
+    phasors: Complex, now: Complex, clock: Vector, length: float, tables: FlightTables, record: Record
+) -> None:
+    """Keep the samples that fall into a flight of ``length`` from clock time on."""
+    counts = record.counts
+    while counts[NEXT_SAMPLE] < len(record.samples):
+        later = time_until(clock, record.start + counts[NEXT_SAMPLE] / record.sample_rate)
+        if later > length:
+            return
+        turn_phasors(now, phasors, later, clock, tables)
+        place_on_phasors(record.samples[counts[NEXT_SAMPLE]], now, tables)
+        counts[NEXT_SAMPLE] += 1
+
+
+@compiled
+def sample_contact(
+    shadow: Vector,
+    clock: Vector,
+    length: float,
+    force: Vector,
+    middle: float,
+    tables: FlightTables,
+    tolerance: float,
+    work: Table,
+    record: Record,
+) -> None:
+    """Keep the samples that fall into a stretch of contact, by a second run that lands on each of them."""
+    counts, reached = record.counts, 0.0
+    none = np.zeros((0, LOG_COLUMNS))
+    while counts[NEXT_SAMPLE] < len(record.samples):
+        later = time_until(clock, record.start + counts[NEXT_SAMPLE] / record.sample_rate)
+        if later > length:
+            return
+        if shadow[SIDE] != 0.0 and later > reached:
+            _, reached = advance_contact(
+                shadow, reached, later, force, middle, tables.par, tolerance, work, none
+            )
+        copy_row(record.samples[counts[NEXT_SAMPLE]], shadow)
+        counts[NEXT_SAMPLE] += 1
+
 
 STRETCH_TURN = 0.3
 """Longest stretch of a contact, as drive phase [rad]: the base force is a polynomial of degree 7 about

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _layout as layout
+from ._axes import Grid
 from ._columns import COLUMNS, Cell, Column
-from ._grid import Grid
 from ._layout import PointState
 
 Arrays = dict[str, NDArray[np.generic]]

@@ -1,8 +1,46 @@
-"""What varies in a study: named axes with their values, units and labels, in the order of the file."""
+"""What varies in a study: named axes with their values, units and labels, in the order of the file.
 
+The points of a study as places in a grid, and which of them lie side by side.
+"""
+
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ._grid import Grid
+
+@dataclass(frozen=True)
+class Grid:
+    """A grid of points, numbered with the last axis running fastest (C order)."""
+
+    shape: tuple[int, ...]
+    is_ordered: tuple[bool, ...]
+    """Whether points side by side along an axis are alike: frequencies are, models are not."""
+
+    @property
+    def size(self) -> int:
+        """How many points there are."""
+        return math.prod(self.shape)
+
+    def place(self, number: int) -> tuple[int, ...]:
+        """Index of a point along each axis."""
+        place = []
+        for length in reversed(self.shape):
+            number, index = divmod(number, length)
+            place.append(index)
+        return tuple(reversed(place))
+
+    def neighbours(self, number: int) -> Iterator[int]:
+        """Points one step away along the ordered axes."""
+        stride, rest = 1, number
+        for length, is_ordered in zip(reversed(self.shape), reversed(self.is_ordered), strict=True):
+            rest, index = divmod(rest, length)
+            if is_ordered:
+                if index > 0:
+                    yield number - stride
+                if index < length - 1:
+                    yield number + stride
+            stride *= length
+
 
 FREQUENCY = "frequency"
 START = "start"

@@ -15,10 +15,9 @@ from distributed.comm import get_address_host_port
 
 from ..scene import Scene, solve_scene
 from ._errors import ClusterLost
-from ._executor import Bundle, Reply, Solved
+from ._executor import Bundle, Reply, Solved, Solver, solve_timed
 from ._software import software
 from ._threads import arrived_in
-from ._timing import Solver, solve_timed
 
 CONNECT_PATIENCE_S = 30.0
 """How long the scheduler, and then its first worker, is waited for."""

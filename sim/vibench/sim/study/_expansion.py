@@ -1,22 +1,53 @@
-"""A study's points as scenes: what each one begins from, and what is kept of its answer."""
+"""A study's points as scenes: what each one begins from, and what is kept of its answer.
 
+The identity of a scene: a digest of everything it says, the same in every process on every machine.
+"""
+
+import hashlib
+import json
 import math
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from ..kernels import Floats
 from ..model import Outcome
 from ..scene import Given, Rest, Scene, plan_scene
 from ._answers import cells_of, cut_text
 from ._arrays import Arrays, PointAnswer
-from ._columns import CONTINUES, DURATION, FINAL_STATE, IDENTITY, MESSAGE, PHASE, TAKEN, Cell
+from ._columns import CONTINUES, DURATION, FINAL_STATE, IDENTITY, IDENTITY_DIGITS, MESSAGE, PHASE, TAKEN, Cell
 from ._executor import Solved
 from ._layout import PointState
 from ._point_scheduler import NOBODY
-from ._scene_identity import scene_identity
 from ._study import GivenStart, Start, Study
+
+_scenes = TypeAdapter(Scene)
+
+
+def scene_identity(scene: Scene, continued: str = "") -> str:
+    """Digest of a scene's content.
+
+    Parameters
+    ----------
+    scene
+        Numbers count to the last bit; the order of fields does not.
+    continued
+        Identity of the scene whose end is this one's start, if it continues one. It stands for the state and
+        the phase at the start, which follow from it.
+
+    """
+    content = _scenes.dump_python(scene, mode="python")
+    # A name changes no motion.
+    content["start"].pop("name", None)
+    if continued:
+        content["start"] = {"continues": continued}
+        del content["drive"]["phase_rad"]
+    # Python writes floats with as many digits as tell them apart, and infinity as a word.
+    text = json.dumps(content, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:IDENTITY_DIGITS]
+
 
 PLANNED = 2000
 """Points that are planned one by one; of a larger study every so manyth, for all up to the next."""

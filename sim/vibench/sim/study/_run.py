@@ -9,11 +9,10 @@ import numpy as np
 
 from ._arrays import PointAnswer, states
 from ._columns import TAKEN
-from ._costs import Costs
 from ._executor import Bundle, Executor, Reply
 from ._expansion import Expansion
 from ._layout import PointState
-from ._point_scheduler import Agenda
+from ._point_scheduler import Agenda, Costs
 from ._progress import Cancelled, StudyProgress, Watcher
 from ._store import Store
 from ._study import Study

@@ -17,15 +17,12 @@ from pydantic import (
 
 from ..model import Accuracy, Harmonic
 from ..scene import AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
-from ._axes import FREQUENCY, MODEL, START, Axis, grid_of
+from ._axes import FREQUENCY, MODEL, START, Axis, Grid, grid_of
 from ._frequency_range import listed
-from ._grid import Grid
 from ._structure import Structure
 
 MOST_POINTS = 10_000_000
 """A file of 2 GB: a range that asks for more is a slip of the pen."""
-
-
 ANY_GAP_M = 1e-5
 """For asking whether a model's name is known, which depends on no gap."""
 
@@ -74,8 +71,6 @@ Model = Annotated[str, AfterValidator(_known)]
 Positive = Annotated[tuple[PositiveFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
 NotNegative = Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
 Frequencies = Annotated[Positive, BeforeValidator(listed)]
-
-
 Kept = Literal[Observable.RESPONSE, Observable.LYAPUNOV, Observable.SCATTER]
 """What has one number a point."""
 

@@ -10,8 +10,7 @@ from typing import TypeVar
 
 from ..scene import Scene, solve_scene
 from ._errors import InvalidStudy
-from ._executor import Bundle, Reply, Solved
-from ._timing import Solver, solve_timed
+from ._executor import Bundle, Reply, Solved, Solver, solve_timed
 
 Item = TypeVar("Item")
 

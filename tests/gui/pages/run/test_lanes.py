@@ -2,8 +2,7 @@
 
 import pytest
 
-from vibench.gui.pages.run._channel_words import channel_axis
-from vibench.gui.pages.run._lanes import Lanes
+from vibench.gui.pages.run._lanes import Lanes, channel_axis
 from vibench.gui.widgets import LIGHT
 
 FOUR = (

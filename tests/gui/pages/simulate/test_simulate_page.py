@@ -5,7 +5,7 @@ import pytest
 
 from vibench.analysis.simulation import SimulationRequest
 from vibench.analysis.simulation._accuracy_cost import MEASURED
-from vibench.analysis.simulation._answers import SimulatedPoint, SimulatedSignal, Trouble
+from vibench.analysis.simulation._request import SimulatedPoint, SimulatedSignal, Trouble
 from vibench.gui.pages.simulate import SimulatePage
 from vibench.gui.widgets import DARK
 from vibench.sim import Accuracy

@@ -1,4 +1,7 @@
-"""The 150 Get, Set and Reset calls for attributes, made from the protocol's own description of them."""
+"""The 150 Get, Set and Reset calls for attributes, made from the protocol's own description of them.
+
+What a program can ask about a custom scale.
+"""
 
 import re
 from collections.abc import Callable
@@ -6,16 +9,60 @@ from typing import Any
 
 from nidaqmx._stubs import nidaqmx_pb2
 
-from ._attributes import AttributeGroup, fields_for, number_of, value_of
+from ._attributes import Attribute, AttributeGroup, fields_for, not_supported, number_of, value_of
 from ._calls import NOTHING, Call, Fields
 from ._channel_attributes import get_attribute, reset_attribute, set_attribute
 from ._channels import Channel
 from ._device_attributes import CALIBRATION, DEVICE, PHYSICAL_CHANNEL, SYSTEM
-from ._scale_attributes import SCALE
+from ._scales import LinearScale, PolynomialScale, Scale, TableScale
 from ._system import DaqmxSystem
 from ._task_attributes import BUFFER, READ, TASK, TIMING, TRIGGER, WRITE
 from ._tasks import Task
 
+
+def _linear(scale: Scale) -> LinearScale:
+    match scale:
+        case LinearScale():
+            return scale
+        case _:
+            raise not_supported("Scale.LIN", f"Scale: {scale.name} ({scale.kind.name})")
+
+
+def _table(scale: Scale) -> TableScale:
+    match scale:
+        case TableScale():
+            return scale
+        case _:
+            raise not_supported("Scale.TABLE", f"Scale: {scale.name} ({scale.kind.name})")
+
+
+def _polynomial(scale: Scale) -> PolynomialScale:
+    match scale:
+        case PolynomialScale():
+            return scale
+        case _:
+            raise not_supported("Scale.POLY", f"Scale: {scale.name} ({scale.kind.name})")
+
+
+SCALE: AttributeGroup[Any] = AttributeGroup(
+    "Scale",
+    {
+        "DESCR": Attribute(lambda _: ""),
+        "SCALED_UNITS": Attribute(lambda scale: scale.scaled_units),
+        "PRE_SCALED_UNITS": Attribute(lambda scale: scale.pre_scaled_units),
+        "TYPE": Attribute(lambda scale: scale.kind),
+        "LIN_SLOPE": Attribute(lambda scale: _linear(scale).slope),
+        "LIN_Y_INTERCEPT": Attribute(lambda scale: _linear(scale).intercept),
+        "TABLE_PRE_SCALED_VALS": Attribute(lambda scale: _table(scale).pre_scaled),
+        "TABLE_SCALED_VALS": Attribute(lambda scale: _table(scale).scaled),
+        "MAP_PRE_SCALED_MIN": Attribute(lambda scale: _table(scale).pre_scaled[0]),
+        "MAP_PRE_SCALED_MAX": Attribute(lambda scale: _table(scale).pre_scaled[-1]),
+        "MAP_SCALED_MIN": Attribute(lambda scale: _table(scale).scaled[0]),
+        "MAP_SCALED_MAX": Attribute(lambda scale: _table(scale).scaled[-1]),
+        "POLY_FORWARD_COEFF": Attribute(lambda scale: _polynomial(scale).forward_coefficients),
+        "POLY_REVERSE_COEFF": Attribute(lambda scale: _polynomial(scale).reverse_coefficients),
+    },
+)
 SERVICE = nidaqmx_pb2.DESCRIPTOR.services_by_name["NiDAQmx"]
 _CALL = re.compile(r"^(?P<verb>Get|Set|Reset)(?P<scope>[A-Za-z]+?)Attribute(?:Ex)?(?P<type>[A-Z]\w*)?$")
 

@@ -178,8 +178,6 @@ PHYSICAL_CHANNEL = AttributeGroup[PhysicalChannel](
         ),
     },
 )
-
-
 CALIBRATION = AttributeGroup[Device](
     "CalibrationInfo",
     {

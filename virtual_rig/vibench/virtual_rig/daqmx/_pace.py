@@ -20,8 +20,6 @@ A fault that heals after a while would otherwise last for ever for a program tha
 
 TICK_S = 0.01
 """How often a rig on the wall clock is brought up to date [s]: well below the shortest usual read."""
-
-
 SLICE_S = 0.1
 """Longest stretch of rig time computed without letting another caller in [s]."""
 

@@ -1,4 +1,7 @@
-"""A simulated DAQmx task: its channels, and the states it goes through."""
+"""A simulated DAQmx task: its channels, and the states it goes through.
+
+Names of the terminals between which a task's clock and start trigger travel.
+"""
 
 from enum import IntEnum
 from typing import Protocol
@@ -15,8 +18,29 @@ from ._errors import DaqmxRefusal
 from ._generation import Generation, OutputBuffer
 from ._names import expand
 from ._rig import Rig
-from ._terminals import SAMPLE_CLOCK, START_TRIGGER, awaited_terminal, terminal
 from ._timing import InputSettings, OutputSettings, Timing, actual_rate, input_buffer_size, kind_of
+
+START_TRIGGER = "StartTrigger"
+SAMPLE_CLOCK = "SampleClock"
+_OWN_CLOCKS = ("", "onboardclock")
+
+
+def terminal(device: Device, side: str, signal: str) -> str:
+    """Name the terminal of a device's timing engine, ``"/Dev1/ai/StartTrigger"`` for example."""
+    return f"/{device.clock_name}/{side}/{signal}"
+
+
+def awaited_terminal(timing: Timing, own_clock: str) -> str:
+    """Name the terminal whose edge makes a task begin; empty: its own start.
+
+    Another task's sample clock begins to tick with that task, so waiting for it is waiting for its start.
+    """
+    if timing.trigger_source:
+        return timing.trigger_source
+    source = timing.clock_source.lower()
+    is_own = source in _OWN_CLOCKS or source == own_clock.lower()
+    return "" if is_own else timing.clock_source.replace(SAMPLE_CLOCK, START_TRIGGER)
+
 
 INPUT_SIDE = "ai"
 OUTPUT_SIDE = "ao"

@@ -4,9 +4,7 @@
 on demand, a fault script plays it by rig time (docs/faults.md).
 """
 
-from ._fault_script import (
-    load_fault_script,
-)
+from ._fault_script import load_fault_script
 from ._virtual_rig import (
     DiskFaults,
     VirtualRig,

@@ -14,8 +14,7 @@ from ..daqmx import LOOPBACK, DaqServer, OnDemandPace, Pace, WallPace, catalogue
 from ..generator import AFG1022, Panel, Quirks, ScpiSocket, Terminal
 from ..usb import UsbTmcInstrument, plug_in, unplug, usb_service
 from ..world import FULL_BAND_HZ, World, compile_beforehand, relative_clock_ppm, virtual_section
-from ._fault_kinds import DISK_FAULTS
-from ._fault_script import FaultPlay, FaultScript, PlayedFault, load_fault_script
+from ._fault_script import DISK_FAULTS, FaultPlay, FaultScript, PlayedFault, load_fault_script
 from ._faults import RigFaults
 
 _USB_RESOURCE_FIELDS = 5

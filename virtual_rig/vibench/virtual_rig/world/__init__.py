@@ -12,10 +12,7 @@ from ._time_grid import (
 from ._warm_up import (
     compile_beforehand,
 )
-from ._world import (
-    World,
-    virtual_section,
-)
+from ._world import World, virtual_section
 
 __all__ = [
     "FULL_BAND_HZ",

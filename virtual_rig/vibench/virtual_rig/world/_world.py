@@ -1,9 +1,14 @@
-"""The analogue world: everything between the generator's terminal and the samples of the converter."""
+"""The analogue world: everything between the generator's terminal and the samples of the converter.
 
+What is to happen at a certain rig time, however the world is advanced there.
+"""
+
+import heapq
 import threading
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import count
 from typing import Protocol
 
 import numpy as np
@@ -18,13 +23,35 @@ from ._analogue_output import AnalogueOutput
 from ._conversion import Conversion, converter_input
 from ._decimation import history_steps
 from ._disturbance import Disturbance, RandomDropouts
-from ._event_schedule import Appointments
 from ._input_stage import InputStage
 from ._noise import NoiseStream
 from ._plant import TRUTH_COLUMNS, Plant
 from ._sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer
-from ._time_grid import PPM, TimeGrid
+from ._time_grid import PPM, USUAL_GRID, TimeGrid
 from ._wiring import OPEN_INPUT, Cable, Signal, amplifier_input, cables_of
+
+
+class Appointments:
+    """Actions by the step at which they are due; those of one step keep the order they were given in."""
+
+    def __init__(self, grid: TimeGrid = USUAL_GRID) -> None:
+        self._grid = grid
+        self._due: list[tuple[int, int, Callable[[], None]]] = []
+        self._number = count()
+
+    def make(self, time_s: float, action: Callable[[], None]) -> None:
+        """Let ``action`` happen at a rig time; one that has passed is kept at the next step."""
+        heapq.heappush(self._due, (self._grid.step_at(time_s), next(self._number), action))
+
+    def keep(self, step: int) -> None:
+        """Do everything that is due at a step."""
+        while self._due and self._due[0][0] <= step:
+            heapq.heappop(self._due)[2]()
+
+    def stop_before(self, step: int) -> int:
+        """Tell how far the world may be computed towards ``step`` without missing one."""
+        return min(step, self._due[0][0]) if self._due else step
+
 
 FloatArray = NDArray[np.float64]
 

@@ -18,11 +18,10 @@ from ...background import Job
 from ...page import Desk, Page, SideAndPicture
 from ...widgets import COMPARE, Notice, NoticeKind, Theme, notice_of, push_button
 from ._analysis_panel import AnalysisPanel
-from ._curve_list import CurveList
+from ._curve_list import CurveList, PairBox
 from ._curve_plots import CurvePlots
 from ._export_elsewhere import exported_elsewhere
 from ._number_tables import PEAK_HEADINGS, NumberTable, marker_headings, marker_rows, peak_rows
-from ._pair_box import PairBox
 
 FILTERS = "SVG (*.svg);;PDF (*.pdf);;PNG (*.png);;Numbers as CSV (*.csv);;Report (*.html)"
 

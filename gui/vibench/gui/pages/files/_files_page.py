@@ -20,11 +20,10 @@ from ...background import Job
 from ...forms import LineField
 from ...page import Desk, Page, Remembered
 from ...widgets import COMPARE, FILES, Notice, NoticeKind, Theme, notice_of, push_button
-from ._campaign_choice import CampaignChoice
 from ._file_words import facts_text
 from ._listing import Levels, Listing, listed, made_levels, thumbnails
-from ._pictures import Pictures
-from ._recording_table import RecordingTable
+from ._recording_table import CampaignChoice, RecordingTable
+from ._spectrogram_view import Pictures
 
 
 class FilesPage(Page):

@@ -1,4 +1,7 @@
-"""The spectrogram of what is in sight of a recording, worked out elsewhere."""
+"""The spectrogram of what is in sight of a recording, worked out elsewhere.
+
+The two pictures of a recording: its channels over time, and the frequencies that one of them holds.
+"""
 
 from math import log10
 from pathlib import Path
@@ -7,12 +10,13 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QRectF
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QTabWidget, QVBoxLayout, QWidget
 
 from vibench.acquisition.recording import Recording
 from vibench.analysis.live import (
     RESPONSE,
     DensityPicture,
+    RecordingOverview,
     RowSpacing,
     SpectrogramRequest,
     recording_spectrogram,
@@ -23,6 +27,7 @@ from ...forms import Choice
 from ...plots import FREQUENCY, LOG_FREQUENCY, TIME, Plot
 from ...widgets import Theme
 from ._file_words import role_text, unit_text
+from ._lanes import RecordingLanes
 
 _WAIT_MS = 250
 """How long a view stands still before it is worked out."""
@@ -205,3 +210,28 @@ class _Image:
         """Write the scale in other colours."""
         self.bar.axis.setPen(pg.mkPen(theme.line))
         self.bar.axis.setTextPen(pg.mkPen(theme.text))
+
+
+class Pictures(QTabWidget):
+    """Both show the same stretch of the same recording."""
+
+    def __init__(self, theme: Theme, background: Background, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Pictures of the recording")
+        self.setDocumentMode(True)
+        self.lanes = RecordingLanes(theme)
+        self.spectrogram = SpectrogramView(theme, background)
+        self.addTab(self.lanes, "Tim&e")
+        self.addTab(self.spectrogram, "&Spectrogram")
+        self.lanes.range_changed.connect(lambda: self.spectrogram.show_view(*self.lanes.view_s))
+
+    def show_recording(self, overview: RecordingOverview | None) -> None:
+        """Show another recording, or none."""
+        self.spectrogram.show_recording(None if overview is None else overview.recording)
+        self.lanes.show_recording(overview)
+        self.spectrogram.show_view(*self.lanes.view_s)
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self.lanes.retheme(theme)
+        self.spectrogram.retheme(theme)

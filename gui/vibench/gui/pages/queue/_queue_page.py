@@ -32,9 +32,8 @@ from ...background import Latest
 from ...forms import Choice
 from ...page import Desk, Orders, Page, Remembered
 from ...widgets import Notice, NoticeKind, ReadTable, clock, notice_of
-from ._campaign_outlook import CampaignOutlook, campaign_outlook
 from ._draft import moved_up, with_measurement, with_sweep, without
-from ._row_words import point_rows
+from ._row_words import CampaignOutlook, campaign_outlook, point_rows
 from ._sweep_form import SweepForm
 
 LOOK_MS = 50

@@ -1,4 +1,7 @@
-"""The newest seconds of every channel, one lane each: smallest and largest sample of every column."""
+"""The newest seconds of every channel, one lane each: smallest and largest sample of every column.
+
+Channels as people call them, and the units that suit them.
+"""
 
 import numpy as np
 import pyqtgraph as pg
@@ -9,7 +12,27 @@ from vibench.analysis.live import LiveView, zigzag
 
 from ...plots import Axis, Plot, trace
 from ...widgets import Theme
-from ._channel_words import channel_axis, channel_word
+
+_WORDS = {
+    "drive_voltage": "drive",
+    "amplifier_voltage": "amplifier",
+    "base_acceleration": "base",
+    "m0_velocity": "m0",
+}
+_SHORT = {"amplifier_voltage": "amp."}
+_UNITS = {"V": ("V", 1.0), "m s-2": ("m/s²", 1.0), "m s-1": ("mm/s", 1e3)}
+
+
+def channel_word(role: str) -> str:
+    """Say a channel in a word."""
+    return _WORDS.get(role, role.replace("_", " "))
+
+
+def channel_axis(role: str, unit: str) -> Axis:
+    """Give a channel's axis: its word, in a unit whose numbers are easy to read."""
+    shown, factor = _UNITS.get(unit, (unit, 1.0))
+    return Axis(channel_word(role), shown, factor, short=f"{_SHORT.get(role, channel_word(role))} ({shown})")
+
 
 AGO = Axis("Time before now", "s")
 """An axis that stands still: one that scrolls would be painted anew in every frame."""

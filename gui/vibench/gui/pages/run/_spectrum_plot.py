@@ -8,7 +8,7 @@ from vibench.analysis.live import LiveView
 
 from ...plots import LOG_FREQUENCY, Axis, Plot, Scale, trace
 from ...widgets import Theme
-from ._channel_words import channel_word
+from ._lanes import channel_word
 
 _UNITS = {"m s-2": "m/s²", "m s-1": "m/s"}
 _LEAST = 1e-12

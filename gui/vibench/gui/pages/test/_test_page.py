@@ -1,4 +1,7 @@
-"""The Test page: a form of what will be played, and beside it exactly what that is and does."""
+"""The Test page: a form of what will be played, and beside it exactly what that is and does.
+
+The live arithmetic of a test: what it comes to, in one line.
+"""
 
 import tomllib
 from pathlib import Path
@@ -17,21 +20,44 @@ from PySide6.QtWidgets import (
 )
 
 from vibench.acquisition import ConfigurationError, save_toml, toml_text, validated
-from vibench.acquisition.plan import Measurement, Outlook
+from vibench.acquisition.plan import LimitCheck, Measurement, Outlook
 from vibench.acquisition.rig import Rig
 from vibench.analysis import Foresight
 
 from ...background import Latest
 from ...forms import Choice
 from ...page import Desk, Orders, Page, Remembered
-from ...widgets import Notice, NoticeKind, Theme, notice_of
+from ...widgets import Notice, NoticeKind, Theme, clock, notice_of
 from ._ahead import Ahead, foreseen, looked_ahead
 from ._library import NamedTest, load_test, own_tests, shipped_tests
 from ._limit_table import LimitTable
-from ._prediction_plot import PredictionPlot
-from ._preview_plots import PreviewPlots
-from ._summary import summary_text
+from ._preview_plots import PredictionPlot, PreviewPlots
 from ._test_form import TestForm
+
+_SHOWN = ("the stroke", "the table's acceleration", "the force", "the amplifier's voltage")
+_UNITS = {"m": ("mm", 1e3), "m/s2": ("m/s²", 1.0), "N": ("N", 1.0), "V": ("V", 1.0)}
+
+
+def summary_text(seen: Outlook) -> str:
+    """Peak stroke, acceleration, force and volts beside their limits; then time and size."""
+    parts = [_load(check) for name in _SHOWN for check in seen.checks if check.what.startswith(name)]
+    parts.append(f"generator {seen.peak_v:.3g} V peak, crest {seen.crest_factor:.2f}")
+    parts.append(f"takes {clock(seen.duration_s)}")
+    parts.append(f"file {seen.size_bytes / 1e6:.0f} MB")
+    passed = [check for check in seen.checks if not check.is_kept]
+    broken = sorted(passed, key=lambda check: not check.forbids)
+    said = "   ·   ".join(parts)
+    if not broken:
+        return f"✔ within all limits   ·   {said}"
+    sign = "✖" if broken[0].forbids else "⚠"
+    return f"{sign} {broken[0].complaint()}   ·   {said}"
+
+
+def _load(check: LimitCheck) -> str:
+    unit, factor = _UNITS.get(check.unit, (check.unit, 1.0))
+    name = check.what.partition(" (")[0].removeprefix("the ").removeprefix("table's ")
+    return f"{name} {check.value * factor:.3g} of {check.limit * factor:.3g} {unit}"
+
 
 LOOK_MS, FORESEE_MS = 200, 900
 """How long a test stands unchanged before it is previewed, and before it is simulated."""

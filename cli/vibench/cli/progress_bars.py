@@ -1,0 +1,79 @@
+"""Progress bar of a study, on standard error, so that standard output stays what was asked for.
+
+The progress bar of an analysis: one step a recording.
+
+Progress bar of an export or an import, on standard error like a study's.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from vibench.sim.study import StudyProgress, Watcher
+
+from .output import console
+
+
+@contextmanager
+def analysis_bar(recordings: int) -> Iterator[Callable[[], None]]:
+    """Show how many of the recordings are analysed; call what it gives after each."""
+    columns = (TextColumn("{task.description:<24}"), BarColumn(bar_width=30), MofNCompleteColumn())
+    with Progress(*columns, TimeElapsedColumn(), console=console) as bars:
+        bar = bars.add_task("analysis and simulation", total=recordings)
+        yield lambda: bars.advance(bar)
+
+
+SECONDS_OF_A_MINUTE = 60.0
+MINUTES_OF_AN_HOUR = 60.0
+
+
+@contextmanager
+def study_bar(points: int) -> Iterator[Watcher]:
+    """Show the bar while inside; what it gives is told how far the study is."""
+    columns = (
+        TextColumn("points"),
+        BarColumn(bar_width=30),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[left]}"),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as bars:
+        bar = bars.add_task("points", total=points, left="")
+
+        def watch(progress: StudyProgress) -> None:
+            bars.update(bar, completed=progress.kept, left=_left(progress))
+
+        yield watch
+
+
+def _left(progress: StudyProgress) -> str:
+    failed = f", {progress.failed} failed" if progress.failed else ""
+    return ("" if progress.left_s is None else f"{_duration(progress.left_s)} left") + failed
+
+
+def _duration(seconds: float) -> str:
+    minutes = seconds / SECONDS_OF_A_MINUTE
+    if minutes < 1.0:
+        return f"{seconds:.0f} s"
+    if minutes < MINUTES_OF_AN_HOUR:
+        return f"{minutes:.0f} min"
+    return f"{minutes / MINUTES_OF_AN_HOUR:.1f} h"
+
+
+@contextmanager
+def transfer_bar(what: str, values: int) -> Iterator[Callable[[int], None]]:
+    """Show the bar while inside; what it gives is told how many values came since the last call."""
+    columns = (TextColumn("{task.description}"), BarColumn(bar_width=30), TaskProgressColumn())
+    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bars:
+        bar = bars.add_task(what, total=values)
+        yield lambda done: bars.advance(bar, done)
