@@ -11,7 +11,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from vibench.sim import Accuracy, Harmonic, gong2025, integrate
-from vibench.sim.chain import chain_of, chain_response, integrate_chain, largest_chain_exponent
+from vibench.sim.chain import chain_of, chain_response, integrate_chain, chain_lyapunov_exponent
 from vibench.sim.chain._tables import chain_tables
 
 REPEATS = 5
@@ -103,7 +103,7 @@ def report_exponents():
     """Largest exponents of short chains."""
     for cells in (1, 2, 4, 8):
         taken, found = best(
-            lambda n=cells: largest_chain_exponent(chain_of(gong2025(), n), Harmonic(260.0, 5e-6)), 1
+            lambda n=cells: chain_lyapunov_exponent(chain_of(gong2025(), n), Harmonic(260.0, 5e-6)), 1
         )
         print(
             f"{cells} cells, 260 Hz 5 um: largest exponent {found.exponent_per_s:.1f} "

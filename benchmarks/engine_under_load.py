@@ -17,7 +17,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from vibench.acquisition import open_recording
-from vibench.acquisition.engine import Attendance, EngineClient, EngineState, start_engine
+from vibench.acquisition.engine import Supervision, EngineClient, EngineState, start_engine
 from vibench.acquisition.engine._requests import Look
 from vibench.acquisition.engine._wire import Message, send
 from vibench.acquisition.plan import Campaign
@@ -52,7 +52,7 @@ def main() -> None:
     assert rig.virtual is not None
     on_the_wall = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
     with ExitStack() as stack, tempfile.TemporaryDirectory() as folder:
-        engine = stack.enter_context(start_engine(Attendance.UNATTENDED))
+        engine = stack.enter_context(start_engine(Supervision.UNATTENDED))
         client = engine.client
         client.open(on_the_wall)
         while client.status().state is EngineState.OPENING:

@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 from vibench.sim import Accuracy, Harmonic, LinearSweep, Sampled, gong2025, integrate
-from vibench.sim.kernels import compiled
+from vibench.sim.kernels import kernel
 from vibench.sim.stepping import advance_interval, interval_tables, new_state
 
 REPEATS = 3
@@ -26,7 +26,7 @@ def best(job):
     return min(times), result
 
 
-@compiled
+@kernel
 def carry(state, pieces, tables):
     """Advance over many intervals as a rig's own kernel would."""
     impacts = 0

@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from vibench.sim import Accuracy, Harmonic, gong2025, largest_exponent
+from vibench.sim import Accuracy, Harmonic, gong2025, lyapunov_exponent
 from vibench.sim.exponents import Precision
 from vibench.sim.kernels import clock_at
 from vibench.sim.motion import new_record
@@ -69,7 +69,7 @@ def figure_10(contact, frequencies_hz, accuracy, precision, workers):
 
         def point(frequency, amplitude=amplitude):
             drive = Harmonic(float(frequency), amplitude)
-            return largest_exponent(specimen, drive, accuracy, precision=precision)
+            return lyapunov_exponent(specimen, drive, accuracy, precision=precision)
 
         with ThreadPoolExecutor(workers) as pool:
             # The busiest first would be better still; they lie together, so a stride mixes them.
@@ -109,7 +109,7 @@ def main():
     asked = parser.parse_args()
     report_cost()
     frequencies = np.arange(asked.start, asked.stop + 0.5 * asked.step, asked.step)
-    largest_exponent(gong2025(contact=asked.contact), Harmonic(260.0, 5e-6), duration_s=2.0)
+    lyapunov_exponent(gong2025(contact=asked.contact), Harmonic(260.0, 5e-6), duration_s=2.0)
     precision = Precision(2.0, asked.error) if asked.error > 0.0 else None
     busy = time.process_time()
     total = sum(figure_10(asked.contact, frequencies, asked.accuracy, precision, asked.workers))

@@ -20,8 +20,8 @@ from contextlib import closing
 from pathlib import Path
 
 from vibench.acquisition import RecordingError
-from vibench.acquisition.campaign import AfterFailure, CampaignItem, Existing, Happening, Item
-from vibench.acquisition.engine import Attendance, Engine, Orders
+from vibench.acquisition.campaign import AfterFailure, PointResult, ExistingRecordings, CampaignEvent, PointOutcome
+from vibench.acquisition.engine import Supervision, Engine, CampaignRequest
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.virtual_rig import load_fault_script
@@ -81,9 +81,9 @@ class Account:
         self._plan = plan
         self._names = plan.recording_names()
         self._began_s = time.monotonic()
-        self._last: dict[str, CampaignItem] = {}
+        self._last: dict[str, PointResult] = {}
 
-    def ended(self, item: CampaignItem) -> None:
+    def ended(self, item: PointResult) -> None:
         """Note how a point came out; a resumed campaign tells the earlier ones again."""
         is_new = self._last.get(item.name) is None
         self._last[item.name] = item
@@ -91,7 +91,7 @@ class Account:
             held = f"{resident_mb():6.0f} MB  {open_files():4} files open"
             print(f"{len(self._last):4} points  {held}  {self.wall_s:6.0f} s", flush=True)
 
-    def happened(self, happening: Happening) -> None:
+    def happened(self, happening: CampaignEvent) -> None:
         """Say what happens, where that was asked for."""
         if "--say" in sys.argv:
             print(f"{self.wall_s:7.1f} s {happening.event}: {happening.text}"[:200], flush=True)
@@ -109,7 +109,7 @@ class Account:
         )
         print(f"unaccounted for: {sorted(set(self._names) - set(self._last))}")
         for item in self._last.values():
-            if item.result not in (Item.RECORDED, Item.KEPT):
+            if item.result not in (PointOutcome.RECORDED, PointOutcome.KEPT):
                 print(f"  {item.name}: {item.reason[:200]}")
         cpu_s = used.user + used.system
         times = self._plan.duration_s / wall_s
@@ -119,7 +119,7 @@ class Account:
 def main() -> None:
     """Live through the night and tell."""
     duration_s = HOUR_S * float(sys.argv[1]) if len(sys.argv) > 1 else NIGHT_S
-    with tempfile.TemporaryDirectory() as temporary, closing(Engine(Attendance.UNATTENDED)) as engine:
+    with tempfile.TemporaryDirectory() as temporary, closing(Engine(Supervision.UNATTENDED)) as engine:
         folder = Path(temporary)
         plan = campaign(duration_s)
         rig = rig_of(folder, duration_s)
@@ -127,7 +127,7 @@ def main() -> None:
         points, load = len(plan.recording_names()), os.getloadavg()[0]
         print(f"{points} points, {plan.duration_s / HOUR_S:.2f} h of rig time planned; load {load:.1f}")
         account = Account(plan)
-        orders = Orders(campaign=plan, folder=folder / "night", after_failure=AfterFailure.GO_ON)
+        orders = CampaignRequest(campaign=plan, folder=folder / "night", after_failure=AfterFailure.GO_ON)
         for _ in range(MORNINGS):
             try:
                 engine.measure(orders, account.ended, account.happened)
@@ -135,7 +135,7 @@ def main() -> None:
             except RecordingError as error:
                 # In the morning somebody makes room on the disk.
                 print(f"ended: {str(error)[:150]}; resumed", flush=True)
-                orders = orders.model_copy(update={"existing": Existing.RESUME})
+                orders = orders.model_copy(update={"existing": ExistingRecordings.RESUME})
         account.tell()
         print(f"faults played: {len(engine.played_faults)}; load {os.getloadavg()[0]:.1f}")
 

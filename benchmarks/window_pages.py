@@ -21,14 +21,14 @@ import numpy as np
 from PySide6.QtCore import QEventLoop, QTimer
 from PySide6.QtWidgets import QApplication
 
-from vibench.analysis import Origin, Response, Trace
-from vibench.analysis.simulation import SimulationCourse
+from vibench.analysis import CurveOrigin, CurveKind, Curve
+from vibench.analysis.simulation import SimulationProgress
 from vibench.analysis.simulation._request import SimulatedPoint
-from vibench.gui.page import Desk, Settings
+from vibench.gui.page import AppContext, Settings
 from vibench.gui.pages.compare import ComparePage
 from vibench.gui.pages.files import FilesPage
 from vibench.gui.pages.simulate import SimulatePage
-from vibench.gui.window._loop_watch import LoopWatch
+from vibench.gui.window._loop_watch import EventLoopMonitor
 from vibench.gui.window._open_window import application
 
 SIZE = (1400, 900)
@@ -42,7 +42,7 @@ def main() -> None:
     """Open, zoom, draw."""
     application(["benchmark"])
     with tempfile.TemporaryDirectory() as folder:
-        desk = Desk(Settings(Path(folder) / "window.ini"))
+        desk = AppContext(Settings(Path(folder) / "window.ini"))
         desk.choose_folder(Path(folder))
         files(desk, Path(sys.argv[1]))
         compare(desk)
@@ -50,13 +50,13 @@ def main() -> None:
         desk.background.close()
 
 
-def files(desk: Desk, path: Path) -> None:
+def files(desk: AppContext, path: Path) -> None:
     """Open the recording and zoom to random places."""
     page = FilesPage(desk)
     page.resize(*SIZE)
     page.show()
     for number in ("first", "next"):
-        watch = LoopWatch(lambda: "Files page")
+        watch = EventLoopMonitor(lambda: "Files page")
         begun = time.monotonic()
         page.lanes.show_recording(None)
         page.open_path(path)
@@ -90,7 +90,7 @@ def zoom(page: FilesPage, starts_s: Iterator[float], span_s: float) -> None:
     page.lanes.show_range(start_s, start_s + span_s)
 
 
-def compare(desk: Desk) -> None:
+def compare(desk: AppContext) -> None:
     """Lay six curves of 4000 points over one another."""
     page = ComparePage(desk)
     page.resize(*SIZE)
@@ -99,8 +99,8 @@ def compare(desk: Desk) -> None:
     rng = np.random.default_rng(2)
     for number in range(6):
         values = np.exp(0.2 * rng.standard_normal(4000).cumsum() / 20)
-        curve = Trace(
-            f"run {number}", Origin.MEASURED, Response.TRANSMISSION, frequency_hz, values, np.full(4000, 0.02)
+        curve = Curve(
+            f"run {number}", CurveOrigin.MEASURED, CurveKind.TRANSMISSION, frequency_hz, values, np.full(4000, 0.02)
         )
         told(
             f"Compare: curve {number + 1} of 4000 points", lambda c=curve: page.add_prediction((c,)), tries=1
@@ -108,12 +108,12 @@ def compare(desk: Desk) -> None:
     page.close()
 
 
-def simulate(desk: Desk) -> None:
+def simulate(desk: AppContext) -> None:
     """Draw a simulation of 2 x 500 points anew, as each tick of the clock does while it grows."""
     page = SimulatePage(desk)
     page.resize(*SIZE)
     page.show()
-    course = SimulationCourse(5e-6, 1000, "")
+    course = SimulationProgress(5e-6, 1000, "")
     for model in ("a", "b"):
         course.add(
             tuple(

@@ -17,7 +17,7 @@ from vibench.acquisition.rig import (
     Channel,
     KnobSheet,
     OutputConfig,
-    Quantity,
+    BaseQuantity,
     Rig,
     RigModel,
     Role,
@@ -183,7 +183,7 @@ class LoopbackDigitizer:
         self._channels = channels
         self._first = 0
         self._velocity = np.zeros(1)
-        self._accelerance = abs(complex(RigModel(world.rig).transfer(Quantity.ACCELERATION, 160.0)))
+        self._accelerance = abs(complex(RigModel(world.rig).transfer(BaseQuantity.ACCELERATION, 160.0)))
 
     @property
     def roles(self) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from vibench.acquisition import open_recording
-from vibench.acquisition.campaign import PointState, read_journal
+from vibench.acquisition.campaign import JournalPointState, read_journal
 from vibench.acquisition.campaign._journal import journal_path
 from vibench.acquisition.recording import RecordingState
 
@@ -111,7 +111,7 @@ def told(out: Path) -> int:
 def done(out: Path) -> int:
     """How many points the journal calls done."""
     points = read_journal(journal_path(out, CAMPAIGN))
-    return sum(point.state is PointState.DONE for point in points)
+    return sum(point.state is JournalPointState.DONE for point in points)
 
 
 def amplitudes(out: Path) -> dict[str, float]:

@@ -3,7 +3,7 @@
 import json
 import sys
 
-from vibench.acquisition.campaign import Estimate
+from vibench.acquisition.campaign import CampaignEstimate
 from vibench.cli.measure import estimate_text
 
 from .killed_campaign import short_points, slow_rig
@@ -34,7 +34,7 @@ def test_a_campaign_is_catalogued_and_its_end_is_told(vibench, tmp_path):
 
 
 def test_an_estimate_in_words_names_lead_ins_and_a_disk_that_is_too_small():
-    expected = Estimate(
+    expected = CampaignEstimate(
         recordings=3,
         kept=2,
         duration_s=3723.4,

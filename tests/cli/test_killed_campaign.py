@@ -6,7 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from vibench.acquisition.campaign import PointState, read_journal
+from vibench.acquisition.campaign import JournalPointState, read_journal
 
 from .conftest import ENVIRONMENT
 from .killed_campaign import amplitudes, branches, command, done, killed, short_points, slow_rig
@@ -33,7 +33,7 @@ def test_a_campaign_that_is_killed_and_resumed_makes_every_point_once(tmp_path, 
     assert ended.stdout.count("kept") >= reached
 
     journal = read_journal(disturbed / "points.campaign.sqlite")
-    assert [point.state for point in journal] == [PointState.DONE] * points
+    assert [point.state for point in journal] == [JournalPointState.DONE] * points
     assert all(point.attempts <= 1 + kills for point in journal)
     expected, found = amplitudes(left_alone), amplitudes(disturbed)
     assert list(found) == list(expected)

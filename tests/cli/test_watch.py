@@ -11,7 +11,7 @@ from threading import Event
 import pytest
 
 from vibench.acquisition import open_recording
-from vibench.acquisition.engine import Attendance, EngineState, announced_engines, start_engine
+from vibench.acquisition.engine import Supervision, EngineState, announced_engines, start_engine
 from vibench.acquisition.engine._address import EngineAddress
 from vibench.acquisition.engine._announcement import announced
 from vibench.acquisition.plan import Campaign
@@ -30,7 +30,7 @@ def own_state(tmp_path_factory, monkeypatch):
 
 @pytest.fixture
 def running(tmp_path):
-    with start_engine(Attendance.UNATTENDED) as engine:
+    with start_engine(Supervision.UNATTENDED) as engine:
         engine.client.open(load_rig(ROOT / "hardware_configs" / "virtual_rig.toml"))
         wait(engine, EngineState.READY)
         engine.client.arm(LONG, tmp_path)

@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QColor, QImage, QPainter
 
-from vibench.gui.page import Desk, Settings
+from vibench.gui.page import AppContext, Settings
 from vibench.gui.window._loop_watch import BOUND_S
 from vibench.gui.window._open_window import application
 from vibench.gui.window._page_catalogue import PAGES
@@ -26,7 +26,7 @@ def qapp():
 
 @pytest.fixture
 def desk(qapp, tmp_path):
-    desk = Desk(Settings(tmp_path / "window.ini"))
+    desk = AppContext(Settings(tmp_path / "window.ini"))
     yield desk
     desk.background.close()
 

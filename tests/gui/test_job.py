@@ -10,9 +10,9 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QLineEdit, QMenu, QVBoxLayout
 
 from vibench.acquisition import open_recording
-from vibench.acquisition.engine import Attendance, EngineState, start_engine
+from vibench.acquisition.engine import Supervision, EngineState, start_engine
 from vibench.acquisition.plan import Measurement
-from vibench.gui.page import Desk, Settings
+from vibench.gui.page import AppContext, Settings
 from vibench.gui.page._orders import ABORT_KEY
 from vibench.gui.pages.rig._rig_choice import PACES
 from vibench.gui.widgets import COMPARE, FILES, RUN, TEST
@@ -51,7 +51,7 @@ def bench(qapp, own_state, tmp_path_factory):
     folder = tmp_path_factory.mktemp("job")
     # Unattended: a machine that is busy with other tests must not end a run here; that a window that
     # falls silent does is tested with the engine.
-    desk = Desk(Settings(folder / "window.ini"), partial(start_engine, Attendance.UNATTENDED))
+    desk = AppContext(Settings(folder / "window.ini"), partial(start_engine, Supervision.UNATTENDED))
     desk.choose_folder(folder / "recordings")
     window = Window(desk, PAGES)
     # Free of the clock: a simulated converter that has to keep up with it may overrun on a busy machine.

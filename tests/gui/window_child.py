@@ -8,7 +8,7 @@ from PySide6.QtCore import QTimer
 from vibench.acquisition.engine import EngineState
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
-from vibench.gui.page import Desk, Settings
+from vibench.gui.page import AppContext, Settings
 from vibench.gui.window._open_window import application
 from vibench.gui.window._page_catalogue import PAGES
 from vibench.gui.window._window import Window
@@ -25,7 +25,7 @@ def main(folder: Path, config: Path) -> None:
     rig = load_rig(config)
     rig = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
     app = application(["vibench"])
-    window = Window(Desk(Settings(folder / "window.ini")), PAGES)
+    window = Window(AppContext(Settings(folder / "window.ini")), PAGES)
     window.show()
     bridge = window.desk.bridge
     bridge.open(rig, None)

@@ -15,7 +15,7 @@ from .campaign import (
 from .check import (
     CheckRule as CheckRule,
     check_and_keep as check_and_keep,
-    last_result as last_result,
+    last_check as last_check,
 )
 from .errors import (
     AcquisitionError as AcquisitionError,

@@ -39,7 +39,7 @@ class DataLost(AcquisitionError):
 
 
 @dataclass(frozen=True)
-class Trip:
+class LimitTrip:
     """The numbers of a limit that the running measurement has passed."""
 
     channel: str
@@ -63,7 +63,7 @@ class LimitExceeded(AcquisitionError):
     the numbers when a running measurement was stopped; it is None for a plan that was refused.
     """
 
-    def __init__(self, text: str, trip: Trip | None = None) -> None:
+    def __init__(self, text: str, trip: LimitTrip | None = None) -> None:
         super().__init__(text)
         self.trip = trip
 

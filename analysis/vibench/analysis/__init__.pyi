@@ -4,12 +4,12 @@ from .chaos import (
 )
 from .comparison import (
     AnalysisOptions as AnalysisOptions,
-    Origin as Origin,
-    Response as Response,
-    Trace as Trace,
+    CurveOrigin as CurveOrigin,
+    CurveKind as CurveKind,
+    Curve as Curve,
     readings as readings,
-    trace_difference as trace_difference,
-    trace_peaks as trace_peaks,
+    curve_difference as curve_difference,
+    curve_peaks as curve_peaks,
 )
 from .errors import (
     AnalysisError as AnalysisError,
@@ -19,39 +19,39 @@ from .errors import (
 from .frequency_response import (
     Estimator as Estimator,
     MagnitudeScale as MagnitudeScale,
-    NoiseRequest as NoiseRequest,
+    FrequencyResponseRequest as FrequencyResponseRequest,
     Resonance as Resonance,
-    Transmission as Transmission,
+    FrequencyResponse as FrequencyResponse,
     quantities_named as quantities_named,
     resonances as resonances,
-    transmission as transmission,
+    transmissibility as transmissibility,
 )
 from .model import (
-    THRESHOLD as THRESHOLD,
-    Difference as Difference,
-    Foresight as Foresight,
+    SIMILARITY_THRESHOLD as SIMILARITY_THRESHOLD,
+    CurveDifference as CurveDifference,
+    MeasurementPrediction as MeasurementPrediction,
     Simulation as Simulation,
-    foresee as foresee,
+    predict_measurement as predict_measurement,
     similarity as similarity,
 )
 from .model_updating import (
-    ShakenSpecimen as ShakenSpecimen,
-    shaken_specimen as shaken_specimen,
+    UpdatedSpecimen as UpdatedSpecimen,
+    update_model as update_model,
 )
 from .recordings import (
-    Watcher as Watcher,
+    ProgressObserver as ProgressObserver,
 )
 from .results import (
     CampaignResults as CampaignResults,
     ComparedRecording as ComparedRecording,
-    Failure as Failure,
+    AnalysisFailure as AnalysisFailure,
     analyse_files as analyse_files,
     analyse_recording as analyse_recording,
-    assembled as assembled,
+    merged_results as merged_results,
     campaign_summary as campaign_summary,
-    compared_recording as compared_recording,
+    compare_recording as compare_recording,
     recordings_in as recordings_in,
-    summary as summary,
+    result_summary as result_summary,
 )
 from .signals import (
     Window as Window,

@@ -10,18 +10,18 @@ import typer
 from vibench.analysis import (
     CampaignResults,
     Estimator,
-    Failure,
+    AnalysisFailure,
     MagnitudeScale,
-    NoiseRequest,
-    ShakenSpecimen,
+    FrequencyResponseRequest,
+    UpdatedSpecimen,
     Simulation,
-    Watcher,
+    ProgressObserver,
     Window,
     analyse_files,
     campaign_summary,
     quantities_named,
     recordings_in,
-    shaken_specimen,
+    update_model,
 )
 from vibench.analysis.report import write_report
 
@@ -56,7 +56,7 @@ def analyse(
         typer.Option(
             help="drive: referenced to the drive voltage, free of any channel's noise.", rich_help_panel=NOISE
         ),
-    ] = NoiseRequest.estimator,
+    ] = FrequencyResponseRequest.estimator,
     noise_ratio: Annotated[
         float | None,
         typer.Option(
@@ -98,18 +98,18 @@ def analyse(
     ] = None,
     window: Annotated[
         Window, typer.Option(help="Taper of a segment.", rich_help_panel=NOISE)
-    ] = NoiseRequest.window,
+    ] = FrequencyResponseRequest.window,
     overlap: Annotated[
         float, typer.Option(metavar="SHARE", help="Of neighbouring segments, 0 to 1.", rich_help_panel=NOISE)
-    ] = NoiseRequest.overlap,
+    ] = FrequencyResponseRequest.overlap,
     confidence: Annotated[
         float,
         typer.Option(metavar="P", help="That the bounds of a line hold the truth.", rich_help_panel=NOISE),
-    ] = NoiseRequest.confidence,
+    ] = FrequencyResponseRequest.confidence,
     as_json: AsJson = False,
 ) -> None:
     """Analyse recordings, complete, interrupted or still growing, and write one HTML report."""
-    request = NoiseRequest(
+    request = FrequencyResponseRequest(
         estimator=estimator,
         noise_ratio=noise_ratio,
         resolution_hz=resolution,
@@ -147,9 +147,9 @@ def analyse(
     complain_about(results)
 
 
-def fitted_to(paths: Sequence[Path], name: str, watcher: Watcher) -> ShakenSpecimen:
+def fitted_to(paths: Sequence[Path], name: str, watcher: ProgressObserver) -> UpdatedSpecimen:
     """Fit the specimen to recordings, whatever the report is to show of them."""
-    return shaken_specimen(analyse_files(paths, name, Simulation.LEFT_OUT, watcher=watcher))
+    return update_model(analyse_files(paths, name, Simulation.LEFT_OUT, watcher=watcher))
 
 
 def complain_about(results: CampaignResults) -> None:
@@ -160,6 +160,6 @@ def complain_about(results: CampaignResults) -> None:
         raise typer.Exit(1)
 
 
-def _named(failure: Failure) -> str:
+def _named(failure: AnalysisFailure) -> str:
     """Give the sentence, with the recording's name where it does not say it itself."""
     return failure.sentence if failure.name in failure.sentence else f"{failure.name}: {failure.sentence}"

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from vibench.acquisition import follow_parent
-from vibench.analysis import CampaignResults, analyse_files, assembled
+from vibench.analysis import CampaignResults, analyse_files, merged_results
 from vibench.sim import Accuracy, Harmonic, Sampled, follow_samples, gong2025, steady_response
 
 
@@ -38,7 +38,7 @@ class Analyst:
 
     def together(self) -> CampaignResults:
         """Give the results as one campaign's."""
-        return assembled(self._name, tuple(self.results()))
+        return merged_results(self._name, tuple(self.results()))
 
 
 @contextmanager

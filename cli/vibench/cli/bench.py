@@ -12,7 +12,7 @@ from vibench.acquisition import (
     StopSwitch,
     Verdict,
     check_and_keep,
-    last_result,
+    last_check,
     list_instruments,
     list_rig_instruments,
     open_bench,
@@ -83,7 +83,7 @@ def _now(path: Path, out: Path) -> CheckResult:
 
 
 def _last(rig: Rig) -> CheckResult:
-    result = last_result(rig.name)
+    result = last_check(rig.name)
     if result is None:
         raise CheckFailed(
             f"the bench {rig.name!r} was never checked on this account, so nothing can be shown; leave out "

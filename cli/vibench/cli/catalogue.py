@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.campaign import CatalogueEntry, Refresh, catalogue
+from vibench.acquisition.campaign import CatalogueEntry, Refresh, list_recordings
 
 from .output import console, print_json
 from .paths import AsJson
@@ -22,7 +22,7 @@ def show_catalogue(
     as_json: AsJson = False,
 ) -> None:
     """List the recordings of a folder and the folders in it: what, when, how they ended, how large."""
-    entries = catalogue(folder, Refresh.ALL if rebuild else Refresh.CHANGED)
+    entries = list_recordings(folder, Refresh.ALL if rebuild else Refresh.CHANGED)
     if as_json:
         print_json({"folder": str(folder.resolve()), "recordings": [asdict(each) for each in entries]})
         return

@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from vibench.acquisition import load_campaign, shipped
-from vibench.acquisition.campaign import CampaignItem, Item
-from vibench.acquisition.engine import Orders
+from vibench.acquisition.campaign import PointResult, PointOutcome
+from vibench.acquisition.engine import CampaignRequest
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import campaign_summary
 from vibench.analysis.report import write_report
@@ -34,14 +34,14 @@ def demo(
     )
     with second_process(campaign.name) as analyst:
 
-        def recorded(item: CampaignItem) -> None:
-            if item.result is Item.RECORDED:
+        def recorded(item: PointResult) -> None:
+            if item.result is PointOutcome.RECORDED:
                 analyst.take(item.path)
 
         rig = shipped("hardware_configs/virtual_rig.toml")
         with the_bench(load_rig(rig), "demo") as engine:
-            items = engine.measure(Orders(campaign=campaign, folder=folder / "recordings"), recorded)
-        if {item.name for item in items if item.result is Item.RECORDED} != set(campaign.recording_names()):
+            items = engine.measure(CampaignRequest(campaign=campaign, folder=folder / "recordings"), recorded)
+        if {item.name for item in items if item.result is PointOutcome.RECORDED} != set(campaign.recording_names()):
             raise typer.Exit(STOPPED_EXIT_CODE)
         with analysis_bar(analyst.asked) as step:
             for _ in analyst.results():

@@ -20,15 +20,15 @@ from vibench.acquisition.campaign import (
     AfterFailure,
     ChangedBench,
     CommandMessenger,
-    Estimate,
-    Existing,
-    Item,
+    CampaignEstimate,
+    ExistingRecordings,
+    PointOutcome,
     MailMessenger,
     MailSettings,
     Messenger,
-    estimate,
+    estimate_campaign,
 )
-from vibench.acquisition.engine import Attendance, Desk, Engine, Orders, Work, hosted
+from vibench.acquisition.engine import Supervision, RequestHandler, Engine, CampaignRequest, JobQueue, serving
 from vibench.acquisition.rig import Rig
 
 from .engine_bars import Watching
@@ -43,7 +43,7 @@ class Form(StrEnum):
     JSON = "json"
 
 
-def tell_estimate(expected: Estimate, form: Form) -> None:
+def tell_estimate(expected: CampaignEstimate, form: Form) -> None:
     """Say how many recordings, how long and how large, and whether the disk has room for them."""
     match form:
         case Form.JSON:
@@ -52,7 +52,7 @@ def tell_estimate(expected: Estimate, form: Form) -> None:
             console.print(estimate_text(expected), markup=False)
 
 
-def estimate_text(expected: Estimate) -> str:
+def estimate_text(expected: CampaignEstimate) -> str:
     """Put an estimate into a few lines."""
     length = timedelta(seconds=round(expected.duration_s))
     kept = f" ({expected.kept} kept)" if expected.kept else ""
@@ -129,12 +129,12 @@ def measure(
             "--json out"
         )
     plan, rig = load_campaign(campaign), rig_at(bench, faults)
-    existing = Existing.RESUME if resume else Existing.REFUSE
-    tell_estimate(estimate(plan, rig, out, existing), Form.JSON if as_json else Form.TEXT)
+    existing = ExistingRecordings.RESUME if resume else ExistingRecordings.REFUSE
+    tell_estimate(estimate_campaign(plan, rig, out, existing), Form.JSON if as_json else Form.TEXT)
     if only_estimate:
         return
     messengers = messengers_of(notify, mail)
-    orders = Orders(
+    orders = CampaignRequest(
         campaign=plan,
         folder=out,
         existing=existing,
@@ -146,16 +146,16 @@ def measure(
         items = engine.measure(orders, messengers=messengers)
     if engine.switch.request is not None:
         raise typer.Exit(STOPPED_EXIT_CODE)
-    if any(item.result is Item.FAILED for item in items):
+    if any(item.result is PointOutcome.FAILED for item in items):
         raise typer.Exit(1)
 
 
 @contextmanager
 def the_bench(rig: Rig, what: str) -> Iterator[Engine]:
     """Open a bench in this process, with bars on the terminal and a door for whoever watches or stops it."""
-    engine = Engine(Attendance.UNATTENDED)
-    desk = Desk(engine, Work(engine))
+    engine = Engine(Supervision.UNATTENDED)
+    desk = RequestHandler(engine, JobQueue(engine))
     with closing(engine):
         engine.open(rig)
-        with hosted(desk, what), Watching(desk.status):
+        with serving(desk, what), Watching(desk.status):
             yield engine

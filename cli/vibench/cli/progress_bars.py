@@ -19,7 +19,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from vibench.sim.study import StudyProgress, Watcher
+from vibench.sim.study import StudyProgress, StudyObserver
 
 from .output import console
 
@@ -38,7 +38,7 @@ MINUTES_OF_AN_HOUR = 60.0
 
 
 @contextmanager
-def study_bar(points: int) -> Iterator[Watcher]:
+def study_bar(points: int) -> Iterator[StudyObserver]:
     """Show the bar while inside; what it gives is told how far the study is."""
     columns = (
         TextColumn("points"),

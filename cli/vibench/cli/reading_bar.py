@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-from vibench.analysis import Watcher
+from vibench.analysis import ProgressObserver
 
 
 class ReadingBar:
@@ -26,7 +26,7 @@ class ReadingBar:
 
 
 @contextmanager
-def reading_bar() -> Iterator[Watcher]:
+def reading_bar() -> Iterator[ProgressObserver]:
     """Show the bar while inside, on a terminal only; it leaves nothing behind."""
     columns = (
         TextColumn("{task.description}"),

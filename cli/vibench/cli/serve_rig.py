@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.rig import METADATA_KEY, VARIABLE
+from vibench.acquisition.rig import TOKEN_KEY, TOKEN_VARIABLE
 from vibench.virtual_rig import DiskFaults, VirtualRig
 
 from .output import bold, console
@@ -43,7 +43,7 @@ def serve_rig(
         console.print(f"  {rig.socket_resource}")
         if rig.token is not None:
             console.print("\nIt is heard by other computers, and lets in whoever has the token:")
-            console.print(f"  export {VARIABLE}={rig.token}  # our own programs; others send it as metadata")
-            console.print(f"  {METADATA_KEY}: {rig.token}")
+            console.print(f"  export {TOKEN_VARIABLE}={rig.token}  # our own programs; others send it as metadata")
+            console.print(f"  {TOKEN_KEY}: {rig.token}")
         stop.wait()
     console.print("The virtual rig is off.")

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from vibench.acquisition import load_toml
-from vibench.sim.study import Existing, Study, StudyResults, doubts, solve_study
+from vibench.sim.study import ExistingStudy, Study, StudyResults, plausibility_warnings, solve_study
 
 from .interruption import told_to_stop
 from .output import console, print_json, print_warnings
@@ -42,8 +42,8 @@ def study(
 ) -> None:
     """Predict responses over every combination of what a file lists, longest first."""
     asked = load_toml(plan, Study)
-    print_warnings(doubts(asked))
-    existing = Existing.RESUME if resume else Existing.REFUSE
+    print_warnings(plausibility_warnings(asked))
+    existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
     with told_to_stop() as is_stopped, study_bar(asked.grid.size) as watcher:
         results = solve_study(asked, out, existing, workers, cluster, watcher, is_stopped)
     if as_json:
@@ -90,7 +90,7 @@ def kept_study(study: Study, folder: Path, workers: int | None) -> StudyResults:
     digest = hashlib.sha256(study.model_dump_json().encode()).hexdigest()[:_DIGEST]
     with told_to_stop() as is_stopped, study_bar(study.grid.size) as watcher:
         results = solve_study(
-            study, folder / f"{digest}.h5", Existing.RESUME, workers, watcher=watcher, cancelled=is_stopped
+            study, folder / f"{digest}.h5", ExistingStudy.RESUME, workers, watcher=watcher, cancelled=is_stopped
         )
     if not results.is_complete:
         typer.echo(

@@ -13,7 +13,7 @@ from rich.table import Table
 from vibench.analysis import InvalidRequest
 from vibench.analysis.report import accuracy_document, tradeoff_figure, worst_error
 from vibench.sim import Accuracy
-from vibench.sim.accuracy_benchmark import MOTIONS, MotionTrade, Thoroughness, Trade, measured_trade
+from vibench.sim.accuracy_benchmark import MOTIONS, MotionBenchmark, Thoroughness, AccuracyBenchmark, measure_accuracy
 
 from .output import console, print_json
 from .paths import AsJson, room_for_folder
@@ -48,7 +48,7 @@ def tradeoff(
         def step(name: str) -> None:
             bars.update(bar, description=name, advance=0 if bars.tasks[0].description == "" else 1)
 
-        trade = measured_trade(Thoroughness(span_s=span), step)
+        trade = measure_accuracy(Thoroughness(span_s=span), step)
         bars.update(bar, completed=len(MOTIONS))
     if as_json:
         print_json(_document(trade))
@@ -64,14 +64,14 @@ def _folder(out: Path | None, markdown: Path | None) -> Path | None:
     return out if out is not None or markdown is None else markdown.parent / "images"
 
 
-def _save(trade: Trade, folder: Path, markdown: Path | None) -> None:
+def _save(trade: AccuracyBenchmark, folder: Path, markdown: Path | None) -> None:
     paths = tradeoff_figure(trade).save(folder)
     if markdown is not None:
         picture = Path(os.path.relpath(paths[0], markdown.parent)).as_posix()
         markdown.write_text(accuracy_document(trade, picture), encoding="utf-8")
 
 
-def _tell(found: MotionTrade) -> None:
+def _tell(found: MotionBenchmark) -> None:
     rows = Table(title=f"{found.motion.regime.value}: {found.motion.name}", title_justify="left")
     for heading in ("", "simulated s per s", "error of the state", "of Response I"):
         rows.add_column(heading)
@@ -92,7 +92,7 @@ def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.1e}"
 
 
-def _document(trade: Trade) -> dict[str, object]:
+def _document(trade: AccuracyBenchmark) -> dict[str, object]:
     return {
         "machine": trade.machine,
         "software": trade.software,

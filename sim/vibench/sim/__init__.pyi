@@ -1,11 +1,11 @@
 from .exponents import (
-    largest_exponent as largest_exponent,
+    lyapunov_exponent as lyapunov_exponent,
     lyapunov_spectrum as lyapunov_spectrum,
 )
 from .model import (
     JOIN as JOIN,
     Accuracy as Accuracy,
-    BaseAnswer as BaseAnswer,
+    BaseResponse as BaseResponse,
     Harmonic as Harmonic,
     Hertz as Hertz,
     HuntCrossley as HuntCrossley,
@@ -18,7 +18,7 @@ from .model import (
     RigidStops as RigidStops,
     Sampled as Sampled,
     Specimen as Specimen,
-    base_answer as base_answer,
+    base_response as base_response,
     base_transmissibility as base_transmissibility,
     gong2025 as gong2025,
 )
@@ -32,17 +32,17 @@ from .motion import (
 )
 from .periodic import (
     PowerSpring as PowerSpring,
-    balance_branch as balance_branch,
+    harmonic_balance_branch as harmonic_balance_branch,
     first_order_states as first_order_states,
     jump_frequencies as jump_frequencies,
-    orbit_branch as orbit_branch,
+    periodic_branch as periodic_branch,
     periodic_orbit as periodic_orbit,
     spring_of as spring_of,
     structure_of as structure_of,
 )
 from .scene import (
     Observable as Observable,
-    Prediction as Prediction,
+    ScenePrediction as ScenePrediction,
     Rest as Rest,
     Scene as Scene,
     ScenePlan as ScenePlan,

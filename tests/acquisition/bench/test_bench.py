@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import CheckFailed, ConfigurationError, InstrumentError, InstrumentLost, open_bench
-from vibench.acquisition.bench import Reality
+from vibench.acquisition.bench import BenchKind
 from vibench.acquisition.drivers import AFG1022X, DaqmxDigitizer
 from vibench.acquisition.errors import DataLost, InstrumentBusy
 from vibench.acquisition.instruments import Digitizer, FunctionGenerator
@@ -81,7 +81,7 @@ def output_of(virtual):
 class TestOpening:
     def test_a_virtual_bench_needs_nothing_but_its_configuration(self, rig):
         with open_bench(rig) as bench:
-            assert bench.reality is Reality.SIMULATED
+            assert bench.reality is BenchKind.SIMULATED
             assert bench.identities["generator"].model == "AFG1022"
             assert bench.identities["digitizer"].model == "NI 9234"
             assert bench.confirmations.operator == "simulated"

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from vibench.acquisition import Overload, RecordingError, run_campaign
-from vibench.acquisition.campaign import Refresh, _catalogue as catalogue_module, catalogue
+from vibench.acquisition.campaign import Refresh, _catalogue as catalogue_module, list_recordings
 from vibench.acquisition.campaign._catalogue import CATALOGUE_NAME
 from vibench.acquisition.plan import Campaign, Dwell, Measurement, RunState, SineSweep
 from vibench.acquisition.run._run import Run
@@ -47,7 +47,7 @@ def reads(monkeypatch):
 
 
 def test_it_says_what_when_and_how_large_also_of_folders_in_the_folder(folder):
-    dwell, sweep = catalogue(folder)
+    dwell, sweep = list_recordings(folder)
     assert (dwell.path, sweep.path) == ("monday/dwell.h5", "tuesday/late/sweep.h5")
     assert (dwell.state, dwell.verdict, dwell.kind) == ("complete", "good", "dwell")
     assert (sweep.amplitude_vpp, sweep.frequency_low_hz, sweep.frequency_high_hz) == (0.5, 200, 300)
@@ -58,23 +58,23 @@ def test_it_says_what_when_and_how_large_also_of_folders_in_the_folder(folder):
 
 
 def test_only_what_is_new_or_changed_is_read_again(folder, reads):
-    before = catalogue(folder)
+    before = list_recordings(folder)
     assert sorted(reads) == ["dwell.h5", "sweep.h5"]
     reads.clear()
-    assert catalogue(folder) == before
+    assert list_recordings(folder) == before
     assert reads == []
     (folder / "monday" / "dwell.h5").rename(folder / "moved.h5")
     os.utime(folder / "tuesday" / "late" / "sweep.h5", (1, 1))
-    assert [entry.path for entry in catalogue(folder)] == ["moved.h5", "tuesday/late/sweep.h5"]
+    assert [entry.path for entry in list_recordings(folder)] == ["moved.h5", "tuesday/late/sweep.h5"]
     assert sorted(reads) == ["moved.h5", "sweep.h5"]
 
 
 def test_it_can_be_made_again_from_the_files(folder, reads):
-    before = catalogue(folder)
+    before = list_recordings(folder)
     (folder / CATALOGUE_NAME).unlink()
-    assert catalogue(folder) == before
+    assert list_recordings(folder) == before
     reads.clear()
-    assert catalogue(folder, Refresh.ALL) == before
+    assert list_recordings(folder, Refresh.ALL) == before
     assert sorted(reads) == ["dwell.h5", "sweep.h5"]
 
 
@@ -92,7 +92,7 @@ def test_what_is_to_be_minded_is_the_verdict(bench, folder):
         for progress in run:
             if progress.state is RunState.RECORDING:
                 run.cancel("seen enough")
-    entry = next(entry for entry in catalogue(folder) if entry.path == "loud.h5")
+    entry = next(entry for entry in list_recordings(folder) if entry.path == "loud.h5")
     assert entry.verdict == "stopped; near full scale: m0_velocity"
     assert entry.reason == "seen enough"
 
@@ -100,15 +100,15 @@ def test_what_is_to_be_minded_is_the_verdict(bench, folder):
 def test_a_recording_that_runs_is_listed_and_one_whose_program_died_is_interrupted(bench, folder):
     with Run(bench, DWELL, folder / "now.h5") as run:
         next(iter(run))
-        running = next(entry for entry in catalogue(folder) if entry.path == "now.h5.part")
+        running = next(entry for entry in list_recordings(folder) if entry.path == "now.h5.part")
     assert running.state == "recording"
     assert not running.is_finished
-    assert "now.h5.part" not in [entry.path for entry in catalogue(folder)]
+    assert "now.h5.part" not in [entry.path for entry in list_recordings(folder)]
 
 
 def test_a_file_that_is_no_recording_is_listed_with_what_is_wrong(folder):
     (folder / "junk.h5").write_bytes(b"no HDF5")
-    entry = next(entry for entry in catalogue(folder) if entry.path == "junk.h5")
+    entry = next(entry for entry in list_recordings(folder) if entry.path == "junk.h5")
     assert entry.state == "unreadable"
     assert "junk.h5" in entry.reason
 
@@ -116,17 +116,17 @@ def test_a_file_that_is_no_recording_is_listed_with_what_is_wrong(folder):
 def test_a_file_of_the_catalogue_s_name_that_is_none_is_left_alone_until_it_is_to_be_rebuilt(folder):
     (folder / CATALOGUE_NAME).write_text("my notes " * 200)
     with pytest.raises(RecordingError, match="is no catalogue"):
-        catalogue(folder)
+        list_recordings(folder)
     assert (folder / CATALOGUE_NAME).read_text().startswith("my notes")
-    assert len(catalogue(folder, Refresh.ALL)) == 2
+    assert len(list_recordings(folder, Refresh.ALL)) == 2
 
 
 def test_a_folder_that_may_not_be_written_is_listed_all_the_same(folder, monkeypatch):
     # A directory in the place of the database: what SQLite says of a folder that is read-only.
     (folder / CATALOGUE_NAME).mkdir()
-    assert len(catalogue(folder)) == 2
+    assert len(list_recordings(folder)) == 2
 
 
 def test_a_folder_that_does_not_exist_is_one_sentence(tmp_path):
     with pytest.raises(RecordingError, match="give the folder that the recordings are in"):
-        catalogue(tmp_path / "nowhere")
+        list_recordings(tmp_path / "nowhere")

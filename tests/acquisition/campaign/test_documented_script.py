@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vibench.acquisition.campaign import PointState, read_journal
+from vibench.acquisition.campaign import JournalPointState, read_journal
 from vibench.acquisition.campaign._journal import journal_path
 
 ROOT = Path(__file__).parents[3]
@@ -39,7 +39,7 @@ def test_it_refines_the_step_around_the_jump_and_can_be_run_again(script, tmp_pa
     Path("campaign.toml").write_text(CAMPAIGN)
     exec(script, {})
     points = read_journal(journal_path(Path("recordings"), "jump"))
-    assert {point.state for point in points} == {PointState.DONE}
+    assert {point.state for point in points} == {JournalPointState.DONE}
     added = [point for point in points if point.added_after]
     assert len(added) == 3, "10 Hz are halved three times, to 1.25 Hz"
     for point in added:

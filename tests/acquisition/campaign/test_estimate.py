@@ -3,7 +3,7 @@
 import pytest
 
 from vibench.acquisition import RecordingError, open_recording, run_campaign, validated
-from vibench.acquisition.campaign import Existing, estimate
+from vibench.acquisition.campaign import ExistingRecordings, estimate_campaign
 from vibench.acquisition.plan import Campaign
 
 CAMPAIGN = validated(
@@ -30,7 +30,7 @@ CAMPAIGN = validated(
 
 
 def test_the_time_is_what_the_recordings_last(bench, rig, tmp_path):
-    expected = estimate(CAMPAIGN, rig, tmp_path / "new" / "folder")
+    expected = estimate_campaign(CAMPAIGN, rig, tmp_path / "new" / "folder")
     assert not (tmp_path / "new").exists()
     made_s = 0.0
     for item in run_campaign(bench, CAMPAIGN, tmp_path / "new" / "folder"):
@@ -42,7 +42,7 @@ def test_the_time_is_what_the_recordings_last(bench, rig, tmp_path):
 
 
 def test_the_bytes_are_those_of_the_samples_and_the_largest_is_the_last(rig, tmp_path):
-    expected = estimate(CAMPAIGN, rig, tmp_path)
+    expected = estimate_campaign(CAMPAIGN, rig, tmp_path)
     bytes_per_s = 5120 * 4 * 4
     assert expected.largest_bytes == pytest.approx((0.6 + 0.4 + 0.5 + 0.3) * bytes_per_s)
     assert expected.largest_bytes < expected.needed_bytes < 3 * expected.largest_bytes * 1.5
@@ -52,7 +52,7 @@ def test_the_bytes_are_those_of_the_samples_and_the_largest_is_the_last(rig, tmp
 def test_what_is_there_already_is_not_counted(bench, rig, tmp_path):
     items = run_campaign(bench, CAMPAIGN, tmp_path)
     with pytest.raises(RecordingError, match="exist already"):
-        estimate(CAMPAIGN, rig, tmp_path)
+        estimate_campaign(CAMPAIGN, rig, tmp_path)
     items[0].path.unlink()
-    expected = estimate(CAMPAIGN, rig, tmp_path, Existing.RESUME)
+    expected = estimate_campaign(CAMPAIGN, rig, tmp_path, ExistingRecordings.RESUME)
     assert (expected.recordings, expected.kept) == (1, 2)

@@ -7,7 +7,7 @@ import sqlite3
 import pytest
 
 from vibench.acquisition import RecordingError
-from vibench.acquisition.campaign import PointState, Why, read_journal
+from vibench.acquisition.campaign import JournalPointState, ReasonCode, read_journal
 from vibench.acquisition.campaign._bench_identity import BenchIdentity
 from vibench.acquisition.campaign._journal import Journal, journal_path
 from vibench.acquisition.campaign._journal_database import is_begun
@@ -38,17 +38,17 @@ def test_it_keeps_plan_and_bench(journal, bench):
         assert again.campaign == CAMPAIGN
         assert again.bench.differences(BenchIdentity.of(bench)) == ()
         assert [point.measurement for point in again.points()] == list(CAMPAIGN.measurements)
-        assert {point.state for point in again.points()} == {PointState.QUEUED}
+        assert {point.state for point in again.points()} == {JournalPointState.QUEUED}
 
 
 def test_attempts_are_counted_and_keep_their_files_and_reasons(journal):
     journal.start("two", "two.h5")
-    assert states(journal.points())[1] == ("two", PointState.RUNNING)
-    journal.end("two", PointState.FAILED, Why.DATA_LOST, "a hole")
+    assert states(journal.points())[1] == ("two", JournalPointState.RUNNING)
+    journal.end("two", JournalPointState.FAILED, ReasonCode.DATA_LOST, "a hole")
     journal.start("two", "two.2.h5")
-    journal.end("two", PointState.DONE, Why.CARRIED_OUT, "the plan was carried out")
+    journal.end("two", JournalPointState.DONE, ReasonCode.CARRIED_OUT, "the plan was carried out")
     point = journal.points()[1]
-    assert (point.state, point.attempts, point.file) == (PointState.DONE, 2, "two.2.h5")
+    assert (point.state, point.attempts, point.file) == (JournalPointState.DONE, 2, "two.2.h5")
     assert point.begun_utc <= point.ended_utc
     with sqlite3.connect(journal.path) as plain:
         kept = plain.execute(
@@ -94,18 +94,18 @@ def test_a_process_that_dies_in_a_transaction_leaves_the_one_before_it(journal):
     child.join()
     assert child.exitcode == 9
     assert states(read_journal(path)) == [
-        ("one", PointState.RUNNING),
-        ("two", PointState.QUEUED),
-        ("three", PointState.QUEUED),
+        ("one", JournalPointState.RUNNING),
+        ("two", JournalPointState.QUEUED),
+        ("three", JournalPointState.QUEUED),
     ]
 
 
 def test_one_may_look_while_it_is_written_and_leaves_nothing_behind(journal, tmp_path):
     journal.start("one", "one.h5")
-    assert read_journal(journal.path)[0].state is PointState.RUNNING
-    journal.end("one", PointState.DONE, Why.CARRIED_OUT, "")
+    assert read_journal(journal.path)[0].state is JournalPointState.RUNNING
+    journal.end("one", JournalPointState.DONE, ReasonCode.CARRIED_OUT, "")
     journal.close()
-    assert read_journal(journal.path)[0].state is PointState.DONE
+    assert read_journal(journal.path)[0].state is JournalPointState.DONE
     assert [path.name for path in tmp_path.iterdir()] == ["c.campaign.sqlite"]
 
 

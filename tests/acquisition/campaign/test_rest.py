@@ -7,7 +7,7 @@ from time import monotonic
 import pytest
 
 from vibench.acquisition import ConfigurationError, StopSwitch, run_campaign, validated
-from vibench.acquisition.campaign import Event, Existing, Item, KeptBench, PointState, estimate, read_journal
+from vibench.acquisition.campaign import CampaignEventKind, ExistingRecordings, PointOutcome, ReconnectingBench, JournalPointState, estimate_campaign, read_journal
 from vibench.acquisition.campaign._attempts import LOOK_EVERY_S
 from vibench.acquisition.campaign._journal import journal_path
 from vibench.acquisition.errors import DataLost
@@ -29,23 +29,23 @@ def points(folder):
 
 def test_the_rig_rests_between_recordings_in_its_own_time_with_nothing_on_the_terminal(rig, tmp_path):
     coarse = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"grid_rate_hz": 25_600.0})})
-    with KeptBench(coarse) as kept:
+    with ReconnectingBench(coarse) as kept:
         world = kept._power._virtual.world
         began_s, loudest_v = [], []
 
         def happened(happening):
             match happening.event:
-                case Event.RESTING:
+                case CampaignEventKind.RESTING:
                     world.keep_truth()
                     began_s.append(world.time_s)
-                case Event.POINT_BEGUN if began_s:
+                case CampaignEventKind.POINT_BEGUN if began_s:
                     assert world.time_s - began_s[-1] == pytest.approx(REST_S, abs=1e-3)
                     loudest_v.append(abs(world.truth()[-1000:, 1]).max())
 
         begun = monotonic()
         items = run_campaign(kept.bench, campaign("one", "two"), tmp_path, on_happening=happened)
         assert monotonic() - begun < REST_S
-    assert [item.result for item in items] == [Item.RECORDED] * 2
+    assert [item.result for item in items] == [PointOutcome.RECORDED] * 2
     assert len(began_s) == 1
     assert max(loudest_v) < 1e-4  # the table's velocity [m/s]: noise of the amplifier
     told = (tmp_path / "c.status").read_text()
@@ -56,9 +56,9 @@ def test_a_rest_is_told_in_the_plan_and_in_the_estimate(rig, tmp_path):
     with_rest, without = campaign("one", "two", "three"), campaign("one", "two", "three", rest_s=0)
     assert with_rest.duration_s - without.duration_s == pytest.approx(2 * REST_S)
     assert with_rest.size_bytes(5120, 4) == without.size_bytes(5120, 4)
-    expected = estimate(with_rest, rig, tmp_path)
+    expected = estimate_campaign(with_rest, rig, tmp_path)
     assert expected.rest_s == pytest.approx(2 * REST_S)
-    assert expected.duration_s == pytest.approx(estimate(without, rig, tmp_path).duration_s + 2 * REST_S)
+    assert expected.duration_s == pytest.approx(estimate_campaign(without, rig, tmp_path).duration_s + 2 * REST_S)
 
 
 def test_a_stop_is_heard_in_the_middle_of_a_rest(bench, tmp_path):
@@ -74,7 +74,7 @@ def test_a_stop_is_heard_in_the_middle_of_a_rest(bench, tmp_path):
     items = run_campaign(bench, campaign("one", "two"), tmp_path, switch=switch)
     assert bench.idled_s == pytest.approx(5.1, abs=0.05)
     assert [item.name for item in items] == ["one"]
-    assert [point.state for point in points(tmp_path)] == [PointState.DONE, PointState.QUEUED]
+    assert [point.state for point in points(tmp_path)] == [JournalPointState.DONE, JournalPointState.QUEUED]
 
 
 def test_a_hold_keeps_a_rest_up_until_it_is_taken_back(bench, tmp_path):
@@ -88,12 +88,12 @@ def test_a_hold_keeps_a_rest_up_until_it_is_taken_back(bench, tmp_path):
     bench.idle = idle_and_press
     items = run_campaign(bench, campaign("one", "two"), tmp_path, switch=switch)
     assert bench.idled_s == pytest.approx(2 * REST_S, abs=0.2)
-    assert [item.result for item in items] == [Item.RECORDED, Item.RECORDED]
+    assert [item.result for item in items] == [PointOutcome.RECORDED, PointOutcome.RECORDED]
 
 
 def test_a_campaign_killed_in_a_rest_goes_on_at_the_next_point(bench, new_bench, rig, tmp_path):
     def as_left_by_a_kill(happening):
-        if happening.event is Event.RESTING:
+        if happening.event is CampaignEventKind.RESTING:
             # What a process leaves that is killed now: the files as they are, the journal's log included.
             shutil.copytree(tmp_path / "out", tmp_path / "killed", dirs_exist_ok=True)
 
@@ -101,12 +101,12 @@ def test_a_campaign_killed_in_a_rest_goes_on_at_the_next_point(bench, new_bench,
     run_campaign(bench, plan, tmp_path / "out", on_happening=as_left_by_a_kill)
     killed = tmp_path / "killed"
     assert [(point.state, point.attempts) for point in points(killed)] == [
-        (PointState.DONE, 1),
-        (PointState.QUEUED, 0),
+        (JournalPointState.DONE, 1),
+        (JournalPointState.QUEUED, 0),
     ]
     fresh = new_bench(rig)
-    items = run_campaign(fresh, plan, killed, Existing.RESUME)
-    assert [item.result for item in items] == [Item.KEPT, Item.RECORDED]
+    items = run_campaign(fresh, plan, killed, ExistingRecordings.RESUME)
+    assert [item.result for item in items] == [PointOutcome.KEPT, PointOutcome.RECORDED]
     assert fresh.idled_s == 0.0  # nothing has been played in this session
 
 

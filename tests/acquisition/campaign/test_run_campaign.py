@@ -12,7 +12,7 @@ from vibench.acquisition import (
     run_campaign,
     run_measurement,
 )
-from vibench.acquisition.campaign import AfterFailure, Existing, Item
+from vibench.acquisition.campaign import AfterFailure, ExistingRecordings, PointOutcome
 from vibench.acquisition.errors import DataLost
 from vibench.acquisition.plan import Campaign, Dwell, Measurement, RunState
 from vibench.acquisition.recording import RecordingState
@@ -57,7 +57,7 @@ def test_a_file_where_the_folder_should_be_is_refused_before_anything_plays(benc
 
 def test_every_measurement_becomes_one_complete_recording(bench, tmp_path):
     items = run_campaign(bench, CAMPAIGN, tmp_path / "out")
-    assert results(items) == [(name, Item.RECORDED) for name in ("one", "two", "three")]
+    assert results(items) == [(name, PointOutcome.RECORDED) for name in ("one", "two", "three")]
     for item in items:
         with open_recording(item.path) as recording:
             assert recording.state is RecordingState.COMPLETE
@@ -89,14 +89,14 @@ def test_resuming_keeps_what_is_complete_and_makes_another_attempt_at_what_is_no
         run_campaign(
             bench, CAMPAIGN, tmp_path, on_progress=failing_in(bench, "two", lambda: DataLost("a hole"))
         )
-    items = run_campaign(bench, CAMPAIGN, tmp_path, Existing.RESUME)
-    assert results(items) == [("one", Item.KEPT), ("two", Item.RECORDED), ("three", Item.RECORDED)]
+    items = run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
+    assert results(items) == [("one", PointOutcome.KEPT), ("two", PointOutcome.RECORDED), ("three", PointOutcome.RECORDED)]
     assert sorted(path.name for path in tmp_path.glob("*.h5")) == ["one.h5", "three.h5", "two.2.h5", "two.h5"]
     with open_recording(tmp_path / "two.h5") as first:
         assert first.state is RecordingState.FAILED
         assert "a hole" in first.reason
-    assert results(run_campaign(bench, CAMPAIGN, tmp_path, Existing.RESUME)) == [
-        (name, Item.KEPT) for name in ("one", "two", "three")
+    assert results(run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)) == [
+        (name, PointOutcome.KEPT) for name in ("one", "two", "three")
     ]
 
 
@@ -104,7 +104,7 @@ def test_resuming_with_another_plan_is_refused(bench, tmp_path):
     run_campaign(bench, CAMPAIGN, tmp_path)
     changed = Campaign(name="c", measurements=(dwell("one", amplitude_vpp=2.0),))
     with pytest.raises(RecordingError, match=r"c\.campaign\.sqlite was begun with another plan"):
-        run_campaign(bench, changed, tmp_path, Existing.RESUME)
+        run_campaign(bench, changed, tmp_path, ExistingRecordings.RESUME)
 
 
 def test_a_campaign_told_to_go_on_passes_a_failed_measurement(bench, tmp_path):
@@ -115,7 +115,7 @@ def test_a_campaign_told_to_go_on_passes_a_failed_measurement(bench, tmp_path):
         after_failure=AfterFailure.GO_ON,
         on_progress=failing_in(bench, "one", lambda: DataLost("a hole")),
     )
-    assert results(items) == [("one", Item.FAILED), ("two", Item.RECORDED), ("three", Item.RECORDED)]
+    assert results(items) == [("one", PointOutcome.FAILED), ("two", PointOutcome.RECORDED), ("three", PointOutcome.RECORDED)]
     assert items[0].reason == "a hole"
 
 
@@ -149,7 +149,7 @@ def test_ctrl_c_ends_the_measurement_softly_and_the_campaign_with_it(bench, tmp_
 
     before = signal.getsignal(signal.SIGINT)
     items = run_campaign(bench, CAMPAIGN, tmp_path, on_progress=press_once)
-    assert results(items) == [("one", Item.RECORDED), ("two", Item.STOPPED)]
+    assert results(items) == [("one", PointOutcome.RECORDED), ("two", PointOutcome.STOPPED)]
     assert not bench.world.is_on
     assert signal.getsignal(signal.SIGINT) is before
     with open_recording(tmp_path / "two.h5") as recording:

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from vibench.acquisition import open_recording, run_campaign
-from vibench.acquisition.campaign import AfterFailure, Item, KeptBench
+from vibench.acquisition.campaign import AfterFailure, PointOutcome, ReconnectingBench
 from vibench.acquisition.plan import Campaign, Dwell, Measurement, Retryable, RetryPolicy
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import with_faults
@@ -32,13 +32,13 @@ def test_every_point_of_a_rehearsed_campaign_is_recorded_past_cable_overrun_serv
         ),
         retry=RetryPolicy(attempts=4, on=(*RetryPolicy().on, Retryable.CHECK_FAILED, Retryable.LIMIT)),
     )
-    with KeptBench(with_faults(rig, script)) as kept:
+    with ReconnectingBench(with_faults(rig, script)) as kept:
         items = run_campaign(
             kept.bench, campaign, tmp_path / "out", after_failure=AfterFailure.GO_ON, reopen=kept.reopen
         )
         assert [each.fault for each in kept._power.played_faults] == [each["fault"] for each in SCRIPT]
     assert [(item.name, item.result) for item in items] == [
-        (f"point{number}", Item.RECORDED) for number in range(6)
+        (f"point{number}", PointOutcome.RECORDED) for number in range(6)
     ]
     said = " ".join(reason_of(path) for path in sorted((tmp_path / "out").glob("*.h5")))
     for cause in ("InstrumentLost", "overwritten", "the base moves with"):

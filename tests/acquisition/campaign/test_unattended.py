@@ -17,10 +17,10 @@ from vibench.acquisition.campaign import (
     AfterFailure,
     ChangedBench,
     CommandMessenger,
-    Existing,
-    Item,
-    PointState,
-    Why,
+    ExistingRecordings,
+    PointOutcome,
+    JournalPointState,
+    ReasonCode,
     read_journal,
 )
 from vibench.acquisition.campaign._journal import journal_path
@@ -66,12 +66,12 @@ class TestRetries:
             on_progress=failing_once(bench, lambda: DataLost("a hole")),
         )
         assert [(item.path.name, item.result) for item in items] == [
-            ("one.2.h5", Item.RECORDED),
-            ("two.h5", Item.RECORDED),
+            ("one.2.h5", PointOutcome.RECORDED),
+            ("two.h5", PointOutcome.RECORDED),
         ]
         assert [(point.state, point.attempts) for point in points(tmp_path)] == [
-            (PointState.DONE, 2),
-            (PointState.DONE, 1),
+            (JournalPointState.DONE, 2),
+            (JournalPointState.DONE, 1),
         ]
         assert [line["why"] for line in log(tmp_path) if line["event"] == "fault"] == ["data_lost"]
 
@@ -85,8 +85,8 @@ class TestRetries:
             )
         (point,) = points(tmp_path)
         assert (point.state, point.why, point.reason, point.attempts) == (
-            PointState.FAILED,
-            Why.DATA_LOST,
+            JournalPointState.FAILED,
+            ReasonCode.DATA_LOST,
             "a hole",
             1,
         )
@@ -105,7 +105,7 @@ class TestRetries:
             on_progress=failing_once(bench, lambda: InstrumentLost("gone")),
             reopen=reopen,
         )
-        assert [item.result for item in items] == [Item.RECORDED, Item.RECORDED]
+        assert [item.result for item in items] == [PointOutcome.RECORDED, PointOutcome.RECORDED]
         assert len(opened) == 1
         assert any(name == "start" for name, _, _ in opened[0].world.calls)
         assert "bench_reopened" in [line["event"] for line in log(tmp_path)]
@@ -124,7 +124,7 @@ class TestRetries:
                 reopen=reopen,
             )
         assert any("still gone" in note for note in ended.value.__notes__)
-        assert [point.state for point in points(tmp_path)] == [PointState.FAILED, PointState.QUEUED]
+        assert [point.state for point in points(tmp_path)] == [JournalPointState.FAILED, JournalPointState.QUEUED]
 
     def test_a_bench_that_comes_back_as_another_one_is_not_used(self, bench, new_bench, rig, tmp_path):
         other = new_bench(rig)
@@ -160,17 +160,17 @@ class TestAnotherBench:
         heavier = rig.model_copy(update={"shaker": rig.shaker.model_copy(update={"fixture_mass_kg": 0.2})})
         bench = new_bench(heavier)
         with pytest.raises(CheckFailed, match=r"rig\.shaker\.fixture_mass_kg was 0\.07 and is 0\.2"):
-            run_campaign(bench, campaign("one", "two"), begun, Existing.RESUME)
+            run_campaign(bench, campaign("one", "two"), begun, ExistingRecordings.RESUME)
         assert not any(name == "start" for name, _, _ in bench.world.calls)
 
     def test_it_is_used_when_accepted_and_then_counts_as_the_campaign_s(self, begun, new_bench, rig):
         bench = new_bench(rig)
         bench.identities = {**bench.identities, "generator": other_serial(bench.identities["generator"])}
         items = run_campaign(
-            bench, campaign("one", "two"), begun, Existing.RESUME, changed_bench=ChangedBench.ACCEPT
+            bench, campaign("one", "two"), begun, ExistingRecordings.RESUME, changed_bench=ChangedBench.ACCEPT
         )
-        assert [item.result for item in items] == [Item.RECORDED, Item.RECORDED]
-        run_campaign(bench, campaign("one", "two"), begun, Existing.RESUME)
+        assert [item.result for item in items] == [PointOutcome.RECORDED, PointOutcome.RECORDED]
+        run_campaign(bench, campaign("one", "two"), begun, ExistingRecordings.RESUME)
 
 
 class TestFurtherMeasurements:
@@ -190,11 +190,11 @@ class TestFurtherMeasurements:
         run_campaign(
             bench, campaign("one", "two"), tmp_path, after=after, on_progress=stop_at_two, switch=stop
         )
-        items = run_campaign(bench, campaign("one", "two"), tmp_path, Existing.RESUME, after=after)
+        items = run_campaign(bench, campaign("one", "two"), tmp_path, ExistingRecordings.RESUME, after=after)
         assert [(item.name, item.result) for item in items] == [
-            ("one", Item.KEPT),
-            ("more", Item.KEPT),
-            ("two", Item.RECORDED),
+            ("one", PointOutcome.KEPT),
+            ("more", PointOutcome.KEPT),
+            ("two", PointOutcome.RECORDED),
         ]
         assert asked == [
             ("one", ["one"], True),
@@ -208,35 +208,35 @@ class TestFurtherMeasurements:
 
         with pytest.raises(ZeroDivisionError):
             run_campaign(bench, campaign("one"), tmp_path, after=broken)
-        assert points(tmp_path)[0].state is PointState.DONE
+        assert points(tmp_path)[0].state is JournalPointState.DONE
         names = iter([[dwell("more")], []])
         items = run_campaign(
-            bench, campaign("one"), tmp_path, Existing.RESUME, after=lambda finished, recording: next(names)
+            bench, campaign("one"), tmp_path, ExistingRecordings.RESUME, after=lambda finished, recording: next(names)
         )
-        assert [(item.name, item.result) for item in items] == [("one", Item.KEPT), ("more", Item.RECORDED)]
+        assert [(item.name, item.result) for item in items] == [("one", PointOutcome.KEPT), ("more", PointOutcome.RECORDED)]
 
 
 class TestResuming:
     def test_a_recording_that_was_taken_away_is_made_again(self, bench, tmp_path):
         run_campaign(bench, campaign("one", "two"), tmp_path)
         (tmp_path / "one.h5").unlink()
-        items = run_campaign(bench, campaign("one", "two"), tmp_path, Existing.RESUME)
-        assert [item.result for item in items] == [Item.RECORDED, Item.KEPT]
+        items = run_campaign(bench, campaign("one", "two"), tmp_path, ExistingRecordings.RESUME)
+        assert [item.result for item in items] == [PointOutcome.RECORDED, PointOutcome.KEPT]
 
     def test_a_lost_journal_is_made_again_from_the_recordings(self, bench, tmp_path):
         run_campaign(bench, campaign("one", "two"), tmp_path)
         journal_path(tmp_path, "c").unlink()
-        items = run_campaign(bench, campaign("one", "two"), tmp_path, Existing.RESUME)
-        assert [item.result for item in items] == [Item.KEPT, Item.KEPT]
-        assert [point.why for point in points(tmp_path)] == [Why.FOUND, Why.FOUND]
+        items = run_campaign(bench, campaign("one", "two"), tmp_path, ExistingRecordings.RESUME)
+        assert [item.result for item in items] == [PointOutcome.KEPT, PointOutcome.KEPT]
+        assert [point.why for point in points(tmp_path)] == [ReasonCode.FOUND, ReasonCode.FOUND]
 
     def test_two_programs_cannot_carry_out_one_campaign(self, bench, tmp_path):
         def second(progress):
             with pytest.raises(RecordingError, match="by another program"):
-                run_campaign(bench, campaign("one"), tmp_path, Existing.RESUME)
+                run_campaign(bench, campaign("one"), tmp_path, ExistingRecordings.RESUME)
 
         run_campaign(bench, campaign("one"), tmp_path, on_progress=second)
-        assert points(tmp_path)[0].state is PointState.DONE
+        assert points(tmp_path)[0].state is JournalPointState.DONE
 
     def test_a_stop_between_two_points_leaves_the_rest_queued(self, bench, tmp_path):
         stop = StopSwitch()
@@ -248,7 +248,7 @@ class TestResuming:
             switch=stop,
         )
         assert [item.name for item in items] == ["one"]
-        assert [point.state for point in points(tmp_path)] == [PointState.DONE, PointState.QUEUED]
+        assert [point.state for point in points(tmp_path)] == [JournalPointState.DONE, JournalPointState.QUEUED]
         assert log(tmp_path)[-1]["text"] == "c was stopped: enough"
 
 

@@ -14,7 +14,7 @@ from vibench.acquisition import (
     RecordingError,
     Verdict,
     check_and_keep,
-    last_result,
+    last_check,
     open_bench,
     open_recording,
     run_measurement,
@@ -97,7 +97,7 @@ def test_the_time_that_a_check_holds_is_the_rigs_to_say(rig, state_folder):
 def test_a_check_made_now_arms_and_stands_in_the_recording(real, tmp_path):
     bench, _ = real
     result = require_fresh(bench, tmp_path, CheckRule.NOW)
-    assert result == last_result(bench.rig.name)
+    assert result == last_check(bench.rig.name)
     run_measurement(bench, DWELL, tmp_path / "run.h5")
     with open_recording(tmp_path / "run.h5") as recording:
         assert recording.bench_check == json.loads(result.model_dump_json())
@@ -109,7 +109,7 @@ def test_a_check_made_now_that_fails_does_not_arm_and_is_kept(real, tmp_path):
     virtual.faults.turn_amplifier_gain(20.0)
     with pytest.raises(CheckFailed, match=r"did not pass its check.*amplifier gain is 20 "):
         require_fresh(bench, tmp_path, CheckRule.NOW)
-    assert last_result(bench.rig.name).verdict is Verdict.FAIL
+    assert last_check(bench.rig.name).verdict is Verdict.FAIL
     with pytest.raises(CheckFailed, match="did not pass"):
         require_fresh(bench, tmp_path)
 
@@ -155,15 +155,15 @@ class TestKeeping:
         other = rig.model_copy(update={"name": "another: rig/1"})
         kept_result(rig, 3.0)
         last, apart = kept_result(rig, 2.0), kept_result(other)
-        assert last_result(rig.name) == last
-        assert last_result(other.name) == apart
+        assert last_check(rig.name) == last
+        assert last_check(other.name) == apart
         assert len(list(state_folder.rglob("*"))) == 1 + 2
 
     @pytest.mark.parametrize("content", ["", "{", '{"rig": 3}', "\x00\xff"])
     def test_a_damaged_file_counts_as_no_check(self, rig, state_folder, content):
         kept_result(rig)
         archive_path(rig.name).write_bytes(content.encode("latin-1"))
-        assert last_result(rig.name) is None
+        assert last_check(rig.name) is None
 
     def test_a_folder_that_cannot_be_written_is_a_sentence(self, rig, state_folder):
         state_folder.write_text("a file in the way")

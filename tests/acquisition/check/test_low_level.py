@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import CheckFailed
-from vibench.acquisition.rig import Quantity, RigModel, Role, channels_of
+from vibench.acquisition.rig import BaseQuantity, RigModel, Role, channels_of
 from vibench.acquisition.run._low_level_check import judged
 
 RATE_HZ = 51_200.0
@@ -21,7 +21,7 @@ def check(rig):
     """Judge a quiet stretch of a tenth of a second before a sine that is as it should be."""
     channels = channels_of(rig)
     terminal_v = 0.5 * AMPLITUDE_VPP * rig.generator.terminal_factor()
-    accelerance = abs(complex(RigModel(rig).transfer(Quantity.ACCELERATION, 160.0)))
+    accelerance = abs(complex(RigModel(rig).transfer(BaseQuantity.ACCELERATION, 160.0)))
     peaks = {Role.DRIVE_VOLTAGE: terminal_v, Role.BASE_ACCELERATION: terminal_v * accelerance}
     heard = np.stack([sine(peaks.get(each.role, 0.0) / each.units_per_volt, 15_360) for each in channels])
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from vibench.acquisition.control import conduct
-from vibench.acquisition.control._control_action import Heard, Move
+from vibench.acquisition.control import feedback_controller
+from vibench.acquisition.control._control_action import PhaseSamples, ControlAction
 from vibench.acquisition.excitation import Tone
 from vibench.acquisition.plan import Measurement, RunState, needed_vpp
 from vibench.acquisition.rig import Rig, Role, channels_of
@@ -65,17 +65,17 @@ class Bench:
 
     def carry_out(self, measurement: Measurement) -> None:
         """Play what is conducted, as a run would, until its end."""
-        conductor = conduct(measurement, self.rig, channels_of(self.rig), RATE_HZ)
+        conductor = feedback_controller(measurement, self.rig, channels_of(self.rig), RATE_HZ)
         noise = np.random.default_rng(5)
         level = 0.0
         most_vpp = measurement.excitation.amplitude_vpp
         try:
-            move: Move = next(conductor)
+            move: ControlAction = next(conductor)
             while True:
                 self.notes += [(self.sample / RATE_HZ, note.kind, note.text) for note in move.notes]
                 phase = move.phase
                 if phase is None:
-                    move = conductor.send(Heard(0, np.empty((0, 0))))
+                    move = conductor.send(PhaseSamples(0, np.empty((0, 0))))
                     continue
                 begin, level = level, phase.end_level
                 first = self.sample
@@ -83,7 +83,7 @@ class Bench:
                 if phase.segment is not None and phase.state is RunState.RECORDING:
                     span = (first / RATE_HZ, self.sample / RATE_HZ)
                     self.segments.append((phase.segment.label, dict(phase.segment.numbers), *span))
-                move = conductor.send(Heard(first, volts))
+                move = conductor.send(PhaseSamples(first, volts))
         except StopIteration:
             pass
 

@@ -18,7 +18,7 @@ from vibench.acquisition.plan import (
 )
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import OutputUse, Role
-from vibench.acquisition.run._low_level_check import BenchCheck
+from vibench.acquisition.run._low_level_check import LowLevelCheck
 from vibench.acquisition.run._run import Run
 from vibench.acquisition.stopping import Cause, StopRequest
 
@@ -39,11 +39,11 @@ DWELL = Measurement(
 )
 
 
-def run_of(bench, tmp_path, measurement=DWELL, check=BenchCheck.AT_LOW_LEVEL):
+def run_of(bench, tmp_path, measurement=DWELL, check=LowLevelCheck.AT_LOW_LEVEL):
     return Run(bench, measurement, tmp_path / "run.h5", check, bench.recorder.create)
 
 
-@pytest.mark.parametrize("check", BenchCheck)
+@pytest.mark.parametrize("check", LowLevelCheck)
 def test_it_ends_silent_and_complete_with_its_level_in_the_recording(bench, tmp_path, check):
     states = {progress.state for progress in run_of(bench, tmp_path, check=check)}
     assert states >= {RunState.RAMPING_UP, RunState.SETTLING, RunState.RECORDING, RunState.RAMPING_DOWN}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.control._gain_estimator import GainTrack
+from vibench.acquisition.control._gain_estimator import GainEstimator
 
 STEP_S = 0.1
 
@@ -11,7 +11,7 @@ STEP_S = 0.1
 def tracked(gain_of, steps=60, memory_s=0.5, noise=0.0, seed=0):
     """Follow a gain with a setting that is foreseen; returns held over target at every step."""
     random = np.random.default_rng(seed)
-    track = GainTrack(memory_s)
+    track = GainEstimator(memory_s)
     achieved = []
     for step in range(steps):
         time_s = (step + 1) * STEP_S
@@ -49,7 +49,7 @@ def test_a_jump_is_forgotten_within_the_memory():
 
 
 def test_nothing_heard_is_nothing_known():
-    track = GainTrack(0.5)
+    track = GainEstimator(0.5)
     track.add(0.1, np.empty(0, np.complex128), 1.0, 1.0)
     assert not track.is_known
     assert track.gain_at(1.0) == track.level == 1.0

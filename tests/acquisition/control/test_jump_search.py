@@ -3,7 +3,7 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.control._jump_search import LocatedJump, Side, Visit, is_on_branch, located, side
+from vibench.acquisition.control._jump_search import LocatedJump, Side, SettledPoint, is_on_branch, located, side
 
 
 def found(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=0.4):
@@ -15,13 +15,13 @@ def found(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=0.4):
 
     asked = []
     search = located(
-        Visit(before_hz, response(before_hz)), Visit(after_hz, response(after_hz)), resolution_hz
+        SettledPoint(before_hz, response(before_hz)), SettledPoint(after_hz, response(after_hz)), resolution_hz
     )
     try:
         frequency_hz = next(search)
         while True:
             asked.append(frequency_hz)
-            frequency_hz = search.send(Visit(frequency_hz, response(frequency_hz)))
+            frequency_hz = search.send(SettledPoint(frequency_hz, response(frequency_hz)))
     except StopIteration as end:
         return end.value, asked
 
@@ -44,17 +44,17 @@ def test_a_bracket_that_is_narrow_enough_asks_for_nothing():
 
 @pytest.mark.parametrize(("response", "expected"), [(1.2, True), (1 / 1.2, True), (1.3, False), (0.6, False)])
 def test_half_the_factor_in_decibels_tells_two_branches_apart(response, expected):
-    assert is_on_branch(Visit(100, response), Visit(100, 1.0), factor=1.5) is expected
+    assert is_on_branch(SettledPoint(100, response), SettledPoint(100, 1.0), factor=1.5) is expected
 
 
 @pytest.mark.parametrize(
     ("response", "expected"), [(3.6, Side.BEFORE), (4.1, Side.BEFORE), (5.0, Side.AFTER), (1.6, Side.AFTER)]
 )
 def test_a_third_branch_lies_after_the_jump(response, expected):
-    assert side(Visit(177, response), Visit(175, 3.6), Visit(180, 5.4)) is expected
+    assert side(SettledPoint(177, response), SettledPoint(175, 3.6), SettledPoint(180, 5.4)) is expected
 
 
 def test_a_chaotic_motion_of_the_same_size_is_another_branch():
-    linear, chaotic = Visit(100, 1.0, period=1), Visit(100, 1.05, period=0)
+    linear, chaotic = SettledPoint(100, 1.0, period=1), SettledPoint(100, 1.05, period=0)
     assert not is_on_branch(chaotic, linear, factor=1.5)
-    assert is_on_branch(Visit(100, 1.4, period=0), chaotic, factor=1.5)
+    assert is_on_branch(SettledPoint(100, 1.4, period=0), chaotic, factor=1.5)

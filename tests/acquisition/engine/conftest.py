@@ -10,7 +10,7 @@ import pytest
 
 from vibench.acquisition import StopLevel
 from vibench.acquisition.engine import (
-    Attendance,
+    Supervision,
     EngineClient,
     EngineProcess,
     EngineState,
@@ -41,7 +41,7 @@ def shipped_rig() -> Rig:
 def engine() -> Iterator[Callable[..., EngineProcess]]:
     """Start engines; they are ended with the test."""
     with ExitStack() as running:
-        yield lambda attendance=Attendance.ATTENDED: running.enter_context(start_engine(attendance))
+        yield lambda attendance=Supervision.ATTENDED: running.enter_context(start_engine(attendance))
 
 
 @pytest.fixture(scope="module")

@@ -16,19 +16,19 @@ import pytest
 
 from vibench.acquisition import CheckRule, LimitExceeded, RecordingError, StopLevel, open_recording
 from vibench.acquisition.engine import (
-    Attendance,
+    Supervision,
     BenchLock,
     EngineClient,
     EngineGone,
     EngineState,
     MessageKind,
-    Orders,
+    CampaignRequest,
     start_engine,
 )
 from vibench.acquisition.engine._address import EngineAddress
 from vibench.acquisition.engine._errors import EngineError
 from vibench.acquisition.engine._requests import Look
-from vibench.acquisition.engine._state import Visit
+from vibench.acquisition.engine._state import ConnectionRole
 from vibench.acquisition.engine._wire import Message, send
 from vibench.acquisition.errors import InstrumentBusy
 from vibench.acquisition.recording import RecordingState
@@ -152,7 +152,7 @@ class TestACheckIsStopped:
     def test_and_the_campaign_that_asked_for_it_begins_nothing(self, client, shipped_rig, tmp_path):
         client.open(shipped_rig)
         until_state(client, EngineState.READY)
-        orders = Orders(campaign=campaign("run"), folder=tmp_path, check=CheckRule.NOW)
+        orders = CampaignRequest(campaign=campaign("run"), folder=tmp_path, check=CheckRule.NOW)
         client.arm_orders(orders)
         client.start()
         client.stop(StopLevel.RAMP, "not yet")
@@ -257,7 +257,7 @@ class TestNobodyLooks:
         until(client, lambda status: status.samples > before + 100_000)
 
     def test_a_frozen_viewer_does_not_hold_the_engine_up(self, engine, shipped_rig, tmp_path):
-        process = engine(Attendance.UNATTENDED)
+        process = engine(Supervision.UNATTENDED)
         client = process.client
         running(client, shipped_rig, tmp_path)
         with EngineClient.attach(process.address) as frozen:
@@ -268,7 +268,7 @@ class TestNobodyLooks:
             until(client, lambda status: status.samples > before + 500_000)
 
     def test_an_unattended_run_goes_on_alone(self, engine, shipped_rig, tmp_path):
-        process = engine(Attendance.UNATTENDED)
+        process = engine(Supervision.UNATTENDED)
         client = process.client
         client.open(shipped_rig)
         until_state(client, EngineState.READY)
@@ -322,7 +322,7 @@ class TestItsEnd:
             text=True,
         ) as engine:
             address = EngineAddress.model_validate_json(engine.stdout.readline())
-            with EngineClient.attach(address, Visit.ATTENDING) as viewer:
+            with EngineClient.attach(address, ConnectionRole.ATTENDING) as viewer:
                 asked_until_s = time.monotonic() + 2.0
                 until(viewer, lambda status: time.monotonic() > asked_until_s)
             assert engine.wait(20) == 0

@@ -2,7 +2,7 @@
 
 from threading import Event
 
-from vibench.acquisition.engine import DRIVING, EngineState, Pulse
+from vibench.acquisition.engine import DRIVING, EngineState, Heartbeat
 
 from .conftest import campaign, until, until_state
 
@@ -15,7 +15,7 @@ def test_a_pulse_keeps_a_run_going_that_nobody_else_asks_about(engine, shipped_r
     client.arm(campaign("beaten"), tmp_path)
     client.start()
     until(client, lambda status: status.samples > 0)
-    pulse = Pulse(process.address)
+    pulse = Heartbeat(process.address)
     clock = Event()
     for _ in range(40):
         pulse.beat()

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import Block
-from vibench.acquisition.campaign import CampaignItem, CampaignProgress, Item, Why
-from vibench.acquisition.engine import Attendance, BenchFacts
-from vibench.acquisition.engine._published_state import Shown
+from vibench.acquisition.campaign import PointResult, CampaignProgress, PointOutcome, ReasonCode
+from vibench.acquisition.engine import Supervision, BenchFacts
+from vibench.acquisition.engine._published_state import PublishedState
 from vibench.acquisition.engine._status import ChannelFacts
 from vibench.acquisition.plan import RunState
 from vibench.acquisition.run import Progress
@@ -27,7 +27,7 @@ def progress(path, first_sample, volts):
 
 @pytest.fixture
 def shown(tmp_path):
-    shown = Shown(Attendance.UNATTENDED)
+    shown = PublishedState(Supervision.UNATTENDED)
     shown.begin(campaign("point"), tmp_path)
     return shown
 
@@ -49,7 +49,7 @@ def test_the_rows_have_another_number_only_when_one_of_them_has_changed(shown, t
     running = shown.status().rows_number
     shown.tell(progress(tmp_path / "point.h5", 100, 1.0), BENCH)
     assert shown.status().rows_number == running
-    shown.item(CampaignItem("point", Item.RECORDED, tmp_path / "point.h5", "", next(iter(Why))))
+    shown.item(PointResult("point", PointOutcome.RECORDED, tmp_path / "point.h5", "", next(iter(ReasonCode))))
     assert shown.status().rows_number > running
     assert [row.state for row in shown.status().rows] == ["recorded"]
 
@@ -64,7 +64,7 @@ def test_a_folder_that_went_away_is_a_disk_without_room_and_ends_no_run(shown, t
 def test_what_an_earlier_run_has_made_counts_as_done(shown, tmp_path):
     twice = campaign("made", "point")
     shown.begin(twice, tmp_path)
-    shown.item(CampaignItem("made", Item.KEPT, tmp_path / "made.h5", "", next(iter(Why))))
+    shown.item(PointResult("made", PointOutcome.KEPT, tmp_path / "made.h5", "", next(iter(ReasonCode))))
     shown.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
     run = shown.status().run
     assert run.campaign_elapsed_s == pytest.approx(twice.duration_s / 2 + run.elapsed_s)

@@ -18,7 +18,7 @@ from vibench.acquisition.plan import (
     shortest_ramp_s,
 )
 from vibench.acquisition.plan._limits import limit_checks, limit_table
-from vibench.acquisition.rig import Quantity, RigModel
+from vibench.acquisition.rig import BaseQuantity, RigModel
 
 
 def plan(excitation, **fields):
@@ -27,7 +27,7 @@ def plan(excitation, **fields):
 
 def test_a_sine_s_loads_are_its_amplitude_times_the_model(rig):
     loads = predicted_loads(Dwell(amplitude_vpp=3.0, frequency_hz=260, duration_s=1), rig)
-    for quantity in Quantity:
+    for quantity in BaseQuantity:
         expected = 1.5 * rig.generator.terminal_factor() * abs(RigModel(rig).transfer(quantity, 260.0))
         assert loads[quantity].peak == pytest.approx(float(expected), rel=1e-12)
         assert loads[quantity].rms == pytest.approx(float(expected) / np.sqrt(2), rel=1e-12)
@@ -36,16 +36,16 @@ def test_a_sine_s_loads_are_its_amplitude_times_the_model(rig):
 def test_far_above_the_suspension_the_acceleration_is_force_over_mass(rig):
     loads = predicted_loads(Dwell(amplitude_vpp=1.0, frequency_hz=1500, duration_s=1), rig)
     mass = rig.shaker.moving_mass_kg + rig.shaker.fixture_mass_kg
-    assert loads[Quantity.ACCELERATION].peak == pytest.approx(loads[Quantity.FORCE].peak / mass, rel=1e-3)
+    assert loads[BaseQuantity.ACCELERATION].peak == pytest.approx(loads[BaseQuantity.FORCE].peak / mass, rel=1e-3)
 
 
 def test_a_sweep_is_judged_where_the_rig_answers_most(rig):
     sweep = SineSweep(amplitude_vpp=1, start_hz=10, stop_hz=100, duration_s=100)
     loads = predicted_loads(sweep, rig)
     grid_hz = np.linspace(10, 100, 20_000)
-    highest = np.max(np.abs(RigModel(rig).transfer(Quantity.STROKE, grid_hz)))
+    highest = np.max(np.abs(RigModel(rig).transfer(BaseQuantity.STROKE, grid_hz)))
     expected = 0.5 * rig.generator.terminal_factor() * highest
-    assert loads[Quantity.STROKE].peak == pytest.approx(expected, rel=1e-3)
+    assert loads[BaseQuantity.STROKE].peak == pytest.approx(expected, rel=1e-3)
 
 
 def test_a_waveform_s_peaks_are_those_of_an_integration_in_time(rig):
@@ -66,14 +66,14 @@ def test_a_waveform_s_peaks_are_those_of_an_integration_in_time(rig):
     voltage = terminal_v * rig.amplifier.gain
     _, _, states = lsim((space.A, space.B[:, :1], np.eye(3), np.zeros((3, 1))), voltage, time_s, interp=False)
     last = states[-len(held) // 3 :]
-    assert loads[Quantity.STROKE].peak == pytest.approx(np.max(np.abs(last[:, 0])), rel=0.02)
-    assert loads[Quantity.VELOCITY].peak == pytest.approx(np.max(np.abs(last[:, 1])), rel=0.02)
-    assert loads[Quantity.CURRENT].peak == pytest.approx(np.max(np.abs(last[:, 2])), rel=0.02)
+    assert loads[BaseQuantity.STROKE].peak == pytest.approx(np.max(np.abs(last[:, 0])), rel=0.02)
+    assert loads[BaseQuantity.VELOCITY].peak == pytest.approx(np.max(np.abs(last[:, 1])), rel=0.02)
+    assert loads[BaseQuantity.CURRENT].peak == pytest.approx(np.max(np.abs(last[:, 2])), rel=0.02)
 
 
 def test_streamed_noise_reaches_the_terminal_s_range_and_no_more(rig):
     noise = StreamedNoise(amplitude_vpp=2.0, band_start_hz=50, band_stop_hz=800, duration_s=1)
-    volts = predicted_loads(noise, rig)[Quantity.AMPLIFIER_VOLTAGE]
+    volts = predicted_loads(noise, rig)[BaseQuantity.AMPLIFIER_VOLTAGE]
     assert volts.peak == pytest.approx(rig.generator.terminal_factor() * rig.amplifier.gain, rel=2e-3)
     assert volts.rms == pytest.approx(volts.peak / 4.5)
 
@@ -87,15 +87,15 @@ def test_loads_grow_with_the_setting(factor):
     rig = load_rig(Path(__file__).parent.parent.parent.parent / "hardware_configs" / "virtual_rig.toml")
     one = predicted_loads(Dwell(amplitude_vpp=1.0, frequency_hz=50, duration_s=1), rig)
     more = predicted_loads(Dwell(amplitude_vpp=factor, frequency_hz=50, duration_s=1), rig)
-    for quantity in Quantity:
+    for quantity in BaseQuantity:
         assert more[quantity].peak == pytest.approx(factor * one[quantity].peak, rel=1e-12)
 
 
 def test_a_wrong_load_setting_doubles_every_load(rig):
     at_50_ohm = rig.model_copy(update={"generator": rig.generator.model_copy(update={"load_ohm": 50.0})})
     sine = Dwell(amplitude_vpp=1.0, frequency_hz=260, duration_s=1)
-    open_load = predicted_loads(sine, rig)[Quantity.FORCE].peak
-    assert predicted_loads(sine, at_50_ohm)[Quantity.FORCE].peak == pytest.approx(2 * open_load, rel=1e-12)
+    open_load = predicted_loads(sine, rig)[BaseQuantity.FORCE].peak
+    assert predicted_loads(sine, at_50_ohm)[BaseQuantity.FORCE].peak == pytest.approx(2 * open_load, rel=1e-12)
 
 
 def test_a_violation_names_quantity_value_limit_source_and_remedy(rig):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import load_campaign
-from vibench.acquisition.plan import excited_band_hz, outlook
+from vibench.acquisition.plan import excited_band_hz, preview_measurement
 from vibench.acquisition.plan._measurement_preview import MOST_SAMPLES, SPECTRUM_POINTS
 from vibench.acquisition.rig import load_rig
 
@@ -21,7 +21,7 @@ def rig():
 
 @pytest.mark.parametrize("name", QUICK)
 def test_peak_and_size_are_those_of_the_signal(rig, name):
-    seen = outlook(QUICK[name], rig)
+    seen = preview_measurement(QUICK[name], rig)
     assert seen.is_allowed
     assert float(np.max(np.abs(seen.volts))) == pytest.approx(seen.peak_v, rel=1e-6)
     assert seen.peak_v <= 0.5 * QUICK[name].excitation.amplitude_vpp * (1 + 1e-6)
@@ -30,7 +30,7 @@ def test_peak_and_size_are_those_of_the_signal(rig, name):
 
 
 def test_a_sine_is_one_line_at_its_place_and_height(rig):
-    seen = outlook(QUICK["dwell"], rig)
+    seen = preview_measurement(QUICK["dwell"], rig)
     highest = int(np.argmax(seen.spectrum_v))
     assert seen.spectrum_hz[highest] == pytest.approx(260, abs=0.5)
     assert seen.spectrum_v[highest] == pytest.approx(0.75, rel=0.02)
@@ -38,7 +38,7 @@ def test_a_sine_is_one_line_at_its_place_and_height(rig):
 
 def test_limits_come_with_the_most_used_first_and_a_broken_one_is_said(rig):
     excitation = QUICK["dwell"].excitation.model_copy(update={"amplitude_vpp": 15.0})
-    seen = outlook(QUICK["dwell"].model_copy(update={"excitation": excitation}), rig)
+    seen = preview_measurement(QUICK["dwell"].model_copy(update={"excitation": excitation}), rig)
     uses = [check.use for check in seen.checks]
     assert uses == sorted(uses, reverse=True)
     assert not seen.is_allowed
@@ -47,7 +47,7 @@ def test_limits_come_with_the_most_used_first_and_a_broken_one_is_said(rig):
 
 def test_a_long_sweep_is_shown_from_a_bounded_number_of_samples(rig):
     excitation = QUICK["sweep"].excitation.model_copy(update={"duration_s": 900.0})
-    seen = outlook(QUICK["sweep"].model_copy(update={"excitation": excitation}), rig)
+    seen = preview_measurement(QUICK["sweep"].model_copy(update={"excitation": excitation}), rig)
     assert len(seen.volts) <= 1.01 * MOST_SAMPLES
     assert seen.sample_rate_hz > 2 * 310
 

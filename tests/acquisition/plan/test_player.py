@@ -6,11 +6,11 @@ from vibench.acquisition.plan import (
     Dwell,
     Measurement,
     MultisineNoise,
-    Player,
+    DriveSource,
     SineSweep,
     SteppedSine,
     StreamedNoise,
-    player_of,
+    drive_source_of,
 )
 from vibench.acquisition.plan._limits import limit_checks
 from vibench.acquisition.rig import OutputConfig, OutputUse
@@ -30,24 +30,24 @@ def with_output(rig, plays):
 
 
 def player(excitation, rig):
-    return player_of(Measurement(name="m", excitation=excitation), rig)
+    return drive_source_of(Measurement(name="m", excitation=excitation), rig)
 
 
 @pytest.mark.parametrize("tone", TONES, ids=lambda tone: tone.kind)
 def test_a_sine_is_played_by_the_output_only_where_it_is_plugged_in_for_sines(rig, tone):
-    assert player(tone, rig) is Player.GENERATOR
-    assert player(tone, with_output(rig, OutputUse.STREAMS)) is Player.GENERATOR
-    assert player(tone, with_output(rig, OutputUse.TONES_AND_STREAMS)) is Player.OUTPUT
+    assert player(tone, rig) is DriveSource.GENERATOR
+    assert player(tone, with_output(rig, OutputUse.STREAMS)) is DriveSource.GENERATOR
+    assert player(tone, with_output(rig, OutputUse.TONES_AND_STREAMS)) is DriveSource.OUTPUT
 
 
 @pytest.mark.parametrize("plays", list(OutputUse))
 def test_a_stream_is_played_by_the_output_and_a_waveform_by_the_generator(rig, plays):
-    assert player(STREAM, with_output(rig, plays)) is Player.OUTPUT
-    assert player(WAVEFORM, with_output(rig, plays)) is Player.GENERATOR
+    assert player(STREAM, with_output(rig, plays)) is DriveSource.OUTPUT
+    assert player(WAVEFORM, with_output(rig, plays)) is DriveSource.GENERATOR
 
 
 def test_a_stream_needs_an_output_also_on_a_rig_without_one(rig):
-    assert player(STREAM, rig) is Player.OUTPUT
+    assert player(STREAM, rig) is DriveSource.OUTPUT
 
 
 def test_the_outputs_limit_counts_for_what_it_plays_and_for_nothing_else(rig):

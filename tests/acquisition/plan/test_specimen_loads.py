@@ -14,14 +14,14 @@ from vibench.acquisition.plan import (
 )
 from vibench.acquisition.plan._limits import limit_checks
 from vibench.acquisition.plan._specimen_loads import predicted_specimen_loads
-from vibench.acquisition.rig import Quantity, RigModel, specimen_of
-from vibench.sim import Harmonic, base_answer, base_transmissibility, steady_response
+from vibench.acquisition.rig import BaseQuantity, RigModel, specimen_of
+from vibench.sim import Harmonic, base_response, base_transmissibility, steady_response
 
 
 def base_m(rig, amplitude_vpp, frequency_hz):
     """Amplitude of the base at a sine's setting [m]."""
     terminal_v = 0.5 * amplitude_vpp * rig.generator.terminal_factor()
-    return terminal_v * abs(complex(RigModel(rig).transfer(Quantity.STROKE, frequency_hz)))
+    return terminal_v * abs(complex(RigModel(rig).transfer(BaseQuantity.STROKE, frequency_hz)))
 
 
 def test_a_sine_that_touches_no_stop_is_foretold_exactly(rig):
@@ -48,8 +48,8 @@ def test_noise_is_foretold_by_its_lines_free_while_weak_and_stuck_when_strong(ri
     more = {"duration_s": 1.0} if kind is StreamedNoise else {"repetition_hz": 1.0, "realisations": 1}
     weak, strong = (kind(amplitude_vpp=level, **band, **more) for level in (0.02, 10.0))
     hz = np.arange(50.0, 600.0, 0.25)
-    answer = base_answer(specimen_of(rig), hz)
-    base = RigModel(rig).transfer(Quantity.STROKE, hz)
+    answer = base_response(specimen_of(rig), hz)
+    base = RigModel(rig).transfer(BaseQuantity.STROKE, hz)
 
     def rms_m(noise, x_over_base):
         """Of noise that is as strong at every frequency of its band, through a linear specimen."""

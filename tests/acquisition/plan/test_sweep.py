@@ -4,7 +4,7 @@ import pytest
 
 from vibench.acquisition import ConfigurationError, load_campaign, toml_text, validated
 from vibench.acquisition.plan import Campaign, RunState, phases, predicted_loads, require_within_limits
-from vibench.acquisition.rig import Quantity
+from vibench.acquisition.rig import BaseQuantity
 
 DWELL = {"kind": "dwell", "settle_s": 1.0, "duration_s": 2.0}
 
@@ -156,8 +156,8 @@ class TestChains:
         playing = [phase.play.level for phase in phases(last) if phase.state is RunState.RECORDING]
         assert playing == [4.0, 2.0, 1.0]
         alone = plan.points()[0].measurement.excitation
-        peak = predicted_loads(last.excitation, rig)[Quantity.ACCELERATION].peak
-        assert peak == pytest.approx(predicted_loads(alone, rig)[Quantity.ACCELERATION].peak)
+        peak = predicted_loads(last.excitation, rig)[BaseQuantity.ACCELERATION].peak
+        assert peak == pytest.approx(predicted_loads(alone, rig)[BaseQuantity.ACCELERATION].peak)
         require_within_limits(last, rig)
 
     def test_a_chain_comes_back_from_its_toml_text_as_it_was(self, tmp_path):

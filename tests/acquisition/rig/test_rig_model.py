@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.rig import Quantity, RigModel, load_rig, suspended_mass_kg
+from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig, suspended_mass_kg
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 MODEL = RigModel(RIG)
@@ -25,28 +25,28 @@ def test_a_direct_coupled_amplifier_holds_the_table_at_its_static_deflection():
     shaker, gain = RIG.shaker, RIG.amplifier.gain
     current = gain / shaker.coil_resistance_ohm
     deflection = shaker.force_constant_n_per_a * current / shaker.suspension_stiffness_n_per_m
-    assert model.transfer(Quantity.CURRENT, 0.0) == pytest.approx(current)
-    assert model.transfer(Quantity.STROKE, 0.0) == pytest.approx(deflection)
-    assert model.transfer(Quantity.VELOCITY, 0.0) == 0
+    assert model.transfer(BaseQuantity.CURRENT, 0.0) == pytest.approx(current)
+    assert model.transfer(BaseQuantity.STROKE, 0.0) == pytest.approx(deflection)
+    assert model.transfer(BaseQuantity.VELOCITY, 0.0) == 0
 
 
 def test_an_amplifier_with_a_lower_band_edge_passes_no_direct_voltage():
     model = with_amplifier(low_cut_hz=0.3)
-    assert model.transfer(Quantity.AMPLIFIER_VOLTAGE, 0.0) == 0
+    assert model.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, 0.0) == 0
 
 
 def test_the_amplifier_is_down_by_the_root_of_two_at_its_band_edges():
     model = with_amplifier(low_cut_hz=0.3, high_cut_hz=30e3)
-    edges = np.abs(model.transfer(Quantity.AMPLIFIER_VOLTAGE, [0.3, 30e3]))
+    edges = np.abs(model.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, [0.3, 30e3]))
     assert edges == pytest.approx(RIG.amplifier.gain / np.sqrt(2), rel=1e-4)
-    middle = abs(model.transfer(Quantity.AMPLIFIER_VOLTAGE, 95.0))
+    middle = abs(model.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, 95.0))
     assert middle == pytest.approx(RIG.amplifier.gain, rel=1e-4)
 
 
 def test_force_over_acceleration_tends_to_the_suspended_mass():
     frequency_hz = 5000.0
-    force = MODEL.transfer(Quantity.FORCE, frequency_hz)
-    acceleration = MODEL.transfer(Quantity.ACCELERATION, frequency_hz)
+    force = MODEL.transfer(BaseQuantity.FORCE, frequency_hz)
+    acceleration = MODEL.transfer(BaseQuantity.ACCELERATION, frequency_hz)
     assert abs(force / acceleration) == pytest.approx(suspended_mass_kg(RIG.shaker), rel=1e-3)
 
 
@@ -55,7 +55,7 @@ def test_the_undamped_unpowered_table_resonates_where_stiffness_and_mass_say():
     resonance_hz = np.sqrt(shaker.suspension_stiffness_n_per_m / suspended_mass_kg(shaker)) / (2 * np.pi)
     model = with_shaker(force_constant_n_per_a=1e-6, suspension_damping_ns_per_m=0.1)
     frequency_hz = np.linspace(0.8, 1.2, 4001) * resonance_hz
-    stroke = np.abs(model.transfer(Quantity.STROKE, frequency_hz))
+    stroke = np.abs(model.transfer(BaseQuantity.STROKE, frequency_hz))
     assert frequency_hz[np.argmax(stroke)] == pytest.approx(resonance_hz, rel=2e-4)
 
 
@@ -63,8 +63,8 @@ def test_the_moving_coil_damps_the_table_by_its_back_emf():
     shaker = RIG.shaker
     resonance_hz = np.sqrt(shaker.suspension_stiffness_n_per_m / suspended_mass_kg(shaker)) / (2 * np.pi)
     model = with_shaker(coil_inductance_h=1e-12)
-    velocity = abs(model.transfer(Quantity.VELOCITY, resonance_hz))
-    voltage = abs(model.transfer(Quantity.AMPLIFIER_VOLTAGE, resonance_hz))
+    velocity = abs(model.transfer(BaseQuantity.VELOCITY, resonance_hz))
+    voltage = abs(model.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, resonance_hz))
     force_constant, resistance = shaker.force_constant_n_per_a, shaker.coil_resistance_ohm
     damping = shaker.suspension_damping_ns_per_m + force_constant**2 / resistance
     assert velocity == pytest.approx(voltage * force_constant / resistance / damping, rel=1e-6)
@@ -73,19 +73,19 @@ def test_the_moving_coil_damps_the_table_by_its_back_emf():
 @given(st.floats(0.5, 20e3))
 def test_velocity_and_acceleration_are_derivatives_of_the_stroke(frequency_hz):
     s = 2j * np.pi * frequency_hz
-    stroke = complex(MODEL.transfer(Quantity.STROKE, frequency_hz))
-    assert complex(MODEL.transfer(Quantity.VELOCITY, frequency_hz)) == pytest.approx(s * stroke)
-    assert complex(MODEL.transfer(Quantity.ACCELERATION, frequency_hz)) == pytest.approx(s**2 * stroke)
+    stroke = complex(MODEL.transfer(BaseQuantity.STROKE, frequency_hz))
+    assert complex(MODEL.transfer(BaseQuantity.VELOCITY, frequency_hz)) == pytest.approx(s * stroke)
+    assert complex(MODEL.transfer(BaseQuantity.ACCELERATION, frequency_hz)) == pytest.approx(s**2 * stroke)
 
 
 @given(st.floats(0.5, 20e3))
 def test_the_state_equations_and_the_transfer_are_the_same_system(frequency_hz):
     equations = MODEL.shaker_equations()
     s = 2j * np.pi * frequency_hz
-    voltage = complex(MODEL.transfer(Quantity.AMPLIFIER_VOLTAGE, frequency_hz))
+    voltage = complex(MODEL.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, frequency_hz))
     state = np.linalg.solve(s * np.eye(3) - equations.A, equations.B[:, 0]) * voltage
     expected = [
-        MODEL.transfer(q, frequency_hz) for q in (Quantity.STROKE, Quantity.VELOCITY, Quantity.CURRENT)
+        MODEL.transfer(q, frequency_hz) for q in (BaseQuantity.STROKE, BaseQuantity.VELOCITY, BaseQuantity.CURRENT)
     ]
     assert state == pytest.approx(np.array(expected), rel=1e-9)
 
@@ -96,7 +96,7 @@ def test_electrical_power_in_is_heat_and_friction(frequency_hz):
     shaker = RIG.shaker
     voltage, current, velocity = (
         complex(MODEL.transfer(q, frequency_hz))
-        for q in (Quantity.AMPLIFIER_VOLTAGE, Quantity.CURRENT, Quantity.VELOCITY)
+        for q in (BaseQuantity.AMPLIFIER_VOLTAGE, BaseQuantity.CURRENT, BaseQuantity.VELOCITY)
     )
     delivered = 0.5 * (voltage * current.conjugate()).real
     heat = 0.5 * shaker.coil_resistance_ohm * abs(current) ** 2
@@ -106,5 +106,5 @@ def test_electrical_power_in_is_heat_and_friction(frequency_hz):
 
 def test_an_array_of_frequencies_keeps_its_shape():
     frequency_hz = np.geomspace(1, 1000, 12).reshape(3, 4)
-    for quantity in Quantity:
+    for quantity in BaseQuantity:
         assert MODEL.transfer(quantity, frequency_hz).shape == (3, 4)

@@ -10,7 +10,7 @@ import pytest
 from vibench.acquisition import Block, LimitExceeded, Overload
 from vibench.acquisition.plan import Dwell, InRunLimits, Measurement, OnOverload
 from vibench.acquisition.rig import Role, channels_of
-from vibench.acquisition.run._limit_monitor import Guard
+from vibench.acquisition.run._limit_monitor import LimitMonitor
 from vibench.acquisition.run._run import Run
 
 RATE_HZ = 51_200.0
@@ -18,7 +18,7 @@ BLOCK = 5120
 
 
 def guard_of(rig, **limits):
-    return Guard(rig, channels_of(rig), InRunLimits(**limits), RATE_HZ)
+    return LimitMonitor(rig, channels_of(rig), InRunLimits(**limits), RATE_HZ)
 
 
 def sine_blocks(rig, frequency_hz, duration_s=3.0, **peaks):

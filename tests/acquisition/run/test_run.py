@@ -31,7 +31,7 @@ from vibench.acquisition.plan import (
     shortest_ramp_s,
 )
 from vibench.acquisition.recording import RecordingState
-from vibench.acquisition.run._low_level_check import BenchCheck, sine_amplitude
+from vibench.acquisition.run._low_level_check import LowLevelCheck, sine_amplitude
 from vibench.acquisition.run._phase_runner import HOLD_LONGEST_S
 from vibench.acquisition.run._run import Run
 from vibench.acquisition.stopping import Cause, StopRequest
@@ -55,7 +55,7 @@ RECORDED_STATES = [
 every_state = pytest.mark.parametrize("state", RECORDED_STATES)
 
 
-def run_of(bench, tmp_path, measurement=DWELL, check=BenchCheck.AT_LOW_LEVEL):
+def run_of(bench, tmp_path, measurement=DWELL, check=LowLevelCheck.AT_LOW_LEVEL):
     return Run(bench, measurement, tmp_path / "run.h5", check, bench.recorder.create)
 
 
@@ -149,7 +149,7 @@ class TestThePlanIsCarriedOut:
         assert at_start == [pytest.approx(0.02 * AMPLITUDE_VPP), pytest.approx(2.5e-3)]
 
     def test_a_checked_bench_is_not_checked_again(self, bench, tmp_path):
-        play(run_of(bench, tmp_path, check=BenchCheck.RECENTLY_PASSED))
+        play(run_of(bench, tmp_path, check=LowLevelCheck.RECENTLY_PASSED))
         assert [each["label"] for each in bench.recorder.segments] == ["ramp_up", "dwell", "ramp_down"]
         events = [event[1:] for event in bench.recorder.events]
         assert ("check", "left out: the bench was checked shortly before") in events

@@ -16,7 +16,7 @@ from vibench.acquisition import (
     run_campaign,
     run_measurement,
 )
-from vibench.acquisition.campaign import Item
+from vibench.acquisition.campaign import PointOutcome
 from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, RunState, SineSweep
 from vibench.acquisition.plan._specimen_loads import predicted_specimen_loads
 from vibench.acquisition.recording import RecordingState
@@ -105,7 +105,7 @@ def test_a_sweep_arrives_with_the_cycles_of_the_ideal_one(virtual_bench, tmp_pat
 
 def test_the_quick_campaign_is_recorded_without_an_overload(virtual_bench, tmp_path):
     items = run_campaign(virtual_bench, load_campaign(ROOT / "campaigns" / "quick.toml"), tmp_path)
-    assert [item.result for item in items] == [Item.RECORDED] * 15
+    assert [item.result for item in items] == [PointOutcome.RECORDED] * 15
     for item in items:
         with open_recording(item.path) as recording:
             assert recording.state is RecordingState.COMPLETE

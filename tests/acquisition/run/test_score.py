@@ -8,7 +8,7 @@ from vibench.acquisition import ConfigurationError
 from vibench.acquisition.excitation import Stream, Tone, Waveform
 from vibench.acquisition.excitation._streamed_noise import GaussianBand
 from vibench.acquisition.plan import Phase, RunState
-from vibench.acquisition.run._stream_drive import RELEASE_S, Score
+from vibench.acquisition.run._stream_drive import RELEASE_S, OutputSynthesizer
 
 RATE_HZ = 5120.0
 NOISE = Stream(GaussianBand(50.0, 600.0, seed=3))
@@ -27,7 +27,7 @@ def half_cosine(samples):
 
 
 def test_a_stream_is_its_source_times_a_half_cosine_envelope_sample_by_sample():
-    score = Score(RATE_HZ)
+    score = OutputSynthesizer(RATE_HZ)
     score.append(ramped(NOISE))
     envelope = np.concatenate([half_cosine(512), np.ones(1536), 1 - half_cosine(512), np.zeros(100)])
     expected = NOISE.source.samples(0, 2660, RATE_HZ) * envelope
@@ -37,7 +37,7 @@ def test_a_stream_is_its_source_times_a_half_cosine_envelope_sample_by_sample():
 
 @given(cuts=st.lists(st.integers(1, 700), max_size=20))
 def test_the_samples_do_not_depend_on_how_many_are_taken_at_once(cuts):
-    whole, pieces = Score(RATE_HZ), Score(RATE_HZ)
+    whole, pieces = OutputSynthesizer(RATE_HZ), OutputSynthesizer(RATE_HZ)
     for score in (whole, pieces):
         score.append([*ramped(Tone(123.4)), *ramped(NOISE)])
     taken = np.concatenate([np.empty(0), *(pieces.take(count) for count in cuts)])
@@ -49,7 +49,7 @@ def test_the_samples_do_not_depend_on_how_many_are_taken_at_once(cuts):
     hold_s=st.floats(0.001, 0.2),
 )
 def test_a_tone_whose_frequency_changes_never_jumps(frequencies, hold_s):
-    score = Score(RATE_HZ)
+    score = OutputSynthesizer(RATE_HZ)
     tones = [Tone(each) for each in frequencies]
     score.append(
         [
@@ -66,7 +66,7 @@ def test_a_tone_whose_frequency_changes_never_jumps(frequencies, hold_s):
 
 @given(durations=st.lists(st.floats(1e-5, 0.05), min_size=1, max_size=40))
 def test_boundaries_lie_at_the_samples_nearest_to_the_sums_of_all_durations(durations):
-    score = Score(RATE_HZ)
+    score = OutputSynthesizer(RATE_HZ)
     levels = [1.0 if number % 2 else 0.5 for number in range(len(durations))]
     phases = [
         Phase(RunState.RECORDING, Tone(RATE_HZ / 4, level), duration)
@@ -82,7 +82,7 @@ def test_boundaries_lie_at_the_samples_nearest_to_the_sums_of_all_durations(dura
 
 
 def test_what_sounds_at_the_end_is_released_without_a_step():
-    score = Score(RATE_HZ)
+    score = OutputSynthesizer(RATE_HZ)
     score.append([Phase(RunState.CHECKING, Tone(160.0), 0.2), Phase(RunState.CHECKING, Tone(160.0), 0.3)])
     volts = score.take(round(RATE_HZ))
     release = round(RELEASE_S * RATE_HZ)
@@ -93,7 +93,7 @@ def test_what_sounds_at_the_end_is_released_without_a_step():
 
 
 def test_what_is_appended_after_the_end_begins_with_the_next_sample():
-    score = Score(RATE_HZ)
+    score = OutputSynthesizer(RATE_HZ)
     score.append(ramped(NOISE))
     score.take(4321)
     score.append(ramped(Tone(100.0)))
@@ -103,7 +103,7 @@ def test_what_is_appended_after_the_end_begins_with_the_next_sample():
 
 @pytest.mark.parametrize("taken", [0, 1, 300, 1000, 2300, 2600])
 def test_a_fade_begins_at_the_level_of_now_and_ends_in_silence(taken):
-    score = Score(RATE_HZ)
+    score = OutputSynthesizer(RATE_HZ)
     score.append(ramped(NOISE))
     score.take(taken)
     level = score.level
@@ -116,7 +116,7 @@ def test_a_fade_begins_at_the_level_of_now_and_ends_in_silence(taken):
 
 
 def test_a_waveform_is_for_the_generator():
-    score = Score(RATE_HZ)
+    score = OutputSynthesizer(RATE_HZ)
     score.append(ramped(Waveform(np.array([0.0, 1.0]), 1.0)))
     with pytest.raises(ConfigurationError, match="play it by the function generator"):
         score.take(10)

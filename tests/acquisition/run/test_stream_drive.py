@@ -15,7 +15,7 @@ from vibench.acquisition.plan import (
     shortest_ramp_s,
 )
 from vibench.acquisition.recording import RecordingState
-from vibench.acquisition.run._low_level_check import BenchCheck
+from vibench.acquisition.run._low_level_check import LowLevelCheck
 from vibench.acquisition.run._run import Run
 from vibench.acquisition.stopping import Cause, StopRequest
 
@@ -35,7 +35,7 @@ every_state = pytest.mark.parametrize("state", [RunState.CHECKING, *HEARD_STATES
 heard_state = pytest.mark.parametrize("state", HEARD_STATES)
 
 
-def run_of(bench, tmp_path, measurement=NOISE, check=BenchCheck.AT_LOW_LEVEL):
+def run_of(bench, tmp_path, measurement=NOISE, check=LowLevelCheck.AT_LOW_LEVEL):
     return Run(bench, measurement, tmp_path / "run.h5", check, bench.recorder.create)
 
 
@@ -94,22 +94,22 @@ def assert_faded_without_a_step(bench, ramp=RAMP):
 
 
 class TestThePlanIsCarriedOut:
-    @pytest.mark.parametrize("check", list(BenchCheck))
+    @pytest.mark.parametrize("check", list(LowLevelCheck))
     def test_the_drive_is_the_planned_noise_under_half_cosines_sample_by_sample(
         self, streaming_bench, tmp_path, check
     ):
         play(run_of(streaming_bench, tmp_path, check=check))
-        begin = round(CHECK_S * RATE) + AHEAD if check is BenchCheck.AT_LOW_LEVEL else 0
+        begin = round(CHECK_S * RATE) + AHEAD if check is LowLevelCheck.AT_LOW_LEVEL else 0
         hold = round(1.35 * RATE)
         level = np.concatenate([half_cosine(RAMP), np.ones(hold), 1 - half_cosine(RAMP)])
         np.testing.assert_allclose(
             drive(streaming_bench)[begin:], level * planned(streaming_bench, level.size), atol=1e-12
         )
 
-    @pytest.mark.parametrize("check", list(BenchCheck))
+    @pytest.mark.parametrize("check", list(LowLevelCheck))
     def test_every_stretch_lies_where_it_is_heard(self, streaming_bench, tmp_path, check):
         play(run_of(streaming_bench, tmp_path, check=check))
-        begin = round(CHECK_S * RATE) + AHEAD if check is BenchCheck.AT_LOW_LEVEL else 0
+        begin = round(CHECK_S * RATE) + AHEAD if check is LowLevelCheck.AT_LOW_LEVEL else 0
         found = {
             each["label"]: (each["first"], each["last"] + 1) for each in streaming_bench.recorder.segments
         }
@@ -122,7 +122,7 @@ class TestThePlanIsCarriedOut:
             "ramp_down": (end, end + RAMP),
         }
 
-    @pytest.mark.parametrize("check", list(BenchCheck))
+    @pytest.mark.parametrize("check", list(LowLevelCheck))
     def test_the_length_is_known_beforehand(self, streaming_bench, tmp_path, check):
         shown = play(run_of(streaming_bench, tmp_path, check=check))
         assert shown[-1].elapsed_s == pytest.approx(shown[-1].total_s)

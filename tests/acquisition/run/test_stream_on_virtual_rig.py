@@ -12,7 +12,7 @@ from vibench.acquisition.excitation._sine_sweep import Hold
 from vibench.acquisition.plan import Measurement, RunState, SineSweep, StreamedNoise
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import OutputUse, load_rig
-from vibench.acquisition.run._low_level_check import BenchCheck
+from vibench.acquisition.run._low_level_check import LowLevelCheck
 from vibench.virtual_rig.world._decimation import GROUP_DELAY_SAMPLES
 
 STREAMING = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig_streaming.toml"
@@ -158,7 +158,7 @@ def test_two_runs_of_one_plan_play_the_same_and_another_seed_plays_another(tmp_p
     with open_bench(RIG) as bench:
         for number, plan in enumerate(short):
             path = tmp_path / f"{number}.h5"
-            run_measurement(bench, plan, path, BenchCheck.RECENTLY_PASSED)
+            run_measurement(bench, plan, path, LowLevelCheck.RECENTLY_PASSED)
             with open_recording(path) as recording:
                 drives.append(recording.read("drive_voltage"))
     first, again, another = drives
@@ -174,7 +174,7 @@ def test_a_sweep_is_streamed_without_a_break_in_phase_or_amplitude(tmp_path):
     output = RIG.daq.output.model_copy(update={"plays": OutputUse.TONES_AND_STREAMS})
     plan = PLAN.model_copy(update={"excitation": sweep})
     with open_bench(RIG.model_copy(update={"daq": RIG.daq.model_copy(update={"output": output})})) as bench:
-        run_measurement(bench, plan, tmp_path / "run.h5", BenchCheck.RECENTLY_PASSED)
+        run_measurement(bench, plan, tmp_path / "run.h5", LowLevelCheck.RECENTLY_PASSED)
     with open_recording(tmp_path / "run.h5") as recording:
         drive = recording.read("drive_voltage")
         (swept,) = [each for each in recording.segments if each.label == "sweep"]

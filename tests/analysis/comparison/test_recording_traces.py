@@ -5,24 +5,24 @@ import pytest
 
 from vibench.analysis import (
     Estimator,
-    NoiseRequest,
+    FrequencyResponseRequest,
     NotEnoughData,
-    Origin,
-    Response,
+    CurveOrigin,
+    CurveKind,
     Simulation,
-    compared_recording,
+    compare_recording,
 )
 from vibench.analysis.results import kept_result
 
 
 @pytest.fixture(scope="module")
 def compared(streamed_file):
-    return compared_recording(streamed_file(), NoiseRequest(), Simulation.LEFT_OUT)
+    return compare_recording(streamed_file(), FrequencyResponseRequest(), Simulation.LEFT_OUT)
 
 
 def test_a_transmission_crosses_to_another_process_with_its_spread(compared):
     (trace,) = pickle.loads(pickle.dumps(compared)).traces
-    assert (trace.origin, trace.response) == (Origin.MEASURED, Response.TRANSMISSION)
+    assert (trace.origin, trace.response) == (CurveOrigin.MEASURED, CurveKind.TRANSMISSION)
     assert np.median(trace.magnitude) == pytest.approx(2.0, rel=0.01)
     assert trace.name == "streamed, transmission, measured"
     assert (trace.lower < trace.magnitude).all()
@@ -36,12 +36,12 @@ def test_the_whole_result_is_kept_for_reports(compared):
 
 
 def test_what_is_asked_for_is_what_is_estimated(streamed_file):
-    found = compared_recording(
-        streamed_file(), NoiseRequest(estimator=Estimator.H1, averages=10), Simulation.LEFT_OUT
+    found = compare_recording(
+        streamed_file(), FrequencyResponseRequest(estimator=Estimator.H1, averages=10), Simulation.LEFT_OUT
     )
     assert found.traces[0].note.startswith("h1, ")
 
 
 def test_a_recording_that_ended_too_early_says_so(streamed_file):
     with pytest.raises(NotEnoughData, match="streamed"):
-        compared_recording(streamed_file(samples=10), NoiseRequest(), Simulation.LEFT_OUT)
+        compare_recording(streamed_file(samples=10), FrequencyResponseRequest(), Simulation.LEFT_OUT)

@@ -5,24 +5,24 @@ import re
 import numpy as np
 import pytest
 
-from vibench.analysis import NotEnoughData, Origin, Response, Trace, trace_difference, trace_peaks
-from vibench.analysis.comparison import sorted_trace
+from vibench.analysis import NotEnoughData, CurveOrigin, CurveKind, Curve, curve_difference, curve_peaks
+from vibench.analysis.comparison import sorted_curve
 from vibench.analysis.figures import comparison_figure
 from vibench.analysis.report import ImageKind
 
 MODE_HZ, DAMPING = 266.0, 0.01
 
 
-def mode(frequency_hz, scale=1.0, source="run", sd=0.01, origin=Origin.MEASURED):
+def mode(frequency_hz, scale=1.0, source="run", sd=0.01, origin=CurveOrigin.MEASURED):
     r = frequency_hz / MODE_HZ
     magnitude = scale * np.abs((1 + 2j * DAMPING * r) / (1 - r**2 + 2j * DAMPING * r))
-    return Trace(
-        source, origin, Response.TRANSMISSION, frequency_hz, magnitude, np.full(frequency_hz.shape, sd), "n"
+    return Curve(
+        source, origin, CurveKind.TRANSMISSION, frequency_hz, magnitude, np.full(frequency_hz.shape, sd), "n"
     )
 
 
 def test_a_peak_is_placed_between_the_points_with_its_width():
-    (peak,) = trace_peaks(mode(np.arange(50.0, 600.0, 0.7)))
+    (peak,) = curve_peaks(mode(np.arange(50.0, 600.0, 0.7)))
     assert peak.frequency_hz == pytest.approx(MODE_HZ * np.sqrt(1 - DAMPING**2), abs=0.1)
     assert peak.magnitude == pytest.approx(50.0, rel=0.01)
     assert peak.damping_ratio == pytest.approx(DAMPING, rel=0.05)
@@ -32,15 +32,15 @@ def test_noise_that_its_own_spread_explains_is_no_peak():
     rng = np.random.default_rng(1)
     frequency_hz = np.arange(50.0, 600.0)
     values = np.exp(0.3 * rng.standard_normal(frequency_hz.size))
-    flat = Trace(
-        "n", Origin.MEASURED, Response.TRANSMISSION, frequency_hz, values, np.full(values.shape, 0.3)
+    flat = Curve(
+        "n", CurveOrigin.MEASURED, CurveKind.TRANSMISSION, frequency_hz, values, np.full(values.shape, 0.3)
     )
-    assert trace_peaks(flat) == ()
+    assert curve_peaks(flat) == ()
 
 
 def test_half_the_height_lies_six_decibels_below_at_any_frequencies():
     upper, lower = mode(np.arange(100.0, 400.0, 1.0)), mode(np.arange(150.3, 500.0, 0.9), 0.5)
-    found = trace_difference(upper, lower)
+    found = curve_difference(upper, lower)
     assert found.frequency_hz[0] == 151.0
     assert found.frequency_hz[-1] == 399.0
     assert np.allclose(found.decibel, 6.0206, atol=0.25)
@@ -51,7 +51,7 @@ def test_half_the_height_lies_six_decibels_below_at_any_frequencies():
 
 def test_curves_without_a_common_frequency_have_no_difference():
     with pytest.raises(NotEnoughData, match="no frequency in common"):
-        trace_difference(mode(np.arange(10.0, 20.0)), mode(np.arange(30.0, 40.0)))
+        curve_difference(mode(np.arange(10.0, 20.0)), mode(np.arange(30.0, 40.0)))
 
 
 def test_a_curve_is_read_between_its_points_and_nowhere_else():
@@ -64,7 +64,7 @@ def test_a_curve_is_read_between_its_points_and_nowhere_else():
 
 def test_a_sweep_downwards_is_turned_round():
     frequency_hz = np.array([300.0, 200.0, 200.0, 100.0])
-    turned = sorted_trace(mode(frequency_hz))
+    turned = sorted_curve(mode(frequency_hz))
     assert np.array_equal(turned.frequency_hz, [100.0, 200.0, 300.0])
     assert turned.magnitude[2] == mode(frequency_hz).magnitude[0]
 
@@ -72,10 +72,10 @@ def test_a_sweep_downwards_is_turned_round():
 def test_a_known_point_of_the_exported_svg_lies_where_it_belongs(tmp_path):
     """The corner of a curve of three points, measured against the ends of the same curve."""
     frequency_hz = np.array([100.0, 300.0, 900.0])
-    curve = Trace(
+    curve = Curve(
         "corner",
-        Origin.MEASURED,
-        Response.RESPONSE_I,
+        CurveOrigin.MEASURED,
+        CurveKind.RESPONSE_I,
         frequency_hz,
         np.array([1.0, 100.0, 10.0]),
         np.full(3, np.nan),

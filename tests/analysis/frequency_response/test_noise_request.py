@@ -9,7 +9,7 @@ from vibench.analysis import (
     Estimator,
     InvalidRequest,
     MagnitudeScale,
-    NoiseRequest,
+    FrequencyResponseRequest,
     NotEnoughData,
     Window,
     analyse_recording,
@@ -23,7 +23,7 @@ RATE = 6400.0
 
 def response(path, **asked):
     with open_recording(path) as recording:
-        return analyse_recording(recording, NoiseRequest(**asked)).response
+        return analyse_recording(recording, FrequencyResponseRequest(**asked)).response
 
 
 def test_streamed_noise_gives_the_exact_ratio_by_every_estimator(streamed_file):
@@ -124,7 +124,7 @@ def test_noise_that_repeats_takes_an_estimator_and_refuses_segments(noise_file):
 )
 def test_a_request_without_meaning_says_what_is_allowed(asked, said):
     with pytest.raises(InvalidRequest, match=said):
-        NoiseRequest(**asked)
+        FrequencyResponseRequest(**asked)
 
 
 def test_a_resolution_that_the_record_cannot_give_is_refused_with_its_length(streamed_file):

@@ -7,7 +7,7 @@ import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, StreamedNoise
-from vibench.acquisition.run._low_level_check import BenchCheck
+from vibench.acquisition.run._low_level_check import LowLevelCheck
 from vibench.analysis import NotEnoughData
 from vibench.analysis.frequency_response import noise_response
 from vibench.analysis.recordings import RecordedChannels
@@ -42,7 +42,7 @@ def responses(tmp_path_factory):
             plan = Measurement(
                 name="noise", excitation=noise(level, duration_s), ramp_s=0.3, ramp_step_s=0.03
             )
-            run_measurement(bench, plan, path, BenchCheck.RECENTLY_PASSED)
+            run_measurement(bench, plan, path, LowLevelCheck.RECENTLY_PASSED)
             with open_recording(path) as recording:
                 found[level] = noise_response(RecordedChannels(recording), plan.excitation)
     return found

@@ -9,7 +9,7 @@ from vibench.analysis.errors import UnusableData
 from vibench.analysis.frequency_response._periodic_transmission import (
     PeriodicSums,
     Scatter,
-    periodic_transmission,
+    periodic_frequency_response,
 )
 
 RATE = 5120.0
@@ -49,7 +49,7 @@ def test_lines_are_exact_whatever_the_clocks_and_however_fractional_the_period(o
     rng = np.random.default_rng(1)
     samples = int(np.ceil(periods * period))
     drive, response = linear_realisation(rng, orders, true_period, samples)
-    result = periodic_transmission([(drive, drive, response)], RATE, repetition_hz=RATE / period)
+    result = periodic_frequency_response([(drive, drive, response)], RATE, repetition_hz=RATE / period)
     exact = resonator(orders * RATE / true_period)
     np.testing.assert_allclose(result.transmission.frequency_hz, orders * RATE / true_period, rtol=1e-10)
     assert np.max(np.abs(result.transmission.value / exact - 1)) < 1e-6
@@ -86,19 +86,19 @@ def test_images_of_a_held_waveform_neither_mislead_the_clock_nor_enter_the_band(
     band, image = np.arange(20, 600, 19), 8192 - np.arange(20, 600, 19)
     drive = multisine(band, rng.uniform(0, 6, band.size), period, 102_400)
     drive += 0.3 * multisine(image, rng.uniform(0, 6, image.size), period, 102_400)
-    result = periodic_transmission([(drive, drive, drive)], 51200.0, repetition_hz=1.0, band_hz=(20, 600))
+    result = periodic_frequency_response([(drive, drive, drive)], 51200.0, repetition_hz=1.0, band_hz=(20, 600))
     assert result.repetitions[0].period_samples == pytest.approx(period, rel=1e-10)
     assert result.repetitions[0].periods == 2
     np.testing.assert_allclose(result.transmission.frequency_hz, band * 51200 / period)
     with pytest.raises(InvalidRequest, match="no line"):
-        periodic_transmission([(drive, drive, drive)], 51200.0, repetition_hz=1.0, band_hz=(1e5, 2e5))
+        periodic_frequency_response([(drive, drive, drive)], 51200.0, repetition_hz=1.0, band_hz=(1e5, 2e5))
 
 
 def test_the_delay_of_the_response_channel_is_removed():
     rng = np.random.default_rng(3)
     orders = np.arange(5, 100)
     drive, response = linear_realisation(rng, orders, 512.0, 2048, delay_samples=2.7)
-    result = periodic_transmission(
+    result = periodic_frequency_response(
         [(drive, drive, response)], RATE, repetition_hz=RATE / 512, delay_s=2.7 / RATE
     )
     np.testing.assert_allclose(result.transmission.value, resonator(orders * 10.0), rtol=1e-6)
@@ -175,7 +175,7 @@ def test_odd_and_even_distortion_show_on_their_own_detection_lines():
 
     def detection(shape):
         drive = multisine(driven, rng.uniform(0, 2 * np.pi, driven.size), 1024, 2048)
-        return periodic_transmission([(drive, drive, shape(drive))], RATE, repetition_hz=5.0).detection
+        return periodic_frequency_response([(drive, drive, shape(drive))], RATE, repetition_hz=5.0).detection
 
     cube, square = detection(lambda u: u + 0.01 * u**3), detection(lambda u: u + 0.01 * u**2)
     even = cube.order % 2 == 0
@@ -200,7 +200,7 @@ def test_noise_on_the_base_does_not_bias_the_drive_referenced_estimate():
 def test_one_realisation_says_that_its_bounds_hold_noise_only():
     orders = np.arange(5, 105)
     drive = multisine(orders, orders**2.0, 512, 2048)
-    result = periodic_transmission([(drive, drive, drive)], RATE, repetition_hz=10.0)
+    result = periodic_frequency_response([(drive, drive, drive)], RATE, repetition_hz=10.0)
     assert result.scatter is Scatter.PERIODS
     assert result.distortion_variance is None
 
@@ -209,16 +209,16 @@ def test_less_than_two_periods_or_a_silent_or_aperiodic_drive_is_refused():
     rng = np.random.default_rng(8)
     short = rng.standard_normal(700)
     with pytest.raises(NotEnoughData, match="at least 2"):
-        periodic_transmission([(short, short, short)], RATE, repetition_hz=10.0)
+        periodic_frequency_response([(short, short, short)], RATE, repetition_hz=10.0)
     silent = np.zeros(2048)
     with pytest.raises(UnusableData, match="silent"):
-        periodic_transmission([(silent, silent, silent)], RATE, repetition_hz=10.0)
+        periodic_frequency_response([(silent, silent, silent)], RATE, repetition_hz=10.0)
     noise = rng.standard_normal(4096)
     with pytest.raises(UnusableData, match="does not repeat"):
-        periodic_transmission([(noise, noise, noise)], RATE, repetition_hz=10.0)
+        periodic_frequency_response([(noise, noise, noise)], RATE, repetition_hz=10.0)
     with pytest.raises(NotEnoughData, match="no realisation"):
-        periodic_transmission([], RATE, repetition_hz=10.0)
+        periodic_frequency_response([], RATE, repetition_hz=10.0)
     with pytest.raises(InvalidRequest, match="equally long"):
-        periodic_transmission([(noise, noise[1:], noise)], RATE, repetition_hz=10.0)
+        periodic_frequency_response([(noise, noise[1:], noise)], RATE, repetition_hz=10.0)
     with pytest.raises(InvalidRequest, match="quarter"):
-        periodic_transmission([], RATE, repetition_hz=2000.0)
+        periodic_frequency_response([], RATE, repetition_hz=2000.0)

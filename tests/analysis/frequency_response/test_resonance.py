@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy import signal
 
-from vibench.analysis import Estimator, InvalidRequest, Transmission, resonances, transmission
-from vibench.analysis.frequency_response import TransmissionSettings
+from vibench.analysis import Estimator, InvalidRequest, FrequencyResponse, resonances, transmissibility
+from vibench.analysis.frequency_response import FrequencyResponseSettings
 from vibench.analysis.signals import student_half_width
 
 
 def curve(frequency_hz, value, relative=1e-4, resolution_hz=0.0, coherence=0.99):
-    return Transmission(
+    return FrequencyResponse(
         frequency_hz=frequency_hz,
         value=value,
         coherence=np.full(frequency_hz.size, coherence),
@@ -23,7 +23,7 @@ def curve(frequency_hz, value, relative=1e-4, resolution_hz=0.0, coherence=0.99)
         resolution_hz=resolution_hz,
         segments_used=50,
         segments_excluded=0,
-        settings=TransmissionSettings(Estimator.H1, 5120.0, 5120, "hann", 0.5, 0.95),
+        settings=FrequencyResponseSettings(Estimator.H1, 5120.0, 5120, "hann", 0.5, 0.95),
     )
 
 
@@ -108,12 +108,12 @@ def test_a_resonance_is_found_in_noise_records_and_its_resolution_is_judged():
     x, extra = np.random.default_rng(2).standard_normal((2, 600_000))
     y = signal.lfilter(*section, x) + 0.05 * extra
     warped_hz = rate / np.pi * np.arctan(260 * np.pi / rate)
-    fine = transmission(x, y, rate, segment_samples=5120)
+    fine = transmissibility(x, y, rate, segment_samples=5120)
     (found,) = resonances(fine, low_hz=100, high_hz=800)
     assert found.frequency_hz == pytest.approx(warped_hz, abs=max(4 * found.sd_frequency_hz, 0.2))
     assert found.damping_ratio == pytest.approx(0.02, rel=0.08)
     assert found.is_resolved
-    coarse = transmission(x, y, rate, segment_samples=1024)
+    coarse = transmissibility(x, y, rate, segment_samples=1024)
     (smeared,) = resonances(coarse, low_hz=100, high_hz=800)
     assert not smeared.is_resolved
     assert smeared.damping_ratio > found.damping_ratio
@@ -121,8 +121,8 @@ def test_a_resonance_is_found_in_noise_records_and_its_resolution_is_judged():
 
 def test_noise_has_no_resonance():
     x, y = np.random.default_rng(3).standard_normal((2, 100_000))
-    assert resonances(transmission(x, y, 5120.0, segment_samples=2048), low_hz=50, high_hz=2000) == ()
-    flat = transmission(x, x + 0.5 * y, 5120.0, segment_samples=2048)
+    assert resonances(transmissibility(x, y, 5120.0, segment_samples=2048), low_hz=50, high_hz=2000) == ()
+    flat = transmissibility(x, x + 0.5 * y, 5120.0, segment_samples=2048)
     assert len(resonances(flat, low_hz=50, high_hz=2000)) <= 2
 
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy import signal
 
-from vibench.analysis import Estimator, InvalidRequest, NotEnoughData, transmission
+from vibench.analysis import Estimator, InvalidRequest, NotEnoughData, transmissibility
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.frequency_response._transmission import TransmissionSums
+from vibench.analysis.frequency_response._transmission import FrequencyResponseSums
 
 RATE = 1024.0
 
@@ -27,7 +27,7 @@ def test_h1_h2_and_coherence_agree_with_scipy_given_the_same_windows(window, ove
     _, s_yy = signal.welch(y, **how)
     frequency, s_xy = signal.csd(x, y, **how)
     ours = {
-        name: transmission(x, y, RATE, segment_samples=300, window=window, overlap=overlap, estimator=name)
+        name: transmissibility(x, y, RATE, segment_samples=300, window=window, overlap=overlap, estimator=name)
         for name in ("h1", "h2")
     }
     np.testing.assert_allclose(ours["h1"].frequency_hz, frequency, rtol=1e-14)
@@ -40,8 +40,8 @@ def test_h1_h2_and_coherence_agree_with_scipy_given_the_same_windows(window, ove
 @given(cuts=st.lists(st.integers(1, 4999), max_size=6), overlap=st.sampled_from([0.0, 0.3, 0.5, 0.75]))
 def test_the_block_size_does_not_change_the_result(cuts, overlap):
     rows = noise(3, 2, 5000)
-    whole = transmission(rows[0], rows[1], RATE, segment_samples=128, overlap=overlap)
-    sums = TransmissionSums(RATE, segment_samples=128, overlap=overlap)
+    whole = transmissibility(rows[0], rows[1], RATE, segment_samples=128, overlap=overlap)
+    sums = FrequencyResponseSums(RATE, segment_samples=128, overlap=overlap)
     edges = [0, *sorted(cuts), 5000]
     for start, stop in pairwise(edges):
         sums.add(rows[:, start:stop])
@@ -59,7 +59,7 @@ def test_the_stated_spread_is_the_scatter_of_repeated_estimates(overlap, n_eff, 
     values, coherences = [], []
     for _ in range(repeats):
         x = rng.standard_normal(64 * segment)
-        result = transmission(
+        result = transmissibility(
             x, x + rng.standard_normal(x.size), RATE, segment_samples=segment, overlap=overlap
         )
         values.append(result.value[2:-2])
@@ -79,7 +79,7 @@ def test_independent_noises_pass_the_significance_level_one_time_in_twenty():
     passed, lines, mean = 0, 0, 0.0
     for block in range(312):
         part = slice(block * 32 * segment, (block + 1) * 32 * segment)
-        result = transmission(x[part], y[part], RATE, segment_samples=segment, window="boxcar", overlap=0.0)
+        result = transmissibility(x[part], y[part], RATE, segment_samples=segment, window="boxcar", overlap=0.0)
         inner = slice(1, -1)
         passed += int(np.count_nonzero(result.is_significant[inner]))
         mean += float(np.sum(result.coherence[inner]))
@@ -98,7 +98,7 @@ def test_the_bounds_hold_the_truth_as_often_as_they_say(averages, output_noise):
     for _ in range(repeats):
         x = rng.standard_normal(averages * segment)
         y = x + output_noise * rng.standard_normal(x.size)
-        result = transmission(x, y, RATE, segment_samples=segment, window="boxcar", overlap=0.0)
+        result = transmissibility(x, y, RATE, segment_samples=segment, window="boxcar", overlap=0.0)
         inner = slice(1, -1)
         inside_magnitude += np.count_nonzero(
             (result.magnitude_lower[inner] <= 1) & (result.magnitude_upper[inner] >= 1)
@@ -119,7 +119,7 @@ def test_noise_on_the_drive_biases_h1_and_noise_on_the_response_biases_h2_by_the
     how = {"segment_samples": 256}
 
     def level(**choice):
-        return float(np.abs(transmission(x, y, RATE, **how, **choice).value[2:-2]).mean())
+        return float(np.abs(transmissibility(x, y, RATE, **how, **choice).value[2:-2]).mean())
 
     assert level(estimator="h1") == pytest.approx(1 / 1.09, abs=0.003)
     assert level(estimator="h2") == pytest.approx(1 + 0.31**2, abs=0.003)
@@ -133,8 +133,8 @@ def test_hv_does_not_depend_on_the_unit_of_the_response(power):
     scale = 10**power
     x, extra = noise(9, 2, 4000)
     y = 0.4 * x + 0.3 * extra
-    base = transmission(x, y, RATE, segment_samples=100, estimator="hv", noise_ratio=2.0)
-    scaled = transmission(x, scale * y, RATE, segment_samples=100, estimator="hv", noise_ratio=2.0 * scale**2)
+    base = transmissibility(x, y, RATE, segment_samples=100, estimator="hv", noise_ratio=2.0)
+    scaled = transmissibility(x, scale * y, RATE, segment_samples=100, estimator="hv", noise_ratio=2.0 * scale**2)
     np.testing.assert_allclose(scaled.value / scale, base.value, rtol=1e-9)
 
 
@@ -148,7 +148,7 @@ def test_the_spread_of_hv_and_of_the_drive_referenced_estimate_is_the_stated_one
         x = clean + 0.3 * rng.standard_normal(clean.size)
         y = clean + 0.3 * rng.standard_normal(clean.size)
         reference = {"reference": clean} if estimator is Estimator.DRIVE else {}
-        result = transmission(x, y, RATE, segment_samples=64, estimator=estimator, **extra, **reference)
+        result = transmissibility(x, y, RATE, segment_samples=64, estimator=estimator, **extra, **reference)
         values.append(result.value[2:-2])
         stated.append(result.relative_sd_magnitude[2:-2])
     assert np.std(np.abs(values), axis=0).mean() == pytest.approx(np.mean(stated), rel=0.04)
@@ -157,7 +157,7 @@ def test_the_spread_of_hv_and_of_the_drive_referenced_estimate_is_the_stated_one
 
 def test_a_delay_turns_the_phase_and_is_removed_again():
     x = noise(11, 60_003)
-    result = transmission(x[3:], x[:-3], RATE, segment_samples=1024)
+    result = transmissibility(x[3:], x[:-3], RATE, segment_samples=1024)
     line = 40
     frequency = result.frequency_hz[line]
     assert result.phase_rad[line] == pytest.approx(-2 * np.pi * frequency * 3 / RATE, abs=0.01)
@@ -172,7 +172,7 @@ def test_coherence_at_a_base_excited_resonator_follows_signal_over_noise():
     section = signal.bilinear([2 * 0.02 * natural, natural**2], [1, 2 * 0.02 * natural, natural**2], fs=rate)
     x = noise(12, 1_000_000)
     y = signal.lfilter(*section, x) + 2.0 * noise(13, 1_000_000)
-    result = transmission(x, y, rate, segment_samples=5120)
+    result = transmissibility(x, y, rate, segment_samples=5120)
     _, exact = signal.freqz(*section, worN=result.frequency_hz, fs=rate)
     off_peak = (
         (np.abs(result.frequency_hz - 260) > 15) & (result.frequency_hz > 5) & (result.frequency_hz < 900)
@@ -196,7 +196,7 @@ def test_gaps_cost_segments_but_not_coherence():
     for start in np.linspace(1000, 190_000, 60).astype(int):
         valid[start : start + 100] = False
     holes = np.where(valid, y, np.nan)
-    result = transmission(x, holes, RATE, segment_samples=1000, valid=valid)
+    result = transmissibility(x, holes, RATE, segment_samples=1000, valid=valid)
     assert np.all(result.coherence > 1 - 1e-12)
     np.testing.assert_allclose(result.value, 2, rtol=1e-12)
     touched = sum(not valid[start : start + 1000].all() for start in range(0, 199_001, 500))
@@ -209,8 +209,8 @@ def test_gaps_lower_the_number_of_effective_averages_as_they_fall():
     x = noise(15, 10_000)
     valid = np.ones(x.size, dtype=bool)
     valid[1500::1000] = True
-    whole = transmission(x, x, RATE, segment_samples=1000, valid=valid)
-    lone = transmission(x, x, RATE, segment_samples=1000, overlap=0.0)
+    whole = transmissibility(x, x, RATE, segment_samples=1000, valid=valid)
+    lone = transmissibility(x, x, RATE, segment_samples=1000, overlap=0.0)
     assert lone.n_eff == 10
     assert 10 < whole.n_eff < 19
     assert whole.segments_used == 19
@@ -231,31 +231,31 @@ def test_gaps_lower_the_number_of_effective_averages_as_they_fall():
 )
 def test_a_meaningless_request_names_what_is_allowed(choice, says):
     with pytest.raises(InvalidRequest, match=says):
-        transmission(noise(16, 1000), noise(17, 1000), RATE, segment_samples=100, **choice)
+        transmissibility(noise(16, 1000), noise(17, 1000), RATE, segment_samples=100, **choice)
 
 
 def test_one_segment_is_not_enough_for_a_coherence():
     with pytest.raises(NotEnoughData, match="at least 2"):
-        transmission(noise(18, 150), noise(19, 150), RATE, segment_samples=100, overlap=0.0)
+        transmissibility(noise(18, 150), noise(19, 150), RATE, segment_samples=100, overlap=0.0)
     with pytest.raises(NotEnoughData, match="no whole valid segment"):
-        transmission(noise(18, 50), noise(19, 50), RATE, segment_samples=100)
+        transmissibility(noise(18, 50), noise(19, 50), RATE, segment_samples=100)
 
 
 def test_a_sample_that_is_not_finite_is_refused_unless_marked():
     y = noise(20, 1000)
     y[500] = np.nan
     with pytest.raises(UnusableData, match="mark"):
-        transmission(noise(21, 1000), y, RATE, segment_samples=100)
+        transmissibility(noise(21, 1000), y, RATE, segment_samples=100)
 
 
 def test_channels_of_different_length_are_refused():
     with pytest.raises(InvalidRequest, match="equally long"):
-        transmission(noise(22, 1000), noise(23, 999), RATE, segment_samples=100)
+        transmissibility(noise(22, 1000), noise(23, 999), RATE, segment_samples=100)
 
 
 def test_a_line_without_drive_has_no_transmission_and_is_not_significant():
     time = np.arange(4000) / RATE
     x = np.sin(2 * np.pi * 128 * time)
-    result = transmission(np.zeros_like(x), x, RATE, segment_samples=1000)
+    result = transmissibility(np.zeros_like(x), x, RATE, segment_samples=1000)
     assert np.all(np.isnan(result.value))
     assert not result.is_significant.any()

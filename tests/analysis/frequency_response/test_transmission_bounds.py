@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.analysis import Estimator, transmission
+from vibench.analysis import Estimator, transmissibility
 
 RATE = 1024.0
 SEGMENT = 64
@@ -27,7 +27,7 @@ def coverage(estimator, overlap, averages, repeats, seed):
             Estimator.HV: {"noise_ratio": 1.0},
             Estimator.DRIVE: {"reference": clean},
         }.get(estimator, {})
-        found = transmission(
+        found = transmissibility(
             drive, response, RATE, segment_samples=SEGMENT, overlap=overlap, estimator=estimator, **how
         )
         low, high = found.magnitude_lower[EVERY_THIRD], found.magnitude_upper[EVERY_THIRD]
@@ -68,7 +68,7 @@ def test_segments_counted_as_independent_would_promise_too_much():
     for _ in range(200):
         drive = rng.standard_normal(12 * SEGMENT)
         response = drive + NOISE * rng.standard_normal(drive.size)
-        found = transmission(drive, response, RATE, segment_samples=SEGMENT, overlap=0.75)
+        found = transmissibility(drive, response, RATE, segment_samples=SEGMENT, overlap=0.75)
         naive = found.half_width * np.sqrt(found.n_eff / found.segments_used)
         error = np.abs(np.log(found.magnitude))
         outside += np.count_nonzero(error[EVERY_THIRD] > naive[EVERY_THIRD])

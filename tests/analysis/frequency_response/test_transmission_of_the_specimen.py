@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.analysis import resonances
-from vibench.analysis.frequency_response import converted_transmission
+from vibench.analysis.frequency_response import converted_frequency_response
 from vibench.analysis.frequency_response._periodic_transmission import PeriodicSums
 from vibench.analysis.signals import Quantity
 from vibench.sim import Sampled, gong2025, integrate
@@ -63,7 +63,7 @@ def recorded(rms_m, realisations, noise_density=0.0):
 
 
 def as_displacements(result):
-    return converted_transmission(
+    return converted_frequency_response(
         result.transmission,
         drive=(Quantity.ACCELERATION, Quantity.DISPLACEMENT),
         response=(Quantity.VELOCITY, Quantity.DISPLACEMENT),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from vibench.analysis import Estimator, transmission
+from vibench.analysis import Estimator, transmissibility
 
 RATE = 2048
 SEGMENT = 512
@@ -24,7 +24,7 @@ def noisy_pair():
 @pytest.mark.parametrize("window", ["hann", "boxcar"])
 @pytest.mark.parametrize("overlap", [0.0, 0.5, 0.75])
 def test_coherence_is_that_of_scipy(noisy_pair, window, overlap):
-    ours = transmission(*noisy_pair, RATE, segment_samples=SEGMENT, window=window, overlap=overlap)
+    ours = transmissibility(*noisy_pair, RATE, segment_samples=SEGMENT, window=window, overlap=overlap)
     how = {"window": window, "nperseg": SEGMENT, "noverlap": int(overlap * SEGMENT), "detrend": False}
     frequency_hz, theirs = signal.coherence(*noisy_pair, RATE, **how)
     np.testing.assert_allclose(ours.frequency_hz, frequency_hz, rtol=1e-14)
@@ -60,7 +60,7 @@ def pyfrf_answer(noisy_pair, request):
 )
 def test_h1_h2_and_hv_are_those_of_pyfrf(noisy_pair, pyfrf_answer, estimator, method, how):
     window, theirs = pyfrf_answer
-    ours = transmission(*noisy_pair, RATE, segment_samples=SEGMENT, window=window, estimator=estimator, **how)
+    ours = transmissibility(*noisy_pair, RATE, segment_samples=SEGMENT, window=window, estimator=estimator, **how)
     np.testing.assert_allclose(ours.frequency_hz, theirs.get_f_axis(), rtol=1e-14)
     np.testing.assert_allclose(
         ours.value[WITHOUT_MEAN], getattr(theirs, method)()[0, 0][WITHOUT_MEAN], rtol=1e-10
@@ -69,7 +69,7 @@ def test_h1_h2_and_hv_are_those_of_pyfrf(noisy_pair, pyfrf_answer, estimator, me
 
 def test_coherence_is_that_of_pyfrf(noisy_pair, pyfrf_answer):
     window, theirs = pyfrf_answer
-    ours = transmission(*noisy_pair, RATE, segment_samples=SEGMENT, window=window)
+    ours = transmissibility(*noisy_pair, RATE, segment_samples=SEGMENT, window=window)
     np.testing.assert_allclose(
         ours.coherence[WITHOUT_MEAN], theirs.get_coherence()[0][WITHOUT_MEAN], rtol=1e-10
     )

@@ -5,7 +5,7 @@ import pytest
 
 from vibench.analysis.live._drive_tone import drive_tone, drive_turns
 from vibench.analysis.live._portrait import PoincareSection, portrait, portrait_samples
-from vibench.analysis.live._ring import Window
+from vibench.analysis.live._ring import RingWindow
 from vibench.analysis.live._sine_response import SinePoint, look_samples, sine_point, stretch_samples
 from vibench.analysis.live._view import SweepTrace
 
@@ -21,7 +21,7 @@ def motion(phase, omega):
 
 def sine(frequency_hz, samples, first=0):
     omega = 2 * np.pi * frequency_hz
-    return Window(first, motion(omega * (first + np.arange(samples)) / RATE + 0.4, omega).astype(np.float32))
+    return RingWindow(first, motion(omega * (first + np.arange(samples)) / RATE + 0.4, omega).astype(np.float32))
 
 
 @pytest.mark.parametrize("frequency_hz", [95.3, 260.01, 499.9])
@@ -55,7 +55,7 @@ def test_responses_of_a_known_motion_are_found(frequency_hz):
 def test_a_point_of_a_sweep_stands_at_the_frequency_of_its_own_time():
     time_s = np.arange(int(2 * RATE)) / RATE
     phase = 2 * np.pi * (255.0 * time_s + 0.5 * 2.0 * time_s**2)
-    window = Window(0, motion(phase, 2 * np.pi * (255.0 + 2.0 * time_s)).astype(np.float32))
+    window = RingWindow(0, motion(phase, 2 * np.pi * (255.0 + 2.0 * time_s)).astype(np.float32))
     point = sine_point(window, (0, 1, 2), RATE)
     assert point.frequency_hz == pytest.approx(255.0 + 2.0 * point.time_s, abs=0.02)
     assert point.response_ii == pytest.approx(5.0, rel=0.01)
@@ -69,7 +69,7 @@ def held_displacement(start_hz, rate_hz_per_s, level=1.0):
         2 * np.pi * (start_hz * time_s + 0.5 * rate_hz_per_s * time_s**2), 2 * np.pi * frequency_hz
     )
     values[0] *= (frequency_hz / start_hz) ** 2
-    return Window(0, (level * values).astype(np.float32))
+    return RingWindow(0, (level * values).astype(np.float32))
 
 
 def test_no_point_is_made_while_the_drive_is_ramped_down():
@@ -89,7 +89,7 @@ def test_a_sweep_of_constant_displacement_is_not_taken_for_a_ramp(start_hz, rate
 
 def test_no_point_is_made_of_lost_samples_or_too_few():
     window = sine(260.0, 60_000)
-    assert sine_point(Window(0, window.values[:, :1000]), (0, 1, 2), RATE) is None
+    assert sine_point(RingWindow(0, window.values[:, :1000]), (0, 1, 2), RATE) is None
     window.values[1, -50] = np.nan
     assert sine_point(window, (0, 1, 2), RATE) is None
 

@@ -7,8 +7,8 @@ import pytest
 
 from vibench.acquisition import load_campaign
 from vibench.acquisition.plan import Measurement, SineSweep, predicted_loads
-from vibench.acquisition.rig import Quantity, load_rig
-from vibench.analysis import foresee
+from vibench.acquisition.rig import BaseQuantity, load_rig
+from vibench.analysis import predict_measurement
 from vibench.analysis.model._foresight import bands_of, base_amplitude_m
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -29,12 +29,12 @@ def test_no_point_inside_is_no_band():
 def test_the_amplitude_of_a_dwell_is_the_stroke_of_its_plan():
     measurement = QUICK["dwell"]
     amplitude_m, _ = base_amplitude_m(measurement, RIG, np.array([260.0]))
-    assert amplitude_m[0] == pytest.approx(predicted_loads(measurement.excitation, RIG)[Quantity.STROKE].peak)
+    assert amplitude_m[0] == pytest.approx(predicted_loads(measurement.excitation, RIG)[BaseQuantity.STROKE].peak)
 
 
 def test_noise_is_stood_for_by_a_sine_of_the_same_rms():
     amplitude_m, basis = base_amplitude_m(QUICK["noise"], RIG, np.array([100.0, 200.0]))
-    rms_m = predicted_loads(QUICK["noise"].excitation, RIG)[Quantity.STROKE].rms
+    rms_m = predicted_loads(QUICK["noise"].excitation, RIG)[BaseQuantity.STROKE].rms
     assert amplitude_m == pytest.approx(np.sqrt(2) * rms_m)
     assert "rms" in basis
 
@@ -44,7 +44,7 @@ def lowest_hz(start_hz, stop_hz, amplitude_vpp):
     sweep = SineSweep(
         amplitude_vpp=amplitude_vpp, start_hz=start_hz, stop_hz=stop_hz, duration_s=60, hold="displacement"
     )
-    return foresee(Measurement(name="sweep", excitation=sweep), RIG).collision_bands_hz[0][0]
+    return predict_measurement(Measurement(name="sweep", excitation=sweep), RIG).collision_bands_hz[0][0]
 
 
 def test_a_sweep_is_predicted_on_the_branch_that_it_comes_along():
@@ -60,6 +60,6 @@ def test_a_sweep_is_predicted_on_the_branch_that_it_comes_along():
 
 @pytest.mark.slow
 def test_a_dwell_inside_the_region_is_predicted_to_collide_there():
-    seen = foresee(QUICK["dwell"], RIG)
+    seen = predict_measurement(QUICK["dwell"], RIG)
     assert any(low < 260 < high for low, high in seen.collision_bands_hz)
     assert np.nanmax(seen.prediction.response_i) > 1

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.analysis import InvalidRequest, NotEnoughData, similarity
-from vibench.analysis.model import Curve, LogarithmOf
+from vibench.analysis.model import SimilarityCurve, LogarithmOf
 
 FREQUENCY_HZ = np.arange(10.0, 510.0, 5.0)
 
 
 def curve(response, amplitude_m=5e-6):
-    return Curve(FREQUENCY_HZ[: len(response)], np.asarray(response, dtype=float), amplitude_m)
+    return SimilarityCurve(FREQUENCY_HZ[: len(response)], np.asarray(response, dtype=float), amplitude_m)
 
 
 def test_a_curve_is_wholly_similar_to_itself_even_where_its_logarithm_is_zero():
@@ -84,7 +84,7 @@ def test_points_that_come_in_runs_widen_the_interval():
 
 
 def test_a_curve_is_read_between_its_points_and_never_beyond():
-    power = Curve(np.array([10.0, 100.0]), np.array([1.0, 100.0]), 1e-6)
+    power = SimilarityCurve(np.array([10.0, 100.0]), np.array([1.0, 100.0]), 1e-6)
     assert power.at(np.array([20.0])).response == pytest.approx([4.0])
     with pytest.raises(InvalidRequest, match="10 to 100 Hz"):
         power.at(np.array([5.0]))
@@ -100,9 +100,9 @@ def test_a_curve_is_read_between_its_points_and_never_beyond():
 )
 def test_a_curve_that_cannot_be_one_is_refused(frequencies, responses, amplitude_m, complaint):
     with pytest.raises(InvalidRequest, match=complaint):
-        Curve(np.array(frequencies), np.array(responses), amplitude_m)
+        SimilarityCurve(np.array(frequencies), np.array(responses), amplitude_m)
 
 
 def test_curves_at_different_frequencies_are_refused():
     with pytest.raises(InvalidRequest, match=r"Curve\.at"):
-        similarity(curve(np.ones(3)), Curve(np.array([1.0, 2.0, 3.0]), np.ones(3), 1e-6))
+        similarity(curve(np.ones(3)), SimilarityCurve(np.array([1.0, 2.0, 3.0]), np.ones(3), 1e-6))

@@ -8,7 +8,7 @@ import pytest
 import synthetic_recordings as synthetic
 
 from vibench.acquisition.plan import MultisineNoise, SineSweep
-from vibench.analysis import CampaignResults, NotEnoughData, Simulation, analyse_files, shaken_specimen
+from vibench.analysis import CampaignResults, NotEnoughData, Simulation, analyse_files, update_model
 from vibench.analysis.model_updating._gap_fit import fit_gap, onsets, swept_relative
 from vibench.analysis.model_updating._shaken_specimen import bracketed_gap, brackets
 from vibench.analysis.model_updating._specimen_fit import LINEAR, Parameter, parameter_value, with_values
@@ -78,7 +78,7 @@ def measured(recorded):
 
 @pytest.fixture(scope="module")
 def shaken(measured):
-    return shaken_specimen(measured)
+    return update_model(measured)
 
 
 def test_every_parameter_lies_within_its_interval_and_the_bench_does_not(shaken):
@@ -146,7 +146,7 @@ def test_dwells_below_and_above_the_onset_bracket_the_gap(dwell_file):
     (bracket,) = brackets(dwells, gong2025())
     assert bracket.low_m < 45e-6 < bracket.high_m
     assert bracket.high_m / bracket.low_m == pytest.approx(10.0, rel=1e-6)
-    found = shaken_specimen(results)
+    found = update_model(results)
     assert [(each.parameter, each.low, each.high) for each in found.values] == [
         (Parameter.GAP, bracket.low_m, bracket.high_m)
     ]
@@ -172,16 +172,16 @@ def test_a_swept_response_lags_by_what_its_rate_says():
 
 def test_without_a_sweep_the_gap_stays_and_the_fit_says_why(measured):
     only_noise = CampaignResults("noise", measured.noise, ())
-    found = shaken_specimen(only_noise)
+    found = update_model(only_noise)
     assert found.specimen.gap_m == gong2025().gap_m
     assert [each for each in found.not_told if "gap stays as the bench says" in each]
-    only_sweep = shaken_specimen(CampaignResults("sweep", measured.sweeps, ()))
+    only_sweep = update_model(CampaignResults("sweep", measured.sweeps, ()))
     assert [each.parameter for each in only_sweep.values] == [Parameter.GAP]
     assert math.isnan(only_sweep.reduced_chi_square)
 
 
 def test_nothing_to_fit_is_one_sentence(measured):
     with pytest.raises(NotEnoughData, match="no result"):
-        shaken_specimen(CampaignResults("empty", (), ()))
+        update_model(CampaignResults("empty", (), ()))
     with pytest.raises(NotEnoughData, match="no sweep enters"):
         fit_gap([], gong2025())

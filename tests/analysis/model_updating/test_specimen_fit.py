@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vibench.analysis import Estimator, InvalidRequest, NotEnoughData, Transmission
-from vibench.analysis.frequency_response import TransmissionSettings
+from vibench.analysis import Estimator, InvalidRequest, NotEnoughData, FrequencyResponse
+from vibench.analysis.frequency_response import FrequencyResponseSettings
 from vibench.analysis.model_updating._specimen_fit import (
     LINEAR,
     Parameter,
@@ -34,7 +34,7 @@ def measured(specimen, rng, sd=SD, lines_hz=LINES_HZ, gain=1.0):
     scatter = sd * (rng.standard_normal(lines_hz.size) + 1j * rng.standard_normal(lines_hz.size))
     value = gain * base_transmissibility(specimen, lines_hz)[:, 0] * np.exp(scatter)
     spread = np.full(lines_hz.size, sd)
-    return Transmission(
+    return FrequencyResponse(
         frequency_hz=lines_hz,
         value=value,
         coherence=np.full(lines_hz.size, 0.99),
@@ -46,7 +46,7 @@ def measured(specimen, rng, sd=SD, lines_hz=LINES_HZ, gain=1.0):
         resolution_hz=0.0,
         segments_used=20,
         segments_excluded=0,
-        settings=TransmissionSettings(Estimator.DRIVE, 6400.0, 1600, "rectangular", 0.0, 0.95),
+        settings=FrequencyResponseSettings(Estimator.DRIVE, 6400.0, 1600, "rectangular", 0.0, 0.95),
     )
 
 

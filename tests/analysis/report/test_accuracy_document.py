@@ -7,14 +7,14 @@ import pytest
 
 from vibench.analysis.report import accuracy_document, tradeoff_figure, worst_error
 from vibench.sim import Accuracy
-from vibench.sim.accuracy_benchmark import MOTIONS, Thoroughness, measured_trade
+from vibench.sim.accuracy_benchmark import MOTIONS, Thoroughness, measure_accuracy
 
 PAGE = Path(__file__).parents[3] / "docs" / "accuracy.md"
 
 
 @pytest.fixture(scope="module")
 def trade():
-    return measured_trade(Thoroughness(span_s=0.03, solver_span_s=0.01), motions=(MOTIONS[1], MOTIONS[-1]))
+    return measure_accuracy(Thoroughness(span_s=0.03, solver_span_s=0.01), motions=(MOTIONS[1], MOTIONS[-1]))
 
 
 def headings(text):

@@ -14,7 +14,7 @@ from vibench.analysis import (
     analyse_files,
     campaign_summary,
     recordings_in,
-    summary,
+    result_summary,
 )
 from vibench.analysis.report import write_report
 
@@ -143,7 +143,7 @@ def test_a_summary_is_json_and_says_the_results(campaign):
 
 def test_every_kind_of_result_has_a_summary(stepped_file):
     found = analyse_files([stepped_file], "steps")
-    document = summary(found.results[0])
+    document = result_summary(found.results[0])
     assert document["kind"] == "stepped_sine"
     assert document["measured"]["response_ii"] == list(found.results[0].analysis.response.response_ii)
     json.dumps(document, allow_nan=False)

@@ -5,7 +5,7 @@ import pytest
 
 from vibench.analysis.reproduction._curve_peaks import (
     bound_peaks,
-    curve_peaks,
+    response_peaks,
     linear_peaks,
     nearest,
     two_highest,
@@ -28,9 +28,9 @@ def test_peaks_of_little_damping_are_the_natural_frequencies():
 
 def test_a_ripple_is_no_peak_and_a_hole_is_stepped_over():
     rough = resonances(200.0, 435.0) * (1.0 + 0.1 * np.sin(GRID))
-    np.testing.assert_allclose(curve_peaks(GRID, rough), [200.0, 435.0], atol=5.0)
+    np.testing.assert_allclose(response_peaks(GRID, rough), [200.0, 435.0], atol=5.0)
     rough[3] = np.nan
-    np.testing.assert_allclose(curve_peaks(GRID, rough), [200.0, 435.0], atol=5.0)
+    np.testing.assert_allclose(response_peaks(GRID, rough), [200.0, 435.0], atol=5.0)
 
 
 def test_the_two_highest_are_ascending_and_the_third_is_measured_against_the_second():

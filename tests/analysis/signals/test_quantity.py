@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.analysis import InvalidRequest, transmission
-from vibench.analysis.frequency_response import converted_transmission
+from vibench.analysis import InvalidRequest, transmissibility
+from vibench.analysis.frequency_response import converted_frequency_response
 from vibench.analysis.signals import Quantity, converted_signal, derivative_factor
 
 RATE = 5120.0
@@ -30,13 +30,13 @@ def test_velocity_over_acceleration_becomes_displacement_over_displacement():
     velocity = 2 * np.fft.irfft(
         np.append(0, np.fft.rfft(acceleration)[1:] / (2j * np.pi * np.fft.rfftfreq(51_200, 1 / RATE)[1:]))
     )
-    mixed = transmission(acceleration, velocity, RATE, segment_samples=51_200 // 16)
-    ratio = converted_transmission(
+    mixed = transmissibility(acceleration, velocity, RATE, segment_samples=51_200 // 16)
+    ratio = converted_frequency_response(
         mixed,
         drive=(Quantity.ACCELERATION, Quantity.DISPLACEMENT),
         response=(Quantity.VELOCITY, Quantity.DISPLACEMENT),
     )
-    same = converted_transmission(
+    same = converted_frequency_response(
         mixed,
         drive=(Quantity.ACCELERATION, Quantity.ACCELERATION),
         response=(Quantity.VELOCITY, Quantity.ACCELERATION),

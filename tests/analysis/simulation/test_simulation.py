@@ -13,7 +13,7 @@ from vibench.analysis.simulation import (
     Cancel,
     Ended,
     Grown,
-    SimulationCourse,
+    SimulationProgress,
     SimulationRequest,
     cost_sentences,
     serve,
@@ -49,7 +49,7 @@ def test_one_model_named_twice_is_simulated_once():
 
 def test_the_answer_grows_to_the_linear_transmission():
     request = SimulationRequest(**LINEAR)
-    course, counts = SimulationCourse(request.amplitude_m, request.points, "n"), []
+    course, counts = SimulationProgress(request.amplitude_m, request.points, "n"), []
     simulate(request, lambda pieces: (course.add(pieces), counts.append(course.done)), lambda: False, 2)
     assert counts[-1] == course.asked == 12
     frequency_hz, found = course.column("linear", "response_ii")
@@ -72,7 +72,7 @@ def point(model, frequency_hz, response, impacts=0):
 
 
 def test_similarity_is_of_the_frequencies_that_both_models_have():
-    course = SimulationCourse(5e-6, 10, "n")
+    course = SimulationProgress(5e-6, 10, "n")
     course.add((point("a", 100.0, 2.0), point("a", 200.0, 4.0), point("b", 200.0, 4.0)))
     assert course.similarity().rate == 1.0
     course.add((point("b", 100.0, 200.0), Trouble("b at 300 Hz: no")))
@@ -82,7 +82,7 @@ def test_similarity_is_of_the_frequencies_that_both_models_have():
 
 
 def test_bands_of_impacts_are_told_apart():
-    course = SimulationCourse(5e-6, 10, "n")
+    course = SimulationProgress(5e-6, 10, "n")
     course.add(tuple(point("a", float(f), 1.0, int(f in (30, 40, 60))) for f in range(10, 80, 10)))
     assert course.collision_bands_hz("a") == ((30.0, 40.0), (60.0, 60.0))
 

@@ -8,7 +8,7 @@ import pytest
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, ResonanceTracking, SettledSine
 from vibench.acquisition.rig import load_rig
-from vibench.analysis import CampaignResults, analyse_recording, summary
+from vibench.analysis import CampaignResults, analyse_recording, result_summary
 from vibench.analysis.figures import stepped_sine_figure
 from vibench.analysis.recordings import FeedbackNote
 from vibench.analysis.report import result_figures
@@ -95,7 +95,7 @@ def test_a_tracked_resonance_is_analysed_and_said(analysed):
     assert numbers["amplitude_m"] == pytest.approx(found.response_ii * found.drive_amplitude_m, rel=0.01)
     assert numbers["base_m_per_s2"] == pytest.approx([0.5], rel=0.05)
     assert numbers["frequency_hz"] == pytest.approx(found.frequency_hz, abs=0.1)
-    document = json.loads(json.dumps(summary(SteppedSineResult(analysis, None))))
+    document = json.loads(json.dumps(result_summary(SteppedSineResult(analysis, None))))
     kinds = [each["kind"] for each in document["recording"]["feedback"]]
     assert kinds.count("resonance") == 1
 

@@ -8,7 +8,7 @@ import pytest
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, SteppedLevel
 from vibench.acquisition.rig import load_rig
-from vibench.analysis import CampaignResults, analyse_recording, summary
+from vibench.analysis import CampaignResults, analyse_recording, result_summary
 from vibench.analysis.figures import stepped_sine_figure
 from vibench.analysis.report._findings import findings
 from vibench.analysis.results import SteppedSineResult
@@ -68,7 +68,7 @@ def test_figure_and_summary_tell_both_jumps(analysis):
     assert "between 0.3 and 0.2 Vpp" in figure.caption
     assert "0.3 to 0.5 V above the fall back" in figure.caption
     assert figure.figure.axes[-1].get_xlabel() == "level at the generator [Vpp]"
-    measured = summary(SteppedSineResult(analysis, None))["measured"]
+    measured = result_summary(SteppedSineResult(analysis, None))["measured"]
     assert [each["direction"] for each in measured["jumps"]] == ["up", "down"]
 
 

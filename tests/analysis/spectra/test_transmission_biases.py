@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import fft, signal
 
-from vibench.analysis import transmission
+from vibench.analysis import transmissibility
 from vibench.analysis.spectra import spectral_density
 
 RATE = 1024.0
@@ -21,7 +21,7 @@ def lagged_share(lag):
 def test_a_delay_costs_the_share_of_the_segment_that_it_moves_out_of(lag):
     """E[h1] = rho(lag) exp(-i omega lag): what of a segment's response belongs to its own drive."""
     record = np.random.default_rng(41).standard_normal(600_000)
-    found = transmission(record[lag:], record[:-lag], RATE, segment_samples=SEGMENT)
+    found = transmissibility(record[lag:], record[:-lag], RATE, segment_samples=SEGMENT)
     inner = slice(3, -3)
     straight = found.without_delay(lag / RATE).value[inner]
     own_error = np.sqrt(np.mean(found.relative_sd_magnitude[inner] ** 2) / straight.size) * lagged_share(lag)
@@ -34,7 +34,7 @@ def test_a_peak_narrower_than_the_resolution_is_the_peak_seen_through_the_window
     omega, damping = 2 * np.pi * 260, 0.02
     section = signal.bilinear([2 * damping * omega, omega**2], [1, 2 * damping * omega, omega**2], fs=RATE)
     drive = np.random.default_rng(42).standard_normal(1_500_000)
-    found = transmission(drive, signal.lfilter(*section, drive), RATE, segment_samples=SEGMENT)
+    found = transmissibility(drive, signal.lfilter(*section, drive), RATE, segment_samples=SEGMENT)
     finer = 64
     fine_hz = fft.fftfreq(finer * SEGMENT, 1 / RATE)
     _, true = signal.freqz(*section, worN=2 * np.pi * fine_hz / RATE)
@@ -55,8 +55,8 @@ def test_filling_holes_with_zeros_would_lower_the_coherence_that_leaving_them_ou
     for start in range(2_000, 390_000, 6_500):
         valid[start : start + 100] = False
     holed = np.where(valid, response, 0.0)
-    kept = transmission(drive, np.where(valid, response, np.nan), RATE, segment_samples=1024, valid=valid)
-    filled = transmission(drive, holed, RATE, segment_samples=1024)
+    kept = transmissibility(drive, np.where(valid, response, np.nan), RATE, segment_samples=1024, valid=valid)
+    filled = transmissibility(drive, holed, RATE, segment_samples=1024)
     assert np.min(kept.coherence) > 0.9999
     # 100 of 6500 samples are missing, and the others cannot know it: 1.5 % of the power no longer belongs.
     assert np.median(filled.coherence) == pytest.approx(1 - 100 / 6500, abs=0.004)

@@ -15,7 +15,7 @@ from vibench.acquisition.recording import (
     RecordingState,
     create_recording,
 )
-from vibench.gui.page import Desk, Settings
+from vibench.gui.page import AppContext, Settings
 
 RATE_HZ = 6400.0
 SAMPLES = 64_000
@@ -60,7 +60,7 @@ def waited():
 @pytest.fixture(scope="session")
 def shared_desk(qapp, tmp_path_factory):
     """A desk whose processes serve all tests: they take seconds to begin."""
-    desk = Desk(Settings(tmp_path_factory.mktemp("settings") / "window.ini"))
+    desk = AppContext(Settings(tmp_path_factory.mktemp("settings") / "window.ini"))
     yield desk
     desk.background.close()
 

@@ -10,7 +10,7 @@ import pytest
 from PySide6.QtCore import QTimer
 
 from vibench.acquisition import Block, Overload, shipped
-from vibench.acquisition.plan import Axis, Measurement, Range, SteppedSine
+from vibench.acquisition.plan import SweepAxis, Measurement, Range, SteppedSine
 from vibench.acquisition.recording import (
     ChannelHeader,
     Origin as RecordingOrigin,
@@ -18,9 +18,9 @@ from vibench.acquisition.recording import (
     RecordingState,
     create_recording,
 )
-from vibench.analysis import Origin, Response, Trace
+from vibench.analysis import CurveOrigin, CurveKind, Curve
 from vibench.analysis.live import LiveChannel, LiveView
-from vibench.analysis.simulation import SimulationCourse
+from vibench.analysis.simulation import SimulationProgress
 from vibench.analysis.simulation._request import SimulatedPoint, SimulatedSignal
 from vibench.gui.engine_link._live_run import warm_up
 from vibench.gui.pages.queue._draft import with_sweep
@@ -43,8 +43,8 @@ SIMULATED = 500
 def curve(number):
     frequency_hz = np.linspace(10.0, 1000.0, 4000)
     magnitude = 1.0 + np.random.default_rng(number).random(4000)
-    return Trace(
-        f"run {number}", Origin.MEASURED, Response.TRANSMISSION, frequency_hz, magnitude, np.full(4000, 0.02)
+    return Curve(
+        f"run {number}", CurveOrigin.MEASURED, CurveKind.TRANSMISSION, frequency_hz, magnitude, np.full(4000, 0.02)
     )
 
 
@@ -78,7 +78,7 @@ def long_recording(tmp_path):
 
 
 def simulated():
-    course = SimulationCourse(5e-6, 2 * SIMULATED, "")
+    course = SimulationProgress(5e-6, 2 * SIMULATED, "")
     time_s = np.arange(5000) / 50e3
     for model in ("hertz", "linear"):
         found = [
@@ -153,7 +153,7 @@ def of_simulate(window):
 
 def of_queue(window):
     queue, entries, rows = window.pages[QUEUE], window.pages[QUEUE].entries, window.pages[QUEUE].rows
-    night = with_sweep(None, SHOWN_TOO, Axis.LEVEL, Range(start=0.5, stop=1.5, count=MANY))
+    night = with_sweep(None, SHOWN_TOO, SweepAxis.LEVEL, Range(start=0.5, stop=1.5, count=MANY))
     paper = shipped("campaigns/paper.toml")
     yield Action("look at Queue", lambda: window.show_page(QUEUE))
     yield Action("open a campaign", lambda: queue.open_file(paper), lambda: entries.rowCount() > 1)

@@ -4,7 +4,7 @@ from math import log10
 
 import pytest
 
-from vibench.gui.plots import LOG_FREQUENCY, Axis
+from vibench.gui.plots import LOG_FREQUENCY, PlotAxis
 from vibench.gui.plots._axis import AxisItem, logarithmic_ticks, number_text
 
 
@@ -35,5 +35,5 @@ def test_the_unit_stands_in_the_label_and_never_with_a_prefix_of_its_own(qapp):
 
 
 def test_metres_are_shown_as_micrometres(qapp):
-    item = AxisItem("left", Axis("Displacement", "µm", 1e6))
+    item = AxisItem("left", PlotAxis("Displacement", "µm", 1e6))
     assert item.tickStrings([0, 5e-6, 1e-5], 1.0, 5e-6) == ["0", "5", "10"]

@@ -3,14 +3,14 @@
 import pytest
 from PySide6.QtGui import QColor
 
-from vibench.gui.plots import LOG_FREQUENCY, TIME, Axis, Plot, trace
+from vibench.gui.plots import LOG_FREQUENCY, TIME, PlotAxis, Plot, curve_style
 from vibench.gui.plots._axis import thinned
 from vibench.gui.widgets import LIGHT
 
 
 @pytest.fixture
 def plot(qapp, qtbot):
-    made = Plot("a plot", TIME, Axis("Velocity of the mass", "mm/s", 1e3, short="v (mm/s)"), LIGHT)
+    made = Plot("a plot", TIME, PlotAxis("Velocity of the mass", "mm/s", 1e3, short="v (mm/s)"), LIGHT)
     qtbot.addWidget(made)
     made.resize(400, 300)
     return made
@@ -29,7 +29,7 @@ def dark_pixels(plot):
 
 def test_the_hint_is_there_until_a_curve_has_points_and_again_without_them(plot, qapp):
     plot.with_hint("What was measured appears here")
-    curve = plot.curve(trace(0))
+    curve = plot.curve(curve_style(0))
     plot.show()
     qapp.processEvents()
     assert dark_pixels(plot) > 50
@@ -47,7 +47,7 @@ def test_the_hint_is_there_until_a_curve_has_points_and_again_without_them(plot,
 def test_the_legend_stands_above_the_axes_in_as_many_lines_as_it_needs(plot, qapp):
     plot.with_legend()
     for number in range(4):
-        plot.curve(trace(number), f"a curve with a long name, number {number}")
+        plot.curve(curve_style(number), f"a curve with a long name, number {number}")
     plot.resize(900, 300)
     plot.show()
     qapp.processEvents()
@@ -82,7 +82,7 @@ def test_ticks_are_thinned_to_round_steps(most):
 
 
 def test_an_axis_that_leaves_its_numbers_to_another_stays_bare(plot, qapp):
-    bare = Plot("bare", LOG_FREQUENCY, Axis("x"), LIGHT)
+    bare = Plot("bare", LOG_FREQUENCY, PlotAxis("x"), LIGHT)
     bare.across.show_nothing()
     bare.resize(600, 200)
     bare.show()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.gui.plots import TIME, Axis, Plot, SignalCurve, trace
+from vibench.gui.plots import TIME, PlotAxis, Plot, SignalCurve, curve_style
 from vibench.gui.widgets import LIGHT
 
 RATE_HZ = 51200.0
@@ -11,7 +11,7 @@ RATE_HZ = 51200.0
 
 @pytest.fixture
 def plot(qtbot):
-    plot = Plot("signal", TIME, Axis("Velocity", "m/s"), LIGHT)
+    plot = Plot("signal", TIME, PlotAxis("Velocity", "m/s"), LIGHT)
     qtbot.addWidget(plot)
     plot.resize(800, 300)
     plot.show()
@@ -28,7 +28,7 @@ def test_an_impact_of_three_samples_is_seen_in_two_seconds(plot, place):
     samples = np.zeros(round(2 * RATE_HZ))
     first = round(place * RATE_HZ)
     samples[first : first + 3] = (0.5, 1.0, -0.5)
-    SignalCurve(plot, trace(0)).set_samples(samples, RATE_HZ)
+    SignalCurve(plot, curve_style(0)).set_samples(samples, RATE_HZ)
     time_s, values = drawn(plot)
     assert len(values) < 4000
     assert values.max() == 1.0
@@ -38,7 +38,7 @@ def test_an_impact_of_three_samples_is_seen_in_two_seconds(plot, place):
 
 def test_a_close_look_shows_the_samples_themselves(plot):
     samples = np.sin(2 * np.pi * 100 * np.arange(round(2 * RATE_HZ)) / RATE_HZ)
-    curve = SignalCurve(plot, trace(0))
+    curve = SignalCurve(plot, curve_style(0))
     curve.set_samples(samples, RATE_HZ)
     plot.setXRange(1.0, 1.01, padding=0)
     time_s, values = drawn(plot)

@@ -2,16 +2,16 @@
 
 import pytest
 
-from vibench.gui.plots import LOG_FREQUENCY, TIME, Axis, Dash, Ink, Plot
+from vibench.gui.plots import LOG_FREQUENCY, TIME, PlotAxis, Dash, LineStyle, Plot
 from vibench.gui.widgets import LIGHT
 
-RED = Ink(lambda _theme: "#ff0000", filled=1.0)
-LINE = Ink(lambda _theme: "#ff0000", Dash.SOLID)
+RED = LineStyle(lambda _theme: "#ff0000", filled=1.0)
+LINE = LineStyle(lambda _theme: "#ff0000", Dash.SOLID)
 
 
 @pytest.fixture
 def plot(qapp):
-    made = Plot("A plot", TIME, Axis("Height", "m"), LIGHT)
+    made = Plot("A plot", TIME, PlotAxis("Height", "m"), LIGHT)
     made.resize(600, 300)
     made.setXRange(0.0, 10.0, padding=0.0)
     made.show()
@@ -59,7 +59,7 @@ def test_lines_are_seen_once_they_are_apart(plot, qapp):
 
 
 def test_a_stripe_of_a_logarithmic_axis_is_at_its_frequency(qapp):
-    made = Plot("A plot", LOG_FREQUENCY, Axis("Height", "m"), LIGHT)
+    made = Plot("A plot", LOG_FREQUENCY, PlotAxis("Height", "m"), LIGHT)
     made.resize(600, 300)
     made.setXRange(1.0, 3.0, padding=0.0)
     made.show()

@@ -4,7 +4,7 @@ from time import thread_time
 
 import pytest
 
-from vibench.gui.window._loop_watch import BOUND_S, LoopWatch
+from vibench.gui.window._loop_watch import BOUND_S, EventLoopMonitor
 
 
 def work_for(duration_s):
@@ -14,7 +14,7 @@ def work_for(duration_s):
 
 
 def test_work_that_holds_the_window_up_is_noted_with_what_was_in_sight(qapp, qtbot):
-    watch = LoopWatch(lambda: "Files page")
+    watch = EventLoopMonitor(lambda: "Files page")
     qtbot.waitUntil(lambda: watch.longest_s > 0 or watch.busiest_s > 0)
     watch.begin()
     work_for(1.6 * BOUND_S)

@@ -3,7 +3,7 @@
 import pytest
 from PySide6.QtCore import Qt
 
-from vibench.gui.page import Desk, Settings
+from vibench.gui.page import AppContext, Settings
 from vibench.gui.widgets import DARK, RIG, TEST
 from vibench.gui.window._page_catalogue import PAGES
 from vibench.gui.window._window import Window
@@ -27,7 +27,7 @@ def test_theme_page_and_test_are_there_again_and_nothing_is_armed(window, qapp, 
     form = window.pages[TEST].form.form
     form.show_content({**form.content(), "name": "kept"})
     window.close()
-    again = Window(Desk(Settings(tmp_path / "window.ini")), PAGES)
+    again = Window(AppContext(Settings(tmp_path / "window.ini")), PAGES)
     assert again.desk.theme is DARK
     assert again.page is again.pages[TEST]
     assert again.desk.intent.measurement.name == "kept"

@@ -3,7 +3,7 @@
 import pytest
 
 from vibench.sim import Accuracy
-from vibench.sim.accuracy_benchmark import LevelFigures, MotionTrade
+from vibench.sim.accuracy_benchmark import LevelFigures, MotionBenchmark
 from vibench.sim.accuracy_benchmark._figures import Motion, Regime
 
 
@@ -12,7 +12,7 @@ def trade(*state_errors, regime=Regime.PERIODIC):
         LevelFigures(accuracy, cost, error, 0.0, 0.0, 1.0, 0.032, -2.0, 0.0)
         for accuracy, cost, error in zip(Accuracy, (1e-3, 1.1e-3, 2e-3), state_errors, strict=True)
     )
-    return MotionTrade(Motion(regime, "power:3", 150.0, 10e-6), 2.0, 0.05, levels, ())
+    return MotionBenchmark(Motion(regime, "power:3", 150.0, 10e-6), 2.0, 0.05, levels, ())
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from vibench.sim import Harmonic, Outcome, gong2025, largest_exponent
-from vibench.sim.chain import chain_of, largest_chain_exponent
+from vibench.sim import Harmonic, Outcome, gong2025, lyapunov_exponent
+from vibench.sim.chain import chain_of, chain_lyapunov_exponent
 from vibench.sim.chain._modes import chain_modal_form
 
 pytestmark = pytest.mark.timeout(300)
@@ -16,22 +16,22 @@ CHAOTIC = Harmonic(260.0, 5e-6)
 
 def test_without_contact_the_exponent_is_the_decay_of_the_slowest_mode():
     chain = chain_of(gong2025(contact="linear", damping_time_s=2e-4), 2)
-    found = largest_chain_exponent(chain, Harmonic(150.0, 1e-6), duration_s=2.0, settle_s=0.0)
+    found = chain_lyapunov_exponent(chain, Harmonic(150.0, 1e-6), duration_s=2.0, settle_s=0.0)
     slowest = float(chain_modal_form(chain).rates.real.max())
     assert found.local_exponents_per_s[-50:].mean() == pytest.approx(slowest, rel=1e-2)
     assert found.impacts == 0
 
 
 def test_the_exponent_of_one_chaotic_cell_is_that_of_the_tangent_flow_within_the_errors():
-    ours = largest_chain_exponent(chain_of(gong2025(), 1), CHAOTIC, duration_s=3.0, settle_s=1.0)
-    theirs = largest_exponent(gong2025(), CHAOTIC, duration_s=10.0, settle_s=2.0)
+    ours = chain_lyapunov_exponent(chain_of(gong2025(), 1), CHAOTIC, duration_s=3.0, settle_s=1.0)
+    theirs = lyapunov_exponent(gong2025(), CHAOTIC, duration_s=10.0, settle_s=2.0)
     assert ours.exponent_per_s > 5.0 * ours.standard_error_per_s
     apart = abs(ours.exponent_per_s - theirs.exponent_per_s)
     assert apart < 4.0 * math.hypot(ours.standard_error_per_s, theirs.standard_error_per_s)
 
 
 def test_a_run_with_too_many_impacts_has_no_exponent():
-    found = largest_chain_exponent(
+    found = chain_lyapunov_exponent(
         chain_of(gong2025(), 2), Harmonic(220.0, 40e-6), duration_s=1.0, max_impact_rate_hz=1.0
     )
     assert found.outcome is Outcome.TOO_MANY_IMPACTS
@@ -44,4 +44,4 @@ def test_a_duration_without_an_error_is_refused_in_one_sentence(duration_s):
     with pytest.raises(
         ValueError, match=r"^Duration .* s is not allowed for an exponent at 260\.0 Hz: .*\.$"
     ):
-        largest_chain_exponent(chain_of(gong2025(), 1), CHAOTIC, duration_s=duration_s)
+        chain_lyapunov_exponent(chain_of(gong2025(), 1), CHAOTIC, duration_s=duration_s)

@@ -10,7 +10,7 @@ from vibench.sim.collision import collide, collision_tables, new_collision
 from vibench.sim.collision._tables import DEPTHS, DURATION, HALF_FORCE, SOFTEST, SPACING
 from vibench.sim.contact import begin_contact
 from vibench.sim.kernels import clock_at
-from vibench.sim.scene._followed_run import FollowedRun, Samples, Watch
+from vibench.sim.scene._followed_run import FollowedRun, Samples, ObservedQuantities
 from vibench.sim.stepping import harmonic_tables, new_state
 
 DRIVE = Harmonic(130.0, 20e-6)
@@ -41,7 +41,7 @@ def followed(start, until, tolerance, **options):
     """The same by steps, which stricter tolerances than the standard's take."""
     run = FollowedRun(gong2025(**options), DRIVE, tolerance, start)
     run.carry_tangent()
-    seen = run.follow(until, Watch.PEAKS_AND_LINES, Samples(0.0, 2e5, 5))
+    seen = run.follow(until, ObservedQuantities.PEAKS_AND_LINES, Samples(0.0, 2e5, 5))
     return run.state, seen
 
 

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from vibench.sim import Accuracy, Harmonic, LinearGap, Outcome, Specimen, gong2025, largest_exponent
+from vibench.sim import Accuracy, Harmonic, LinearGap, Outcome, Specimen, gong2025, lyapunov_exponent
 from vibench.sim.exponents import Precision
-from vibench.sim.exponents._lyapunov import FEWEST_INTERVALS, Source, Tendency
+from vibench.sim.exponents._lyapunov import FEWEST_INTERVALS, Source, ExponentVerdict
 from vibench.sim.exponents._settling import FinalMotion
 
 CHAOS = Harmonic(260.0, 5e-6)
@@ -28,10 +28,10 @@ def slowest_decay(specimen):
 @pytest.mark.parametrize("contact", ["linear", "hertz", "linear_gap", "hunt_crossley:0.5", "rigid:0.8"])
 def test_without_impacts_the_exponent_is_the_decay_of_the_slowest_mode(contact):
     specimen = gong2025(damping_time_s=3e-5, contact=contact)
-    found = largest_exponent(specimen, Harmonic(180.0, 1e-6), duration_s=5.0, settle_s=1.0)
+    found = lyapunov_exponent(specimen, Harmonic(180.0, 1e-6), duration_s=5.0, settle_s=1.0)
     assert found.source is Source.MODES
     assert found.motion is FinalMotion.QUIET
-    assert found.tendency is Tendency.REGULAR
+    assert found.tendency is ExponentVerdict.REGULAR
     assert found.exponent_per_s == pytest.approx(slowest_decay(specimen), rel=1e-9)
     # The reference's closed form, -time * omega1^2 / 2, and what the run itself measured.
     omega = 2.0 * math.pi * specimen.natural_frequencies_hz[0]
@@ -41,43 +41,43 @@ def test_without_impacts_the_exponent_is_the_decay_of_the_slowest_mode(contact):
 
 def test_a_weak_power_law_decays_as_the_linear_structure():
     specimen = gong2025(contact="power:5")
-    found = largest_exponent(specimen, Harmonic(180.0, 1e-9), duration_s=5.0, settle_s=2.0)
+    found = lyapunov_exponent(specimen, Harmonic(180.0, 1e-9), duration_s=5.0, settle_s=2.0)
     assert found.source is Source.MULTIPLIERS
     assert found.exponent_per_s == pytest.approx(slowest_decay(specimen), rel=1e-4)
 
 
 def test_the_papers_statements_on_chaos_hold():
     # Its section 3.1 and Fig. 10: over 100 per second when colliding at 5 um; near zero or below at 1 um.
-    colliding = largest_exponent(gong2025(), CHAOS)
-    assert colliding.tendency is Tendency.CHAOTIC
+    colliding = lyapunov_exponent(gong2025(), CHAOS)
+    assert colliding.tendency is ExponentVerdict.CHAOTIC
     assert colliding.exponent_per_s > 100.0
     assert colliding.exponent_per_s - 3.0 * colliding.standard_error_per_s > 90.0
     for frequency_hz in (94.4, 180.0, 260.0, 266.0, 500.0):
-        still = largest_exponent(gong2025(), Harmonic(frequency_hz, 1e-6))
+        still = lyapunov_exponent(gong2025(), Harmonic(frequency_hz, 1e-6))
         assert still.exponent_per_s < 4.0
 
 
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "power:5"])
 def test_two_halves_of_a_chaotic_run_agree_within_their_errors(contact):
     specimen = gong2025(contact=contact)
-    first = largest_exponent(specimen, CHAOS, Accuracy.QUICK)
-    second = largest_exponent(specimen, CHAOS, Accuracy.STANDARD, initial_state=first.final_state)
-    assert first.tendency is second.tendency is Tendency.CHAOTIC
+    first = lyapunov_exponent(specimen, CHAOS, Accuracy.QUICK)
+    second = lyapunov_exponent(specimen, CHAOS, Accuracy.STANDARD, initial_state=first.final_state)
+    assert first.tendency is second.tendency is ExponentVerdict.CHAOTIC
     allowed = math.hypot(first.standard_error_per_s, second.standard_error_per_s)
     assert abs(first.exponent_per_s - second.exponent_per_s) < 4.0 * allowed
     assert allowed < 0.05 * first.exponent_per_s
 
 
 def test_a_periodic_motion_has_the_exponent_of_its_multipliers_and_of_its_average():
-    found = largest_exponent(gong2025(), Harmonic(130.0, 20e-6), duration_s=10.0)
+    found = lyapunov_exponent(gong2025(), Harmonic(130.0, 20e-6), duration_s=10.0)
     assert found.source is Source.MULTIPLIERS
     assert found.standard_error_per_s < 1e-3
     assert found.exponent_per_s == pytest.approx(found.local_exponents_per_s[-300:].mean(), abs=0.3)
 
 
 def test_a_run_ends_as_soon_as_its_error_is_small_enough():
-    whole = largest_exponent(gong2025(), Harmonic(430.0, 50e-6), Accuracy.QUICK, duration_s=10.0)
-    short = largest_exponent(
+    whole = lyapunov_exponent(gong2025(), Harmonic(430.0, 50e-6), Accuracy.QUICK, duration_s=10.0)
+    short = lyapunov_exponent(
         gong2025(),
         Harmonic(430.0, 50e-6),
         Accuracy.QUICK,
@@ -90,9 +90,9 @@ def test_a_run_ends_as_soon_as_its_error_is_small_enough():
 
 
 def test_a_lost_run_has_no_exponent_and_says_why():
-    found = largest_exponent(gong2025(), CHAOS, duration_s=5.0, max_impact_rate_hz=10.0)
+    found = lyapunov_exponent(gong2025(), CHAOS, duration_s=5.0, max_impact_rate_hz=10.0)
     assert found.outcome is Outcome.TOO_MANY_IMPACTS
-    assert found.tendency is Tendency.UNKNOWN
+    assert found.tendency is ExponentVerdict.UNKNOWN
     assert math.isnan(found.exponent_per_s)
 
 
@@ -108,7 +108,7 @@ def test_a_lost_run_has_no_exponent_and_says_why():
 )
 def test_what_makes_no_run_is_refused(options, message):
     with pytest.raises(ValueError, match=message):
-        largest_exponent(gong2025(), CHAOS, **options)
+        lyapunov_exponent(gong2025(), CHAOS, **options)
 
 
 def heavy_base(restoring, gap, stiffness=1.0, damping=0.02):
@@ -127,7 +127,7 @@ def heavy_base(restoring, gap, stiffness=1.0, damping=0.02):
 
 def test_an_oscillator_that_never_reaches_its_stop_on_a_heavy_base_decays_by_itself():
     specimen = heavy_base(LinearGap(29.0), 1.26)
-    found = largest_exponent(
+    found = lyapunov_exponent(
         specimen, Harmonic(0.8 / (2.0 * math.pi), 0.01), duration_s=2000.0, settle_s=500.0
     )
     assert found.exponent_per_s == pytest.approx(-0.01, rel=1e-4)

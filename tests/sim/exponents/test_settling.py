@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, largest_exponent
-from vibench.sim.exponents._lyapunov import Source, Tendency
+from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, lyapunov_exponent
+from vibench.sim.exponents._lyapunov import Source, ExponentVerdict
 from vibench.sim.exponents._settling import FinalMotion, settling
 from vibench.sim.exponents._tangent_run import Interval, TangentRun
 
@@ -94,10 +94,10 @@ def test_the_specimens_chaos_that_dies_out_is_told_with_its_time_and_its_exponen
     # Each start lives in chaos for a time of its own; what comes after is one and the same.
     spread = np.repeat([2e-5, 2e-2], 3)
     starts = [np.random.default_rng(seed).uniform(-1.0, 1.0, 6) * spread for seed in range(6)]
-    found = [largest_exponent(gong2025(), drive, Accuracy.QUICK, initial_state=start) for start in starts]
+    found = [lyapunov_exponent(gong2025(), drive, Accuracy.QUICK, initial_state=start) for start in starts]
     settled = [each for each in found if each.source is source]
     assert len(settled) >= 4
-    assert all(each.tendency is Tendency.REGULAR for each in settled)
+    assert all(each.tendency is ExponentVerdict.REGULAR for each in settled)
     exponents = np.array([each.exponent_per_s for each in settled])
     assert exponents == pytest.approx(exponents[0], rel=1e-3)
     chaotic = [each for each in settled if each.transient is not None]

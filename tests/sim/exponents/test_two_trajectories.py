@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, largest_exponent
+from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, lyapunov_exponent
 from vibench.sim.exponents._tangent_run import interval_for, run_with_tangent
 from vibench.sim.exponents._two_trajectories import two_trajectory_exponent
 
@@ -28,7 +28,7 @@ def test_interval_by_interval_two_motions_part_as_the_tangent_grows(contact):
 @pytest.mark.parametrize("contact", ["hertz", "power:5"])
 def test_on_average_both_give_the_same_exponent_within_their_errors(contact):
     specimen = gong2025(contact=contact)
-    tangent = largest_exponent(specimen, CHAOS, duration_s=20.0)
+    tangent = lyapunov_exponent(specimen, CHAOS, duration_s=20.0)
     two = two_trajectory_exponent(specimen, CHAOS, Accuracy.STANDARD, duration_s=20.0)
     allowed = math.hypot(tangent.standard_error_per_s, two.standard_error_per_s)
     assert abs(tangent.exponent_per_s - two.exponent_per_s) < 4.0 * allowed

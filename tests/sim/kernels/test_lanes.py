@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.sim.kernels import (
-    compiled,
+    kernel,
     eight,
     eight_of_eight,
     eight_of_sixteen,
@@ -21,7 +21,7 @@ from vibench.sim.kernels._simd import first_outside
 RANDOM = np.random.default_rng(7)
 
 
-@compiled
+@kernel
 def reckoned(table, weights, out):
     """A bit of everything: 1 + 2 w + w sqrt(w) - rows 0 and 1, and what is drawn from it."""
     w = sixteen_of_sixteen(table, 0, weights)
@@ -31,12 +31,12 @@ def reckoned(table, weights, out):
     return total(value), largest(value)
 
 
-@compiled
+@kernel
 def outside(row, low, high):
     return first_outside(sixteen(row, 0), low, high)
 
 
-@compiled
+@kernel
 def sums_of_eight(table, weights, out):
     store(out, 0, eight_of_eight(table, 0, weights))
     store(out, 1, eight_of_sixteen(table, 0, weights))

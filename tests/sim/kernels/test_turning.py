@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from vibench.sim.kernels import (
-    AHEAD,
-    compiled,
+    STEPS_AHEAD,
+    kernel,
     fill_series,
     march,
     series_rows,
     steps_ahead,
     sum_now,
-    turn_by,
+    propagate_by,
 )
 
 RATES = np.array([-3.0 + 600.0j, -20.0 + 1700.0j, -60.0 + 3100.0j, 1630.0j])
@@ -21,15 +21,15 @@ TERMS = np.array([2.0 - 1.0j, 0.5 + 0.3j, -0.2 + 0.1j, 1.0 + 1.5j])
 NOW, SERIES = steps_ahead(RATES, GRID_S), series_rows(RATES)
 
 
-@compiled
+@kernel
 def marched(terms, steps, low, high):
     return march(terms, NOW, steps, low, high)
 
 
-@compiled
+@kernel
 def looked_ahead(terms, series):
     fill_series(series, terms, SERIES)
-    turn_by(terms, NOW, 5)
+    propagate_by(terms, NOW, 5)
     return sum_now(terms)
 
 
@@ -38,7 +38,7 @@ def exact(time_s):
 
 
 def test_a_series_is_that_of_the_sum_and_turning_goes_where_it_says():
-    terms, series = TERMS.copy(), np.zeros(AHEAD)
+    terms, series = TERMS.copy(), np.zeros(STEPS_AHEAD)
     assert looked_ahead(terms, series) == pytest.approx(exact(5 * GRID_S), rel=1e-13)
     time_s = np.linspace(0.0, GRID_S, 9)
     np.testing.assert_allclose(np.polynomial.Polynomial(series)(time_s), exact(time_s), rtol=1e-14)

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from vibench.sim import Harmonic, Specimen, base_answer, base_transmissibility, gong2025, steady_response
+from vibench.sim import Harmonic, Specimen, base_response, base_transmissibility, gong2025, steady_response
 
 FREQUENCY_HZ = np.array([20.0, 94.0, 201.0, 266.0, 350.0, 436.0, 500.0])
 
 
 def test_free_is_the_transmissibility():
-    answer, truth = base_answer(gong2025(), FREQUENCY_HZ), base_transmissibility(gong2025(), FREQUENCY_HZ)
+    answer, truth = base_response(gong2025(), FREQUENCY_HZ), base_transmissibility(gong2025(), FREQUENCY_HZ)
     np.testing.assert_array_equal(answer.free_x, truth[:, 0])
     np.testing.assert_array_equal(answer.free_p, truth[:, 3])
 
@@ -20,7 +20,7 @@ def test_stuck_is_the_answer_of_two_masses_in_one():
     k0, k1, k2 = specimen.stiffnesses
     tied = Specimen(specimen.masses, (k0, 1e6 * k1, k2), specimen.dampings, 45e-6, specimen.contact)
     np.testing.assert_allclose(
-        base_answer(specimen, FREQUENCY_HZ).stuck_x,
+        base_response(specimen, FREQUENCY_HZ).stuck_x,
         base_transmissibility(tied, FREQUENCY_HZ)[:, 0],
         rtol=1e-4,
     )
@@ -33,7 +33,7 @@ def test_the_lever_tells_x_from_any_p(stiffer):
     k0, k1, k2 = specimen.stiffnesses
     other = Specimen(specimen.masses, (k0, stiffer * k1, k2), specimen.dampings, 45e-6, specimen.contact)
     moved = base_transmissibility(other, FREQUENCY_HZ)
-    answer = base_answer(specimen, FREQUENCY_HZ)
+    answer = base_response(specimen, FREQUENCY_HZ)
     np.testing.assert_allclose(answer.stuck_x + answer.lever * moved[:, 3], moved[:, 0], rtol=1e-9)
 
 
@@ -42,7 +42,7 @@ def test_the_lever_tells_x_from_any_p(stiffer):
 def test_a_large_motion_against_the_stops_is_about_the_fundamental_s(frequency_hz, amplitude_m):
     specimen = gong2025()
     settled = steady_response(specimen, Harmonic(frequency_hz, amplitude_m), duration_s=12.0, window_s=2.0)
-    answer = base_answer(specimen, frequency_hz)
+    answer = base_response(specimen, frequency_hz)
     estimate_m = abs(answer.stuck_x[0]) * amplitude_m + abs(answer.lever[0]) * specimen.gap_m
     assert abs(answer.free_p[0]) * amplitude_m > specimen.gap_m
     assert 0.8 < settled.largest_x_m / estimate_m < 1.3

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vibench.sim import PowerSpring, balance_branch, gong2025, jump_frequencies, spring_of, structure_of
+from vibench.sim import PowerSpring, harmonic_balance_branch, gong2025, jump_frequencies, spring_of, structure_of
 from vibench.sim.periodic._balance_branch import raised_balance
 from vibench.sim.periodic._balance_solver import BalanceOptions, balance
-from vibench.sim.periodic._branch import Happening, Parameter
+from vibench.sim.periodic._branch import BifurcationKind, Parameter
 from vibench.sim.periodic._condensation import Structure
 from vibench.sim.periodic._continuation import ArcEnd, ArcSteps
 from vibench.sim.periodic._harmonic_balance import BalanceEnd, HarmonicSet
@@ -30,9 +30,9 @@ def test_a_first_order_branch_folds_where_the_closed_form_says():
     options = BalanceOptions(fewest=1, most=1)
     low, high = 0.8 / (2 * math.pi), 2.0 / (2 * math.pi)
     start = balance(structure, spring, low, 0.1, options)
-    branch = balance_branch(structure, spring, start, Parameter.FREQUENCY, high, options)
+    branch = harmonic_balance_branch(structure, spring, start, Parameter.FREQUENCY, high, options)
     assert branch.end is ArcEnd.REACHED_BOUND
-    folds = [e.frequency_hz for e in branch.events if e.kind is Happening.FOLD]
+    folds = [e.frequency_hz for e in branch.events if e.kind is BifurcationKind.FOLD]
     jumps = jump_frequencies(structure, spring, 0.1, low, high, 401)
     assert sorted(folds) == pytest.approx(jumps, rel=1e-9)
 
@@ -42,8 +42,8 @@ def test_between_its_folds_a_duffing_branch_is_unstable_and_a_multiplier_passes_
     options = BalanceOptions(fewest=7, tolerance=1e-6)
     low, high = 1.1 / (2 * math.pi), 2.0 / (2 * math.pi)
     start = balance(structure, spring, low, 0.1, options)
-    branch = balance_branch(structure, spring, start, Parameter.FREQUENCY, high, options)
-    assert kinds(branch) == [Happening.FOLD, Happening.FOLD]
+    branch = harmonic_balance_branch(structure, spring, start, Parameter.FREQUENCY, high, options)
+    assert kinds(branch) == [BifurcationKind.FOLD, BifurcationKind.FOLD]
     first, second = (event.index for event in branch.events)
     assert np.all(branch.is_stable[: first + 1])
     assert not np.any(branch.is_stable[first + 1 : second + 1])
@@ -54,7 +54,7 @@ def test_between_its_folds_a_duffing_branch_is_unstable_and_a_multiplier_passes_
 def test_a_linear_branch_has_no_events_and_reaches_its_end():
     structure = structure_of(gong2025(contact="linear"))
     start = balance(structure, NoForce(), 50.0, 1e-6, BalanceOptions(fewest=1))
-    branch = balance_branch(structure, NoForce(), start, Parameter.FREQUENCY, 80.0, BalanceOptions(fewest=1))
+    branch = harmonic_balance_branch(structure, NoForce(), start, Parameter.FREQUENCY, 80.0, BalanceOptions(fewest=1))
     assert branch.end is ArcEnd.REACHED_BOUND
     assert branch.events == ()
     assert branch.frequencies_hz[[0, -1]] == pytest.approx([50.0, 80.0])
@@ -68,10 +68,10 @@ def test_raising_the_drive_finds_the_stops_at_the_amplitude_at_which_p_equals_th
         structure, spring, 100.0, 5e-6, BalanceOptions(fewest=15, most=15), ArcSteps(most_points=230)
     )
     linear = balance(structure, NoForce(), 100.0, 1e-6)
-    assert branch.events[0].kind is Happening.GRAZING
+    assert branch.events[0].kind is BifurcationKind.GRAZING
     assert branch.events[0].amplitude_m == pytest.approx(45e-6 / linear.response_ii[3], rel=1e-6)
     # Near a resonance a stop stiffens the motion away from it: the branch turns back at once.
-    assert branch.events[1].kind is Happening.FOLD
+    assert branch.events[1].kind is BifurcationKind.FOLD
 
 
 def test_a_strong_power_law_is_reached_by_raising_the_drive():
@@ -102,7 +102,7 @@ def test_a_mirrored_duffing_motion_loses_or_gains_stability_where_its_symmetry_b
     structure, spring = oscillator(0.2, 1e-9), PowerSpring(1.0, ((3, 1.0),))
     options = BalanceOptions(fewest=15, tolerance=1e-8)
     _, branch = raised_balance(structure, spring, 1.0 / (2 * math.pi), 6.0, options, ArcSteps(longest=0.1))
-    broken = [event for event in branch.events if event.kind is Happening.SYMMETRY_BREAKING]
+    broken = [event for event in branch.events if event.kind is BifurcationKind.SYMMETRY_BREAKING]
     assert broken
     before = branch.multipliers[broken[0].index, :2]
     after = branch.multipliers[broken[0].index + 1, :2]
@@ -121,14 +121,14 @@ def test_the_two_mass_unilateral_stop_of_nlvib_doubles_its_period_and_loses_it_o
     options = BalanceOptions(HarmonicSet.ALL, fewest=21, most=21, tolerance=1e-2)
     start = balance(structure, spring, 0.8 / (2 * math.pi), 0.1, options)
     steps = ArcSteps(first=0.05, longest=0.3, most_points=1500)
-    branch = balance_branch(
+    branch = harmonic_balance_branch(
         structure, spring, start, Parameter.FREQUENCY, 0.5 / (2 * math.pi), options, steps
     )
     omega = 2 * math.pi * branch.frequencies_hz
-    assert Happening.FOLD in kinds(branch)
-    doublings = [e for e in branch.events if e.kind is Happening.PERIOD_DOUBLING]
+    assert BifurcationKind.FOLD in kinds(branch)
+    doublings = [e for e in branch.events if e.kind is BifurcationKind.PERIOD_DOUBLING]
     assert len(doublings) == 2
-    torus = next(e for e in branch.events if e.kind is Happening.NEIMARK_SACKER)
+    torus = next(e for e in branch.events if e.kind is BifurcationKind.NEIMARK_SACKER)
     assert 0.60 < 2 * math.pi * torus.frequency_hz < 0.62
     between = slice(doublings[1].index + 1, torus.index)
     assert np.all(branch.is_stable[between])

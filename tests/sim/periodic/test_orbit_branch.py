@@ -7,11 +7,11 @@ from vibench.sim import (
     base_transmissibility,
     gong2025,
     integrate,
-    orbit_branch,
+    periodic_branch,
     periodic_orbit,
 )
 from vibench.sim.motion import state_scales
-from vibench.sim.periodic._branch import Happening, Parameter
+from vibench.sim.periodic._branch import BifurcationKind, Parameter
 from vibench.sim.periodic._continuation import ArcEnd, ArcSteps
 from vibench.sim.periodic._period_map import OrbitShape
 
@@ -23,7 +23,7 @@ STEPS = ArcSteps(first=0.02, longest=0.3, shortest=1e-7, tolerance=1e-9, most_po
 def upward():
     """The mirrored motion at 100 Hz and 5 um, followed up to 112 Hz."""
     orbit = periodic_orbit(SPECIMEN, Harmonic(100.0, 5e-6), OrbitShape.MIRRORED)
-    return orbit_branch(orbit, Parameter.FREQUENCY, 112.0, STEPS)
+    return periodic_branch(orbit, Parameter.FREQUENCY, 112.0, STEPS)
 
 
 def test_a_branch_ends_where_it_is_asked_to(upward):
@@ -33,7 +33,7 @@ def test_a_branch_ends_where_it_is_asked_to(upward):
 
 
 def test_at_a_neimark_sacker_point_a_complex_pair_lies_on_the_unit_circle(upward):
-    points = [event for event in upward.events if event.kind is Happening.NEIMARK_SACKER]
+    points = [event for event in upward.events if event.kind is BifurcationKind.NEIMARK_SACKER]
     assert points
     for event in points:
         orbit = periodic_orbit(SPECIMEN, Harmonic(event.frequency_hz, 5e-6), start=event.state)
@@ -63,10 +63,10 @@ def test_a_branch_that_leaves_the_stops_does_so_at_the_grazing_of_the_linear_res
     # Under a weak drive at 60 Hz, raised until p meets the gap.
     gap_amplitude = SPECIMEN.gap_m / abs(base_transmissibility(SPECIMEN, 60.0)[0, 3])
     orbit = periodic_orbit(SPECIMEN, Harmonic(60.0, 0.9 * gap_amplitude), OrbitShape.MIRRORED)
-    branch = orbit_branch(
+    branch = periodic_branch(
         orbit, Parameter.AMPLITUDE, 1.1 * gap_amplitude, ArcSteps(tolerance=1e-9, longest=0.5, most_points=60)
     )
-    assert branch.events[0].kind is Happening.GRAZING
+    assert branch.events[0].kind is BifurcationKind.GRAZING
     assert branch.events[0].amplitude_m == pytest.approx(gap_amplitude, rel=1e-6)
     linear = base_transmissibility(SPECIMEN, 60.0)[0]
     assert branch.response_ii[0] == pytest.approx(np.abs(linear), rel=1e-8)
@@ -75,4 +75,4 @@ def test_a_branch_that_leaves_the_stops_does_so_at_the_grazing_of_the_linear_res
 def test_a_branch_to_where_it_is_goes_nowhere():
     orbit = periodic_orbit(SPECIMEN, Harmonic(130.0, 20e-6))
     with pytest.raises(ValueError, match="two different ends"):
-        orbit_branch(orbit, Parameter.FREQUENCY, 130.0)
+        periodic_branch(orbit, Parameter.FREQUENCY, 130.0)

@@ -12,7 +12,7 @@ from vibench.sim.model import state_matrix
 from vibench.sim.power_law import FEED, FREE, GAIN, MOVE
 from vibench.sim.power_law._numbers import INNER
 from vibench.sim.power_law._tables import POINTS_AT
-from vibench.sim.scene._followed_run import FollowedRun, Watch
+from vibench.sim.scene._followed_run import FollowedRun, ObservedQuantities
 from vibench.sim.stepping import harmonic_tables
 
 DRIVE = Harmonic(130.0, 20e-6)
@@ -76,7 +76,7 @@ def test_samples_and_peaks_are_the_motions_own_whatever_the_steps(contact):
         reached = integrate(specimen, DRIVE, dense.time_s[place], Accuracy.REFERENCE).final_state
         np.testing.assert_allclose(dense.states[place], reached, atol=1e-13, rtol=1e-7)
     run = FollowedRun(specimen, DRIVE, Accuracy.REFERENCE.tolerance, np.zeros(6))
-    seen = run.follow(until, Watch.PEAKS)
+    seen = run.follow(until, ObservedQuantities.PEAKS)
     p = np.abs(dense.states[:, 1] - dense.states[:, 2])
     for peak, sampled in ((seen.peak_x_m, np.abs(dense.states[:, 0])), (seen.peak_p_m, p)):
         # Between samples 1 us apart a peak may hide: a millionth of it at the fastest rate of this motion.

@@ -7,12 +7,12 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
 from vibench.sim import Accuracy, gong2025
-from vibench.sim.kernels import compiled
+from vibench.sim.kernels import kernel
 from vibench.sim.model import state_matrix
 from vibench.sim.stepping import FAILED, advance_interval, base_reaction, interval_tables, new_state
 
 
-@compiled
+@kernel
 def advance_all(state, pieces, tables):
     impacts = 0
     for index in range(len(pieces)):

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from vibench.sim.study import Existing, Study, solve_study
+from vibench.sim.study import ExistingStudy, Study, solve_study
 
 STUDY = Study(
     frequencies_hz={"start": 180.0, "stop": 300.0, "step": 2.0},
@@ -19,7 +19,7 @@ def main(path):
         sys.stdout.write(f"{progress.kept}\n")
         sys.stdout.flush()
 
-    solve_study(STUDY, Path(path), Existing.RESUME, workers=2, watcher=tell)
+    solve_study(STUDY, Path(path), ExistingStudy.RESUME, workers=2, watcher=tell)
 
 
 if __name__ == "__main__":

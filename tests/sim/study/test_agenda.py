@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings, strategies as st
 
 from vibench.sim.study._axes import Grid
-from vibench.sim.study._point_scheduler import NOBODY, Agenda, Costs
+from vibench.sim.study._point_scheduler import NOBODY, PointScheduler, Costs
 
 
 def agenda_of(planned_s, after=None, is_done=None):
@@ -12,7 +12,7 @@ def agenda_of(planned_s, after=None, is_done=None):
     costs = Costs(Grid((points,), (True,)), np.array(planned_s, dtype=float))
     after = np.full(points, NOBODY) if after is None else np.array(after)
     is_done = np.zeros(points, dtype=bool) if is_done is None else np.array(is_done)
-    return Agenda(after, is_done, costs)
+    return PointScheduler(after, is_done, costs)
 
 
 def test_the_longest_point_begins_first():

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import vibench.sim
-from vibench.sim.study import Existing, MemoryStore, PointState, Study, open_study, run_study, solve_study
+from vibench.sim.study import ExistingStudy, MemoryStore, PointState, Study, open_study, run_study, solve_study
 from vibench.sim.study._columns import SESSION
 from vibench.sim.study._errors import ClusterLost
 from vibench.sim.study._layout import STATE
@@ -121,7 +121,7 @@ def test_a_cluster_that_dies_is_told_and_what_was_kept_goes_on_elsewhere(
     executor.close()
     kept = np.count_nonzero(open_study(path).arrays[STATE])
     assert longer.grid.size // 3 <= kept < longer.grid.size
-    results = solve_study(longer, path, Existing.RESUME, workers=2)
+    results = solve_study(longer, path, ExistingStudy.RESUME, workers=2)
     assert np.count_nonzero(results.values(SESSION) == 0.0) == kept
     require_equal(results, truth)
 

@@ -8,9 +8,9 @@ import h5py
 import numpy as np
 import pytest
 
-from vibench.sim import Prediction, Rest, solve_scene
+from vibench.sim import ScenePrediction, Rest, solve_scene
 from vibench.sim.study import (
-    Existing,
+    ExistingStudy,
     MemoryStore,
     PointState,
     Study,
@@ -60,7 +60,7 @@ def test_every_field_of_a_prediction_is_kept_or_has_another_length_for_every_sce
     kept = set(NUMBERS) | {"motion", "method", "outcome", "ended", "final_state"}
     of_the_study = {"frequency_hz", "amplitude_m", "accuracy", "start"}
     of_any_length = {"section", "spectrum", "spectrum_hz"}
-    assert set(Prediction.__dataclass_fields__) == kept | of_the_study | of_any_length
+    assert set(ScenePrediction.__dataclass_fields__) == kept | of_the_study | of_any_length
 
 
 def test_what_comes_out_of_the_file_is_what_went_in(small, tmp_path, require_equal):
@@ -150,7 +150,7 @@ def test_a_complete_study_is_not_touched_when_it_is_resumed(small, tmp_path):
     path = tmp_path / "a.h5"
     solve_study(small, path)
     before = path.read_bytes()
-    assert solve_study(small, path, Existing.RESUME).is_complete
+    assert solve_study(small, path, ExistingStudy.RESUME).is_complete
     assert path.read_bytes() == before
 
 
@@ -187,7 +187,7 @@ def test_another_study_is_refused_by_what_differs_and_changes_nothing(small, tmp
     before = path.read_bytes()
     other = Study.model_validate({**small.model_dump(), **change})
     with pytest.raises(StudyError, match=said):
-        solve_study(other, path, Existing.RESUME)
+        solve_study(other, path, ExistingStudy.RESUME)
     assert path.read_bytes() == before
 
 

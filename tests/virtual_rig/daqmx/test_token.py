@@ -6,7 +6,7 @@ import pytest
 from nidaqmx import GrpcSessionOptions
 
 from vibench.acquisition import InstrumentLost, open_bench
-from vibench.acquisition.rig import VARIABLE, CalibrationRule, confirm_simulated, load_rig
+from vibench.acquisition.rig import TOKEN_VARIABLE, CalibrationRule, confirm_simulated, load_rig
 from vibench.virtual_rig import VirtualRig
 from vibench.virtual_rig.daqmx import token_for
 from vibench.virtual_rig.usb._remote import RemoteUsbDevice
@@ -50,7 +50,7 @@ def test_a_stranger_is_turned_away_from_converter_and_cable(served):
 
 def test_a_bench_with_the_token_is_let_in(served, monkeypatch):
     virtual, address = served
-    monkeypatch.setenv(VARIABLE, virtual.token)
+    monkeypatch.setenv(TOKEN_VARIABLE, virtual.token)
     with bench_on(connected(virtual, address)) as bench:
         assert bench.digitizer.identity.model == "NI 9234"
     remote = RemoteUsbDevice(address)
@@ -60,6 +60,6 @@ def test_a_bench_with_the_token_is_let_in(served, monkeypatch):
 
 def test_a_wrong_token_is_no_token(served, monkeypatch):
     virtual, address = served
-    monkeypatch.setenv(VARIABLE, virtual.token[:-1])
+    monkeypatch.setenv(TOKEN_VARIABLE, virtual.token[:-1])
     with pytest.raises(InstrumentLost, match="UNAUTHENTICATED"):
         RemoteUsbDevice(address)

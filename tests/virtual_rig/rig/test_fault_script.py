@@ -8,7 +8,7 @@ import pytest
 
 from vibench.acquisition import ConfigurationError, InstrumentError, InstrumentLost, open_bench
 from vibench.acquisition.bench import RigPower
-from vibench.acquisition.campaign import KeptBench
+from vibench.acquisition.campaign import ReconnectingBench
 from vibench.acquisition.errors import DataLost, InstrumentBusy
 from vibench.acquisition.recording._disk_room import claim_room
 from vibench.acquisition.rig import load_rig, with_faults
@@ -146,7 +146,7 @@ class TestEffects:
         ],
     )
     def test_a_fault_of_the_converter_stops_its_reader_and_heals(self, scripted, name, parameters, error):
-        with KeptBench(scripted(fault(name, 0.5, for_s=0.4, **parameters))) as kept:
+        with ReconnectingBench(scripted(fault(name, 0.5, for_s=0.4, **parameters))) as kept:
             kept.bench.digitizer.start()
             with pytest.raises(error):
                 read_for(kept.bench, 1.0)
@@ -179,7 +179,7 @@ class TestEffects:
             assert refusals == 4  # the first at once, a second each after it
 
     def test_a_device_taken_by_another_program_is_named_as_such_until_it_is_given_back(self, scripted):
-        with KeptBench(scripted(fault("reserve_device", 0.2, for_s=1.5))) as kept:
+        with ReconnectingBench(scripted(fault("reserve_device", 0.2, for_s=1.5))) as kept:
             kept.bench.digitizer.start()
             read_for(kept.bench, 0.5)  # a task that runs goes on
             with pytest.raises(InstrumentBusy, match="another program"):
@@ -190,7 +190,7 @@ class TestEffects:
         ("name", "said"), [("pull_usb_cable", "amplifier"), ("hang_generator", "MAY STILL BE ON")]
     )
     def test_a_generator_out_of_reach_is_found_at_the_next_command_and_comes_back(self, scripted, name, said):
-        with KeptBench(scripted(fault(name, 0.2, for_s=1.5))) as kept:
+        with ReconnectingBench(scripted(fault(name, 0.2, for_s=1.5))) as kept:
             kept.bench.digitizer.start()
             read_for(kept.bench, 0.3)
             with pytest.raises(InstrumentError, match=said):

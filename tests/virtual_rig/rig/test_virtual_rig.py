@@ -14,7 +14,7 @@ from nidaqmx.errors import DaqError, DaqReadError, RpcError
 from nidaqmx.stream_readers import AnalogMultiChannelReader
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
-from vibench.acquisition.rig import Quantity, RigModel, load_rig
+from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig
 from vibench.virtual_rig import VirtualRig
 from vibench.virtual_rig.generator import Panel, Quirks
 from vibench.virtual_rig.usb._remote import RemoteUsbDevice
@@ -105,10 +105,10 @@ def test_a_sine_set_by_pyvisa_is_read_by_nidaqmx_through_the_whole_chain(switch_
     model = RigModel(RIG)
     drive = amplitude(volts[DRIVE]) * RIG.daq.channels[DRIVE].attenuation
     assert drive == pytest.approx(into_amplifier, rel=2e-3)
-    voltage = abs(complex(model.transfer(Quantity.AMPLIFIER_VOLTAGE, 160.0)))
+    voltage = abs(complex(model.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, 160.0)))
     amplifier = amplitude(volts[AMPLIFIER]) * RIG.daq.channels[AMPLIFIER].attenuation
     assert amplifier == pytest.approx(voltage * into_amplifier, rel=5e-3)
-    acceleration = abs(complex(model.transfer(Quantity.ACCELERATION, 160.0)))
+    acceleration = abs(complex(model.transfer(BaseQuantity.ACCELERATION, 160.0)))
     base = amplitude(volts[BASE]) / RIG.accelerometer.sensitivity_v_per_m_per_s2
     # The specimen, 10 g on 127 g, is not in the model.
     assert base == pytest.approx(acceleration * into_amplifier, rel=0.1)

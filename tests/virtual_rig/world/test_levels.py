@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.rig import Quantity, RigModel, load_rig, specimen_of
+from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig, specimen_of
 from vibench.virtual_rig.world._plant import TRUTH_COLUMNS, Plant
 from vibench.virtual_rig.world._time_grid import USUAL_GRID
 
@@ -63,13 +63,13 @@ def sine(amplitude_vpp, frequency_hz, first_s, seconds):
     return 0.5 * amplitude_vpp * np.sin(2 * np.pi * frequency_hz * time_s)
 
 
-@pytest.mark.parametrize("quantity", [Quantity.FORCE, Quantity.CURRENT, Quantity.STROKE])
+@pytest.mark.parametrize("quantity", [BaseQuantity.FORCE, BaseQuantity.CURRENT, BaseQuantity.STROKE])
 def test_the_strongest_sine_stays_within_the_shakers_limits_from_fifty_hertz_up(quantity):
     limits = RIG.shaker.limits
     allowed = {
-        Quantity.FORCE: limits.force_n.value,
-        Quantity.CURRENT: limits.current_a.value,
-        Quantity.STROKE: limits.stroke_m.value,
+        BaseQuantity.FORCE: limits.force_n.value,
+        BaseQuantity.CURRENT: limits.current_a.value,
+        BaseQuantity.STROKE: limits.stroke_m.value,
     }[quantity]
     reached = np.abs(RigModel(RIG).transfer(quantity, np.arange(50.0, 801.0))) * STRONG_VPP / 2
     assert np.max(reached) < 0.95 * allowed

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import AcquisitionError
-from vibench.acquisition.rig import Quantity, RigModel, load_rig, suspended_mass_kg
+from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig, suspended_mass_kg
 from vibench.acquisition.rig._model import amplifier_gain
 from vibench.sim import base_transmissibility, gong2025
 from vibench.virtual_rig.world._plant import TRUTH_COLUMNS, Plant
@@ -81,7 +81,7 @@ def test_base_and_specimen_answer_as_the_closed_form_of_the_loaded_rig(linear_mo
 def test_the_specimen_notches_the_base_where_it_resonates(linear_motion):
     drive, motion = linear_motion
     measured = np.abs(lines(motion.base_acceleration) / lines(drive))
-    alone = np.abs(RigModel(RIG).transfer(Quantity.ACCELERATION, LINES_HZ))
+    alone = np.abs(RigModel(RIG).transfer(BaseQuantity.ACCELERATION, LINES_HZ))
     at_resonance = np.abs(measured / alone - 1)[LINES_HZ == 266]
     beside = np.abs(measured / alone - 1)[LINES_HZ == 777]
     assert at_resonance > 0.03
@@ -101,9 +101,9 @@ def test_without_a_specimen_to_speak_of_the_shaker_is_the_rig_model():
     )
     drive = tones(1e-3, LINES_HZ)
     motion = settled(Plant(RIG, dust, STEP_S), drive, 2)
-    expected = RigModel(RIG).transfer(Quantity.ACCELERATION, LINES_HZ)
+    expected = RigModel(RIG).transfer(BaseQuantity.ACCELERATION, LINES_HZ)
     assert lines(motion.base_acceleration) / lines(drive) == pytest.approx(expected, rel=5e-4)
-    voltage = RigModel(RIG).transfer(Quantity.AMPLIFIER_VOLTAGE, LINES_HZ)
+    voltage = RigModel(RIG).transfer(BaseQuantity.AMPLIFIER_VOLTAGE, LINES_HZ)
     assert lines(motion.amplifier_voltage) / lines(drive) == pytest.approx(voltage, rel=5e-4)
 
 
@@ -168,7 +168,7 @@ def test_noise_is_added_at_the_amplifiers_output():
 
 def test_the_rubber_stops_end_the_stroke_and_are_counted():
     plant = Plant(RIG, gong2025(), STEP_S)
-    free = abs(complex(RigModel(RIG).transfer(Quantity.STROKE, 8.0))) * 6.0
+    free = abs(complex(RigModel(RIG).transfer(BaseQuantity.STROKE, 8.0))) * 6.0
     stroke = RIG.shaker.limits.stroke_m.value
     assert free > 1.2 * stroke
     motion = plant.move(tones(6.0, [8.0]), np.zeros(SECOND), SECOND)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from vibench.acquisition import ConfigurationError
-from vibench.acquisition.rig import Quantity, RigModel, load_rig, specimen_of
+from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig, specimen_of
 from vibench.sim import base_transmissibility
 from vibench.virtual_rig.analogue import Coupling, Input
 from vibench.virtual_rig.world import World, relative_clock_ppm
@@ -78,7 +78,7 @@ def test_every_channel_shows_what_the_model_of_rig_and_specimen_says(frequency_h
     volts = sampler.read(25_600)
     drive, amplifier, base, laser = (phasor(row, frequency_hz, 51_200.0, settle) for row in volts)
     model = RigModel(QUIET)
-    voltage = complex(model.transfer(Quantity.AMPLIFIER_VOLTAGE, frequency_hz))
+    voltage = complex(model.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, frequency_hz))
     assert drive * RIG.daq.channels[DRIVE].attenuation == pytest.approx(amplitude_v, rel=2e-4)
     assert amplifier * RIG.daq.channels[AMPLIFIER].attenuation == pytest.approx(
         voltage * amplitude_v, rel=1e-3

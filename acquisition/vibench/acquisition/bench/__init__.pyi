@@ -1,6 +1,6 @@
 from ._bench import (
     Bench as Bench,
-    Reality as Reality,
+    BenchKind as BenchKind,
     open_bench as open_bench,
 )
 from ._instrument_list import (

@@ -27,7 +27,7 @@ from ._result import CheckResult
 from ._rig_power import RigPower
 
 
-class Reality(StrEnum):
+class BenchKind(StrEnum):
     """Whether the numbers of a bench come from the world or from a calculation."""
 
     REAL = "real"
@@ -73,9 +73,9 @@ class Bench:
         return identities if self.output is None else {**identities, "output": self.output.identity}
 
     @property
-    def reality(self) -> Reality:
+    def reality(self) -> BenchKind:
         """Whether the instruments are simulated."""
-        return Reality.REAL if self.rig.virtual is None else Reality.SIMULATED
+        return BenchKind.REAL if self.rig.virtual is None else BenchKind.SIMULATED
 
     def idle(self, duration_s: float) -> None:
         """Wait while nothing is sampled [s]; a virtual rig at its own pace lets its own time pass."""

@@ -1,26 +1,26 @@
 from ._catalogue import (
     Refresh as Refresh,
-    catalogue as catalogue,
+    list_recordings as list_recordings,
 )
 from ._catalogue_entry import (
     UNREADABLE as UNREADABLE,
     CatalogueEntry as CatalogueEntry,
 )
 from ._estimate import (
-    Estimate as Estimate,
-    estimate as estimate,
+    CampaignEstimate as CampaignEstimate,
+    estimate_campaign as estimate_campaign,
 )
 from ._event import (
-    Event as Event,
-    Happening as Happening,
-    Listener as Listener,
-    ignore_happening as ignore_happening,
+    CampaignEventKind as CampaignEventKind,
+    CampaignEvent as CampaignEvent,
+    CampaignListener as CampaignListener,
+    ignore_event as ignore_event,
 )
 from ._journal import (
     JOURNAL_SUFFIX as JOURNAL_SUFFIX,
 )
 from ._journal_point import (
-    PointState as PointState,
+    JournalPointState as JournalPointState,
     read_journal as read_journal,
 )
 from ._notice import (
@@ -35,16 +35,16 @@ from ._opening import (
 )
 from ._point_outcome import (
     AfterFailure as AfterFailure,
-    CampaignItem as CampaignItem,
+    PointResult as PointResult,
     CampaignProgress as CampaignProgress,
     ChangedBench as ChangedBench,
-    Existing as Existing,
-    Item as Item,
-    Why as Why,
-    ignore_item as ignore_item,
+    ExistingRecordings as ExistingRecordings,
+    PointOutcome as PointOutcome,
+    ReasonCode as ReasonCode,
+    ignore_result as ignore_result,
 )
 from ._reconnecting_bench import (
-    KeptBench as KeptBench,
+    ReconnectingBench as ReconnectingBench,
 )
 from ._run_campaign import (
     run_campaign as run_campaign,

@@ -16,21 +16,21 @@ from ..run import BLOCK_S, Outcome, Progress, run_measurement
 from ..stopping import StopSwitch
 from ._attempt_files import next_attempt
 from ._bench_identity import BenchIdentity
-from ._event import Event, Happening, Listener
+from ._event import CampaignEventKind, CampaignEvent, CampaignListener
 from ._journal import Journal
-from ._journal_point import PointState
+from ._journal_point import JournalPointState
 from ._opening import require_same_bench
-from ._point_outcome import CampaignItem, Item, Why, why_of
+from ._point_outcome import PointResult, PointOutcome, ReasonCode, reason_code_of
 
 
-class Rest:
+class CoolingPause:
     """Rests before a recording when another one was made before it in this session.
 
     A stop ends it at once; a hold keeps it up until it is taken back. Nothing is written into the journal:
     the next point stays queued, so that a campaign that is killed here goes on as from between two points.
     """
 
-    def __init__(self, rest_s: float, switch: StopSwitch, say: Listener) -> None:
+    def __init__(self, rest_s: float, switch: StopSwitch, say: CampaignListener) -> None:
         self._rest_s = rest_s
         self._switch = switch
         self._say = say
@@ -46,7 +46,7 @@ class Rest:
             return
         self._is_due = False
         text = f"resting for {self._rest_s:g} s before {name}"
-        self._say(Happening(Event.RESTING, text, {"point": name, "rest_s": self._rest_s}))
+        self._say(CampaignEvent(CampaignEventKind.RESTING, text, {"point": name, "rest_s": self._rest_s}))
         left_s = self._rest_s
         while (left_s > 0 or self._switch.is_holding) and self._switch.request is None:
             piece_s = min(left_s, BLOCK_S) if left_s > 0 else BLOCK_S
@@ -72,8 +72,8 @@ class Attempts:
         journal: Journal,
         policy: RetryPolicy,
         switch: StopSwitch,
-        say: Listener,
-        rest: Rest,
+        say: CampaignListener,
+        rest: CoolingPause,
         reopen: Reopen | None,
     ) -> None:
         self._bench = bench
@@ -88,7 +88,7 @@ class Attempts:
         """Leave the time between two recordings that the campaign asks for; a stop ends it."""
         self._rest.take(self._bench, name)
 
-    def carry_out(self, point: Point, tell: Callable[[Path, Progress], None]) -> CampaignItem:
+    def carry_out(self, point: Point, tell: Callable[[Path, Progress], None]) -> PointResult:
         """Make one recording of a point that counts; ``tell`` is called after every block.
 
         Raises
@@ -101,55 +101,55 @@ class Attempts:
             path = next_attempt(self._journal.path.parent, point.name)
             self._rest.owe()
             self._journal.start(point.name, path.name)
-            self._tell(Event.POINT_BEGUN, f"{path.name} begins", point, path)
+            self._tell(CampaignEventKind.POINT_BEGUN, f"{path.name} begins", point, path)
             try:
                 outcome = run_measurement(
                     self._bench, point.measurement, path, on_progress=partial(tell, path), switch=self._switch
                 )
             except AcquisitionError as error:
                 self._failed(point, path, error)
-                if not (left and self._may_mend(why_of(error))):
+                if not (left and self._may_mend(reason_code_of(error))):
                     raise
                 self._made_ready(point, path, error)
                 self._rested(point, error)
             except BaseException as error:
                 reason = f"{type(error).__name__}: {error}".removesuffix(": ")
-                self._journal.end(point.name, PointState.INTERRUPTED, Why.STOPPED, reason)
+                self._journal.end(point.name, JournalPointState.INTERRUPTED, ReasonCode.STOPPED, reason)
                 raise
             else:
                 item = self._ended(point, outcome)
-                if not (left and item.why is Why.OVER_RANGE and self._may_mend(item.why)):
+                if not (left and item.why is ReasonCode.OVER_RANGE and self._may_mend(item.why)):
                     return item
-                self._tell(Event.RETRY, f"{point.name} is tried again: {item.reason}", point, path)
+                self._tell(CampaignEventKind.RETRY, f"{point.name} is tried again: {item.reason}", point, path)
                 self.rest_before(point.name)
                 if self._switch.request is not None:
                     return item
         raise AssertionError("the last attempt returns or raises")
 
-    def _ended(self, point: Point, outcome: Outcome) -> CampaignItem:
+    def _ended(self, point: Point, outcome: Outcome) -> PointResult:
         if outcome.state is not RunState.FINISHED:
-            self._journal.end(point.name, PointState.INTERRUPTED, Why.STOPPED, outcome.reason)
-            self._tell(Event.POINT_STOPPED, f"{point.name}: {outcome.reason}", point, outcome.path)
-            return CampaignItem(point.name, Item.STOPPED, outcome.path, outcome.reason, Why.STOPPED)
+            self._journal.end(point.name, JournalPointState.INTERRUPTED, ReasonCode.STOPPED, outcome.reason)
+            self._tell(CampaignEventKind.POINT_STOPPED, f"{point.name}: {outcome.reason}", point, outcome.path)
+            return PointResult(point.name, PointOutcome.STOPPED, outcome.path, outcome.reason, ReasonCode.STOPPED)
         over = _over_range(outcome.path)
-        why = Why.OVER_RANGE if over else Why.CARRIED_OUT
+        why = ReasonCode.OVER_RANGE if over else ReasonCode.CARRIED_OUT
         reason = f"{outcome.reason}; {over}" if over else outcome.reason
-        self._journal.end(point.name, PointState.DONE, why, reason)
-        self._tell(Event.POINT_DONE, f"{point.name}: {reason}", point, outcome.path)
-        return CampaignItem(point.name, Item.RECORDED, outcome.path, reason, why)
+        self._journal.end(point.name, JournalPointState.DONE, why, reason)
+        self._tell(CampaignEventKind.POINT_DONE, f"{point.name}: {reason}", point, outcome.path)
+        return PointResult(point.name, PointOutcome.RECORDED, outcome.path, reason, why)
 
     def _failed(self, point: Point, path: Path, error: AcquisitionError) -> None:
-        why = why_of(error)
-        self._journal.end(point.name, PointState.FAILED, why, str(error))
+        why = reason_code_of(error)
+        self._journal.end(point.name, JournalPointState.FAILED, why, str(error))
         self._say(
-            Happening(
-                Event.FAULT,
+            CampaignEvent(
+                CampaignEventKind.FAULT,
                 f"{point.name}: {error}",
                 {"point": point.name, "file": path.name, "why": why.value},
             )
         )
 
-    def _may_mend(self, why: Why) -> bool:
+    def _may_mend(self, why: ReasonCode) -> bool:
         is_stopping = self._switch.request is not None
         return not is_stopping and why.value in {each.value for each in self._policy.on}
 
@@ -159,10 +159,10 @@ class Attempts:
             if self._reopen is None:
                 raise error
             self._bench = self._reopened(self._reopen, error)
-            self._tell(Event.BENCH_REOPENED, "the bench was closed and opened again", point, path)
+            self._tell(CampaignEventKind.BENCH_REOPENED, "the bench was closed and opened again", point, path)
         else:
             self._bench.idle(LOOK_EVERY_S)  # what has just failed seldom works in the next instant
-        self._tell(Event.RETRY, f"{point.name} is tried again", point, path)
+        self._tell(CampaignEventKind.RETRY, f"{point.name} is tried again", point, path)
 
     def _rested(self, point: Point, failed: AcquisitionError) -> None:
         """Rest before another attempt; where a stop comes meanwhile there is none."""
@@ -188,8 +188,8 @@ class Attempts:
                 require_same_bench(self._journal.bench, BenchIdentity.of(bench))
                 return bench
 
-    def _tell(self, event: Event, text: str, point: Point, path: Path) -> None:
-        self._say(Happening(event, text, {"point": point.name, "file": path.name}))
+    def _tell(self, event: CampaignEventKind, text: str, point: Point, path: Path) -> None:
+        self._say(CampaignEvent(event, text, {"point": point.name, "file": path.name}))
 
 
 def _over_range(path: Path) -> str:
@@ -205,4 +205,4 @@ def _over_range(path: Path) -> str:
     return f"near full scale: {', '.join(roles)}" if roles else ""
 
 
-assert {each.value for each in Retryable} <= {each.value for each in Why}
+assert {each.value for each in Retryable} <= {each.value for each in ReasonCode}

@@ -7,14 +7,14 @@ from pathlib import Path
 from ..plan import BYTES_PER_SAMPLE, Campaign, measured_s
 from ..rig import Rig, channels_of
 from ._opening import planned_recordings
-from ._point_outcome import Existing
+from ._point_outcome import ExistingRecordings
 
 WRITTEN_SHARE = 1 / 1.7
 """A finished recording over its size while it is made: white noise at 24 bit; dwells need less."""
 
 
 @dataclass(frozen=True)
-class Estimate:
+class CampaignEstimate:
     """How long and how large a campaign is; what is there already is not counted."""
 
     recordings: int
@@ -45,7 +45,7 @@ class Estimate:
         return self.needed_bytes <= self.free_bytes
 
 
-def estimate(campaign: Campaign, rig: Rig, folder: Path, existing: Existing = Existing.REFUSE) -> Estimate:
+def estimate_campaign(campaign: Campaign, rig: Rig, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE) -> CampaignEstimate:
     """Say what a campaign will take on a rig; opens no instrument and writes nothing.
 
     Raises
@@ -59,7 +59,7 @@ def estimate(campaign: Campaign, rig: Rig, folder: Path, existing: Existing = Ex
     durations_s = [measured_s(each) for each in missing]
     bytes_per_s = rig.daq.sample_rate_hz * len(channels_of(rig)) * BYTES_PER_SAMPLE
     rest_s = campaign.rest_s * max(0, len(missing) - 1)
-    return Estimate(
+    return CampaignEstimate(
         recordings=len(missing),
         kept=len(planned) - len(missing),
         duration_s=sum(durations_s) + rest_s,

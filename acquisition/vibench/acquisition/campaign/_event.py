@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 
-class Event(StrEnum):
+class CampaignEventKind(StrEnum):
     """What happened."""
 
     BEGUN = "begun"
@@ -27,17 +27,17 @@ class Event(StrEnum):
 
 
 @dataclass(frozen=True)
-class Happening:
+class CampaignEvent:
     """One thing that happened, as a sentence and as facts."""
 
-    event: Event
+    event: CampaignEventKind
     text: str
     facts: Mapping[str, str | int | float] = field(default_factory=dict)
 
 
-Listener = Callable[[Happening], None]
+CampaignListener = Callable[[CampaignEvent], None]
 """Told of every happening, in order; must not raise."""
 
 
-def ignore_happening(happening: Happening) -> None:
+def ignore_event(happening: CampaignEvent) -> None:
     """Tell nobody."""

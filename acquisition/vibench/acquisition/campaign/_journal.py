@@ -17,8 +17,8 @@ from ..errors import RecordingError
 from ..plan import Campaign, Point
 from ._bench_identity import BenchIdentity
 from ._journal_database import SCHEMA, VERSION, connected, require_version, sentences
-from ._journal_point import JournalPoint, PointState, points_of
-from ._point_outcome import Why
+from ._journal_point import JournalPoint, JournalPointState, points_of
+from ._point_outcome import ReasonCode
 
 JOURNAL_SUFFIX = ".campaign.sqlite"
 
@@ -95,15 +95,15 @@ class Journal:
     def start(self, name: str, file: str) -> None:
         """Say that an attempt begins, before anything plays."""
         with self._transaction() as connection:
-            self._set(connection, name, PointState.RUNNING, Why.RUNNING, "")
+            self._set(connection, name, JournalPointState.RUNNING, ReasonCode.RUNNING, "")
             connection.execute("UPDATE points SET file = ? WHERE name = ?", (file, name))
             connection.execute(
                 "INSERT INTO attempts SELECT ?, COUNT(*) + 1, ?, 'running', ?, '', ?, '' FROM attempts "
                 "WHERE name = ?",
-                (name, file, Why.RUNNING, _now(), name),
+                (name, file, ReasonCode.RUNNING, _now(), name),
             )
 
-    def end(self, name: str, state: PointState, why: Why, reason: str) -> None:
+    def end(self, name: str, state: JournalPointState, why: ReasonCode, reason: str) -> None:
         """Say how the running attempt came out."""
         with self._transaction() as connection:
             self._set(connection, name, state, why, reason)
@@ -113,15 +113,15 @@ class Journal:
                 (state, why, reason, _now(), name),
             )
 
-    def requeue(self, name: str, why: Why, reason: str) -> None:
+    def requeue(self, name: str, why: ReasonCode, reason: str) -> None:
         """Put a point back, whose recording is not there after all."""
         with self._transaction() as connection:
-            self._set(connection, name, PointState.QUEUED, why, reason)
+            self._set(connection, name, JournalPointState.QUEUED, why, reason)
 
     def keep(self, name: str, file: str) -> None:
         """Count a recording that lies in the folder already."""
         with self._transaction() as connection:
-            self._set(connection, name, PointState.DONE, Why.FOUND, "complete before")
+            self._set(connection, name, JournalPointState.DONE, ReasonCode.FOUND, "complete before")
             connection.execute("UPDATE points SET file = ? WHERE name = ?", (file, name))
 
     def follow_up(self, name: str, further: Sequence[Point] = ()) -> None:
@@ -149,7 +149,7 @@ class Journal:
         return str(value)
 
     def _set(
-        self, connection: sqlite3.Connection, name: str, state: PointState, why: Why, reason: str
+        self, connection: sqlite3.Connection, name: str, state: JournalPointState, why: ReasonCode, reason: str
     ) -> None:
         connection.execute(
             "UPDATE points SET state = ?, why = ?, reason = ? WHERE name = ?", (state, why, reason, name)
@@ -168,7 +168,7 @@ class Journal:
                         each.measurement.model_dump_json(),
                         each.chain,
                         added_after,
-                        Why.NOT_YET,
+                        ReasonCode.NOT_YET,
                     )
                     for number, each in enumerate(points, start=place)
                 ),

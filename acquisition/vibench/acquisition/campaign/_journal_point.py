@@ -9,10 +9,10 @@ from pathlib import Path
 from ..errors import RecordingError
 from ..plan import Measurement
 from ._journal_database import POINTS, opened_to_look, require_version, sentences
-from ._point_outcome import Why
+from ._point_outcome import ReasonCode
 
 
-class PointState(StrEnum):
+class JournalPointState(StrEnum):
     """Where a point stands."""
 
     QUEUED = "queued"
@@ -32,8 +32,8 @@ class JournalPoint:
     chain: str
     added_after: str
     """The point whose result asked for this one; empty when it stood in the plan."""
-    state: PointState
-    why: Why
+    state: JournalPointState
+    why: ReasonCode
     reason: str
     file: str
     """Of the last attempt; a name in the journal's folder, empty before the first."""
@@ -69,8 +69,8 @@ def points_of(connection: sqlite3.Connection) -> tuple[JournalPoint, ...]:
             measurement=Measurement.model_validate_json(row["measurement_json"]),
             chain=row["chain"],
             added_after=row["added_after"],
-            state=PointState(row["state"]),
-            why=Why(row["why"]),
+            state=JournalPointState(row["state"]),
+            why=ReasonCode(row["why"]),
             reason=row["reason"],
             file=row["file"],
             attempts=row["attempts"],

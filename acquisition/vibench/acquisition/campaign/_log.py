@@ -15,8 +15,8 @@ from typing import Self
 
 from ..errors import RecordingError
 from ..plan import measured_s
-from ._event import Event, Happening
-from ._journal_point import JournalPoint, PointState
+from ._event import CampaignEventKind, CampaignEvent
+from ._journal_point import JournalPoint, JournalPointState
 from ._point_outcome import CampaignProgress
 
 LOG_SUFFIX = ".log.jsonl"
@@ -41,7 +41,7 @@ class CampaignLog:
                 "written"
             ) from error
 
-    def __call__(self, happening: Happening) -> None:
+    def __call__(self, happening: CampaignEvent) -> None:
         """Write one happening down."""
         utc = datetime.now(UTC).isoformat(timespec="milliseconds")
         line = {"utc": utc, "event": happening.event.value, "text": happening.text, **happening.facts}
@@ -78,8 +78,8 @@ class StatusLine:
         """``rest_s`` lies between two points."""
         self._path = path
         self._campaign = campaign
-        self._counts = Counter(done=sum(point.state is PointState.DONE for point in points))
-        left_s = [measured_s(each.measurement) for each in points if each.state is not PointState.DONE]
+        self._counts = Counter(done=sum(point.state is JournalPointState.DONE for point in points))
+        left_s = [measured_s(each.measurement) for each in points if each.state is not JournalPointState.DONE]
         self._left_s = sum(left_s) + rest_s * max(0, len(left_s) - 1)
         self._begun = monotonic()
         self._made_s = 0.0
@@ -88,15 +88,15 @@ class StatusLine:
         self._written = -LINE_EVERY_S
         self._where = ""
 
-    def __call__(self, happening: Happening) -> None:
+    def __call__(self, happening: CampaignEvent) -> None:
         """Write what has happened."""
         match happening.event:
-            case Event.POINT_DONE:
+            case CampaignEventKind.POINT_DONE:
                 self._counts["done"] += 1
                 self._made_s, self._point_s = self._made_s + self._point_s, 0.0
-            case Event.RESTING:
+            case CampaignEventKind.RESTING:
                 self._made_s += float(happening.facts["rest_s"])
-            case Event.FAULT if "point" in happening.facts:
+            case CampaignEventKind.FAULT if "point" in happening.facts:
                 self._counts["failed attempts"] += 1
         self._write(happening.text)
 

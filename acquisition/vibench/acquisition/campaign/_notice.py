@@ -21,7 +21,7 @@ from pydantic import Field, PositiveFloat, PositiveInt, SecretStr
 
 from ..errors import ConfigurationError
 from ..host import FrozenModel
-from ._event import Event, Happening, Listener
+from ._event import CampaignEventKind, CampaignEvent, CampaignListener
 
 
 class Security(StrEnum):
@@ -83,7 +83,7 @@ class MailMessenger:
         return smtplib.SMTP(settings.host, settings.port, timeout=settings.timeout_s)
 
 
-TOLD_OF = frozenset({Event.FAULT, Event.ENDED})
+TOLD_OF = frozenset({CampaignEventKind.FAULT, CampaignEventKind.ENDED})
 COMMAND_LONGEST_S = 30.0
 """A command that takes longer is ended [s]."""
 
@@ -146,14 +146,14 @@ class CommandMessenger:
 class Notifier:
     """Listens to a campaign, and passes faults and its end on. What fails there harms nothing."""
 
-    def __init__(self, campaign: str, folder: Path, messengers: tuple[Messenger, ...], say: Listener) -> None:
+    def __init__(self, campaign: str, folder: Path, messengers: tuple[Messenger, ...], say: CampaignListener) -> None:
         """``say``: told how each attempt to reach somebody went."""
         self._campaign = campaign
         self._folder = folder
         self._messengers = messengers
         self._say = say
 
-    def __call__(self, happening: Happening) -> None:
+    def __call__(self, happening: CampaignEvent) -> None:
         """Pass a happening on, if it is one to be told of."""
         if happening.event not in TOLD_OF:
             return
@@ -166,4 +166,4 @@ class Notifier:
             **happening.facts,
         }
         for messenger in self._messengers:
-            self._say(Happening(Event.NOTICE, messenger.send(notice)))
+            self._say(CampaignEvent(CampaignEventKind.NOTICE, messenger.send(notice)))

@@ -17,8 +17,8 @@ from ._attempt_files import attempts_in, complete_attempt, is_made_by, next_atte
 from ._bench_identity import BenchIdentity
 from ._journal import Journal, journal_path
 from ._journal_database import is_begun
-from ._journal_point import JournalPoint, PointState, read_journal
-from ._point_outcome import ChangedBench, Existing, Why
+from ._journal_point import JournalPoint, JournalPointState, read_journal
+from ._point_outcome import ChangedBench, ExistingRecordings, ReasonCode
 
 PROGRAM_ENDED = "its program ended in the middle of it"
 
@@ -32,10 +32,10 @@ def reconcile(journal: Journal, folder: Path) -> None:
     """
     for point in journal.points():
         match point.state:
-            case PointState.RUNNING:
+            case JournalPointState.RUNNING:
                 journal.end(point.name, *_ended(point, folder))
-            case PointState.DONE if not (folder / point.file).exists():
-                journal.requeue(point.name, Why.GONE, f"{point.file} is no longer in the folder")
+            case JournalPointState.DONE if not (folder / point.file).exists():
+                journal.requeue(point.name, ReasonCode.GONE, f"{point.file} is no longer in the folder")
 
 
 def found_complete(points: Sequence[Point], folder: Path) -> dict[str, Path]:
@@ -51,7 +51,7 @@ def found_complete(points: Sequence[Point], folder: Path) -> dict[str, Path]:
     return {name: path for name, path in found.items() if path is not None}
 
 
-def _ended(point: JournalPoint, folder: Path) -> tuple[PointState, Why, str]:
+def _ended(point: JournalPoint, folder: Path) -> tuple[JournalPointState, ReasonCode, str]:
     path = folder / point.file
     try:
         if part_of(path).exists():
@@ -59,24 +59,24 @@ def _ended(point: JournalPoint, folder: Path) -> tuple[PointState, Why, str]:
         if path.exists():
             return _judged(path, point.measurement)
     except RecordingError as error:
-        return PointState.INTERRUPTED, Why.PROGRAM_ENDED, f"{PROGRAM_ENDED}; {error}"
-    return PointState.INTERRUPTED, Why.PROGRAM_ENDED, f"{PROGRAM_ENDED}, before anything was recorded"
+        return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, f"{PROGRAM_ENDED}; {error}"
+    return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, f"{PROGRAM_ENDED}, before anything was recorded"
 
 
-def _judged(path: Path, measurement: Measurement) -> tuple[PointState, Why, str]:
+def _judged(path: Path, measurement: Measurement) -> tuple[JournalPointState, ReasonCode, str]:
     with open_recording(path) as recording:
         state, reason = recording.state, recording.reason
         if state is RecordingState.COMPLETE and is_made_by(recording, measurement):
-            return PointState.DONE, Why.CARRIED_OUT, reason
+            return JournalPointState.DONE, ReasonCode.CARRIED_OUT, reason
         if state is RecordingState.INTERRUPTED:
             reason = f"{PROGRAM_ENDED}, {recording.duration_s:.1f} s into its recording"
     match state:
         case RecordingState.FAILED:
-            return PointState.FAILED, Why.FAULT, reason
+            return JournalPointState.FAILED, ReasonCode.FAULT, reason
         case RecordingState.STOPPED:
-            return PointState.INTERRUPTED, Why.STOPPED, reason
+            return JournalPointState.INTERRUPTED, ReasonCode.STOPPED, reason
         case _:
-            return PointState.INTERRUPTED, Why.PROGRAM_ENDED, reason
+            return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, reason
 
 
 MOST_DIFFERENCES = 5
@@ -107,7 +107,7 @@ def require_all_within_limits(points: tuple[Point, ...], bench: RunBench) -> Non
         raise LimitExceeded(" ".join(complaints))
 
 
-def planned_recordings(campaign: Campaign, folder: Path, existing: Existing) -> tuple[PlannedRecording, ...]:
+def planned_recordings(campaign: Campaign, folder: Path, existing: ExistingRecordings) -> tuple[PlannedRecording, ...]:
     """Say which recordings are to be made and which are there; touches nothing.
 
     Raises
@@ -118,20 +118,20 @@ def planned_recordings(campaign: Campaign, folder: Path, existing: Existing) -> 
     """
     points = campaign.points()
     match existing:
-        case Existing.REFUSE:
+        case ExistingRecordings.REFUSE:
             require_new(campaign, points, folder)
             return tuple(
                 PlannedRecording(each.name, each.measurement, next_attempt(folder, each.name))
                 for each in points
             )
-        case Existing.RESUME:
+        case ExistingRecordings.RESUME:
             return _resumable(campaign, points, folder)
         case _:
             assert_never(existing)
 
 
 def opened_journal(
-    bench: RunBench, campaign: Campaign, folder: Path, existing: Existing, changed: ChangedBench
+    bench: RunBench, campaign: Campaign, folder: Path, existing: ExistingRecordings, changed: ChangedBench
 ) -> Journal:
     """Begin a journal, or open the one that the campaign was begun with and bring it up to date.
 
@@ -147,12 +147,12 @@ def opened_journal(
     path = journal_path(folder, campaign.name)
     identity = BenchIdentity.of(bench)
     match existing:
-        case Existing.REFUSE:
+        case ExistingRecordings.REFUSE:
             require_new(campaign, campaign.points(), folder)
             return Journal.begin(path, campaign, identity)
-        case Existing.RESUME if is_begun(path):
+        case ExistingRecordings.RESUME if is_begun(path):
             return _gone_on_with(path, campaign, identity, folder, changed)
-        case Existing.RESUME:
+        case ExistingRecordings.RESUME:
             found = found_complete(campaign.points(), folder)
             journal = Journal.begin(path, campaign, identity)
             for name, recording in found.items():
@@ -244,7 +244,7 @@ def _resumable(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> t
         found = {
             each.name: folder / each.file
             for each in known
-            if each.state is PointState.DONE and (folder / each.file).exists()
+            if each.state is JournalPointState.DONE and (folder / each.file).exists()
         }
         wanted = [(each.name, each.measurement) for each in known]
     return tuple(

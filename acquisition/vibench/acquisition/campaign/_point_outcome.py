@@ -23,7 +23,7 @@ from ..recording import Recording
 from ..run import Progress
 
 
-class Why(StrEnum):
+class ReasonCode(StrEnum):
     """The named reason of a point's state; the words of `plan.retry.Retryable` are among them."""
 
     NOT_YET = "not_yet"
@@ -52,23 +52,23 @@ class Why(StrEnum):
     """Anything else that went wrong."""
 
 
-_WHY_BY_ERROR: tuple[tuple[type[AcquisitionError], Why], ...] = (
-    (DataLost, Why.DATA_LOST),
-    (InstrumentLost, Why.INSTRUMENT_LOST),
-    (InstrumentError, Why.INSTRUMENT_FAULT),
-    (CheckFailed, Why.CHECK_FAILED),
-    (LimitExceeded, Why.LIMIT),
-    (RecordingError, Why.DISK),
-    (ConfigurationError, Why.PLAN),
+_CODE_BY_ERROR: tuple[tuple[type[AcquisitionError], ReasonCode], ...] = (
+    (DataLost, ReasonCode.DATA_LOST),
+    (InstrumentLost, ReasonCode.INSTRUMENT_LOST),
+    (InstrumentError, ReasonCode.INSTRUMENT_FAULT),
+    (CheckFailed, ReasonCode.CHECK_FAILED),
+    (LimitExceeded, ReasonCode.LIMIT),
+    (RecordingError, ReasonCode.DISK),
+    (ConfigurationError, ReasonCode.PLAN),
 )
 
 
-def why_of(error: AcquisitionError) -> Why:
+def reason_code_of(error: AcquisitionError) -> ReasonCode:
     """Name the reason that an error stands for."""
-    return next((why for kind, why in _WHY_BY_ERROR if isinstance(error, kind)), Why.FAULT)
+    return next((why for kind, why in _CODE_BY_ERROR if isinstance(error, kind)), ReasonCode.FAULT)
 
 
-class Existing(StrEnum):
+class ExistingRecordings(StrEnum):
     """What to do about recordings that are in the folder already."""
 
     REFUSE = "refuse"
@@ -93,7 +93,7 @@ class ChangedBench(StrEnum):
     """Go on, and keep both in the journal."""
 
 
-class Item(StrEnum):
+class PointOutcome(StrEnum):
     """How one recording of a campaign came out."""
 
     RECORDED = "recorded"
@@ -104,14 +104,14 @@ class Item(StrEnum):
 
 
 @dataclass(frozen=True)
-class CampaignItem:
+class PointResult:
     """One recording of a campaign, as it came out."""
 
     name: str
-    result: Item
+    result: PointOutcome
     path: Path
     reason: str
-    why: Why
+    why: ReasonCode
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,5 +154,5 @@ def ignore_campaign_progress(progress: CampaignProgress) -> None:
     """Watch nothing."""
 
 
-def ignore_item(item: CampaignItem) -> None:
+def ignore_result(item: PointResult) -> None:
     """Do nothing about a recording."""

@@ -13,7 +13,7 @@ LOOK_AGAIN_S = 1.0
 """Rig time that passes on a virtual rig before its bench is opened again: cables are put back in it."""
 
 
-class KeptBench:
+class ReconnectingBench:
     """Opens a rig's bench, and opens it again without asking anybody anything. Use it in a ``with``."""
 
     def __init__(self, config: Rig | Path, confirm: Confirm | None = None) -> None:

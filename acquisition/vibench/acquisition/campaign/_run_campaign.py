@@ -9,39 +9,39 @@ from ..errors import RecordingError
 from ..plan import Campaign
 from ..recording import sole_use
 from ..stopping import StopSwitch, stop_on_signal
-from ._attempts import Attempts, Reopen, Rest
-from ._event import Happening, Listener, ignore_happening
+from ._attempts import Attempts, Reopen, CoolingPause
+from ._event import CampaignEvent, CampaignListener, ignore_event
 from ._log import LOG_SUFFIX, STATUS_SUFFIX, CampaignLog, StatusLine
 from ._notice import Messenger, Notifier
 from ._opening import make_folder, opened_journal, require_all_within_limits, require_new
 from ._point_outcome import (
     After,
     AfterFailure,
-    CampaignItem,
+    PointResult,
     CampaignProgress,
     ChangedBench,
-    Existing,
+    ExistingRecordings,
     ignore_campaign_progress,
-    ignore_item,
+    ignore_result,
 )
-from ._runner import Course
+from ._runner import CampaignRunner
 
 
 def run_campaign(
     bench: RunBench,
     campaign: Campaign,
     folder: Path,
-    existing: Existing = Existing.REFUSE,
+    existing: ExistingRecordings = ExistingRecordings.REFUSE,
     after_failure: AfterFailure = AfterFailure.STOP,
     on_progress: Callable[[CampaignProgress], None] = ignore_campaign_progress,
-    on_item: Callable[[CampaignItem], None] = ignore_item,
+    on_item: Callable[[PointResult], None] = ignore_result,
     switch: StopSwitch | None = None,
     after: After | None = None,
     reopen: Reopen | None = None,
     changed_bench: ChangedBench = ChangedBench.REFUSE,
-    on_happening: Listener = ignore_happening,
+    on_happening: CampaignListener = ignore_event,
     messengers: tuple[Messenger, ...] = (),
-) -> tuple[CampaignItem, ...]:
+) -> tuple[PointResult, ...]:
     """Make every recording of ``campaign`` in ``folder``, in order, on an open bench.
 
     All points are held against the limits of the rig before the first one begins. What was done, what
@@ -89,7 +89,7 @@ def run_campaign(
     """
     points = campaign.points()
     require_all_within_limits(points, bench)
-    if existing is Existing.REFUSE:
+    if existing is ExistingRecordings.REFUSE:
         require_new(campaign, points, folder)
     make_folder(folder)
     stop = StopSwitch() if switch is None else switch
@@ -101,7 +101,7 @@ def run_campaign(
         notifier = Notifier(campaign.name, folder, messengers, log)
         session.enter_context(stop_on_signal(stop))
 
-        def say(happening: Happening) -> None:
+        def say(happening: CampaignEvent) -> None:
             for listener in (log, status, notifier, on_happening):
                 listener(happening)
 
@@ -109,9 +109,9 @@ def run_campaign(
             status.progress(stand)
             on_progress(stand)
 
-        rest = Rest(campaign.rest_s, stop, say)
+        rest = CoolingPause(campaign.rest_s, stop, say)
         attempts = Attempts(bench, journal, campaign.retry, stop, say, rest, reopen)
-        course = Course(journal, folder, attempts, stop, after_failure, after, say)
+        course = CampaignRunner(journal, folder, attempts, stop, after_failure, after, say)
         return course.gone_through(campaign, progress, on_item)
 
 

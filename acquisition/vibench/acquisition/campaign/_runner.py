@@ -10,22 +10,22 @@ from ..recording import open_recording
 from ..run import Progress
 from ..stopping import StopSwitch
 from ._attempts import Attempts
-from ._event import Event, Happening, Listener
+from ._event import CampaignEventKind, CampaignEvent, CampaignListener
 from ._journal import Journal
-from ._journal_point import JournalPoint, PointState
+from ._journal_point import JournalPoint, JournalPointState
 from ._point_outcome import (
     After,
     AfterFailure,
-    CampaignItem,
+    PointResult,
     CampaignProgress,
     DonePoint,
     Finished,
-    Item,
-    why_of,
+    PointOutcome,
+    reason_code_of,
 )
 
 
-class Course:
+class CampaignRunner:
     """The way through the points, with what results add to it."""
 
     def __init__(
@@ -36,7 +36,7 @@ class Course:
         stop: StopSwitch,
         after_failure: AfterFailure,
         after: After | None,
-        say: Listener,
+        say: CampaignListener,
     ) -> None:
         self._journal = journal
         self._folder = folder
@@ -47,19 +47,19 @@ class Course:
         self._say = say
         self._coming = deque(journal.points())
         self._count = len(self._coming)
-        self._items: list[CampaignItem] = []
+        self._items: list[PointResult] = []
 
     def gone_through(
         self,
         campaign: Campaign,
         on_progress: Callable[[CampaignProgress], None],
-        on_item: Callable[[CampaignItem], None],
-    ) -> tuple[CampaignItem, ...]:
+        on_item: Callable[[PointResult], None],
+    ) -> tuple[PointResult, ...]:
         """Make the points one after the other; returns how each came out."""
-        done = sum(point.state is PointState.DONE for point in self._coming)
-        begun = Event.RESUMED if any(point.attempts for point in self._coming) or done else Event.BEGUN
+        done = sum(point.state is JournalPointState.DONE for point in self._coming)
+        begun = CampaignEventKind.RESUMED if any(point.attempts for point in self._coming) or done else CampaignEventKind.BEGUN
         text = f"{campaign.name}: {self._count} points, {done} done before"
-        self._say(Happening(begun, text, {"points": self._count, "done": done}))
+        self._say(CampaignEvent(begun, text, {"points": self._count, "done": done}))
         try:
             while self._coming and self._may_begin(self._coming[0]):
                 point = self._coming.popleft()
@@ -74,10 +74,10 @@ class Course:
                 self._items.append(item)
                 on_item(item)
                 self._follow_up(point, item)
-                if item.result is Item.STOPPED:
+                if item.result is PointOutcome.STOPPED:
                     break
         except AcquisitionError as error:
-            self._ended(f"{campaign.name} ended: {error}", str(why_of(error)))
+            self._ended(f"{campaign.name} ended: {error}", str(reason_code_of(error)))
             raise
         except BaseException as error:
             self._ended(f"{campaign.name} ended: {type(error).__name__}", "stopped")
@@ -87,14 +87,14 @@ class Course:
 
     def _may_begin(self, point: JournalPoint) -> bool:
         """Rest before a point that is to be made; a stop ends the rest, and the campaign."""
-        if point.state is not PointState.DONE and self._stop.request is None:
+        if point.state is not JournalPointState.DONE and self._stop.request is None:
             self._attempts.rest_before(point.name)
         return self._stop.request is None
 
-    def _made(self, point: JournalPoint, tell: Callable[[Path, Progress], None]) -> CampaignItem:
-        if point.state is PointState.DONE:
+    def _made(self, point: JournalPoint, tell: Callable[[Path, Progress], None]) -> PointResult:
+        if point.state is JournalPointState.DONE:
             path = self._folder / point.file
-            return CampaignItem(point.name, Item.KEPT, path, "complete before", point.why)
+            return PointResult(point.name, PointOutcome.KEPT, path, "complete before", point.why)
         try:
             return self._attempts.carry_out(Point(point.name, point.measurement, point.chain), tell)
         except (InstrumentLost, RecordingError):
@@ -105,17 +105,17 @@ class Course:
             path = self._folder / next(
                 each.file for each in self._journal.points() if each.name == point.name
             )
-            return CampaignItem(point.name, Item.FAILED, path, str(error), why_of(error))
+            return PointResult(point.name, PointOutcome.FAILED, path, str(error), reason_code_of(error))
 
-    def _follow_up(self, point: JournalPoint, item: CampaignItem) -> None:
+    def _follow_up(self, point: JournalPoint, item: PointResult) -> None:
         """Ask what a result asks for, once, and put it next."""
-        is_done = item.result in (Item.RECORDED, Item.KEPT)
+        is_done = item.result in (PointOutcome.RECORDED, PointOutcome.KEPT)
         if not is_done or point.is_followed_up or self._after is None:
             return
         done = tuple(
             DonePoint(each.name, each.measurement, self._folder / each.file)
             for each in self._journal.points()
-            if each.state is PointState.DONE
+            if each.state is JournalPointState.DONE
         )
         this = next(each for each in done if each.name == point.name)
         with open_recording(item.path) as recording:
@@ -129,18 +129,18 @@ class Course:
         self._coming.extendleft(reversed(added))
         self._count += len(added)
         text = f"{point.name} asks for {', '.join(each.name for each in added)}"
-        self._say(Happening(Event.FURTHER, text, {"point": point.name, "points": len(added)}))
+        self._say(CampaignEvent(CampaignEventKind.FURTHER, text, {"point": point.name, "points": len(added)}))
 
     def _closing(self) -> str:
         request = self._stop.request
         if request is not None:
             return f"was stopped: {request.reason}"
-        failed = sum(item.result is Item.FAILED for item in self._items)
+        failed = sum(item.result is PointOutcome.FAILED for item in self._items)
         return f"is through, {failed} points failed" if failed else "is through"
 
     def _ended(self, text: str, why: str) -> None:
-        counts = {each.value: sum(item.result is each for item in self._items) for each in Item}
-        self._say(Happening(Event.ENDED, text, {"why": why, "left": len(self._coming), **counts}))
+        counts = {each.value: sum(item.result is each for item in self._items) for each in PointOutcome}
+        self._say(CampaignEvent(CampaignEventKind.ENDED, text, {"why": why, "left": len(self._coming), **counts}))
 
 
 def _names(measurement: Measurement) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 from ._admission import (
     check_and_keep as check_and_keep,
-    last_result as last_result,
+    last_check as last_check,
     require_fresh as require_fresh,
     require_on_record as require_on_record,
 )

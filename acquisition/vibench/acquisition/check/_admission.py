@@ -23,7 +23,7 @@ from ..bench import (
     Bounds,
     CheckResult,
     Finding,
-    Reality,
+    BenchKind,
     Verdict,
     ago,
     judged,
@@ -47,7 +47,7 @@ def archive_path(rig_name: str) -> Path:
     return state_folder() / FOLDER / f"{plain}-{digest}.json"
 
 
-def last_result(rig_name: str) -> CheckResult | None:
+def last_check(rig_name: str) -> CheckResult | None:
     """Give the last check of a rig; None when there is none, or none that this version can read."""
     try:
         return CheckResult.model_validate_json(archive_path(rig_name).read_text(encoding="utf-8"))
@@ -149,7 +149,7 @@ def check_and_keep(
 ) -> CheckResult:
     """Check a bench, compare with the last time, and keep the result for later; see `check_bench`."""
     report, at = check_bench(bench, folder, switch), clock()
-    last = last_result(bench.rig.name)
+    last = last_check(bench.rig.name)
     if last is not None and last.rig_digest == rig_digest(bench.rig):
         report = BenchReport(findings=(*report.findings, *drift(report, last, at)))
     result = CheckResult.of(bench.rig, report, at)
@@ -189,7 +189,7 @@ def require_fresh(
     """
     match rule:
         case CheckRule.WAIVED:
-            bench.last_check = last_result(bench.rig.name)
+            bench.last_check = last_check(bench.rig.name)
             return bench.last_check
         case CheckRule.NOW:
             return _passed(check_and_keep(bench, folder, clock, switch))
@@ -200,15 +200,15 @@ def require_fresh(
 
 
 def _fresh(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | None) -> CheckResult:
-    last = last_result(bench.rig.name)
+    last = last_check(bench.rig.name)
     complaint = why_not(last, bench.rig, clock())
     if last is not None and complaint is None:
         bench.last_check = last
         return last
     match bench.reality:
-        case Reality.SIMULATED:
+        case BenchKind.SIMULATED:
             return _passed(check_and_keep(bench, folder, clock, switch))
-        case Reality.REAL:
+        case BenchKind.REAL:
             raise CheckFailed(
                 f"{complaint}. Nothing was played; check it with 'vibench bench check' or --check now, or go "
                 "on without with --check waived"
@@ -224,11 +224,11 @@ def require_on_record(bench: Bench, clock: Clock = utc_now) -> None:
         When a real bench has no check that holds.
 
     """
-    last = last_result(bench.rig.name)
+    last = last_check(bench.rig.name)
     complaint = why_not(last, bench.rig, clock())
     if complaint is None:
         bench.last_check = last
-    elif bench.reality is Reality.REAL:
+    elif bench.reality is BenchKind.REAL:
         raise CheckFailed(f"{complaint}. Nothing was armed; check the bench first")
 
 

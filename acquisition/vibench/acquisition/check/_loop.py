@@ -11,7 +11,7 @@ import numpy as np
 from ..bench import Bench, Bounds, Finding, Verdict, judged
 from ..instruments import Samples
 from ..plan import CHECK_FREQUENCY_HZ
-from ..rig import Quantity, RigModel, Role
+from ..rig import BaseQuantity, RigModel, Role
 
 _PPM = 1e6
 _WINDOWS = 20
@@ -119,11 +119,11 @@ class LoopCheck:
         if self._hears(Role.DRIVE_VOLTAGE):
             found.append(self._clocks())
         if self._hears(Role.DRIVE_VOLTAGE) and self._hears(Role.AMPLIFIER_VOLTAGE):
-            found += [self._gain(), self._sign(Role.AMPLIFIER_VOLTAGE, Quantity.AMPLIFIER_VOLTAGE)]
+            found += [self._gain(), self._sign(Role.AMPLIFIER_VOLTAGE, BaseQuantity.AMPLIFIER_VOLTAGE)]
         if self._hears(Role.BASE_ACCELERATION):
             found.append(self._base())
         if self._hears(Role.DRIVE_VOLTAGE) and self._hears(Role.BASE_ACCELERATION):
-            found.append(self._sign(Role.BASE_ACCELERATION, Quantity.ACCELERATION))
+            found.append(self._sign(Role.BASE_ACCELERATION, BaseQuantity.ACCELERATION))
         return found
 
     def _hears(self, role: Role) -> bool:
@@ -196,7 +196,7 @@ class LoopCheck:
             (drive.uncertainty / drive.amplitude) ** 2 + (output.uncertainty / output.amplitude) ** 2
         )
         gain_db = _db(output.amplitude / drive.amplitude)
-        expected_db = _db(abs(complex(self._model.transfer(Quantity.AMPLIFIER_VOLTAGE, CHECK_FREQUENCY_HZ))))
+        expected_db = _db(abs(complex(self._model.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, CHECK_FREQUENCY_HZ))))
         verdict = GAIN_DB.verdict(abs(gain_db - expected_db))
         advice = f"set the gain of the {self._rig.amplifier.model} to {self._rig.amplifier.gain_db:g} dB"
         expected = f"{expected_db:.2f} dB within {GAIN_DB.well:g} dB"
@@ -204,14 +204,14 @@ class LoopCheck:
 
     def _base(self) -> Finding:
         fit = self._fit(Role.BASE_ACCELERATION)
-        transfer = abs(complex(self._model.transfer(Quantity.ACCELERATION, CHECK_FREQUENCY_HZ)))
+        transfer = abs(complex(self._model.transfer(BaseQuantity.ACCELERATION, CHECK_FREQUENCY_HZ)))
         modelled = self._terminal_v * transfer
         verdict = BASE_DB.verdict(abs(_db(fit.amplitude / modelled)))
         expected = f"{modelled:.3g} m/s2 within {BASE_DB.well:g} dB"
         advice = "check the accelerometer's sensitivity, the fixture's mass, the amplifier's power and gain"
         return judged("base acceleration", fit.amplitude, "m/s2", expected, verdict, advice, fit.uncertainty)
 
-    def _sign(self, role: Role, quantity: Quantity) -> Finding:
+    def _sign(self, role: Role, quantity: BaseQuantity) -> Finding:
         """Compare a channel's phase against the drive with the model's: half a turn is a wrong sign."""
         turned_rad = self._fit(role).phase_rad - self._fit(Role.DRIVE_VOLTAGE).phase_rad
         modelled_rad = float(np.angle(self._model.transfer(quantity, CHECK_FREQUENCY_HZ)))

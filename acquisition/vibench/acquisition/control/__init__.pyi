@@ -1,7 +1,7 @@
 from ._control_action import (
-    Conduct as Conduct,
-    heard as heard,
+    Controller as Controller,
+    phase_samples as phase_samples,
 )
 from ._controllers import (
-    conduct as conduct,
+    feedback_controller as feedback_controller,
 )

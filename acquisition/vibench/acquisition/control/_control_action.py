@@ -20,7 +20,7 @@ class Note:
 
 
 @dataclass(frozen=True)
-class Move:
+class ControlAction:
     """The next phase, and what is noted at its first sample."""
 
     phase: Phase | None
@@ -29,7 +29,7 @@ class Move:
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class PhaseSamples:
     """The samples of a phase, from its first one, or from the last hole in them, to its end."""
 
     first_sample: int
@@ -38,14 +38,14 @@ class Heard:
 
 
 Result = TypeVar("Result")
-Conduct: TypeAlias = Generator[Move, Heard, Result]
+Controller: TypeAlias = Generator[ControlAction, PhaseSamples, Result]
 """Yields moves and is sent what was heard during each; returns what it was for."""
 
-SILENCE = Heard(0, np.empty((0, 0)))
+SILENCE = PhaseSamples(0, np.empty((0, 0)))
 """What is heard during notes alone."""
 
 
-def heard(blocks: Sequence[Block]) -> Heard:
+def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
     """Join the blocks of a phase; one before which samples are missing (the run was held) begins anew."""
     if not blocks:
         return SILENCE
@@ -54,4 +54,4 @@ def heard(blocks: Sequence[Block]) -> Heard:
         if joined and block.first_sample != joined[-1].first_sample + joined[-1].volts.shape[1]:
             joined.clear()
         joined.append(block)
-    return Heard(joined[0].first_sample, np.concatenate([block.volts for block in joined], axis=1))
+    return PhaseSamples(joined[0].first_sample, np.concatenate([block.volts for block in joined], axis=1))

@@ -5,18 +5,18 @@ from typing import assert_never
 from ..excitation import AbstractFeedback, HeldDwell, HeldSweep, ResonanceTracking, SettledSine
 from ..plan import Measurement
 from ..rig import Channel, Rig
-from ._control_action import Conduct
+from ._control_action import Controller
 from ._dwell_controller import hold_dwell
-from ._feedback_channels import ears_of
+from ._feedback_channels import feedback_channels_of
 from ._resonance_controller import track_resonance
 from ._settled_controller import step_settled
-from ._sine_loop import SinePlay
+from ._sine_loop import SineLoop
 from ._sweep_controller import hold_sweep
 
 
-def conduct(
+def feedback_controller(
     measurement: Measurement, rig: Rig, channels: tuple[Channel, ...], sample_rate_hz: float
-) -> Conduct[None]:
+) -> Controller[None]:
     """Conduct a measurement with feedback, from its ramp up to its ramp down.
 
     Raises
@@ -27,7 +27,7 @@ def conduct(
     """
     excitation = measurement.excitation
     assert isinstance(excitation, AbstractFeedback), "only feedback needs a conductor"
-    play = SinePlay(ears_of(channels, sample_rate_hz), rig, measurement)
+    play = SineLoop(feedback_channels_of(channels, sample_rate_hz), rig, measurement)
     match excitation:
         case SettledSine():
             return step_settled(play, excitation)

@@ -6,16 +6,16 @@ from math import ceil
 from ..excitation import HeldDwell
 from ..plan import RunState
 from ._closed_loop_check import require_answer
-from ._control_action import Conduct
+from ._control_action import Controller
 from ._level_control import Held, LevelControl, measured_level
-from ._settle import Settler, shortened
-from ._sine_loop import SinePlay
+from ._settle import SettlingController, shortened
+from ._sine_loop import SineLoop
 from ._start import started
 
 
-def hold_dwell(play: SinePlay, plan: HeldDwell) -> Conduct[None]:
+def hold_dwell(play: SineLoop, plan: HeldDwell) -> Controller[None]:
     """Ramp up to the level, settle, record, ramp down."""
-    settler = Settler(play, plan.settling, plan.base_level)
+    settler = SettlingController(play, plan.settling, plan.base_level)
     yield from started(play, plan.frequency_hz, plan.base_level)
     yield from settler.settled()
     control = LevelControl(plan.base_level, play.most_vpp)

@@ -8,12 +8,12 @@ import numpy as np
 from ..errors import ConfigurationError
 from ..instruments import Samples
 from ..rig import Channel, Role
-from ._control_action import Heard
+from ._control_action import PhaseSamples
 from ._stroboscope import Phasors, Stroboscope
 
 
 @dataclass(frozen=True)
-class Ears:
+class FeedbackChannels:
     """Finds drive, base and m0 in what was heard."""
 
     drive: int
@@ -28,7 +28,7 @@ class Ears:
     """Of the vibrometer; taken out of every phase [s]."""
     sample_rate_hz: float
 
-    def rows(self, heard: Heard) -> tuple[Samples, Samples, Samples]:
+    def rows(self, heard: PhaseSamples) -> tuple[Samples, Samples, Samples]:
         """Give drive [V], base acceleration [m/s2] and m0 velocity [m/s], each of shape (samples,)."""
         return (
             heard.volts[self.drive],
@@ -51,7 +51,7 @@ class Ears:
         return complex(2j * pi * frequency_hz * turned * np.mean(response) / np.mean(base))
 
 
-def ears_of(channels: tuple[Channel, ...], sample_rate_hz: float) -> Ears:
+def feedback_channels_of(channels: tuple[Channel, ...], sample_rate_hz: float) -> FeedbackChannels:
     """Find the channels that feedback needs.
 
     Raises
@@ -63,7 +63,7 @@ def ears_of(channels: tuple[Channel, ...], sample_rate_hz: float) -> Ears:
     drive, base, response = (
         _row(channels, role) for role in (Role.DRIVE_VOLTAGE, Role.BASE_ACCELERATION, Role.M0_VELOCITY)
     )
-    return Ears(
+    return FeedbackChannels(
         drive=drive,
         base=base,
         response=response,

@@ -22,7 +22,7 @@ class _Answer:
     """Measured over what should be held."""
 
 
-class GainTrack:
+class GainEstimator:
     """What the base did over what the linear model of the rig says, for the last while.
 
     In chaos the fundamental of a few periods is mostly chance: the mean of the track counts. Where the

@@ -10,11 +10,11 @@ from enum import Enum, auto
 
 from ..excitation import SEARCH_LABEL, Segment, SettledSine
 from ..plan import RunState
-from ._control_action import Conduct
-from ._jump_search import LocatedJump, Side, Visit, is_on_branch, located, side
+from ._control_action import Controller
+from ._jump_search import LocatedJump, Side, SettledPoint, is_on_branch, located, side
 from ._record import recorded
-from ._settle import Settled, Settler, shortened
-from ._sine_loop import SinePlay
+from ._settle import SettledState, SettlingController, shortened
+from ._sine_loop import SineLoop
 from ._start import glided
 
 RUNGS = 12
@@ -24,7 +24,7 @@ _RUNG_S = 0.1
 _LOWEST_S = 0.5
 
 
-def let_die(play: SinePlay) -> Conduct[None]:
+def decay_motion(play: SineLoop) -> Controller[None]:
     """Lower the setting rung by rung, wait, and raise it to what it was."""
     now = play.played
     for rung in range(1, RUNGS + 1):
@@ -57,12 +57,12 @@ class _Pace(Enum):
 
 
 @dataclass
-class _Hunted:
+class _JumpSearch:
     """Where the search stands."""
 
-    branch: list[Visit]
+    branch: list[SettledPoint]
     """Visits on the branch before the jump, in the order of the pass."""
-    after: Visit
+    after: SettledPoint
     here: Side
 
     @property
@@ -70,7 +70,7 @@ class _Hunted:
         """What is known of the jump."""
         return LocatedJump(self.branch[-1], self.after)
 
-    def narrow(self, visit: Visit) -> None:
+    def narrow(self, visit: SettledPoint) -> None:
         """Take in a visit between the two ends."""
         self.here = side(visit, self.branch[-1], self.after)
         match self.here:
@@ -79,7 +79,7 @@ class _Hunted:
             case Side.AFTER:
                 self.after = visit
 
-    def left(self, place: int, visit: Visit) -> None:
+    def left(self, place: int, visit: SettledPoint) -> None:
         """Take in that the branch was left on the way to its visit number ``place``."""
         del self.branch[place:]
         self.after = visit
@@ -89,15 +89,15 @@ class _Hunted:
 class Arrival:
     """Where a search has ended, at the frequency it was begun for."""
 
-    visit: Visit
+    visit: SettledPoint
     branch: Side
     is_jump: bool
 
 
-class JumpHunt:
+class JumpLocator:
     """Looks into one jump of a pass."""
 
-    def __init__(self, settler: Settler, plan: SettledSine, direction: str, number: int) -> None:
+    def __init__(self, settler: SettlingController, plan: SettledSine, direction: str, number: int) -> None:
         assert plan.jumps is not None
         self._settler = settler
         self._plan = plan
@@ -106,13 +106,13 @@ class JumpHunt:
         self._number = number
         self._until_s = settler.play.elapsed_s + plan.search_s
 
-    def localised(self, visited: Sequence[Visit], after: Visit) -> Conduct[Arrival]:
+    def localised(self, visited: Sequence[SettledPoint], after: SettledPoint) -> Controller[Arrival]:
         """Narrow the bracket between the last of ``visited`` and ``after``; end at ``after``'s frequency.
 
         A response that only changes steeply is no jump: it closes as the bracket does. Where both
         branches are there at ``after``, the way to it may end on either, which is said.
         """
-        hunted = _Hunted(list(visited), after, Side.AFTER)
+        hunted = _JumpSearch(list(visited), after, Side.AFTER)
         found, why = yield from self._bisected(hunted)
         is_jump = found.is_jump(self._rule.factor)
         end = yield from self._led_to(after.frequency_hz)
@@ -122,14 +122,14 @@ class JumpHunt:
         self._say(found, why, branch)
         return Arrival(visit, branch, is_jump)
 
-    def _bisected(self, hunted: _Hunted) -> Conduct[tuple[LocatedJump, str]]:
+    def _bisected(self, hunted: _JumpSearch) -> Controller[tuple[LocatedJump, str]]:
         for _ in range(_MOST_BRACKETS):
             found = yield from self._halved(hunted)
             if found is not None:
                 return found
         return hunted.bracket, "the motion jumped somewhere else each time"
 
-    def _halved(self, hunted: _Hunted) -> Conduct[tuple[LocatedJump, str] | None]:
+    def _halved(self, hunted: _JumpSearch) -> Controller[tuple[LocatedJump, str] | None]:
         """Halve the bracket to its end; None when the motion left its branch earlier: a new bracket."""
         seek = located(hunted.branch[-1], hunted.after, self._rule.resolution_hz)
         try:
@@ -151,12 +151,12 @@ class JumpHunt:
         except StopIteration:
             return hunted.bracket, "localised"
 
-    def _led_back(self, hunted: _Hunted) -> Conduct[_Return]:
+    def _led_back(self, hunted: _JumpSearch) -> Controller[_Return]:
         """Go back along the pass until its branch is found again, then forward to the branch's end.
 
         Forward in one glide, which is quick; if that leaves the branch, step by step, which tells where.
         """
-        left: tuple[int, Visit] | None = None
+        left: tuple[int, SettledPoint] | None = None
         for pace in _Pace:
             place = yield from self._rejoined(hunted.branch)
             if place is None:
@@ -172,7 +172,7 @@ class JumpHunt:
         hunted.left(*left)
         return _Return.LEFT
 
-    def _left(self, branch: Sequence[Visit], steps: range) -> Conduct[tuple[int, Visit] | None]:
+    def _left(self, branch: Sequence[SettledPoint], steps: range) -> Controller[tuple[int, SettledPoint] | None]:
         """Go forward; give place and finding where the motion has left the branch."""
         for place in steps:
             found = yield from self._led_to(branch[place].frequency_hz)
@@ -180,7 +180,7 @@ class JumpHunt:
                 return place, found.visit
         return None
 
-    def _rejoined(self, branch: Sequence[Visit]) -> Conduct[int | None]:
+    def _rejoined(self, branch: Sequence[SettledPoint]) -> Controller[int | None]:
         """Go back, in longer and longer strides, until a response of the branch is met; give its place."""
         stride = 1
         place = len(branch) - 1
@@ -193,18 +193,18 @@ class JumpHunt:
             place, stride = max(0, place - stride), 2 * stride
         return None
 
-    def _revived(self, first: Visit) -> Conduct[int | None]:
+    def _revived(self, first: SettledPoint) -> Controller[int | None]:
         """Let the motion die at the branch's first frequency: a branch that began from rest is back then."""
-        yield from let_die(self._settler.play)
+        yield from decay_motion(self._settler.play)
         found = yield from self._settler.settled()
         return 0 if is_on_branch(found.visit, first, self._rule.factor) else None
 
-    def _led_to(self, frequency_hz: float) -> Conduct[Settled]:
+    def _led_to(self, frequency_hz: float) -> Controller[SettledState]:
         plan = self._plan
         yield from glided(self._settler.play, frequency_hz, plan.base_level, plan.glide_step_hz)
         return (yield from self._settler.settled())
 
-    def _searched(self, frequency_hz: float) -> Conduct[Visit]:
+    def _searched(self, frequency_hz: float) -> Controller[SettledPoint]:
         found = yield from self._led_to(frequency_hz)
         segment = Segment(
             SEARCH_LABEL,

@@ -14,7 +14,7 @@ class Side(StrEnum):
 
 
 @dataclass(frozen=True)
-class Visit:
+class SettledPoint:
     """A frequency at which the motion was let settle, and the Response II that was found."""
 
     frequency_hz: float
@@ -27,8 +27,8 @@ class Visit:
 class LocatedJump:
     """A jump between two settled frequencies of one pass."""
 
-    before: Visit
-    after: Visit
+    before: SettledPoint
+    after: SettledPoint
 
     @property
     def frequency_hz(self) -> float:
@@ -45,11 +45,11 @@ class LocatedJump:
         return ratio(self.before, self.after) > factor
 
 
-Seek = Generator[float, Visit, LocatedJump]
+Seek = Generator[float, SettledPoint, LocatedJump]
 """Asks for a frequency to be reached on the branch before the jump, and is told what was found there."""
 
 
-def located(before: Visit, after: Visit, resolution_hz: float) -> Seek:
+def located(before: SettledPoint, after: SettledPoint, resolution_hz: float) -> Seek:
     """Halve the bracket until it is no wider than ``resolution_hz``.
 
     `side` says where a middle belongs. Whoever answers must reach each frequency from ``before``'s side.
@@ -64,7 +64,7 @@ def located(before: Visit, after: Visit, resolution_hz: float) -> Seek:
     return LocatedJump(before, after)
 
 
-def side(visit: Visit, before: Visit, after: Visit) -> Side:
+def side(visit: SettledPoint, before: SettledPoint, after: SettledPoint) -> Side:
     """Say on which side of a jump a response lies that was found between them.
 
     Before it is what is nearer to the response before, and no further from that than the one after: a
@@ -74,14 +74,14 @@ def side(visit: Visit, before: Visit, after: Visit) -> Side:
     return Side.BEFORE if away <= min(ratio(visit, after), ratio(before, after)) else Side.AFTER
 
 
-def ratio(one: Visit, other: Visit) -> float:
+def ratio(one: SettledPoint, other: SettledPoint) -> float:
     """Larger over smaller response; 1 when they are equal, and infinite when one of them is none."""
     if min(one.response, other.response) <= 0.0:
         return 1.0 if one.response == other.response else inf
     return float(2.0 ** abs(log(one.response / other.response, 2)))
 
 
-def is_on_branch(visit: Visit, expected: Visit, factor: float) -> bool:
+def is_on_branch(visit: SettledPoint, expected: SettledPoint, factor: float) -> bool:
     """Whether a motion is the one that was found before at the same frequency.
 
     It has the same period, or as little of one. The branches differ by ``factor`` at least; half of

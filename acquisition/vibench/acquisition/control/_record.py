@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from ..excitation import Segment
 from ..plan import RunState
-from ._control_action import Conduct
+from ._control_action import Controller
 from ._level_control import Held, MeasuredLevel, measured_level
-from ._settle import Settled, Settler, shortened
+from ._settle import SettledState, SettlingController, shortened
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Recorded:
     held: Held
 
 
-def recorded(settler: Settler, found: Settled, segment: Segment, duration_s: float) -> Conduct[Recorded]:
+def recorded(settler: SettlingController, found: SettledState, segment: Segment, duration_s: float) -> Controller[Recorded]:
     """Record a settled motion as a segment, and note the level that was achieved in it."""
     play = settler.play
     play.forget()

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..excitation import ResonanceTracking
-from ._control_action import Conduct
+from ._control_action import Controller
 from ._record import recorded
-from ._settle import Settled, Settler, shortened
-from ._sine_loop import SinePlay
+from ._settle import SettledState, SettlingController, shortened
+from ._sine_loop import SineLoop
 from ._start import moved, started
 from ._steadiness import Steadiness
 from ._stroboscope import Periods
@@ -197,7 +197,7 @@ _FURTHEST = 1.5
 """Half-widths of the resonance between it and the furthest point of a flank."""
 
 
-class Lock(StrEnum):
+class LockResult(StrEnum):
     """How a search for a resonance ended."""
 
     LOCKED = "locked"
@@ -205,7 +205,7 @@ class Lock(StrEnum):
     AT_THE_EDGE = "outside the range"
 
 
-def track_resonance(play: SinePlay, plan: ResonanceTracking) -> Conduct[None]:
+def track_resonance(play: SineLoop, plan: ResonanceTracking) -> Controller[None]:
     """Lock on to the resonance at every level, record there, go on to the next level from there."""
     yield from started(play, plan.start_hz, plan.base_level(0))
     frequency_hz = plan.start_hz
@@ -215,30 +215,30 @@ def track_resonance(play: SinePlay, plan: ResonanceTracking) -> Conduct[None]:
     yield from play.say()
 
 
-def _tracked(play: SinePlay, plan: ResonanceTracking, number: int, start_hz: float) -> Conduct[float]:
+def _tracked(play: SineLoop, plan: ResonanceTracking, number: int, start_hz: float) -> Controller[float]:
     level = plan.base_level(number)
-    settler = Settler(play, plan.settling, level)
+    settler = SettlingController(play, plan.settling, level)
     search = PhaseSearch(plan.low_hz, plan.high_hz, plan.widest_step_hz)
-    visits: list[Settled] = []
-    frequency_hz, lock = start_hz, Lock.LOST
+    visits: list[SettledState] = []
+    frequency_hz, lock = start_hz, LockResult.LOST
     for _ in range(plan.most_tries):
         moved(play, frequency_hz, level)
         visits.append((yield from settler.settled()))
         error = _phase_error(play.periods, visits[-1], plan.phase_deg)
         search.tries.append(error)
         if abs(error.error_deg) <= plan.phase_tolerance_deg and len(search.tries) > 1:
-            lock = Lock.LOCKED
+            lock = LockResult.LOCKED
             break
         next_hz = search.next_hz()
         if next_hz == frequency_hz:
-            lock = Lock.AT_THE_EDGE
+            lock = LockResult.AT_THE_EDGE
             break
         frequency_hz = next_hz
     found = visits[-1]
     resonance = search.resonance(plan.sensor_phase_deg)
     yield from recorded(settler, found, plan.segment(number, found.frequency_hz), plan.record_s)
     mode = None
-    if lock is Lock.LOCKED:
+    if lock is LockResult.LOCKED:
         flanks = yield from _flanks(settler, plan, resonance)
         mode = _mode([*visits, *flanks], resonance)
     _say(play, plan, number, found, Tracked(resonance, mode, lock, len(search.tries)))
@@ -251,13 +251,13 @@ class Tracked:
 
     resonance: PhaseResonance
     mode: Mode | None
-    lock: Lock
+    lock: LockResult
     tries: int
 
 
-def _flanks(settler: Settler, plan: ResonanceTracking, resonance: PhaseResonance) -> Conduct[list[Settled]]:
+def _flanks(settler: SettlingController, plan: ResonanceTracking, resonance: PhaseResonance) -> Controller[list[SettledState]]:
     """Measure on both sides, up to one and a half half-widths away."""
-    found: list[Settled] = []
+    found: list[SettledState] = []
     pairs = plan.flank_pairs
     for place in (*range(-pairs, 0), *range(1, pairs + 1)):
         frequency_hz = resonance.frequency_hz + _FURTHEST * resonance.half_width_hz * place / pairs
@@ -267,7 +267,7 @@ def _flanks(settler: Settler, plan: ResonanceTracking, resonance: PhaseResonance
     return found
 
 
-def _mode(visits: Sequence[Settled], resonance: PhaseResonance) -> Mode | None:
+def _mode(visits: Sequence[SettledState], resonance: PhaseResonance) -> Mode | None:
     """Fit the mode to all that was visited near it."""
     reach_hz = 1.1 * _FURTHEST * resonance.half_width_hz
     near = [each for each in visits if abs(each.drive_hz - resonance.frequency_hz) <= reach_hz]
@@ -276,7 +276,7 @@ def _mode(visits: Sequence[Settled], resonance: PhaseResonance) -> Mode | None:
     )
 
 
-def _phase_error(periods: Periods, found: Settled, wanted_deg: float) -> PhaseError:
+def _phase_error(periods: Periods, found: SettledState, wanted_deg: float) -> PhaseError:
     """Compare the phase of m0 over the base with the wanted one; batches of periods tell its uncertainty."""
     newer = periods.last(periods.count // 2)
     length = len(newer.base) // _BATCHES
@@ -292,8 +292,8 @@ def _phase_error(periods: Periods, found: Settled, wanted_deg: float) -> PhaseEr
     return PhaseError(found.drive_hz, error_deg, degrees(spread) / sqrt(_BATCHES))
 
 
-def _say(play: SinePlay, plan: ResonanceTracking, number: int, found: Settled, tracked: Tracked) -> None:
-    is_told = tracked.lock is Lock.LOCKED and found.judgement.steadiness is not Steadiness.UNSETTLED
+def _say(play: SineLoop, plan: ResonanceTracking, number: int, found: SettledState, tracked: Tracked) -> None:
+    is_told = tracked.lock is LockResult.LOCKED and found.judgement.steadiness is not Steadiness.UNSETTLED
     said: dict[str, int | float | str | None] = {
         "level": number,
         "asked_m_per_s2": plan.accelerations_m_per_s2[number],

@@ -7,10 +7,10 @@ from math import isfinite
 from ..excitation import BaseLevel, Settling
 from ..plan import RunState
 from ._closed_loop_check import require_answer
-from ._control_action import Conduct
-from ._jump_search import Visit
+from ._control_action import Controller
+from ._jump_search import SettledPoint
 from ._level_control import Held, LevelControl, MeasuredLevel, measured_level
-from ._sine_loop import SinePlay
+from ._sine_loop import SineLoop
 from ._steadiness import Judgement, Steadiness, judged
 
 LOOK_S = 0.2
@@ -20,7 +20,7 @@ _SURE = 2.0
 
 
 @dataclass(frozen=True)
-class Settled:
+class SettledState:
     """What was found at one frequency after waiting."""
 
     frequency_hz: float
@@ -42,9 +42,9 @@ class Settled:
         return abs(self.transmissibility)
 
     @property
-    def visit(self) -> Visit:
+    def visit(self) -> SettledPoint:
         """What a search for a jump needs of it."""
-        return Visit(self.frequency_hz, self.response, self.judgement.period)
+        return SettledPoint(self.frequency_hz, self.response, self.judgement.period)
 
     def numbers(self) -> dict[str, int | float | str]:
         """Give what belongs beside the samples."""
@@ -64,14 +64,14 @@ class Settled:
 
 
 @dataclass(frozen=True)
-class Settler:
+class SettlingController:
     """Brings the motion at one frequency to rest, as far as it comes to rest."""
 
-    play: SinePlay
+    play: SineLoop
     rule: Settling
     level: BaseLevel | None
 
-    def settled(self) -> Conduct[Settled]:
+    def settled(self) -> Controller[SettledState]:
         """Wait at the frequency that is played; correct the setting whenever the level is off."""
         waited_s = 0.0
         while True:
@@ -119,11 +119,11 @@ class Settler:
         self.play.change(now.frequency_hz, next_vpp)
         return True
 
-    def _found(self, waited_s: float) -> Settled:
+    def _found(self, waited_s: float) -> SettledState:
         play, periods = self.play, self.play.periods
         newest = periods.last(max(self.rule.periods, periods.count // 2))
         measured = measured_level(newest.base)
-        return Settled(
+        return SettledState(
             frequency_hz=play.played.frequency_hz,
             drive_hz=play.drive_hz,
             setting_vpp=play.played.setting_vpp,
@@ -134,7 +134,7 @@ class Settler:
             transmissibility=play.ears.transmissibility(newest.base, newest.response[:, 1], play.drive_hz),
         )
 
-    def _is_steady(self, found: Settled) -> bool:
+    def _is_steady(self, found: SettledState) -> bool:
         """Whether the level is known well enough to be called held; it may be out of reach, too."""
         if self.level is None:
             return True
@@ -142,7 +142,7 @@ class Settler:
         is_at_the_end = found.setting_vpp >= self.play.most_vpp
         return is_known and (found.held is Held.WITHIN or is_at_the_end)
 
-    def _say(self, found: Settled) -> None:
+    def _say(self, found: SettledState) -> None:
         self.play.note("settled", json.dumps({"frequency_hz": found.frequency_hz, **found.numbers()}))
 
 

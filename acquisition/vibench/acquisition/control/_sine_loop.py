@@ -8,23 +8,23 @@ import numpy as np
 from ..excitation import LOWEST_AMPLITUDE_VPP, Segment, Tone
 from ..plan import HUSH_S, Measurement, Phase, RunState, ramp
 from ..rig import Rig
-from ._control_action import Conduct, Heard, Move, Note
-from ._feedback_channels import Ears
+from ._control_action import Controller, PhaseSamples, ControlAction, Note
+from ._feedback_channels import FeedbackChannels
 from ._stroboscope import Periods, Stroboscope
 
 
 @dataclass(frozen=True)
-class Played:
+class DriveSetting:
     """What the generator is set to."""
 
     frequency_hz: float
     setting_vpp: float
 
 
-class SinePlay:
+class SineLoop:
     """Knows what is played, and looks at it once a period."""
 
-    def __init__(self, ears: Ears, rig: Rig, measurement: Measurement) -> None:
+    def __init__(self, ears: FeedbackChannels, rig: Rig, measurement: Measurement) -> None:
         self._measurement = measurement
         self._notes: list[Note] = []
         self._scope: Stroboscope
@@ -33,7 +33,7 @@ class SinePlay:
         self.rig = rig
         self.most_vpp = measurement.excitation.amplitude_vpp
         """Largest setting of the plan [V]."""
-        self.played = Played(0.0, LOWEST_AMPLITUDE_VPP)
+        self.played = DriveSetting(0.0, LOWEST_AMPLITUDE_VPP)
         self.elapsed_s = 0.0
         """Listened so far [s]."""
 
@@ -52,7 +52,7 @@ class SinePlay:
         """Rms of the response channel's own noise, in the orders seen at the frequency of now [m/s]."""
         return Stroboscope.noise_of(self._silence, self.played.frequency_hz, self.ears.sample_rate_hz)
 
-    def hush(self) -> Conduct[None]:
+    def hush(self) -> Controller[None]:
         """Listen to silence: what the response shows then is noise."""
         heard = yield from self._move(Phase(RunState.ARMED, None, HUSH_S))
         _, _, response = self.ears.rows(heard)
@@ -63,7 +63,7 @@ class SinePlay:
         """Play something else from the next move on."""
         if frequency_hz != self.played.frequency_hz:
             self._scope = self.ears.stroboscope(frequency_hz)
-        self.played = Played(frequency_hz, setting_vpp)
+        self.played = DriveSetting(frequency_hz, setting_vpp)
         self.forget()
 
     def bounded_vpp(self, setting_vpp: float) -> float:
@@ -78,27 +78,27 @@ class SinePlay:
         """Have something noted with the next move."""
         self._notes.append(Note(kind, text))
 
-    def ramp_up(self) -> Conduct[None]:
+    def ramp_up(self) -> Controller[None]:
         """Begin to play."""
         yield from self._move(ramp(RunState.RAMPING_UP, self._tone, self._measurement))
 
-    def ramp_down(self) -> Conduct[None]:
+    def ramp_down(self) -> Controller[None]:
         """End the play."""
         yield from self._move(ramp(RunState.RAMPING_DOWN, self._tone, self._measurement))
 
-    def listen(self, state: RunState, duration_s: float, segment: Segment | None = None) -> Conduct[None]:
+    def listen(self, state: RunState, duration_s: float, segment: Segment | None = None) -> Controller[None]:
         """Play on for a while, and look."""
         heard = yield from self._move(Phase(state, self._tone, duration_s, segment))
         self.elapsed_s += duration_s
         self._scope.add(heard.first_sample, *self.ears.rows(heard))
 
-    def say(self) -> Conduct[None]:
+    def say(self) -> Controller[None]:
         """Have everything noted that is still to be noted."""
         if self._notes:
-            yield Move(None, self._taken_notes())
+            yield ControlAction(None, self._taken_notes())
 
-    def _move(self, phase: Phase) -> Generator[Move, Heard, Heard]:
-        return (yield Move(phase, self._taken_notes()))
+    def _move(self, phase: Phase) -> Generator[ControlAction, PhaseSamples, PhaseSamples]:
+        return (yield ControlAction(phase, self._taken_notes()))
 
     def _taken_notes(self) -> tuple[Note, ...]:
         notes = tuple(self._notes)

@@ -7,15 +7,15 @@ import numpy as np
 from ..excitation import GLIDE_TONE_S, BaseLevel
 from ..plan import RunState, needed_vpp
 from ._closed_loop_check import require_answer
-from ._control_action import Conduct
-from ._gain_estimator import GainTrack
-from ._sine_loop import SinePlay
+from ._control_action import Controller
+from ._gain_estimator import GainEstimator
+from ._sine_loop import SineLoop
 
 _GLIDE_MEMORY_S = 0.5
 """Over which a glide averages the base's answer [s]."""
 
 
-def started(play: SinePlay, frequency_hz: float, level: BaseLevel | None) -> Conduct[None]:
+def started(play: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Controller[None]:
     """Ramp up at a frequency: to the level, as the rig's model has it, or to the plan's setting."""
     setting_vpp = play.most_vpp
     if level is not None:
@@ -26,11 +26,11 @@ def started(play: SinePlay, frequency_hz: float, level: BaseLevel | None) -> Con
     yield from play.ramp_up()
 
 
-def glided(play: SinePlay, frequency_hz: float, level: BaseLevel | None, step_hz: float) -> Conduct[None]:
+def glided(play: SineLoop, frequency_hz: float, level: BaseLevel | None, step_hz: float) -> Controller[None]:
     """Go to another frequency through others at most ``step_hz`` apart: a large step would be a kick."""
     begin_hz = play.played.frequency_hz
     tones = max(1, ceil(abs(frequency_hz - begin_hz) / step_hz * (1 - 1e-9)))
-    track = GainTrack(_GLIDE_MEMORY_S)
+    track = GainEstimator(_GLIDE_MEMORY_S)
     for tone in range(1, tones):
         tracked(play, begin_hz + (frequency_hz - begin_hz) * tone / tones, level, track, GLIDE_TONE_S)
         yield from play.listen(RunState.SETTLING, GLIDE_TONE_S)
@@ -38,7 +38,7 @@ def glided(play: SinePlay, frequency_hz: float, level: BaseLevel | None, step_hz
     tracked(play, frequency_hz, level, track, GLIDE_TONE_S)
 
 
-def moved(play: SinePlay, frequency_hz: float, level: BaseLevel | None) -> None:
+def moved(play: SineLoop, frequency_hz: float, level: BaseLevel | None) -> None:
     """Play another frequency: the setting follows the rig's model from where it is."""
     setting_vpp = play.played.setting_vpp
     if level is not None:
@@ -48,7 +48,7 @@ def moved(play: SinePlay, frequency_hz: float, level: BaseLevel | None) -> None:
 
 
 def tracked(
-    play: SinePlay, frequency_hz: float, level: BaseLevel | None, track: GainTrack, duration_s: float
+    play: SineLoop, frequency_hz: float, level: BaseLevel | None, track: GainEstimator, duration_s: float
 ) -> None:
     """Play another frequency for ``duration_s``, at the setting that the track foresees for its middle."""
     if level is None or not track.is_known:
@@ -59,7 +59,7 @@ def tracked(
     _change(play, frequency_hz, modelled_vpp / gain, level)
 
 
-def followed(play: SinePlay, level: BaseLevel | None, track: GainTrack) -> None:
+def followed(play: SineLoop, level: BaseLevel | None, track: GainEstimator) -> None:
     """Take what was just heard into the track."""
     if level is None:
         return
@@ -72,13 +72,13 @@ def followed(play: SinePlay, level: BaseLevel | None, track: GainTrack) -> None:
     track.add(play.elapsed_s, play.periods.base, modelled, target)
 
 
-def _modelled_vpp(play: SinePlay, level: BaseLevel) -> float:
+def _modelled_vpp(play: SineLoop, level: BaseLevel) -> float:
     """Give the setting that the model needs for the level at the frequency of now [V]."""
     frequency_hz = play.played.frequency_hz
     return needed_vpp(play.rig, level.acceleration_at(frequency_hz), frequency_hz)
 
 
-def _change(play: SinePlay, frequency_hz: float, wanted_vpp: float, level: BaseLevel | None) -> None:
+def _change(play: SineLoop, frequency_hz: float, wanted_vpp: float, level: BaseLevel | None) -> None:
     """Change frequency and setting, the latter by no more than the level allows at once."""
     if level is not None:
         now_vpp = play.played.setting_vpp

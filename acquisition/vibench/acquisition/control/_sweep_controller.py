@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 from ..excitation import HeldSweep
 from ..plan import RunState
-from ._control_action import Conduct
-from ._gain_estimator import GainTrack
+from ._control_action import Controller
+from ._gain_estimator import GainEstimator
 from ._level_control import Held
-from ._settle import Settler, shortened
-from ._sine_loop import SinePlay
+from ._settle import SettlingController, shortened
+from ._sine_loop import SineLoop
 from ._start import followed, started, tracked
 
 
@@ -23,12 +23,12 @@ class _Excursion:
     """Largest deviation, as a share, with its sign."""
 
 
-def hold_sweep(play: SinePlay, plan: HeldSweep) -> Conduct[None]:
+def hold_sweep(play: SineLoop, plan: HeldSweep) -> Controller[None]:
     """Ramp up to the level, settle, sweep, ramp down."""
     level = plan.base_level
     yield from started(play, plan.start_hz, level)
-    yield from Settler(play, plan.settling, level).settled()
-    track = GainTrack(plan.average_s)
+    yield from SettlingController(play, plan.settling, level).settled()
+    track = GainEstimator(plan.average_s)
     excursion: _Excursion | None = None
     steps = outside = 0
     for mean_hz, duration_s in plan.mean_steps():
@@ -47,7 +47,7 @@ def hold_sweep(play: SinePlay, plan: HeldSweep) -> Conduct[None]:
 
 
 def _judged(
-    play: SinePlay, before: _Excursion | None, frequency_hz: float, deviation: float, tolerance: float
+    play: SineLoop, before: _Excursion | None, frequency_hz: float, deviation: float, tolerance: float
 ) -> _Excursion | None:
     """Begin, continue or end a stretch outside the tolerance."""
     if abs(deviation) <= tolerance:
@@ -59,7 +59,7 @@ def _judged(
     return _Excursion(before.begin_hz, frequency_hz, max(before.worst, deviation, key=abs))
 
 
-def _say(play: SinePlay, excursion: _Excursion) -> None:
+def _say(play: SineLoop, excursion: _Excursion) -> None:
     said = {
         "from_hz": shortened(excursion.begin_hz),
         "to_hz": shortened(excursion.end_hz),

@@ -8,7 +8,7 @@ import grpc
 from nidaqmx import GrpcSessionOptions
 from nidaqmx.system import System
 
-from ..rig import METADATA_KEY, given_token
+from ..rig import TOKEN_KEY, given_token
 
 # Longer than any single read (`daqmx.LONGEST_READ_S` plus its margin): a server that is silent for
 # so long is gone, even if its connection still stands.
@@ -26,7 +26,7 @@ class _Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc] # grpc 
 
     def intercept_unary_unary(self, continuation: Callable[..., Any], details: Any, request: Any) -> Any:
         # A namedtuple's _replace is public in spite of its underscore.
-        carried = ((METADATA_KEY, given_token()),) if given_token() else ()
+        carried = ((TOKEN_KEY, given_token()),) if given_token() else ()
         metadata = (*(details.metadata or ()), *carried)
         return continuation(details._replace(timeout=CALL_DEADLINE_S, metadata=metadata), request)
 

@@ -13,25 +13,25 @@ from ._errors import (
     EngineGone as EngineGone,
 )
 from ._heartbeat import (
-    Pulse as Pulse,
+    Heartbeat as Heartbeat,
 )
 from ._job_queue import (
-    Work as Work,
+    JobQueue as JobQueue,
 )
 from ._lock import (
     BenchLock as BenchLock,
 )
 from ._request_handler import (
-    Desk as Desk,
+    RequestHandler as RequestHandler,
 )
 from ._requests import (
-    Orders as Orders,
+    CampaignRequest as CampaignRequest,
 )
 from ._sample_buffer import (
-    Glance as Glance,
+    SampleSlice as SampleSlice,
 )
 from ._server import (
-    hosted as hosted,
+    serving as serving,
 )
 from ._start import (
     EngineProcess as EngineProcess,
@@ -39,7 +39,7 @@ from ._start import (
 )
 from ._state import (
     DRIVING as DRIVING,
-    Attendance as Attendance,
+    Supervision as Supervision,
     EngineState as EngineState,
 )
 from ._status import (

@@ -11,10 +11,10 @@ from types import FrameType
 
 from ..stopping import Cause
 from ._engine import Engine
-from ._job_queue import Work
-from ._request_handler import Desk
-from ._server import LOOPBACK, hosted, spoken
-from ._state import Attendance
+from ._job_queue import JobQueue
+from ._request_handler import RequestHandler
+from ._server import LOOPBACK, serving, spoken
+from ._state import Supervision
 
 FORGOTTEN_S = 60.0
 """An unattended engine that was never used waits this long for somebody to ask [s]."""
@@ -24,12 +24,12 @@ def main() -> None:
     """Serve until told to end, by a request, a signal, or the end of the one that started it."""
     options = _options()
     engine = Engine(options.attendance)
-    work = Work(engine)
-    desk = Desk(engine, work)
+    work = JobQueue(engine)
+    desk = RequestHandler(engine, work)
     _heed_signals(desk)
-    with hosted(desk, options.what, options.host) as server:
+    with serving(desk, options.what, options.host) as server:
         print(spoken(server.address), flush=True)  # noqa: T201 - this line is the handshake
-        if options.attendance is Attendance.ATTENDED:
+        if options.attendance is Supervision.ATTENDED:
             Thread(target=_follow_parent, args=(desk,), name="engine parent", daemon=True).start()
         else:
             _end_when_forgotten(desk, options.forgotten_s)
@@ -38,7 +38,7 @@ def main() -> None:
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m vibench.acquisition.engine", description=__doc__)
-    parser.add_argument("--attendance", type=Attendance, default=Attendance.ATTENDED)
+    parser.add_argument("--attendance", type=Supervision, default=Supervision.ATTENDED)
     parser.add_argument("--what", default="engine", help="what it is started for, shown to others")
     parser.add_argument("--host", default=LOOPBACK, help="loopback unless told otherwise; there is a token")
     parser.add_argument(
@@ -50,7 +50,7 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _heed_signals(desk: Desk) -> None:
+def _heed_signals(desk: RequestHandler) -> None:
     def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
         desk.shutdown(Cause.TERMINATED, f"{signal.Signals(number).name}: ended by the system")
 
@@ -58,7 +58,7 @@ def _heed_signals(desk: Desk) -> None:
         signal.signal(number, on_signal)
 
 
-def _end_when_forgotten(desk: Desk, after_s: float) -> None:
+def _end_when_forgotten(desk: RequestHandler, after_s: float) -> None:
     """End an engine that does nothing when whoever started it has gone away: it may hold a bench."""
 
     def look() -> None:
@@ -70,7 +70,7 @@ def _end_when_forgotten(desk: Desk, after_s: float) -> None:
     Thread(target=look, name="engine forgotten", daemon=True).start()
 
 
-def _follow_parent(desk: Desk) -> None:
+def _follow_parent(desk: RequestHandler) -> None:
     """End with whoever started the engine: standard input is a pipe from there."""
     # Not through sys.stdin: a buffer that a thread waits in cannot be torn down at the process's end.
     while os.read(sys.stdin.fileno(), 4096):

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from .. import errors
-from ..campaign import Existing
+from ..campaign import ExistingRecordings
 from ..errors import AcquisitionError
 from ..plan import Campaign
 from ..rig import KnobSheet, Rig
@@ -19,9 +19,9 @@ from ..stopping import StopLevel
 from . import _requests as ask
 from ._address import EngineAddress
 from ._errors import EngineError, EngineGone
-from ._requests import Orders
-from ._sample_buffer import Glance
-from ._state import Visit
+from ._requests import CampaignRequest
+from ._sample_buffer import SampleSlice
+from ._state import ConnectionRole
 from ._status import ArmedPlan, EngineStatus, RowStatus
 from ._wire import Message, receive, send
 
@@ -44,7 +44,7 @@ class EngineClient:
         self._rows: tuple[int, tuple[RowStatus, ...]] = (-1, ())
 
     @classmethod
-    def attach(cls, address: EngineAddress, visit: Visit = Visit.VISITING) -> "EngineClient":
+    def attach(cls, address: EngineAddress, visit: ConnectionRole = ConnectionRole.VISITING) -> "EngineClient":
         """Connect to a running engine, for a look or to attend to its run."""
         try:
             connection = socket.create_connection((address.host, address.port), PATIENCE_S)
@@ -71,11 +71,11 @@ class EngineClient:
         self._rows = (status.rows_number, status.rows)
         return status
 
-    def look(self, since_sample: int, most: int) -> Glance:
+    def look(self, since_sample: int, most: int) -> SampleSlice:
         """Give the newest samples of the run: from ``since_sample`` on, at most ``most`` a channel."""
         facts, payload = self._asked(ask.Look(since_sample=since_sample, most=most))
         volts = np.frombuffer(payload, "<f4").reshape(facts["shape"])
-        return Glance(facts["run_id"], facts["first_sample"], facts["sample_rate_hz"], volts)
+        return SampleSlice(facts["run_id"], facts["first_sample"], facts["sample_rate_hz"], volts)
 
     def open(self, rig: Rig, confirmations: KnobSheet | None = None) -> None:
         """Open the bench of a rig; the status says when it is open."""
@@ -89,11 +89,11 @@ class EngineClient:
         """Check the bench; the status will hold what was found."""
         self._do(ask.Check(folder=str(folder.absolute())))
 
-    def arm(self, campaign: Campaign, folder: Path, existing: Existing = Existing.REFUSE) -> ArmedPlan:
+    def arm(self, campaign: Campaign, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE) -> ArmedPlan:
         """Get ready to carry out a campaign, or be refused with the reasons."""
-        return self.arm_orders(Orders(campaign=campaign, folder=folder, existing=existing))
+        return self.arm_orders(CampaignRequest(campaign=campaign, folder=folder, existing=existing))
 
-    def arm_orders(self, orders: Orders) -> ArmedPlan:
+    def arm_orders(self, orders: CampaignRequest) -> ArmedPlan:
         """Get ready as `arm` does, with everything said that can be said."""
         absolute = orders.model_copy(update={"folder": orders.folder.absolute()})
         return self._told(ask.Arm(orders=absolute), ArmedPlan)

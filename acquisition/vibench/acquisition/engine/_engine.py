@@ -8,16 +8,16 @@ from pathlib import Path
 
 from ..bench import Bench
 from ..campaign import (
-    CampaignItem,
+    PointResult,
     CampaignProgress,
-    Event,
-    Happening,
-    Item,
-    KeptBench,
-    Listener,
+    CampaignEventKind,
+    CampaignEvent,
+    PointOutcome,
+    ReconnectingBench,
+    CampaignListener,
     Messenger,
-    ignore_happening,
-    ignore_item,
+    ignore_event,
+    ignore_result,
     make_folder,
     run_campaign,
 )
@@ -26,9 +26,9 @@ from ..errors import AcquisitionError, CheckStopped, InstrumentLost
 from ..rig import Confirm, Rig
 from ..stopping import StopSwitch, stop_on_signal
 from ._lock import BenchLock
-from ._published_state import Shown
-from ._requests import Orders
-from ._state import Attendance, EngineState
+from ._published_state import PublishedState
+from ._requests import CampaignRequest
+from ._state import Supervision, EngineState
 from ._status import BenchFacts, ChannelFacts
 
 
@@ -58,12 +58,12 @@ class Engine:
     shown it; leave the engine through a ``with``, and the bench is silent and closed.
     """
 
-    def __init__(self, attendance: Attendance) -> None:
+    def __init__(self, attendance: Supervision) -> None:
         self.attendance = attendance
-        self.shown = Shown(attendance)
+        self.shown = PublishedState(attendance)
         self.switch = StopSwitch()
         """Holds or ends what runs; a new one for every campaign."""
-        self._kept: KeptBench | None = None
+        self._kept: ReconnectingBench | None = None
         self._lock: BenchLock | None = None
 
     @property
@@ -81,7 +81,7 @@ class Engine:
         """Open the bench of a rig; ``confirm`` as `vibench.acquisition.bench.open_bench` takes it."""
         try:
             self._lock = BenchLock.of(rig)
-            self._kept = KeptBench(rig, confirm)
+            self._kept = ReconnectingBench(rig, confirm)
             self._kept.__enter__()
         except AcquisitionError as error:
             self._kept = None
@@ -111,11 +111,11 @@ class Engine:
 
     def measure(
         self,
-        orders: Orders,
-        on_item: Callable[[CampaignItem], None] = ignore_item,
-        on_happening: Listener = ignore_happening,
+        orders: CampaignRequest,
+        on_item: Callable[[PointResult], None] = ignore_result,
+        on_happening: CampaignListener = ignore_event,
         messengers: tuple[Messenger, ...] = (),
-    ) -> tuple[CampaignItem, ...]:
+    ) -> tuple[PointResult, ...]:
         """Make the recordings of a campaign; see `run_campaign`, which calls what is given here."""
         assert self._kept is not None
         facts = bench_facts(self.bench)
@@ -123,12 +123,12 @@ class Engine:
         def tell(progress: CampaignProgress) -> None:
             self.shown.tell(progress, facts)
 
-        def ended(item: CampaignItem) -> None:
+        def ended(item: PointResult) -> None:
             self.shown.item(item)
             on_item(item)
 
-        def happened(happening: Happening) -> None:
-            if happening.event is Event.RESTING:
+        def happened(happening: CampaignEvent) -> None:
+            if happening.event is CampaignEventKind.RESTING:
                 self.shown.rests(orders.campaign.rest_s, happening.text)
             on_happening(happening)
 
@@ -193,7 +193,7 @@ class Engine:
                 lock.close()
 
 
-def _told(items: tuple[CampaignItem, ...]) -> str:
+def _told(items: tuple[PointResult, ...]) -> str:
     """Say in a line how a campaign came out."""
-    counts = {result: sum(item.result is result for item in items) for result in Item}
+    counts = {result: sum(item.result is result for item in items) for result in PointOutcome}
     return "Campaign ended: " + ", ".join(f"{count} {each.value}" for each, count in counts.items() if count)

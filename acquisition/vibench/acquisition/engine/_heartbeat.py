@@ -7,14 +7,14 @@ from . import _requests as ask
 from ._address import EngineAddress
 from ._client import PATIENCE_S
 from ._errors import EngineGone
-from ._state import Visit
+from ._state import ConnectionRole
 from ._wire import Message, receive, send
 
 READ_BYTES = 1 << 20
 _BEAT = Message(ask.Beat().model_dump_json().encode())
 
 
-class Pulse:
+class Heartbeat:
     """A connection of its own, on which nothing is wanted and every answer is thrown away.
 
     A viewer's thread that paints can beat at any time: a beat takes some ten microseconds, takes no lock
@@ -22,7 +22,7 @@ class Pulse:
     """
 
     def __init__(self, address: EngineAddress) -> None:
-        hello = ask.Hello(token=address.token, visit=Visit.ATTENDING)
+        hello = ask.Hello(token=address.token, visit=ConnectionRole.ATTENDING)
         try:
             self._connection = socket.create_connection((address.host, address.port), PATIENCE_S)
             send(self._connection, Message(hello.model_dump_json().encode()))

@@ -12,7 +12,7 @@ ENDING_CAUSES = frozenset({Cause.TERMINATED, Cause.KEYBOARD, Cause.PARENT_GONE})
 """After a campaign that one of these has stopped, the process ends too."""
 
 
-class Work:
+class JobQueue:
     """A queue of jobs for an engine: filled from any thread, emptied by the one that calls `run`."""
 
     def __init__(self, engine: Engine) -> None:

@@ -13,12 +13,12 @@ from time import monotonic
 import numpy as np
 
 from ..bench import BenchReport
-from ..campaign import CampaignItem, CampaignProgress, Item
+from ..campaign import PointResult, CampaignProgress, PointOutcome
 from ..errors import AcquisitionError
 from ..instruments import Block
 from ..plan import Campaign, RunState, measured_s
-from ._sample_buffer import Recent
-from ._state import Attendance, EngineState
+from ._sample_buffer import SampleBuffer
+from ._state import Supervision, EngineState
 from ._status import (
     ArmedPlan,
     BenchFacts,
@@ -91,11 +91,11 @@ DISK_INTERVAL_S = 2.0
 _STATES = {RunState.HELD: EngineState.HELD, RunState.RAMPING_DOWN: EngineState.RAMPING_DOWN}
 
 
-class Shown:
+class PublishedState:
     """The newest of everything. Each value is replaced as a whole, so that no reader sees half of it."""
 
-    def __init__(self, attendance: Attendance) -> None:
-        self.recent = Recent()
+    def __init__(self, attendance: Supervision) -> None:
+        self.recent = SampleBuffer()
         self.messages = Messages()
         self._lock = threading.Lock()
         self._status = EngineStatus(state=EngineState.CLOSED, attendance=attendance)
@@ -179,9 +179,9 @@ class Shown:
         self._done_s += rest_s
         self.messages.info(text)
 
-    def item(self, item: CampaignItem) -> None:
+    def item(self, item: PointResult) -> None:
         """Show how a recording came out; what an earlier run has made is done already."""
-        if item.result is Item.KEPT:
+        if item.result is PointOutcome.KEPT:
             self._done_s += self._planned_s.get(item.name, 0.0)
         elif self._status.run is not None and item.name == self._status.run.name:
             self._done_s += self._status.run.total_s

@@ -20,17 +20,17 @@ from ..run import drive_for
 from ..stopping import Cause, StopLevel, StopRequest, StopSwitch
 from ._engine import Engine
 from ._errors import EngineError
-from ._job_queue import Work
-from ._requests import Orders
-from ._sample_buffer import Glance
-from ._state import DRIVING, SOUNDING, VIEWER_PATIENCE_S, Attendance, EngineState
+from ._job_queue import JobQueue
+from ._requests import CampaignRequest
+from ._sample_buffer import SampleSlice
+from ._state import DRIVING, SOUNDING, VIEWER_PATIENCE_S, Supervision, EngineState
 from ._status import ArmedPlan, EngineStatus
 
 ARMED_S = 60.0
 """An armed engine disarms itself after this long [s]."""
 
 
-def armed_plan(bench: Bench, orders: Orders) -> ArmedPlan:
+def armed_plan(bench: Bench, orders: CampaignRequest) -> ArmedPlan:
     """Hold a campaign against bench and folder; nothing is played and nothing written.
 
     Raises
@@ -90,18 +90,18 @@ STALL_S = 0.2
 """A look after this process's own viewers that comes so late tells of a stall of this process [s]."""
 
 
-class Desk:
+class RequestHandler:
     """Takes what is asked of an engine.
 
     It answers from what is known, puts a job into the engine's queue or presses its switch. A method
     raises `EngineError` with one sentence when the engine's state does not allow what was asked.
     """
 
-    def __init__(self, engine: Engine, work: Work) -> None:
+    def __init__(self, engine: Engine, work: JobQueue) -> None:
         self._engine = engine
         self._work = work
         self._asking = Lock()
-        self._orders: Orders | None = None
+        self._orders: CampaignRequest | None = None
         self._armed_s = 0.0
         self._heard_s = self._looked_s = monotonic()
 
@@ -113,7 +113,7 @@ class Desk:
         """Say where the engine stands."""
         return self._engine.shown.status()
 
-    def look(self, since_sample: int, most: int) -> Glance:
+    def look(self, since_sample: int, most: int) -> SampleSlice:
         """Give the newest samples of the run."""
         return self._engine.shown.recent.since(since_sample, most)
 
@@ -142,7 +142,7 @@ class Desk:
             self._engine.shown.enter(EngineState.CHECKING)
             self._work.put(lambda: self._engine.check(folder))
 
-    def arm(self, orders: Orders) -> ArmedPlan:
+    def arm(self, orders: CampaignRequest) -> ArmedPlan:
         """Get ready to carry out a campaign; raises AcquisitionError with the reasons when it cannot be."""
         with self._asking:
             self._require("arm", EngineState.READY, EngineState.ARMED)
@@ -199,7 +199,7 @@ class Desk:
             self.disarm()
             engine.shown.messages.warn(f"Armed for {ARMED_S:g} s and not started.", "Disarmed.", "Arm again.")
         alone_s = now_s - self._heard_s
-        if engine.attendance is Attendance.ATTENDED and alone_s > VIEWER_PATIENCE_S:
+        if engine.attendance is Supervision.ATTENDED and alone_s > VIEWER_PATIENCE_S:
             self._act_alone(f"nobody has looked for {alone_s:.1f} s")
 
     def is_forgotten(self, after_s: float) -> bool:

@@ -8,22 +8,22 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, NonNegativeInt, PositiveInt, TypeAdapter
 
-from ..campaign import AfterFailure, ChangedBench, Existing
+from ..campaign import AfterFailure, ChangedBench, ExistingRecordings
 from ..check import CheckRule
 from ..host import FrozenModel
 from ..plan import Campaign
 from ..rig import KnobSheet, Rig
 from ..stopping import StopLevel
-from ._state import Visit
+from ._state import ConnectionRole
 
 
-class Orders(FrozenModel):
+class CampaignRequest(FrozenModel):
     """A campaign, and how it is to be carried out."""
 
     campaign: Campaign
     folder: Path
     """Where its recordings go."""
-    existing: Existing = Existing.REFUSE
+    existing: ExistingRecordings = ExistingRecordings.REFUSE
     after_failure: AfterFailure = AfterFailure.STOP
     changed_bench: ChangedBench = ChangedBench.REFUSE
     check: CheckRule = CheckRule.FRESH
@@ -34,7 +34,7 @@ class Hello(FrozenModel):
 
     ask: Literal["hello"] = "hello"
     token: str
-    visit: Visit = Visit.VISITING
+    visit: ConnectionRole = ConnectionRole.VISITING
 
 
 class Open(FrozenModel):
@@ -64,7 +64,7 @@ class Arm(FrozenModel):
     """Get ready to carry out a campaign, or refuse it with reasons."""
 
     ask: Literal["arm"] = "arm"
-    orders: Orders
+    orders: CampaignRequest
 
 
 class Disarm(FrozenModel):

@@ -14,7 +14,7 @@ HELD_S = 10.0
 
 
 @dataclass(frozen=True, eq=False)
-class Glance:
+class SampleSlice:
     """Samples as a viewer gets them."""
 
     run_id: int
@@ -24,7 +24,7 @@ class Glance:
     """Shape (channels, samples) [V] at the converter's input."""
 
 
-class Recent:
+class SampleBuffer:
     """A window over the newest samples: written by the run, read by anybody, bounded in memory."""
 
     def __init__(self) -> None:
@@ -72,7 +72,7 @@ class Recent:
             while self._blocks and self._blocks[0][0] + self._blocks[0][1].shape[1] <= oldest:
                 self._blocks.popleft()
 
-    def since(self, sample: int, most: int) -> Glance:
+    def since(self, sample: int, most: int) -> SampleSlice:
         """Give what is held from ``sample`` on, the newest ``most`` of it."""
         with self._lock:
             blocks = tuple(self._blocks)
@@ -82,4 +82,4 @@ class Recent:
             volts[:, max(0, first - begin) :] for begin, volts in blocks if begin + volts.shape[1] > first
         ]
         volts = np.concatenate(parts, axis=1) if parts else np.empty((channels, 0), np.float32)
-        return Glance(run_id, min(first, end), rate_hz, volts)
+        return SampleSlice(run_id, min(first, end), rate_hz, volts)

@@ -25,15 +25,15 @@ from . import _requests as ask
 from ._address import EngineAddress
 from ._announcement import announced
 from ._errors import EngineError
-from ._request_handler import Desk
-from ._sample_buffer import Glance
-from ._state import Visit
+from ._request_handler import RequestHandler
+from ._sample_buffer import SampleSlice
+from ._state import ConnectionRole
 from ._wire import Message, WireError, receive, send
 
 DONE = Message(b'{"ok": true}')
 
 
-def answered(desk: Desk, message: Message) -> Message:
+def answered(desk: RequestHandler, message: Message) -> Message:
     """Do what a message asks for; what is refused comes back as one sentence."""
     try:
         request = ask.REQUEST.validate_json(message.text)
@@ -53,22 +53,22 @@ def refused(sentence: str, error: Exception) -> Message:
     return Message(json.dumps({"refused": sentence, "kind": type(error).__name__}).encode())
 
 
-def _answer(desk: Desk, request: ask.Request) -> Message:
+def _answer(desk: RequestHandler, request: ask.Request) -> Message:
     match request:
         case ask.Status(known_rows=known):
             status = desk.status()
             is_known = status.rows_number == known
             return _model(status.model_copy(update={"rows": ()}) if is_known else status)
         case ask.Look(since_sample=since, most=most):
-            return _glance(desk.look(since, most))
+            return _slice_message(desk.look(since, most))
         case ask.Arm(orders=orders):
             return _model(desk.arm(orders))
         case _:
-            _ORDERS[type(request)](desk, request)
+            _ACTIONS[type(request)](desk, request)
             return DONE
 
 
-_ORDERS: Mapping[type, Callable[[Desk, Any], None]] = {
+_ACTIONS: Mapping[type, Callable[[RequestHandler, Any], None]] = {
     ask.Hello: lambda _desk, _order: None,
     ask.Beat: lambda _desk, _order: None,
     ask.Open: lambda desk, order: desk.open(order.rig, order.confirmations),
@@ -88,7 +88,7 @@ def _model(model: BaseModel) -> Message:
     return Message(model.model_dump_json().encode())
 
 
-def _glance(glance: Glance) -> Message:
+def _slice_message(glance: SampleSlice) -> Message:
     facts = {
         "run_id": glance.run_id,
         "first_sample": glance.first_sample,
@@ -106,7 +106,7 @@ GREETING_S = 5.0
 class Server:
     """Answers for a desk. Nobody is let in without the token, from this computer or another."""
 
-    def __init__(self, desk: Desk, host: str = LOOPBACK, port: int = 0) -> None:
+    def __init__(self, desk: RequestHandler, host: str = LOOPBACK, port: int = 0) -> None:
         self._desk = desk
         self._token = secrets.token_urlsafe(32)
         self._listening = socket.create_server((host, port))
@@ -141,18 +141,18 @@ class Server:
             connection.settimeout(None)
             while True:
                 message = receive(connection)
-                if visit is Visit.ATTENDING:
+                if visit is ConnectionRole.ATTENDING:
                     self._desk.heard()
                 send(connection, answered(self._desk, message))
 
-    def _let_in(self, connection: socket.socket) -> Visit | None:
+    def _let_in(self, connection: socket.socket) -> ConnectionRole | None:
         """Say what the connection is for, or turn it away."""
         try:
             hello = ask.Hello.model_validate_json(receive(connection).text)
         except ValidationError:
             hello = ask.Hello(token="")
         if hmac.compare_digest(hello.token.encode(), self._token.encode()):
-            if hello.visit is Visit.ATTENDING:
+            if hello.visit is ConnectionRole.ATTENDING:
                 self._desk.heard()
             send(connection, DONE)
             return hello.visit
@@ -169,10 +169,10 @@ INTERVAL_S = 0.05
 """How often attendance is looked at [s]."""
 
 
-class Watch:
+class Watchdog:
     """Lets a desk look after its engine at every `INTERVAL_S`, until closed."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: RequestHandler) -> None:
         self._desk = desk
         self._closing = Event()
         self._thread = Thread(target=self._run, name="engine watch", daemon=True)
@@ -189,10 +189,10 @@ class Watch:
 
 
 @contextmanager
-def hosted(desk: Desk, what: str, host: str = LOOPBACK) -> Iterator[Server]:
+def serving(desk: RequestHandler, what: str, host: str = LOOPBACK) -> Iterator[Server]:
     """Serve a desk; ``what`` is shown to those who look for an engine."""
     with ExitStack() as inside:
         server = inside.enter_context(closing(Server(desk, host)))
-        inside.enter_context(closing(Watch(desk)))
+        inside.enter_context(closing(Watchdog(desk)))
         inside.enter_context(announced(server.address, what))
         yield server

@@ -8,7 +8,7 @@ from typing import Self
 from ._address import EngineAddress
 from ._client import EngineClient
 from ._errors import EngineGone
-from ._state import Attendance, Visit
+from ._state import Supervision, ConnectionRole
 
 LEAVING_S = 10.0
 """How long an engine may take to ramp down, finish its recording and end [s]."""
@@ -21,7 +21,7 @@ class EngineProcess:
         self._process = process
         self.address = address
         """Where others may ask it as well."""
-        self.client = EngineClient.attach(address, Visit.ATTENDING)
+        self.client = EngineClient.attach(address, ConnectionRole.ATTENDING)
 
     @property
     def pid(self) -> int:
@@ -60,7 +60,7 @@ class EngineProcess:
         self.close()
 
 
-def start_engine(attendance: Attendance = Attendance.ATTENDED) -> EngineProcess:
+def start_engine(attendance: Supervision = Supervision.ATTENDED) -> EngineProcess:
     """Start an engine of this installation, with no bench open.
 
     Raises
@@ -71,7 +71,7 @@ def start_engine(attendance: Attendance = Attendance.ATTENDED) -> EngineProcess:
     """
     process = subprocess.Popen(  # noqa: S603 - this interpreter, and nothing of a user's
         [sys.executable, "-m", "vibench.acquisition.engine", "--attendance", attendance.value],
-        stdin=subprocess.PIPE if attendance is Attendance.ATTENDED else subprocess.DEVNULL,
+        stdin=subprocess.PIPE if attendance is Supervision.ATTENDED else subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         text=True,
         # Ctrl-C in a terminal is for whoever shows the run: that one decides what the engine is told.

@@ -32,7 +32,7 @@ SOUNDING = DRIVING | {EngineState.CHECKING}
 """The drive may be on, if only for the small sine of a check."""
 
 
-class Attendance(StrEnum):
+class Supervision(StrEnum):
     """Whether a run needs somebody who looks."""
 
     ATTENDED = "attended"
@@ -41,7 +41,7 @@ class Attendance(StrEnum):
     """A campaign that is left alone: viewers may come and go."""
 
 
-class Visit(StrEnum):
+class ConnectionRole(StrEnum):
     """What a connection is for."""
 
     ATTENDING = "attending"

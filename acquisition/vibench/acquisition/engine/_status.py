@@ -6,7 +6,7 @@ from enum import StrEnum
 from ..bench import BenchReport
 from ..host import FrozenModel
 from ..plan import RunState
-from ._state import Attendance, EngineState
+from ._state import Supervision, EngineState
 
 
 class ChannelFacts(FrozenModel):
@@ -103,7 +103,7 @@ class EngineStatus(FrozenModel):
     """Everything a viewer shows, but the samples."""
 
     state: EngineState
-    attendance: Attendance
+    attendance: Supervision
     bench: BenchFacts | None = None
     check: BenchReport | None = None
     checked_utc: str = ""

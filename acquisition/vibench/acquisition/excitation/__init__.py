@@ -40,7 +40,7 @@ from ._plan import (
     AbstractFeedback,
 )
 from ._preview import (
-    Preview,
+    SignalPreview,
 )
 from ._resonance_tracking import (
     RESONANCE_LABEL,
@@ -99,7 +99,7 @@ __all__ = [
     "MultisineNoise",
     "OddMultisine",
     "Play",
-    "Preview",
+    "SignalPreview",
     "ResonanceTracking",
     "SampleSource",
     "Samples",

@@ -7,7 +7,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from ..host import FrozenModel
 from ._plan import AbstractExcitation, AmplitudeVpp, FrequencyHz
-from ._preview import Preview, preview_of
+from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
 MOST_LEAD_INS = 1000
@@ -76,8 +76,8 @@ class Dwell(AbstractExcitation):
         segment = Segment("dwell", {"frequency_hz": self.frequency_hz})
         yield Step(Tone(self.frequency_hz), self.settle_s, self.duration_s, segment)
 
-    def preview(self, sample_rate_hz: float) -> Preview:
+    def preview(self, sample_rate_hz: float) -> SignalPreview:
         """Show the sine from the moment the lead-in, or the wait, begins."""
-        return preview_of(
+        return signal_preview(
             self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
         )

@@ -7,7 +7,7 @@ from pydantic import PositiveFloat
 
 from ._feedback import BaseLevel, Settling
 from ._plan import AbstractFeedback, FrequencyHz
-from ._preview import Preview, preview_of
+from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
 
@@ -49,8 +49,8 @@ class HeldDwell(AbstractFeedback):
         """Give the level at the dwell's frequency."""
         yield self.frequency_hz, self.base_level.acceleration_at(self.frequency_hz)
 
-    def preview(self, sample_rate_hz: float) -> Preview:
+    def preview(self, sample_rate_hz: float) -> SignalPreview:
         """Show the recorded part at the largest setting."""
-        return preview_of(
+        return signal_preview(
             self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
         )

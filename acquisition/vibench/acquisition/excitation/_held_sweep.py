@@ -7,7 +7,7 @@ from pydantic import PositiveFloat
 
 from ._feedback import BaseLevel, Settling
 from ._plan import AbstractFeedback
-from ._preview import Preview, preview_of
+from ._preview import SignalPreview, signal_preview
 from ._sine_sweep import MovingSine
 from ._steps import Segment, Step, Tone
 
@@ -58,8 +58,8 @@ class HeldSweep(MovingSine, AbstractFeedback):
         for mean_hz, _ in self.mean_steps():
             yield mean_hz, self.base_level.acceleration_at(mean_hz)
 
-    def preview(self, sample_rate_hz: float) -> Preview:
+    def preview(self, sample_rate_hz: float) -> SignalPreview:
         """Show the whole sweep at the largest setting."""
-        return preview_of(
+        return signal_preview(
             self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
         )

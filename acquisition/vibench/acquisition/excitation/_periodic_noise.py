@@ -9,7 +9,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_
 
 from ._multisine import Lines, band_lines, flat_periods, require_playable
 from ._plan import AbstractExcitation, FrequencyHz
-from ._preview import Preview, preview_of
+from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Waveform
 
 
@@ -81,10 +81,10 @@ class PeriodicNoise(AbstractExcitation):
                 ),
             )
 
-    def preview(self, sample_rate_hz: float) -> Preview:
+    def preview(self, sample_rate_hz: float) -> SignalPreview:
         """Show one period of the first realisation."""
         first = next(self.steps())
         period = Step(first.play, settle_s=0.0, record_s=1 / self.repetition_hz, segment=first.segment)
-        return preview_of(
+        return signal_preview(
             [period], self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
         )

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field, PositiveFloat
 
 from ..host import FrozenModel
-from ._preview import Preview
+from ._preview import SignalPreview
 from ._steps import Step
 
 LOWEST_AMPLITUDE_VPP = 2e-3
@@ -53,7 +53,7 @@ class AbstractExcitation(FrozenModel, ABC):
         """The highest frequency that is meant to be there; what a converter must be able to follow [Hz]."""
 
     @abstractmethod
-    def preview(self, sample_rate_hz: float) -> Preview:
+    def preview(self, sample_rate_hz: float) -> SignalPreview:
         """Show what will be played, before anything moves.
 
         Raises

@@ -10,7 +10,7 @@ from ._steps import Play, Samples, Step, Stream, Tone, Waveform
 
 
 @dataclass(frozen=True, eq=False)
-class Preview:
+class SignalPreview:
     """The voltage that the generator's panel promises, as samples and in figures."""
 
     time_s: Samples
@@ -32,13 +32,13 @@ class Preview:
         return self.peak_v / self.rms_v
 
 
-def preview_of(
+def signal_preview(
     steps: Iterable[Step],
     amplitude_vpp: float,
     sample_rate_hz: float,
     highest_frequency_hz: float,
     duration_s: float,
-) -> Preview:
+) -> SignalPreview:
     """Sample ``steps`` one after the other; a tone takes up the phase where the one before it ended."""
     if sample_rate_hz <= 2 * highest_frequency_hz:
         raise ConfigurationError(
@@ -50,7 +50,7 @@ def preview_of(
     one_sided[0] /= 2
     if len(volts) % 2 == 0:
         one_sided[-1] /= 2
-    return Preview(
+    return SignalPreview(
         time_s=np.arange(len(volts)) / sample_rate_hz,
         volts=volts,
         frequency_hz=np.asarray(np.arange(len(one_sided)) * sample_rate_hz / len(volts), dtype=np.float64),

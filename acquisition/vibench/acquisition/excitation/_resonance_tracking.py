@@ -7,7 +7,7 @@ from pydantic import Field, PositiveFloat, model_validator
 
 from ._feedback import BaseLevel, Settling
 from ._plan import AbstractFeedback, FrequencyHz
-from ._preview import Preview, preview_of
+from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
 RESONANCE_LABEL = "resonance"
@@ -104,8 +104,8 @@ class ResonanceTracking(AbstractFeedback):
         """Give the largest level where the search begins."""
         yield self.start_hz, max(self.accelerations_m_per_s2)
 
-    def preview(self, sample_rate_hz: float) -> Preview:
+    def preview(self, sample_rate_hz: float) -> SignalPreview:
         """Show the recorded parts where the search begins, at the largest setting."""
-        return preview_of(
+        return signal_preview(
             self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
         )

@@ -7,7 +7,7 @@ from pydantic import Field, PositiveFloat, model_validator
 
 from ._feedback import BaseLevel, JumpSearch, Settling
 from ._plan import AbstractFeedback
-from ._preview import Preview, preview_of
+from ._preview import SignalPreview, signal_preview
 from ._stepped_sine import FrequencySteps
 from ._steps import Segment, Step, Tone
 
@@ -71,8 +71,8 @@ class SettledSine(FrequencySteps, AbstractFeedback):
             for frequency_hz in self.rising_hz:
                 yield frequency_hz, self.base_level.acceleration_at(frequency_hz)
 
-    def preview(self, sample_rate_hz: float) -> Preview:
+    def preview(self, sample_rate_hz: float) -> SignalPreview:
         """All steps of the list, waits left out, at the largest setting."""
-        return preview_of(
+        return signal_preview(
             self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
         )

@@ -8,7 +8,7 @@ from typing import Literal, Self
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from ._plan import LOWEST_AMPLITUDE_VPP, AbstractExcitation, FrequencyHz
-from ._preview import Preview, preview_of
+from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
 
@@ -147,9 +147,9 @@ class SineSweep(MovingSine):
             yield Step(Tone(mean_hz, self.level(mean_hz)), settle_s, duration_s, segment)
             settle_s = 0.0
 
-    def preview(self, sample_rate_hz: float) -> Preview:
+    def preview(self, sample_rate_hz: float) -> SignalPreview:
         """Show the whole sweep, without the wait before it."""
         moving = (Step(step.play, 0.0, step.record_s, step.segment) for step in self.steps())
-        return preview_of(
+        return signal_preview(
             moving, self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
         )

@@ -7,7 +7,7 @@ from typing import Literal, Self
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from ._plan import AbstractExcitation, AmplitudeVpp, FrequencyHz
-from ._preview import Preview, preview_of
+from ._preview import SignalPreview, signal_preview
 from ._stepped_sine import MOST_STEPS, Direction
 from ._steps import Segment, Step, Tone
 
@@ -80,9 +80,9 @@ class SteppedLevel(AbstractExcitation):
                 tone = Tone(self.frequency_hz, level_vpp / self.amplitude_vpp)
                 yield Step(tone, self.settle_s, self.record_s, Segment("step", numbers))
 
-    def preview(self, sample_rate_hz: float) -> Preview:
+    def preview(self, sample_rate_hz: float) -> SignalPreview:
         """All levels, waits included."""
-        return preview_of(self.steps(), self.amplitude_vpp, sample_rate_hz, self.frequency_hz, self.playing_s)
+        return signal_preview(self.steps(), self.amplitude_vpp, sample_rate_hz, self.frequency_hz, self.playing_s)
 
     def _steps(self) -> int:
         # Counted before any list of them is made: a wrong step could ask for millions.

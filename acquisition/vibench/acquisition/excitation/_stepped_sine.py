@@ -10,7 +10,7 @@ from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from ..host import FrozenModel
 from ._plan import AbstractExcitation, FrequencyHz
-from ._preview import Preview, preview_of
+from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
 MOST_STEPS = 4000
@@ -135,8 +135,8 @@ class SteppedSine(FrequencySteps):
                 segment = Segment("step", {"frequency_hz": frequency_hz, "direction": direction})
                 yield Step(Tone(frequency_hz), self.settle_s, self.record_s, segment)
 
-    def preview(self, sample_rate_hz: float) -> Preview:
+    def preview(self, sample_rate_hz: float) -> SignalPreview:
         """All steps, waits included."""
-        return preview_of(
+        return signal_preview(
             self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
         )

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from ._plan import AbstractExcitation, FrequencyHz
-from ._preview import Preview, preview_of
+from ._preview import SignalPreview, signal_preview
 from ._steps import Samples, Segment, Step, Stream
 
 CREST_FACTOR = 4.5
@@ -119,10 +119,10 @@ class StreamedNoise(AbstractExcitation):
         band = {"band_start_hz": self.band_start_hz, "band_stop_hz": self.band_stop_hz}
         yield Step(Stream(self.source), self.settle_s, self.duration_s, Segment("noise", band))
 
-    def preview(self, sample_rate_hz: float) -> Preview:
+    def preview(self, sample_rate_hz: float) -> SignalPreview:
         """Show the first seconds of it."""
         (step,) = self.steps()
         shown = Step(step.play, 0.0, min(self.duration_s, PREVIEW_S), step.segment)
-        return preview_of(
+        return signal_preview(
             [shown], self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
         )

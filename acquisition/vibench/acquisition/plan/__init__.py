@@ -2,7 +2,7 @@
 
 A `Measurement` is one excitation with its ramps and limits while running; a `Campaign` an ordered list of
 them and of nested sweeps, read from TOML. Before anything moves, a plan is held against the limits of the
-rig by its linear model (`predicted_loads`, `Outlook`) and laid out in phases of time (`duration_s`). All
+rig by its linear model (`predicted_loads`, `MeasurementPreview`) and laid out in phases of time (`duration_s`). All
 are frozen and validated. Frequencies in Hz, times in s, amplitudes peak to peak in V. Plans open no
 instrument and know no bench and no run. Chains of points: docs/decisions/0014-chains-of-points.md.
 Feedback: docs/feedback.md.
@@ -27,7 +27,7 @@ from ..excitation import (
     LeadIn,
     MultisineNoise,
     OddMultisine,
-    Preview,
+    SignalPreview,
     ResonanceTracking,
     Segment,
     SettledSine,
@@ -46,20 +46,20 @@ from ._band import (
 )
 from ._campaign import BYTES_PER_SAMPLE, Campaign, Retryable, RetryPolicy, load_campaign
 from ._drive_source import (
-    Player,
-    player_of,
+    DriveSource,
+    drive_source_of,
 )
 from ._limits import (
     LimitCheck,
-    Side,
+    LimitSide,
     require_within_limits,
     shortest_ramp_s,
 )
 from ._loads import needed_vpp, predicted_loads
 from ._measurement import InRunLimits, Measurement, OnOverload, Point
 from ._measurement_preview import (
-    Outlook,
-    outlook,
+    MeasurementPreview,
+    preview_measurement,
 )
 from ._run_state import (
     RunState,
@@ -81,7 +81,7 @@ from ._schedule import (
     stairs,
 )
 from ._sweep import (
-    Axis,
+    SweepAxis,
 )
 
 __all__ = [
@@ -93,7 +93,7 @@ __all__ = [
     "RESONANCE_LABEL",
     "STEP_LABEL",
     "AbstractExcitation",
-    "Axis",
+    "SweepAxis",
     "Campaign",
     "Direction",
     "Dwell",
@@ -108,11 +108,11 @@ __all__ = [
     "MultisineNoise",
     "OddMultisine",
     "OnOverload",
-    "Outlook",
+    "MeasurementPreview",
     "Phase",
-    "Player",
+    "DriveSource",
     "Point",
-    "Preview",
+    "SignalPreview",
     "Range",
     "RangeSpacing",
     "ResonanceTracking",
@@ -121,7 +121,7 @@ __all__ = [
     "RunState",
     "Segment",
     "SettledSine",
-    "Side",
+    "LimitSide",
     "SineSweep",
     "Step",
     "SteppedLevel",
@@ -137,9 +137,9 @@ __all__ = [
     "load_campaign",
     "measured_s",
     "needed_vpp",
-    "outlook",
+    "preview_measurement",
     "phases",
-    "player_of",
+    "drive_source_of",
     "predicted_loads",
     "ramp",
     "require_within_limits",

@@ -7,23 +7,23 @@ from ..rig import OutputUse, Rig
 from ._measurement import Measurement
 
 
-class Player(StrEnum):
+class DriveSource(StrEnum):
     """What drives the amplifier."""
 
     GENERATOR = "function generator"
     OUTPUT = "analogue output"
 
 
-def player_of(measurement: Measurement, rig: Rig) -> Player:
+def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
     """Say what plays a measurement on a rig; a stream needs an output, also where there is none."""
     use = OutputUse.STREAMS if rig.daq.output is None else rig.daq.output.plays
-    players = {_player(step.play, use) for step in measurement.excitation.steps()}
-    return Player.OUTPUT if Player.OUTPUT in players else Player.GENERATOR
+    players = {_source_of(step.play, use) for step in measurement.excitation.steps()}
+    return DriveSource.OUTPUT if DriveSource.OUTPUT in players else DriveSource.GENERATOR
 
 
-def _player(play: Play, use: OutputUse) -> Player:
+def _source_of(play: Play, use: OutputUse) -> DriveSource:
     match play, use:
         case (Stream(), _) | (Tone(), OutputUse.TONES_AND_STREAMS):
-            return Player.OUTPUT
+            return DriveSource.OUTPUT
         case (Tone() | Waveform(), _):
-            return Player.GENERATOR
+            return DriveSource.GENERATOR

@@ -10,14 +10,14 @@ from ..errors import LimitExceeded
 from ..rig import (
     LARGEST_LEVEL_ERROR,
     OutputConfig,
-    Quantity,
+    BaseQuantity,
     Rig,
     Role,
     channels_of,
     highest_carried_hz,
     suspended_mass_kg,
 )
-from ._drive_source import Player, player_of
+from ._drive_source import DriveSource, drive_source_of
 from ._loads import needed_vpp, predicted_loads
 from ._measurement import Measurement, OnOverload
 from ._specimen_loads import predicted_specimen_loads
@@ -28,7 +28,7 @@ USABLE_BANDWIDTH = 0.45
 """Share of the sample rate below which a converter with an anti-alias filter is flat (NI 9234: 0.45)."""
 
 
-class Side(StrEnum):
+class LimitSide(StrEnum):
     """Which side of the limit is allowed."""
 
     AT_MOST = "at most"
@@ -56,16 +56,16 @@ class LimitCheck:
     """Where the limit comes from."""
     remedy: str
     """What to change when it is exceeded."""
-    side: Side = Side.AT_MOST
+    side: LimitSide = LimitSide.AT_MOST
     consequence: Consequence = Consequence.REFUSED
 
     @property
     def use(self) -> float:
         """How much of the limit is used: above 1 is too much."""
         match self.side:
-            case Side.AT_MOST:
+            case LimitSide.AT_MOST:
                 return self.value / self.limit
-            case Side.AT_LEAST:
+            case LimitSide.AT_LEAST:
                 return self.limit / self.value
 
     @property
@@ -161,7 +161,7 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
             f"levels there are {LARGEST_LEVEL_ERROR:.0%} off",
             "lower the frequency or raise virtual.grid_rate_hz",
         )
-    if rig.daq.output is not None and player_of(measurement, rig) is Player.OUTPUT:
+    if rig.daq.output is not None and drive_source_of(measurement, rig) is DriveSource.OUTPUT:
         yield from _streaming(measurement, rig, rig.daq.output)
     yield LimitCheck(
         "the ramp",
@@ -170,7 +170,7 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
         "s",
         f"{RAMP_PERIODS:g} periods of the shaker's suspension",
         "lengthen ramp_s",
-        Side.AT_LEAST,
+        LimitSide.AT_LEAST,
     )
 
 
@@ -219,16 +219,16 @@ def _loads(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
     less = "lower amplitude_vpp"
     gentler = "lower amplitude_vpp or raise the lowest frequency"
     for quantity, what, limit, unit, remedy in (
-        (Quantity.STROKE, "the stroke", limits.stroke_m, "m", gentler),
-        (Quantity.VELOCITY, "the table's velocity", limits.velocity_m_per_s, "m/s", gentler),
-        (Quantity.ACCELERATION, "the table's acceleration", limits.acceleration_m_per_s2, "m/s2", less),
-        (Quantity.FORCE, "the force", limits.force_n, "N", less),
-        (Quantity.CURRENT, "the coil current", limits.current_a, "A", less),
+        (BaseQuantity.STROKE, "the stroke", limits.stroke_m, "m", gentler),
+        (BaseQuantity.VELOCITY, "the table's velocity", limits.velocity_m_per_s, "m/s", gentler),
+        (BaseQuantity.ACCELERATION, "the table's acceleration", limits.acceleration_m_per_s2, "m/s2", less),
+        (BaseQuantity.FORCE, "the force", limits.force_n, "N", less),
+        (BaseQuantity.CURRENT, "the coil current", limits.current_a, "A", less),
     ):
         load = loads[quantity]
         name = f"{what} ({load.cause}, peak)"
         yield LimitCheck(name, load.peak, limit.value, unit, limit.source, remedy)
-    current, volts = loads[Quantity.CURRENT], loads[Quantity.AMPLIFIER_VOLTAGE]
+    current, volts = loads[BaseQuantity.CURRENT], loads[BaseQuantity.AMPLIFIER_VOLTAGE]
     limiter = rig.amplifier.current_limit_a
     yield LimitCheck(
         f"the current ({current.cause}, rms)", current.rms, limiter.value, "A", limiter.source, less
@@ -237,7 +237,7 @@ def _loads(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
     name = f"the amplifier's voltage ({volts.cause}, peak)"
     yield LimitCheck(name, volts.peak, rig.amplifier.clip_v, "V", clip, "lower amplitude_vpp or the gain")
     yield from _inputs(
-        rig, measurement.excitation.highest_amplitude_vpp, volts.peak, loads[Quantity.ACCELERATION].peak
+        rig, measurement.excitation.highest_amplitude_vpp, volts.peak, loads[BaseQuantity.ACCELERATION].peak
     )
 
 

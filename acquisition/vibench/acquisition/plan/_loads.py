@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..excitation import Excitation, Play, SampleSource, Stream, Tone, Waveform, held_lines
-from ..rig import ComplexArray, Quantity, Rig, RigModel
+from ..rig import ComplexArray, BaseQuantity, Rig, RigModel
 
 HELD_SPANS = 4
 """A held waveform is followed to twice its playback rate: the images above are below 1/20 of the band
@@ -36,7 +36,7 @@ class Load:
     """What in the plan does it: ``"at 150 Hz"``."""
 
 
-def predicted_loads(excitation: Excitation, rig: Rig) -> dict[Quantity, Load]:
+def predicted_loads(excitation: Excitation, rig: Rig) -> dict[BaseQuantity, Load]:
     """Peak and rms of every quantity of the rig while ``excitation`` plays, steady state.
 
     Exact for the linear model: by frequency for sines, by Fourier lines summed in time for periodic
@@ -47,7 +47,7 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> dict[Quantity, Load]:
     model = RigModel(rig)
     tones, waveforms, sources = plays_of(excitation)
 
-    def worst(quantity: Quantity) -> Load:
+    def worst(quantity: BaseQuantity) -> Load:
         transfer = partial(model.transfer, quantity)
         loads = [_of_tones(transfer, tones)] if tones else []
         loads += [of_waveform(transfer, each, number) for number, each in enumerate(waveforms)]
@@ -55,7 +55,7 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> dict[Quantity, Load]:
         per_volt = max(loads, key=lambda load: load.peak)
         return Load(per_volt.peak * terminal_v, per_volt.rms * terminal_v, per_volt.cause)
 
-    return {quantity: worst(quantity) for quantity in Quantity}
+    return {quantity: worst(quantity) for quantity in BaseQuantity}
 
 
 def terminal_volts(excitation: Excitation, rig: Rig) -> float:
@@ -119,5 +119,5 @@ def needed_vpp(rig: Rig, acceleration: float, frequency_hz: float) -> float:
 
     The specimen is not in the model: where it pushes back, more or less is needed.
     """
-    per_volt = abs(complex(RigModel(rig).transfer(Quantity.ACCELERATION, frequency_hz)))
+    per_volt = abs(complex(RigModel(rig).transfer(BaseQuantity.ACCELERATION, frequency_hz)))
     return 2 * acceleration / (per_volt * rig.generator.terminal_factor())

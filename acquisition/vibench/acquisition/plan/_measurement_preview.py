@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..excitation import Preview, Samples
+from ..excitation import SignalPreview, Samples
 from ..rig import Rig
 from ._campaign import BYTES_PER_SAMPLE
 from ._limits import LimitCheck, limit_checks
@@ -19,7 +19,7 @@ _LOWEST_RATE = 2.1
 
 
 @dataclass(frozen=True, eq=False)
-class Outlook:
+class MeasurementPreview:
     """Everything that can be said of a measurement on a rig without touching it."""
 
     measurement: Measurement
@@ -50,7 +50,7 @@ class Outlook:
         return self.peak_v / self.rms_v
 
 
-def outlook(measurement: Measurement, rig: Rig) -> Outlook:
+def preview_measurement(measurement: Measurement, rig: Rig) -> MeasurementPreview:
     """Look ahead at a measurement on a rig; raises ConfigurationError when it cannot be sampled."""
     excitation = measurement.excitation
     rate_hz = _shown_rate_hz(excitation.playing_s, excitation.highest_frequency_hz, rig.daq.sample_rate_hz)
@@ -58,7 +58,7 @@ def outlook(measurement: Measurement, rig: Rig) -> Outlook:
     spectrum_hz, spectrum_v = _highest_lines(preview)
     length_s = duration_s(measurement)
     checks = sorted(limit_checks(measurement, rig), key=lambda check: check.use, reverse=True)
-    return Outlook(
+    return MeasurementPreview(
         measurement=measurement,
         volts=preview.volts.astype(np.float32),
         sample_rate_hz=rate_hz,
@@ -77,7 +77,7 @@ def _shown_rate_hz(playing_s: float, highest_hz: float, converter_hz: float) -> 
     return max(min(converter_hz, affordable), _LOWEST_RATE * highest_hz)
 
 
-def _highest_lines(preview: Preview) -> tuple[Samples, Samples]:
+def _highest_lines(preview: SignalPreview) -> tuple[Samples, Samples]:
     """Keep of every stretch, equal in logarithm, its highest line: what is excited must not be lost."""
     frequency_hz, amplitude_v = preview.frequency_hz[1:], preview.spectrum_v[1:]
     if len(frequency_hz) <= SPECTRUM_POINTS:

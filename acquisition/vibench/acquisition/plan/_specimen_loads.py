@@ -12,10 +12,10 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim import BaseAnswer, NoContact, Specimen, base_answer
+from vibench.sim import BaseResponse, NoContact, Specimen, base_response
 
 from ..excitation import Excitation, SampleSource, Tone, Waveform
-from ..rig import ComplexArray, Quantity, Rig, RigModel, specimen_of
+from ..rig import ComplexArray, BaseQuantity, Rig, RigModel, specimen_of
 from ._loads import BAND_POINTS, Load, of_source, of_waveform, plays_of, terminal_volts
 
 Floats = NDArray[np.float64]
@@ -35,9 +35,9 @@ class SpecimenLoads:
 class _Motion:
     """One quantity of m0 by its phasors: per unit of base displacement, and per unit of p."""
 
-    free: Callable[[BaseAnswer, Floats], ComplexArray]
-    stuck: Callable[[BaseAnswer, Floats], ComplexArray]
-    lever: Callable[[BaseAnswer, Floats], ComplexArray]
+    free: Callable[[BaseResponse, Floats], ComplexArray]
+    stuck: Callable[[BaseResponse, Floats], ComplexArray]
+    lever: Callable[[BaseResponse, Floats], ComplexArray]
 
 
 _AMPLITUDE = _Motion(
@@ -75,12 +75,12 @@ class _Answers:
     def __init__(self, specimen: Specimen) -> None:
         self.gap_m = inf if isinstance(specimen.contact, NoContact) else min(specimen.gaps_m)
         self._specimen = specimen
-        self._known: dict[bytes, BaseAnswer] = {}
+        self._known: dict[bytes, BaseResponse] = {}
 
-    def at(self, hz: Floats) -> BaseAnswer:
+    def at(self, hz: Floats) -> BaseResponse:
         key = hz.tobytes()
         if key not in self._known:
-            self._known[key] = base_answer(self._specimen, hz)
+            self._known[key] = base_response(self._specimen, hz)
         return self._known[key]
 
 
@@ -131,7 +131,7 @@ class _Swing:
         return Load(stuck.peak + pushed, float(np.hypot(stuck.rms, pushed / np.sqrt(2))), stuck.cause)
 
     def _base(self, hz: Floats) -> ComplexArray:
-        return self._terminal_v * self._model.transfer(Quantity.STROKE, hz)
+        return self._terminal_v * self._model.transfer(BaseQuantity.STROKE, hz)
 
     def _p(self, hz: Floats) -> ComplexArray:
         return self._base(hz) * self._answer(hz).free_p

@@ -19,7 +19,7 @@ MOST_POINTS = 10_000
 LONGEST_NAME = 64
 
 
-class Axis(StrEnum):
+class SweepAxis(StrEnum):
     """What a sweep may vary; the words of ``order``."""
 
     REPETITION = "repetition"
@@ -29,8 +29,8 @@ class Axis(StrEnum):
     FREQUENCY = "frequency_hz"
 
 
-USUAL_ORDER = (Axis.REPETITION, Axis.EXCITATION, Axis.LEVEL, Axis.DIRECTION, Axis.FREQUENCY)
-_UNITS = {Axis.LEVEL: "vpp", Axis.FREQUENCY: "hz"}
+USUAL_ORDER = (SweepAxis.REPETITION, SweepAxis.EXCITATION, SweepAxis.LEVEL, SweepAxis.DIRECTION, SweepAxis.FREQUENCY)
+_UNITS = {SweepAxis.LEVEL: "vpp", SweepAxis.FREQUENCY: "hz"}
 _TURNING = frozenset({Direction.UP_THEN_DOWN, Direction.DOWN_THEN_UP})
 
 
@@ -38,8 +38,8 @@ _TURNING = frozenset({Direction.UP_THEN_DOWN, Direction.DOWN_THEN_UP})
 class _Place:
     """Where a point lies: its value on each axis that is given."""
 
-    values: Mapping[Axis, Any]
-    words: Mapping[Axis, str]
+    values: Mapping[SweepAxis, Any]
+    words: Mapping[SweepAxis, str]
     """Each value as a part of a name, in the order of the axes."""
 
     def name(self, sweep: str) -> str:
@@ -48,7 +48,7 @@ class _Place:
 
     def with_words(self, **words: str) -> "_Place":
         """Call some values otherwise."""
-        return _Place(self.values, {**self.words, **{Axis[axis]: word for axis, word in words.items()}})
+        return _Place(self.values, {**self.words, **{SweepAxis[axis]: word for axis, word in words.items()}})
 
 
 class Sweep(FrozenModel):
@@ -69,9 +69,9 @@ class Sweep(FrozenModel):
     amplitude_vpp: Values | None = None
     direction: tuple[Direction, ...] = ()
     frequency_hz: Values | None = None
-    order: tuple[Axis, ...] = USUAL_ORDER
+    order: tuple[SweepAxis, ...] = USUAL_ORDER
     """The axes, the outermost (slowest) first."""
-    continue_from_previous: Axis | None = None
+    continue_from_previous: SweepAxis | None = None
     """``frequency_hz`` or ``amplitude_vpp``: the innermost axis, along which the branch is kept."""
     lead_s: PositiveFloat = 0.5
     """Time at each earlier point of a chain on the way to a point [s]."""
@@ -94,12 +94,12 @@ class Sweep(FrozenModel):
         axis = self.continue_from_previous
         if axis is None:
             return self
-        if axis not in (Axis.FREQUENCY, Axis.LEVEL):
+        if axis not in (SweepAxis.FREQUENCY, SweepAxis.LEVEL):
             raise ValueError(
                 f"continue_from_previous = {axis.value!r} is no axis to go along; allowed are "
                 "'frequency_hz' and 'amplitude_vpp'"
             )
-        given = [each for each in self.order if each in self._axes() and each is not Axis.DIRECTION]
+        given = [each for each in self.order if each in self._axes() and each is not SweepAxis.DIRECTION]
         if not given or given[-1] is not axis:
             raise ValueError(
                 f"continue_from_previous = {axis.value!r} must be the innermost axis that is given; "
@@ -117,7 +117,7 @@ class Sweep(FrozenModel):
     def _points_are_measurements(self) -> Self:
         counts = {axis.value: len(values) for axis, values in self._axes().items()}
         if self.direction:
-            counts[Axis.DIRECTION.value] = self._passes()
+            counts[SweepAxis.DIRECTION.value] = self._passes()
         count = prod(counts.values())
         if count > MOST_POINTS:
             shown = " x ".join(f"{number} {axis}" for axis, number in counts.items())
@@ -143,22 +143,22 @@ class Sweep(FrozenModel):
         """How often the directions go through an axis."""
         return sum(2 if way in _TURNING and self.continue_from_previous else 1 for way in self.direction)
 
-    def _axes(self) -> dict[Axis, tuple[Any, ...]]:
+    def _axes(self) -> dict[SweepAxis, tuple[Any, ...]]:
         """Values of every axis that is given."""
-        given: dict[Axis, tuple[Any, ...]] = {}
+        given: dict[SweepAxis, tuple[Any, ...]] = {}
         if self.repetitions > 1:
-            given[Axis.REPETITION] = tuple(range(1, self.repetitions + 1))
+            given[SweepAxis.REPETITION] = tuple(range(1, self.repetitions + 1))
         if self.excitations:
-            given[Axis.EXCITATION] = tuple(range(len(self.excitations)))
+            given[SweepAxis.EXCITATION] = tuple(range(len(self.excitations)))
         if self.amplitude_vpp is not None:
-            given[Axis.LEVEL] = values_of(self.amplitude_vpp)
+            given[SweepAxis.LEVEL] = values_of(self.amplitude_vpp)
         if self.direction:
-            given[Axis.DIRECTION] = self.direction
+            given[SweepAxis.DIRECTION] = self.direction
         if self.frequency_hz is not None:
-            given[Axis.FREQUENCY] = values_of(self.frequency_hz)
+            given[SweepAxis.FREQUENCY] = values_of(self.frequency_hz)
         return given
 
-    def _places(self, axes: Mapping[Axis, tuple[Any, ...]]) -> Iterator[_Place]:
+    def _places(self, axes: Mapping[SweepAxis, tuple[Any, ...]]) -> Iterator[_Place]:
         ordered = [axis for axis in self.order if axis in axes]
         for values in product(*(axes[axis] for axis in ordered)):
             place = dict(zip(ordered, values, strict=True))
@@ -168,18 +168,18 @@ class Sweep(FrozenModel):
         for place in self._places(self._axes()):
             name = place.name(self.name)
             content = self._content(name, place.values)
-            if Axis.DIRECTION in place.values:
-                _turn(content["excitation"], place.values[Axis.DIRECTION], name)
+            if SweepAxis.DIRECTION in place.values:
+                _turn(content["excitation"], place.values[SweepAxis.DIRECTION], name)
             yield Point(name, _measurement(content, name))
 
     def _led(self) -> Iterator[Point]:
         """Go along each chain, the points passed before being the way to the next."""
         axes = self._axes()
-        along = Axis(str(self.continue_from_previous))
+        along = SweepAxis(str(self.continue_from_previous))
         rising = sorted(axes.pop(along))
         for chain in self._places(axes):
             way: list[LeadIn] = []
-            for word, value in _passed(chain.values.get(Axis.DIRECTION), rising):
+            for word, value in _passed(chain.values.get(SweepAxis.DIRECTION), rising):
                 there = chain.with_words(DIRECTION=word) if word else chain
                 name = f"{there.name(self.name)}-{self._word(along, value)}"
                 content = self._content(name, {**chain.values, along: value})
@@ -189,28 +189,28 @@ class Sweep(FrozenModel):
                 yield Point(name, _measurement({**content, "excitation": led}, name), chain.name(self.name))
                 way.append(LeadIn(frequency_hz=led.frequency_hz, amplitude_vpp=led.amplitude_vpp))
 
-    def _content(self, name: str, values: Mapping[Axis, Any]) -> dict[str, Any]:
+    def _content(self, name: str, values: Mapping[SweepAxis, Any]) -> dict[str, Any]:
         """Put the values of a place into the template."""
         excitation = dict(self.measurement.get("excitation", {}))
-        if Axis.EXCITATION in values:
-            excitation |= self.excitations[values[Axis.EXCITATION]]
-        for axis in (Axis.LEVEL, Axis.FREQUENCY):
+        if SweepAxis.EXCITATION in values:
+            excitation |= self.excitations[values[SweepAxis.EXCITATION]]
+        for axis in (SweepAxis.LEVEL, SweepAxis.FREQUENCY):
             if axis in values:
                 excitation[axis.value] = values[axis]
         return {**self.measurement, "name": name, "excitation": excitation}
 
-    def _word(self, axis: Axis, value: Any) -> str:
+    def _word(self, axis: SweepAxis, value: Any) -> str:
         """Write a value as a part of a name: ``0p5vpp``, ``205hz``, ``up``, ``r2``."""
         match axis:
-            case Axis.REPETITION:
+            case SweepAxis.REPETITION:
                 return f"r{value}"
-            case Axis.DIRECTION:
+            case SweepAxis.DIRECTION:
                 return str(value)
-            case Axis.EXCITATION:
+            case SweepAxis.EXCITATION:
                 kinds = [str(each.get("kind", self._template_kind())) for each in self.excitations]
                 kind = kinds[value]
                 return kind if kinds.count(kind) == 1 else f"{kind}{value + 1}"
-            case Axis.LEVEL | Axis.FREQUENCY:
+            case SweepAxis.LEVEL | SweepAxis.FREQUENCY:
                 return f"{value:.7g}{_UNITS[axis]}".replace(".", "p").replace("+", "")
 
     def _template_kind(self) -> str:

@@ -30,7 +30,7 @@ from ._knobs import (
 )
 from ._model import (
     ComplexArray as ComplexArray,
-    Quantity as Quantity,
+    BaseQuantity as BaseQuantity,
     RigModel as RigModel,
     specimen_of as specimen_of,
     suspended_mass_kg as suspended_mass_kg,
@@ -41,9 +41,9 @@ from ._output import (
 )
 from ._virtual import (
     LARGEST_LEVEL_ERROR as LARGEST_LEVEL_ERROR,
-    METADATA_KEY as METADATA_KEY,
+    TOKEN_KEY as TOKEN_KEY,
     USUAL_GRID_RATE_HZ as USUAL_GRID_RATE_HZ,
-    VARIABLE as VARIABLE,
+    TOKEN_VARIABLE as TOKEN_VARIABLE,
     VirtualConfig as VirtualConfig,
     fastest_sample_rate_hz as fastest_sample_rate_hz,
     given_token as given_token,

@@ -17,7 +17,7 @@ ComplexArray = NDArray[np.complex128]
 FloatArray = NDArray[np.float64]
 
 
-class Quantity(StrEnum):
+class BaseQuantity(StrEnum):
     """A quantity of the chain that has a limit."""
 
     AMPLIFIER_VOLTAGE = "amplifier_voltage"
@@ -61,7 +61,7 @@ class RigModel:
 
     rig: Rig
 
-    def transfer(self, quantity: Quantity, frequency_hz: ArrayLike) -> ComplexArray:
+    def transfer(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
         """Peak of ``quantity`` per volt at the generator's terminal, with phase, shape of ``frequency_hz``.
 
         Time goes as exp(+i omega t). Zero hertz is allowed: a direct-coupled amplifier holds the table
@@ -77,17 +77,17 @@ class RigModel:
         coupled = impedance * dynamic_stiffness + s * force_constant**2
         stroke = force_constant * voltage / coupled
         match quantity:
-            case Quantity.AMPLIFIER_VOLTAGE:
+            case BaseQuantity.AMPLIFIER_VOLTAGE:
                 result = voltage
-            case Quantity.CURRENT:
+            case BaseQuantity.CURRENT:
                 result = dynamic_stiffness * voltage / coupled
-            case Quantity.FORCE:
+            case BaseQuantity.FORCE:
                 result = force_constant * dynamic_stiffness * voltage / coupled
-            case Quantity.STROKE:
+            case BaseQuantity.STROKE:
                 result = stroke
-            case Quantity.VELOCITY:
+            case BaseQuantity.VELOCITY:
                 result = s * stroke
-            case Quantity.ACCELERATION:
+            case BaseQuantity.ACCELERATION:
                 result = s**2 * stroke
         return np.asarray(result, dtype=np.complex128)
 

@@ -11,15 +11,15 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
 
 from ..host import FrozenModel
 
-METADATA_KEY = "vibench-token"
+TOKEN_KEY = "vibench-token"
 """Where a gRPC call carries it."""
-VARIABLE = "VIBENCH_RIG_TOKEN"
+TOKEN_VARIABLE = "VIBENCH_RIG_TOKEN"
 """Where our own programs find it: the environment, never a command line that others can read."""
 
 
 def given_token() -> str:
     """Token from the environment; empty where none is needed."""
-    return os.environ.get(VARIABLE, "")
+    return os.environ.get(TOKEN_VARIABLE, "")
 
 
 USUAL_GRID_RATE_HZ = 102_400.0

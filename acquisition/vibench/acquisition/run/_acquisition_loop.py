@@ -18,7 +18,7 @@ LIMIT_KIND = "limit"
 """Kind of the event that holds the numbers of a limit that was passed, as a JSON object."""
 
 
-class Recorder(Protocol):
+class SampleSink(Protocol):
     """Where a run puts its samples; `recording.writer.RecordingWriter` is one."""
 
     def append(self, block: Block) -> None:
@@ -37,10 +37,10 @@ class Recorder(Protocol):
         """End the recording, and return the finished file."""
 
 
-class Tape:
+class AcquisitionLoop:
     """The recording as it runs. Its clock is the number of samples read: to wait is to read."""
 
-    def __init__(self, digitizer: Digitizer, recorder: Recorder) -> None:
+    def __init__(self, digitizer: Digitizer, recorder: SampleSink) -> None:
         self._digitizer = digitizer
         self._recorder = recorder
         self._segment: Segment | None = None

@@ -5,7 +5,7 @@ from typing import Protocol
 
 from ..bench import RunBench
 from ..errors import ConfigurationError
-from ..plan import Measurement, Phase, Player, player_of
+from ..plan import Measurement, Phase, DriveSource, drive_source_of
 from ._generator_drive import GeneratorDrive
 from ._stream_drive import StreamDrive
 
@@ -18,7 +18,7 @@ class Drive(Protocol):
     """
 
     @property
-    def player(self) -> Player:
+    def player(self) -> DriveSource:
         """The instrument that is heard."""
 
     @property
@@ -65,14 +65,14 @@ def drive_for(bench: RunBench, measurement: Measurement) -> Drive:
         When it needs an analogue output and the bench has none.
 
     """
-    match player_of(measurement, bench.rig), bench.output:
-        case Player.GENERATOR, _:
+    match drive_source_of(measurement, bench.rig), bench.output:
+        case DriveSource.GENERATOR, _:
             return GeneratorDrive(bench.generator, measurement)
-        case Player.OUTPUT, None:
+        case DriveSource.OUTPUT, None:
             raise ConfigurationError(
                 "streamed noise needs an analogue output, and this bench has none: its function generator "
                 "repeats one waveform. Nothing was played; add [daq.output] to the hardware configuration, "
                 "or use multisine_noise with more realisations"
             )
-        case Player.OUTPUT, output:
+        case DriveSource.OUTPUT, output:
             return StreamDrive(output, measurement, bench.rig.generator.terminal_factor())

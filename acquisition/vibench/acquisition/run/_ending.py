@@ -13,7 +13,7 @@ from ..instruments import Block, Digitizer
 from ..plan import RunState
 from ..recording import RecordingState
 from ..stopping import Cause
-from ._acquisition_loop import Recorder
+from ._acquisition_loop import SampleSink
 from ._drive import Drive
 
 
@@ -75,7 +75,7 @@ class Ending:
         """Tell how it ended."""
         return Outcome(self.state, self.reason, path, self._cause)
 
-    def leave(self, drive: Drive, digitizer: Digitizer, recorder: Recorder) -> None:
+    def leave(self, drive: Drive, digitizer: Digitizer, recorder: SampleSink) -> None:
         """Silence, end sampling, finish the recording: each of them, whatever the others do."""
         with ExitStack() as leaving:
             leaving.callback(self._finish, recorder)
@@ -98,7 +98,7 @@ class Ending:
             if not has_failed_already:  # else the first failure is the cause, and must stay in front
                 raise
 
-    def _finish(self, recorder: Recorder) -> None:
+    def _finish(self, recorder: SampleSink) -> None:
         try:
             recorder.finish(_RECORDED_AS[self.state], self.reason)
         except AcquisitionError as failure:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import bilinear, lfilter, lfilter_zi
 
-from ..errors import LimitExceeded, Trip
+from ..errors import LimitExceeded, LimitTrip
 from ..instruments import Block, Overload, Samples
 from ..plan import InRunLimits, OnOverload
 from ..rig import Channel, Rig, Role, suspended_mass_kg
@@ -101,7 +101,7 @@ _OFF = "The run was ramped down and its recording kept; lower amplitude_vpp"
 
 
 @dataclass(frozen=True)
-class _Watched:
+class _MonitoredQuantity:
     """One quantity over a block, next to its limit."""
 
     role: Role
@@ -113,7 +113,7 @@ class _Watched:
     source: str
 
 
-class Guard:
+class LimitMonitor:
     """Says when the run must end.
 
     It sits in the loop that reads the samples, with nothing between it and the generator: no window
@@ -131,7 +131,7 @@ class Guard:
         self._begin(0)
 
     def require_safe(self, block: Block) -> None:
-        """Raise LimitExceeded, with its `Trip`, when a block passes a limit; the run then ramps down."""
+        """Raise LimitExceeded, with its `LimitTrip`, when a block passes a limit; the run then ramps down."""
         if not block.volts.shape[1]:
             return
         if block.first_sample != self._next_sample:
@@ -148,7 +148,7 @@ class Guard:
         self._specimen = SpecimenTracker(self._rate_hz)
         self._mean_square_a2 = 0.0
 
-    def _watched(self, block: Block) -> Iterator[_Watched]:
+    def _watched(self, block: Block) -> Iterator[_MonitoredQuantity]:
         """Everything with a limit: what is measured comes before what follows from it."""
         rows = {
             channel.role: volts * channel.units_per_volt
@@ -170,22 +170,22 @@ class Guard:
         if is_settled:
             yield from integrated
 
-    def _acceleration(self, acceleration: Samples) -> _Watched:
+    def _acceleration(self, acceleration: Samples) -> _MonitoredQuantity:
         limit = self._rig.shaker.limits.acceleration_m_per_s2
         allowed = limit.value * self._limits.base_acceleration
         what = "the base acceleration"
-        return _Watched(Role.BASE_ACCELERATION, what, acceleration, allowed, "m/s2", limit.source)
+        return _MonitoredQuantity(Role.BASE_ACCELERATION, what, acceleration, allowed, "m/s2", limit.source)
 
-    def _at_the_base(self, base: BaseMotion) -> Iterator[_Watched]:
+    def _at_the_base(self, base: BaseMotion) -> Iterator[_MonitoredQuantity]:
         shaker, share = self._rig.shaker.limits, self._limits
         v, x = shaker.velocity_m_per_s, shaker.stroke_m
         for what, values, limit, fraction, unit in (
             ("the base velocity", base.velocity, v, share.base_velocity, "m/s"),
             ("the stroke", base.displacement, x, share.stroke, "m"),
         ):
-            yield _Watched(Role.BASE_ACCELERATION, what, values, limit.value * fraction, unit, limit.source)
+            yield _MonitoredQuantity(Role.BASE_ACCELERATION, what, values, limit.value * fraction, unit, limit.source)
 
-    def _table(self, acceleration: Samples, base: BaseMotion) -> _Watched:
+    def _table(self, acceleration: Samples, base: BaseMotion) -> _MonitoredQuantity:
         """Force that moves the table: mass times acceleration, and what its suspension takes."""
         shaker = self._rig.shaker
         force = (
@@ -194,7 +194,7 @@ class Guard:
             + shaker.suspension_stiffness_n_per_m * base.displacement
         )
         limit = shaker.limits.force_n
-        return _Watched(
+        return _MonitoredQuantity(
             Role.BASE_ACCELERATION,
             "the force on the table",
             force,
@@ -203,18 +203,18 @@ class Guard:
             f"{REACTION:g} times: {limit.source}",
         )
 
-    def _at_the_amplifier(self, voltage: Samples, base: BaseMotion) -> Iterator[_Watched]:
+    def _at_the_amplifier(self, voltage: Samples, base: BaseMotion) -> Iterator[_MonitoredQuantity]:
         rig, share, role = self._rig, self._limits, Role.AMPLIFIER_VOLTAGE
         shaker = rig.shaker
         clip_v = rig.amplifier.clip_v * share.amplifier_voltage
-        yield _Watched(
+        yield _MonitoredQuantity(
             role, "the amplifier voltage", voltage, clip_v, "V", f"clipping of the {rig.amplifier.model}"
         )
         # The coil's inductance is left out, which makes the current too large, by 3 % at 1 kHz.
         current = (voltage - shaker.force_constant_n_per_a * base.velocity) / shaker.coil_resistance_ohm
         peak, force, limiter = shaker.limits.current_a, shaker.limits.force_n, rig.amplifier.current_limit_a
-        yield _Watched(role, "the coil current", current, peak.value * share.current, "A", peak.source)
-        yield _Watched(
+        yield _MonitoredQuantity(role, "the coil current", current, peak.value * share.current, "A", peak.source)
+        yield _MonitoredQuantity(
             role,
             "the coil's force",
             shaker.force_constant_n_per_a * current,
@@ -223,7 +223,7 @@ class Guard:
             force.source,
         )
         rms = np.full(1, self._rms(current))
-        yield _Watched(
+        yield _MonitoredQuantity(
             role, "the coil current (rms)", rms, limiter.value * share.current, "A", limiter.source
         )
 
@@ -232,18 +232,18 @@ class Guard:
         self._mean_square_a2 += share * (float(np.mean(current**2)) - self._mean_square_a2)
         return sqrt(self._mean_square_a2)
 
-    def _in_the_specimen(self, velocity: Samples, base: BaseMotion, block: Block) -> _Watched:
+    def _in_the_specimen(self, velocity: Samples, base: BaseMotion, block: Block) -> _MonitoredQuantity:
         limit = self._rig.specimen.amplitude_limit_m
         stretched = self._specimen.follow(velocity, base.velocity, _blind(block))
         allowed = limit.value * self._limits.specimen_amplitude
-        return _Watched(Role.M0_VELOCITY, "the specimen's amplitude", stretched, allowed, "m", limit.source)
+        return _MonitoredQuantity(Role.M0_VELOCITY, "the specimen's amplitude", stretched, allowed, "m", limit.source)
 
-    def _require(self, watched: _Watched, first_sample: int) -> None:
+    def _require(self, watched: _MonitoredQuantity, first_sample: int) -> None:
         peak = float(np.max(np.abs(watched.values)))
         if peak <= watched.limit:
             return
         sample = first_sample + int(np.argmax(np.abs(watched.values) > watched.limit))
-        trip = Trip(
+        trip = LimitTrip(
             channel=watched.role.value,
             quantity=watched.what.removeprefix("the "),
             value=peak,
@@ -265,7 +265,7 @@ class Guard:
         volts = block.volts[roles.index(overload.channel)]
         is_sensor = channel.full_scale_v < channel.range_v
         what = f"range of the {channel.sensor}" if is_sensor else f"range of {channel.physical}"
-        trip = Trip(
+        trip = LimitTrip(
             channel=overload.channel,
             quantity=what,
             value=float(np.max(np.abs(volts))) * abs(channel.units_per_volt),

@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import CheckFailed
 from ..instruments import Samples
 from ..plan import CHECK_FREQUENCY_HZ
-from ..rig import Channel, Quantity, Rig, RigModel, Role
+from ..rig import Channel, BaseQuantity, Rig, RigModel, Role
 
 DRIVE_TOLERANCE = 0.15
 """How far the measured drive may lie from the setting: a wrong load is a factor of 2, a cable is nothing."""
@@ -22,7 +22,7 @@ STILL_SHARE = 0.3
 filter, and the table still moves."""
 
 
-class BenchCheck(StrEnum):
+class LowLevelCheck(StrEnum):
     """Whether a run begins with the check of the bench."""
 
     AT_LOW_LEVEL = "at low level"
@@ -73,7 +73,7 @@ def judged(
     drive = _row(channels, Role.DRIVE_VOLTAGE)
     base = _row(channels, Role.BASE_ACCELERATION)
     terminal_v = 0.5 * amplitude_vpp * rig.generator.terminal_factor()
-    accelerance = abs(complex(RigModel(rig).transfer(Quantity.ACCELERATION, CHECK_FREQUENCY_HZ)))
+    accelerance = abs(complex(RigModel(rig).transfer(BaseQuantity.ACCELERATION, CHECK_FREQUENCY_HZ)))
 
     def measured(volts: Samples, row: int) -> float:
         return sine_amplitude(volts[row], CHECK_FREQUENCY_HZ, sample_rate_hz) * channels[row].units_per_volt

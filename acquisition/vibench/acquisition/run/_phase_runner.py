@@ -7,10 +7,10 @@ from ..instruments import Block
 from ..plan import Phase, RunState
 from ..recording import HOLD_ROOM_S
 from ..stopping import Cause, StopLevel, StopRequest, StopSwitch
-from ._acquisition_loop import BLOCK_S, Tape
+from ._acquisition_loop import BLOCK_S, AcquisitionLoop
 from ._drive import Drive
 from ._ending import Progress
-from ._limit_monitor import Guard
+from ._limit_monitor import LimitMonitor
 
 HOLD_LONGEST_S = HOLD_ROOM_S
 """How long a run may be held in all [s]: its recording has room for that."""
@@ -24,14 +24,14 @@ class Stopped(Exception):
         self.request = request
 
 
-class Performance:
+class PhaseRunner:
     """The part of a run in which samples pass: phases, holds, and the ramp of an early end.
 
     After every block it looks at the limits and at the switch: it raises LimitExceeded or `Stopped`,
     and it is up to the run to let it ramp down.
     """
 
-    def __init__(self, drive: Drive, tape: Tape, guard: Guard, switch: StopSwitch, total_s: float) -> None:
+    def __init__(self, drive: Drive, tape: AcquisitionLoop, guard: LimitMonitor, switch: StopSwitch, total_s: float) -> None:
         self.state = RunState.CHECKING
         self.tape = tape
         self._drive = drive

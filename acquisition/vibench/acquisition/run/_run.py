@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Self
 
 from ..bench import RunBench
-from ..control import Conduct, conduct, heard
+from ..control import Controller, feedback_controller, phase_samples
 from ..errors import AcquisitionError, ConfigurationError, LimitExceeded
 from ..excitation import AbstractFeedback
 from ..instruments import Block
@@ -20,29 +20,29 @@ from ..plan import (
     CHECK_S,
     Measurement,
     Phase,
-    Player,
+    DriveSource,
     RunState,
     check_amplitude_vpp,
     check_phases,
     duration_s,
     known_phases,
     phases,
-    player_of,
+    drive_source_of,
     require_within_limits,
     shortest_ramp_s,
 )
 from ..recording import ChannelHeader, Origin, RecordingHeader, create_recording
 from ..rig import Channel, KnobSheet
 from ..stopping import LEVELS, Cause, StopLevel, StopRequest, StopSwitch
-from ._acquisition_loop import Recorder, Tape
+from ._acquisition_loop import SampleSink, AcquisitionLoop
 from ._drive import Drive, drive_for
 from ._ending import Ending, Outcome, Progress
-from ._limit_monitor import Guard
-from ._low_level_check import BenchCheck, judged, require_checkable
-from ._phase_runner import Performance, Stopped
+from ._limit_monitor import LimitMonitor
+from ._low_level_check import LowLevelCheck, judged, require_checkable
+from ._phase_runner import PhaseRunner, Stopped
 
 
-def conductor_for(bench: RunBench, measurement: Measurement) -> Conduct[None] | None:
+def controller_for(bench: RunBench, measurement: Measurement) -> Controller[None] | None:
     """Give who conducts a measurement; None for one whose course is known.
 
     Raises
@@ -53,12 +53,12 @@ def conductor_for(bench: RunBench, measurement: Measurement) -> Conduct[None] | 
     """
     if not isinstance(measurement.excitation, AbstractFeedback):
         return None
-    if player_of(measurement, bench.rig) is Player.OUTPUT:
+    if drive_source_of(measurement, bench.rig) is DriveSource.OUTPUT:
         raise ConfigurationError(
             f"{measurement.name} is decided while it plays, and an analogue output is written ahead of its "
             "time. Nothing was played; let daq.output play streams only, and connect the function generator"
         )
-    return conduct(measurement, bench.rig, bench.channels, bench.digitizer.sample_rate_hz)
+    return feedback_controller(measurement, bench.rig, bench.channels, bench.digitizer.sample_rate_hz)
 
 
 def run_header(bench: RunBench, measurement: Measurement, planned_s: float) -> RecordingHeader:
@@ -106,7 +106,7 @@ def _confirmations(sheet: KnobSheet) -> dict[str, str]:
     return {"operator": sheet.operator, "confirmed": sheet.confirmed.isoformat(), **knobs}
 
 
-CreateRecording = Callable[[Path, RecordingHeader], Recorder]
+CreateRecording = Callable[[Path, RecordingHeader], SampleSink]
 
 
 class Run:
@@ -131,7 +131,7 @@ class Run:
         bench: RunBench,
         measurement: Measurement,
         path: Path,
-        bench_check: BenchCheck = BenchCheck.AT_LOW_LEVEL,
+        bench_check: LowLevelCheck = LowLevelCheck.AT_LOW_LEVEL,
         create: CreateRecording = create_recording,
         switch: StopSwitch | None = None,
     ) -> None:
@@ -143,12 +143,12 @@ class Run:
         self._bench_check = bench_check
         self._create = create
         self._drive: Drive  # chosen when the plan is admitted; nothing plays before
-        self._conductor: Conduct[None] | None = None
-        self._guard = Guard(bench.rig, bench.channels, measurement.limits, bench.digitizer.sample_rate_hz)
+        self._conductor: Controller[None] | None = None
+        self._guard = LimitMonitor(bench.rig, bench.channels, measurement.limits, bench.digitizer.sample_rate_hz)
         self._total_s = duration_s(measurement)
         self._state = RunState.IDLE
         self._ending = Ending()
-        self._performance: Performance | None = None
+        self._performance: PhaseRunner | None = None
         self._blocks = self._carry_out()
 
     @property
@@ -190,8 +190,8 @@ class Run:
 
     def _carry_out(self) -> Generator[Progress, None, None]:
         recorder = self._admitted()
-        tape = Tape(self._bench.digitizer, recorder)
-        self._performance = Performance(self._drive, tape, self._guard, self._switch, self._total_s)
+        tape = AcquisitionLoop(self._bench.digitizer, recorder)
+        self._performance = PhaseRunner(self._drive, tape, self._guard, self._switch, self._total_s)
         try:
             yield from self._played_or_stopped(self._performance)
         except (GeneratorExit, LimitExceeded):
@@ -208,7 +208,7 @@ class Run:
             finally:
                 self._performance.state = self._ending.state
 
-    def _played_or_stopped(self, performance: Performance) -> Iterator[Progress]:
+    def _played_or_stopped(self, performance: PhaseRunner) -> Iterator[Progress]:
         """Play the plan; where somebody or a limit ends it, ramp down as hard as the cause asks for."""
         try:
             yield from self._played(performance)
@@ -226,14 +226,14 @@ class Run:
             deque(self._ramped_down_early(performance, LEVELS[Cause.PROGRAM]), maxlen=0)
             raise
 
-    def _admitted(self) -> Recorder:
+    def _admitted(self) -> SampleSink:
         """Refuse what can be refused before anything moves; then begin the recording."""
         self._state = RunState.CHECKING
         try:
             require_checkable(self._bench.channels)
             require_within_limits(self._measurement, self._bench.rig)
             self._drive = drive_for(self._bench, self._measurement)
-            self._conductor = conductor_for(self._bench, self._measurement)
+            self._conductor = controller_for(self._bench, self._measurement)
             self._total_s += self._before_s()
             return self._create(self._path, run_header(self._bench, self._measurement, self._total_s))
         except AcquisitionError as error:
@@ -241,16 +241,16 @@ class Run:
             self._state = RunState.FAILED
             raise
 
-    def _played(self, performance: Performance) -> Iterator[Progress]:
+    def _played(self, performance: PhaseRunner) -> Iterator[Progress]:
         tape = performance.tape
         tape.log("player", self._drive.player.value)
         match self._bench_check:
-            case BenchCheck.AT_LOW_LEVEL:
+            case LowLevelCheck.AT_LOW_LEVEL:
                 self._begin(check_phases(self._measurement))
                 yield from self._checked(performance)
                 self._drive.announce(known_phases(self._measurement))
                 pause_s = self._drive.pause_s
-            case BenchCheck.RECENTLY_PASSED:
+            case LowLevelCheck.RECENTLY_PASSED:
                 self._begin(known_phases(self._measurement))
                 tape.log("check", "left out: the bench was checked shortly before")
                 pause_s = 0.0
@@ -259,15 +259,15 @@ class Run:
             for phase in phases(self._measurement):
                 yield from performance.perform(phase)
         else:
-            yield from _conducted(performance, self._conductor)
+            yield from _controlled(performance, self._conductor)
         tape.enter(None)
 
     def _before_s(self) -> float:
         """Time before the first ramp [s]: what comes is told when the check has passed, and not before."""
         match self._bench_check:
-            case BenchCheck.AT_LOW_LEVEL:
+            case LowLevelCheck.AT_LOW_LEVEL:
                 return CHECK_S + self._drive.pause_s
-            case BenchCheck.RECENTLY_PASSED:
+            case LowLevelCheck.RECENTLY_PASSED:
                 return 0.0
 
     def _begin(self, coming: Iterable[Phase]) -> None:
@@ -275,7 +275,7 @@ class Run:
         self._drive.arm(coming)
         self._bench.digitizer.start()
 
-    def _checked(self, performance: Performance) -> Iterator[Progress]:
+    def _checked(self, performance: PhaseRunner) -> Iterator[Progress]:
         before: list[Block] = []
         during: list[Block] = []
         listening, settling, measuring = check_phases(self._measurement)
@@ -285,14 +285,14 @@ class Run:
         figures = judged(
             self._bench.rig,
             self._bench.channels,
-            heard(before).volts,
-            heard(during).volts,
+            phase_samples(before).volts,
+            phase_samples(during).volts,
             self._bench.digitizer.sample_rate_hz,
             check_amplitude_vpp(self._measurement.excitation.amplitude_vpp),
         )
         performance.tape.log("check", figures.text())
 
-    def _ramped_down_early(self, performance: Performance, level: StopLevel) -> Iterator[Progress]:
+    def _ramped_down_early(self, performance: PhaseRunner, level: StopLevel) -> Iterator[Progress]:
         return performance.ramp_down_early(self._ending.reason, level, self._ramp_s)
 
     def _ramp_s(self, level: StopLevel) -> float:
@@ -301,7 +301,7 @@ class Run:
         return planned_s if level is StopLevel.RAMP else min(planned_s, shortest_ramp_s(self._bench.rig))
 
 
-def _conducted(performance: Performance, conductor: Conduct[None]) -> Iterator[Progress]:
+def _controlled(performance: PhaseRunner, conductor: Controller[None]) -> Iterator[Progress]:
     """Carry out moves one by one; what was heard during each decides the next."""
     try:
         move = next(conductor)
@@ -311,6 +311,6 @@ def _conducted(performance: Performance, conductor: Conduct[None]) -> Iterator[P
             blocks: list[Block] = []
             if move.phase is not None:
                 yield from performance.perform(move.phase, blocks)
-            move = conductor.send(heard(blocks))
+            move = conductor.send(phase_samples(blocks))
     except StopIteration:
         pass

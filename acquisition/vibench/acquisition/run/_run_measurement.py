@@ -8,7 +8,7 @@ from ..plan import Measurement
 from ..recording import create_recording
 from ..stopping import StopSwitch, stop_on_signal
 from ._ending import Outcome, Progress
-from ._low_level_check import BenchCheck
+from ._low_level_check import LowLevelCheck
 from ._run import CreateRecording, Run
 
 
@@ -20,7 +20,7 @@ def run_measurement(
     bench: RunBench,
     measurement: Measurement,
     path: Path,
-    bench_check: BenchCheck = BenchCheck.AT_LOW_LEVEL,
+    bench_check: LowLevelCheck = LowLevelCheck.AT_LOW_LEVEL,
     on_progress: Callable[[Progress], None] = ignore_progress,
     create: CreateRecording = create_recording,
     switch: StopSwitch | None = None,

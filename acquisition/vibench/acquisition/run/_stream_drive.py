@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import AcquisitionError, ConfigurationError
 from ..excitation import Play, Stream, Tone, Waveform
 from ..instruments import AnalogOutput, Samples
-from ..plan import Measurement, Phase, Player, half_cosine
+from ..plan import Measurement, Phase, DriveSource, half_cosine
 from ._acquisition_loop import BLOCK_S
 
 RELEASE_S = 0.05
@@ -22,7 +22,7 @@ RELEASE_S = 0.05
 
 
 @dataclass(frozen=True)
-class _Piece:
+class _Stretch:
     """A stretch of samples over which the level goes from one value to another on a half cosine."""
 
     play: Play | None
@@ -38,7 +38,7 @@ class _Piece:
         return np.asarray(self.begin_level + rise * 0.5 * (1 - np.cos(np.pi * progress)))
 
 
-class Score:
+class OutputSynthesizer:
     """Phases as samples from -1 to 1, made on demand and in order.
 
     The level is an envelope, sample by sample: a half cosine over a ramp, and constant elsewhere. The
@@ -50,7 +50,7 @@ class Score:
     def __init__(self, sample_rate_hz: float) -> None:
         self._rate_hz = sample_rate_hz
         self._coming: Iterator[Phase] = iter(())
-        self._piece = _Piece(None, 0, 0, 0.0, 0.0)
+        self._piece = _Stretch(None, 0, 0, 0.0, 0.0)
         self._sample = 0
         self._due_s = 0.0
         self._level = 0.0
@@ -109,15 +109,15 @@ class Score:
     def _begin(self, phase: Phase) -> None:
         self._due_s += phase.duration_s
         end = round(self._due_s * self._rate_hz)
-        self._piece = _Piece(phase.play, self._sample, end, self._level, phase.end_level)
+        self._piece = _Stretch(phase.play, self._sample, end, self._level, phase.end_level)
 
     def _fade(self, duration_s: float) -> None:
         end = self._sample + max(1, round(duration_s * self._rate_hz))
-        self._piece = _Piece(self._piece.play, self._sample, end, self._level, 0.0)
+        self._piece = _Stretch(self._piece.play, self._sample, end, self._level, 0.0)
         self._due_s = end / self._rate_hz
 
     def _rest(self, samples: int) -> None:
-        self._piece = _Piece(None, self._sample, self._sample + samples, 0.0, 0.0)
+        self._piece = _Stretch(None, self._sample, self._sample + samples, 0.0, 0.0)
         self._due_s = self._piece.end / self._rate_hz
 
     def _sound(self, play: Play | None, count: int) -> Samples:
@@ -152,7 +152,7 @@ class StreamDrive:
     so breaking off takes effect after at most that long.
     """
 
-    player = Player.OUTPUT
+    player = DriveSource.OUTPUT
     can_hold = False
 
     def __init__(self, output: AnalogOutput, measurement: Measurement, terminal_factor: float) -> None:
@@ -160,7 +160,7 @@ class StreamDrive:
         self._output = output
         self._amplitude_vpp = measurement.excitation.amplitude_vpp
         self._full_v = 0.5 * self._amplitude_vpp * terminal_factor
-        self._score = Score(output.sample_rate_hz)
+        self._score = OutputSynthesizer(output.sample_rate_hz)
         self._read_s = 0.0
         self._written = 0
         self._sounds_until = 0

@@ -10,32 +10,32 @@ from ._options import (
 )
 from ._recording_traces import (
     dwell_traces,
-    predicted_traces,
+    predicted_curves,
     stepped_traces,
     sweep_traces,
     transmission_trace,
 )
 from ._trace import (
-    Origin,
-    Response,
-    Trace,
-    sorted_trace,
-    trace_difference,
+    CurveOrigin,
+    CurveKind,
+    Curve,
+    sorted_curve,
+    curve_difference,
 )
-from ._trace_peaks import readings, trace_peaks
+from ._trace_peaks import readings, curve_peaks
 
 __all__ = [
     "AnalysisOptions",
-    "Origin",
-    "Response",
-    "Trace",
+    "CurveOrigin",
+    "CurveKind",
+    "Curve",
     "dwell_traces",
-    "predicted_traces",
+    "predicted_curves",
     "readings",
-    "sorted_trace",
+    "sorted_curve",
     "stepped_traces",
     "sweep_traces",
-    "trace_difference",
-    "trace_peaks",
+    "curve_difference",
+    "curve_peaks",
     "transmission_trace",
 ]

@@ -7,7 +7,7 @@ from pydantic import Field, PositiveFloat, model_validator
 
 from vibench.acquisition import FrozenModel
 
-from ..frequency_response import Estimator, NoiseRequest
+from ..frequency_response import Estimator, FrequencyResponseRequest
 from ..model import Simulation
 from ..signals import DEFAULT_CONFIDENCE, Window
 
@@ -46,9 +46,9 @@ class AnalysisOptions(FrozenModel):
         return self
 
     @property
-    def request(self) -> NoiseRequest:
+    def request(self) -> FrequencyResponseRequest:
         """The same for the analysis."""
-        return NoiseRequest(
+        return FrequencyResponseRequest(
             estimator=self.estimator,
             noise_ratio=self.noise_ratio,
             resolution_hz=self.resolution_hz,

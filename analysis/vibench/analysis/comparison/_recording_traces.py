@@ -4,38 +4,38 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..frequency_response import Transmission
-from ..model import Prediction
+from ..frequency_response import FrequencyResponse
+from ..model import ResponsePrediction
 from ..signals import Reals
 from ..sine import DwellResponse, SteppedResponse, SweepResponse
-from ._trace import Origin, Response, Trace
+from ._trace import CurveOrigin, CurveKind, Curve
 
 SAME_HZ = 0.01
 """Frequencies that lie within this are one [Hz]."""
 
 
-def predicted_traces(name: str, found: Prediction) -> Iterator[Trace]:
+def predicted_curves(name: str, found: ResponsePrediction) -> Iterator[Curve]:
     """Give Responses I and II under sines."""
     low, high = 1e6 * float(found.amplitude_m.min()), 1e6 * float(found.amplitude_m.max())
     level = f"{low:.3g} µm" if low == high else f"{low:.3g} to {high:.3g} µm"
     note = f"sines of A0 = {level}, {found.accuracy.value}"
     unknown = np.full(found.frequency_hz.shape, np.nan)
-    yield Trace(
-        name, Origin.PREDICTED, Response.RESPONSE_I, found.frequency_hz, found.response_i, unknown, note
+    yield Curve(
+        name, CurveOrigin.PREDICTED, CurveKind.RESPONSE_I, found.frequency_hz, found.response_i, unknown, note
     )
-    yield Trace(
-        name, Origin.PREDICTED, Response.RESPONSE_II, found.frequency_hz, found.response_ii, unknown, note
+    yield Curve(
+        name, CurveOrigin.PREDICTED, CurveKind.RESPONSE_II, found.frequency_hz, found.response_ii, unknown, note
     )
 
 
-def transmission_trace(name: str, origin: Origin, found: Transmission) -> Trace:
+def transmission_trace(name: str, origin: CurveOrigin, found: FrequencyResponse) -> Curve:
     """Make a curve of an estimated transmission, with its bounds."""
     how = found.settings
     note = f"{how.estimator.value}, {found.n_eff:.3g} averages, lines {found.resolution_hz:.3g} Hz wide"
-    return Trace(
+    return Curve(
         name,
         origin,
-        Response.TRANSMISSION,
+        CurveKind.TRANSMISSION,
         found.frequency_hz,
         found.magnitude,
         found.relative_sd_magnitude,
@@ -43,7 +43,7 @@ def transmission_trace(name: str, origin: Origin, found: Transmission) -> Trace:
     )
 
 
-def sweep_traces(name: str, origin: Origin, found: SweepResponse) -> Iterator[Trace]:
+def sweep_traces(name: str, origin: CurveOrigin, found: SweepResponse) -> Iterator[Curve]:
     """Make a curve of each response that a sweep measured."""
     note = f"{found.sweep_rate_hz_per_s:+.3g} Hz/s"
     yield from _responses(
@@ -51,7 +51,7 @@ def sweep_traces(name: str, origin: Origin, found: SweepResponse) -> Iterator[Tr
     )
 
 
-def stepped_traces(name: str, origin: Origin, found: SteppedResponse) -> Iterator[Trace]:
+def stepped_traces(name: str, origin: CurveOrigin, found: SteppedResponse) -> Iterator[Curve]:
     """Make a curve of each response that a stepped sine measured."""
     """Give steps up and steps down as curves of their own: between jumps they differ."""
     if found.frequency_hz.size > 1 and np.ptp(found.frequency_hz) < SAME_HZ:
@@ -65,7 +65,7 @@ def stepped_traces(name: str, origin: Origin, found: SteppedResponse) -> Iterato
         )
 
 
-def dwell_traces(name: str, origin: Origin, found: DwellResponse) -> Iterator[Trace]:
+def dwell_traces(name: str, origin: CurveOrigin, found: DwellResponse) -> Iterator[Curve]:
     """Make a point of each response that a dwell measured."""
     values = (
         np.array([found.response_i]),
@@ -77,9 +77,9 @@ def dwell_traces(name: str, origin: Origin, found: DwellResponse) -> Iterator[Tr
 
 
 def _responses(
-    name: str, origin: Origin, frequency_hz: Reals, values: tuple[Reals, Reals, Reals], note: str
-) -> Iterator[Trace]:
+    name: str, origin: CurveOrigin, frequency_hz: Reals, values: tuple[Reals, Reals, Reals], note: str
+) -> Iterator[Curve]:
     first, second, sd_second = values
     unknown = np.full(frequency_hz.shape, np.nan)
-    yield Trace(name, origin, Response.RESPONSE_I, frequency_hz, first, unknown, note)
-    yield Trace(name, origin, Response.RESPONSE_II, frequency_hz, second, sd_second / second, note)
+    yield Curve(name, origin, CurveKind.RESPONSE_I, frequency_hz, first, unknown, note)
+    yield Curve(name, origin, CurveKind.RESPONSE_II, frequency_hz, second, sd_second / second, note)

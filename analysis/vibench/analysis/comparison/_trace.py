@@ -12,11 +12,11 @@ import numpy as np
 
 from ..errors import NotEnoughData
 from ..live import column_starts, envelope
-from ..model import Difference, logarithmic_difference
+from ..model import CurveDifference, logarithmic_difference
 from ..signals import Reals
 
 
-class Origin(StrEnum):
+class CurveOrigin(StrEnum):
     """Where a curve comes from."""
 
     MEASURED = "measured"
@@ -26,7 +26,7 @@ class Origin(StrEnum):
     """The specimen under sines."""
 
 
-class Response(StrEnum):
+class CurveKind(StrEnum):
     """What a curve tells of the motion."""
 
     TRANSMISSION = "transmission"
@@ -35,13 +35,13 @@ class Response(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class Curve:
     """One curve; arrays of shape (points,), frequencies ascending."""
 
     source: str
     """Name of the recording or of the prediction."""
-    origin: Origin
-    response: Response
+    origin: CurveOrigin
+    response: CurveKind
     frequency_hz: Reals
     magnitude: Reals
     """Displacement of m0 over displacement of the base; NaN where there is none."""
@@ -77,7 +77,7 @@ class Trace:
         """Bounds that reach further say that nothing is known, and would only fill the picture."""
         return np.minimum(2 * self.relative_sd, np.log(10.0))
 
-    def at(self, frequency_hz: Reals) -> "Trace":
+    def at(self, frequency_hz: Reals) -> "Curve":
         """Read the curve at other frequencies, straight between points in both logarithms; NaN outside."""
         known = np.isfinite(self.magnitude) & (self.magnitude > 0)
         if not known.any():
@@ -93,7 +93,7 @@ class Trace:
         return replace(self, frequency_hz=frequency_hz, magnitude=np.exp(magnitude), relative_sd=spread)
 
 
-def sorted_trace(trace: Trace) -> Trace:
+def sorted_curve(trace: Curve) -> Curve:
     """Bring the points into ascending order, each frequency once: sweeps downwards come the other way."""
     frequency_hz, first = np.unique(trace.frequency_hz, return_index=True)
     return replace(
@@ -104,7 +104,7 @@ def sorted_trace(trace: Trace) -> Trace:
     )
 
 
-def trace_difference(trace: Trace, reference: Trace) -> Difference:
+def curve_difference(trace: Curve, reference: Curve) -> CurveDifference:
     """Say how far a curve lies above another, at its own frequencies within both.
 
     Raises

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from ..signals import Reals
-from ._trace import Trace
+from ._trace import Curve
 
 
 @dataclass(frozen=True)
@@ -24,12 +24,12 @@ class Reading:
     """The last over the first; NaN where either is missing."""
 
 
-def readings(traces: Sequence[Trace], frequencies_hz: Sequence[float]) -> tuple[Reading, ...]:
+def readings(traces: Sequence[Curve], frequencies_hz: Sequence[float]) -> tuple[Reading, ...]:
     """Read every curve at every frequency."""
     return tuple(_reading(each, np.asarray(frequencies_hz, dtype=np.float64)) for each in traces)
 
 
-def _reading(trace: Trace, frequency_hz: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> Reading:
+def _reading(trace: Curve, frequency_hz: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> Reading:
     values = trace.at(frequency_hz).magnitude
     ratio = float(20 * np.log10(values[-1] / values[0])) if values.size else float("nan")
     return Reading(trace.name, tuple(float(value) for value in values), ratio)
@@ -44,7 +44,7 @@ _PER_NEPER_DB = 20 / np.log(10)
 
 
 @dataclass(frozen=True)
-class TracePeak:
+class CurvePeak:
     """One peak of a curve."""
 
     frequency_hz: float
@@ -62,7 +62,7 @@ class TracePeak:
         return None if width_hz is None else 0.5 * width_hz / self.frequency_hz
 
 
-def trace_peaks(trace: Trace, most: int = 6) -> tuple[TracePeak, ...]:
+def curve_peaks(trace: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
     """Find the highest peaks, in the order of frequency."""
     known = np.isfinite(trace.magnitude) & (trace.magnitude > 0)
     frequency_hz, height = trace.frequency_hz[known], np.log(trace.magnitude[known])
@@ -76,12 +76,12 @@ def trace_peaks(trace: Trace, most: int = 6) -> tuple[TracePeak, ...]:
     return tuple(_peak(frequency_hz, height, trace.relative_sd[known], int(p)) for p in sorted(highest))
 
 
-def _peak(frequency_hz: Reals, height: Reals, spread: Reals, place: int) -> TracePeak:
+def _peak(frequency_hz: Reals, height: Reals, spread: Reals, place: int) -> CurvePeak:
     x, y = np.log(frequency_hz[place - 1 : place + 2]), height[place - 1 : place + 2]
     bend, slope, top = np.polyfit(x - x[1], y, 2)
     offset = float(np.clip(-slope / (2 * bend), x[0] - x[1], x[2] - x[1])) if bend < 0 else 0.0
     peak = float(top + slope * offset + bend * offset**2)
-    return TracePeak(
+    return CurvePeak(
         frequency_hz=float(np.exp(x[1] + offset)),
         magnitude=float(np.exp(peak)),
         relative_sd=float(spread[place]),

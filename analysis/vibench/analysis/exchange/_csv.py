@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..signals import Reals
-from ._excerpt import Excerpt, Watcher, unwatched
+from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._source_channel import SourceChannel, TableSource
 
 TIME_FORMAT = "%.9f"
@@ -22,7 +22,7 @@ VALUE_FORMAT = "%.10g"
 """One more digit than 2^-30 of the range needs; lost samples read ``nan``."""
 
 
-def write_csv_samples(excerpt: Excerpt, path: Path, watcher: Watcher = unwatched) -> None:
+def write_csv_samples(excerpt: Excerpt, path: Path, watcher: TransferObserver = unobserved) -> None:
     """Write time and channels, a block at a time."""
     headings = ["time [s]", *(f"{each.role} [{each.unit}]" for each in excerpt.channels)]
     row = ",".join([TIME_FORMAT, *(VALUE_FORMAT for _ in excerpt.channels)]) + "\n"

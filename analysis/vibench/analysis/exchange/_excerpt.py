@@ -11,11 +11,11 @@ from ..signals import Reals
 BLOCK_SAMPLES = 51_200
 """One chunk of the file: 0.4 MB a channel in memory."""
 
-Watcher = Callable[[int], None]
+TransferObserver = Callable[[int], None]
 """Told how many values were written since it was last called."""
 
 
-def unwatched(_values: int) -> None:
+def unobserved(_values: int) -> None:
     """Watch nothing."""
 
 

@@ -4,7 +4,7 @@ from enum import Enum, StrEnum, auto
 from pathlib import Path
 
 from ._csv import write_csv_samples
-from ._excerpt import Excerpt, Watcher, unwatched
+from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._facts_document import facts_path, write_facts
 from ._mat import require_small, write_mat
 from ._new_file import new_file, require_unused
@@ -38,7 +38,7 @@ def export_samples(
     to: Format,
     path: Path,
     results: Results = Results.LEFT_OUT,
-    watcher: Watcher = unwatched,
+    watcher: TransferObserver = unobserved,
 ) -> tuple[Path, ...]:
     """Write the excerpt as ``path``, and what its format has no place for as ``PATH.facts.json`` beside it.
 

@@ -28,7 +28,7 @@ from vibench.acquisition.recording import (
 
 from ..errors import InvalidRequest
 from ..signals import Flags, Reals
-from ._excerpt import BLOCK_SAMPLES, Watcher, unwatched
+from ._excerpt import BLOCK_SAMPLES, TransferObserver, unobserved
 from ._mapping import ChannelMapping, ImportMapping
 from ._source import Source, find_channel, opened_source
 from ._source_channel import SourceChannel
@@ -127,7 +127,7 @@ class _Wanted:
     source: SourceChannel
 
 
-def import_recording(path: Path, mapping: ImportMapping, out: Path, watcher: Watcher = unwatched) -> Path:
+def import_recording(path: Path, mapping: ImportMapping, out: Path, watcher: TransferObserver = unobserved) -> Path:
     """Make the recording ``out`` from a file, a block at a time.
 
     Values that are no finite numbers count as lost samples, of all channels. The stored "volts" are the
@@ -264,7 +264,7 @@ def _write(
     wanted: Sequence[_Wanted],
     parts: Sequence[LaidPart],
     samples: int,
-    watcher: Watcher,
+    watcher: TransferObserver,
 ) -> None:
     starts = {each.start: each.segment for each in parts}
     stops = {each.stop for each in parts}

@@ -20,7 +20,7 @@ from vibench.acquisition.recording import ChannelHeader
 
 from ..errors import InvalidRequest
 from ..signals import Reals
-from ._excerpt import Excerpt, Watcher, unwatched
+from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._facts_document import facts_document
 from ._hdf5_source import Hdf5Source, opened_hdf5
 from ._source_channel import SourceChannel, TableSource
@@ -45,7 +45,7 @@ def require_small(excerpt: Excerpt) -> None:
         )
 
 
-def write_mat(excerpt: Excerpt, path: Path, results: Mapping[str, Any], watcher: Watcher = unwatched) -> None:
+def write_mat(excerpt: Excerpt, path: Path, results: Mapping[str, Any], watcher: TransferObserver = unobserved) -> None:
     """Write one variable after the other, so that one channel at a time is in memory.
 
     Raises
@@ -69,7 +69,7 @@ def _save(file: Any, variables: dict[str, Any]) -> None:
     savemat(file, variables, long_field_names=True, oned_as="column")
 
 
-def _whole(excerpt: Excerpt, role: str, watcher: Watcher) -> Reals:
+def _whole(excerpt: Excerpt, role: str, watcher: TransferObserver) -> Reals:
     values = np.empty(excerpt.samples)
     done = 0
     for block in excerpt.channel_blocks(role):

@@ -28,7 +28,7 @@ from vibench.acquisition.recording import ChannelHeader
 
 from ..errors import UnusableData
 from ..signals import Reals
-from ._excerpt import Excerpt, Watcher, unwatched
+from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._source_channel import SourceChannel
 
 DELIMITER = "    -1"
@@ -76,7 +76,7 @@ SCALAR = 0
 """Direction of the response: the recording does not say how a sensor points."""
 
 
-def write_uff(excerpt: Excerpt, path: Path, watcher: Watcher = unwatched) -> None:
+def write_uff(excerpt: Excerpt, path: Path, watcher: TransferObserver = unobserved) -> None:
     """Write one dataset for each channel, a block at a time; lost samples are NaN."""
     with path.open("xb") as file:
         file.write(SI_UNITS.encode("ascii"))

@@ -17,7 +17,7 @@ from scipy.io import wavfile
 
 from ..errors import InvalidRequest
 from ..signals import Reals
-from ._excerpt import Excerpt, Watcher, unwatched
+from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._source_channel import SourceChannel
 
 BYTES = 4
@@ -42,7 +42,7 @@ def require_sound(excerpt: Excerpt) -> None:
         )
 
 
-def write_wav(excerpt: Excerpt, path: Path, watcher: Watcher = unwatched) -> None:
+def write_wav(excerpt: Excerpt, path: Path, watcher: TransferObserver = unobserved) -> None:
     """Write all channels, a block at a time; lost samples are silent, and past full scale is full scale.
 
     Counts of a converter of up to 32 bits stay exact: only zeros are put behind them.

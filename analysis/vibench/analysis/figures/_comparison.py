@@ -5,16 +5,16 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..comparison import Origin, Trace, trace_difference, trace_peaks
+from ..comparison import CurveOrigin, Curve, curve_difference, curve_peaks
 from ..errors import InvalidRequest
-from ..model import Difference
+from ..model import CurveDifference
 from ..tables import Table, table
 from ._drawn import DrawnFigure
 from ._style import BOUNDS, LEVELS, MEASURED, frequency_axis, legend_above, magnitude_axis, new_figure, styled
 
 _HEIGHT_IN = 4.6
 _DIFFERENCE_IN = 1.4
-_STYLES = {Origin.MEASURED: "-", Origin.SIMULATED: "--", Origin.PREDICTED: ":"}
+_STYLES = {CurveOrigin.MEASURED: "-", CurveOrigin.SIMULATED: "--", CurveOrigin.PREDICTED: ":"}
 _LONE = 1
 """A curve of one point is drawn as a mark."""
 _SINGLE_BAND = 0.2
@@ -22,8 +22,8 @@ _SINGLE_BAND = 0.2
 
 def comparison_figure(
     name: str,
-    traces: Sequence[Trace],
-    pair: tuple[Trace, Trace] | None = None,
+    traces: Sequence[Curve],
+    pair: tuple[Curve, Curve] | None = None,
     markers_hz: Sequence[float] = (),
 ) -> DrawnFigure:
     """Draw curves with their bounds, the difference of two of them, and markers.
@@ -45,7 +45,7 @@ def comparison_figure(
     """
     if not traces:
         raise InvalidRequest("a figure of no curves was asked for; choose one or more")
-    difference = None if pair is None else trace_difference(*pair)
+    difference = None if pair is None else curve_difference(*pair)
     with styled():
         rows = 1 if difference is None else 2
         figure = new_figure(_HEIGHT_IN + (rows - 1) * _DIFFERENCE_IN)
@@ -74,7 +74,7 @@ def comparison_figure(
     )
 
 
-def _curve(axes: Axes, trace: Trace, colour: str) -> None:
+def _curve(axes: Axes, trace: Curve, colour: str) -> None:
     lone = trace.frequency_hz.size <= _LONE
     known = np.isfinite(trace.relative_sd)
     if known.any() and not lone:
@@ -94,31 +94,31 @@ def _curve(axes: Axes, trace: Trace, colour: str) -> None:
     )
 
 
-def _difference(axes: Axes, difference: Difference) -> None:
+def _difference(axes: Axes, difference: CurveDifference) -> None:
     axes.plot(difference.frequency_hz, difference.decibel, color=MEASURED, linewidth=0.8)
     axes.axhline(0, color=BOUNDS, linewidth=0.6)
     axes.set_ylabel("difference\n[dB]")
 
 
-def _heights(traces: Sequence[Trace]) -> tuple[float, float]:
+def _heights(traces: Sequence[Curve]) -> tuple[float, float]:
     """Let the curves fill the picture, not their bounds."""
     known = np.concatenate([each.magnitude[np.isfinite(each.magnitude)] for each in traces])
     positive = known[known > 0]
     return (float(positive.min()) / 2, 2 * float(positive.max())) if positive.size else (0.1, 10.0)
 
 
-def _span(traces: Sequence[Trace]) -> tuple[float, float]:
+def _span(traces: Sequence[Curve]) -> tuple[float, float]:
     low = min(float(each.frequency_hz[0]) for each in traces)
     high = max(float(each.frequency_hz[-1]) for each in traces)
     return (low, high) if high > low else (low * (1 - _SINGLE_BAND), high * (1 + _SINGLE_BAND))
 
 
-def comparison_caption(traces: Sequence[Trace], pair: tuple[Trace, Trace] | None) -> str:
+def comparison_caption(traces: Sequence[Curve], pair: tuple[Curve, Curve] | None) -> str:
     """Say what each curve is, with its numbers."""
     said = [f"{each.name}: {each.note}." if each.note else f"{each.name}." for each in traces]
     said.append("Shaded: two standard deviations.")
     if pair is not None:
-        difference = trace_difference(*pair)
+        difference = curve_difference(*pair)
         said.append(
             f"Difference of {pair[0].name} over {pair[1].name}: median {difference.median_abs_db:.2g} dB, "
             f"root mean square {difference.rms_db:.2g} dB."
@@ -127,7 +127,7 @@ def comparison_caption(traces: Sequence[Trace], pair: tuple[Trace, Trace] | None
 
 
 def comparison_tables(
-    name: str, traces: Sequence[Trace], pair: tuple[Trace, Trace] | None = None
+    name: str, traces: Sequence[Curve], pair: tuple[Curve, Curve] | None = None
 ) -> tuple[Table, ...]:
     """Give every curve, the difference, and the peaks, with units in the headings."""
     found = [
@@ -139,7 +139,7 @@ def comparison_tables(
         )
         for number, trace in enumerate(traces, start=1)
     ]
-    peaks = [(trace.name, peak) for trace in traces for peak in trace_peaks(trace)]
+    peaks = [(trace.name, peak) for trace in traces for peak in curve_peaks(trace)]
     if peaks:
         found.append(
             table(
@@ -151,7 +151,7 @@ def comparison_tables(
             )
         )
     if pair is not None:
-        difference = trace_difference(*pair)
+        difference = curve_difference(*pair)
         found.append(
             table(
                 f"{name}_difference",
@@ -163,6 +163,6 @@ def comparison_tables(
     return tuple(found)
 
 
-def _file_word(trace: Trace) -> str:
+def _file_word(trace: Curve) -> str:
     kept = (each if each.isalnum() or each in "-_" else "_" for each in trace.name.replace(", ", "_"))
     return "".join(kept)

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..frequency_response import Distortion, NoiseAnalysis, PeriodicTransmission, distortion, is_even_line
+from ..frequency_response import Distortion, NoiseAnalysis, PeriodicFrequencyResponse, distortion, is_even_line
 from ..signals import Reals
 from ..tables import table
 from ._drawn import DrawnFigure
@@ -24,7 +24,7 @@ _LOW_HEIGHT_IN = 3.0
 _EVEN, _ODD = LINEAR, SIMULATED
 
 
-def distortion_figure(analysis: NoiseAnalysis, periodic: PeriodicTransmission) -> DrawnFigure:
+def distortion_figure(analysis: NoiseAnalysis, periodic: PeriodicFrequencyResponse) -> DrawnFigure:
     """Draw how much of the scatter is noise and how much distortion, and what lies on quiet lines."""
     lines = periodic.detection
     has_quiet_lines = lines.order.size > 0
@@ -59,11 +59,11 @@ def distortion_figure(analysis: NoiseAnalysis, periodic: PeriodicTransmission) -
     )
 
 
-def _share(variance: Reals, periodic: PeriodicTransmission) -> Reals:
+def _share(variance: Reals, periodic: PeriodicFrequencyResponse) -> Reals:
     return np.asarray(np.sqrt(variance) / periodic.transmission.magnitude)
 
 
-def _shares(axes: Axes, periodic: PeriodicTransmission) -> None:
+def _shares(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
     frequency_hz = periodic.transmission.frequency_hz
     axes.plot(
         frequency_hz,
@@ -89,7 +89,7 @@ def _shares(axes: Axes, periodic: PeriodicTransmission) -> None:
     axes.set_ylabel("sd over |H|")
 
 
-def _detection(axes: Axes, periodic: PeriodicTransmission) -> None:
+def _detection(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
     lines = periodic.detection
     is_even = is_even_line(lines)
     for chosen, colour, marker, label in (
@@ -116,7 +116,7 @@ def _dots(axes: Axes, frequency_hz: Reals, amplitude: Reals, look: tuple[str, st
     )
 
 
-def distortion_caption(periodic: PeriodicTransmission) -> str:
+def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
     """Say how much of the scatter is noise and how much is distortion."""
     found = distortion(periodic)
     said = [

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vibench.acquisition.plan import Measurement, Preview
+from vibench.acquisition.plan import Measurement, SignalPreview
 
 from ..signals import Reals, envelope
 from ..tables import table
@@ -57,7 +57,7 @@ def excitation_figure(measurement: Measurement) -> DrawnFigure:
     )
 
 
-def _largest_lines(seen: Preview) -> tuple[Reals, Reals]:
+def _largest_lines(seen: SignalPreview) -> tuple[Reals, Reals]:
     """Frequency and size of the largest line in each of at most so many columns, above 0 Hz."""
     frequency_hz, size = seen.frequency_hz[1:], seen.spectrum_v[1:]
     width = -(-size.size // _COLUMNS)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vibench.sim import Accuracy
-from vibench.sim.accuracy_benchmark import Trade
+from vibench.sim.accuracy_benchmark import AccuracyBenchmark
 
 from ..tables import table
 from ._drawn import DrawnFigure
@@ -14,7 +14,7 @@ _LEAST = 1e-14
 """An error below this is rounding."""
 
 
-def tradeoff_figure(trade: Trade) -> DrawnFigure:
+def tradeoff_figure(trade: AccuracyBenchmark) -> DrawnFigure:
     """Draw the state's error over processor time per simulated second, both logarithmic."""
     shown = [each for each in trade.motions if each.levels[0].state_error is not None]
     rows: list[tuple[str, str, float, float]] = []

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..frequency_response import MagnitudeScale, NoiseAnalysis, NoiseResponse
-from ..model import NoiseOverlay, linear_transmission
+from ..model import NoiseOverlay, linear_transmissibility
 from ..recordings import specimen_of
 from ..signals import Reals
 from ..tables import Table, table
@@ -82,7 +82,7 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, 
     if laid is not None:
         simulated, sines = view.shown(laid.response.transmission), laid.prediction
         fine_hz = np.geomspace(measured.frequency_hz[0], measured.frequency_hz[-1], _LINEAR_POINTS)
-        linear = linear_transmission(laid.run.specimen, fine_hz)
+        linear = linear_transmissibility(laid.run.specimen, fine_hz)
         linear = view.drawn(linear * view.factor(fine_hz))
         axes.plot(fine_hz, linear, color=LINEAR, linestyle="--", label="without contact")
         micrometres = 1e6 * float(sines.amplitude_m[0])

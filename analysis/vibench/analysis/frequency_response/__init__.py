@@ -11,7 +11,7 @@ from ._distortion import (
     distortion,
     is_even_line,
 )
-from ._noise_request import MagnitudeScale, NoiseRequest, quantities_named
+from ._noise_request import MagnitudeScale, FrequencyResponseRequest, quantities_named
 from ._noise_response import (
     DEFAULT_REQUEST,
     Noise,
@@ -19,20 +19,20 @@ from ._noise_response import (
     NoiseResponse,
     noise_response,
 )
-from ._periodic_transmission import PeriodicTransmission
+from ._periodic_transmission import PeriodicFrequencyResponse
 from ._resonance import (
     Resonance,
     resonances,
 )
 from ._results import (
     Estimator,
-    Transmission,
-    TransmissionSettings,
-    converted_transmission,
+    FrequencyResponse,
+    FrequencyResponseSettings,
+    converted_frequency_response,
 )
 from ._transmission import (
-    transmission,
-    transmission_of,
+    transmissibility,
+    frequency_response_of,
 )
 
 __all__ = [
@@ -42,18 +42,18 @@ __all__ = [
     "MagnitudeScale",
     "Noise",
     "NoiseAnalysis",
-    "NoiseRequest",
+    "FrequencyResponseRequest",
     "NoiseResponse",
-    "PeriodicTransmission",
+    "PeriodicFrequencyResponse",
     "Resonance",
-    "Transmission",
-    "TransmissionSettings",
-    "converted_transmission",
+    "FrequencyResponse",
+    "FrequencyResponseSettings",
+    "converted_frequency_response",
     "distortion",
     "is_even_line",
     "noise_response",
     "quantities_named",
     "resonances",
-    "transmission",
-    "transmission_of",
+    "transmissibility",
+    "frequency_response_of",
 ]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..signals import Flags, Reals
-from ._periodic_transmission import DetectionLines, PeriodicTransmission
+from ._periodic_transmission import DetectionLines, PeriodicFrequencyResponse
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Distortion:
     """Rms of what noise leaves on the quiet lines."""
 
 
-def distortion(periodic: PeriodicTransmission) -> Distortion:
+def distortion(periodic: PeriodicFrequencyResponse) -> Distortion:
     """Sum up what a periodic transmission says of noise and of distortion.
 
     The quiet lines hold whatever is not linear between the drive voltage and the response: amplifier and

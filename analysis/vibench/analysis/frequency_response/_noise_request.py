@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InvalidRequest, NotEnoughData
 from ..signals import DEFAULT_CONFIDENCE, Quantity, Reals, Window, derivative_factor, hop_samples, taper
-from ._results import Estimator, Transmission, converted_transmission
+from ._results import Estimator, FrequencyResponse, converted_frequency_response
 
 
 class MagnitudeScale(StrEnum):
@@ -29,7 +29,7 @@ _UNITS = {-2: "s²", -1: "s", 0: "", 1: "1/s", 2: "1/s²"}
 
 
 @dataclass(frozen=True)
-class TransmissionView:
+class FrequencyResponseView:
     """The motion of m0 over the motion of the base."""
 
     response: Quantity = Quantity.DISPLACEMENT
@@ -72,9 +72,9 @@ class TransmissionView:
         steps = (start, stop) if self.power >= 0 else (stop, start)
         return np.asarray(np.abs(derivative_factor(frequency_hz, *steps)))
 
-    def shown(self, transmission: Transmission) -> Transmission:
+    def shown(self, transmission: FrequencyResponse) -> FrequencyResponse:
         """Turn displacement over displacement into the view's quantities, bounds included."""
-        return converted_transmission(
+        return converted_frequency_response(
             transmission,
             drive=(Quantity.DISPLACEMENT, self.base),
             response=(Quantity.DISPLACEMENT, self.response),
@@ -90,7 +90,7 @@ class TransmissionView:
                     return np.asarray(20 * np.log10(magnitude))
 
 
-def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> TransmissionView:
+def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> FrequencyResponseView:
     """Read ``"velocity/acceleration"``; a single word stands for both.
 
     Raises
@@ -106,7 +106,7 @@ def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> T
             f"the quantity {text!r} is not known; give m0's over the base's, each one of "
             f"{', '.join(known)}, such as velocity/acceleration"
         )
-    found = TransmissionView(response=known[words[0]], base=known[words[-1]])
+    found = FrequencyResponseView(response=known[words[0]], base=known[words[-1]])
     return replace(found, scale=scale)
 
 
@@ -119,7 +119,7 @@ _PROXY_SAMPLES = 4096
 
 
 @dataclass(frozen=True)
-class NoiseRequest:
+class FrequencyResponseRequest:
     """How to estimate a transmission; the defaults suit the paper's specimen.
 
     At most one of resolution, segment length and averages can be chosen: the other two follow.
@@ -136,7 +136,7 @@ class NoiseRequest:
     window: Window = Window.HANN
     overlap: float = 0.5
     confidence: float = DEFAULT_CONFIDENCE
-    view: TransmissionView = field(default_factory=TransmissionView)
+    view: FrequencyResponseView = field(default_factory=FrequencyResponseView)
 
     def __post_init__(self) -> None:
         lengths = {
@@ -174,8 +174,8 @@ class NoiseRequest:
         """Whether it asks for something that only averages over segments have."""
         chosen = (self.resolution_hz, self.segment_s, self.averages)
         return any(each is not None for each in chosen) or (self.window, self.overlap) != (
-            NoiseRequest.window,
-            NoiseRequest.overlap,
+            FrequencyResponseRequest.window,
+            FrequencyResponseRequest.overlap,
         )
 
     def segment_samples(self, samples: int, sample_rate_hz: float) -> int:

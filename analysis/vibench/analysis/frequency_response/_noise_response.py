@@ -16,18 +16,18 @@ from ..signals import Complexes, Flags, Quantity, Reals, relative_sd, student_ha
 from ..spectra import DensitySums
 from ..tones import NoiseDriveLevel, noise_drive_level
 from ._estimators import coherence, least_squares
-from ._noise_request import NoiseRequest
-from ._periodic_transmission import PeriodicSums, PeriodicTransmission
+from ._noise_request import FrequencyResponseRequest
+from ._periodic_transmission import PeriodicSums, PeriodicFrequencyResponse
 from ._repetition import period_spectra
 from ._resonance import Resonance, resonances
-from ._results import Estimator, Transmission, converted_transmission
-from ._transmission import TransmissionSums
+from ._results import Estimator, FrequencyResponse, converted_frequency_response
+from ._transmission import FrequencyResponseSums
 
 Noise = MultisineNoise | OddMultisine | StreamedNoise
 _BLOCK = 1 << 19
 """Samples of a record that are looked at together."""
 _LEVEL_SEGMENT_S = 1.0
-DEFAULT_REQUEST = NoiseRequest()
+DEFAULT_REQUEST = FrequencyResponseRequest()
 _LEAST_PERIODS = 2
 
 
@@ -35,13 +35,13 @@ _LEAST_PERIODS = 2
 class NoiseResponse:
     """Transmission of base displacement to m0's displacement, and what was found in it."""
 
-    transmission: Transmission
+    transmission: FrequencyResponse
     """The estimate to use: by default referenced to the drive voltage, so that noise biases it nowhere."""
-    h1: Transmission
-    h2: Transmission
+    h1: FrequencyResponse
+    h2: FrequencyResponse
     resonances: tuple[Resonance, ...]
     base_level: NoiseDriveLevel
-    periodic: PeriodicTransmission | None
+    periodic: PeriodicFrequencyResponse | None
     """Where the scatter comes from; None for noise that does not repeat."""
     used_s: float
     """Length of what was averaged [s]."""
@@ -54,7 +54,7 @@ class NoiseResponse:
 
 
 def noise_response(
-    channels: Channels, noise: Noise, request: NoiseRequest = DEFAULT_REQUEST
+    channels: Channels, noise: Noise, request: FrequencyResponseRequest = DEFAULT_REQUEST
 ) -> NoiseResponse:
     """Estimate the transmission of a noise measurement from everything usable in it.
 
@@ -74,7 +74,7 @@ def noise_response(
 
 
 def _repeated(
-    channels: Channels, noise: MultisineNoise | OddMultisine, request: NoiseRequest
+    channels: Channels, noise: MultisineNoise | OddMultisine, request: FrequencyResponseRequest
 ) -> NoiseResponse:
     if request.cuts_segments:
         raise InvalidRequest(
@@ -110,7 +110,7 @@ def _repeated(
     order = np.rint(periodic.transmission.frequency_hz / noise.repetition_hz).astype(int)
     motion = np.stack([each[:, order] for each in means])
 
-    def by(estimator: Estimator) -> Transmission:
+    def by(estimator: Estimator) -> FrequencyResponse:
         if estimator is Estimator.DRIVE:
             return as_displacements(periodic.transmission)
         return _least_squares(
@@ -175,8 +175,8 @@ def _mean_spectra(data: Reals, nominal_period: float) -> Complexes:
 
 
 def _least_squares(
-    like: Transmission, motion: Complexes, estimator: Estimator, delay_s: float, noise_ratio: float | None
-) -> Transmission:
+    like: FrequencyResponse, motion: Complexes, estimator: Estimator, delay_s: float, noise_ratio: float | None
+) -> FrequencyResponse:
     """h1, h2 or hv over realisations; ``motion`` has the shape (realisations, 2, lines)."""
     s_xx = np.sum(np.abs(motion[:, 0]) ** 2, axis=0)
     s_yy = np.sum(np.abs(motion[:, 1]) ** 2, axis=0)
@@ -196,7 +196,7 @@ def _least_squares(
     return as_displacements(result.without_delay(delay_s))
 
 
-def _streamed(channels: Channels, noise: StreamedNoise, request: NoiseRequest) -> NoiseResponse:
+def _streamed(channels: Channels, noise: StreamedNoise, request: FrequencyResponseRequest) -> NoiseResponse:
     rate = channels.sample_rate_hz
     stretch = only_stretch(channels, "noise")
     segment = request.segment_samples(stretch.samples, rate)
@@ -205,7 +205,7 @@ def _streamed(channels: Channels, noise: StreamedNoise, request: NoiseRequest) -
             f"{stretch.samples / rate:.3g} s of noise leave segments of {segment / rate:.3g} s, and one "
             f"must hold a period of {noise.band_start_hz:g} Hz: ask for fewer averages, or measure longer"
         )
-    sums = TransmissionSums(
+    sums = FrequencyResponseSums(
         rate,
         segment_samples=segment,
         window=request.window,
@@ -226,7 +226,7 @@ def _streamed(channels: Channels, noise: StreamedNoise, request: NoiseRequest) -
         level.add(data[1], valid)
     band = (noise.band_start_hz, noise.band_stop_hz)
 
-    def by(estimator: Estimator) -> Transmission:
+    def by(estimator: Estimator) -> FrequencyResponse:
         noise_ratio = request.noise_ratio if estimator is Estimator.HV else None
         found = sums.by(estimator, noise_ratio).without_delay(channels.response_delay_s)
         return as_displacements(found.between(*band))
@@ -246,16 +246,16 @@ def _streamed(channels: Channels, noise: StreamedNoise, request: NoiseRequest) -
     )
 
 
-def as_displacements(transmission: Transmission) -> Transmission:
+def as_displacements(transmission: FrequencyResponse) -> FrequencyResponse:
     """Turn m0 velocity over base acceleration into displacement over displacement."""
-    return converted_transmission(
+    return converted_frequency_response(
         transmission,
         drive=(Quantity.ACCELERATION, Quantity.DISPLACEMENT),
         response=(Quantity.VELOCITY, Quantity.DISPLACEMENT),
     )
 
 
-def _resonances(transmission: Transmission) -> tuple[Resonance, ...]:
+def _resonances(transmission: FrequencyResponse) -> tuple[Resonance, ...]:
     low, high = float(transmission.frequency_hz[0]), float(transmission.frequency_hz[-1])
     return resonances(transmission, low_hz=low, high_hz=high)
 
@@ -268,5 +268,5 @@ class NoiseAnalysis:
     checks: tuple[Check, ...]
     excitation: Noise
     response: NoiseResponse
-    request: NoiseRequest
+    request: FrequencyResponseRequest
     """What was asked for."""

@@ -18,7 +18,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..signals import DEFAULT_CONFIDENCE, Complexes, Flags, Integers, Reals, Window, coherence_significance
 from ._estimators import coherence
 from ._repetition import Repetition, driven_lines, measured_repetition, period_spectra
-from ._results import Estimator, Transmission, TransmissionSettings
+from ._results import Estimator, FrequencyResponse, FrequencyResponseSettings
 
 
 class Scatter(StrEnum):
@@ -122,10 +122,10 @@ class DetectionLines:
 
 
 @dataclass(frozen=True)
-class PeriodicTransmission:
+class PeriodicFrequencyResponse:
     """Best linear approximation of response over drive, and where its scatter comes from."""
 
-    transmission: Transmission
+    transmission: FrequencyResponse
     noise_variance: Reals
     """Complex variance of one realisation's estimate that noise explains [(unit of the value)^2]."""
     distortion_variance: Reals | None
@@ -213,7 +213,7 @@ class PeriodicSums:
 
     def transmission(
         self, *, delay_s: float = 0.0, band_hz: tuple[float, float] = EVERYTHING
-    ) -> PeriodicTransmission:
+    ) -> PeriodicFrequencyResponse:
         """Give the transmission of the realisations added so far.
 
         Parameters
@@ -239,7 +239,7 @@ class PeriodicSums:
         estimate = best_linear_approximation(
             drive[:, driven], base[:, driven], response[:, driven], covariance[:, :, driven], periods
         )
-        return PeriodicTransmission(
+        return PeriodicFrequencyResponse(
             transmission=self._transmission(frequency_hz[driven], estimate, period).without_delay(delay_s),
             noise_variance=estimate.noise_variance,
             distortion_variance=estimate.distortion_variance,
@@ -251,9 +251,9 @@ class PeriodicSums:
 
     def _transmission(
         self, frequency_hz: Reals, estimate: BestLinearApproximation, period: float
-    ) -> Transmission:
+    ) -> FrequencyResponse:
         quantile = float(stats.t.ppf((1 + self._confidence) / 2, 2 * (estimate.averages - 1)))
-        return Transmission(
+        return FrequencyResponse(
             frequency_hz=frequency_hz,
             value=estimate.value,
             coherence=estimate.coherence,
@@ -265,7 +265,7 @@ class PeriodicSums:
             resolution_hz=0.0,
             segments_used=sum(one.repetition.periods for one in self._realisations),
             segments_excluded=0,
-            settings=TransmissionSettings(
+            settings=FrequencyResponseSettings(
                 estimator=Estimator.DRIVE,
                 sample_rate_hz=self._sample_rate_hz,
                 segment_samples=round(period),
@@ -276,7 +276,7 @@ class PeriodicSums:
         )
 
 
-def periodic_transmission(
+def periodic_frequency_response(
     realisations: Iterable[tuple[Reals, Reals, Reals]],
     sample_rate_hz: float,
     *,
@@ -284,7 +284,7 @@ def periodic_transmission(
     delay_s: float = 0.0,
     band_hz: tuple[float, float] = EVERYTHING,
     confidence: float = DEFAULT_CONFIDENCE,
-) -> PeriodicTransmission:
+) -> PeriodicFrequencyResponse:
     """Estimate response over base motion from realisations of a multisine, with honest bounds.
 
     Parameters

@@ -8,7 +8,7 @@ from scipy.signal import find_peaks
 
 from ..errors import InvalidRequest
 from ..signals import Complexes, Reals
-from ._results import Transmission
+from ._results import FrequencyResponse
 
 _REACH_BANDWIDTHS = 2.0
 """The fit uses lines within so many half-power bandwidths of the peak."""
@@ -72,7 +72,7 @@ class Resonance:
         return self.half_power_bandwidth_hz * self.sd_damping_ratio / self.damping_ratio
 
 
-def resonances(transmission: Transmission, *, low_hz: float, high_hz: float) -> tuple[Resonance, ...]:
+def resonances(transmission: FrequencyResponse, *, low_hz: float, high_hz: float) -> tuple[Resonance, ...]:
     """Find and fit the resonances of a transmission in a band, in the order of frequency.
 
     Each significant peak is fitted, weighted by the stated spreads, with
@@ -101,7 +101,7 @@ def resonances(transmission: Transmission, *, low_hz: float, high_hz: float) -> 
     return tuple(_distinct(found))
 
 
-def _significant_peaks(band: Transmission) -> list[tuple[int, int]]:
+def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
     """Lines of peaks, and their half-power widths in lines."""
     spread = np.maximum(np.nan_to_num(band.relative_sd_magnitude, posinf=1e9), _SMALLEST_RELATIVE_SD)
     size = _smoothed(np.nan_to_num(np.log(np.maximum(band.magnitude, 1e-300)), nan=-700.0), spread)
@@ -131,7 +131,7 @@ def _half_power_lines(size: Reals, line: int) -> int:
     return int(np.min(np.abs(below - line))) if below.size else size.size // 2
 
 
-def _fitted(band: Transmission, line: int, half_width: int) -> Resonance | None:
+def _fitted(band: FrequencyResponse, line: int, half_width: int) -> Resonance | None:
     reach = max(int(np.ceil(2 * _REACH_BANDWIDTHS * half_width)), _LEAST_LINES // 2)
     part = slice(max(0, line - reach), line + reach + 1)
     frequency_hz, value = band.frequency_hz[part], band.value[part]
@@ -151,7 +151,7 @@ def _fitted(band: Transmission, line: int, half_width: int) -> Resonance | None:
 
 
 def _fitted_on(
-    band: Transmission, data: tuple[Reals, Complexes, Reals, float], half_width: int, degree: int
+    band: FrequencyResponse, data: tuple[Reals, Complexes, Reals, float], half_width: int, degree: int
 ) -> Resonance | None:
     """Fit one mode on a background of one degree."""
     frequency_hz, value, spread, centre_hz = data
@@ -174,7 +174,7 @@ def _fitted_on(
     return _resonance(band, result.x, jacobian, result.fun, data, degree)
 
 
-def _refitted(band: Transmission, first: Resonance | None) -> Resonance | None:
+def _refitted(band: FrequencyResponse, first: Resonance | None) -> Resonance | None:
     """Fit once more over the bandwidth found: the first width was read off single, noisy lines."""
     if first is None:
         return None
@@ -192,7 +192,7 @@ def _basis(frequency_hz: Reals, natural_hz: float, damping: float, degree: int) 
 
 
 def _resonance(
-    band: Transmission,
+    band: FrequencyResponse,
     pole: Reals,
     jacobian: Reals,
     left: Reals,

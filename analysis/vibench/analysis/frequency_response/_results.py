@@ -23,7 +23,7 @@ class Estimator(StrEnum):
 
 
 @dataclass(frozen=True)
-class TransmissionSettings:
+class FrequencyResponseSettings:
     """What made a transmission, kept beside it."""
 
     estimator: Estimator
@@ -41,7 +41,7 @@ class TransmissionSettings:
 
 
 @dataclass(frozen=True)
-class Transmission:
+class FrequencyResponse:
     """Response over drive against frequency, with bounds; all arrays have the shape (lines,)."""
 
     frequency_hz: Reals
@@ -63,7 +63,7 @@ class Transmission:
     """Noise bandwidth of a line: finer features are smeared; zero for exactly periodic drive."""
     segments_used: int
     segments_excluded: int
-    settings: TransmissionSettings
+    settings: FrequencyResponseSettings
     reference_coherence: Reals | None = None
     """For the drive-referenced estimator: the lower of the reference's coherences with the two channels."""
 
@@ -109,13 +109,13 @@ class Transmission:
         decisive = self.coherence if self.reference_coherence is None else self.reference_coherence
         return np.asarray(decisive > self.coherence_significance)
 
-    def without_delay(self, delay_s: float) -> "Transmission":
+    def without_delay(self, delay_s: float) -> "FrequencyResponse":
         """Turn the phase back by a delay of the response channel behind the drive channel [s]."""
         turned = self.value * np.exp(2j * np.pi * self.frequency_hz * delay_s)
         settings = replace(self.settings, delay_s=self.settings.delay_s + delay_s)
         return replace(self, value=turned, settings=settings)
 
-    def between(self, low_hz: float, high_hz: float) -> "Transmission":
+    def between(self, low_hz: float, high_hz: float) -> "FrequencyResponse":
         """Keep the lines from ``low_hz`` to ``high_hz``, both included."""
         kept = (self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz)
         if not np.any(kept):
@@ -136,12 +136,12 @@ class Transmission:
         )
 
 
-def converted_transmission(
-    transmission: Transmission,
+def converted_frequency_response(
+    transmission: FrequencyResponse,
     *,
     drive: tuple[Quantity, Quantity],
     response: tuple[Quantity, Quantity],
-) -> Transmission:
+) -> FrequencyResponse:
     """Express a transmission in other quantities: each pair is (recorded, wanted).
 
     Base acceleration to m0 velocity becomes displacement over displacement by

@@ -23,14 +23,14 @@ from ._estimators import (
     least_squares,
     named_estimator,
 )
-from ._results import Estimator, Transmission, TransmissionSettings
+from ._results import Estimator, FrequencyResponse, FrequencyResponseSettings
 
 _LEAST_SEGMENTS = 2
 _DRIVE, _RESPONSE, _REFERENCE = range(3)
 _ROWS = ("drive", "response", "reference")
 
 
-class TransmissionSums:
+class FrequencyResponseSums:
     """Takes a long record block by block and gives its transmission at any moment.
 
     Memory does not grow with the record. Blocks have the rows drive, response and, for the
@@ -48,7 +48,7 @@ class TransmissionSums:
         noise_ratio: float | None = None,
         confidence: float = DEFAULT_CONFIDENCE,
     ) -> None:
-        self._settings = TransmissionSettings(
+        self._settings = FrequencyResponseSettings(
             estimator=named_estimator(estimator),
             sample_rate_hz=sample_rate_hz,
             segment_samples=segment_samples,
@@ -70,7 +70,7 @@ class TransmissionSums:
             )
         self._spectra.add(block, valid)
 
-    def transmission(self) -> Transmission:
+    def transmission(self) -> FrequencyResponse:
         """Give the transmission of everything added so far.
 
         Raises
@@ -81,8 +81,8 @@ class TransmissionSums:
         """
         return self.by(self._settings.estimator, self._settings.noise_ratio)
 
-    def by(self, estimator: Estimator, noise_ratio: float | None = None) -> Transmission:
-        """Give what another estimator makes of the same averages; errors as `transmission` has them."""
+    def by(self, estimator: Estimator, noise_ratio: float | None = None) -> FrequencyResponse:
+        """Give what another estimator makes of the same averages; errors as `transmissibility` has them."""
         settings = replace(self._settings, estimator=estimator, noise_ratio=noise_ratio)
         _check(settings)
         if estimator is Estimator.DRIVE and self._channels < len(_ROWS):
@@ -94,10 +94,10 @@ class TransmissionSums:
                 f"{averages.segments_excluded} touched invalid samples; a coherence needs at least "
                 f"{_LEAST_SEGMENTS}: use shorter segments or a longer record"
             )
-        return transmission_of(averages, settings)
+        return frequency_response_of(averages, settings)
 
 
-def transmission(
+def transmissibility(
     x: Reals,
     y: Reals,
     sample_rate_hz: float,
@@ -110,7 +110,7 @@ def transmission(
     noise_ratio: float | None = None,
     valid: Flags | None = None,
     confidence: float = DEFAULT_CONFIDENCE,
-) -> Transmission:
+) -> FrequencyResponse:
     """Estimate response y over drive x from a noise record, with bounds on every line.
 
     Parameters
@@ -144,7 +144,7 @@ def transmission(
 
     """
     signals = (x, y) if reference is None else (x, y, reference)
-    sums = TransmissionSums(
+    sums = FrequencyResponseSums(
         sample_rate_hz,
         segment_samples=segment_samples,
         window=window,
@@ -158,7 +158,7 @@ def transmission(
     return sums.transmission()
 
 
-def _check(settings: TransmissionSettings) -> None:
+def _check(settings: FrequencyResponseSettings) -> None:
     ratio = settings.noise_ratio
     if settings.estimator is Estimator.HV:
         if ratio is None:
@@ -176,7 +176,7 @@ def _check(settings: TransmissionSettings) -> None:
         raise InvalidRequest(f"sample_rate_hz is {settings.sample_rate_hz:g}; it is more than 0")
 
 
-def transmission_of(averages: SpectralAverages, settings: TransmissionSettings) -> Transmission:
+def frequency_response_of(averages: SpectralAverages, settings: FrequencyResponseSettings) -> FrequencyResponse:
     """Form the transmission of averaged products, rows drive, response and perhaps reference, with bounds."""
     products = averages.products
     s_xx, s_yy = products[_DRIVE, _DRIVE].real, products[_RESPONSE, _RESPONSE].real
@@ -193,7 +193,7 @@ def transmission_of(averages: SpectralAverages, settings: TransmissionSettings) 
             coherence(s_rr, s_yy, products[_REFERENCE, _RESPONSE]),
         )
     bandwidth_lines = averages.segment_samples * averages.window_energy / averages.window_sum**2
-    return Transmission(
+    return FrequencyResponse(
         frequency_hz=averages.frequency_hz(settings.sample_rate_hz),
         value=value,
         coherence=ordinary,
@@ -210,7 +210,7 @@ def transmission_of(averages: SpectralAverages, settings: TransmissionSettings) 
     )
 
 
-def _value(products: Complexes, settings: TransmissionSettings) -> Complexes:
+def _value(products: Complexes, settings: FrequencyResponseSettings) -> Complexes:
     if settings.estimator is Estimator.DRIVE:
         return drive_referenced(products[_REFERENCE, _DRIVE], products[_REFERENCE, _RESPONSE])
     s_xx, s_yy = products[_DRIVE, _DRIVE].real, products[_RESPONSE, _RESPONSE].real

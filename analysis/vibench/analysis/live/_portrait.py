@@ -7,7 +7,7 @@ from scipy import fft
 
 from ..signals import Reals
 from ._drive_tone import drive_tone, drive_turns
-from ._ring import Window
+from ._ring import RingWindow
 from ._sine_response import displacement_of, look_samples
 
 SHOWN_PERIODS = 20
@@ -35,7 +35,7 @@ class Portrait:
 
 
 def portrait(
-    window: Window, drive_row: int, response_row: int, sample_rate_hz: float, *, delay_s: float = 0.0
+    window: RingWindow, drive_row: int, response_row: int, sample_rate_hz: float, *, delay_s: float = 0.0
 ) -> Portrait | None:
     """Draw the newest periods; None when no sine is playing, or too few samples are there.
 

@@ -11,7 +11,7 @@ Values = NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
-class Window:
+class RingWindow:
     """Consecutive samples up to the newest."""
 
     first_sample: int
@@ -71,13 +71,13 @@ class Ring:
         self._put(first_sample + values.shape[1] - newest.shape[1], newest)
         self._next = first_sample + values.shape[1]
 
-    def newest(self, samples: int) -> Window:
+    def newest(self, samples: int) -> RingWindow:
         """Give so many of the newest samples, fewer when there are not so many."""
         count = min(max(samples, 0), self.held)
         end = self._next % self._capacity + self._capacity
-        return Window(self._next - count, self._values[:, end - count : end])
+        return RingWindow(self._next - count, self._values[:, end - count : end])
 
-    def since(self, sample: int) -> Window:
+    def since(self, sample: int) -> RingWindow:
         """Give what came from a sample on, as far as it is still held."""
         return self.newest(self._next - sample)
 

@@ -7,7 +7,7 @@ from scipy import fft
 
 from ..signals import Quantity, Reals, converted_signal
 from ._drive_tone import amplitudes_at, drive_tone
-from ._ring import Window
+from ._ring import RingWindow
 
 _BAND_BELOW = 0.3
 """Displacement is kept down to this part of the drive frequency: half orders pass, drift does not."""
@@ -53,7 +53,7 @@ def look_samples(sample_rate_hz: float) -> int:
     return fft.next_fast_len(round(_LOOK_S * sample_rate_hz), real=True)
 
 
-def sine_point(window: Window, rows: tuple[int, int, int], sample_rate_hz: float) -> SinePoint | None:
+def sine_point(window: RingWindow, rows: tuple[int, int, int], sample_rate_hz: float) -> SinePoint | None:
     """Make a point of the newest samples.
 
     None when they hold no sine, are too few, some were lost, or the drive is ramped down: m0 then rings

@@ -10,10 +10,10 @@ from scipy import fft
 from ..errors import InvalidRequest
 from ..frequency_response import (
     Estimator,
-    Transmission,
-    TransmissionSettings,
-    converted_transmission,
-    transmission_of,
+    FrequencyResponse,
+    FrequencyResponseSettings,
+    converted_frequency_response,
+    frequency_response_of,
 )
 from ..signals import (
     DEFAULT_CONFIDENCE,
@@ -136,7 +136,7 @@ class LiveSpectra:
         high_hz: float,
         delay_s: float = 0.0,
         confidence: float = DEFAULT_CONFIDENCE,
-    ) -> Transmission | None:
+    ) -> FrequencyResponse | None:
         """Give displacement over displacement, with coherence and bounds; None before two segments.
 
         Parameters
@@ -154,7 +154,7 @@ class LiveSpectra:
         if int(np.count_nonzero(used)) < _LEAST_SEGMENTS:
             return None
         estimator = Estimator.DRIVE if len(rows) == 3 else Estimator.H1
-        settings = TransmissionSettings(
+        settings = FrequencyResponseSettings(
             estimator=estimator,
             sample_rate_hz=self._rate_hz,
             segment_samples=self._settings.segment_samples,
@@ -163,8 +163,8 @@ class LiveSpectra:
             confidence=confidence,
         )
         highest = int(high_hz * self._settings.segment_samples / self._rate_hz) + 2
-        found = transmission_of(self._averages(used, rows, highest), settings).between(low_hz, high_hz)
-        return converted_transmission(
+        found = frequency_response_of(self._averages(used, rows, highest), settings).between(low_hz, high_hz)
+        return converted_frequency_response(
             found.without_delay(delay_s),
             drive=(Quantity.ACCELERATION, Quantity.DISPLACEMENT),
             response=(Quantity.VELOCITY, Quantity.DISPLACEMENT),

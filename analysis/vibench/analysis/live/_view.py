@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ..frequency_response import Transmission
+from ..frequency_response import FrequencyResponse
 from ..recordings import BASE, DRIVE, RESPONSE
 from ..signals import Reals
 from ._envelope import Samples, column_starts
@@ -27,7 +27,7 @@ _COLUMNS = tuple(each.name for each in fields(SinePoint))
 
 
 @dataclass(frozen=True, eq=False)
-class SweepCourse:
+class SweepHistory:
     """All points so far, in the order of time; arrays of shape (points,)."""
 
     time_s: Reals
@@ -61,16 +61,16 @@ class SweepTrace:
         self._end += 1
         self._begin = max(self._begin, self._end - self._most)
 
-    def course(self) -> SweepCourse:
+    def course(self) -> SweepHistory:
         """Give all points."""
-        return SweepCourse(*self._rows[:, self._begin : self._end].copy())
+        return SweepHistory(*self._rows[:, self._begin : self._end].copy())
 
 
 HELD_S = 10.0
 _POINT_EVERY_S = 0.1
 """Points of a sweep's course, and portraits, change this often; the other pictures with every frame."""
 _LOWEST_DRIVE_HZ = 10.0
-_TRANSMISSION_ROLES = (BASE, RESPONSE, DRIVE)
+_FREQUENCY_RESPONSE_ROLES = (BASE, RESPONSE, DRIVE)
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class LiveChannel:
 
 
 @dataclass(frozen=True, eq=False)
-class Lanes:
+class TimeHistories:
     """The newest seconds of every channel, as they are drawn."""
 
     time_s: Reals
@@ -136,7 +136,7 @@ class LiveView:
         self._pointed = 0
         self._section = PoincareSection()
         self._portrait: tuple[int, Portrait | None] = (-(10**12), None)
-        self._transmission: tuple[int, Transmission | None] = (0, None)
+        self._transmission: tuple[int, FrequencyResponse | None] = (0, None)
         self._spectrum: tuple[int, LiveSpectrum | None] = (0, None)
 
     @property
@@ -163,12 +163,12 @@ class LiveView:
         if self._has(DRIVE, BASE, RESPONSE) and self._is_point_due():
             self._add_point()
 
-    def lanes(self, span_s: float, columns: int) -> Lanes:
+    def lanes(self, span_s: float, columns: int) -> TimeHistories:
         """Give the newest seconds as columns of a picture."""
         window = self._ring.newest(round(span_s * self._rate_hz))
         low, high = outline(window.values, columns)
         starts = column_starts(window.values.shape[1], columns)
-        return Lanes((window.first_sample + starts) / self._rate_hz, low, high)
+        return TimeHistories((window.first_sample + starts) / self._rate_hz, low, high)
 
     def spectrum(self) -> LiveSpectrum | None:
         """Give the spectral density of every channel; None before the first segment."""
@@ -176,12 +176,12 @@ class LiveView:
             self._spectrum = (self._spectra.segments, self._spectra.spectrum())
         return self._spectrum[1]
 
-    def transmission(self) -> Transmission | None:
+    def transmission(self) -> FrequencyResponse | None:
         """Give |x / U| of the newest segments, with coherence and bounds; None before two of them."""
         if not self._has(BASE, RESPONSE):
             return None
         if self._transmission[0] != self._spectra.segments:
-            rows = [self._rows[role] for role in _TRANSMISSION_ROLES if role in self._rows]
+            rows = [self._rows[role] for role in _FREQUENCY_RESPONSE_ROLES if role in self._rows]
             low_hz, high_hz = self._band_hz
             found = self._spectra.transmission(rows, low_hz=low_hz, high_hz=high_hz, delay_s=self._delay_s)
             self._transmission = (self._spectra.segments, found)
@@ -212,7 +212,7 @@ class LiveView:
         """The Poincaré points of all portraits so far."""
         return self._section
 
-    def course(self) -> SweepCourse:
+    def course(self) -> SweepHistory:
         """Give Responses I and II and extremes against the frequency really played, so far."""
         return self._trace.course()
 

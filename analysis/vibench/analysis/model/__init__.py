@@ -7,12 +7,12 @@ logarithm is a named option. Nothing is fitted here.
 """
 
 from ._difference import (
-    Difference,
+    CurveDifference,
     logarithmic_difference,
 )
 from ._foresight import (
-    Foresight,
-    foresee,
+    MeasurementPrediction,
+    predict_measurement,
 )
 from ._overlay import (
     DwellOverlay,
@@ -31,14 +31,14 @@ from ._prediction import (
     PAPER_TERMINAL_RESONANCES_HZ,
     PREDICTION_S,
     WINDOW_S,
-    Prediction,
-    linear_transmission,
+    ResponsePrediction,
+    linear_transmissibility,
     paper_amplitude_m,
     predicted,
 )
 from ._similarity import (
-    THRESHOLD,
-    Curve,
+    SIMILARITY_THRESHOLD,
+    SimilarityCurve,
     LogarithmOf,
     Similarity,
     similarity,
@@ -49,15 +49,15 @@ __all__ = [
     "PAPER_RESONANCES_HZ",
     "PAPER_TERMINAL_RESONANCES_HZ",
     "PREDICTION_S",
-    "THRESHOLD",
+    "SIMILARITY_THRESHOLD",
     "WINDOW_S",
-    "Curve",
-    "Difference",
+    "SimilarityCurve",
+    "CurveDifference",
     "DwellOverlay",
-    "Foresight",
+    "MeasurementPrediction",
     "LogarithmOf",
     "NoiseOverlay",
-    "Prediction",
+    "ResponsePrediction",
     "Similarity",
     "SimulatedChannels",
     "SimulatedRun",
@@ -66,8 +66,8 @@ __all__ = [
     "SteppedSineOverlay",
     "SweepOverlay",
     "dwell_overlay",
-    "foresee",
-    "linear_transmission",
+    "predict_measurement",
+    "linear_transmissibility",
     "logarithmic_difference",
     "noise_overlay",
     "paper_amplitude_m",

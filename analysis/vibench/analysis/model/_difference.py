@@ -10,7 +10,7 @@ _PER_NEPER_DB = 20 / np.log(10)
 
 
 @dataclass(frozen=True)
-class Difference:
+class CurveDifference:
     """Measured over simulated magnitude; arrays of shape (points,)."""
 
     frequency_hz: Reals
@@ -18,9 +18,9 @@ class Difference:
     standard_errors: Reals
     """ln(measured / simulated) over the standard deviation of both; infinite where neither has any."""
 
-    def where(self, kept: Flags) -> "Difference":
+    def where(self, kept: Flags) -> "CurveDifference":
         """Keep some of the points."""
-        return Difference(self.frequency_hz[kept], self.decibel[kept], self.standard_errors[kept])
+        return CurveDifference(self.frequency_hz[kept], self.decibel[kept], self.standard_errors[kept])
 
     @property
     def median_abs_db(self) -> float:
@@ -40,9 +40,9 @@ class Difference:
 
 def logarithmic_difference(
     frequency_hz: Reals, measured: tuple[Reals, Reals], simulated: tuple[Reals, Reals]
-) -> Difference:
+) -> CurveDifference:
     """Compare magnitudes; each pair is (magnitude, relative standard deviation)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         nepers = np.log(measured[0] / simulated[0])
         spread = np.hypot(measured[1], simulated[1])
-        return Difference(frequency_hz, _PER_NEPER_DB * nepers, np.asarray(nepers / spread))
+        return CurveDifference(frequency_hz, _PER_NEPER_DB * nepers, np.asarray(nepers / spread))

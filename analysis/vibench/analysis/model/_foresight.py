@@ -14,32 +14,32 @@ from vibench.acquisition.plan import (
     excited_band_hz,
     predicted_loads,
 )
-from vibench.acquisition.rig import Quantity, Rig, RigModel
+from vibench.acquisition.rig import BaseQuantity, Rig, RigModel
 
 from ..recordings import specimen_of
 from ..signals import Flags, Reals
 from ._overlay import prediction_grid
-from ._prediction import Lead, Prediction, predicted
+from ._prediction import Approach, ResponsePrediction, predicted
 
 MOST_POINTS = 60
 """Frequencies that are simulated: some seconds of work."""
-FORESEEN_S = 6.0
+SIMULATED_S = 6.0
 """Simulated from rest at each frequency; all but a thousandth of the transient has died out by half of it."""
-LED_POINTS = 200
-LED_S = 2.0
+FOLLOWED_POINTS = 200
+FOLLOWED_S = 2.0
 """Where a sweep is followed: steps so small that they disturb little, and the time spent at each [s]."""
 _TONES = frozenset({"dwell", "sine_sweep", "stepped_sine"})
 
 
 @dataclass(frozen=True, eq=False)
-class Foresight:
+class MeasurementPrediction:
     """Responses under sines of the base amplitude that the rig's linear model promises."""
 
     measurement: Measurement
-    prediction: Prediction
+    prediction: ResponsePrediction
     basis: str
     """Where the base amplitude comes from."""
-    lead: Lead
+    lead: Approach
     """Where each simulated point begins."""
 
     @property
@@ -54,31 +54,31 @@ class Foresight:
         return f"gong2025, gap {specimen.gap_m * 1e6:g} µm"
 
 
-def foresee(measurement: Measurement, rig: Rig) -> Foresight:
+def predict_measurement(measurement: Measurement, rig: Rig) -> MeasurementPrediction:
     """Simulate the specimen of a rig over the band that a measurement excites."""
     specimen = specimen_of({"specimen": rig.specimen.model_dump()})
     low_hz, high_hz = excited_band_hz(measurement.excitation)
-    lead = lead_of(measurement.excitation)
+    lead = approach_of(measurement.excitation)
     match lead:
-        case Lead.REST:
-            grid, each_s = _thinned(prediction_grid(specimen, low_hz, high_hz)), FORESEEN_S
-        case Lead.UP | Lead.DOWN:
-            grid, each_s = np.linspace(low_hz, high_hz, LED_POINTS, dtype=np.float64), LED_S
+        case Approach.REST:
+            grid, each_s = _thinned(prediction_grid(specimen, low_hz, high_hz)), SIMULATED_S
+        case Approach.UP | Approach.DOWN:
+            grid, each_s = np.linspace(low_hz, high_hz, FOLLOWED_POINTS, dtype=np.float64), FOLLOWED_S
     amplitude_m, basis = base_amplitude_m(measurement, rig, grid)
     prediction = predicted(specimen, grid, amplitude_m, duration_s=each_s, lead=lead)
-    return Foresight(measurement, prediction, basis, lead)
+    return MeasurementPrediction(measurement, prediction, basis, lead)
 
 
-def lead_of(excitation: Excitation) -> Lead:
+def approach_of(excitation: Excitation) -> Approach:
     """Tell how a measurement comes to each of its frequencies: a sweep keeps to its branch."""
     match excitation:
         case SineSweep(start_hz=start, stop_hz=stop):
-            return Lead.UP if start < stop else Lead.DOWN
+            return Approach.UP if start < stop else Approach.DOWN
         case FrequencySteps():
             first, _ = next(excitation.passes())
-            return Lead.UP if first == Direction.UP.value else Lead.DOWN
+            return Approach.UP if first == Direction.UP.value else Approach.DOWN
         case _:
-            return Lead.REST
+            return Approach.REST
 
 
 def base_amplitude_m(measurement: Measurement, rig: Rig, frequency_hz: Reals) -> tuple[Reals, str]:
@@ -89,10 +89,10 @@ def base_amplitude_m(measurement: Measurement, rig: Rig, frequency_hz: Reals) ->
     """
     excitation = measurement.excitation
     if excitation.kind not in _TONES:
-        rms_m = predicted_loads(excitation, rig)[Quantity.STROKE].rms
+        rms_m = predicted_loads(excitation, rig)[BaseQuantity.STROKE].rms
         return np.full(frequency_hz.shape, np.sqrt(2) * rms_m), "a sine of the same rms base displacement"
     terminal_v = 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
-    stroke_m = np.abs(RigModel(rig).transfer(Quantity.STROKE, frequency_hz)) * terminal_v
+    stroke_m = np.abs(RigModel(rig).transfer(BaseQuantity.STROKE, frequency_hz)) * terminal_v
     if isinstance(excitation, SineSweep):
         stroke_m = stroke_m * np.array([excitation.level(float(each)) for each in frequency_hz])
     return np.asarray(stroke_m), "the rig's linear model"

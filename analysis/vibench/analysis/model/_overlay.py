@@ -27,8 +27,8 @@ from ..sine import (
     stepped_response,
     terminal_levels,
 )
-from ._difference import Difference, logarithmic_difference
-from ._prediction import Prediction, paper_amplitude_m, predicted
+from ._difference import CurveDifference, logarithmic_difference
+from ._prediction import ResponsePrediction, paper_amplitude_m, predicted
 from ._simulated_channels import SimulatedChannels, SimulatedSpecimen, played_impacts
 
 PREDICTION_STEP_HZ = 2.0
@@ -63,9 +63,9 @@ class NoiseOverlay:
     run: SimulatedRun
     response: NoiseResponse
     """Of the simulated specimen under the recorded base motion."""
-    difference: Difference
+    difference: CurveDifference
     """Measured over simulated transmission."""
-    prediction: Prediction
+    prediction: ResponsePrediction
     """Under sines."""
     amplitude_basis: str
     """Where the sines' A0 comes from."""
@@ -78,9 +78,9 @@ class SweepOverlay:
     run: SimulatedRun
     response: SweepResponse
     collisions: Collisions
-    difference: Difference
+    difference: CurveDifference
     """Measured over simulated Response II."""
-    prediction: Prediction
+    prediction: ResponsePrediction
     """Under sines of the measured A0 at each frequency."""
 
 
@@ -94,9 +94,9 @@ class DwellOverlay:
     terminal: tuple[TerminalLevel, ...]
     response_i_db: float
     """Measured over simulated Response I [dB]."""
-    difference: Difference
+    difference: CurveDifference
     """Measured over simulated Response II."""
-    prediction: Prediction
+    prediction: ResponsePrediction
     """Under a sine of the measured A0."""
 
 
@@ -106,8 +106,8 @@ class SteppedSineOverlay:
 
     run: SimulatedRun
     response: SteppedResponse
-    difference: Difference
-    prediction: Prediction
+    difference: CurveDifference
+    prediction: ResponsePrediction
 
 
 def _run(channels: SimulatedChannels, label: str) -> SimulatedRun:

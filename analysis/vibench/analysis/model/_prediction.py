@@ -32,7 +32,7 @@ WINDOW_S = 5.0
 the paper's 30 s would say nothing else. In chaos each value is one draw, whatever the duration."""
 
 
-class Lead(StrEnum):
+class Approach(StrEnum):
     """Where the simulation of each point begins; with several motions at one frequency it decides which."""
 
     REST = "from rest"
@@ -46,7 +46,7 @@ Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class ResponsePrediction:
     """Responses of m0 under sines; arrays of shape (points,)."""
 
     specimen: Specimen
@@ -81,9 +81,9 @@ def predicted(
     accuracy: Accuracy = Accuracy.QUICK,
     *,
     duration_s: float = PREDICTION_S,
-    lead: Lead = Lead.REST,
+    lead: Approach = Approach.REST,
     progress: Progress = ignore_points,
-) -> Prediction:
+) -> ResponsePrediction:
     """Simulate a sine at each frequency: from rest on all cores, or one after the other as a sweep comes by.
 
     Parameters
@@ -100,30 +100,30 @@ def predicted(
     amplitudes = np.broadcast_to(np.asarray(amplitude_m, dtype=np.float64), frequency_hz.shape)
     drives = [Harmonic(float(f), float(a)) for f, a in zip(frequency_hz, amplitudes, strict=True)]
     # Led, half of the time is for the step from the last frequency to die away in.
-    window_s = min(WINDOW_S, duration_s if lead is Lead.REST else duration_s / 2)
+    window_s = min(WINDOW_S, duration_s if lead is Approach.REST else duration_s / 2)
 
     def point(drive: Harmonic, state: Reals | None = None, for_s: float = duration_s) -> Response:
         return steady_response(specimen, drive, accuracy, for_s, window_s, state)
 
     points: list[Response] = []
     match lead:
-        case Lead.REST:
+        case Approach.REST:
             with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
                 for found in pool.map(point, drives):
                     points.append(found)
                     progress(len(points), len(drives))
-        case Lead.UP:
-            points = list(_led(point, drives, duration_s, progress))
-        case Lead.DOWN:
-            points = list(_led(point, drives[::-1], duration_s, progress))[::-1]
+        case Approach.UP:
+            points = list(_followed(point, drives, duration_s, progress))
+        case Approach.DOWN:
+            points = list(_followed(point, drives[::-1], duration_s, progress))[::-1]
     ended = np.array([each.outcome is Outcome.REACHED_END for each in points])
-    return Prediction(
+    return ResponsePrediction(
         specimen=specimen,
         frequency_hz=np.asarray(frequency_hz, dtype=np.float64),
         amplitude_m=amplitudes.copy(),
         response_i=np.where(ended, [each.response_i for each in points], np.nan),
         response_ii=np.where(ended, [each.response_ii for each in points], np.nan),
-        linear=linear_transmission(specimen, frequency_hz),
+        linear=linear_transmissibility(specimen, frequency_hz),
         impacts=np.array([each.impacts for each in points], dtype=np.int64),
         accuracy=accuracy,
         duration_s=duration_s,
@@ -131,7 +131,7 @@ def predicted(
     )
 
 
-def _led(
+def _followed(
     point: Callable[[Harmonic, Reals | None, float], Response],
     drives: Sequence[Harmonic],
     duration_s: float,
@@ -151,7 +151,7 @@ def _led(
         progress(number, len(drives))
 
 
-def linear_transmission(specimen: Specimen, frequency_hz: Reals) -> Reals:
+def linear_transmissibility(specimen: Specimen, frequency_hz: Reals) -> Reals:
     """|x / U| of the specimen without contact, exact, shape of ``frequency_hz``."""
     return np.abs(base_transmissibility(specimen, frequency_hz)[:, 0])
 

@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import InvalidRequest, NotEnoughData
 from ..signals import Flags, Reals
 
-THRESHOLD = 0.1
+SIMILARITY_THRESHOLD = 0.1
 """Points that differ by at most so much are similar (Gong et al. 2025, section 4)."""
 DRAWS = 2000
 """Resamples of a bootstrap: its limits then scatter by about a fortieth of the interval's width."""
@@ -29,7 +29,7 @@ _PER_METRE = {LogarithmOf.METRES: 1.0, LogarithmOf.MILLIMETRES: 1e3, LogarithmOf
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class SimilarityCurve:
     """A response curve, simulated or measured; arrays of shape (points,)."""
 
     frequency_hz: Reals
@@ -51,7 +51,7 @@ class Curve:
                 f"a drive amplitude of {self.amplitude_m} m is not allowed; give a positive one"
             )
 
-    def at(self, frequency_hz: Reals) -> "Curve":
+    def at(self, frequency_hz: Reals) -> "SimilarityCurve":
         """Read the curve at other frequencies, straight between its points in both logarithms.
 
         Raises InvalidRequest for frequencies outside of the curve: nothing is extrapolated.
@@ -63,7 +63,7 @@ class Curve:
                 f"{frequency_hz[-1]:g}; compare within it"
             )
         between = np.interp(np.log(frequency_hz), np.log(self.frequency_hz), np.log(self.response))
-        return Curve(frequency_hz, np.exp(between), self.amplitude_m)
+        return SimilarityCurve(frequency_hz, np.exp(between), self.amplitude_m)
 
     def logarithm(self, of: LogarithmOf) -> Reals:
         """Take log10 of the response in the unit named, shape (points,)."""
@@ -102,10 +102,10 @@ class Similarity:
 
 
 def similarity(
-    reference: Curve,
-    model: Curve,
+    reference: SimilarityCurve,
+    model: SimilarityCurve,
     logarithm_of: LogarithmOf = LogarithmOf.MILLIMETRES,
-    threshold: float = THRESHOLD,
+    threshold: float = SIMILARITY_THRESHOLD,
     *,
     seed: int = 0,
 ) -> Similarity:
@@ -115,7 +115,7 @@ def similarity(
     ----------
     reference, model
         The piece-wise model (or a measurement) and what is to stand in for it, at the same frequencies;
-        `Curve.at` brings one to the other's.
+        `SimilarityCurve.at` brings one to the other's.
     logarithm_of
         The paper leaves it open. Where the reference is 1 in this unit its logarithm is zero and the
         difference infinite: such points are dissimilar unless both are equal.

@@ -4,9 +4,9 @@ Damping and frequencies come from the weakest noise, the gap from where sweeps b
 two dwells that bracket it. Every value has its bounds; what could not be told is said.
 """
 
-from ._shaken_specimen import ShakenSpecimen, shaken_specimen
+from ._shaken_specimen import UpdatedSpecimen, update_model
 
 __all__ = [
-    "ShakenSpecimen",
-    "shaken_specimen",
+    "UpdatedSpecimen",
+    "update_model",
 ]

@@ -105,7 +105,7 @@ _LEFT_OVER = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class ShakenSpecimen:
+class UpdatedSpecimen:
     """A specimen fitted to recordings, with what could not be told."""
 
     specimen: Specimen
@@ -159,7 +159,7 @@ def _said(found: FittedValue) -> str:
     return f"Fitted {name} = {value} {unit} ({low} to {high} {unit}, 95 %); the bench says {nominal} {unit}."
 
 
-def shaken_specimen(results: CampaignResults) -> ShakenSpecimen:
+def update_model(results: CampaignResults) -> UpdatedSpecimen:
     """Fit damping and frequencies to the weakest noise, and the gap to where sweeps or dwells collide.
 
     Parameters
@@ -186,7 +186,7 @@ def shaken_specimen(results: CampaignResults) -> ShakenSpecimen:
         model, values = with_values(model, {Parameter.GAP: gap.value}), (*values, gap)
     if not values:
         raise NotEnoughData(f"no specimen can be fitted to {results.name!r}: {' '.join(not_told)}")
-    return ShakenSpecimen(
+    return UpdatedSpecimen(
         specimen=model,
         values=values,
         linear_from=linear_from,

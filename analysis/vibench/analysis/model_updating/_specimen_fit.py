@@ -15,7 +15,7 @@ from scipy.stats import t as student
 from vibench.sim import Specimen, base_transmissibility
 
 from ..errors import InvalidRequest, NotEnoughData
-from ..frequency_response import Transmission
+from ..frequency_response import FrequencyResponse
 from ..signals import DEFAULT_CONFIDENCE, Complexes, Reals
 
 
@@ -123,7 +123,7 @@ class SpecimenFit:
 
 
 def fit_specimen(
-    transmission: Transmission,
+    transmission: FrequencyResponse,
     nominal: Specimen,
     free: Sequence[Parameter] = LINEAR,
     confidence: float = DEFAULT_CONFIDENCE,
@@ -220,7 +220,7 @@ class _Lines:
         return np.asarray(self.weights * np.concatenate([apart.real, apart.imag - channels]))
 
 
-def _lines(transmission: Transmission, nominal: Specimen, free: tuple[Parameter, ...]) -> _Lines:
+def _lines(transmission: FrequencyResponse, nominal: Specimen, free: tuple[Parameter, ...]) -> _Lines:
     """Take the lines that stand above their uncertainty; NotEnoughData where they are too few."""
     used = transmission.is_significant & np.isfinite(transmission.relative_sd_magnitude)
     count, needed = int(np.count_nonzero(used)), 2 * (len(free) + CHANNEL_PHASES)

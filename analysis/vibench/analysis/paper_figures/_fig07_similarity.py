@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from vibench.sim.study import Study, StudyResults
 
 from ..figures import LEVEL_STYLES, LEVELS, MEASURED, SIMULATED, DrawnFigure, legend_above, new_figure, styled
-from ..model import Curve, Similarity, similarity
+from ..model import SimilarityCurve, Similarity, similarity
 from ..signals import Reals
 from ..tables import table
 from ._options import AMPLITUDES_M, CASES, FigureOptions
@@ -54,7 +54,7 @@ def compared(
 ) -> Similarity:
     """Compare one continuous model with the piece-wise one at one amplitude."""
     curves = [
-        Curve(
+        SimilarityCurve(
             np.asarray(results.study.frequencies_hz), _values(results, each, amplitude_m, what), amplitude_m
         )
         for each in (_PIECE_WISE, model)

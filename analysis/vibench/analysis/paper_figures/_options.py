@@ -8,7 +8,7 @@ from vibench.sim import Accuracy
 from vibench.sim.study import frequency_range
 
 from ..errors import InvalidRequest
-from ..model import THRESHOLD, LogarithmOf
+from ..model import SIMILARITY_THRESHOLD, LogarithmOf
 
 AMPLITUDES_M = (1e-6, 5e-6, 10e-6, 50e-6)
 """The paper's four cases, weak to strong (its section 3.1; Figs. 3, 6 and 7)."""
@@ -43,7 +43,7 @@ class FigureOptions:
     similarity_highest_hz: float = 500.0
     """Upper end of the grid on which models are compared: the rates depend on it."""
     logarithm_of: LogarithmOf = LogarithmOf.MILLIMETRES
-    threshold: float = THRESHOLD
+    threshold: float = SIMILARITY_THRESHOLD
     duration_s: float = 30.0
     window_s: float = 5.0
     """The paper's: 30 s from rest, the last 5 s observed."""

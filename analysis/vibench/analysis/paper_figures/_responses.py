@@ -9,7 +9,7 @@ from vibench.sim import Harmonic, Specimen
 from vibench.sim.study import Study, StudyResults
 
 from ..figures import COLLIDING, LINEAR, frequency_axis, magnitude_axis
-from ..model import linear_transmission
+from ..model import linear_transmissibility
 from ..signals import Flags, Reals
 from ._options import FigureOptions
 
@@ -70,7 +70,7 @@ def draw_linear(axes: Axes, frequency_hz: Reals, specimen: Specimen) -> None:
     fine = np.linspace(frequency_hz[0], frequency_hz[-1], 4 * frequency_hz.size)
     axes.plot(
         fine,
-        linear_transmission(specimen, fine),
+        linear_transmissibility(specimen, fine),
         color=LINEAR,
         linestyle="--",
         linewidth=1.0,

@@ -130,7 +130,7 @@ def read_whole(channels: Channels, stretch: Stretch) -> Reals:
     return data
 
 
-class Watcher(Protocol):
+class ProgressObserver(Protocol):
     """Told what is computed and how much of the recording was read."""
 
     def begin(self, recording: str, stage: str) -> None:
@@ -140,7 +140,7 @@ class Watcher(Protocol):
         """Hear how many samples per channel of the stage are read."""
 
 
-class Unwatched:
+class Unobserved:
     """Tells nobody."""
 
     def begin(self, recording: str, stage: str) -> None:
@@ -151,11 +151,11 @@ class Unwatched:
 
 
 @dataclass(frozen=True, eq=False)
-class WatchedChannels:
+class ObservedChannels:
     """Channels whose reading is watched."""
 
     channels: Channels
-    watcher: Watcher
+    watcher: ProgressObserver
 
     @property
     def sample_rate_hz(self) -> float:

@@ -28,7 +28,7 @@ from ._accuracy_document import (
     worst_error,
 )
 from ._comparison_export import (
-    exported,
+    write_comparison,
 )
 from ._figure_choice import (
     recording_figures,
@@ -45,7 +45,7 @@ __all__ = [
     "FrequencyGrid",
     "ImageKind",
     "accuracy_document",
-    "exported",
+    "write_comparison",
     "levels_figure",
     "recording_figures",
     "result_figures",

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from vibench.sim import Accuracy
-from vibench.sim.accuracy_benchmark import LEAST_GAIN, LevelFigures, MotionTrade, SolverFigures, Trade
+from vibench.sim.accuracy_benchmark import LEAST_GAIN, LevelFigures, MotionBenchmark, SolverFigures, AccuracyBenchmark
 
 _HEAD = (
     "| level or solver | simulated s per s | error of the state "
@@ -13,7 +13,7 @@ _RULE = "|---|---|---|---|---|---|"
 ABSENT = "–"
 
 
-def accuracy_document(trade: Trade, picture: str) -> str:
+def accuracy_document(trade: AccuracyBenchmark, picture: str) -> str:
     """Write the page.
 
     Parameters
@@ -27,7 +27,7 @@ def accuracy_document(trade: Trade, picture: str) -> str:
     return "\n".join(_lines(trade, picture)) + "\n"
 
 
-def _lines(trade: Trade, picture: str) -> Iterator[str]:
+def _lines(trade: AccuracyBenchmark, picture: str) -> Iterator[str]:
     yield from (
         "# Speed and accuracy, measured",
         "",
@@ -46,7 +46,7 @@ def _lines(trade: Trade, picture: str) -> Iterator[str]:
     yield from _promises(trade)
 
 
-def _motion(found: MotionTrade) -> Iterator[str]:
+def _motion(found: MotionBenchmark) -> Iterator[str]:
     yield from (
         "",
         f"## {found.motion.regime.value.capitalize()}: {found.motion.name}",
@@ -81,7 +81,7 @@ def _number(value: float | None) -> str:
     return ABSENT if value is None else f"{value:.1e}"
 
 
-def _promises(trade: Trade) -> Iterator[str]:
+def _promises(trade: AccuracyBenchmark) -> Iterator[str]:
     yield from ("", "## Promises", "", "| level | promised | worst above | kept |", "|---|---|---|---|")
     for accuracy in Accuracy:
         worst = worst_error(trade, accuracy)
@@ -99,7 +99,7 @@ def _promises(trade: Trade) -> Iterator[str]:
         yield f"| {name} | {ratio:.0f} |"
 
 
-def _without_gain(trade: Trade) -> Iterator[str]:
+def _without_gain(trade: AccuracyBenchmark) -> Iterator[str]:
     """Name the motions on which a level buys nothing."""
     lines = [
         f"- {level.accuracy.value} is no better than {before.accuracy.value}: {each.motion.name}"
@@ -110,7 +110,7 @@ def _without_gain(trade: Trade) -> Iterator[str]:
         yield from ("", f"Errors that a level does not lessen by a factor of {LEAST_GAIN:g}:", "", *lines)
 
 
-def worst_error(trade: Trade, accuracy: Accuracy) -> float:
+def worst_error(trade: AccuracyBenchmark, accuracy: Accuracy) -> float:
     """Give the largest error of the state that a level made on any motion that is not chaotic."""
     return max(
         (

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ..comparison import Trace, trace_difference
+from ..comparison import Curve, curve_difference
 from ..errors import InvalidRequest
 from ..figures import comparison_figure
 from ..results import CampaignResults, ComparedRecording, kept_result
 from ..tables import Table, write_csv
 from ._report import write_report
 
-Pair = tuple[Trace, Trace]
+Pair = tuple[Curve, Curve]
 
 
 class ExportKind(StrEnum):
@@ -28,9 +28,9 @@ class ExportKind(StrEnum):
     """The report of the recordings."""
 
 
-def exported(
+def write_comparison(
     path: Path,
-    traces: Sequence[Trace],
+    traces: Sequence[Curve],
     recordings: Sequence[ComparedRecording],
     pair: Pair | None = None,
     markers_hz: Sequence[float] = (),
@@ -71,7 +71,7 @@ def _report(target: Path, recordings: Sequence[ComparedRecording]) -> None:
     write_report(CampaignResults(target.stem, tuple(result for result, _ in kept), failures), target)
 
 
-def comparison_table(name: str, traces: Sequence[Trace], pair: Pair | None) -> Table:
+def comparison_table(name: str, traces: Sequence[Curve], pair: Pair | None) -> Table:
     """Lay all curves side by side; headings name the curve and the unit."""
     if not traces:
         raise InvalidRequest("numbers of no curves were asked for; choose one or more")
@@ -83,7 +83,7 @@ def comparison_table(name: str, traces: Sequence[Trace], pair: Pair | None) -> T
             (f"relative standard deviation [1] ({each.name})", _cells(each.relative_sd)),
         ]
     if pair is not None:
-        difference = trace_difference(*pair)
+        difference = curve_difference(*pair)
         said = f"{pair[0].name} over {pair[1].name}"
         columns += [
             (f"frequency [Hz] ({said})", _cells(difference.frequency_hz)),

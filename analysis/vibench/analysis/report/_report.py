@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from ..errors import NotEnoughData
 from ..figures import DrawnFigure
 from ..recordings import RecordingFacts, Verdict
-from ..results import CampaignResults, Failure, Result
+from ..results import CampaignResults, AnalysisFailure, Result
 from ._figure_choice import recording_figures, result_figures
 from ._findings import findings, limits
 from ._recording_section import (
@@ -166,7 +166,7 @@ def _warnings(results: CampaignResults) -> Iterator[str]:
                 yield f"{result.analysis.facts.name}: {check.what.lower()}: {check.text}"
 
 
-def _sentence(failure: Failure) -> str:
+def _sentence(failure: AnalysisFailure) -> str:
     return f"{failure.name}: no {failure.what}: {failure.sentence}"
 
 

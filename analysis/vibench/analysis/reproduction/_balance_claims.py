@@ -8,7 +8,7 @@ from ..model import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
 from ..signals import Reals
 from ._case import DAMPINGS, Case
 from ._claim import Claim, about, at_least, at_most
-from ._curve_peaks import curve_peaks, nearest, two_highest
+from ._curve_peaks import response_peaks, nearest, two_highest
 from ._evidence import CONTINUOUS, STRONG_M, WEAK_M, Evidence, level
 
 AGREES = 0.1
@@ -49,12 +49,12 @@ def _lowest(solutions: tuple[Reals, ...]) -> Reals:
 def _weak_balance(evidence: Evidence, case: Case) -> tuple[float, ...]:
     frequency_hz = np.asarray(case.options.frequencies_hz)
     lowest = _lowest(balanced(evidence, case, WEAK_M))
-    return nearest(curve_peaks(frequency_hz, lowest, _SMOOTH_PROMINENCE), PAPER_RESONANCES_HZ)
+    return nearest(response_peaks(frequency_hz, lowest, _SMOOTH_PROMINENCE), PAPER_RESONANCES_HZ)
 
 
 def _weak_response(evidence: Evidence, case: Case) -> tuple[float, ...]:
     curve = level(evidence, case, WEAK_M, CONTINUOUS)
-    found = curve_peaks(curve.frequency_hz, curve.response_i, _SMOOTH_PROMINENCE)
+    found = response_peaks(curve.frequency_hz, curve.response_i, _SMOOTH_PROMINENCE)
     return nearest(found, PAPER_RESONANCES_HZ)
 
 

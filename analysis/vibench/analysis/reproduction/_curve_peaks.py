@@ -5,7 +5,7 @@ from scipy.signal import find_peaks
 
 from vibench.sim import JOIN, Specimen
 
-from ..model import linear_transmission
+from ..model import linear_transmissibility
 from ..signals import Reals
 
 LEAST_PROMINENCE = 2.0
@@ -15,7 +15,7 @@ _FINE_POINTS = 60_000
 """0.01 Hz over the band."""
 
 
-def curve_peaks(frequency_hz: Reals, response: Reals, least_prominence: float = LEAST_PROMINENCE) -> Reals:
+def response_peaks(frequency_hz: Reals, response: Reals, least_prominence: float = LEAST_PROMINENCE) -> Reals:
     """Frequencies of the peaks of a curve, ascending: places of the grid, shape (peaks,)."""
     known = np.isfinite(response)
     found, _ = find_peaks(np.log(response[known]), prominence=np.log(least_prominence))
@@ -25,7 +25,7 @@ def curve_peaks(frequency_hz: Reals, response: Reals, least_prominence: float = 
 def linear_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
     """Frequencies of the peaks of m0 over the base without contact, to 0.01 Hz, shape (peaks,)."""
     fine = np.linspace(low_hz, high_hz, _FINE_POINTS)
-    return curve_peaks(fine, linear_transmission(specimen, fine))
+    return response_peaks(fine, linear_transmissibility(specimen, fine))
 
 
 def bound_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
@@ -39,12 +39,12 @@ def bound_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
     force = np.zeros((fine.size, 2, 1), dtype=np.complex128)
     force[:, 0, 0] = specimen.stiffnesses[0] + 1j * omega[:, 0, 0] * specimen.dampings[0]
     moved = np.linalg.solve(stiffness - omega**2 * mass + 1j * omega * damping, force)
-    return curve_peaks(fine, np.abs(moved[:, 0, 0]))
+    return response_peaks(fine, np.abs(moved[:, 0, 0]))
 
 
 def two_highest(frequency_hz: Reals, response: Reals) -> tuple[float, float, float]:
     """Frequencies of the two highest peaks, ascending, and the next over the second; NaN if there is one."""
-    found = np.flatnonzero(np.isin(frequency_hz, curve_peaks(frequency_hz, response)))
+    found = np.flatnonzero(np.isin(frequency_hz, response_peaks(frequency_hz, response)))
     if found.size < PAIR:
         return np.nan, np.nan, np.nan
     ranked = found[np.argsort(-response[found])]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from vibench.sim import Observable, Specimen, gong2025
-from vibench.sim.study import Kept, Study, StudyResults
+from vibench.sim.study import StudyObservable, Study, StudyResults
 
 from ..paper_figures import AMPLITUDES_M, Responses, responses
 from ._case import Case
@@ -62,9 +62,9 @@ def levels_asked(case: Case, model: str = PIECE_WISE) -> Study:
     return model_study(case, model, AMPLITUDES_M, with_exponents(model))
 
 
-def with_exponents(model: str) -> tuple[Kept, ...]:
+def with_exponents(model: str) -> tuple[StudyObservable, ...]:
     """Say what is observed of a model at the four amplitudes."""
-    both: tuple[Kept, ...] = (Observable.RESPONSE, Observable.LYAPUNOV)
+    both: tuple[StudyObservable, ...] = (Observable.RESPONSE, Observable.LYAPUNOV)
     return both if model in WITH_EXPONENTS else both[:1]
 
 
@@ -72,7 +72,7 @@ def model_study(
     case: Case,
     model: str,
     amplitudes_m: Sequence[float],
-    observe: tuple[Kept, ...],
+    observe: tuple[StudyObservable, ...],
     damping_time_s: float | None = None,
 ) -> Study:
     """One model over the case's grid, at the case's damping unless another is given."""

@@ -4,7 +4,7 @@ import numpy as np
 
 from vibench.sim import gong2025, spring_of
 
-from ..model import Curve, LogarithmOf, similarity
+from ..model import SimilarityCurve, LogarithmOf, similarity
 from ..paper_figures import AMPLITUDES_M
 from ..signals import Reals
 from ._case import DAMPINGS, EQUAL_PARTS, Alternative, Case, compared_up_to, logarithm, summed
@@ -36,7 +36,7 @@ def rate(evidence: Evidence, case: Case, model: str, amplitude_m: float, what: s
     for each in (PIECE_WISE, model):
         curve = level(evidence, case, amplitude_m, each)
         within = curve.frequency_hz <= options.similarity_highest_hz
-        curves.append(Curve(curve.frequency_hz[within], getattr(curve, what)[within], amplitude_m))
+        curves.append(SimilarityCurve(curve.frequency_hz[within], getattr(curve, what)[within], amplitude_m))
     return similarity(curves[0], curves[1], options.logarithm_of, options.threshold).rate
 
 

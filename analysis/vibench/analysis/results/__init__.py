@@ -8,39 +8,39 @@ with its unit in its name and its uncertainty beside it, and the curves of a com
 from ._campaign_results import (
     CampaignResults,
     DwellResult,
-    Failure,
+    AnalysisFailure,
     NoiseResult,
     Overlay,
     Result,
     SteppedSineResult,
     SweepResult,
     analyse_files,
-    assembled,
+    merged_results,
     overlay,
     recordings_in,
     result_of,
 )
 from ._compared_recording import (
     ComparedRecording,
-    compared_recording,
+    compare_recording,
     kept_result,
 )
 from ._measurement_analysis import (
-    UNWATCHED,
+    UNOBSERVED,
     RecordingAnalysis,
     analyse_recording,
 )
 from ._summary import (
     campaign_summary,
-    summary,
+    result_summary,
 )
 
 __all__ = [
-    "UNWATCHED",
+    "UNOBSERVED",
     "CampaignResults",
     "ComparedRecording",
     "DwellResult",
-    "Failure",
+    "AnalysisFailure",
     "NoiseResult",
     "Overlay",
     "RecordingAnalysis",
@@ -49,12 +49,12 @@ __all__ = [
     "SweepResult",
     "analyse_files",
     "analyse_recording",
-    "assembled",
+    "merged_results",
     "campaign_summary",
-    "compared_recording",
+    "compare_recording",
     "kept_result",
     "overlay",
     "recordings_in",
     "result_of",
-    "summary",
+    "result_summary",
 ]

@@ -10,7 +10,7 @@ from vibench.acquisition.recording import Recording
 from vibench.sim import Accuracy, Specimen
 
 from ..errors import AnalysisError, NotEnoughData
-from ..frequency_response import DEFAULT_REQUEST, NoiseAnalysis, NoiseRequest
+from ..frequency_response import DEFAULT_REQUEST, NoiseAnalysis, FrequencyResponseRequest
 from ..model import (
     DwellOverlay,
     NoiseOverlay,
@@ -24,13 +24,13 @@ from ..model import (
     stepped_overlay,
     sweep_overlay,
 )
-from ..recordings import RecordedChannels, RecordingFacts, Watcher, specimen_of
+from ..recordings import RecordedChannels, RecordingFacts, ProgressObserver, specimen_of
 from ..sine import (
     DwellAnalysis,
     SteppedSineAnalysis,
     SweepAnalysis,
 )
-from ._measurement_analysis import UNWATCHED, RecordingAnalysis, analyse_recording
+from ._measurement_analysis import UNOBSERVED, RecordingAnalysis, analyse_recording
 
 Overlay = NoiseOverlay | SweepOverlay | DwellOverlay | SteppedSineOverlay
 Stage = Callable[[str], None]
@@ -123,7 +123,7 @@ Result = NoiseResult | SweepResult | DwellResult | SteppedSineResult
 
 
 @dataclass(frozen=True)
-class Failure:
+class AnalysisFailure:
     """A recording without a result, or a result without its simulation, and why."""
 
     name: str
@@ -138,7 +138,7 @@ class CampaignResults:
 
     name: str
     results: tuple[Result, ...]
-    failures: tuple[Failure, ...]
+    failures: tuple[AnalysisFailure, ...]
     model_said: tuple[str, ...] = ()
     """What is to be known of the model that was laid over: a sentence for each fitted value."""
 
@@ -179,8 +179,8 @@ def analyse_files(
     paths: Sequence[Path],
     name: str,
     simulation: Simulation = Simulation.LAID_OVER,
-    request: NoiseRequest = DEFAULT_REQUEST,
-    watcher: Watcher = UNWATCHED,
+    request: FrequencyResponseRequest = DEFAULT_REQUEST,
+    watcher: ProgressObserver = UNOBSERVED,
     specimen: Specimen | None = None,
 ) -> CampaignResults:
     """Analyse recordings one after the other, each with the model laid over it, as `analyse_recording` does.
@@ -196,20 +196,20 @@ def analyse_files(
     if not paths:
         raise NotEnoughData(f"no recording was given for {name!r}; give the paths of one or more .h5 files")
     results: list[Result] = []
-    failures: list[Failure] = []
+    failures: list[AnalysisFailure] = []
     for path in paths:
         try:
             with open_recording(path) as recording:
                 result, failed = result_of(recording, simulation, request, watcher, specimen)
         except (AnalysisError, RecordingError) as error:
-            failures.append(Failure(path.name, "analysis", str(error)))
+            failures.append(AnalysisFailure(path.name, "analysis", str(error)))
             continue
         results.append(result)
         failures.extend(failed)
     return CampaignResults(name, tuple(results), tuple(failures))
 
 
-def assembled(name: str, parts: Sequence[CampaignResults]) -> CampaignResults:
+def merged_results(name: str, parts: Sequence[CampaignResults]) -> CampaignResults:
     """Put results that were made one by one together as one campaign's."""
     return CampaignResults(
         name,
@@ -221,10 +221,10 @@ def assembled(name: str, parts: Sequence[CampaignResults]) -> CampaignResults:
 def result_of(
     recording: Recording,
     simulation: Simulation = Simulation.LAID_OVER,
-    request: NoiseRequest = DEFAULT_REQUEST,
-    watcher: Watcher = UNWATCHED,
+    request: FrequencyResponseRequest = DEFAULT_REQUEST,
+    watcher: ProgressObserver = UNOBSERVED,
     specimen: Specimen | None = None,
-) -> tuple[Result, tuple[Failure, ...]]:
+) -> tuple[Result, tuple[AnalysisFailure, ...]]:
     """Analyse one recording; a simulation that fails leaves the measured result standing.
 
     Raises
@@ -240,7 +240,7 @@ def result_of(
     try:
         laid = overlay(recording, analysis, specimen=specimen, stage=lambda stage: watcher.begin(name, stage))
     except AnalysisError as error:
-        return _paired(analysis, None), (Failure(name, "simulation", str(error)),)
+        return _paired(analysis, None), (AnalysisFailure(name, "simulation", str(error)),)
     return _paired(analysis, laid), ()
 
 

@@ -8,20 +8,20 @@ from pathlib import Path
 from vibench.acquisition import open_recording
 
 from ..comparison import (
-    Origin,
-    Trace,
+    CurveOrigin,
+    Curve,
     dwell_traces,
-    predicted_traces,
-    sorted_trace,
+    predicted_curves,
+    sorted_curve,
     stepped_traces,
     sweep_traces,
     transmission_trace,
 )
-from ..frequency_response import NoiseRequest
+from ..frequency_response import FrequencyResponseRequest
 from ..model import Simulation
 from ._campaign_results import (
     DwellResult,
-    Failure,
+    AnalysisFailure,
     NoiseResult,
     Result,
     SteppedSineResult,
@@ -36,7 +36,7 @@ class ComparedRecording:
 
     path: Path
     name: str
-    traces: tuple[Trace, ...]
+    traces: tuple[Curve, ...]
     failures: tuple[str, ...]
     """Sentences on what could not be analysed or simulated."""
     warnings: tuple[str, ...]
@@ -45,7 +45,7 @@ class ComparedRecording:
     """The whole result, for reports: only they open it, with `kept_result`."""
 
 
-def compared_recording(path: Path, request: NoiseRequest, simulation: Simulation) -> ComparedRecording:
+def compare_recording(path: Path, request: FrequencyResponseRequest, simulation: Simulation) -> ComparedRecording:
     """Analyse a recording for a comparison.
 
     Raises
@@ -60,36 +60,36 @@ def compared_recording(path: Path, request: NoiseRequest, simulation: Simulation
     return ComparedRecording(
         path=path,
         name=name,
-        traces=tuple(sorted_trace(each) for each in _traces(result, name)),
+        traces=tuple(sorted_curve(each) for each in _curves(result, name)),
         failures=tuple(each.sentence for each in failures),
         warnings=tuple(each.text for each in result.analysis.checks if each.verdict.value == "warning"),
         kept=pickle.dumps((result, failures)),
     )
 
 
-def kept_result(compared: ComparedRecording) -> tuple[Result, tuple[Failure, ...]]:
+def kept_result(compared: ComparedRecording) -> tuple[Result, tuple[AnalysisFailure, ...]]:
     """Open the whole result again; the bytes were made by this program a moment ago, never by a file."""
     result, failures = pickle.loads(compared.kept)  # noqa: S301
     return result, failures
 
 
-def _traces(result: Result, name: str) -> Iterator[Trace]:
+def _curves(result: Result, name: str) -> Iterator[Curve]:
     match result:
         case NoiseResult(analysis=noise, laid=laid):
-            yield transmission_trace(name, Origin.MEASURED, noise.response.transmission)
+            yield transmission_trace(name, CurveOrigin.MEASURED, noise.response.transmission)
             if laid is not None:
-                yield transmission_trace(name, Origin.SIMULATED, laid.response.transmission)
+                yield transmission_trace(name, CurveOrigin.SIMULATED, laid.response.transmission)
         case SweepResult(analysis=sweep, laid=laid):
-            yield from sweep_traces(name, Origin.MEASURED, sweep.response)
+            yield from sweep_traces(name, CurveOrigin.MEASURED, sweep.response)
             if laid is not None:
-                yield from sweep_traces(name, Origin.SIMULATED, laid.response)
+                yield from sweep_traces(name, CurveOrigin.SIMULATED, laid.response)
         case DwellResult(analysis=dwell, laid=laid):
-            yield from dwell_traces(name, Origin.MEASURED, dwell.response)
+            yield from dwell_traces(name, CurveOrigin.MEASURED, dwell.response)
             if laid is not None:
-                yield from dwell_traces(name, Origin.SIMULATED, laid.response)
+                yield from dwell_traces(name, CurveOrigin.SIMULATED, laid.response)
         case SteppedSineResult(analysis=stepped, laid=laid):
-            yield from stepped_traces(name, Origin.MEASURED, stepped.response)
+            yield from stepped_traces(name, CurveOrigin.MEASURED, stepped.response)
             if laid is not None:
-                yield from stepped_traces(name, Origin.SIMULATED, laid.response)
+                yield from stepped_traces(name, CurveOrigin.SIMULATED, laid.response)
     if result.laid is not None and result.laid.prediction.frequency_hz.size > 1:
-        yield from predicted_traces(name, result.laid.prediction)
+        yield from predicted_curves(name, result.laid.prediction)

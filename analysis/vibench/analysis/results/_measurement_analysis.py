@@ -16,14 +16,14 @@ from vibench.acquisition.plan import (
 from vibench.acquisition.recording import Recording
 
 from ..errors import AnalysisError
-from ..frequency_response import DEFAULT_REQUEST, NoiseAnalysis, NoiseRequest, noise_response
+from ..frequency_response import DEFAULT_REQUEST, NoiseAnalysis, FrequencyResponseRequest, noise_response
 from ..recordings import (
     Channels,
     RecordedChannels,
     RecordingFacts,
-    Unwatched,
-    WatchedChannels,
-    Watcher,
+    Unobserved,
+    ObservedChannels,
+    ProgressObserver,
     measurement_checks,
     recording_facts,
     require_moving_channels,
@@ -43,12 +43,12 @@ from ..sine import (
     terminal_levels,
 )
 
-UNWATCHED = Unwatched()
+UNOBSERVED = Unobserved()
 RecordingAnalysis = NoiseAnalysis | SweepAnalysis | DwellAnalysis | SteppedSineAnalysis
 
 
 def analyse_recording(
-    recording: Recording, request: NoiseRequest = DEFAULT_REQUEST, watcher: Watcher = UNWATCHED
+    recording: Recording, request: FrequencyResponseRequest = DEFAULT_REQUEST, watcher: ProgressObserver = UNOBSERVED
 ) -> RecordingAnalysis:
     """Analyse a recording, complete or not, by the excitation that its plan names.
 
@@ -72,13 +72,13 @@ def analyse_recording(
     facts = recording_facts(recording, watcher.read)
     watcher.begin(name, "analysing")
     try:
-        return _analysed(facts, WatchedChannels(RecordedChannels(recording), watcher), request)
+        return _analysed(facts, ObservedChannels(RecordedChannels(recording), watcher), request)
     except AnalysisError as error:
         ended = f"{facts.state.value}" + (f": {facts.reason}" if facts.reason else "")
         raise type(error)(f"{recording.path.name} ({ended}): {error}") from error
 
 
-def _analysed(facts: RecordingFacts, channels: Channels, request: NoiseRequest) -> RecordingAnalysis:
+def _analysed(facts: RecordingFacts, channels: Channels, request: FrequencyResponseRequest) -> RecordingAnalysis:
     checks = measurement_checks(facts)
     require_moving_channels(facts.channels)
     match facts.measurement.excitation:

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..chaos import MotionVerdict
-from ..frequency_response import NoiseAnalysis, PeriodicTransmission, Resonance, distortion
-from ..model import Difference, SimulatedRun
+from ..frequency_response import NoiseAnalysis, PeriodicFrequencyResponse, Resonance, distortion
+from ..model import CurveDifference, SimulatedRun
 from ..recordings import RecordingFacts
 from ..sine import CollisionRegion, Collisions, Edge, TerminalLevel, level_summary
 from ._campaign_results import (
@@ -23,7 +23,7 @@ from ._campaign_results import (
 Json = dict[str, Any]
 
 
-def summary(result: Result) -> Json:
+def result_summary(result: Result) -> Json:
     """Say a result in numbers that JSON can hold; what is not finite becomes null."""
     document: Json = {
         "recording": _facts(result.analysis.facts),
@@ -50,7 +50,7 @@ def campaign_summary(results: CampaignResults) -> Json:
     """Say all results of a campaign, and what failed."""
     return {
         "campaign": results.name,
-        "results": [summary(each) for each in results.results],
+        "results": [result_summary(each) for each in results.results],
         "failures": [{"recording": f.name, "what": f.what, "error": f.sentence} for f in results.failures],
     }
 
@@ -122,7 +122,7 @@ def _transmission(analysis: NoiseAnalysis) -> Json:
     }
 
 
-def _distortion(periodic: PeriodicTransmission) -> Json:
+def _distortion(periodic: PeriodicFrequencyResponse) -> Json:
     found = distortion(periodic)
     return {
         "realisations": periodic.realisations,
@@ -309,7 +309,7 @@ def _run(run: SimulatedRun) -> Json:
     }
 
 
-def _difference(found: Difference) -> Json:
+def _difference(found: CurveDifference) -> Json:
     return {
         "median_abs_db": found.median_abs_db,
         "rms_db": found.rms_db,

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.special import i0
 
-from vibench.sim.kernels import compiled
+from vibench.sim.kernels import kernel
 
 from ._arrays import Reals
 
@@ -43,7 +43,7 @@ def interpolated(samples: Reals, positions: Reals) -> Reals:
     return result
 
 
-@compiled
+@kernel
 def _interpolate(samples: Reals, positions: Reals, table: Reals, result: Reals) -> None:
     steps = table.size - 1
     for i in range(positions.size):

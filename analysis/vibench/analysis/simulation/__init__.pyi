@@ -2,10 +2,10 @@ from ._accuracy_cost import (
     cost_sentences as cost_sentences,
 )
 from ._course import (
-    SimulationCourse as SimulationCourse,
+    SimulationProgress as SimulationProgress,
 )
 from ._request import (
-    Piece as Piece,
+    PartialResult as PartialResult,
     SimulationRequest as SimulationRequest,
 )
 from ._worker import (

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from ..comparison import Origin, Response, Trace
+from ..comparison import CurveOrigin, CurveKind, Curve
 from ..errors import AnalysisError
-from ..model import Curve, Similarity, similarity
+from ..model import SimilarityCurve, Similarity, similarity
 from ..signals import Reals
-from ._request import Piece, SimulatedPoint, SimulatedSignal, Trouble
+from ._request import PartialResult, SimulatedPoint, SimulatedSignal, Trouble
 
 
-class SimulationCourse:
+class SimulationProgress:
     """Takes the pieces as they come, in any order."""
 
     def __init__(self, amplitude_m: float, points: int, note: str) -> None:
@@ -20,7 +20,7 @@ class SimulationCourse:
         self._signals: dict[str, SimulatedSignal] = {}
         self._troubles: list[str] = []
 
-    def add(self, pieces: tuple[Piece, ...]) -> None:
+    def add(self, pieces: tuple[PartialResult, ...]) -> None:
         """Take what has come."""
         for piece in pieces:
             match piece:
@@ -83,12 +83,12 @@ class SimulationCourse:
         groups = np.split(striking, np.flatnonzero(np.diff(striking) > 1) + 1) if striking.size else []
         return tuple((float(frequency_hz[each[0]]), float(frequency_hz[each[-1]])) for each in groups)
 
-    def traces(self) -> tuple[Trace, ...]:
+    def traces(self) -> tuple[Curve, ...]:
         """Give Responses I and II of every model, to be laid over recordings."""
         return tuple(
-            Trace(
+            Curve(
                 f"model {model}",
-                Origin.PREDICTED,
+                CurveOrigin.PREDICTED,
                 response,
                 *self.column(model, name),
                 np.full(len(self._found[model]), np.nan),
@@ -96,7 +96,7 @@ class SimulationCourse:
             )
             for model in self.models
             if model in self._found
-            for response, name in ((Response.RESPONSE_I, "response_i"), (Response.RESPONSE_II, "response_ii"))
+            for response, name in ((CurveKind.RESPONSE_I, "response_i"), (CurveKind.RESPONSE_II, "response_ii"))
         )
 
     def similarity(self) -> Similarity | None:
@@ -110,7 +110,7 @@ class SimulationCourse:
         for model in (first, second):
             values = [self._found[model][key].response_i for key in both]
             response = np.array([np.nan if v is None else v for v in values], dtype=np.float64)
-            curves.append(Curve(frequency_hz, response, self._amplitude_m))
+            curves.append(SimilarityCurve(frequency_hz, response, self._amplitude_m))
         try:
             return similarity(curves[0], curves[1])
         except AnalysisError:

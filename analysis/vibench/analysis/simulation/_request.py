@@ -51,7 +51,7 @@ class Trouble:
     sentence: str
 
 
-Piece = SimulatedPoint | SimulatedSignal | Trouble
+PartialResult = SimulatedPoint | SimulatedSignal | Trouble
 MOST_POINTS = 20_000
 """Of both models together: a picture shows no more, and an afternoon computes no more."""
 

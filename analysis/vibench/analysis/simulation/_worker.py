@@ -12,7 +12,7 @@ from multiprocessing.connection import Connection
 
 import numpy as np
 
-from vibench.sim import Harmonic, Outcome, Prediction, integrate
+from vibench.sim import Harmonic, Outcome, ScenePrediction, integrate
 from vibench.sim.study import (
     MESSAGE,
     MemoryStore,
@@ -25,9 +25,9 @@ from vibench.sim.study import (
     run_study,
 )
 
-from ._request import Piece, SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
+from ._request import PartialResult, SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
 
-Tell = Callable[[tuple[Piece, ...]], None]
+Tell = Callable[[tuple[PartialResult, ...]], None]
 Cancelled = Callable[[], bool]
 SIGNAL_PERIODS = 12
 SAMPLES_PER_PERIOD = 400
@@ -46,7 +46,7 @@ class _TellingStore(MemoryStore):
         super().keep(answers)
         self._tell(tuple(self._pieces(answers)))
 
-    def _pieces(self, answers: Sequence[PointAnswer]) -> Iterator[Piece]:
+    def _pieces(self, answers: Sequence[PointAnswer]) -> Iterator[PartialResult]:
         study = self._study
         for answer in answers:
             place = study.grid.place(answer.number)
@@ -113,7 +113,7 @@ def simulated_signal(
     )
 
 
-def simulated_point(model: str, found: Prediction) -> SimulatedPoint:
+def simulated_point(model: str, found: ScenePrediction) -> SimulatedPoint:
     """Take from a prediction what a picture shows."""
     return SimulatedPoint(
         model=model,
@@ -145,7 +145,7 @@ class Grown:
     """More of an answer."""
 
     number: int
-    pieces: tuple[Piece, ...]
+    pieces: tuple[PartialResult, ...]
 
 
 @dataclass(frozen=True)
@@ -187,7 +187,7 @@ def _computed(connection: "Connection[Grown | Ended, Order]", begin: Begin) -> B
             is_over = True
         return is_over
 
-    def tell(pieces: tuple[Piece, ...]) -> None:
+    def tell(pieces: tuple[PartialResult, ...]) -> None:
         connection.send(Grown(begin.number, pieces))
 
     try:

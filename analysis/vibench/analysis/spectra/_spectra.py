@@ -108,7 +108,7 @@ def spectral_density(
 ) -> SpectralDensity:
     """Estimate the spectral density of a signal by Welch's method, with chi-square bounds.
 
-    Equal to ``scipy.signal.welch(..., detrend=False)`` for equal settings; see `transmission` for the
+    Equal to ``scipy.signal.welch(..., detrend=False)`` for equal settings; see `transmissibility` for the
     parameters and errors.
     """
     sums = DensitySums(

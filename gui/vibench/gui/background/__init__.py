@@ -1,14 +1,14 @@
 """Work that takes longer than a frame, done in spawned processes.
 
-`Background` hands functions to a pool and polls for answers; `Latest` keeps only the newest
+`Background` hands functions to a pool and polls for answers; `LatestRequest` keeps only the newest
 question. Functions, arguments and answers must be importable and picklable, and their modules
 free of Qt widgets: every process that calls them imports them.
 """
 
-from ._background import Background, Job, Latest
+from ._background import Background, Job, LatestRequest
 
 __all__ = [
     "Background",
     "Job",
-    "Latest",
+    "LatestRequest",
 ]

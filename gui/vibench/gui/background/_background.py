@@ -152,7 +152,7 @@ class Background(QObject):
 Question = TypeVar("Question")
 
 
-class Latest(QObject, Generic[Question, Answer]):
+class LatestRequest(QObject, Generic[Question, Answer]):
     """Asks when a question has stood for a moment; never more than one question is out."""
 
     def __init__(

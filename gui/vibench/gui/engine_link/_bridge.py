@@ -14,7 +14,7 @@ from PySide6.QtCore import QEvent, QObject, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
 from vibench.acquisition import AcquisitionError, StopLevel
-from vibench.acquisition.campaign import Existing
+from vibench.acquisition.campaign import ExistingRecordings
 from vibench.acquisition.engine import (
     DRIVING,
     ArmedPlan,
@@ -24,7 +24,7 @@ from vibench.acquisition.engine import (
     EngineMessage,
     EngineState,
     EngineStatus,
-    Glance,
+    SampleSlice,
     start_engine,
 )
 from vibench.acquisition.plan import Campaign
@@ -44,7 +44,7 @@ PIECE_S = 0.2
 BEAT_S = 0.04
 """The engine is not told more often than this that the window lives; it waits for half a second."""
 
-Glimpse = tuple[EngineStatus, Glance | None]
+Snapshot = tuple[EngineStatus, SampleSlice | None]
 
 
 class Bridge(QObject):
@@ -146,7 +146,7 @@ class Bridge(QObject):
         """Check the bench; ``folder`` is where recordings will go."""
         self._order(lambda client: client.check(folder))
 
-    def arm(self, campaign: Campaign, folder: Path, existing: Existing = Existing.REFUSE) -> None:
+    def arm(self, campaign: Campaign, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE) -> None:
         """Get ready to carry out a campaign; `armed` or a notice follows."""
 
         def keep(plan: ArmedPlan) -> None:
@@ -195,11 +195,11 @@ class Bridge(QObject):
             return
         self._line.ask(Urgency.ORDER, question, on_answer or _done, self._refused)
 
-    def _look_question(self) -> Callable[[EngineClient], Glimpse]:
+    def _look_question(self) -> Callable[[EngineClient], Snapshot]:
         view, run, status = self._view, self._view_run, self._status
         rate_hz = 0.0 if status is None or status.bench is None else status.bench.sample_rate_hz
 
-        def look(client: EngineClient) -> Glimpse:
+        def look(client: EngineClient) -> Snapshot:
             now = client.status()
             since = view.next_sample if view is not None and now.run_id == run else 0
             if now.samples <= since or rate_hz == 0.0:
@@ -208,7 +208,7 @@ class Bridge(QObject):
 
         return look
 
-    def _looked(self, glimpse: Glimpse) -> None:
+    def _looked(self, glimpse: Snapshot) -> None:
         self._status, glance = glimpse
         if glance is None or self._status.bench is None or glance.volts.shape[1] == 0:
             self._is_looking = False
@@ -216,7 +216,7 @@ class Bridge(QObject):
             self._begin_taking(self._status, self._status.bench, glance)
         self._tell(self._status)
 
-    def _begin_taking(self, status: EngineStatus, bench: BenchFacts, glance: Glance) -> None:
+    def _begin_taking(self, status: EngineStatus, bench: BenchFacts, glance: SampleSlice) -> None:
         if self._view is None or glance.run_id != self._view_run:
             name = "" if status.run is None else status.run.name
             self._view = live_view(bench, self._rig, self._campaign, name)

@@ -9,7 +9,7 @@ from queue import Empty, PriorityQueue, SimpleQueue
 from typing import Any
 
 from vibench.acquisition import AcquisitionError
-from vibench.acquisition.engine import EngineClient, EngineProcess, Pulse, start_engine
+from vibench.acquisition.engine import EngineClient, EngineProcess, Heartbeat, start_engine
 
 Starter = Callable[[], EngineProcess]
 Question = Callable[[EngineClient], Any]
@@ -46,7 +46,7 @@ class EngineLine:
         self._answers: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._numbers = count()
         self._engine: EngineProcess | None = None
-        self._pulse: Pulse | None = None
+        self._pulse: Heartbeat | None = None
         self._thread = threading.Thread(target=self._run, name="engine line", daemon=True)
         self._thread.start()
 
@@ -56,7 +56,7 @@ class EngineLine:
         return None if self._engine is None else self._engine.pid
 
     @property
-    def pulse(self) -> Pulse | None:
+    def pulse(self) -> Heartbeat | None:
         """Tells the engine that the window is alive; None before there is an engine."""
         return self._pulse
 
@@ -100,7 +100,7 @@ class EngineLine:
         try:
             if self._engine is None:
                 self._engine = self._start()
-                self._pulse = Pulse(self._engine.address)
+                self._pulse = Heartbeat(self._engine.address)
             answer = call.question(self._engine.client)
         except AcquisitionError as error:
             refusal = error

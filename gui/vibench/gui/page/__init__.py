@@ -1,16 +1,16 @@
 """What the pages of the window share.
 
 `Page` is their base class; `Desk` hands each of them the bridge, settings, background work and
-signals to the window. `Intent` holds rig, test and campaign as they are being made, none of them
+signals to the window. `Selection` holds rig, test and campaign as they are being made, none of them
 sent yet; `Orders` carries out what keys, menus and buttons ask for.
 Pages know each other by name only.
 """
 
 from ._desk import (
-    Desk,
+    AppContext,
 )
 from ._orders import (
-    Orders,
+    UserActions,
 )
 from ._page import Page, SideAndPicture
 from ._settings import (
@@ -20,8 +20,8 @@ from ._settings import (
 )
 
 __all__ = [
-    "Desk",
-    "Orders",
+    "AppContext",
+    "UserActions",
     "Page",
     "Remembered",
     "Settings",

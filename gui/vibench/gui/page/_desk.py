@@ -9,14 +9,14 @@ from vibench.acquisition.engine import start_engine
 from ..background import Background
 from ..engine_link import Bridge, Starter
 from ..widgets import LIGHT, THEMES, Notice, Theme
-from ._intent import Intent
+from ._intent import Selection
 from ._settings import Remembered, Settings
 
 WORKERS = 2
 """One for previews, which must be quick, and one for whatever takes long."""
 
 
-class Desk(QObject):
+class AppContext(QObject):
     """Handed to every page; pages know each other by name only."""
 
     noticed = Signal(object)
@@ -39,7 +39,7 @@ class Desk(QObject):
     ) -> None:
         super().__init__(parent)
         self.settings = settings
-        self.intent = Intent(self)
+        self.intent = Selection(self)
         self.bridge = Bridge(start, self)
         self.bridge.noticed.connect(self.noticed)
         self.bridge.recording_ended.connect(self.recording_made)

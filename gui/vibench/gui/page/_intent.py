@@ -6,10 +6,10 @@ from PySide6.QtCore import QObject, Signal
 
 from vibench.acquisition.plan import Campaign, Measurement
 from vibench.acquisition.rig import Rig
-from vibench.analysis import Foresight
+from vibench.analysis import MeasurementPrediction
 
 
-class Intent(QObject):
+class Selection(QObject):
     """Values that several pages work on; each is whole and valid, or None."""
 
     rig_changed = Signal()
@@ -22,7 +22,7 @@ class Intent(QObject):
         self._rig_path: Path | None = None
         self._measurement: Measurement | None = None
         self._campaign: Campaign | None = None
-        self._foresight: Foresight | None = None
+        self._foresight: MeasurementPrediction | None = None
 
     @property
     def rig(self) -> Rig | None:
@@ -40,7 +40,7 @@ class Intent(QObject):
         return self._measurement
 
     @property
-    def foresight(self) -> Foresight | None:
+    def foresight(self) -> MeasurementPrediction | None:
         """What the specimen is predicted to do under the test; None while nobody knows."""
         return self._foresight
 
@@ -60,7 +60,7 @@ class Intent(QObject):
             self._measurement, self._foresight = measurement, None
             self.measurement_changed.emit()
 
-    def foresee(self, foresight: Foresight) -> None:
+    def foresee(self, foresight: MeasurementPrediction) -> None:
         """Keep what is predicted of the test."""
         self._foresight = foresight
 

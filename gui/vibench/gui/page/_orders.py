@@ -5,22 +5,22 @@ from pathlib import Path
 from PySide6.QtCore import QObject
 
 from vibench.acquisition import StopLevel
-from vibench.acquisition.campaign import Existing
+from vibench.acquisition.campaign import ExistingRecordings
 from vibench.acquisition.engine import EngineState
 from vibench.acquisition.plan import Campaign, Measurement
 
 from ..widgets import Notice, NoticeKind
-from ._desk import Desk
+from ._desk import AppContext
 
 OPERATOR_STOP = "stopped by the operator, in the window"
 ABORT_KEY = "aborted by the key, in the window"
 LONGEST_NAME = 60
 
 
-class Orders(QObject):
+class UserActions(QObject):
     """Carries out what a person wants, or says why not."""
 
-    def __init__(self, desk: Desk, parent: QObject | None = None) -> None:
+    def __init__(self, desk: AppContext, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._desk = desk
 
@@ -40,7 +40,7 @@ class Orders(QObject):
         named = measurement.model_copy(update={"name": free_name(folder, measurement)})
         self._desk.bridge.arm(Campaign(name=named.name, measurements=(named,)), folder)
 
-    def arm_campaign(self, existing: Existing = Existing.REFUSE) -> None:
+    def arm_campaign(self, existing: ExistingRecordings = ExistingRecordings.REFUSE) -> None:
         """Arm the campaign of the Queue page, in a folder of its name."""
         campaign = self._desk.intent.campaign
         if campaign is None:

@@ -7,14 +7,14 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QScrollArea, QSplitter, QVBoxLayout, QWidget
 
 from ..widgets import Theme
-from ._desk import Desk
+from ._desk import AppContext
 from ._settings import Remembered
 
 
 class Page(QWidget):
     """One step of the job. It keeps no truth of its own: what is shown is asked for at every tick."""
 
-    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.desk = desk
 
@@ -39,7 +39,7 @@ class Page(QWidget):
 class SideAndPicture(QSplitter):
     """Keeps for each page where the line between its parts was put."""
 
-    def __init__(self, desk: Desk, page: str, side: QWidget, picture: QWidget) -> None:
+    def __init__(self, desk: AppContext, page: str, side: QWidget, picture: QWidget) -> None:
         super().__init__(Qt.Orientation.Horizontal)
         self._settings, self._page = desk.settings, page
         self.setAccessibleName(f"Parts of the {page} page")

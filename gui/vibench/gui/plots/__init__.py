@@ -5,7 +5,7 @@ largest sample of every column of pixels, so that no impact is lost.
 It knows nothing of what is drawn.
 """
 
-from ._axis import FREQUENCY, LOG_FREQUENCY, TIME, Axis, Scale
+from ._axis import FREQUENCY, LOG_FREQUENCY, TIME, PlotAxis, Scale
 from ._bar_delegate import (
     SHARE_ROLE,
     BarDelegate,
@@ -15,8 +15,8 @@ from ._ink import (
     LIMIT,
     PREDICTED,
     Dash,
-    Ink,
-    trace,
+    LineStyle,
+    curve_style,
 )
 from ._plot import Plot
 from ._signal_curve import (
@@ -31,12 +31,12 @@ __all__ = [
     "PREDICTED",
     "SHARE_ROLE",
     "TIME",
-    "Axis",
+    "PlotAxis",
     "BarDelegate",
     "Dash",
-    "Ink",
+    "LineStyle",
     "Plot",
     "Scale",
     "SignalCurve",
-    "trace",
+    "curve_style",
 ]

@@ -31,7 +31,7 @@ class Blankness(Enum):
 
 
 @dataclass(frozen=True)
-class Axis:
+class PlotAxis:
     """What an axis shows."""
 
     label: str
@@ -49,9 +49,9 @@ class Axis:
         return f"{self.label} ({self.unit})" if self.unit else self.label
 
 
-FREQUENCY = Axis("Frequency", "Hz")
-LOG_FREQUENCY = Axis("Frequency", "Hz", scale=Scale.LOGARITHMIC)
-TIME = Axis("Time", "s")
+FREQUENCY = PlotAxis("Frequency", "Hz")
+LOG_FREQUENCY = PlotAxis("Frequency", "Hz", scale=Scale.LOGARITHMIC)
+TIME = PlotAxis("Time", "s")
 _LINE_DISTANCE = 1.25
 """From one label to that above it, in heights of the font."""
 _WIDE = "2000"
@@ -61,7 +61,7 @@ _WIDE = "2000"
 class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
     """An axis of a plot; in logarithmic mode positions are powers of ten."""
 
-    def __init__(self, orientation: str, axis: Axis) -> None:
+    def __init__(self, orientation: str, axis: PlotAxis) -> None:
         super().__init__(orientation)
         self._blankness = Blankness.WRITTEN
         self.levels: tuple[list[float], ...] = ()
@@ -72,7 +72,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         # Painted when it changes, and copied otherwise: its text is the dearest part of a frame.
         self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
 
-    def show_unit(self, axis: Axis) -> None:
+    def show_unit(self, axis: PlotAxis) -> None:
         """Change what the axis shows."""
         self._axis, self._factor = axis, axis.factor
         self._fit_label()

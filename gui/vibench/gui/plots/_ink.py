@@ -21,7 +21,7 @@ class Dash(Enum):
 
 
 @dataclass(frozen=True)
-class Ink:
+class LineStyle:
     """Which colour of a theme, and which dash: told anew at every change of theme."""
 
     colour: Callable[[Theme], Colour]
@@ -30,24 +30,24 @@ class Ink:
     """Opacity of an area, 0 to 1."""
 
 
-def trace(number: int, dash: Dash = Dash.SOLID) -> Ink:
+def curve_style(number: int, dash: Dash = Dash.SOLID) -> LineStyle:
     """Ink of the trace with this number."""
-    return Ink(lambda theme: theme.traces[number % len(theme.traces)], dash)
+    return LineStyle(lambda theme: theme.traces[number % len(theme.traces)], dash)
 
 
-PREDICTED = Ink(lambda theme: theme.predicted, Dash.DASHED)
-LIMIT = Ink(lambda theme: "#b3261e" if theme.name == "light" else "#ff8a80", Dash.DASHED)
-GUIDE = Ink(lambda theme: theme.line, Dash.DOTTED)
+PREDICTED = LineStyle(lambda theme: theme.predicted, Dash.DASHED)
+LIMIT = LineStyle(lambda theme: "#b3261e" if theme.name == "light" else "#ff8a80", Dash.DASHED)
+GUIDE = LineStyle(lambda theme: theme.line, Dash.DOTTED)
 SIGNS = {Dash.SOLID: "━━━", Dash.DASHED: "╍╍╍", Dash.DOTTED: "┉┉┉", Dash.DASH_DOTTED: "━╸╺"}
 
 
-def straight_pen(ink: Ink, theme: Theme, ratio: float) -> QPen:
+def straight_pen(ink: LineStyle, theme: Theme, ratio: float) -> QPen:
     """Give the pen of a straight line, as wide as a pixel of the layout: so many of the screen."""
     pen: QPen = pg.mkPen(ink.colour(theme), width=ratio, style=ink.dash.value)
     return pen
 
 
-def curve_pen(ink: Ink, theme: Theme, ratio: float) -> QPen:
+def curve_pen(ink: LineStyle, theme: Theme, ratio: float) -> QPen:
     """Give the pen of a curve, one pixel of the screen wide; `logical_line` draws it wider.
 
     Its dashes are as long on a fine screen as on a coarse one.
@@ -58,7 +58,7 @@ def curve_pen(ink: Ink, theme: Theme, ratio: float) -> QPen:
     return pen
 
 
-def shade_of(ink: Ink, theme: Theme) -> QColor:
+def shade_of(ink: LineStyle, theme: Theme) -> QColor:
     """Give the colour of an area."""
     colour: QColor = pg.mkColor(ink.colour(theme))
     colour.setAlphaF(ink.filled or 0.25)

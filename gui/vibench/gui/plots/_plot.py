@@ -12,9 +12,9 @@ from PySide6.QtGui import QGuiApplication, QKeyEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from ..widgets import Theme, paint_hint
-from ._axis import Axis, AxisItem, Blankness, Grid, Scale
+from ._axis import PlotAxis, AxisItem, Blankness, Grid, Scale
 from ._band import Band
-from ._ink import SIGNS, Ink, curve_pen, shade_of, straight_pen
+from ._ink import SIGNS, LineStyle, curve_pen, shade_of, straight_pen
 from ._legend import LegendEntry, LegendLine
 from ._logical_line import LogicalLine
 from ._upright_marks import Rules, Stripes
@@ -62,7 +62,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     """
 
     def __init__(
-        self, name: str, across: Axis, up: Axis, theme: Theme, parent: QWidget | None = None
+        self, name: str, across: PlotAxis, up: PlotAxis, theme: Theme, parent: QWidget | None = None
     ) -> None:
         self.across = AxisItem("bottom", across)
         self.up = AxisItem("left", up)
@@ -86,9 +86,9 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.addItem(self._grid, ignoreBounds=True)
         self.getPlotItem().setLogMode(across.scale is Scale.LOGARITHMIC, up.scale is Scale.LOGARITHMIC)
         self._scales = [across.scale, up.scale]
-        self._inked: list[tuple[Ink, Callable[[Theme], None]]] = []
+        self._inked: list[tuple[LineStyle, Callable[[Theme], None]]] = []
         self._legend: LegendLine | None = None
-        self._legend_entries: list[tuple[Ink, str, str]] = []
+        self._legend_entries: list[tuple[LineStyle, str, str]] = []
         self._curves: list[pg.PlotDataItem] = []
         self._hint, self._is_empty = "", False
         self._blanked: tuple[AxisItem, ...] = (self.across, self.up)
@@ -115,7 +115,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.across.blank(Blankness.WRITTEN)
         return self
 
-    def curve(self, ink: Ink, name: str = "") -> pg.PlotDataItem:
+    def curve(self, ink: LineStyle, name: str = "") -> pg.PlotDataItem:
         """Add a line; ``setData(x, y)`` draws it."""
         item = LogicalLine()
         item.setSkipFiniteCheck(False)
@@ -126,7 +126,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._relegend()
         return item
 
-    def dots(self, ink: Ink, name: str = "", size: int = 4) -> pg.PlotDataItem:
+    def dots(self, ink: LineStyle, name: str = "", size: int = 4) -> pg.PlotDataItem:
         """Add points without a line."""
         item = pg.PlotDataItem(pen=None, symbol="o", symbolSize=size, symbolPen=None)
         self._add(item)
@@ -136,32 +136,32 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._relegend()
         return item
 
-    def band(self, ink: Ink) -> Band:
+    def band(self, ink: LineStyle) -> Band:
         """Add an area between two lines, for uncertainties and envelopes."""
         band = Band()
         self.addItem(band.item)
         self._ink(ink, lambda theme: band.paint(shade_of(ink, theme)))
         return band
 
-    def stripes(self, ink: Ink) -> Stripes:
+    def stripes(self, ink: LineStyle) -> Stripes:
         """Add upright stripes: where something happens, or is predicted to."""
         item = Stripes(self._across)
         self.addItem(item, ignoreBounds=True)
         self._ink(ink, lambda theme: item.dress(shade_of(ink, theme)))
         return item
 
-    def rules(self, ink: Ink) -> Rules:
+    def rules(self, ink: LineStyle) -> Rules:
         """Add upright lines without labels."""
         item = Rules(self._across)
         self.addItem(item, ignoreBounds=True)
         self._ink(ink, lambda theme: item.dress(straight_pen(ink, theme, self.devicePixelRatioF())))
         return item
 
-    def upright(self, ink: Ink, value: float, label: str = "", label_at: float = 0.92) -> pg.InfiniteLine:
+    def upright(self, ink: LineStyle, value: float, label: str = "", label_at: float = 0.92) -> pg.InfiniteLine:
         """Add an upright line at a value; its label stands at a share of the height."""
         return self._line(ink, self._across(value), 90, label, label_at)
 
-    def level(self, ink: Ink, value: float, label: str = "") -> pg.InfiniteLine:
+    def level(self, ink: LineStyle, value: float, label: str = "") -> pg.InfiniteLine:
         """Add a level line at a value."""
         shown = log10(value) if self._scales[1] is Scale.LOGARITHMIC else value
         return self._line(ink, shown, 0, label, 0.92)
@@ -261,7 +261,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def _across(self, value: float) -> float:
         return log10(value) if self._scales[0] is Scale.LOGARITHMIC else value
 
-    def _line(self, ink: Ink, position: float, angle: float, label: str, at: float) -> pg.InfiniteLine:
+    def _line(self, ink: LineStyle, position: float, angle: float, label: str, at: float) -> pg.InfiniteLine:
         options = {"position": at, "movable": False}
         item = pg.InfiniteLine(position, angle, label=label or None, labelOpts=options if label else None)
         self.addItem(item, ignoreBounds=True)
@@ -275,7 +275,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._ink(ink, paint)
         return item
 
-    def _ink(self, ink: Ink, paint: Callable[[Theme], None]) -> None:
+    def _ink(self, ink: LineStyle, paint: Callable[[Theme], None]) -> None:
         self._inked.append((ink, paint))
         paint(self._theme)
 

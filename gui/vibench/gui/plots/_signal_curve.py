@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from vibench.analysis.live import outline, zigzag
 
-from ._ink import Ink
+from ._ink import LineStyle
 from ._plot import Plot
 
 MOST_COLUMNS = 3000
@@ -14,7 +14,7 @@ MOST_COLUMNS = 3000
 class SignalCurve:
     """Draws what of a signal is in sight, from its samples: an impact of three samples is never lost."""
 
-    def __init__(self, plot: Plot, ink: Ink, name: str = "") -> None:
+    def __init__(self, plot: Plot, ink: LineStyle, name: str = "") -> None:
         self._plot = plot
         self._curve = plot.curve(ink, name)
         self._samples: NDArray[np.float64] = np.empty(0)

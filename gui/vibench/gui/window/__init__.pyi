@@ -1,6 +1,6 @@
 from ._banner import (
     CLOSED as CLOSED,
-    Face as Face,
+    StateIndicator as StateIndicator,
 )
 from ._open_window import (
     open_window as open_window,

@@ -10,7 +10,7 @@ from ..widgets import Tone
 
 
 @dataclass(frozen=True)
-class Face:
+class StateIndicator:
     """What the banner shows of a state."""
 
     symbol: str
@@ -20,7 +20,7 @@ class Face:
     """What changes while the state stays: a clock, a level."""
 
 
-CLOSED = Face("○", "NO BENCH", Tone.CALM, "Open one on the Rig page")
+CLOSED = StateIndicator("○", "NO BENCH", Tone.CALM, "Open one on the Rig page")
 
 
 class Banner(QFrame):
@@ -55,11 +55,11 @@ class Banner(QFrame):
         self._paint()
 
     @property
-    def face(self) -> Face:
+    def face(self) -> StateIndicator:
         """What is shown."""
         return self._face
 
-    def show_face(self, face: Face) -> None:
+    def show_face(self, face: StateIndicator) -> None:
         """Show a state; nothing is repainted while nothing changes."""
         if face == self._face:
             return

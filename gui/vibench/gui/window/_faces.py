@@ -6,29 +6,29 @@ from pathlib import Path
 from vibench.acquisition.engine import EngineState, EngineStatus, RunStatus
 
 from ..widgets import Tone, clock
-from ._banner import CLOSED, Face
+from ._banner import CLOSED, StateIndicator
 from ._status_line import StatusField
 
-_FACES = {
+_INDICATORS = {
     EngineState.CLOSED: CLOSED,
-    EngineState.OPENING: Face("◌", "OPENING", Tone.CALM, "Looking for the instruments"),
-    EngineState.READY: Face("●", "READY", Tone.GOOD),
-    EngineState.ARMED: Face("▲", "ARMED", Tone.CAUTION),
-    EngineState.RUNNING: Face("▶", "RUNNING", Tone.ACTIVE),
-    EngineState.HELD: Face("❚❚", "HELD", Tone.CAUTION),
-    EngineState.RAMPING_DOWN: Face("▼", "RAMPING DOWN", Tone.CAUTION),
-    EngineState.CHECKING: Face("◍", "CHECKING", Tone.ACTIVE, "A small sine plays for some seconds"),
-    EngineState.FAULT: Face("✖", "FAULT", Tone.DANGER, "Silent; open the bench again on the Rig page"),
+    EngineState.OPENING: StateIndicator("◌", "OPENING", Tone.CALM, "Looking for the instruments"),
+    EngineState.READY: StateIndicator("●", "READY", Tone.GOOD),
+    EngineState.ARMED: StateIndicator("▲", "ARMED", Tone.CAUTION),
+    EngineState.RUNNING: StateIndicator("▶", "RUNNING", Tone.ACTIVE),
+    EngineState.HELD: StateIndicator("❚❚", "HELD", Tone.CAUTION),
+    EngineState.RAMPING_DOWN: StateIndicator("▼", "RAMPING DOWN", Tone.CAUTION),
+    EngineState.CHECKING: StateIndicator("◍", "CHECKING", Tone.ACTIVE, "A small sine plays for some seconds"),
+    EngineState.FAULT: StateIndicator("✖", "FAULT", Tone.DANGER, "Silent; open the bench again on the Rig page"),
 }
 _BYTES_PER_SAMPLE = 4
 _LITTLE_ROOM_S = 3600.0
 
 
-def face_of(status: EngineStatus | None) -> Face:
+def indicator_of(status: EngineStatus | None) -> StateIndicator:
     """Give the state a symbol, a word and what changes in it."""
     if status is None:
         return CLOSED
-    return replace(_FACES[status.state], detail=_detail(status))
+    return replace(_INDICATORS[status.state], detail=_detail(status))
 
 
 def _detail(status: EngineStatus) -> str:
@@ -45,7 +45,7 @@ def _detail(status: EngineStatus) -> str:
         case EngineState.RUNNING | EngineState.RAMPING_DOWN:
             return run_text(status.run)
         case state:
-            return _FACES[state].detail
+            return _INDICATORS[state].detail
 
 
 def run_text(run: RunStatus | None) -> str:

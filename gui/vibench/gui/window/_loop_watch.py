@@ -32,7 +32,7 @@ class Wait:
     """What was in sight."""
 
 
-class LoopWatch(QObject):
+class EventLoopMonitor(QObject):
     """A timer that notes how late it comes.
 
     Whatever keeps the thread keeps the timer: work, a file, a lock, another thread of Python.

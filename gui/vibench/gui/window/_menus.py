@@ -12,7 +12,7 @@ from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QAction, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QApplication, QFileDialog, QMainWindow, QMessageBox
 
-from ..page import Desk, Orders
+from ..page import AppContext, UserActions
 from ..widgets import DARK, LIGHT, Theme
 
 ABORT_KEYS = frozenset({Qt.Key.Key_Escape, Qt.Key.Key_Pause})
@@ -77,7 +77,7 @@ EMERGENCY = "STOP is not an emergency stop: in an emergency, switch the amplifie
 
 
 def build_menus(
-    window: QMainWindow, desk: Desk, orders: Orders, pages: tuple[str, ...], reset_layout: Callable[[], None]
+    window: QMainWindow, desk: AppContext, orders: UserActions, pages: tuple[str, ...], reset_layout: Callable[[], None]
 ) -> None:
     """Put the menus on a window."""
     bar = window.menuBar()
@@ -102,7 +102,7 @@ def build_menus(
     _add(help_menu.addAction("&Keys"), "F1", lambda: show_keys(window))
 
 
-def choose_folder(window: QMainWindow, desk: Desk) -> None:
+def choose_folder(window: QMainWindow, desk: AppContext) -> None:
     """Ask where recordings go from now on."""
     chosen = QFileDialog.getExistingDirectory(window, "Folder for recordings", str(desk.folder))
     if chosen:
@@ -122,9 +122,9 @@ def _add(action: QAction, key: str, act: Callable[[], object]) -> None:
     action.triggered.connect(lambda _checked=False: act())
 
 
-def _showing(desk: Desk, name: str) -> Callable[[], None]:
+def _showing(desk: AppContext, name: str) -> Callable[[], None]:
     return lambda: desk.page_wanted.emit(name)
 
 
-def _other(desk: Desk) -> Theme:
+def _other(desk: AppContext) -> Theme:
     return DARK if desk.theme is LIGHT else LIGHT

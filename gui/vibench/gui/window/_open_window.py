@@ -12,7 +12,7 @@ from PySide6.QtCore import QCoreApplication, Qt, QTimer
 from PySide6.QtGui import QFont, QFontDatabase
 from PySide6.QtWidgets import QApplication, QStyleFactory
 
-from ..page import Desk, Remembered, Settings, default_settings_path
+from ..page import AppContext, Remembered, Settings, default_settings_path
 from ._page_catalogue import PAGES
 from ._window import Window
 
@@ -47,7 +47,7 @@ def open_window(bench: Path | None, settings: Path | None) -> int:
     kept = Settings(settings or default_settings_path())
     if bench is not None:
         kept.keep_text(Remembered.BENCH, str(bench.resolve()))
-    window = Window(Desk(kept), PAGES)
+    window = Window(AppContext(kept), PAGES)
     # None of all this ever is garbage: a collector that looked through it would hold the window up.
     gc.freeze()
     window.show()

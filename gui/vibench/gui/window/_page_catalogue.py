@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ..page import Desk, Page
+from ..page import AppContext, Page
 from ..pages.compare import ComparePage
 from ..pages.files import FilesPage
 from ..pages.queue import QueuePage
@@ -21,7 +21,7 @@ class PageEntry:
     name: str
     number: int
     """Ctrl and this number shows it."""
-    make: Callable[[Desk], Page]
+    make: Callable[[AppContext], Page]
 
 
 PAGES: tuple[PageEntry, ...] = (

@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QListWidget, QListWidgetItem, QSizePolicy, QWidget
 DONE = "✔"
 
 
-class Rail(QListWidget):
+class NavigationBar(QListWidget):
     """Names of the pages; the chosen one is shown."""
 
     chosen = Signal(str)

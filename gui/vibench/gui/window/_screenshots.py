@@ -13,11 +13,11 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 
 from vibench.acquisition import shipped
-from vibench.acquisition.engine import Attendance, EngineState, start_engine
+from vibench.acquisition.engine import Supervision, EngineState, start_engine
 from vibench.acquisition.plan import Measurement
 from vibench.analysis.live import RowSpacing
 
-from ..page import Desk, Remembered, Settings
+from ..page import AppContext, Remembered, Settings
 from ..pages.compare import ComparePage
 from ..pages.files import FilesPage
 from ..pages.queue import QueuePage
@@ -72,7 +72,7 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
         if bench is not None:
             settings.keep_text(Remembered.BENCH, str(bench.resolve()))
         # Unattended: to change the theme and to write pictures takes longer than an attended run waits.
-        desk = Desk(settings, partial(start_engine, Attendance.UNATTENDED))
+        desk = AppContext(settings, partial(start_engine, Supervision.UNATTENDED))
         desk.choose_folder(Path(scratch) / "recordings")
         window = Window(desk, PAGES)
         # As in `vibench.gui.window`: pictures are to show what a person would see.

@@ -21,15 +21,15 @@ from PySide6.QtWidgets import (
 )
 
 from ..engine_link import SignOfLife
-from ..page import Desk, Orders, Page, Remembered
+from ..page import AppContext, UserActions, Page, Remembered
 from ..widgets import RUN, Theme, palette, style_sheet
 from ._banner import Banner
-from ._faces import face_of, status_fields
-from ._loop_watch import LoopWatch
+from ._faces import indicator_of, status_fields
+from ._loop_watch import EventLoopMonitor
 from ._menus import AbortKey, build_menus
 from ._message_strip import MessageStrip
 from ._page_catalogue import PageEntry
-from ._rail import Rail
+from ._rail import NavigationBar
 from ._status_line import StatusField, StatusLine
 
 SPAN_S = 1.0
@@ -57,7 +57,7 @@ TICK_MS = 50
 class Window(QMainWindow):
     """Holds the pages; what they show, and what the banner shows, comes from the engine at every tick."""
 
-    def __init__(self, desk: Desk, entries: tuple[PageEntry, ...]) -> None:
+    def __init__(self, desk: AppContext, entries: tuple[PageEntry, ...]) -> None:
         super().__init__()
         self.desk = desk
         self.setWindowTitle("vibench")
@@ -66,7 +66,7 @@ class Window(QMainWindow):
         self.status_line = StatusLine()
         ordered = sorted(entries, key=lambda entry: entry.number)
         self.pages: dict[str, Page] = {entry.name: entry.make(desk) for entry in ordered}
-        self.rail = Rail(tuple(self.pages))
+        self.rail = NavigationBar(tuple(self.pages))
         self.rail.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._stack = QStackedWidget()
         self._unthemed: list[Callable[[], None]] = []
@@ -74,7 +74,7 @@ class Window(QMainWindow):
             page.setAccessibleName(f"{name} page")
             self._stack.addWidget(page)
         self._lay_out()
-        self.orders = Orders(desk, self)
+        self.orders = UserActions(desk, self)
         build_menus(self, desk, self.orders, tuple(self.pages), self._reset_layout)
         self._connect()
         self._restore()
@@ -82,7 +82,7 @@ class Window(QMainWindow):
         self._timer.timeout.connect(self.tick)
         self._timer.start()
         self._frames = FrameCount()
-        self.loop_watch = LoopWatch(lambda: f"{self.rail.chosen_name} page", self)
+        self.loop_watch = EventLoopMonitor(lambda: f"{self.rail.chosen_name} page", self)
 
     @property
     def page(self) -> Page:
@@ -107,7 +107,7 @@ class Window(QMainWindow):
         """Show what is true now, and let the engine know that somebody looks."""
         self.desk.bridge.tick()
         status = self.desk.bridge.status
-        self.banner.show_face(face_of(status))
+        self.banner.show_face(indicator_of(status))
         self.status_line.show_fields(
             *status_fields(status, self._frames.counted(), self.loop_watch.longest_s)
         )

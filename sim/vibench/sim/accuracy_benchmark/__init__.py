@@ -1,6 +1,6 @@
 """What a level of accuracy costs and what it buys, measured on this machine, regime by regime.
 
-`measured_trade` runs free, periodic and chaotic motions (`MOTIONS`) at every level of accuracy and with
+`measure_accuracy` runs free, periodic and chaotic motions (`MOTIONS`) at every level of accuracy and with
 general solvers of scipy, interleaved so that a busy machine slows all alike; it takes minutes. Cost is
 processor time over simulated time; errors are measured against a solution that shares nothing with the
 kernels: DOP853 on the paper's equations as a textbook writes them. The result for one machine is
@@ -14,19 +14,19 @@ periodic - hertz, 130 Hz, 20 µm
 periodic - linear_gap, 130 Hz, 20 µm
 """
 
-from ._figures import LEAST_GAIN, MOTIONS, LevelFigures, MotionTrade, SolverFigures, Trade
+from ._figures import LEAST_GAIN, MOTIONS, LevelFigures, MotionBenchmark, SolverFigures, AccuracyBenchmark
 from ._measuring import (
     Thoroughness,
-    measured_trade,
+    measure_accuracy,
 )
 
 __all__ = [
     "LEAST_GAIN",
     "MOTIONS",
     "LevelFigures",
-    "MotionTrade",
+    "MotionBenchmark",
     "SolverFigures",
     "Thoroughness",
-    "Trade",
-    "measured_trade",
+    "AccuracyBenchmark",
+    "measure_accuracy",
 ]

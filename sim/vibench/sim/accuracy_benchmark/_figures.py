@@ -93,7 +93,7 @@ class SolverFigures:
 
 
 @dataclass(frozen=True)
-class MotionTrade:
+class MotionBenchmark:
     """The trade on one motion."""
 
     motion: Motion
@@ -148,10 +148,10 @@ def _is_better(level: LevelFigures, before: LevelFigures) -> bool:
 
 
 @dataclass(frozen=True)
-class Trade:
+class AccuracyBenchmark:
     """Everything that was measured in one run."""
 
-    motions: tuple[MotionTrade, ...]
+    motions: tuple[MotionBenchmark, ...]
     machine: str
     """Processor and cores."""
     software: str

@@ -12,12 +12,12 @@ from typing import Literal
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..exponents import largest_exponent
+from ..exponents import lyapunov_exponent
 from ..kernels import Floats
 from ..model import Accuracy
 from ..motion import integrate, smallest_period, state_scales, steady_response, stroboscopic_section
 from ..study import software
-from ._figures import MOTIONS, LevelFigures, Motion, MotionTrade, Regime, SolverFigures, Trade
+from ._figures import MOTIONS, LevelFigures, Motion, MotionBenchmark, Regime, SolverFigures, AccuracyBenchmark
 from ._independent_solution import independent_state, state_error
 from ._plain_equations import Place, law_of, numbers_of, rates_at
 
@@ -49,11 +49,11 @@ class Thoroughness:
     """Of general solvers, which are slow."""
 
 
-def measured_trade(
+def measure_accuracy(
     thoroughness: Thoroughness = Thoroughness(),
     step: Step = lambda _: None,
     motions: tuple[Motion, ...] = MOTIONS,
-) -> Trade:
+) -> AccuracyBenchmark:
     """Measure the trade on every motion.
 
     Raises
@@ -66,10 +66,10 @@ def measured_trade(
     for motion in motions:
         step(motion.name)
         found.append(measured_motion(motion, thoroughness))
-    return Trade(tuple(found), _machine(), software())
+    return AccuracyBenchmark(tuple(found), _machine(), software())
 
 
-def measured_motion(motion: Motion, thoroughness: Thoroughness) -> MotionTrade:
+def measured_motion(motion: Motion, thoroughness: Thoroughness) -> MotionBenchmark:
     """Measure the trade on one motion, from its settled state."""
     start = settled_state(motion)
     span_s = _whole(thoroughness.span_s, motion)
@@ -82,7 +82,7 @@ def measured_motion(motion: Motion, thoroughness: Thoroughness) -> MotionTrade:
         _level(motion, level, costs[level], responses, start, span_s, truths[0]) for level in LEVELS
     )
     solvers = tuple(_solver(name, motion, start, solver_span_s, truths[1]) for name in SOLVERS)
-    return MotionTrade(motion, span_s, solver_span_s, levels, solvers)
+    return MotionBenchmark(motion, span_s, solver_span_s, levels, solvers)
 
 
 def settled_state(motion: Motion) -> Floats:
@@ -149,7 +149,7 @@ def _level(
 ) -> LevelFigures:
     mean, exact = responses[level].mean(axis=0), responses[Accuracy.REFERENCE].mean(axis=0)
     off = np.abs(mean / exact - 1.0)
-    exponent = largest_exponent(motion.specimen, motion.drive, level, EXPONENT_S, 0.5, start)
+    exponent = lyapunov_exponent(motion.specimen, motion.drive, level, EXPONENT_S, 0.5, start)
     is_chaotic = truth is None
     return LevelFigures(
         accuracy=level,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels import compiled
+from ..kernels import kernel
 from ..model import Harmonic, Hertz, HuntCrossley, LinearGap, NoContact, PowerLaw, RigidStops, Specimen
 
 Floats = NDArray[np.float64]
@@ -115,7 +115,7 @@ def _depths(state: Floats, law: Law) -> tuple[float, float]:
     return -p - law.lower, p - law.upper
 
 
-@compiled
+@kernel
 def _rates(time_s: float, state: Floats, place: int, law: Law, numbers: Floats) -> Floats:
     """d/dt of x, y, z, vx, vy, vz. On a stop the force ends at depth zero; in flight there is none."""
     m0, m1, m2, k0, k1, k2, c0, c1, c2, amplitude, omega, phase = numbers

@@ -29,7 +29,7 @@ from ._integrate import (
     integrate_chain,
 )
 from ._lyapunov import (
-    largest_chain_exponent,
+    chain_lyapunov_exponent,
 )
 from ._modes import (
     chain_transmissibility,
@@ -46,5 +46,5 @@ __all__ = [
     "chain_response",
     "chain_transmissibility",
     "integrate_chain",
-    "largest_chain_exponent",
+    "chain_lyapunov_exponent",
 ]

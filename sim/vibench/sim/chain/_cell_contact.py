@@ -28,7 +28,7 @@ from ..contact import (
     step_factor,
 )
 from ..flight import polynomial_at
-from ..kernels import Table, Vector, compiled, inlined, lean
+from ..kernels import Table, Vector, kernel, inlined, kernel_without_refcount
 from ._cell_flow import (
     MEMORY,
     MOMENT,
@@ -56,19 +56,19 @@ FIRST_STEP_TOLERANCE = 1e-6
 """The tolerance for which a contact's first step is tuned; it scales with the eighth root."""
 
 
-@compiled
+@kernel
 def cell_workspace() -> Table:
     """Memory that one run (one thread) hands to every contact."""
     return np.zeros((WORK_ROWS, WIDTH))
 
 
-@lean
+@kernel_without_refcount
 def gap_on(side: float, law: CellLaw) -> float:
     """Clearance of the stop on one side [m]."""
     return law.upper if side > 0.0 else law.lower
 
 
-@lean
+@kernel_without_refcount
 def motion_in_series(cell: Vector, series: Vector, markov: Vector, tau: float) -> tuple[float, float]:
     """Displacement and velocity ``tau`` after the window began: the series less what the force has done."""
     value, slope = polynomial_at(series, tau)
@@ -79,7 +79,7 @@ def motion_in_series(cell: Vector, series: Vector, markov: Vector, tau: float) -
     return value, slope
 
 
-@lean
+@kernel_without_refcount
 def begin_pressing(
     cell: Vector,
     side: float,
@@ -126,7 +126,7 @@ def _try_step(work: Table, step: float, side: float, curvature: Vector, markov: 
         stop_step(work, step, side, curvature, markov, law)
 
 
-@lean
+@kernel_without_refcount
 def _land(
     work: Table,
     longest: float,
@@ -170,7 +170,7 @@ def copy_row(to: Vector, source: Vector) -> None:
         to[k] = source[k]
 
 
-@lean
+@kernel_without_refcount
 def log_moment(log: Table, at: Vector) -> None:
     """Add a point of the motion as the log's next row, if there is room."""
     row = int(log[0, LOGGED]) + 1
@@ -179,13 +179,13 @@ def log_moment(log: Table, at: Vector) -> None:
         log[0, LOGGED] = row
 
 
-@lean
+@kernel_without_refcount
 def _far(w: float, side: float, law: CellLaw) -> float:
     """abs(p) of a pressed cell [m]."""
     return abs(w) if law.kind == POWER else gap_on(side, law) + w * w
 
 
-@lean
+@kernel_without_refcount
 def _log_apex(
     log: Table, work: Table, step: float, side: float, curvature: Vector, markov: Vector, law: CellLaw
 ) -> None:
@@ -207,7 +207,7 @@ def _log_apex(
     copy_row(work[TRIAL], work[SPARE])
 
 
-@lean
+@kernel_without_refcount
 def _gather(work: Table, cell: Vector, tau: float) -> None:
     at = work[POINT]
     at[W], at[R], at[T] = cell[ROOT], cell[RATE], tau
@@ -215,7 +215,7 @@ def _gather(work: Table, cell: Vector, tau: float) -> None:
         at[MOMENT + k] = cell[MEMORY + k]
 
 
-@lean
+@kernel_without_refcount
 def _scatter(work: Table, cell: Vector, series: Vector, markov: Vector, law: CellLaw) -> None:
     """Hand back the point reached; the first two moments become those that lead to its p and dp/dt exactly.
 
@@ -233,7 +233,7 @@ def _scatter(work: Table, cell: Vector, series: Vector, markov: Vector, law: Cel
     cell[MEMORY] += (rate - side * at[R]) / markov[1]
 
 
-@compiled
+@kernel
 def press_cell(  # noqa: C901, PLR0912 - a step control and its three ends are one loop
     cell: Vector,
     tau: float,

@@ -76,7 +76,7 @@ from ..contact import (
     W,
 )
 from ..flight import SERIES_TERMS
-from ..kernels import Table, Vector, inlined, lean
+from ..kernels import Table, Vector, inlined, kernel_without_refcount
 from ..slots import PowerTerms
 
 T = 2
@@ -120,7 +120,7 @@ class CellLaw(NamedTuple):
 CURVATURE_TERMS = SERIES_TERMS - 2
 
 
-@lean
+@kernel_without_refcount
 def fill_curvature(curvature: Vector, series: Vector) -> None:
     """Write the second derivative of a polynomial, coefficients ascending, shape (CURVATURE_TERMS,)."""
     for k in range(CURVATURE_TERMS):
@@ -165,7 +165,7 @@ def stop_rates(
         rates[k] = w * at[k - 1]
 
 
-@lean
+@kernel_without_refcount
 def stop_step(  # noqa: C901 - the twelve stages of one formula, in order
     work: Table, step: float, side: float, curvature: Vector, markov: Vector, law: CellLaw
 ) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate._ivp import dop853_coefficients as _dop
 
 from ..contact import STAGES, R, W
-from ..kernels import Table, Vector, lean
+from ..kernels import Table, Vector, kernel_without_refcount
 from ..power_law import MOST_SHORTENINGS, SHORTENING, WALL_TURN, power_force
 from ..slots import PowerTerms
 from ._cell_flow import (
@@ -39,7 +39,7 @@ FADING = 0.999
 """How much of a past size is left after a window."""
 
 
-@lean
+@kernel_without_refcount
 def power_cell_rates(at: Vector, rates: Vector, curvature: Vector, markov: Vector, power: PowerTerms) -> None:
     """Write d/dt of the unknowns at ``at`` into ``rates``."""
     force = power_force(at[W], power)
@@ -52,7 +52,7 @@ def power_cell_rates(at: Vector, rates: Vector, curvature: Vector, markov: Vecto
         rates[k] = at[k - 1]
 
 
-@lean
+@kernel_without_refcount
 def power_cell_step(  # noqa: C901 - stages, terms and unknowns are three loops
     work: Table, step: float, curvature: Vector, markov: Vector, power: PowerTerms
 ) -> None:
@@ -78,7 +78,7 @@ def power_cell_step(  # noqa: C901 - stages, terms and unknowns are three loops
         end[i] = point[i] + step * end[i]
 
 
-@lean
+@kernel_without_refcount
 def begin_power(cell: Vector, series: Vector, markov: Vector, law: CellLaw, length: float) -> None:
     """Take p and dp/dt of a cell under a power law from the chain, and the sizes that errors are held to."""
     p, rate = series[0], series[1]
@@ -91,7 +91,7 @@ def begin_power(cell: Vector, series: Vector, markov: Vector, law: CellLaw, leng
         cell[STEP] = FIRST_PART * length
 
 
-@lean
+@kernel_without_refcount
 def short_of_the_wall(step: float, at: Vector, markov: Vector, law: CellLaw) -> float:
     """Shorten a step until it turns the steepest spring on its way by little: see
     `vibench.sim.power_law`.

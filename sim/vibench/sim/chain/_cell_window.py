@@ -2,7 +2,7 @@
 
 from ..contact import DEEPEST, HELD, LEFT, LOGGED, NOT_FINITE, R, W
 from ..flight import NEVER, SERIES_TERMS, first_contact, touched_side
-from ..kernels import Table, Vector, lean
+from ..kernels import Table, Vector, kernel_without_refcount
 from ..model import Outcome
 from ._cell_contact import begin_pressing, log_moment, motion_in_series, press_cell
 from ._cell_flow import (
@@ -32,7 +32,7 @@ COUNT = 0
 """Place 0 of a list of touches: how many follow."""
 
 
-@lean
+@kernel_without_refcount
 def age_moments(cell: Vector, by: float) -> None:
     """Let time pass without a force: I_k+1 grows by the integral of I_k, exactly."""
     for k in range(MOMENTS - 1, 0, -1):
@@ -43,7 +43,7 @@ def age_moments(cell: Vector, by: float) -> None:
         cell[MEMORY + k] += added
 
 
-@lean
+@kernel_without_refcount
 def fill_later_series(later: Vector, series: Vector, cell: Vector, markov: Vector, tau: float) -> None:
     """Write p as a polynomial in the time since ``tau``, without a force from then on."""
     for k in range(SERIES_TERMS):
@@ -63,7 +63,7 @@ def fill_later_series(later: Vector, series: Vector, cell: Vector, markov: Vecto
         later[n] -= inverse_factorial * done
 
 
-@lean
+@kernel_without_refcount
 def curvature_bound(series: Vector, length: float) -> float:
     """Bound of the second derivative of a polynomial on [0, length]."""
     bound = 0.0
@@ -72,7 +72,7 @@ def curvature_bound(series: Vector, length: float) -> float:
     return bound
 
 
-@lean
+@kernel_without_refcount
 def _log_now(log: Table, work: Table, cell: Vector, tau: float) -> None:
     if len(log) > 0:
         node = work[ARGUMENT]
@@ -82,7 +82,7 @@ def _log_now(log: Table, work: Table, cell: Vector, tau: float) -> None:
         log_moment(log, node)
 
 
-@lean
+@kernel_without_refcount
 def cross_window(
     cell: Vector,
     start: float,

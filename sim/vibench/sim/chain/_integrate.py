@@ -15,7 +15,7 @@ from ._cell_flow import CURVATURE_TERMS, POWER, SIDE, fill_curvature
 from ._chain import MASSES_PER_CELL, Chain
 from ._run import IMPACTS, NEXT_SAMPLE, ChainRecord, advance_chain, chain_cells
 from ._tables import OBSERVED, PATH, ChainTables, chain_tables
-from ._tally import NOTHING, ChainTally
+from ._tally import NOTHING, ChainObservations
 from ._windows import drive_term, fill_observed, law_of
 
 STATES_PER_CELL = 2 * MASSES_PER_CELL
@@ -103,7 +103,7 @@ def integrate_chain(
     clock, end = clock_at(start_time_s), start_time_s + duration_s
     record = new_chain_record(chain, start_time_s, duration_s, sample_rate_hz, max_impact_rate_hz)
     code = advance_chain(
-        cells, phasors, clock, end, tables, accuracy.tolerance, record, new_tally(chain, NOTHING)
+        cells, phasors, clock, end, tables, accuracy.tolerance, record, new_observations(chain, NOTHING)
     )
     return _trajectory(chain, phasors, float(clock[0]), tables, record, Outcome(code), accuracy)
 
@@ -146,9 +146,9 @@ def start_chain(
     return cells, phasors
 
 
-def new_tally(chain: Chain, mode: int) -> ChainTally:
+def new_observations(chain: Chain, mode: int) -> ChainObservations:
     """Make what a run observes into."""
-    return ChainTally(mode, np.zeros((OBSERVED, chain.size)), np.zeros(chain.size, np.complex128))
+    return ChainObservations(mode, np.zeros((OBSERVED, chain.size)), np.zeros(chain.size, np.complex128))
 
 
 def new_chain_record(

@@ -17,7 +17,7 @@ from ..kernels import Floats, Table, clock_at
 from ..model import Accuracy, Harmonic, Outcome
 from ..motion import MAX_IMPACT_RATE_HZ
 from ._chain import MASSES_PER_CELL, Chain
-from ._integrate import integrate_chain, new_chain_record, new_tally, start_chain, state_of_phasors
+from ._integrate import integrate_chain, new_chain_record, new_observations, start_chain, state_of_phasors
 from ._run import IMPACTS, advance_chain
 from ._tables import ChainTables, chain_tables
 from ._tally import NOTHING
@@ -52,7 +52,7 @@ class ChainExponent:
     outcome: Outcome
 
 
-def largest_chain_exponent(
+def chain_lyapunov_exponent(
     chain: Chain,
     drive: Harmonic,
     accuracy: Accuracy = Accuracy.REFERENCE,
@@ -143,7 +143,7 @@ class _Pair:
             self.tables,
             self.accuracy.tolerance,
             record,
-            new_tally(self.chain, NOTHING),
+            new_observations(self.chain, NOTHING),
         )
         return state_of_phasors(self.chain, phasors, self.tables), int(record.counts[IMPACTS]), Outcome(code)
 

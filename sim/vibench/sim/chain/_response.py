@@ -10,7 +10,7 @@ from ..kernels import Complex, Floats, clock_at
 from ..model import Accuracy, Harmonic, Outcome
 from ..motion import MAX_IMPACT_RATE_HZ, whole_periods
 from ._chain import MASSES_PER_CELL, Chain
-from ._integrate import impacts_of, new_chain_record, new_tally, start_chain, state_of_phasors
+from ._integrate import impacts_of, new_chain_record, new_observations, start_chain, state_of_phasors
 from ._modes import chain_impulses, chain_state_matrix
 from ._run import IMPACTS, advance_chain
 from ._tables import chain_tables
@@ -88,7 +88,7 @@ def chain_response(
     cells, phasors = start_chain(chain, initial_state, 0.0, tables, accuracy)
     clock, line_s = clock_at(0.0), periods / drive.frequency_hz
     record = new_chain_record(chain, 0.0, duration_s, None, max_impact_rate_hz)
-    tally, before, line_start = new_tally(chain, NOTHING), 0, phasors
+    tally, before, line_start = new_observations(chain, NOTHING), 0, phasors
     code = int(Outcome.REACHED_END)
     ends = (duration_s - window_s, duration_s - line_s, duration_s)
     for mode, until in zip((NOTHING, PEAKS, PEAKS_AND_LINES), ends, strict=True):

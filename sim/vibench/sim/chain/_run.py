@@ -10,15 +10,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels import Complex, Table, Vector, advance_clock, compiled, lean, time_until
+from ..kernels import Complex, Table, Vector, advance_clock, kernel, kernel_without_refcount, time_until
 from ..model import Outcome
 from ._cell_flow import CELL_SIZE, MEMORY, POWER, SIDE
 from ._cell_power import begin_power
 from ._cell_window import COUNT, cross_window
 from ._tables import KIND, LOWER, OBSERVED, PATH, UPPER, ChainTables
-from ._tally import NOTHING, PEAKS_AND_LINES, ChainTally, tally_busy, tally_forces, tally_idle
+from ._tally import NOTHING, PEAKS_AND_LINES, ChainObservations, observe_busy, observe_forces, observe_idle
 from ._windows import (
-    Space,
+    Workspace,
     copy_motion,
     copy_terms,
     deposit,
@@ -32,8 +32,8 @@ from ._windows import (
     place_motion,
     place_observed,
     set_ceilings,
-    space_for,
-    turn_window,
+    workspace_for,
+    propagate_window,
     weigh,
 )
 
@@ -60,7 +60,7 @@ class ChainRecord(NamedTuple):
     """Samples and impacts so far."""
 
 
-@compiled
+@kernel
 def advance_chain(  # noqa: C901 - the kinds of window and their ends are one loop
     cells: Table,
     phasors: Complex,
@@ -69,10 +69,10 @@ def advance_chain(  # noqa: C901 - the kinds of window and their ends are one lo
     tables: ChainTables,
     tolerance: float,
     record: ChainRecord,
-    tally: ChainTally,
+    tally: ChainObservations,
 ) -> int:
     """Advance cells, phasors and clock in place to the instant ``until`` [s]; returns an `Outcome` code."""
-    space = space_for(tables)
+    space = workspace_for(tables)
     observed = 1 if tally.mode == NOTHING else OBSERVED
     count, drive = len(cells), len(phasors) - 1
     phasors[drive] = drive_term(clock, 0.0, tables)
@@ -108,9 +108,9 @@ def advance_chain(  # noqa: C901 - the kinds of window and their ends are one lo
             return code
 
 
-@compiled
+@kernel
 def _go_quietly(
-    space: Space,
+    space: Workspace,
     phasors: Complex,
     cells: Table,
     clock: Vector,
@@ -118,7 +118,7 @@ def _go_quietly(
     tables: ChainTables,
     tolerance: float,
     record: ChainRecord,
-    tally: ChainTally,
+    tally: ChainObservations,
 ) -> None:
     """Go to the end in one step when no cell can ever touch; who watches looks at every window."""
     longest, drive = time_until(clock, until), len(phasors) - 1
@@ -133,10 +133,10 @@ def _go_quietly(
         while left > 0.0:
             if _march_on(space, phasors, cells, then, left, tally, record, tables) == 0:
                 length = min(left, tables.windows[0])
-                turn_window(space, phasors, then, length, 0, tables)
+                propagate_window(space, phasors, then, length, 0, tables)
                 place_observed(space.motion_end, space.turned, OBSERVED, tables)
                 for i in range(len(cells)):
-                    tally_idle(tally, i, space, phasors, length, tables)
+                    observe_idle(tally, i, space, phasors, length, tables)
                 copy_terms(phasors, space.turned)
                 copy_motion(space.motion, space.motion_end, OBSERVED)
                 advance_clock(then, length)
@@ -147,14 +147,14 @@ def _go_quietly(
     phasors[drive] = drive_term(clock, 0.0, tables)
 
 
-@lean
+@kernel_without_refcount
 def _march_on(
-    space: Space,
+    space: Workspace,
     phasors: Complex,
     cells: Table,
     clock: Vector,
     longest: float,
-    tally: ChainTally,
+    tally: ChainObservations,
     record: ChainRecord,
     tables: ChainTables,
 ) -> int:
@@ -178,9 +178,9 @@ def _march_on(
     return march(space, phasors, clock, observed, steps, tables)
 
 
-@lean
+@kernel_without_refcount
 def _choose_window(
-    space: Space,
+    space: Workspace,
     cells: Table,
     phasors: Complex,
     clock: Vector,
@@ -195,7 +195,7 @@ def _choose_window(
     length, count = longest, 0
     for level in range(len(tables.windows)):
         length = min(longest, tables.windows[level])
-        turn_window(space, phasors, clock, length, level, tables)
+        propagate_window(space, phasors, clock, length, level, tables)
         place_observed(space.motion_end, space.turned, observed, tables)
         count = find_busy(space, cells, length, tables)
         if neighbours_clash(space.busy, count, tables.clash[level]) == 0:
@@ -203,8 +203,8 @@ def _choose_window(
     return length, count
 
 
-@lean
-def is_quiet(space: Space, cells: Table, tables: ChainTables) -> int:
+@kernel_without_refcount
+def is_quiet(space: Workspace, cells: Table, tables: ChainTables) -> int:
     """Say (1 or 0) whether no cell can ever touch: free phasors only shrink."""
     for i in range(len(cells)):
         law = tables.laws[i]
@@ -213,9 +213,9 @@ def is_quiet(space: Space, cells: Table, tables: ChainTables) -> int:
     return 1
 
 
-@lean
+@kernel_without_refcount
 def _cross(
-    space: Space,
+    space: Workspace,
     cells: Table,
     phasors: Complex,
     count: int,
@@ -224,7 +224,7 @@ def _cross(
     tables: ChainTables,
     tolerance: float,
     record: ChainRecord,
-    tally: ChainTally,
+    tally: ChainObservations,
 ) -> int:
     """Take every cell through the window and observe it."""
     observed = 1 if tally.mode == NOTHING else OBSERVED
@@ -233,7 +233,7 @@ def _cross(
     for i in range(len(cells)):
         if busy == count or space.busy[busy] != i:
             if tally.mode != NOTHING:
-                tally_idle(tally, i, space, phasors, length, tables)
+                observe_idle(tally, i, space, phasors, length, tables)
             continue
         busy += 1
         cell, series, markov = cells[i], space.series[i], tables.markov[i, PATH]
@@ -253,14 +253,14 @@ def _cross(
         if code == REACHED_END:
             code = _record_touches(space.touches, i, clock, record)
         if tally.mode != NOTHING:
-            tally_busy(tally, i, series, log, tables)
+            observe_busy(tally, i, series, log, tables)
         if tally.mode == PEAKS_AND_LINES:
-            tally_forces(tally, cell, i, space.turned[len(phasors) - 1], tables.omega)
+            observe_forces(tally, cell, i, space.turned[len(phasors) - 1], tables.omega)
         worst = max(worst, code)
     return worst
 
 
-@lean
+@kernel_without_refcount
 def _record_touches(touches: Vector, place: int, clock: Vector, record: ChainRecord) -> int:
     for k in range(1, int(touches[COUNT]) + 1):
         impact = record.counts[IMPACTS]
@@ -272,9 +272,9 @@ def _record_touches(touches: Vector, place: int, clock: Vector, record: ChainRec
     return REACHED_END
 
 
-@compiled
+@kernel
 def _sample(
-    space: Space,
+    space: Workspace,
     phasors: Complex,
     clock: Vector,
     length: float,
@@ -308,7 +308,7 @@ def _sample(
         counts[NEXT_SAMPLE] += 1
 
 
-@compiled
+@kernel
 def chain_cells(count: int) -> Table:
     """Make the rows of cells in flight."""
     return np.zeros((count, CELL_SIZE))

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 from ..contact import DEEPEST, LOGGED
 from ..flight import polynomial_at, series_peak
-from ..kernels import Complex, Table, Vector, lean
+from ..kernels import Complex, Table, Vector, kernel_without_refcount
 from ._cell_flow import MEMORY, MOMENT, MOMENTS, T
 from ._tables import OBSERVED, PATH, ChainTables
-from ._windows import Space, fill_observed
+from ._windows import Workspace, fill_observed
 
 NOTHING, PEAKS, PEAKS_AND_LINES = range(3)
 """What a tally's mode asks for."""
@@ -20,7 +20,7 @@ SECANTS = 3
 """Secant steps to the extreme of a cubic: there its slope is zero, so that their error counts squared."""
 
 
-class ChainTally(NamedTuple):
+class ChainObservations(NamedTuple):
     """Sums of a run."""
 
     mode: int
@@ -30,8 +30,8 @@ class ChainTally(NamedTuple):
     """Integral of each cell's force against exp(-i (omega t + phase)), shape (cells,) [N s]."""
 
 
-@lean
-def tally_forces(tally: ChainTally, cell: Vector, place: int, end: complex, omega: float) -> None:
+@kernel_without_refcount
+def observe_forces(tally: ChainObservations, cell: Vector, place: int, end: complex, omega: float) -> None:
     """Add the moments of a window's force; ``end`` is the drive's term at the window's end."""
     total = complex(0.0, 0.0)
     for k in range(MOMENTS - 1, -1, -1):
@@ -39,9 +39,9 @@ def tally_forces(tally: ChainTally, cell: Vector, place: int, end: complex, omeg
     tally.forces[place] += end.conjugate() * total
 
 
-@lean
-def tally_idle(
-    tally: ChainTally, place: int, space: Space, phasors: Complex, length: float, tables: ChainTables
+@kernel_without_refcount
+def observe_idle(
+    tally: ChainObservations, place: int, space: Workspace, phasors: Complex, length: float, tables: ChainTables
 ) -> None:
     """Look for larger motions of a cell without a force; its row of ``space.series`` is overwritten.
 
@@ -59,7 +59,7 @@ def tally_idle(
         tally.peaks[what, place] = series_peak(tally.peaks[what, place], series[what], 0.0, length)
 
 
-@lean
+@kernel_without_refcount
 def _node(series: Vector, markov: Vector, at: Vector) -> tuple[float, float]:
     """Value and slope of an observed motion at a logged instant."""
     value, slope = polynomial_at(series, at[T])
@@ -69,8 +69,8 @@ def _node(series: Vector, markov: Vector, at: Vector) -> tuple[float, float]:
     return value, slope - markov[MOMENTS] * at[MOMENT + MOMENTS - 1]
 
 
-@lean
-def tally_busy(tally: ChainTally, place: int, series: Table, log: Table, tables: ChainTables) -> None:
+@kernel_without_refcount
+def observe_busy(tally: ChainObservations, place: int, series: Table, log: Table, tables: ChainTables) -> None:
     """Look for larger motions of a cell between the logged instants of its window."""
     tally.peaks[PATH, place] = max(tally.peaks[PATH, place], log[0, DEEPEST])
     for what in range(OBSERVED):
@@ -84,7 +84,7 @@ def tally_busy(tally: ChainTally, place: int, series: Table, log: Table, tables:
         tally.peaks[what, place] = best
 
 
-@lean
+@kernel_without_refcount
 def _cubic_peak(best: float, x0: float, v0: float, x1: float, v1: float) -> float:
     """Largest magnitude on [0, 1] of the cubic with these end values and slopes, or ``best``."""
     best = max(best, abs(x0), abs(x1))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..flight import LARGEST_BOUND, SERIES_TERMS
-from ..kernels import Complex, Table, Vector, advance_clock, angle_at, compiled, inlined, lean
+from ..kernels import Complex, Table, Vector, advance_clock, angle_at, kernel, inlined, kernel_without_refcount
 from ..model import MOST_TERMS
 from ..slots import PowerTerms
 from ._cell_contact import cell_workspace
@@ -31,7 +31,7 @@ _INVERSES: NDArray[np.float64] = 1.0 / np.arange(1.0, SERIES_TERMS + 1.0)
 """1 / (k + 1)."""
 
 
-class Space(NamedTuple):
+class Workspace(NamedTuple):
     """Workspaces of one run."""
 
     start: Complex
@@ -66,11 +66,11 @@ class Space(NamedTuple):
     no_log: Table
 
 
-@compiled
-def space_for(tables: ChainTables) -> Space:
+@kernel
+def workspace_for(tables: ChainTables) -> Workspace:
     """Allocate the workspaces."""
     terms, _, cells = tables.real.shape
-    return Space(
+    return Workspace(
         np.zeros(terms, np.complex128),
         np.zeros(terms, np.complex128),
         np.zeros(terms, np.complex128),
@@ -145,7 +145,7 @@ def copy_motion(to: Table, source: Table, observed: int) -> None:
 
 
 @inlined
-def is_bounded(space: Space) -> int:
+def is_bounded(space: Workspace) -> int:
     """Say (1 or 0) whether the motion is small enough for statements about touches."""
     for i in range(space.curvature.shape[1]):
         if not space.curvature[PATH, i] < LARGEST_BOUND:
@@ -154,7 +154,7 @@ def is_bounded(space: Space) -> int:
 
 
 @inlined
-def weigh(space: Space, phasors: Complex, observed: int, tables: ChainTables) -> None:
+def weigh(space: Workspace, phasors: Complex, observed: int, tables: ChainTables) -> None:
     """Bound the motion and acceleration of the first ``observed`` of p, x, y, z, until a force acts."""
     for what in range(observed):
         for i in range(space.reach.shape[1]):
@@ -169,8 +169,8 @@ def weigh(space: Space, phasors: Complex, observed: int, tables: ChainTables) ->
 
 
 @inlined
-def turn_window(
-    space: Space, phasors: Complex, clock: Vector, length: float, level: int, tables: ChainTables
+def propagate_window(
+    space: Workspace, phasors: Complex, clock: Vector, length: float, level: int, tables: ChainTables
 ) -> None:
     """Write the phasors at the window's end, as if no force acted in it."""
     modes = len(phasors) - 1
@@ -184,7 +184,7 @@ def turn_window(
 
 
 @inlined
-def set_ceilings(space: Space, peaks: Table, observed: int, length: float, tables: ChainTables) -> None:
+def set_ceilings(space: Workspace, peaks: Table, observed: int, length: float, tables: ChainTables) -> None:
     """Work out between which values at the ends of windows of ``length`` nothing can happen within them.
 
     Nothing is: no touch, and no motion larger than the largest so far, if that is observed.
@@ -200,9 +200,9 @@ def set_ceilings(space: Space, peaks: Table, observed: int, length: float, table
                 space.floor[what, i] = max(space.floor[what, i], margin - law[LOWER])
 
 
-@lean
+@kernel_without_refcount
 def march(
-    space: Space, phasors: Complex, clock: Vector, observed: int, steps: int, tables: ChainTables
+    space: Workspace, phasors: Complex, clock: Vector, observed: int, steps: int, tables: ChainTables
 ) -> int:
     """Advance over long windows in which nothing can happen, at most ``steps``; gives how many there were."""
     window, factors, drive = tables.windows[0], tables.factors[0], len(phasors) - 1
@@ -229,7 +229,7 @@ def march(
 
 
 @inlined
-def find_busy(space: Space, cells: Table, length: float, tables: ChainTables) -> int:
+def find_busy(space: Workspace, cells: Table, length: float, tables: ChainTables) -> int:
     """List the cells that press, or whose touch within the window is not excluded; gives how many."""
     count = 0
     for i in range(len(cells)):
@@ -290,7 +290,7 @@ def deposit(turned: Complex, cell: Vector, place: int, tables: ChainTables) -> N
         turned[j] -= tables.push[place, j] * total
 
 
-@lean
+@kernel_without_refcount
 def place_motion(motion: Vector, phasors: Complex, tables: ChainTables) -> None:
     """Write displacements and velocities, shape (6 cells,)."""
     for i in range(len(motion)):

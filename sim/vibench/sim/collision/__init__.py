@@ -13,24 +13,24 @@ from ._collision import (
     new_collision,
 )
 from ._observer import (
-    tally_collision,
+    observe_collision,
 )
 from ._tables import (
     CollisionTables,
     collision_tables,
 )
 from ._variation import (
-    carry_through_collision,
+    propagate_tangent_collision,
     collision_memory,
 )
 
 __all__ = [
     "Collision",
     "CollisionTables",
-    "carry_through_collision",
+    "propagate_tangent_collision",
     "collide",
     "collision_memory",
     "collision_tables",
     "new_collision",
-    "tally_collision",
+    "observe_collision",
 ]

@@ -15,7 +15,7 @@ import numpy as np
 from ..contact import ROOT_FLOOR, gap_of
 from ..flight import AT_X, AT_Z, COSINE, P_RATE, SINE, WIDE, X_RATE, Z_RATE, FlightTables, P, drive_phasor
 from ..kernels import (
-    Lanes,
+    SimdVector,
     Table,
     Vector,
     eight_of_eight,
@@ -66,7 +66,7 @@ LAG = 3e-6
 """What the slow springs make of the force is a thousandth, and is found anew while depths change by more."""
 SLOW_TERMS = 6
 """Terms of that: the next is 1e-12."""
-DEPTHS, FORCE, MISFIT, ACROSS, ACROSS_RATE, ROOM_ROWS = range(6)
+DEPTHS, FORCE, MISFIT, ACROSS, ACROSS_RATE, WORKSPACE_ROWS = range(6)
 """Rows of a room, at the points: depths over the largest, force [N], misfits of depths; x and vx for who
 watches."""
 
@@ -90,7 +90,7 @@ class Collision(NamedTuple):
 def new_collision() -> Collision:
     """Make the memory of all collisions of a run."""
     return Collision(
-        np.zeros((ROOM_ROWS, POINTS)),
+        np.zeros((WORKSPACE_ROWS, POINTS)),
         np.zeros(WIDE),
         np.zeros(TERMS),
         np.zeros(TERMS),
@@ -155,7 +155,7 @@ def _leave(state: Vector, after: Vector, par: Parameters) -> None:
 
 
 @inlined
-def _press(collision: Collision, depths: Lanes, stiff: float, collisions: CollisionTables) -> None:
+def _press(collision: Collision, depths: SimdVector, stiff: float, collisions: CollisionTables) -> None:
     """Write the force at the points, and what comes of it by the end."""
     force = collision.room[FORCE]
     store(force, 0, stiff * depths * root(depths))

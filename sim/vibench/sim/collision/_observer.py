@@ -3,12 +3,12 @@
 from ..contact import hermite_peak
 from ..flight import AT_X, COSINE, SINE, X_RATE
 from ..kernels import (
-    Lanes,
+    SimdVector,
     Vector,
     eight_of_eight,
     inlined,
     largest,
-    lean,
+    kernel_without_refcount,
     sixteen,
     sixteen_of_sixteen,
     store,
@@ -27,7 +27,7 @@ ABOVE_POINTS = 1.03
 
 
 @inlined
-def tally_collision(
+def observe_collision(
     tally: Vector,
     collision: Collision,
     duration: float,
@@ -76,7 +76,7 @@ def _add_lines(
 
 
 @inlined
-def cosine_of(square: Lanes) -> Lanes:
+def cosine_of(square: SimdVector) -> SimdVector:
     """Cosine of angles below `vibench.sim.collision.LONGEST_TURN`, from their squares: to 3e-11."""
     return 1.0 + square * (
         -1.0 / 2.0 + square * (1.0 / 24.0 + square * (-1.0 / 720.0 + square * (1.0 / 40320.0)))
@@ -84,7 +84,7 @@ def cosine_of(square: Lanes) -> Lanes:
 
 
 @inlined
-def sine_over(square: Lanes) -> Lanes:
+def sine_over(square: SimdVector) -> SimdVector:
     """Sine over the angle, likewise."""
     return 1.0 + square * (
         -1.0 / 6.0 + square * (1.0 / 120.0 + square * (-1.0 / 5040.0 + square * (1.0 / 362880.0)))
@@ -118,7 +118,7 @@ def _fill_across_rate(collision: Collision, duration: float, collisions: Collisi
     store(room, ACROSS_RATE, rate)
 
 
-@lean
+@kernel_without_refcount
 def _turning_peak(best: float, collision: Collision, duration: float, collisions: CollisionTables) -> float:
     """Largest magnitude of x in a collision in which it turns."""
     room, motion, after = collision.room, collision.motion, collision.after

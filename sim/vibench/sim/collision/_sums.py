@@ -1,13 +1,13 @@
 """Sums over the points of a collision, and over the terms of what is slow beside it. SI units."""
 
-from ..kernels import Lanes, Vector, eight, eight_of_eight, inlined, sixteen_of_sixteen, store
+from ..kernels import SimdVector, Vector, eight, eight_of_eight, inlined, sixteen_of_sixteen, store
 from ._tables import TERMS, CollisionTables
 
 
 @inlined
-def at_heights(terms: Vector, turns: Lanes) -> Lanes:
+def at_heights(terms: Vector, turns: SimdVector) -> SimdVector:
     """Give a polynomial without its first term."""
-    value: Lanes = terms[TERMS - 1] * turns
+    value: SimdVector = terms[TERMS - 1] * turns
     for term in range(TERMS - 2, 0, -1):
         value = (value + terms[term]) * turns
     return value
@@ -16,11 +16,11 @@ def at_heights(terms: Vector, turns: Lanes) -> Lanes:
 @inlined
 def pushed(
     force: Vector, first: int, last: int, place: int, duration: float, collisions: CollisionTables
-) -> Lanes:
+) -> SimdVector:
     """Give what a force at the points does to a number of the motion, by some terms of the series."""
     turn = collisions.fastest * duration
     factor = duration * turn**first
-    value: Lanes = (
+    value: SimdVector = (
         factor * collisions.struck[first, place] * sixteen_of_sixteen(collisions.shares[first], 0, force)
     )
     for term in range(first + 1, last):

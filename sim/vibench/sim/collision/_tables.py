@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..flight import AT_X, P, linear_series
-from ..kernels import Table, Vector, lean
+from ..kernels import Table, Vector, kernel_without_refcount
 from ..model import Hertz, Specimen
 
 POINTS = 16
@@ -86,7 +86,7 @@ NEARBY = 0.06
 """Three depths this far apart in phi, about the deepest, hold it to a hundred-millionth."""
 
 
-@lean
+@kernel_without_refcount
 def depth_at(depths: Vector, phi: float) -> float:
     """Depth between the points: the polynomial in phi through them."""
     value, norm = 0.0, 0.0
@@ -100,7 +100,7 @@ def depth_at(depths: Vector, phi: float) -> float:
     return value / norm
 
 
-@lean
+@kernel_without_refcount
 def deepest_of(depths: Vector) -> float:
     """Largest depth of the polynomial through the points, by a parabola about the deepest of them."""
     top = 1

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from ..flight import P, read_change, write_change
-from ..kernels import Table, eight_of_eight, lean, sixteen, solve_in_place, store
+from ..kernels import Table, eight_of_eight, kernel_without_refcount, sixteen, solve_in_place, store
 from ..slots import UNITS, Parameters, keep_in_range
 from ._collision import DEPTHS, Collision
 from ._sums import at_heights, move_on
@@ -24,8 +24,8 @@ def collision_memory() -> Table:
     return np.zeros((EQUATIONS + POINTS, POINTS + UNITS))
 
 
-@lean
-def carry_through_collision(
+@kernel_without_refcount
+def propagate_tangent_collision(
     tangent: Table,
     collision: Collision,
     duration: float,

@@ -116,10 +116,10 @@ from ._flow import (
 )
 from ._observer import (
     hermite_peak,
-    tally_contact,
+    observe_contact,
 )
 from ._variation import (
-    carry_through_steps,
+    propagate_tangent_steps,
     tangent_workspace,
 )
 
@@ -219,7 +219,7 @@ __all__ = [
     "advance_contact",
     "base_force_at",
     "begin_contact",
-    "carry_through_steps",
+    "propagate_tangent_steps",
     "contact_workspace",
     "gap_of",
     "hermite_peak",
@@ -227,7 +227,7 @@ __all__ = [
     "motion_rates",
     "step_error",
     "step_factor",
-    "tally_contact",
+    "observe_contact",
     "tangent_workspace",
     "trial_step",
 ]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ..kernels import Table, Vector, compiled, copy_row, inlined, lean
+from ..kernels import Table, Vector, kernel, copy_row, inlined, kernel_without_refcount
 from ..model import VX, VY, VZ, X, Y, Z
 from ..slots import PACE, RATE, RATE_SCALE, ROOT, ROOT_SCALE, SIDE, STEP, Parameters
 from ._end import step_to_exit, step_to_time
@@ -68,7 +68,7 @@ w at its stages, from which a small change of the motion is carried along exactl
 WIDE_LOG_COLUMNS = LOG_STEP + 1 + 2 * STAGES
 
 
-@compiled
+@kernel
 def contact_workspace() -> Table:
     """Memory that one run (one thread) hands to every contact."""
     return np.zeros((WORK_ROWS, WIDTH))
@@ -83,13 +83,13 @@ def log_for(tally: Vector, tangent: Table | None) -> Table:
     return np.zeros((LOG_ROWS if tally[0] != 0.0 else 0, LOG_COLUMNS))
 
 
-@lean
+@kernel_without_refcount
 def gap_of(side: float, par: Parameters) -> float:
     """Clearance of the stop on one side [m]."""
     return par.upper if side > 0.0 else par.lower
 
 
-@lean
+@kernel_without_refcount
 def begin_contact(state: Vector, side: float, par: Parameters, tolerance: float) -> None:
     """Enter contact from the flight state, at any penetration (zero when the stop is just touched).
 
@@ -120,7 +120,7 @@ def begin_contact(state: Vector, side: float, par: Parameters, tolerance: float)
     state[STEP] = step_scale(tolerance) * _foreseen(root / state[ROOT_SCALE], rate) * whole
 
 
-@lean
+@kernel_without_refcount
 def step_scale(tolerance: float) -> float:
     """Give the ratio of steps at a tolerance to those at the standard one: its eighth root."""
     return math.sqrt(math.sqrt(math.sqrt(tolerance / STANDARD_TOLERANCE)))
@@ -141,14 +141,14 @@ def _foreseen(depth: float, rate: float) -> float:
     return 0.6 if depth > 0.65 else 0.9
 
 
-@lean
+@kernel_without_refcount
 def _gather(work: Table, state: Vector, tau: float) -> None:
     at = work[POINT]
     at[W], at[R], at[CX], at[CZ] = state[ROOT], state[RATE], state[X], state[Z]
     at[CVX], at[CVZ], at[T], at[WIDTH - 1] = state[VX], state[VZ], tau, 0.0
 
 
-@lean
+@kernel_without_refcount
 def _scatter(work: Table, state: Vector, par: Parameters) -> None:
     at, side = work[POINT], state[SIDE]
     state[ROOT], state[RATE] = at[W], at[R]
@@ -157,7 +157,7 @@ def _scatter(work: Table, state: Vector, par: Parameters) -> None:
     state[VY] = at[CVZ] + side * at[R]
 
 
-@lean
+@kernel_without_refcount
 def _start_log(log: Table, work: Table, side: float, par: Parameters) -> None:
     if len(log) > 0:
         log[0, LOGGED] = 0.0
@@ -165,7 +165,7 @@ def _start_log(log: Table, work: Table, side: float, par: Parameters) -> None:
         _log_point(log, work, side, par)
 
 
-@lean
+@kernel_without_refcount
 def _log_point(log: Table, work: Table, side: float, par: Parameters) -> None:
     """Add the accepted point as the log's next row."""
     at = work[POINT]
@@ -175,7 +175,7 @@ def _log_point(log: Table, work: Table, side: float, par: Parameters) -> None:
     log[row, LOG_P], log[row, LOG_RATE] = side * (gap_of(side, par) + at[W] * at[W]), side * at[R]
 
 
-@lean
+@kernel_without_refcount
 def log_stages(log: Table, work: Table, step: float) -> None:
     """Add the stages of the step just taken to the row of its start, if the log is wide enough."""
     if log.shape[1] == WIDE_LOG_COLUMNS:
@@ -185,7 +185,7 @@ def log_stages(log: Table, work: Table, step: float) -> None:
             row[LOG_STAGE_T + stage], row[LOG_STAGE_W + stage] = work[stage, T], work[stage, W]
 
 
-@lean
+@kernel_without_refcount
 def _log_apex(
     log: Table, work: Table, step: float, side: float, force: Vector, middle: float, par: Parameters
 ) -> None:
@@ -207,7 +207,7 @@ def _log_apex(
     copy_row(work[TRIAL], work[SPARE])
 
 
-@lean
+@kernel_without_refcount
 def step_factor(error: float) -> float:
     """Next step over this one. The eighth root as three square roots; an error of NaN shrinks."""
     if not error < 1e300:
@@ -217,7 +217,7 @@ def step_factor(error: float) -> float:
     return min(GROW, max(SHRINK, SAFETY / math.sqrt(math.sqrt(math.sqrt(error)))))
 
 
-@lean
+@kernel_without_refcount
 def advance_contact(  # noqa: C901, PLR0912 - a step control and its three ends are one loop
     state: Vector,
     tau: float,

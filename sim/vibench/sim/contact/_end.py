@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..kernels import Table, Vector, lean
+from ..kernels import Table, Vector, kernel_without_refcount
 from ..slots import Parameters
 from ._flow import POINT, SPARE, TRIAL, WIDTH, R, T, W, contact_rates, trial_step
 
@@ -12,7 +12,7 @@ GUESSES = 4
 """Newton steps on a quintic: from a straight line to rounding, nearly always."""
 
 
-@lean
+@kernel_without_refcount
 def step_to_exit(
     work: Table,
     longest: float,
@@ -49,7 +49,7 @@ def step_to_exit(
     return step
 
 
-@lean
+@kernel_without_refcount
 def _where_root_ends(
     work: Table, longest: float, side: float, force: Vector, middle: float, par: Parameters
 ) -> float:
@@ -72,7 +72,7 @@ def _where_root_ends(
     return step
 
 
-@lean
+@kernel_without_refcount
 def _slip_to_exit(work: Table, side: float, force: Vector, middle: float, par: Parameters) -> None:
     """Go the last hair to w = 0 without a step: all rates but that of w are in proportion to w itself.
 
@@ -85,7 +85,7 @@ def _slip_to_exit(work: Table, side: float, force: Vector, middle: float, par: P
     work[TRIAL, W] = 0.0
 
 
-@lean
+@kernel_without_refcount
 def step_to_time(
     work: Table, longest: float, limit: float, side: float, force: Vector, middle: float, par: Parameters
 ) -> float:

@@ -18,7 +18,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 from scipy.integrate._ivp import dop853_coefficients as _dop
 
-from ..kernels import Table, Vector, inlined, lean
+from ..kernels import Table, Vector, inlined, kernel_without_refcount
 from ..slots import Parameters
 
 W, R, CX, CZ, CVX, CVZ, T = range(7)
@@ -115,7 +115,7 @@ def _choose_contact_rates(
     return chosen
 
 
-@lean
+@kernel_without_refcount
 def trial_step(  # noqa: C901 - the twelve stages of one formula, in order
     work: Table, step: float, side: float, force: Vector, middle: float, system: System
 ) -> None:
@@ -188,7 +188,7 @@ def _blended(fifth: float, third: float, step: float) -> float:
     return step * fifth / math.sqrt(2.0 * blended)
 
 
-@lean
+@kernel_without_refcount
 def step_error(work: Table, step: float, root_scale: float, rate_scale: float, tolerance: float) -> float:
     """Error of the step just tried, over what is allowed: on w and r, the two fast unknowns."""
     fifth_w, third_w = _errors(work, W, tolerance * (root_scale + abs(work[POINT, W])))
@@ -196,7 +196,7 @@ def step_error(work: Table, step: float, root_scale: float, rate_scale: float, t
     return _blended(fifth_w + fifth_r, third_w + third_r, step)
 
 
-@lean
+@kernel_without_refcount
 def contact_error(work: Table, step: float, root_scale: float, rate_scale: float, tolerance: float) -> float:
     """Error of a step in contact: on w, r and vx.
 

@@ -6,13 +6,13 @@ closed form over flights, and by the corrected trapezoidal rule (error ~ step^4)
 """
 
 from ..flight import FlightTables, drive_phasor
-from ..kernels import Table, Vector, lean
+from ..kernels import Table, Vector, kernel_without_refcount
 from ..slots import LINE_P_RE, LINE_X_RE, MODE, PEAK_P, PEAK_X, PEAKS_AND_LINES, SECANTS
 from ._contact import DEEPEST, LOG_P, LOG_RATE, LOG_TIME, LOG_VX, LOG_X, LOGGED, gap_of
 
 
-@lean
-def tally_contact(tally: Vector, log: Table, clock: Vector, tables: FlightTables) -> None:
+@kernel_without_refcount
+def observe_contact(tally: Vector, log: Table, clock: Vector, tables: FlightTables) -> None:
     """Add the steps of a contact, whose log counts time from clock time."""
     rows = int(log[0, LOGGED])
     deepest = log[0, DEEPEST]
@@ -32,7 +32,7 @@ def tally_contact(tally: Vector, log: Table, clock: Vector, tables: FlightTables
             at = then
 
 
-@lean
+@kernel_without_refcount
 def _add_step(
     tally: Vector,
     line: int,
@@ -55,7 +55,7 @@ def _add_step(
     tally[line + 1] += area.imag
 
 
-@lean
+@kernel_without_refcount
 def hermite_peak(best: float, x0: float, v0: float, x1: float, v1: float, step: float) -> float:
     """Largest abs(x) over a step, x as the cubic through both ends with their velocities."""
     best = max(best, abs(x0), abs(x1))

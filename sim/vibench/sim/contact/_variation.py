@@ -17,7 +17,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from ..flight import FORCE_TERMS
-from ..kernels import Table, Vector, compiled, inlined, lean
+from ..kernels import Table, Vector, kernel, inlined, kernel_without_refcount
 from ..model import VX, VY, VZ, X, Y, Z
 from ..slots import Parameters, keep_in_range
 from ._contact import LOG_STAGE_T, LOG_STAGE_W, LOG_STEP, LOGGED
@@ -90,7 +90,7 @@ def _choose_tangent_rates(
     return chosen
 
 
-@lean
+@kernel_without_refcount
 def _fill_slopes(slopes: Table, row: Vector, par: Parameters) -> None:
     """Linearise the force at the stages that a row of a log holds."""
     for stage in range(STAGES):
@@ -108,8 +108,8 @@ def tangent_workspace() -> Table:
     return np.zeros((WORK_ROWS + STAGES, WIDTH))
 
 
-@compiled
-def carry_through_steps(tangent: Table, log: Table, par: Parameters, memory: Table) -> None:
+@kernel
+def propagate_tangent_steps(tangent: Table, log: Table, par: Parameters, memory: Table) -> None:
     """Carry every change over the steps of a wide log."""
     work, slopes, unforced = memory[:WORK_ROWS], memory[WORK_ROWS:], log[0, :FORCE_TERMS]
     stage = np.zeros(1, np.int64)

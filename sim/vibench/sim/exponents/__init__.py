@@ -13,7 +13,7 @@ from ._blocking import (
 from ._lyapunov import (
     LyapunovEstimate,
     Precision,
-    largest_exponent,
+    lyapunov_exponent,
 )
 from ._lyapunov_spectrum import (
     lyapunov_spectrum,
@@ -24,6 +24,6 @@ __all__ = [
     "LyapunovEstimate",
     "Precision",
     "blocked_mean",
-    "largest_exponent",
+    "lyapunov_exponent",
     "lyapunov_spectrum",
 ]

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate._ivp import dop853_coefficients as _dop
 
 from ..contact import BLEND, ERROR_3, ERROR_5, STAGES, step_factor
-from ..kernels import Floats, Table, Vector, lean, orthonormal_rows, orthonormalise
+from ..kernels import Floats, Table, Vector, kernel_without_refcount, orthonormal_rows, orthonormalise
 from ._blocking import blocked_mean
 from ._lyapunov_spectrum import kaplan_yorke
 
@@ -222,7 +222,7 @@ def _fill_slopes(
                 slopes[stage, first + i] = slope
 
 
-@lean
+@kernel_without_refcount
 def _step_error(slopes: Table, state: Vector, step: float, tolerance: float) -> float:
     """Error of a step of the state, over what is allowed; NaN when a stage ran away."""
     largest, fifth, third = 1e-300, 0.0, 0.0

@@ -25,7 +25,7 @@ FEWEST_INTERVALS = 32
 """Intervals that must fit into the duration, so that a mean can have an error."""
 
 
-class Tendency(StrEnum):
+class ExponentVerdict(StrEnum):
     """What the exponent says, within its error."""
 
     CHAOTIC = "chaotic: neighbouring motions part"
@@ -85,7 +85,7 @@ class LyapunovEstimate:
     exponent_per_s: float
     standard_error_per_s: float
     """Of a mean: from blocks; of multipliers: how far two cycles differ; of modes: zero."""
-    tendency: Tendency
+    tendency: ExponentVerdict
     source: Source
     motion: FinalMotion
     """What the run ended in."""
@@ -115,7 +115,7 @@ class LyapunovEstimate:
         return math.nan if self.blocks is None else self.blocks.correlation_length * self.interval_s
 
 
-def largest_exponent(
+def lyapunov_exponent(
     specimen: Specimen,
     drive: Harmonic,
     accuracy: Accuracy = Accuracy.STANDARD,
@@ -248,7 +248,7 @@ def _described(
         accuracy=accuracy,
         exponent_per_s=taken.mean,
         standard_error_per_s=taken.error,
-        tendency=_tendency(taken),
+        tendency=_verdict(taken),
         source=taken.source,
         motion=end.motion,
         since_s=since * length,
@@ -265,19 +265,19 @@ def _described(
     )
 
 
-def tendency_of(mean: float, error: float) -> Tendency:
+def verdict_of(mean: float, error: float) -> ExponentVerdict:
     """Say what an exponent means within its error."""
     if not (math.isfinite(mean) and math.isfinite(error)):
-        return Tendency.UNKNOWN
+        return ExponentVerdict.UNKNOWN
     if abs(mean) <= SURE * error:
-        return Tendency.NEUTRAL
-    return Tendency.CHAOTIC if mean > 0.0 else Tendency.REGULAR
+        return ExponentVerdict.NEUTRAL
+    return ExponentVerdict.CHAOTIC if mean > 0.0 else ExponentVerdict.REGULAR
 
 
-def _tendency(taken: _Exponent) -> Tendency:
+def _verdict(taken: _Exponent) -> ExponentVerdict:
     if taken.blocks is not None and not taken.blocks.is_long_enough:
-        return Tendency.UNKNOWN
-    return tendency_of(taken.mean, taken.error)
+        return ExponentVerdict.UNKNOWN
+    return verdict_of(taken.mean, taken.error)
 
 
 def _transient(run: TangentRun, end: Settling) -> ChaoticTransient | None:

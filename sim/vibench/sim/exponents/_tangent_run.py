@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..flight import FlightTables, take_off
-from ..kernels import Floats, Table, Vector, clock_at, compiled, orthonormal_rows, orthonormalise
+from ..flight import FlightTables, start_flight
+from ..kernels import Floats, Table, Vector, clock_at, kernel, orthonormal_rows, orthonormalise
 from ..model import Accuracy, Harmonic, Outcome, Specimen
 from ..motion import MAX_IMPACT_RATE_HZ, new_record, start_motion
 from ..slots import GROWTH, IMPACTS, REACHED_END, SIDE, TANGENT_SIZE, PowerTerms, Record
-from ..stepping import HarmonicTables, Room, advance_by_law, harmonic_tables, new_state, room_for
+from ..stepping import HarmonicTables, Workspace, advance_by_law, harmonic_tables, new_state, workspace_for
 
 LONGEST_TURN, LONGEST_DECAY = 2.0 * math.pi, 20.0
 """Several changes are made orthogonal at least this often, in radians and decays of the fastest mode: they
@@ -119,7 +119,7 @@ def run_with_tangent(
     record = record._replace(tangent=tangent)
     readings = Readings(np.zeros((count, changes)), np.zeros(count, np.int64), np.zeros((count, 6)))
     clock = clock_at(0.0)
-    room = room_for(len(tables.flight.rates), record.tally, tangent)
+    room = workspace_for(len(tables.flight.rates), record.tally, tangent)
     parts = _parts(tables.flight, interval.length_s) if changes > 1 else 1
     made, code = 0, REACHED_END
     stride = count if enough is None else math.ceil(count / CHECKS)
@@ -177,7 +177,7 @@ def starting_changes(metric: Table, changes: int) -> Table:
     return np.hstack([rows, np.zeros((changes, TANGENT_SIZE - GROWTH))])
 
 
-@compiled
+@kernel
 def _take_readings(
     state: Vector,
     clock: Vector,
@@ -191,7 +191,7 @@ def _take_readings(
     tangent: Table,
     metric: Table,
     readings: Readings,
-    room: Room,
+    room: Workspace,
 ) -> tuple[int, int]:
     """Advance from interval to interval; returns an `Outcome` code and the first that was not completed."""
     laws = (tables.power, tables.steps, tables.held, tables.collisions)
@@ -210,13 +210,13 @@ def _take_readings(
     return REACHED_END, last
 
 
-@compiled
+@kernel
 def _is_quiet(state: Vector, clock: Vector, tables: FlightTables, power: PowerTerms | None) -> int:
     """Say (1 or 0) whether it is certain that m1 will never touch a stop: free phasors only shrink."""
     if power is not None or state[SIDE] != 0.0:
         return 0
     phasors, reach = np.empty(len(tables.rates), np.complex128), 0.0
-    take_off(phasors, state, clock, tables)
+    start_flight(phasors, state, clock, tables)
     for j in range(len(phasors)):
         reach += abs(phasors[j] * tables.path[j])
     return 1 if reach < min(tables.par.lower, tables.par.upper) else 0

@@ -12,18 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels import Floats, Table, Vector, clock_at, compiled, dot
+from ..kernels import Floats, Table, Vector, clock_at, kernel, dot
 from ..model import Accuracy, Harmonic, Outcome, Specimen
 from ..motion import MAX_IMPACT_RATE_HZ, new_record, start_motion
 from ..slots import REACHED_END, Record
 from ..stepping import (
     HarmonicTables,
-    Room,
+    Workspace,
     advance_by_law,
     harmonic_tables,
     new_state,
     place_on_its_side,
-    room_for,
+    workspace_for,
 )
 from ._blocking import BlockedMean, blocked_mean
 from ._lyapunov import intervals_to_skip
@@ -77,7 +77,7 @@ def two_trajectory_exponent(
     growth = np.zeros(count)
     record = new_record(0.0, 2.0 * (settle_s + duration_s), None, max_impact_rate_hz)
     tables = harmonic_tables(specimen, drive)
-    room = room_for(len(tables.flight.rates), record.tally, None)
+    room = workspace_for(len(tables.flight.rates), record.tally, None)
     code = _part(
         first, second, interval.length_s, tables, accuracy.tolerance, record, metric, size, growth, room
     )
@@ -88,7 +88,7 @@ def two_trajectory_exponent(
     return TwoTrajectoryExponent(mean.mean, mean.standard_error, mean, rates, Outcome(code))
 
 
-@compiled
+@kernel
 def _part(
     first: Vector,
     second: Vector,
@@ -99,7 +99,7 @@ def _part(
     metric: Table,
     size: float,
     growth: Vector,
-    room: Room,
+    room: Workspace,
 ) -> int:
     """Advance two motions interval by interval, each time bringing the second back to its distance."""
     here, there, apart = clock_at(0.0), clock_at(0.0), np.zeros(HALF)

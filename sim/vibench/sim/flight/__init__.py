@@ -26,7 +26,7 @@ from ._detection import (
 )
 from ._flight import (
     CLEAR,
-    DEPARTS,
+    LIFTS_OFF,
     GRID_TURN,
     OUT_OF_RANGE,
     RUN_OF_STEPS,
@@ -38,8 +38,8 @@ from ._flight import (
     flight_tables,
     fly,
     place_on_phasors,
-    take_off,
-    turn_phasors,
+    start_flight,
+    propagate_phasors,
 )
 from ._linear_series import (
     AT_X,
@@ -57,14 +57,14 @@ from ._linear_series import (
 )
 from ._observer import (
     series_peak,
-    tally_flight,
+    observe_flight,
 )
 from ._series import (
     fill_flight_series,
     place_on_series,
 )
 from ._variation import (
-    carry_through_flight,
+    propagate_tangent_flight,
 )
 
 __all__ = [
@@ -72,7 +72,7 @@ __all__ = [
     "AT_Z",
     "CLEAR",
     "COSINE",
-    "DEPARTS",
+    "LIFTS_OFF",
     "FORCE_TERMS",
     "GRID_TURN",
     "LARGEST_BOUND",
@@ -94,7 +94,7 @@ __all__ = [
     "P",
     "base_force",
     "begin_terms",
-    "carry_through_flight",
+    "propagate_tangent_flight",
     "derivative_bound",
     "drive_phasor",
     "fill_base_force",
@@ -109,9 +109,9 @@ __all__ = [
     "read_change",
     "series_peak",
     "shifted",
-    "take_off",
-    "tally_flight",
+    "start_flight",
+    "observe_flight",
     "touched_side",
-    "turn_phasors",
+    "propagate_phasors",
     "write_change",
 ]

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ..kernels import Vector, lean
+from ..kernels import Vector, kernel_without_refcount
 from ..slots import Parameters
 
 
@@ -15,7 +15,7 @@ class Cubic(NamedTuple):
     f3: float
 
 
-@lean
+@kernel_without_refcount
 def base_force(base: Vector, par: Parameters) -> Cubic:
     """Turn the base displacement c0 + c1 tau + c2 tau^2 + c3 tau^3 [m], shape (4,), into force."""
     return Cubic(
@@ -26,7 +26,7 @@ def base_force(base: Vector, par: Parameters) -> Cubic:
     )
 
 
-@lean
+@kernel_without_refcount
 def shifted(force: Cubic, by: float) -> Cubic:
     """Express the same force in the time since ``by``."""
     return Cubic(

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ..kernels import Vector, lean
+from ..kernels import Vector, kernel_without_refcount
 
 LARGEST_BOUND = 1e150
 """Beyond it squares overflow, and nothing can be said about touches [m/s^2]."""
@@ -36,7 +36,7 @@ IMPATIENT = 1e-4
 """... to this part of the stretch."""
 
 
-@lean
+@kernel_without_refcount
 def polynomial_at(series: Vector, tau: float) -> tuple[float, float]:
     """Value and derivative of a polynomial, coefficients ascending, an even number of them.
 
@@ -52,7 +52,7 @@ def polynomial_at(series: Vector, tau: float) -> tuple[float, float]:
     return even + tau * odd, odd + 2.0 * tau * (even_slope + tau * odd_slope)
 
 
-@lean
+@kernel_without_refcount
 def derivative_bound(series: Vector, length: float, derivative: int) -> float:
     """Bound of a derivative of a polynomial on [0, length]; coefficients ascending."""
     bound, power = 0.0, 1.0
@@ -65,7 +65,7 @@ def derivative_bound(series: Vector, length: float, derivative: int) -> float:
     return bound
 
 
-@lean
+@kernel_without_refcount
 def _earliest(gap: float, approach: float, bound: float) -> float:
     """Earliest time [s] at which a gap can close when it closes now at ``approach`` [m/s]."""
     root = math.sqrt(approach * approach + 2.0 * bound * gap)
@@ -74,7 +74,7 @@ def _earliest(gap: float, approach: float, bound: float) -> float:
     return JUST_SHORT * (root - approach) / bound
 
 
-@lean
+@kernel_without_refcount
 def first_contact(
     series: Vector, length: float, lowest: float, highest: float, bound: float, scale: float
 ) -> float:
@@ -118,7 +118,7 @@ def first_contact(
     return NEVER
 
 
-@lean
+@kernel_without_refcount
 def touched_side(p: float, rate: float, lowest: float, highest: float) -> float:
     """Side of the stop that is touched at p: the nearer one, not the one moved towards.
 

@@ -25,7 +25,7 @@ from ..kernels import (
     series_rows,
     steps_ahead,
     sum_now,
-    turn_by,
+    propagate_by,
 )
 from ..model import VX, VY, VZ, Harmonic, Specimen, X, Y, Z, harmonic_motion, modal_form
 from ..slots import Parameters, parameters
@@ -36,7 +36,7 @@ GRID_TURN = LONGEST_TURN
 """Grid step as the fastest rate times its length [rad]: half as long is slower by a seventh."""
 RUN_OF_STEPS = 512
 """Grid steps between two fresh exponentials: keeps the products' rounding below 1e-13."""
-CLEAR, TOUCHES, OUT_OF_RANGE, DEPARTS = range(4)
+CLEAR, TOUCHES, OUT_OF_RANGE, LIFTS_OFF = range(4)
 """How a flight ends; the last: it has surely left the rigid stop on which m1 stood, and goes on."""
 
 
@@ -113,7 +113,7 @@ def fill_base_force(force: Vector, clock: Vector, middle: float, tables: FlightT
 
 
 @inlined
-def take_off(phasors: Complex, state: Vector, clock: Vector, tables: FlightTables) -> None:
+def start_flight(phasors: Complex, state: Vector, clock: Vector, tables: FlightTables) -> None:
     """Write the phasors of the flight that starts from ``state`` now, shape (n+1,)."""
     modes = len(tables.rows)
     drive = drive_phasor(clock, 0.0, tables)
@@ -136,7 +136,7 @@ def take_off(phasors: Complex, state: Vector, clock: Vector, tables: FlightTable
 
 
 @inlined
-def turn_phasors(
+def propagate_phasors(
     turned: Complex, phasors: Complex, later: float, clock: Vector, tables: FlightTables
 ) -> None:
     """Write the phasors ``later`` seconds after take-off, by fresh exponentials."""
@@ -187,7 +187,7 @@ def fly(
     elapsed = 0.0
     while elapsed < longest:
         if elapsed > 0.0:
-            turn_phasors(now, phasors, elapsed, clock, tables)
+            propagate_phasors(now, phasors, elapsed, clock, tables)
         else:
             copy_row(now, phasors)
         reach, bound = begin_terms(terms, now, tables.path, tables)
@@ -213,7 +213,7 @@ def fly(
                 return TOUCHES, elapsed + touch
             if length < h:
                 return CLEAR, longest
-            turn_by(terms, tables.ahead, 1)
+            propagate_by(terms, tables.ahead, 1)
             made += 1
             elapsed = begun + made * h
     return CLEAR, longest

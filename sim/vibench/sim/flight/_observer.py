@@ -5,7 +5,7 @@ exp(-i (omega t + phase)). The peaks are extremes of the motion itself, not of s
 closed form over flights, and by the corrected trapezoidal rule (error ~ step^4) over the steps of contacts.
 """
 
-from ..kernels import Complex, Vector, copy_row, fill_series, inlined, lean, march, sum_now, turn_by
+from ..kernels import Complex, Vector, copy_row, fill_series, inlined, kernel_without_refcount, march, sum_now, propagate_by
 from ..slots import (
     LINE_P_IM,
     LINE_P_RE,
@@ -19,14 +19,14 @@ from ..slots import (
     SECANTS,
 )
 from ._detection import polynomial_at
-from ._flight import RUN_OF_STEPS, FlightTables, begin_terms, turn_phasors
+from ._flight import RUN_OF_STEPS, FlightTables, begin_terms, propagate_phasors
 
 SMALL_EXPONENT = 1e-3
 """Below it (exp(q) - 1)/q is summed as a series, whose fifth term is rounding."""
 
 
 @inlined
-def tally_flight(
+def observe_flight(
     tally: Vector,
     phasors: Complex,
     landed: Complex,
@@ -47,7 +47,7 @@ def tally_flight(
         _add_flight_lines(tally, phasors, landed, length, tables)
 
 
-@lean
+@kernel_without_refcount
 def series_peak(best: float, series: Vector, low: float, high: float) -> float:
     """Largest magnitude of a polynomial on [low, high], which holds at most one extreme."""
     value_low, slope_low = polynomial_at(series, low)
@@ -87,7 +87,7 @@ def _flight_peak(
     h, done = tables.grid, 0.0
     while True:
         if done > 0.0:
-            turn_phasors(now, phasors, done, clock, tables)
+            propagate_phasors(now, phasors, done, clock, tables)
         else:
             copy_row(now, phasors)
         reach, bound = begin_terms(terms, now, shape, tables)
@@ -105,7 +105,7 @@ def _flight_peak(
                 break
             fill_series(series, terms, tables.series)
             best = series_peak(best, series, 0.0, h)
-            turn_by(terms, tables.ahead, 1)
+            propagate_by(terms, tables.ahead, 1)
             made += 1
         done += steps * h
 

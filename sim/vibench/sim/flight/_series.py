@@ -1,13 +1,13 @@
 """Flight as a Taylor series in time: the exact motion over a short stretch, at any instant. SI units."""
 
-from ..kernels import Table, Vector, lean
+from ..kernels import Table, Vector, kernel_without_refcount
 from ..model import VX, VY, VZ, X, Y, Z
 from ..slots import Parameters
 from ._base_force import Cubic
 from ._detection import SERIES_TERMS
 
 
-@lean
+@kernel_without_refcount
 def fill_flight_series(series: Table, path: Vector, state: Vector, force: Cubic, par: Parameters) -> None:
     """Write the coefficients of the motion to ``series`` (terms, 6) and those of p to ``path`` (terms,).
 
@@ -32,7 +32,7 @@ def fill_flight_series(series: Table, path: Vector, state: Vector, force: Cubic,
         path[k + 1] = share * (vy - vz)
 
 
-@lean
+@kernel_without_refcount
 def place_on_series(state: Vector, series: Table, tau: float) -> None:
     """Set the motion of ``state`` to that of the series at ``tau``."""
     for i in range(6):

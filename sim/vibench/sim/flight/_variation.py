@@ -4,13 +4,13 @@ import cmath
 
 import numpy as np
 
-from ..kernels import Table, compiled
+from ..kernels import Table, kernel
 from ..slots import GROWTH, keep_in_range
 from ._flight import FlightTables
 
 
-@compiled
-def carry_through_flight(tangent: Table, length: float, tables: FlightTables) -> None:
+@kernel
+def propagate_tangent_flight(tangent: Table, length: float, tables: FlightTables) -> None:
     """Carry every change over a flight of ``length`` [s], exactly."""
     modes = len(tables.rows)
     turned = np.empty(modes, np.complex128)

@@ -12,9 +12,9 @@ from ._clock import (
 )
 from ._compile import (
     SOURCES as SOURCES,
-    compiled as compiled,
+    kernel as kernel,
     inlined as inlined,
-    lean as lean,
+    kernel_without_refcount as kernel_without_refcount,
 )
 from ._elimination import (
     solve_in_place as solve_in_place,
@@ -25,19 +25,19 @@ from ._orthonormal import (
     orthonormalise as orthonormalise,
 )
 from ._phasor_sum import (
-    AHEAD as AHEAD,
+    STEPS_AHEAD as STEPS_AHEAD,
     fill_series as fill_series,
     march as march,
     series_rows as series_rows,
     steps_ahead as steps_ahead,
     sum_now as sum_now,
-    turn_by as turn_by,
+    propagate_by as propagate_by,
 )
 from ._row import (
     copy_row as copy_row,
 )
 from ._simd import (
-    Lanes as Lanes,
+    SimdVector as SimdVector,
     eight as eight,
     eight_of_eight as eight_of_eight,
     eight_of_sixteen as eight_of_sixteen,

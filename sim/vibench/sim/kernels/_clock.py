@@ -9,13 +9,13 @@ import math
 import numpy as np
 
 from ._arrays import Vector
-from ._compile import compiled, lean
+from ._compile import kernel, kernel_without_refcount
 
 SPLITTER = 134217729.0
 """2^27 + 1: cuts a double into two halves whose products are exact."""
 
 
-@compiled
+@kernel
 def clock_at(time: float) -> Vector:
     """Start a clock."""
     clock = np.zeros(2)
@@ -23,7 +23,7 @@ def clock_at(time: float) -> Vector:
     return clock
 
 
-@lean
+@kernel_without_refcount
 def advance_clock(clock: Vector, by: float) -> None:
     """Let time pass; what the sum rounds off is kept in the low part."""
     high = clock[0]
@@ -34,14 +34,14 @@ def advance_clock(clock: Vector, by: float) -> None:
     clock[1] = low - (clock[0] - total)
 
 
-@lean
+@kernel_without_refcount
 def time_until(clock: Vector, instant: float) -> float:
     """How long it is from now to an instant [s]."""
     left: float = (instant - clock[0]) - clock[1]
     return left
 
 
-@lean
+@kernel_without_refcount
 def angle_at(clock: Vector, later: float, frequency: float) -> float:
     """Phase of a harmonic at clock time plus ``later``, in (-2 pi, 4 pi): whole turns are dropped exactly."""
     turns = frequency * clock[0]

@@ -57,11 +57,11 @@ def _cache_of(kernel: Callable[..., object]) -> Iterator[None]:
 
 _OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """How every kernel is compiled. Nobody calls one as a C function, so that wrapper is left out."""
-_COUNTING, _LEAN = ({**_OPTIONS, "_nrt": counts} for counts in (True, False))
+_COUNTING, _WITHOUT_REFCOUNT = ({**_OPTIONS, "_nrt": counts} for counts in (True, False))
 """With numba's memory and without. Said outright, or a kernel would take after the first that calls it."""
 
 
-def compiled(kernel: Kernel) -> Kernel:
+def kernel(kernel: Kernel) -> Kernel:
     """Compile with numba: cached on disk, without the interpreter lock, IEEE division.
 
     ``error_model="numpy"`` divides as the processor does (x/0 is inf): kernels guard their own
@@ -72,14 +72,14 @@ def compiled(kernel: Kernel) -> Kernel:
         return cast("Kernel", njit(**_COUNTING)(kernel))
 
 
-def lean(kernel: Kernel) -> Kernel:
-    """Compile like `compiled` what makes no array and hands none back.
+def kernel_without_refcount(kernel: Kernel) -> Kernel:
+    """Compile like `kernel` what makes no array and hands none back.
 
     Such a kernel need not count references to the arrays that it is given. Counting is atomic, twice for
     every array of a named tuple in every call: more than half of the time of a step under a power law.
     """
     with _cache_of(kernel):
-        return cast("Kernel", njit(**_LEAN)(kernel))
+        return cast("Kernel", njit(**_WITHOUT_REFCOUNT)(kernel))
 
 
 def inlined(kernel: Kernel) -> Kernel:
@@ -89,4 +89,4 @@ def inlined(kernel: Kernel) -> Kernel:
     twice as long for that alone. What is copied as source has no arguments.
     """
     with _cache_of(kernel):
-        return cast("Kernel", njit(**_LEAN, inline="always")(kernel))
+        return cast("Kernel", njit(**_WITHOUT_REFCOUNT, inline="always")(kernel))

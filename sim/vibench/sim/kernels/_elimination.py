@@ -1,10 +1,10 @@
 """Linear equations with several right-hand sides, for kernels. SI units."""
 
 from ._arrays import Table
-from ._compile import lean
+from ._compile import kernel_without_refcount
 
 
-@lean
+@kernel_without_refcount
 def solve_in_place(equations: Table, size: int, columns: int) -> None:
     """Put the answers in the place of the right-hand sides, by elimination with row exchange.
 

@@ -9,14 +9,14 @@ import math
 import numpy as np
 
 from ._arrays import Table, Vector
-from ._compile import lean
+from ._compile import kernel_without_refcount
 
 PASSES = 2
 LOST = 1e-11
 """A row of which no more than this part is left has no direction of its own any more."""
 
 
-@lean
+@kernel_without_refcount
 def dot(first: Vector, second: Vector, metric: Table) -> float:
     """Inner product first' metric second."""
     total = 0.0
@@ -28,7 +28,7 @@ def dot(first: Vector, second: Vector, metric: Table) -> float:
     return total
 
 
-@lean
+@kernel_without_refcount
 def orthonormalise(rows: Table, metric: Table, logarithms: Vector) -> None:
     """Make ``rows`` orthonormal in place; add the logarithm of what each is divided by to ``logarithms``.
 
@@ -55,7 +55,7 @@ def orthonormalise(rows: Table, metric: Table, logarithms: Vector) -> None:
             row[k] /= length
 
 
-@lean
+@kernel_without_refcount
 def _left_of(rows: Table, i: int, metric: Table) -> float:
     """Take from row ``i`` its part along the rows before, and give the length of what is left."""
     row = rows[i]

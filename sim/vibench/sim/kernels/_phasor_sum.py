@@ -10,22 +10,22 @@ import numpy as np
 
 from ._arrays import Complex, Table, Vector
 from ._compile import inlined
-from ._simd import Lanes, first_outside, sixteen, store
+from ._simd import SimdVector, first_outside, sixteen, store
 
-AHEAD = 16
+STEPS_AHEAD = 16
 """Steps that are seen at once, and terms of a series."""
 REAL, IMAG = range(2)
 
 
 def steps_ahead(rates: Complex, grid: float) -> Table:
     """Give what terms are multiplied with by 1, 2, ... AHEAD steps of ``grid`` [s], shape (n, 2, AHEAD)."""
-    return _rows(np.exp(rates[:, None] * grid * np.arange(1, AHEAD + 1)))
+    return _rows(np.exp(rates[:, None] * grid * np.arange(1, STEPS_AHEAD + 1)))
 
 
 def series_rows(rates: Complex) -> Table:
     """Give the Taylor coefficients of exp(rate t), shape (n, 2, AHEAD)."""
-    factorials = [float(math.factorial(k)) for k in range(AHEAD)]
-    return _rows(rates[:, None] ** np.arange(AHEAD) / factorials)
+    factorials = [float(math.factorial(k)) for k in range(STEPS_AHEAD)]
+    return _rows(rates[:, None] ** np.arange(STEPS_AHEAD) / factorials)
 
 
 def _rows(numbers: Complex) -> Table:
@@ -33,9 +33,9 @@ def _rows(numbers: Complex) -> Table:
 
 
 @inlined
-def sum_of(terms: Complex, rows: Table) -> Lanes:
+def sum_of(terms: Complex, rows: Table) -> SimdVector:
     """Give Re sum terms_j rows_j."""
-    value: Lanes = terms[0].real * sixteen(rows[0], REAL) - terms[0].imag * sixteen(rows[0], IMAG)
+    value: SimdVector = terms[0].real * sixteen(rows[0], REAL) - terms[0].imag * sixteen(rows[0], IMAG)
     for j in range(1, len(terms)):
         value += terms[j].real * sixteen(rows[j], REAL) - terms[j].imag * sixteen(rows[j], IMAG)
     return value
@@ -57,7 +57,7 @@ def fill_series(series: Vector, terms: Complex, rows: Table) -> None:
 
 
 @inlined
-def turn_by(terms: Complex, ahead: Table, steps: int) -> None:
+def propagate_by(terms: Complex, ahead: Table, steps: int) -> None:
     """Turn terms in place by at most AHEAD steps."""
     for j in range(len(terms)):
         terms[j] *= complex(ahead[j, REAL, steps - 1], ahead[j, IMAG, steps - 1])
@@ -70,8 +70,8 @@ def march(terms: Complex, ahead: Table, steps: int, low: float, high: float) -> 
     while made < steps:
         inside = min(first_outside(sum_of(terms, ahead), low, high), steps - made)
         if inside > 0:
-            turn_by(terms, ahead, inside)
+            propagate_by(terms, ahead, inside)
         made += inside
-        if inside < AHEAD:
+        if inside < STEPS_AHEAD:
             break
     return made

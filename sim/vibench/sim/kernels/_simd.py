@@ -23,7 +23,7 @@ _CHAINS = 4
 """Sums of rows that run beside each other, so that no addition waits for the one before."""
 
 
-class Lanes:
+class SimdVector:
     """Eight or sixteen numbers, in a kernel only; a number beside them counts as often."""
 
     def __add__(self, _other: Self | float) -> Self:
@@ -42,19 +42,19 @@ class Lanes:
         raise NotImplementedError
 
 
-class _LanesType(types.Type):
+class _SimdVectorType(types.Type):
     def __init__(self, count: int) -> None:
         self.vector = ir.VectorType(_DOUBLE, count)
         super().__init__(name=f"Lanes({count})")
 
 
-@register_model(_LanesType)
-class _LanesModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, lanes: _LanesType) -> None:
+@register_model(_SimdVectorType)
+class _SimdVectorModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, lanes: _SimdVectorType) -> None:
         super().__init__(manager, lanes, lanes.vector)
 
 
-_EIGHT, _SIXTEEN = _LanesType(8), _LanesType(16)
+_EIGHT, _SIXTEEN = _SimdVectorType(8), _SimdVectorType(16)
 
 
 def _spread(builder: Any, value: Any, vector: Any) -> Any:
@@ -82,7 +82,7 @@ def _is_array(kind: Any) -> bool:
     return isinstance(kind, types.Array) and kind.dtype == types.float64 and kind.layout == "C"
 
 
-def _loading(lanes: _LanesType) -> Any:
+def _loading(lanes: _SimdVectorType) -> Any:
     @intrinsic
     def load(_context: Any, array: Any, row: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
@@ -95,7 +95,7 @@ def _loading(lanes: _LanesType) -> Any:
     return load
 
 
-def _spreading(lanes: _LanesType) -> Any:
+def _spreading(lanes: _SimdVectorType) -> Any:
     @intrinsic
     def spread(_context: Any, value: Any) -> Any:
         def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
@@ -106,7 +106,7 @@ def _spreading(lanes: _LanesType) -> Any:
     return spread
 
 
-def _weighing(lanes: _LanesType, rows: int) -> Any:
+def _weighing(lanes: _SimdVectorType, rows: int) -> Any:
     @intrinsic
     def weigh(_context: Any, table: Any, first: Any, weights: Any) -> Any:  # noqa: ARG001 - numba's names
         def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
@@ -123,7 +123,7 @@ def _weighing(lanes: _LanesType, rows: int) -> Any:
             one, two = (builder.fadd(chains[i], chains[i + 1]) for i in (0, 2))
             return builder.fadd(one, two)
 
-        fits = _is_array(table) and (_is_array(weights) or isinstance(weights, _LanesType))
+        fits = _is_array(table) and (_is_array(weights) or isinstance(weights, _SimdVectorType))
         return (lanes(table, types.intp, weights), code) if fits else None
 
     return weigh
@@ -131,19 +131,19 @@ def _weighing(lanes: _LanesType, rows: int) -> Any:
 
 def _numbers(context: Any, builder: Any, kind: Any, given: Any) -> Callable[[int], Any]:
     """Give what draws single numbers from lanes, or from an array."""
-    if isinstance(kind, _LanesType):
+    if isinstance(kind, _SimdVectorType):
         return lambda place: builder.extract_element(given, _PLACE(place))
     data = context.make_array(kind)(context, builder, given).data
     return lambda place: builder.load(builder.gep(data, [_PLACE(place)]))
 
 
-eight = cast("Callable[[Table | Vector, int], Lanes]", _loading(_EIGHT))
+eight = cast("Callable[[Table | Vector, int], SimdVector]", _loading(_EIGHT))
 """A row of an array with eight columns."""
-sixteen = cast("Callable[[Table | Vector, int], Lanes]", _loading(_SIXTEEN))
+sixteen = cast("Callable[[Table | Vector, int], SimdVector]", _loading(_SIXTEEN))
 """A row of an array with sixteen columns."""
-eights = cast("Callable[[float], Lanes]", _spreading(_EIGHT))
+eights = cast("Callable[[float], SimdVector]", _spreading(_EIGHT))
 """Eight times the same number."""
-Weigh = Callable[[Table, int, Vector | Lanes], Lanes]
+Weigh = Callable[[Table, int, Vector | SimdVector], SimdVector]
 eight_of_eight = cast("Weigh", _weighing(_EIGHT, 8))
 """The sum of eight rows of eight numbers from one on, each times its weight."""
 eight_of_sixteen = cast("Weigh", _weighing(_EIGHT, 16))
@@ -162,7 +162,7 @@ def _store(_context: Any, array: Any, row: Any, lanes: Any) -> Any:  # noqa: ARG
     return types.none(array, types.intp, lanes), code
 
 
-store = cast("Callable[[Table | Vector, int, Lanes], None]", _store)
+store = cast("Callable[[Table | Vector, int, SimdVector], None]", _store)
 """Write to a row of an array with as many columns."""
 
 
@@ -177,7 +177,7 @@ def _root(_context: Any, lanes: Any) -> Any:
     return lanes(lanes), code
 
 
-root = cast("Callable[[Lanes], Lanes]", _root)
+root = cast("Callable[[SimdVector], SimdVector]", _root)
 """Square roots; zero of what is negative."""
 
 
@@ -205,7 +205,7 @@ def _total(_context: Any, lanes: Any) -> Any:
     return types.float64(lanes), code
 
 
-total = cast("Callable[[Lanes], float]", _total)
+total = cast("Callable[[SimdVector], float]", _total)
 """The sum of all, by halves."""
 
 
@@ -225,7 +225,7 @@ def _largest(_context: Any, lanes: Any) -> Any:
     return types.float64(lanes), code
 
 
-largest = cast("Callable[[Lanes], float]", _largest)
+largest = cast("Callable[[SimdVector], float]", _largest)
 """The largest magnitude of all; NaN where one is not a number."""
 
 
@@ -243,7 +243,7 @@ def _first_outside(_context: Any, lanes: Any, low: Any, high: Any) -> Any:  # no
     return types.intp(lanes, types.float64, types.float64), code
 
 
-first_outside = cast("Callable[[Lanes, float, float], int]", _first_outside)
+first_outside = cast("Callable[[SimdVector, float, float], int]", _first_outside)
 """The first lane that is not between two numbers; the count of lanes if all are."""
 
 
@@ -252,7 +252,7 @@ def _give_operator(function: Callable[..., object], name: str) -> None:
 
     def typer(_context: Any) -> Callable[..., object]:
         def typed(one: object, other: object) -> object:
-            found = [each for each in (one, other) if isinstance(each, _LanesType)]
+            found = [each for each in (one, other) if isinstance(each, _SimdVectorType)]
             fits = found and all(each in (found[0], types.float64) for each in (one, other))
             return found[0] if fits else None
 
@@ -263,7 +263,7 @@ def _give_operator(function: Callable[..., object], name: str) -> None:
         return getattr(builder, name)(*(_spread(builder, each, vector) for each in pair))
 
     type_callable(function)(typer)
-    for one, other in ((_LanesType, _LanesType), (_LanesType, types.Float), (types.Float, _LanesType)):
+    for one, other in ((_SimdVectorType, _SimdVectorType), (_SimdVectorType, types.Float), (types.Float, _SimdVectorType)):
         lower_builtin(function, one, other)(lowered)
 
 

@@ -2,8 +2,8 @@ from ._accuracy import (
     Accuracy as Accuracy,
 )
 from ._against_stops import (
-    BaseAnswer as BaseAnswer,
-    base_answer as base_answer,
+    BaseResponse as BaseResponse,
+    base_response as base_response,
 )
 from ._bound_modes import (
     JOIN as JOIN,

@@ -17,7 +17,7 @@ from ._specimen import Specimen
 
 
 @dataclass(frozen=True, eq=False)
-class BaseAnswer:
+class BaseResponse:
     """Phasors per unit of base displacement, each of shape (n,); time goes as exp(+i w t)."""
 
     free_p: Complex
@@ -30,7 +30,7 @@ class BaseAnswer:
     """x over a p that the stops bring about while the base rests."""
 
 
-def base_answer(specimen: Specimen, frequency_hz: ArrayLike) -> BaseAnswer:
+def base_response(specimen: Specimen, frequency_hz: ArrayLike) -> BaseResponse:
     """Answer of x and p at each of the frequencies, shape (n,) [Hz]; zero and above."""
     free = base_transmissibility(specimen, frequency_hz)
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
@@ -41,4 +41,4 @@ def base_answer(specimen: Specimen, frequency_hz: ArrayLike) -> BaseAnswer:
     )
     apart = np.linalg.solve(dynamic, np.array([[0.0], [1.0], [-1.0]]))[:, :, 0]
     lever = apart[:, 0] / (apart[:, 1] - apart[:, 2])
-    return BaseAnswer(free[:, 3], free[:, 0], free[:, 0] - lever * free[:, 3], lever)
+    return BaseResponse(free[:, 3], free[:, 0], free[:, 0] - lever * free[:, 3], lever)

@@ -17,7 +17,7 @@ from ..model import (
     Specimen,
     Sweep,
 )
-from ..slots import IMPACTS, NEXT_SAMPLE, TALLY_SIZE, Record
+from ..slots import IMPACTS, NEXT_SAMPLE, OBSERVATIONS_SIZE, Record
 from ..stepping import advance_harmonic, advance_intervals, harmonic_tables, interval_tables, new_state
 from ._base_motion import BaseMotion, sampled_motion, sweep_interval_s, sweep_motion
 from ._trajectory import Impacts, Trajectory
@@ -187,7 +187,7 @@ def new_record(
         samples=np.zeros((count, 6)),
         impact_times=np.zeros(min(math.ceil(impact_rate_hz * duration_s) + SPARE_IMPACTS, MOST_IMPACTS)),
         counts=np.zeros(2, np.int64),
-        tally=np.zeros(TALLY_SIZE),
+        tally=np.zeros(OBSERVATIONS_SIZE),
         tangent=None,
     )
 

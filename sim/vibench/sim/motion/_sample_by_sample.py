@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..kernels import Table, Vector, compiled
+from ..kernels import Table, Vector, kernel
 from ..model import Accuracy, Sampled, Specimen
 from ..stepping import FAILED, IntervalTables, advance_interval, interval_tables, new_state
 from ._base_motion import sampled_motion
@@ -67,7 +67,7 @@ def follow_samples(
     return FollowedMotion(states[:reached], impacts[: reached - 1], len(states))
 
 
-@compiled
+@kernel
 def _follow(
     state: Vector, pieces: Table, tables: IntervalTables, states: Table, impacts: NDArray[np.int64]
 ) -> int:

@@ -1,13 +1,13 @@
 """Motions that repeat, stable or not: harmonic balance, shooting, their branches, Floquet multipliers.
 
 `first_order_states` is the paper's analytical solution (Gong et al. 2025, eqs. 4 and 5), all branches of
-it; `balance_branch` follows balances of any number of harmonics, `orbit_branch` exact motions with impacts,
+it; `harmonic_balance_branch` follows balances of any number of harmonics, `periodic_branch` exact motions with impacts,
 along frequency or amplitude, through folds (pseudo-arclength continuation). Stability: multipliers of the
 variational equation, which also tell folds, period doublings and Neimark-Sacker points. The spring is a
 `RestoringForce` of p, the rest a linear structure condensed to p (Krack and Gross 2019).
 """
 
-from ._balance_branch import balance_branch
+from ._balance_branch import harmonic_balance_branch
 from ._condensation import (
     structure_of,
 )
@@ -16,7 +16,7 @@ from ._floquet import (
     multipliers,
 )
 from ._orbit_branch import (
-    orbit_branch,
+    periodic_branch,
 )
 from ._restoring_force import (
     PowerSpring,
@@ -28,11 +28,11 @@ from ._shooting import (
 
 __all__ = [
     "PowerSpring",
-    "balance_branch",
+    "harmonic_balance_branch",
     "first_order_states",
     "jump_frequencies",
     "multipliers",
-    "orbit_branch",
+    "periodic_branch",
     "periodic_orbit",
     "spring_of",
     "structure_of",

@@ -115,7 +115,7 @@ def orbit_signs(
     return OrbitSigns(multipliers(transition(structure, spring, motion)), contacts, Symmetry.NONE)
 
 
-def balance_branch(
+def harmonic_balance_branch(
     structure: Structure,
     spring: RestoringForce,
     start: Balance,

@@ -21,7 +21,7 @@ class Parameter(StrEnum):
     """Drive amplitude [m]."""
 
 
-class Happening(StrEnum):
+class BifurcationKind(StrEnum):
     """What a special point of a branch is."""
 
     FOLD = "fold"
@@ -40,7 +40,7 @@ class Happening(StrEnum):
 class BranchEvent:
     """A special point."""
 
-    kind: Happening
+    kind: BifurcationKind
     frequency_hz: float
     amplitude_m: float
     state: Floats

@@ -6,9 +6,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ._branch import Branch, BranchEvent, Happening, Parameter
+from ._branch import Branch, BranchEvent, BifurcationKind, Parameter
 from ._continuation import ArcEnd, ArcPoint, ArcSteps, Curve, correct, locate, trace
-from ._orbit_events import OrbitSigns, happenings_between, sign_of
+from ._orbit_events import OrbitSigns, bifurcations_between, sign_of
 
 Vector = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ class _Gathered:
     reports: list[OrbitReport]
     events: list[BranchEvent]
 
-    def add_event(self, kind: Happening, report: OrbitReport) -> None:
+    def add_event(self, kind: BifurcationKind, report: OrbitReport) -> None:
         last = len(self.reports) - 1
         self.events.append(BranchEvent(kind, report.frequency_hz, report.amplitude_m, report.state, last))
 
@@ -128,13 +128,13 @@ def _follow_at(
             return None, here
         report = family.report(here.point)
         if here.is_fold:
-            gathered.add_event(Happening.FOLD, report)
+            gathered.add_event(BifurcationKind.FOLD, report)
             continue
         if report.left_out > family.tolerance and family.refined(before.point, before.tangent) is not None:
             return None, before
         if here.end is ArcEnd.TOO_MANY_POINTS:
             return here.end, here
-        for kind in happenings_between(signs, report.signs):
+        for kind in bifurcations_between(signs, report.signs):
             _add_located(family, before, here, kind, signs, steps, gathered)
         gathered.reports.append(report)
         if here.end is not None:
@@ -147,7 +147,7 @@ def _add_located(
     family: Family,
     before: ArcPoint,
     after: ArcPoint,
-    kind: Happening,
+    kind: BifurcationKind,
     signs: OrbitSigns,
     steps: ArcSteps,
     gathered: _Gathered,
@@ -159,7 +159,7 @@ def _add_located(
     if found is None:
         return
     report = family.report(found.point)
-    if kind is Happening.NEIMARK_SACKER and not report.signs.has_pair_on_circle:
+    if kind is BifurcationKind.NEIMARK_SACKER and not report.signs.has_pair_on_circle:
         return
     gathered.add_event(kind, report)
 

@@ -85,7 +85,7 @@ class OrbitFamily:
         return None
 
 
-def orbit_branch(
+def periodic_branch(
     orbit: PeriodicOrbit, parameter: Parameter, stop: float, steps: ArcSteps = ORBIT_STEPS
 ) -> Branch:
     """Follow a periodic motion along frequency [Hz] or drive amplitude [m], from where it is to ``stop``.

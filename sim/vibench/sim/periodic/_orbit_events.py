@@ -15,7 +15,7 @@ from enum import StrEnum
 import numpy as np
 
 from ..kernels import Complex
-from ._branch import Happening
+from ._branch import BifurcationKind
 
 COMPLEX_PART = 1e-6
 """A pair with less imaginary part than this is a real pair of product one: no motion is born there."""
@@ -62,25 +62,25 @@ class OrbitSigns:
         return bool(abs(first.imag) > COMPLEX_PART)
 
 
-def happenings_between(before: OrbitSigns, after: OrbitSigns) -> list[Happening]:
+def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[BifurcationKind]:
     """Name what happens between two neighbouring points; folds apart."""
     found = []
     if before.contacts != after.contacts:
-        found.append(Happening.GRAZING)
+        found.append(BifurcationKind.GRAZING)
     if before.flip * after.flip < 0.0:
         is_mirrored = before.symmetry is Symmetry.MIRRORED
-        found.append(Happening.SYMMETRY_BREAKING if is_mirrored else Happening.PERIOD_DOUBLING)
+        found.append(BifurcationKind.SYMMETRY_BREAKING if is_mirrored else BifurcationKind.PERIOD_DOUBLING)
     if before.torus * after.torus < 0.0 and (before.has_pair_on_circle or after.has_pair_on_circle):
-        found.append(Happening.NEIMARK_SACKER)
+        found.append(BifurcationKind.NEIMARK_SACKER)
     return found
 
 
-def sign_of(kind: Happening, here: OrbitSigns, before: OrbitSigns) -> float:
+def sign_of(kind: BifurcationKind, here: OrbitSigns, before: OrbitSigns) -> float:
     """Give the number whose change of sign is the happening."""
     match kind:
-        case Happening.GRAZING:
+        case BifurcationKind.GRAZING:
             return 1.0 if here.contacts == before.contacts else -1.0
-        case Happening.NEIMARK_SACKER:
+        case BifurcationKind.NEIMARK_SACKER:
             return here.torus
         case _:
             return here.flip

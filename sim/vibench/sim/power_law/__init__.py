@@ -29,7 +29,7 @@ from ._smooth import (
     begin_smooth,
 )
 from ._step import (
-    Stride,
+    PowerStepState,
 )
 from ._tables import (
     PowerTables,
@@ -47,7 +47,7 @@ __all__ = [
     "WALL_TURN",
     "PowerSystem",
     "PowerTables",
-    "Stride",
+    "PowerStepState",
     "advance_smooth",
     "advance_under_power",
     "begin_smooth",

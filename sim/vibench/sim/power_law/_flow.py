@@ -11,7 +11,7 @@ from typing import NamedTuple
 from numba.extending import overload
 
 from ..contact import base_force_at, motion_rates
-from ..kernels import Lanes, Vector, inlined
+from ..kernels import SimdVector, Vector, inlined
 from ..model import MOST_TERMS
 from ..slots import Parameters, PowerTerms
 
@@ -49,7 +49,7 @@ def power_force(p: float, power: PowerTerms) -> float:
 
 
 @inlined
-def power_forces(p: Lanes, power: PowerTerms) -> Lanes:
+def power_forces(p: SimdVector, power: PowerTerms) -> SimdVector:
     """Give the force at eight p at once [N]."""
     u = power.inverse_reference * p
     square = u * u

@@ -14,7 +14,7 @@ rounding for the lengths that are used, needs no modes, and loses nothing where 
 from typing import NamedTuple
 
 from ..flight import WIDE, P
-from ..kernels import Table, Vector, eight, inlined, lean, store
+from ..kernels import Table, Vector, eight, inlined, kernel_without_refcount, store
 
 POINTS = 8
 """Gauss's points in a step. With ten a step costs half as much again and is a tenth longer."""
@@ -53,7 +53,7 @@ def _clear(numbers: Table, first: int, last: int) -> None:
             numbers[row, i] = 0.0
 
 
-@lean
+@kernel_without_refcount
 def fill_ends(numbers: Table, length: float, series: StepSeries) -> None:
     """Write what is needed to make a step of ``length`` [s]."""
     _clear(numbers, 0, END_ROWS)
@@ -69,7 +69,7 @@ def fill_ends(numbers: Table, length: float, series: StepSeries) -> None:
         factor *= series.fastest * length
 
 
-@lean
+@kernel_without_refcount
 def fill_inner(numbers: Table, length: float, series: StepSeries) -> None:
     """Write what is needed to know the whole motion at the points of a step."""
     _clear(numbers, END_ROWS, ALL_ROWS)
@@ -83,7 +83,7 @@ def fill_inner(numbers: Table, length: float, series: StepSeries) -> None:
             factor *= series.fastest * length
 
 
-@lean
+@kernel_without_refcount
 def fill_levels(levels: Table, lengths: Vector, series: StepSeries) -> None:
     """Write the numbers of steps of all ``lengths``, shape (levels, ALL_ROWS, WIDE)."""
     for level in range(len(lengths)):

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..flight import AT_X, COSINE, P_RATE, SINE, WIDE, X_RATE, P
-from ..kernels import Table, Vector, compiled, eight, eight_of_eight, lean, store, time_until
+from ..kernels import Table, Vector, kernel, eight, eight_of_eight, kernel_without_refcount, store, time_until
 from ..slots import (
     LINE_P_IM,
     LINE_P_RE,
@@ -25,14 +25,14 @@ from ..slots import (
 )
 from ._flow import power_forces
 from ._numbers import ALL_ROWS, FEED, FREE, GAIN, INNER, MOVE, POINTS, fill_ends
-from ._step import Stride, write_motion
+from ._step import PowerStepState, write_motion
 from ._tables import INSTANT_SLOPES, INSTANT_WEIGHTS, INSTANTS, POINT_WEIGHTS, WEIGHTS, PowerTables
 
 SECANTS = 6
 """To where the motion turns: what is missing then changes no peak."""
 
 
-class Watcher(NamedTuple):
+class PowerObserver(NamedTuple):
     """Workspaces of who watches steps."""
 
     course: Table
@@ -44,10 +44,10 @@ class Watcher(NamedTuple):
     """Of that step."""
 
 
-@compiled
-def new_watcher() -> Watcher:
+@kernel
+def new_power_observer() -> PowerObserver:
     """Make them."""
-    return Watcher(
+    return PowerObserver(
         np.zeros((len(INSTANTS), WIDE)),
         np.zeros(POINTS),
         np.zeros(WIDE),
@@ -55,8 +55,8 @@ def new_watcher() -> Watcher:
     )
 
 
-@lean
-def tally_step(tally: Vector, stride: Stride, numbers: Table, length: float, watcher: Watcher) -> None:
+@kernel_without_refcount
+def observe_step(tally: Vector, stride: PowerStepState, numbers: Table, length: float, watcher: PowerObserver) -> None:
     """Add a step that was tried and found good: its peaks, and its lines by Gauss's sums."""
     course = watcher.course
     motion, force = eight(stride.motion, 0), eight(stride.force, 0)
@@ -78,7 +78,7 @@ def tally_step(tally: Vector, stride: Stride, numbers: Table, length: float, wat
         tally[LINE_P_IM] -= weight * at[P] * at[SINE]
 
 
-@lean
+@kernel_without_refcount
 def _peak(best: float, course: Table, value: int, rate: int, length: float) -> float:
     """Largest magnitude over a step, or ``best`` if that is larger."""
     for i in range(len(INSTANTS)):
@@ -94,7 +94,7 @@ def _peak(best: float, course: Table, value: int, rate: int, length: float) -> f
     return best
 
 
-@lean
+@kernel_without_refcount
 def _turning_value(course: Table, first: int, value: int, rate: int, length: float) -> float:
     """Largest magnitude between an instant and the next, where the rate changes its sign."""
     low, high = INSTANTS[first], INSTANTS[first + 1]
@@ -109,7 +109,7 @@ def _turning_value(course: Table, first: int, value: int, rate: int, length: flo
     return abs(_within_exactly(course, at, value, rate, length))
 
 
-@lean
+@kernel_without_refcount
 def _within(course: Table, at: float, place: int) -> float:
     """Give a number of the motion within a step as the polynomial through the instants."""
     total, norm = 0.0, 0.0
@@ -123,7 +123,7 @@ def _within(course: Table, at: float, place: int) -> float:
     return total / norm
 
 
-@lean
+@kernel_without_refcount
 def _within_exactly(course: Table, at: float, value: int, rate: int, length: float) -> float:
     """Do the same with the rates known as well (Hermite's polynomial)."""
     total, norm = 0.0, 0.0
@@ -139,15 +139,15 @@ def _within_exactly(course: Table, at: float, value: int, rate: int, length: flo
     return total / (norm * norm)
 
 
-@lean
+@kernel_without_refcount
 def sample_step(
-    stride: Stride,
+    stride: PowerStepState,
     clock: Vector,
     length: float,
     power: PowerTerms,
     steps: PowerTables,
     record: Record,
-    watcher: Watcher,
+    watcher: PowerObserver,
 ) -> None:
     """Keep the samples that fall into the step just tried, which begins at clock time."""
     counts, numbers = record.counts, watcher.numbers
@@ -164,8 +164,8 @@ def sample_step(
         counts[NEXT_SAMPLE] += 1
 
 
-@lean
-def _move_within(stride: Stride, ratio: float, power: PowerTerms, watcher: Watcher) -> None:
+@kernel_without_refcount
+def _move_within(stride: PowerStepState, ratio: float, power: PowerTerms, watcher: PowerObserver) -> None:
     """Make the part of a step that the watcher has numbers for; the force is known but for one refinement."""
     guess, motion, numbers = watcher.force, eight(stride.motion, 0), watcher.numbers
     for i in range(POINTS):

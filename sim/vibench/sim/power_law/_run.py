@@ -3,28 +3,28 @@
 import math
 
 from ..flight import FlightTables
-from ..kernels import Table, Vector, advance_clock, compiled, inlined, lean, time_until
+from ..kernels import Table, Vector, advance_clock, kernel, inlined, kernel_without_refcount, time_until
 from ..model import X, Y, Z
 from ..slots import LEVEL, LOST, MODE, NEXT_SAMPLE, NOTHING, REACHED_END, STUCK, PowerTerms, Record
 from ._numbers import fill_ends, fill_inner
-from ._observer import Watcher, new_watcher, sample_step, tally_step
+from ._observer import PowerObserver, new_power_observer, sample_step, observe_step
 from ._step import (
     FIRST_LEVEL,
-    Stride,
+    PowerStepState,
     accept_step,
-    begin_stride,
-    end_stride,
+    begin_power_step,
+    end_power_step,
     level_after,
     level_that_sees,
-    new_stride,
+    new_power_step,
     set_drive,
     try_step,
 )
 from ._tables import LEVELS, PowerTables
-from ._variation import carry_through_power, power_memory
+from ._variation import propagate_tangent_power, power_memory
 
 
-@compiled
+@kernel
 def advance_under_power(
     state: Vector,
     clock: Vector,
@@ -37,13 +37,13 @@ def advance_under_power(
     tangent: Table | None,
 ) -> int:
     """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code."""
-    stride, watcher, memory = new_stride(), new_watcher(), power_memory()
+    stride, watcher, memory = new_power_step(), new_power_observer(), power_memory()
     return _advance(
         state, clock, until, tables, tolerance, record, power, steps, tangent, stride, watcher, memory
     )
 
 
-@lean
+@kernel_without_refcount
 def _advance(
     state: Vector,
     clock: Vector,
@@ -54,13 +54,13 @@ def _advance(
     power: PowerTerms,
     steps: PowerTables,
     tangent: Table | None,
-    stride: Stride,
-    watcher: Watcher,
+    stride: PowerStepState,
+    watcher: PowerObserver,
     memory: Table,
 ) -> int:
     """Do so in the workspaces that are given."""
     level = int(state[LEVEL]) - 1 if state[LEVEL] > 0.0 else FIRST_LEVEL
-    begin_stride(stride, state, power)
+    begin_power_step(stride, state, power)
     set_drive(stride.motion, clock, tables)
     code, left = REACHED_END, time_until(clock, until)
     while left > 0.0:
@@ -76,9 +76,9 @@ def _advance(
         if not misfit <= 1.0:
             level = level_after(level, misfit)
             continue
-        _watch(stride, numbers, length, clock, record, power, steps, watcher)
+        _observe(stride, numbers, length, clock, record, power, steps, watcher)
         if tangent is not None and len(tangent) > 0:
-            carry_through_power(tangent, stride, numbers, power, memory)
+            propagate_tangent_power(tangent, stride, numbers, power, memory)
         accept_step(stride, length)
         if length < left:
             advance_clock(clock, length)
@@ -87,25 +87,25 @@ def _advance(
             clock[0], clock[1] = until, 0.0
         left = time_until(clock, until)
         set_drive(stride.motion, clock, tables)
-    end_stride(stride, state, level)
+    end_power_step(stride, state, level)
     return code
 
 
 @inlined
-def _watch(
-    stride: Stride,
+def _observe(
+    stride: PowerStepState,
     numbers: Table,
     length: float,
     clock: Vector,
     record: Record,
     power: PowerTerms,
     steps: PowerTables,
-    watcher: Watcher,
+    watcher: PowerObserver,
 ) -> None:
     """Observe the step just tried, which begins at clock time."""
     if record.tally[MODE] != NOTHING:
         if numbers is stride.other:
             fill_inner(numbers, length, steps.series)
-        tally_step(record.tally, stride, numbers, length, watcher)
+        observe_step(record.tally, stride, numbers, length, watcher)
     if record.counts[NEXT_SAMPLE] < len(record.samples):
         sample_step(stride, clock, length, power, steps, record, watcher)

@@ -32,7 +32,7 @@ from ..contact import (
     step_factor,
     trial_step,
 )
-from ..kernels import Table, Vector, copy_row, lean
+from ..kernels import Table, Vector, copy_row, kernel_without_refcount
 from ..model import VX, VY, VZ, X, Y, Z
 from ..slots import RATE, ROOT, SCALES, SIDE, STEP, Parameters, PowerTerms
 from ._flow import PowerSystem, power_rates, stiffest_rate
@@ -55,7 +55,7 @@ that would fail are not tried [rad]."""
 SHORTENING, MOST_SHORTENINGS = 0.75, 40
 
 
-@lean
+@kernel_without_refcount
 def begin_smooth(state: Vector) -> None:
     """Set up from the displacements and velocities of ``state``."""
     state[SIDE] = 1.0
@@ -66,14 +66,14 @@ def begin_smooth(state: Vector) -> None:
     sizes[CZ], sizes[CVX], sizes[CVZ] = abs(state[Z]), abs(state[VX]), abs(state[VZ])
 
 
-@lean
+@kernel_without_refcount
 def _gather(work: Table, state: Vector, tau: float) -> None:
     at = work[POINT]
     at[W], at[R], at[CX], at[CZ] = state[ROOT], state[RATE], state[X], state[Z]
     at[CVX], at[CVZ], at[T], at[WIDTH - 1] = state[VX], state[VZ], tau, 0.0
 
 
-@lean
+@kernel_without_refcount
 def _scatter(work: Table, state: Vector) -> None:
     at = work[POINT]
     state[ROOT], state[RATE] = at[W], at[R]
@@ -81,7 +81,7 @@ def _scatter(work: Table, state: Vector) -> None:
     state[Y], state[VY] = at[CZ] + at[W], at[CVZ] + at[R]
 
 
-@lean
+@kernel_without_refcount
 def _widen_sizes(sizes: Vector, at: Vector, fading: float, push: float, par: Parameters) -> None:
     """Bring the recent sizes up to date with the point reached."""
     for i in range(MOTIONS):
@@ -94,7 +94,7 @@ def _widen_sizes(sizes: Vector, at: Vector, fading: float, push: float, par: Par
     sizes[R], sizes[CVX], sizes[CVZ] = max(sizes[R], fast), max(sizes[CVX], fast), max(sizes[CVZ], fast)
 
 
-@lean
+@kernel_without_refcount
 def smooth_error(work: Table, step: float, sizes: Vector, tolerance: float) -> float:
     """Error of the step just tried, over what is allowed: root mean square of all six motions.
 
@@ -119,7 +119,7 @@ def smooth_error(work: Table, step: float, sizes: Vector, tolerance: float) -> f
     return error
 
 
-@lean
+@kernel_without_refcount
 def _short_of_the_wall(step: float, at: Vector, par: Parameters, power: PowerTerms) -> float:
     """Shorten a step until it would turn the stiffest spring on its way by `WALL_TURN` at most.
 
@@ -135,7 +135,7 @@ def _short_of_the_wall(step: float, at: Vector, par: Parameters, power: PowerTer
     return step
 
 
-@lean
+@kernel_without_refcount
 def _largest_push(force: Vector, half: float) -> float:
     """Bound of the base force on a stretch of twice ``half`` about its middle."""
     push, power = 0.0, 1.0
@@ -145,7 +145,7 @@ def _largest_push(force: Vector, half: float) -> float:
     return push
 
 
-@lean
+@kernel_without_refcount
 def advance_smooth(
     state: Vector,
     tau: float,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..flight import AT_X, AT_Z, COSINE, P_RATE, SINE, WIDE, X_RATE, Z_RATE, FlightTables, P, drive_phasor
-from ..kernels import Table, Vector, compiled, eight, eight_of_eight, eights, inlined, largest, store, total
+from ..kernels import Table, Vector, kernel, eight, eight_of_eight, eights, inlined, largest, store, total
 from ..model import VX, VY, VZ, X, Y, Z
 from ..slots import LEVEL, SCALES, SIDE, Parameters, PowerTerms
 from ._flow import power_force, power_forces, stiffest_rate
@@ -46,7 +46,7 @@ NO_COURSE = 0.0
 """Length of the last step where there is none."""
 
 
-class Stride(NamedTuple):
+class PowerStepState(NamedTuple):
     """Where a run stands between two steps, and workspaces."""
 
     motion: Vector
@@ -70,10 +70,10 @@ class Stride(NamedTuple):
 PUSH_NOW, PUSH_AHEAD, LAST_LENGTH = range(3)
 
 
-@compiled
-def new_stride() -> Stride:
+@kernel
+def new_power_step() -> PowerStepState:
     """Make the memory of a run."""
-    return Stride(
+    return PowerStepState(
         np.zeros(WIDE),
         np.zeros(WIDE),
         np.zeros(POINTS),
@@ -86,7 +86,7 @@ def new_stride() -> Stride:
 
 
 @inlined
-def begin_stride(stride: Stride, state: Vector, power: PowerTerms) -> None:
+def begin_power_step(stride: PowerStepState, state: Vector, power: PowerTerms) -> None:
     """Stand at a state; the drive's phase is not its concern."""
     motion = stride.motion
     motion[P], motion[P_RATE] = state[Y] - state[Z], state[VY] - state[VZ]
@@ -105,8 +105,8 @@ def write_motion(out: Vector, motion: Vector) -> None:
 
 
 @inlined
-def end_stride(stride: Stride, state: Vector, level: int) -> None:
-    """Leave a state behind from which `begin_stride` goes on."""
+def end_power_step(stride: PowerStepState, state: Vector, level: int) -> None:
+    """Leave a state behind from which `begin_power_step` goes on."""
     write_motion(state, stride.motion)
     state[SIDE], state[LEVEL] = 1.0, level + 1.0
     state[SIZE_P], state[SIZE_X], state[SIZE_Z] = stride.sizes[0], stride.sizes[1], stride.sizes[2]
@@ -140,7 +140,7 @@ def level_that_sees(
 
 
 @inlined
-def _guess_force(stride: Stride, length: float) -> None:
+def _guess_force(stride: PowerStepState, length: float) -> None:
     """Guess F in a step of ``length`` [s]: its course in the last one goes on."""
     course, last = stride.course, stride.push[LAST_LENGTH]
     if last == NO_COURSE:
@@ -154,7 +154,7 @@ def _guess_force(stride: Stride, length: float) -> None:
 
 
 @inlined
-def _keep_course(stride: Stride, length: float) -> None:
+def _keep_course(stride: PowerStepState, length: float) -> None:
     """Remember how F went in the step just made."""
     end = stride.push[PUSH_AHEAD] * eight(COURSE, POINTS)
     store(stride.course, 0, end + eight_of_eight(COURSE, 0, stride.force))
@@ -162,7 +162,7 @@ def _keep_course(stride: Stride, length: float) -> None:
 
 
 @inlined
-def substitute(stride: Stride, numbers: Table, weight: float, close: float, power: PowerTerms) -> bool:
+def substitute(stride: PowerStepState, numbers: Table, weight: float, close: float, power: PowerTerms) -> bool:
     """Find the force at the points of a step from its guess; false when it does not settle, or overflows.
 
     ``weight`` says how far a newton moves p over the step [m/N], ``close`` how far is nothing.
@@ -183,7 +183,7 @@ def substitute(stride: Stride, numbers: Table, weight: float, close: float, powe
 
 
 @inlined
-def largest_unseen(stride: Stride) -> float:
+def largest_unseen(stride: PowerStepState) -> float:
     """Size against which errors count: of the smallest of the three displacements, up to the step's end."""
     motion, ahead, sizes = stride.motion, stride.ahead, stride.sizes
     p = max(sizes[0], abs(motion[P]), abs(ahead[P]))
@@ -195,7 +195,7 @@ def largest_unseen(stride: Stride) -> float:
 
 @inlined
 def try_step(
-    stride: Stride, numbers: Table, length: float, tolerance: float, par: Parameters, power: PowerTerms
+    stride: PowerStepState, numbers: Table, length: float, tolerance: float, par: Parameters, power: PowerTerms
 ) -> float:
     """Try a step and write where it leads to ``stride.ahead``; gives its misfit over what is allowed."""
     motion, ahead, force = stride.motion, stride.ahead, stride.force
@@ -217,7 +217,7 @@ def try_step(
 
 
 @inlined
-def accept_step(stride: Stride, length: float) -> None:
+def accept_step(stride: PowerStepState, length: float) -> None:
     """Stand where the step just tried has led; the drive's phase is to be set."""
     motion, ahead, sizes = stride.motion, stride.ahead, stride.sizes
     sizes[0] = _widen(sizes[0], motion[P], ahead[P])

@@ -8,18 +8,18 @@ anew, and what holds for the step, such as being symplectic without damping, hol
 import numpy as np
 
 from ..flight import read_change, write_change
-from ..kernels import Table, compiled, eight, eight_of_eight, inlined, lean, solve_in_place, store
+from ..kernels import Table, kernel, eight, eight_of_eight, inlined, kernel_without_refcount, solve_in_place, store
 from ..model import MOST_TERMS
 from ..slots import UNITS, PowerTerms, keep_in_range
 from ._flow import whole_power
 from ._numbers import FEED, FREE, GAIN, MOVE, POINTS
-from ._step import Stride
+from ._step import PowerStepState
 
 SLOPES, BEFORE, AFTER, EQUATIONS = range(4)
 """Rows of the memory: the law's slopes, a change at the step's start and at its end, and the equations."""
 
 
-@compiled
+@kernel
 def power_memory() -> Table:
     """Memory that one run hands to every step."""
     return np.zeros((EQUATIONS + POINTS, POINTS + UNITS))
@@ -39,9 +39,9 @@ def power_stiffness(p: float, power: PowerTerms) -> float:
     return result
 
 
-@lean
-def carry_through_power(
-    tangent: Table, stride: Stride, numbers: Table, power: PowerTerms, memory: Table
+@kernel_without_refcount
+def propagate_tangent_power(
+    tangent: Table, stride: PowerStepState, numbers: Table, power: PowerTerms, memory: Table
 ) -> None:
     """Carry every change over the step just tried and found good."""
     slopes, before, after, equations = memory[SLOPES], memory[BEFORE], memory[AFTER], memory[EQUATIONS:]

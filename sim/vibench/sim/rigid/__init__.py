@@ -14,12 +14,12 @@ from ._stop import (
     rebound,
 )
 from ._variation import (
-    carry_through_impact,
+    propagate_tangent_impact,
 )
 
 __all__ = [
     "RESOLVED",
-    "carry_through_impact",
+    "propagate_tangent_impact",
     "closed_gap",
     "is_resolved",
     "place_between_rigid_stops",

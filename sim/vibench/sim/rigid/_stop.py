@@ -11,7 +11,7 @@ import math
 
 from ..contact import gap_of
 from ..flight import ROUNDING, TOUCH
-from ..kernels import Vector, lean
+from ..kernels import Vector, kernel_without_refcount
 from ..model import VX, VY, VZ, X, Y, Z
 from ..slots import CLOSED, SIDE, Parameters
 
@@ -22,20 +22,20 @@ LARGEST_PART = 1e-3
 """... and of the room between the stops that gap may be this part."""
 
 
-@lean
+@kernel_without_refcount
 def closed_gap(scale: float, par: Parameters) -> float:
     """How far from a stop m1 counts as touching it [m]; ``scale`` as in `vibench.sim.flight`."""
     closed: float = TOUCH * min(par.lower, par.upper) + ROUNDING * scale
     return closed
 
 
-@lean
+@kernel_without_refcount
 def is_resolved(closed: float, par: Parameters) -> bool:
     """Whether m1 between its stops can be told from m1 on one of them: not where p is rounding."""
     return closed < LARGEST_PART * (par.lower + par.upper)
 
 
-@lean
+@kernel_without_refcount
 def press_on(side: float, state: Vector, par: Parameters) -> float:
     """Acceleration with which m1 is pressed on the stop at its side, d2|p|/dt2 if the stop were not [m/s^2].
 
@@ -47,7 +47,7 @@ def press_on(side: float, state: Vector, par: Parameters) -> float:
     return press
 
 
-@lean
+@kernel_without_refcount
 def place_on_stop(state: Vector, side: float, rate: float, par: Parameters) -> None:
     """Put m1 exactly on a stop, with ``rate`` = d|p|/dt [m/s]; the pair keeps its centre and its momentum."""
     gap = side * gap_of(side, par)
@@ -59,7 +59,7 @@ def place_on_stop(state: Vector, side: float, rate: float, par: Parameters) -> N
     state[VY] = state[VZ] + side * rate
 
 
-@lean
+@kernel_without_refcount
 def rebound(state: Vector, side: float, par: Parameters, restitution: float, tolerance: float) -> None:
     """Strike a rigid stop; ``state[SIDE]`` says whether m1 stays on it.
 
@@ -73,7 +73,7 @@ def rebound(state: Vector, side: float, par: Parameters, restitution: float, tol
     hold_if_pressed(state, side, par, restitution, tolerance)
 
 
-@lean
+@kernel_without_refcount
 def hold_if_pressed(
     state: Vector, side: float, par: Parameters, restitution: float, tolerance: float
 ) -> None:
@@ -92,7 +92,7 @@ def hold_if_pressed(
         state[SIDE] = side
 
 
-@lean
+@kernel_without_refcount
 def place_between_rigid_stops(state: Vector, par: Parameters, restitution: float, tolerance: float) -> None:
     """Decide whether a motion that is given starts held by a stop; one beyond a stop is put on it."""
     p = state[Y] - state[Z]

@@ -14,27 +14,27 @@ dv+ = -rho dv- + (rho a- + a+) dx- / v-. At a grazing impact, v = 0, no derivati
 import math
 
 from ..contact import SLOWEST_TOUCH
-from ..kernels import Table, Vector, lean
+from ..kernels import Table, Vector, kernel_without_refcount
 from ..model import VX, VY, VZ, X, Y, Z
 from ..slots import SIDE, Parameters, keep_in_range
 
 
-@lean
+@kernel_without_refcount
 def _free_pull(state: Vector, par: Parameters) -> float:
     """Force that m0 puts on m2 [N]."""
     pull: float = par.k2 * (state[Z] - state[X]) + par.c2 * (state[VZ] - state[VX])
     return pull
 
 
-@lean
+@kernel_without_refcount
 def _free_inner(state: Vector, par: Parameters) -> float:
     """Force of the spring and damper between m1 and m2 [N]."""
     inner: float = par.k1 * (state[Y] - state[Z]) + par.c1 * (state[VY] - state[VZ])
     return inner
 
 
-@lean
-def carry_through_impact(
+@kernel_without_refcount
+def propagate_tangent_impact(
     tangent: Table, before: Vector, after: Vector, par: Parameters, restitution: float
 ) -> None:
     """Carry every change through an impact from the state ``before`` to the state ``after``."""
@@ -63,7 +63,7 @@ def carry_through_impact(
         keep_in_range(change)
 
 
-@lean
+@kernel_without_refcount
 def _hold(change: Vector, par: Parameters) -> None:
     """Join m1 and m2, whose centre goes on: on a stop that holds m1 no change of p is left."""
     share = par.reduced_mass / par.mass2

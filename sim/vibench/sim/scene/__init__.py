@@ -13,7 +13,7 @@ from ._plan import (
 from ._prediction import (
     Method,
     MotionKind,
-    Prediction,
+    ScenePrediction,
 )
 from ._scene import (
     AutomaticDuration,
@@ -32,7 +32,7 @@ __all__ = [
     "Method",
     "MotionKind",
     "Observable",
-    "Prediction",
+    "ScenePrediction",
     "Rest",
     "Scene",
     "ScenePlan",

@@ -19,12 +19,12 @@ import numpy as np
 
 from ..kernels import Floats
 from ..model import Accuracy, Outcome, PowerLaw, Specimen
-from ._followed_run import FollowedRun, Stretch, Watch
+from ._followed_run import FollowedRun, Stretch, ObservedQuantities
 from ._observed_window import (
     ObservedWindow,
     follow_strobed,
     states_of,
-    watch_window,
+    observe_window,
     whole_periods,
     window_of,
 )
@@ -111,7 +111,7 @@ def run_for(run: FollowedRun, duration_s: float, window_s: float, pace: Pace) ->
     last = _last_section(run, duration_s - window_s, pace)
     if pace.repeats([last]) is None:
         run.carry_tangent()
-    window = watch_window(run, window_s)
+    window = observe_window(run, window_s)
     return judged(run, window, [last], pace, f"the {duration_s:g} s asked for are over")
 
 
@@ -196,7 +196,7 @@ def run_until_settled(run: FollowedRun, window_s: float, longest_s: float, pace:
         if not late:
             run.carry_tangent()
         starts.append(run.apart())
-        late.append(follow_strobed(run, end_s, Watch.PEAKS_AND_LINES))
+        late.append(follow_strobed(run, end_s, ObservedQuantities.PEAKS_AND_LINES))
     before = late or early
     return _observed(run, before, starts, in_window, pace, f"it has not settled within {longest_s:g} s")
 
@@ -212,7 +212,7 @@ def _observe_period(run: FollowedRun, repeats: Repetition, pace: Pace) -> SceneR
     """Observe one period of a motion that repeats."""
     settled_s, begins = run.time_s, run.apart()
     end_s = settled_s + repeats.period / pace.frequency_hz
-    one = follow_strobed(run, end_s, Watch.PEAKS_AND_LINES)
+    one = follow_strobed(run, end_s, ObservedQuantities.PEAKS_AND_LINES)
     window = window_of(begins, [one], [one.peak_x_m])
     seen = judged(run, window, [], pace, f"it repeats after {repeats.period} drive period(s)")
     if run.outcome is not Outcome.REACHED_END:

@@ -32,7 +32,7 @@ from ..slots import (
 from ..stepping import advance_harmonic, harmonic_tables, new_state
 
 
-class Watch(Enum):
+class ObservedQuantities(Enum):
     """What is observed of a stretch."""
 
     NOTHING = NOTHING
@@ -123,7 +123,7 @@ class FollowedRun:
         self._tangent = np.zeros((1, TANGENT_SIZE))
         self._tangent[0, :GROWTH] = self._scales * np.linspace(1.0, 2.0, GROWTH)
 
-    def follow(self, until_s: float, watch: Watch = Watch.NOTHING, samples: Samples | None = None) -> Stretch:
+    def follow(self, until_s: float, watch: ObservedQuantities = ObservedQuantities.NOTHING, samples: Samples | None = None) -> Stretch:
         """Advance to an instant; a run that has failed stays where it is."""
         start_s, before = self.time_s, self._size()
         kept = Samples(start_s, 1.0, 0) if samples is None else samples

@@ -9,7 +9,7 @@ from ._prediction import Method
 from ._scatter import MEMBERS
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
 
-FORGOTTEN = 1e-9
+DECAYED_SHARE = 1e-9
 """Share of the response that the start may still have where the steady motion stands for it."""
 
 CLOSED_FORM_S = 5e-4
@@ -68,9 +68,9 @@ def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
     return ScenePlan(method, sentences, _cost_s(scene, motion, method), motion.largest_p_m)
 
 
-def forgotten_s(motion: LinearMotion) -> float:
+def transient_decay_s(motion: LinearMotion) -> float:
     """When the start has no share in a motion without contact any more; infinite if never."""
-    return motion.died_away_s(FORGOTTEN)
+    return motion.died_away_s(DECAYED_SHARE)
 
 
 def _method(specimen: Specimen, motion: LinearMotion, duration: FixedDuration | AutomaticDuration) -> Method:
@@ -81,7 +81,7 @@ def _method(specimen: Specimen, motion: LinearMotion, duration: FixedDuration | 
             by_s = duration.duration_s - duration.window_s
         case _, AutomaticDuration():
             by_s = duration.longest_s - 1.0 / motion.drive.frequency_hz
-    is_proved = never_touches(specimen, motion) and forgotten_s(motion) <= by_s
+    is_proved = never_touches(specimen, motion) and transient_decay_s(motion) <= by_s
     return Method.CLOSED_FORM if is_proved else Method.EVENT_DRIVEN
 
 

@@ -37,7 +37,7 @@ class Method(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class ScenePrediction:
     """Responses of one scene and all that is needed to judge them. None where it was not asked, or not found.
 
     Responses are over the drive amplitude, those called relative are of p = y - z.

@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..exponents import LyapunovEstimate, Precision, largest_exponent
+from ..exponents import LyapunovEstimate, Precision, lyapunov_exponent
 from ..kernels import Floats
 from ..model import Accuracy, Outcome
 from ._fixed_run import Pace, SceneRun, pace_of, run_for, run_until_settled
-from ._followed_run import FollowedRun, Watch
+from ._followed_run import FollowedRun, ObservedQuantities
 from ._linear_motion import LinearMotion, linear_motion
 from ._observed_window import ObservedWindow, samples_between, states_of, whole_periods
-from ._plan import forgotten_s, plan_of
-from ._prediction import Method, MotionKind, Prediction, State
+from ._plan import transient_decay_s, plan_of
+from ._prediction import Method, MotionKind, ScenePrediction, State
 from ._scatter import WindowScatter, response_ensemble, window_scatter
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
 
@@ -67,7 +67,7 @@ def _tolerances(accuracy: Accuracy) -> tuple[float, float]:
 
 def _responses(run: FollowedRun, length_s: float) -> Floats:
     """Largest x and p and both lines over a stretch, shape (4,); NaN if the run was lost."""
-    seen = run.follow(run.time_s + length_s, Watch.PEAKS_AND_LINES)
+    seen = run.follow(run.time_s + length_s, ObservedQuantities.PEAKS_AND_LINES)
     if run.outcome is not Outcome.REACHED_END:
         return np.full(4, np.nan)
     scale = 2.0 / length_s
@@ -120,7 +120,7 @@ EXPONENT_S = 25.0
 EXPONENT_PRECISION = Precision(absolute_per_s=0.2, relative=0.01)
 
 
-def solve_scene(scene: Scene) -> Prediction:
+def solve_scene(scene: Scene) -> ScenePrediction:
     """Run a scene as planned, and say what was seen and how far to trust it.
 
     ``error_estimate`` is how far, relatively, Response I of another run of the same scene at a far stricter
@@ -142,7 +142,7 @@ def solve_scene(scene: Scene) -> Prediction:
     return _followed(scene, plan.method, motion)
 
 
-def _in_closed_form(scene: Scene, motion: LinearMotion) -> Prediction:
+def _in_closed_form(scene: Scene, motion: LinearMotion) -> ScenePrediction:
     """Give the steady motion without contact."""
     amplitude, period_s = scene.drive.amplitude_m, 1.0 / scene.drive.frequency_hz
     settled_s: float | None = None
@@ -150,12 +150,12 @@ def _in_closed_form(scene: Scene, motion: LinearMotion) -> Prediction:
         case FixedDuration(duration_s=duration_s, window_s=window_s):
             ended = f"the {duration_s:g} s asked for are over"
         case AutomaticDuration():
-            settled_s, window_s = forgotten_s(motion), period_s
+            settled_s, window_s = transient_decay_s(motion), period_s
             duration_s = settled_s + period_s
             ended = "it repeats after 1 drive period(s)"
     x, p = abs(motion.steady_x) / amplitude, abs(motion.steady_p) / amplitude
     has_exponent = Observable.LYAPUNOV in scene.observe
-    found = Prediction(
+    found = ScenePrediction(
         frequency_hz=scene.drive.frequency_hz,
         amplitude_m=amplitude,
         response_i=x,
@@ -190,7 +190,7 @@ def _in_closed_form(scene: Scene, motion: LinearMotion) -> Prediction:
     return found
 
 
-def _followed(scene: Scene, method: Method, motion: LinearMotion) -> Prediction:
+def _followed(scene: Scene, method: Method, motion: LinearMotion) -> ScenePrediction:
     """Follow the motion in time, and judge it."""
     tolerance = scene.accuracy.tolerance
     run = FollowedRun(scene.specimen, scene.drive, tolerance, scene.start.state)
@@ -200,7 +200,7 @@ def _followed(scene: Scene, method: Method, motion: LinearMotion) -> Prediction:
     error = _integration_error(scene.accuracy, seen, run, pace) if is_whole else None
     drawn = _between_windows(seen) if is_whole else None
     exponent = _exponent(scene, run) if is_whole and Observable.LYAPUNOV in scene.observe else None
-    found = Prediction(
+    found = ScenePrediction(
         frequency_hz=scene.drive.frequency_hz,
         amplitude_m=amplitude,
         response_i=window.largest_x_m / amplitude if is_whole else None,
@@ -288,7 +288,7 @@ def _exponent(scene: Scene, run: FollowedRun) -> LyapunovEstimate:
     phase = math.fmod(
         2.0 * math.pi * math.fmod(drive.frequency_hz * run.time_s, 1.0) + drive.phase_rad, 2.0 * math.pi
     )
-    return largest_exponent(
+    return lyapunov_exponent(
         scene.specimen,
         replace(drive, phase_rad=phase),
         scene.accuracy,
@@ -299,7 +299,7 @@ def _exponent(scene: Scene, run: FollowedRun) -> LyapunovEstimate:
     )
 
 
-def _with_pictures(scene: Scene, found: Prediction, seen: SceneRun) -> Prediction:
+def _with_pictures(scene: Scene, found: ScenePrediction, seen: SceneRun) -> ScenePrediction:
     """Add the section and the spectrum where they were asked for."""
     window = seen.window
     if Observable.POINCARE in scene.observe:

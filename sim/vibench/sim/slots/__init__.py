@@ -18,7 +18,7 @@ from ._observed import (
     PEAKS,
     PEAKS_AND_LINES,
     SECANTS,
-    TALLY_SIZE,
+    OBSERVATIONS_SIZE,
 )
 from ._parameters import (
     CLOSED,
@@ -85,7 +85,7 @@ __all__ = [
     "STATE_SIZE",
     "STEP",
     "STUCK",
-    "TALLY_SIZE",
+    "OBSERVATIONS_SIZE",
     "TANGENT_SIZE",
     "TOO_MANY_IMPACTS",
     "UNITS",

@@ -6,7 +6,7 @@ closed form over flights, and by the corrected trapezoidal rule (error ~ step^4)
 """
 
 MODE, PEAK_X, PEAK_P, LINE_X_RE, LINE_X_IM, LINE_P_RE, LINE_P_IM = range(7)
-TALLY_SIZE = 7
+OBSERVATIONS_SIZE = 7
 NOTHING, PEAKS, PEAKS_AND_LINES = 0.0, 1.0, 2.0
 """What ``tally[MODE]`` asks for."""
 SECANTS = 4

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from ..kernels import Table, Vector, lean
+from ..kernels import Table, Vector, kernel_without_refcount
 
 GROWTH = 6
 """Column of the factor's logarithm: the change itself is exp(row[GROWTH]) * row[:6]."""
@@ -34,7 +34,7 @@ def derivative_of(tangent: Table) -> Table:
     return np.asarray((np.exp(tangent[:, GROWTH, None]) * tangent[:, :GROWTH]).T)
 
 
-@lean
+@kernel_without_refcount
 def keep_in_range(change: Vector) -> None:
     """Move a factor that has become very large or small into the logarithm."""
     size = 0.0

@@ -5,7 +5,7 @@ Harmonic drives go from event to event (`advance_harmonic`); other drives are cu
 the base is a cubic, U(tau) = c0 + c1 tau + c2 tau^2 + c3 tau^3 [m]
 (docs/decisions/0004-contact-integration.md). The face is for programs that step a specimen inside a loop of
 their own, as the virtual rig does: tables once, a state, then one call an interval, also from a compiled
-kernel (`compiled`). Tables may be shared by threads.
+kernel (`kernel`). Tables may be shared by threads.
 
 >>> import numpy as np
 >>> from vibench.sim import gong2025
@@ -44,15 +44,15 @@ from ._substep import (
     IntervalTables,
 )
 from ._workspace import (
-    Room,
-    room_for,
+    Workspace,
+    workspace_for,
 )
 
 __all__ = [
     "FAILED",
     "HarmonicTables",
     "IntervalTables",
-    "Room",
+    "Workspace",
     "advance_by_law",
     "advance_harmonic",
     "advance_interval",
@@ -62,5 +62,5 @@ __all__ = [
     "interval_tables",
     "new_state",
     "place_on_its_side",
-    "room_for",
+    "workspace_for",
 ]

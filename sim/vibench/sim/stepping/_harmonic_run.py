@@ -10,13 +10,13 @@ power law, no rigid stop and no tangent. To compile all of them took twice as lo
 
 from ..collision import CollisionTables
 from ..flight import FlightTables
-from ..kernels import Table, Vector, lean
+from ..kernels import Table, Vector, kernel_without_refcount
 from ..power_law import PowerTables, advance_under_power
 from ..slots import PowerTerms, Record
 from ..sticking import HeldTables
 from ._harmonic_tables import HarmonicTables
 from ._stops_run import advance_between_stops
-from ._workspace import Room, room_for
+from ._workspace import Workspace, workspace_for
 
 
 def advance_harmonic(
@@ -27,13 +27,13 @@ def advance_harmonic(
     tangent = record.tangent
     if power is not None and steps is not None:
         return advance_under_power(state, clock, until, flight, tolerance, record, power, steps, tangent)
-    room = room_for(len(flight.rates), record.tally, tangent)
+    room = workspace_for(len(flight.rates), record.tally, tangent)
     return advance_between_stops(
         state, clock, until, flight, tolerance, record, held, collisions, tangent, room
     )
 
 
-@lean
+@kernel_without_refcount
 def advance_by_law(
     state: Vector,
     clock: Vector,
@@ -46,7 +46,7 @@ def advance_by_law(
     held: HeldTables | None,
     collisions: CollisionTables | None,
     tangent: Table | None,
-    room: Room,
+    room: Workspace,
 ) -> int:
     """Do the same within a kernel; what may be None is given once more.
 

@@ -19,12 +19,12 @@ from scipy.linalg import expm
 
 from ..contact import begin_contact
 from ..flight import LONGEST_TURN, base_force, shifted
-from ..kernels import Table, Vector, compiled, lean
+from ..kernels import Table, Vector, kernel, kernel_without_refcount
 from ..model import VX, VY, VZ, Accuracy, Specimen, X, Y, Z, state_matrix
 from ..power_law import begin_smooth
 from ..rigid import place_between_rigid_stops
 from ..slots import SIDE, STATE_SIZE, Parameters, PowerTerms, parameters, power_terms
-from ._substep import FAILED, IntervalTables, advance_part, carry_if_clear
+from ._substep import FAILED, IntervalTables, advance_substep, advance_if_clear
 
 CUBIC_TERMS = 4
 INSIDE = 1e-9
@@ -114,7 +114,7 @@ def _refuse_inside_a_stop(state: Vector, specimen: Specimen) -> None:
         raise ValueError(msg)
 
 
-@lean
+@kernel_without_refcount
 def place_on_its_side(
     state: Vector, par: Parameters, power: PowerTerms | None, restitution: float | None, tolerance: float
 ) -> None:
@@ -129,7 +129,7 @@ def place_on_its_side(
         begin_contact(state, math.copysign(1.0, p), par, tolerance)
 
 
-@compiled
+@kernel
 def advance_interval(state: Vector, base: Vector, tables: IntervalTables) -> int:
     """Advance ``state`` in place over one interval and count the impacts that begin in it.
 
@@ -141,15 +141,15 @@ def advance_interval(state: Vector, base: Vector, tables: IntervalTables) -> int
     for piece in range(tables.pieces):
         if piece > 0:
             force = shifted(force, tables.length)
-        if not carry_if_clear(state, force, tables):
-            fresh = advance_part(state, force, tables.length, tables, np.empty(0))
+        if not advance_if_clear(state, force, tables):
+            fresh = advance_substep(state, force, tables.length, tables, np.empty(0))
             if fresh < 0:
                 return FAILED
             impacts += fresh
     return impacts
 
 
-@lean
+@kernel_without_refcount
 def base_reaction(state: Vector, displacement: float, velocity: float, tables: IntervalTables) -> float:
     """Force that the specimen puts on its base, k0 (x - U) + c0 (vx - dU/dt) [N]."""
     par = tables.par

@@ -5,15 +5,15 @@ import math
 import numpy as np
 
 from ..flight import Cubic, base_force, shifted
-from ..kernels import Table, Vector, advance_clock, compiled, copy_row, lean, time_until
+from ..kernels import Table, Vector, advance_clock, kernel, copy_row, kernel_without_refcount, time_until
 from ..slots import IMPACTS, LOST, NEXT_SAMPLE, REACHED_END, TOO_MANY_IMPACTS, Record
-from ._substep import IntervalTables, advance_part, carry_if_clear
+from ._substep import IntervalTables, advance_substep, advance_if_clear
 
 ALMOST = 1.0 - 1e-12
 """An interval is whole although its length, cut into pieces and joined, rounds differently."""
 
 
-@lean
+@kernel_without_refcount
 def advance_intervals(
     state: Vector,
     clock: Vector,
@@ -55,7 +55,7 @@ def advance_intervals(
     return REACHED_END
 
 
-@lean
+@kernel_without_refcount
 def _advance_step(
     state: Vector,
     clock: Vector,
@@ -69,8 +69,8 @@ def _advance_step(
     kept = counts[IMPACTS]
     _sample(state, clock, force, length, tables, record)
     fresh = 0
-    if not (is_whole and carry_if_clear(state, force, tables)):
-        fresh = advance_part(state, force, length, tables, times[kept:])
+    if not (is_whole and advance_if_clear(state, force, tables)):
+        fresh = advance_substep(state, force, length, tables, times[kept:])
     if fresh < 0:
         return LOST
     counts[IMPACTS] = min(kept + fresh, len(times))
@@ -82,13 +82,13 @@ def _advance_step(
     return REACHED_END
 
 
-@lean
+@kernel_without_refcount
 def _base_force(base: Vector, at: float, tables: IntervalTables) -> Cubic:
     """k0 U + c0 dU/dt as a cubic in the time since ``at``."""
     return shifted(base_force(base, tables.par), at)
 
 
-@compiled
+@kernel
 def _sample(
     state: Vector, clock: Vector, force: Cubic, length: float, tables: IntervalTables, record: Record
 ) -> None:
@@ -100,6 +100,6 @@ def _sample(
             return
         shadow = state.copy()
         if later > 0.0:
-            advance_part(shadow, force, later, tables, np.empty(0))
+            advance_substep(shadow, force, later, tables, np.empty(0))
         copy_row(record.samples[counts[NEXT_SAMPLE]], shadow)
         counts[NEXT_SAMPLE] += 1

@@ -7,33 +7,33 @@ import math
 
 import numpy as np
 
-from ..collision import CollisionTables, carry_through_collision, collide, tally_collision
+from ..collision import CollisionTables, propagate_tangent_collision, collide, observe_collision
 from ..contact import (
     HELD,
     LEFT,
     LOG_COLUMNS,
     NOT_FINITE,
     advance_contact,
-    carry_through_steps,
+    propagate_tangent_steps,
     gap_of,
-    tally_contact,
+    observe_contact,
 )
 from ..flight import (
     CLEAR,
-    DEPARTS,
+    LIFTS_OFF,
     OUT_OF_RANGE,
     FlightTables,
-    carry_through_flight,
+    propagate_tangent_flight,
     fill_base_force,
     fly,
     place_on_phasors,
-    take_off,
-    tally_flight,
-    turn_phasors,
+    start_flight,
+    observe_flight,
+    propagate_phasors,
 )
-from ..kernels import Complex, Table, Vector, advance_clock, compiled, copy_row, inlined, lean, time_until
+from ..kernels import Complex, Table, Vector, advance_clock, kernel, copy_row, inlined, kernel_without_refcount, time_until
 from ..model import X, Y, Z
-from ..rigid import carry_through_impact, is_resolved
+from ..rigid import propagate_tangent_impact, is_resolved
 from ..slots import (
     CLOSED,
     IMPACTS,
@@ -48,12 +48,12 @@ from ..slots import (
     Parameters,
     Record,
 )
-from ..sticking import HeldTables, closed_for, departure, hold, place_held, tally_held
-from ._touch import strike
-from ._workspace import Room
+from ..sticking import HeldTables, closed_for, lift_off, hold, place_held, observe_held
+from ._touch import contact_onset
+from ._workspace import Workspace
 
 
-@lean
+@kernel_without_refcount
 def sample_flight(
     phasors: Complex, now: Complex, clock: Vector, length: float, tables: FlightTables, record: Record
 ) -> None:
@@ -63,12 +63,12 @@ def sample_flight(
         later = time_until(clock, record.start + counts[NEXT_SAMPLE] / record.sample_rate)
         if later > length:
             return
-        turn_phasors(now, phasors, later, clock, tables)
+        propagate_phasors(now, phasors, later, clock, tables)
         place_on_phasors(record.samples[counts[NEXT_SAMPLE]], now, tables)
         counts[NEXT_SAMPLE] += 1
 
 
-@compiled
+@kernel
 def sample_contact(
     shadow: Vector,
     clock: Vector,
@@ -100,7 +100,7 @@ STRETCH_TURN = 0.3
 its middle, whose first term left out is 0.15^8/8! = 6e-12 of the force."""
 
 
-@lean
+@kernel_without_refcount
 def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases and their ends are one loop
     state: Vector,
     clock: Vector,
@@ -111,7 +111,7 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
     held: HeldTables | None,
     collisions: CollisionTables | None,
     tangent: Table | None,
-    room: Room,
+    room: Workspace,
 ) -> int:
     """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code.
 
@@ -129,15 +129,15 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
         if not math.isfinite(state[X] + state[Y] + state[Z]):
             return LOST
         if state[SIDE] == 0.0:
-            take_off(phasors, state, clock, tables)
+            start_flight(phasors, state, clock, tables)
             ends, length = _fly_on(phasors, now, workspace, series, clock, longest, tables, held)
             if ends == OUT_OF_RANGE:
                 return LOST
-            turn_phasors(landed, phasors, length, clock, tables)
+            propagate_phasors(landed, phasors, length, clock, tables)
             if record.tally[MODE] != NOTHING:
-                tally_flight(record.tally, phasors, landed, now, workspace, series, clock, length, tables)
+                observe_flight(record.tally, phasors, landed, now, workspace, series, clock, length, tables)
             if tangent is not None and len(tangent) > 0:
-                carry_through_flight(tangent, length, tables)
+                propagate_tangent_flight(tangent, length, tables)
             if counts[NEXT_SAMPLE] < len(record.samples):
                 sample_flight(phasors, now, clock, length, tables, record)
             place_on_phasors(state, landed, tables)
@@ -145,7 +145,7 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
                 clock[0], clock[1] = until, 0.0
                 continue
             advance_clock(clock, length)
-            if ends == DEPARTS:
+            if ends == LIFTS_OFF:
                 continue
             if counts[IMPACTS] == len(record.impact_times):
                 return TOO_MANY_IMPACTS
@@ -154,9 +154,9 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
             copy_row(shadow, state)
             if held is not None:
                 state[CLOSED] = closed_for(landed, tables)
-            strike(state, tables.par, tables.par.restitution, tolerance)
+            contact_onset(state, tables.par, tables.par.restitution, tolerance)
             if held is not None:
-                _carry_through_impact(tangent, shadow, state, tables.par, tables.par.restitution)
+                _propagate_tangent_impact(tangent, shadow, state, tables.par, tables.par.restitution)
         elif held is not None:
             ends, length = _stay_held(state, clock, longest, series, record, held, tangent)
             if ends == OUT_OF_RANGE:
@@ -171,7 +171,7 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
             if collisions is not None:
                 length = collide(state, clock, longest, tolerance, tables, collisions, room.collision)
                 if length > 0.0:
-                    _watch_collision(
+                    _observe_collision_in_full(
                         shadow, clock, length, tables, tolerance, record, collisions, tangent, room
                     )
                     advance_clock(clock, length)
@@ -185,9 +185,9 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
             if code not in (LEFT, HELD):
                 return STUCK
             if record.tally[MODE] != NOTHING:
-                tally_contact(record.tally, log, clock, tables)
+                observe_contact(record.tally, log, clock, tables)
             if tangent is not None and len(tangent) > 0:
-                carry_through_steps(tangent, log, tables.par, memory)
+                propagate_tangent_steps(tangent, log, tables.par, memory)
             if counts[NEXT_SAMPLE] < len(record.samples):
                 sample_contact(shadow, clock, length, force, middle, tables, tolerance, work, record)
             if length >= longest:
@@ -211,14 +211,14 @@ def _fly_on(
     if held is not None:
         if not is_resolved(closed_for(phasors, tables), tables.par):
             return OUT_OF_RANGE, 0.0
-        leaves = departure(phasors, terms, series, tables)
+        leaves = lift_off(phasors, terms, series, tables)
         if leaves > 0.0:
-            return (DEPARTS, leaves) if leaves < longest else (CLEAR, longest)
+            return (LIFTS_OFF, leaves) if leaves < longest else (CLEAR, longest)
     return fly(phasors, now, terms, series, clock, longest, tables)
 
 
 @inlined
-def _watch_collision(
+def _observe_collision_in_full(
     shadow: Vector,
     clock: Vector,
     length: float,
@@ -227,29 +227,29 @@ def _watch_collision(
     record: Record,
     collisions: CollisionTables,
     tangent: Table | None,
-    room: Room,
+    room: Workspace,
 ) -> None:
     """Observe a collision that began in the state ``shadow`` at clock time."""
     par, collision = tables.par, room.collision
     if record.tally[MODE] != NOTHING:
         gap = gap_of(shadow[SIDE], par)
-        tally_collision(record.tally, collision, length, gap, tables.omega, collisions)
+        observe_collision(record.tally, collision, length, gap, tables.omega, collisions)
     if tangent is not None and len(tangent) > 0:
-        carry_through_collision(tangent, collision, length, par, collisions, room.equations)
+        propagate_tangent_collision(tangent, collision, length, par, collisions, room.equations)
     if record.counts[NEXT_SAMPLE] < len(record.samples):
         fill_base_force(room.force, clock, 0.5 * length, tables)
         sample_contact(shadow, clock, length, room.force, 0.5 * length, tables, tolerance, room.work, record)
 
 
-@lean
-def _carry_through_impact(
+@kernel_without_refcount
+def _propagate_tangent_impact(
     tangent: Table | None, before: Vector, after: Vector, par: Parameters, restitution: float | None
 ) -> None:
     if tangent is not None and restitution is not None:
-        carry_through_impact(tangent, before, after, par, restitution)
+        propagate_tangent_impact(tangent, before, after, par, restitution)
 
 
-@compiled
+@kernel
 def _stay_held(
     state: Vector,
     clock: Vector,
@@ -264,15 +264,15 @@ def _stay_held(
     terms, side, first = len(flight.rates), state[SIDE], record.counts[NEXT_SAMPLE]
     phasors, now = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
     landed, workspace = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
-    take_off(phasors, state, clock, flight)
+    start_flight(phasors, state, clock, flight)
     ends, length = hold(side, phasors, now, workspace, series, clock, longest, flight, held.pulls)
     if ends == OUT_OF_RANGE:
         return ends, length
-    turn_phasors(landed, phasors, length, clock, flight)
-    tally_flight(record.tally, phasors, landed, now, workspace, series, clock, length, flight)
-    tally_held(record.tally, side, clock, length, flight)
+    propagate_phasors(landed, phasors, length, clock, flight)
+    observe_flight(record.tally, phasors, landed, now, workspace, series, clock, length, flight)
+    observe_held(record.tally, side, clock, length, flight)
     if tangent is not None and len(tangent) > 0:
-        carry_through_flight(tangent, length, flight)
+        propagate_tangent_flight(tangent, length, flight)
     sample_flight(phasors, now, clock, length, flight, record)
     for row in range(first, record.counts[NEXT_SAMPLE]):
         record.samples[row, Y] += side * gap_of(side, flight.par)

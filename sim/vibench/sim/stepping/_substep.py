@@ -8,7 +8,7 @@ import numpy as np
 from ..contact import HELD, LEFT, LOG_COLUMNS, contact_workspace
 from ..flight import (
     CLEAR,
-    DEPARTS,
+    LIFTS_OFF,
     FORCE_TERMS,
     LARGEST_BOUND,
     NEVER,
@@ -21,14 +21,14 @@ from ..flight import (
     place_on_series,
     shifted,
 )
-from ..kernels import Table, Vector, compiled, lean
+from ..kernels import Table, Vector, kernel, kernel_without_refcount
 from ..model import VX, VY, VZ, X, Y, Z
 from ..rigid import closed_gap, is_resolved
 from ..slots import CLOSED, SIDE, Parameters, PowerTerms
-from ..sticking import hold_on_series, time_to_depart
-from ._touch import advance_touching, strike
+from ..sticking import hold_on_series, time_to_lift_off
+from ._touch import advance_touching, contact_onset
 
-MOST_PHASES_IN_A_PIECE = 100_000
+MOST_PHASES_IN_A_SUBSTEP = 100_000
 """Flights and contacts: far beyond any motion of a specimen, chatter on rigid stops included. A search that
 reaches it has lost its way."""
 FAILED = -1
@@ -51,7 +51,7 @@ class IntervalTables(NamedTuple):
     tolerance: float
 
 
-@lean
+@kernel_without_refcount
 def acceleration_bound(state: Vector, force: Cubic, tables: IntervalTables) -> float:
     """Bound of abs(d2p/dt2) over one piece in flight, from the energy at its start [m/s^2].
 
@@ -65,28 +65,28 @@ def acceleration_bound(state: Vector, force: Cubic, tables: IntervalTables) -> f
     return tables.bound_per_root_energy * (math.sqrt(kinetic + elastic) + h * push / math.sqrt(par.mass0))
 
 
-@lean
-def carry_if_clear(state: Vector, force: Cubic, tables: IntervalTables) -> bool:
+@kernel_without_refcount
+def advance_if_clear(state: Vector, force: Cubic, tables: IntervalTables) -> bool:
     """Carry a flight across one piece, or leave ``state`` alone when a touch cannot be excluded."""
     if state[SIDE] != 0.0:
         return False
     h, step = tables.length, tables.transition
     margin = acceleration_bound(state, force, tables) * h * h / 8.0
     low, high = margin - tables.par.lower, tables.par.upper - margin
-    y = _carried(step, 1, state, force)
-    z = _carried(step, 2, state, force)
+    y = _advanced(step, 1, state, force)
+    z = _advanced(step, 2, state, force)
     if not (low < state[Y] - state[Z] < high and low < y - z < high):
         return False
-    x = _carried(step, 0, state, force)
-    vx = _carried(step, 3, state, force)
-    vy = _carried(step, 4, state, force)
-    vz = _carried(step, 5, state, force)
+    x = _advanced(step, 0, state, force)
+    vx = _advanced(step, 3, state, force)
+    vy = _advanced(step, 4, state, force)
+    vz = _advanced(step, 5, state, force)
     state[X], state[Y], state[Z], state[VX], state[VY], state[VZ] = x, y, z, vx, vy, vz
     return True
 
 
-@lean
-def _carried(step: Table, i: int, s: Vector, force: Cubic) -> float:
+@kernel_without_refcount
+def _advanced(step: Table, i: int, s: Vector, force: Cubic) -> float:
     """One row of the transition: a component of the state one piece later."""
     free: float = (step[i, 0] * s[0] + step[i, 1] * s[1] + step[i, 2] * s[2]) + (
         step[i, 3] * s[3] + step[i, 4] * s[4] + step[i, 5] * s[5]
@@ -97,8 +97,8 @@ def _carried(step: Table, i: int, s: Vector, force: Cubic) -> float:
     return free + forced
 
 
-@compiled
-def advance_part(state: Vector, force: Cubic, length: float, tables: IntervalTables, times: Vector) -> int:
+@kernel
+def advance_substep(state: Vector, force: Cubic, length: float, tables: IntervalTables, times: Vector) -> int:
     """Advance over ``length`` [s], at most a piece, through every touch and every contact in it.
 
     Impact times (since the start of the piece) go to ``times`` while there is room. Returns the
@@ -106,7 +106,7 @@ def advance_part(state: Vector, force: Cubic, length: float, tables: IntervalTab
     """
     work, series, path = contact_workspace(), np.empty((SERIES_TERMS, 6)), np.empty(SERIES_TERMS)
     tau, impacts = 0.0, 0
-    for _ in range(MOST_PHASES_IN_A_PIECE):
+    for _ in range(MOST_PHASES_IN_A_SUBSTEP):
         if state[SIDE] != 0.0:
             code, tau = _stay_on_stop(
                 state, force, tau, length, tables, tables.par.restitution, work, series, path
@@ -115,7 +115,7 @@ def advance_part(state: Vector, force: Cubic, length: float, tables: IntervalTab
                 return impacts
             if code != LEFT:
                 return FAILED
-        ends, tau = _fly_part(state, force, tau, length, tables, tables.par.restitution, series, path)
+        ends, tau = _fly_substep(state, force, tau, length, tables, tables.par.restitution, series, path)
         if ends == CLEAR:
             return impacts
         if ends == OUT_OF_RANGE:
@@ -124,11 +124,11 @@ def advance_part(state: Vector, force: Cubic, length: float, tables: IntervalTab
             if impacts < len(times):
                 times[impacts] = tau
             impacts += 1
-            strike(state, tables.par, tables.par.restitution, tables.tolerance)
+            contact_onset(state, tables.par, tables.par.restitution, tables.tolerance)
     return FAILED
 
 
-@compiled
+@kernel
 def _stay_on_stop(
     state: Vector,
     force: Cubic,
@@ -156,8 +156,8 @@ def _stay_on_stop(
     )
 
 
-@lean
-def _fly_part(
+@kernel_without_refcount
+def _fly_substep(
     state: Vector,
     force: Cubic,
     tau: float,
@@ -180,10 +180,10 @@ def _fly_part(
         state[CLOSED] = closed_gap(scale, par)
         if not is_resolved(state[CLOSED], par):
             return OUT_OF_RANGE, tau
-        leaves = time_to_depart(path, left, state[CLOSED], par)
+        leaves = time_to_lift_off(path, left, state[CLOSED], par)
         if leaves > 0.0:
             place_on_series(state, series, leaves)
-            return (DEPARTS, tau + leaves) if leaves < left else (CLEAR, length)
+            return (LIFTS_OFF, tau + leaves) if leaves < left else (CLEAR, length)
     touch = first_contact(path, left, par.lower, par.upper, bound, scale)
     place_on_series(state, series, left if touch == NEVER else touch)
     return (CLEAR, length) if touch == NEVER else (TOUCHES, tau + touch)

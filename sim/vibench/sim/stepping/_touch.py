@@ -2,15 +2,15 @@
 
 from ..contact import advance_contact, begin_contact
 from ..flight import touched_side
-from ..kernels import Table, Vector, lean
+from ..kernels import Table, Vector, kernel_without_refcount
 from ..model import VY, VZ, Y, Z
 from ..power_law import PowerSystem, advance_smooth
 from ..rigid import rebound
 from ..slots import Parameters, PowerTerms
 
 
-@lean
-def strike(state: Vector, par: Parameters, restitution: float | None, tolerance: float) -> None:
+@kernel_without_refcount
+def contact_onset(state: Vector, par: Parameters, restitution: float | None, tolerance: float) -> None:
     """Touch the stop that m1 has come to; the state is placed on it."""
     side = touched_side(state[Y] - state[Z], state[VY] - state[VZ], par.lower, par.upper)
     if restitution is not None:
@@ -19,7 +19,7 @@ def strike(state: Vector, par: Parameters, restitution: float | None, tolerance:
         begin_contact(state, side, par, tolerance)
 
 
-@lean
+@kernel_without_refcount
 def advance_touching(
     state: Vector,
     tau: float,

@@ -7,11 +7,11 @@ import numpy as np
 from ..collision import Collision, collision_memory, new_collision
 from ..contact import contact_workspace, log_for, tangent_workspace
 from ..flight import FORCE_TERMS
-from ..kernels import AHEAD, Complex, Table, Vector
+from ..kernels import STEPS_AHEAD, Complex, Table, Vector
 from ..slots import STATE_SIZE
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Workspaces of a run."""
 
     phasors: Complex
@@ -28,14 +28,14 @@ class Room(NamedTuple):
     equations: Table
 
 
-def room_for(terms: int, tally: Vector, tangent: Table | None) -> Room:
+def workspace_for(terms: int, tally: Vector, tangent: Table | None) -> Workspace:
     """Make the memory of a run whose flights have so many terms."""
-    return Room(
+    return Workspace(
         np.zeros(terms, np.complex128),
         np.zeros(terms, np.complex128),
         np.zeros(terms, np.complex128),
         np.zeros(terms, np.complex128),
-        np.zeros(AHEAD),
+        np.zeros(STEPS_AHEAD),
         np.zeros(FORCE_TERMS),
         contact_workspace(),
         np.zeros(STATE_SIZE),

@@ -7,8 +7,8 @@ searched.
 
 from ._lift_off import (
     closed_for,
-    departure,
-    time_to_depart,
+    lift_off,
+    time_to_lift_off,
 )
 from ._sticking import (
     HeldTables,
@@ -16,17 +16,17 @@ from ._sticking import (
     hold,
     hold_on_series,
     place_held,
-    tally_held,
+    observe_held,
 )
 
 __all__ = [
     "HeldTables",
     "closed_for",
-    "departure",
+    "lift_off",
     "held_tables",
     "hold",
     "hold_on_series",
     "place_held",
-    "tally_held",
-    "time_to_depart",
+    "observe_held",
+    "time_to_lift_off",
 ]

@@ -12,7 +12,7 @@ crossed to the other stop.
 import math
 
 from ..flight import FlightTables, derivative_bound
-from ..kernels import Complex, Vector, fill_series, lean
+from ..kernels import Complex, Vector, fill_series, kernel_without_refcount
 from ..rigid import RESOLVED, closed_gap
 from ..slots import Parameters
 
@@ -23,8 +23,8 @@ NEARLY = 0.99
 """Part of the least time to the other stop: the speed at the start, which is rounding, is in the rest."""
 
 
-@lean
-def time_to_depart(series: Vector, length: float, closed: float, par: Parameters) -> float:
+@kernel_without_refcount
+def time_to_lift_off(series: Vector, length: float, closed: float, par: Parameters) -> float:
     """Time for which m1 surely leaves the stop on which it stands [s]; 0 where it does not stand on one.
 
     ``series`` is p as in `vibench.sim.flight.first_contact` from the start of the flight,
@@ -55,7 +55,7 @@ def time_to_depart(series: Vector, length: float, closed: float, par: Parameters
     return min(length, across, max(sure, SHORTEST_PART * length))
 
 
-@lean
+@kernel_without_refcount
 def closed_for(phasors: Complex, tables: FlightTables) -> float:
     """How far from a stop m1 counts as touching it in a flight with these phasors [m]."""
     reach = 0.0
@@ -64,10 +64,10 @@ def closed_for(phasors: Complex, tables: FlightTables) -> float:
     return closed_gap(reach, tables.par)
 
 
-@lean
-def departure(phasors: Complex, terms: Complex, series: Vector, tables: FlightTables) -> float:
-    """Find how long a flight from these phasors surely leaves a stop [s]; see `time_to_depart`."""
+@kernel_without_refcount
+def lift_off(phasors: Complex, terms: Complex, series: Vector, tables: FlightTables) -> float:
+    """Find how long a flight from these phasors surely leaves a stop [s]; see `time_to_lift_off`."""
     for j in range(len(phasors)):
         terms[j] = phasors[j] * tables.path[j]
     fill_series(series, terms, tables.series)
-    return time_to_depart(series, tables.grid, closed_for(phasors, tables), tables.par)
+    return time_to_lift_off(series, tables.grid, closed_for(phasors, tables), tables.par)

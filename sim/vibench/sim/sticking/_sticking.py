@@ -28,9 +28,9 @@ from ..flight import (
     first_contact,
     place_on_phasors,
     place_on_series,
-    turn_phasors,
+    propagate_phasors,
 )
-from ..kernels import Complex, Table, Vector, fill_series, lean, march, series_rows, steps_ahead, sum_now
+from ..kernels import Complex, Table, Vector, fill_series, kernel_without_refcount, march, series_rows, steps_ahead, sum_now
 from ..model import PULL, RATE, ROW, SHAPE, VX, VY, VZ, X, Y, Z
 from ..slots import LINE_P_IM, LINE_P_RE, MODE, NOTHING, PEAK_P, PEAKS_AND_LINES, SIDE, Parameters
 
@@ -65,7 +65,7 @@ def held_tables(tables: FlightTables, bound: Complex) -> HeldTables:
     return HeldTables(flight, bound[:, PULL].copy())
 
 
-@lean
+@kernel_without_refcount
 def hold(
     side: float,
     phasors: Complex,
@@ -83,7 +83,7 @@ def hold(
     par, elapsed = held.par, 0.0
     weight, spring = -side / par.mass2, par.k1 * gap_of(side, par) / par.reduced_mass
     while elapsed < longest:
-        turn_phasors(now, phasors, elapsed, clock, held)
+        propagate_phasors(now, phasors, elapsed, clock, held)
         reach, bound = spring, 0.0
         for j in range(len(now)):
             terms[j] = weight * now[j] * pulls[j]
@@ -107,15 +107,15 @@ def hold(
     return CLEAR, longest
 
 
-@lean
+@kernel_without_refcount
 def place_held(state: Vector, side: float, phasors: Complex, held: FlightTables) -> None:
     """Write the motion of the phasors to ``state``, m1 on its stop."""
     place_on_phasors(state, phasors, held)
     state[Y] = state[Z] + side * gap_of(side, held.par)
 
 
-@lean
-def tally_held(tally: Vector, side: float, clock: Vector, length: float, held: FlightTables) -> None:
+@kernel_without_refcount
+def observe_held(tally: Vector, side: float, clock: Vector, length: float, held: FlightTables) -> None:
     """Add what the constant p does to its peak and line; `vibench.sim.flight.tally_flight` does the
     rest.
     """
@@ -133,7 +133,7 @@ def tally_held(tally: Vector, side: float, clock: Vector, length: float, held: F
         tally[LINE_P_IM] += line.imag
 
 
-@lean
+@kernel_without_refcount
 def hold_on_series(
     series: Table, path: Vector, state: Vector, force: Cubic, length: float, par: Parameters
 ) -> float:
@@ -155,7 +155,7 @@ def hold_on_series(
     return free
 
 
-@lean
+@kernel_without_refcount
 def _fill_held_series(series: Table, path: Vector, state: Vector, force: Cubic, par: Parameters) -> None:
     """Taylor coefficients of the bound motion, and of minus the pull that presses m1 on its stop [m/s^2]."""
     for i in range(6):

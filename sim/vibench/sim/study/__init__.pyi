@@ -17,11 +17,11 @@ from ._layout import (
     PointState as PointState,
 )
 from ._plausibility_warnings import (
-    doubts as doubts,
+    plausibility_warnings as plausibility_warnings,
 )
 from ._progress import (
     StudyProgress as StudyProgress,
-    Watcher as Watcher,
+    StudyObserver as StudyObserver,
 )
 from ._results import (
     StudyResults as StudyResults,
@@ -35,7 +35,7 @@ from ._software import (
     software as software,
 )
 from ._solve import (
-    Existing as Existing,
+    ExistingStudy as ExistingStudy,
     solve_study as solve_study,
 )
 from ._store import (
@@ -45,7 +45,7 @@ from ._structure import (
     Structure as Structure,
 )
 from ._study import (
-    Kept as Kept,
+    StudyObservable as StudyObservable,
     Start as Start,
     Study as Study,
 )

@@ -3,12 +3,12 @@
 import numpy as np
 
 from ..model import Accuracy, Outcome
-from ..scene import Method, MotionKind, Prediction
+from ..scene import Method, MotionKind, ScenePrediction
 from ._arrays import Arrays
 from ._columns import ENDED, FINAL_STATE, METHOD, MOTION, NUMBERS, OUTCOME, TEXT_BYTES, Cell
 
 
-def cells_of(prediction: Prediction) -> dict[str, Cell]:
+def cells_of(prediction: ScenePrediction) -> dict[str, Cell]:
     """Turn a prediction into cells; what was not asked, or not found, stays missing."""
     numbers = {column.name: getattr(prediction, field) for field, column in NUMBERS.items()}
     known: dict[str, Cell] = {name: value for name, value in numbers.items() if value is not None}
@@ -23,11 +23,11 @@ def cells_of(prediction: Prediction) -> dict[str, Cell]:
 
 def prediction_at(
     arrays: Arrays, number: int, frequency_hz: float, amplitude_m: float, accuracy: Accuracy, start: str
-) -> Prediction:
+) -> ScenePrediction:
     """Make the prediction of a point from its cells and from what the study says of it."""
     numbers = {field: _number(arrays[column.name][number]) for field, column in NUMBERS.items()}
     x, y, z, vx, vy, vz = (float(value) for value in arrays[FINAL_STATE][number].astype(np.float64))
-    return Prediction(
+    return ScenePrediction(
         **numbers,  # type: ignore[arg-type]
         frequency_hz=frequency_hz,
         amplitude_m=amplitude_m,

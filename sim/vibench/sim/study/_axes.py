@@ -48,7 +48,7 @@ MODEL = "model"
 
 
 @dataclass(frozen=True)
-class Axis:
+class StudyAxis:
     """One dimension of a study's arrays."""
 
     name: str
@@ -64,6 +64,6 @@ class Axis:
         return bool(self.units)
 
 
-def grid_of(axes: tuple[Axis, ...]) -> Grid:
+def grid_of(axes: tuple[StudyAxis, ...]) -> Grid:
     """Grid over these axes, the last one running fastest."""
     return Grid(tuple(len(axis.values) for axis in axes), tuple(axis.is_ordered for axis in axes))

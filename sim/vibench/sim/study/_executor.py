@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..scene import Prediction, Scene
+from ..scene import ScenePrediction, Scene
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Bundle:
 class Solved:
     """The answer to one scene, and what it cost."""
 
-    prediction: Prediction
+    prediction: ScenePrediction
     taken_s: float
     """Processor time of the thread that computed it [s]; NaN when compiling was part of it."""
 
@@ -72,7 +72,7 @@ class Executor(Protocol):
         """Let go of every worker. Legal at any time."""
 
 
-Solver = Callable[[Scene], Prediction]
+Solver = Callable[[Scene], ScenePrediction]
 Kind = tuple[object, ...]
 
 _solved_before: set[Kind] = set()

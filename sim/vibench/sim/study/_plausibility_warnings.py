@@ -9,7 +9,7 @@ MOST_GAPS = 1000.0
 _MICRO = 1e-6
 
 
-def doubts(study: Study) -> Iterator[str]:
+def plausibility_warnings(study: Study) -> Iterator[str]:
     """Say what looks wrong; the study can be solved all the same."""
     largest_m, narrowest_m = study.amplitudes_m[-1], study.gaps_m[0]
     if largest_m > MOST_GAPS * narrowest_m:

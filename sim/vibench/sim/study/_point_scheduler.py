@@ -60,7 +60,7 @@ NOBODY = -1
 """Predecessor of a point that depends on none."""
 
 
-class Agenda:
+class PointScheduler:
     """The work that is left, in the order in which it should begin.
 
     Starting the longest first keeps all workers busy to the end; a point counts with the planned time of

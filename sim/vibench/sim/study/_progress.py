@@ -20,7 +20,7 @@ class StudyProgress:
     """Until everything has an answer, as far as can be told; None before the first answer."""
 
 
-Watcher = Callable[[StudyProgress], None]
+StudyObserver = Callable[[StudyProgress], None]
 """Told in the thread that runs the study, after every batch of answers."""
 Cancelled = Callable[[], bool]
 """Asked in the thread that runs the study, several times a second."""

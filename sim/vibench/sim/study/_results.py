@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels import Floats
-from ..scene import Prediction
+from ..scene import ScenePrediction
 from ._answers import prediction_at
 from ._arrays import Arrays, states
-from ._axes import Axis
+from ._axes import StudyAxis
 from ._columns import COLUMNS, CONTINUES, MESSAGE
 from ._errors import InvalidStudy
 from ._expansion import continued_from
@@ -37,13 +37,13 @@ class StudyResults:
     """Who computed, and when; empty for a study that was kept in memory."""
 
     @property
-    def axes(self) -> tuple[Axis, ...]:
+    def axes(self) -> tuple[StudyAxis, ...]:
         """Dimensions of the arrays."""
         return self.study.axes
 
     @property
     def state(self) -> NDArray[np.uint8]:
-        """A `PointState` for each point, over all axes."""
+        """A `JournalPointState` for each point, over all axes."""
         return states(self.arrays).reshape(self.study.grid.shape)
 
     @property
@@ -83,13 +83,13 @@ class StudyResults:
         whole = rows.reshape(shape if column.components == 1 else (*shape, column.components))
         return np.asarray(whole[self._place(fixed)])
 
-    def predictions(self) -> Iterator[Prediction]:
+    def predictions(self) -> Iterator[ScenePrediction]:
         """Give the answers of all points that were computed, in the order of the arrays."""
         state = states(self.arrays)
         for number in np.flatnonzero((state == PointState.DONE) | (state == PointState.STOPPED)):
             yield self._prediction(int(number))
 
-    def _prediction(self, number: int) -> Prediction:
+    def _prediction(self, number: int) -> ScenePrediction:
         place = self.study.grid.place(number)
         before = int(self.arrays[CONTINUES][number])
         frequencies_hz = self.study.frequencies_hz
@@ -148,7 +148,7 @@ def results_of(study: Study, arrays: Arrays) -> StudyResults:
     return StudyResults(study, {name: values.copy() for name, values in arrays.items()})
 
 
-def _index(axis: Axis, value: Value) -> int:
+def _index(axis: StudyAxis, value: Value) -> int:
     for index, each in enumerate(axis.values):
         if _is_same(each, value):
             return index

@@ -12,8 +12,8 @@ from ._columns import TAKEN
 from ._executor import Bundle, Executor, Reply
 from ._expansion import Expansion
 from ._layout import PointState
-from ._point_scheduler import Agenda, Costs
-from ._progress import Cancelled, StudyProgress, Watcher
+from ._point_scheduler import PointScheduler, Costs
+from ._progress import Cancelled, StudyProgress, StudyObserver
 from ._store import Store
 from ._study import Study
 
@@ -40,7 +40,7 @@ def run_study(
     study: Study,
     executor: Executor,
     store: Store,
-    watcher: Watcher | None = None,
+    watcher: StudyObserver | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
     """Compute every point that the store misses, longest first.
@@ -81,7 +81,7 @@ class _Session:
         for number in np.flatnonzero(is_done & np.isfinite(store.arrays[TAKEN].astype(float))):
             for _ in self._costs.learn(int(number), float(store.arrays[TAKEN][number])):
                 pass
-        self._agenda = Agenda(self._expansion.after, is_done, self._costs)
+        self._agenda = PointScheduler(self._expansion.after, is_done, self._costs)
         self._points = study.grid.size
         self._failed = int(np.count_nonzero(states(store.arrays) > PointState.DONE))
         self._out = 0

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ._errors import ClusterLost
 from ._executor import Executor
-from ._progress import Cancelled, Watcher
+from ._progress import Cancelled, StudyObserver
 from ._results import StudyResults, open_study, results_of
 from ._run import run_study
 from ._store import FileStore, MemoryStore
@@ -15,7 +15,7 @@ from ._study import Study
 from ._threads import ThreadExecutor
 
 
-class Existing(StrEnum):
+class ExistingStudy(StrEnum):
     """What to do with a file that is there already."""
 
     REFUSE = "refuse"
@@ -25,10 +25,10 @@ class Existing(StrEnum):
 def solve_study(
     study: Study,
     out: Path | None = None,
-    existing: Existing = Existing.REFUSE,
+    existing: ExistingStudy = ExistingStudy.REFUSE,
     workers: int | None = None,
     cluster: str | None = None,
-    watcher: Watcher | None = None,
+    watcher: StudyObserver | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyResults:
     """Compute what a study asks for, and what its file does not hold yet.
@@ -70,8 +70,8 @@ def solve_study(
         return open_study(out)
 
 
-def _file_store(study: Study, out: Path, existing: Existing) -> FileStore:
-    if existing is Existing.RESUME and out.exists():
+def _file_store(study: Study, out: Path, existing: ExistingStudy) -> FileStore:
+    if existing is ExistingStudy.RESUME and out.exists():
         return FileStore(out, study)
     return FileStore.created(out, study)
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from . import _layout as layout
 from ._arrays import Arrays, PointAnswer, empty_arrays, put
-from ._axes import Axis
+from ._axes import StudyAxis
 from ._columns import COLUMNS, COORDINATE, COORDINATES, SESSION, Column
 from ._disk import Disk, SoleWriter, sync_file, sync_folder
 from ._errors import StudyError
@@ -103,7 +103,7 @@ def _fill(file: h5py.File, study: Study) -> None:
     text = study.model_dump_json().encode()
     file.create_dataset(layout.STUDY, data=np.array(text, dtype=h5py.string_dtype("utf-8", len(text))))
     scales = [_scale(file, axis) for axis in study.axes]
-    coordinate = _scale(file, Axis(COORDINATE, COORDINATES, "", "x, y, z and their velocities"))
+    coordinate = _scale(file, StudyAxis(COORDINATE, COORDINATES, "", "x, y, z and their velocities"))
     for column in COLUMNS:
         dataset = _column(file, column, study.grid.shape)
         for index, scale in enumerate([*scales, coordinate][: dataset.ndim]):
@@ -111,7 +111,7 @@ def _fill(file: h5py.File, study: Study) -> None:
     _sessions(file)
 
 
-def _scale(file: h5py.File, axis: Axis) -> h5py.Dataset:
+def _scale(file: h5py.File, axis: StudyAxis) -> h5py.Dataset:
     match axis.values[0]:
         case str():
             raw = [str(value).encode() for value in axis.values]

@@ -17,7 +17,7 @@ from pydantic import (
 
 from ..model import Accuracy, Harmonic
 from ..scene import AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
-from ._axes import FREQUENCY, MODEL, START, Axis, Grid, grid_of
+from ._axes import FREQUENCY, MODEL, START, StudyAxis, Grid, grid_of
 from ._frequency_range import listed
 from ._structure import Structure
 
@@ -71,7 +71,7 @@ Model = Annotated[str, AfterValidator(_known)]
 Positive = Annotated[tuple[PositiveFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
 NotNegative = Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
 Frequencies = Annotated[Positive, BeforeValidator(listed)]
-Kept = Literal[Observable.RESPONSE, Observable.LYAPUNOV, Observable.SCATTER]
+StudyObservable = Literal[Observable.RESPONSE, Observable.LYAPUNOV, Observable.SCATTER]
 """What has one number a point."""
 
 
@@ -92,7 +92,7 @@ class Study(BaseModel):
     """Clearance at both stops."""
     starts: Annotated[tuple[Start | GivenStart, ...], Field(min_length=1)] = (Start.REST,)
     """Where each point begins: the state that is reached may depend on it."""
-    observe: tuple[Kept, ...] = (Observable.RESPONSE,)
+    observe: tuple[StudyObservable, ...] = (Observable.RESPONSE,)
     """What is looked at; sections and spectra, whose lengths differ, are asked of one scene at a time."""
     accuracy: Accuracy = Accuracy.STANDARD
     """Of every point."""
@@ -132,15 +132,15 @@ class Study(BaseModel):
         return tuple(str(start) for start in self.starts)
 
     @property
-    def axes(self) -> tuple[Axis, ...]:
+    def axes(self) -> tuple[StudyAxis, ...]:
         """Dimensions of the results, in order."""
         return (
-            Axis(MODEL, self.models, "", "contact law"),
-            Axis("damping_time", self.damping_times_s, "s", "damping over stiffness of every link"),
-            Axis("gap", self.gaps_m, "m", "clearance at both stops"),
-            Axis("amplitude", self.amplitudes_m, "m", "amplitude of the base displacement"),
-            Axis(START, self.start_labels, "", "state from which a point begins"),
-            Axis(FREQUENCY, self.frequencies_hz, "Hz", "drive frequency"),
+            StudyAxis(MODEL, self.models, "", "contact law"),
+            StudyAxis("damping_time", self.damping_times_s, "s", "damping over stiffness of every link"),
+            StudyAxis("gap", self.gaps_m, "m", "clearance at both stops"),
+            StudyAxis("amplitude", self.amplitudes_m, "m", "amplitude of the base displacement"),
+            StudyAxis(START, self.start_labels, "", "state from which a point begins"),
+            StudyAxis(FREQUENCY, self.frequencies_hz, "Hz", "drive frequency"),
         )
 
     @property

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
-from vibench.analysis import Origin, Response, Trace
+from vibench.analysis import CurveOrigin, CurveKind, Curve
 from vibench.gui.pages.compare import ComparePage
 from vibench.gui.widgets import DARK
 
@@ -16,7 +16,7 @@ def mode(source, scale=1.0, low_hz=50.0, high_hz=600.0):
     r = frequency_hz / 266.0
     magnitude = scale * np.abs((1 + 0.02j * r) / (1 - r**2 + 0.02j * r))
     spread = np.full(frequency_hz.shape, 0.01)
-    return Trace(source, Origin.PREDICTED, Response.RESPONSE_I, frequency_hz, magnitude, spread, "a note")
+    return Curve(source, CurveOrigin.PREDICTED, CurveKind.RESPONSE_I, frequency_hz, magnitude, spread, "a note")
 
 
 @pytest.fixture

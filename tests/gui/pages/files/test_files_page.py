@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import Qt
 
 from vibench.acquisition import load_toml, shipped
-from vibench.acquisition.campaign import PointState, Why
+from vibench.acquisition.campaign import JournalPointState, ReasonCode
 from vibench.acquisition.campaign._bench_identity import BenchIdentity
 from vibench.acquisition.campaign._journal import Journal, journal_path
 from vibench.acquisition.plan import Campaign, Dwell, Measurement
@@ -33,8 +33,8 @@ def _begin_campaign(folder):
         journal_path(folder, "night"), Campaign(name="night", measurements=plans), bench
     ) as journal:
         for name, state, why in (
-            ("whole", PointState.DONE, Why.CARRIED_OUT),
-            ("stopped", PointState.FAILED, Why.LIMIT),
+            ("whole", JournalPointState.DONE, ReasonCode.CARRIED_OUT),
+            ("stopped", JournalPointState.FAILED, ReasonCode.LIMIT),
         ):
             journal.start(name, f"{name}.h5")
             journal.end(name, state, why, "so it was")

@@ -3,7 +3,7 @@
 import pytest
 
 from vibench.acquisition import ConfigurationError, load_campaign, save_toml
-from vibench.acquisition.plan import Axis, Measurement, Range
+from vibench.acquisition.plan import SweepAxis, Measurement, Range
 from vibench.gui.pages.queue._draft import moved_up, with_measurement, with_sweep, without
 
 DWELL = Measurement.model_validate(
@@ -25,14 +25,14 @@ def test_the_same_test_twice_gets_two_names():
 
 
 def test_a_sweep_over_the_level_makes_a_recording_a_level():
-    campaign = with_sweep(with_measurement(None, DWELL), DWELL, Axis.LEVEL, LEVELS)
+    campaign = with_sweep(with_measurement(None, DWELL), DWELL, SweepAxis.LEVEL, LEVELS)
     levels = [each.excitation.amplitude_vpp for _, each in campaign.recordings()]
     assert levels == [1.5, 0.5, 1.0, 1.5, 2.0, 2.5]
 
 
 def test_a_sweep_past_what_the_generator_can_play_is_refused():
     with pytest.raises(ConfigurationError, match=r"amplitude_vpp"):
-        with_sweep(None, DWELL, Axis.LEVEL, Range(start=1, stop=100, count=2))
+        with_sweep(None, DWELL, SweepAxis.LEVEL, Range(start=1, stop=100, count=2))
 
 
 def test_entries_change_places_and_go_away():
@@ -45,7 +45,7 @@ def test_entries_change_places_and_go_away():
 
 def test_a_saved_campaign_reads_back_as_the_same_one(tmp_path):
     campaign = with_sweep(
-        with_measurement(None, DWELL), DWELL, Axis.FREQUENCY, Range(start=200, stop=300, step=50)
+        with_measurement(None, DWELL), DWELL, SweepAxis.FREQUENCY, Range(start=200, stop=300, step=50)
     )
     save_toml(campaign, tmp_path / "sub" / "queue.toml")
     assert load_campaign(tmp_path / "sub" / "queue.toml") == campaign

@@ -2,7 +2,7 @@
 
 import pytest
 
-from vibench.gui.pages.run._lanes import Lanes, channel_axis
+from vibench.gui.pages.run._lanes import TimeHistoryPlots, channel_axis
 from vibench.gui.widgets import LIGHT
 
 FOUR = (
@@ -16,7 +16,7 @@ OTHERS = (("base_acceleration", "m/s²"), ("m0_velocity", "V"))
 
 @pytest.fixture
 def lanes(qapp, qtbot):
-    made = Lanes(LIGHT)
+    made = TimeHistoryPlots(LIGHT)
     qtbot.addWidget(made)
     made.resize(1000, 700)
     made.show()

@@ -7,7 +7,7 @@ from typing import Any
 
 import grpc
 
-from vibench.acquisition.rig import METADATA_KEY, VARIABLE
+from vibench.acquisition.rig import TOKEN_KEY, TOKEN_VARIABLE
 
 LOOPBACK_HOSTS = frozenset({"127.0.0.1", "localhost", "[::1]"})
 
@@ -26,7 +26,7 @@ class TokenRequired(grpc.ServerInterceptor):  # type: ignore[misc] # grpc ships 
 
     def intercept_service(self, continuation: Callable[[Any], Any], details: Any) -> Any:
         """Let a call pass, or answer it with a refusal."""
-        given = dict(details.invocation_metadata).get(METADATA_KEY, "")
+        given = dict(details.invocation_metadata).get(TOKEN_KEY, "")
         if hmac.compare_digest(str(given).encode(), self._token.encode()):
             return continuation(details)
         return grpc.unary_unary_rpc_method_handler(_refuse)
@@ -35,5 +35,5 @@ class TokenRequired(grpc.ServerInterceptor):  # type: ignore[misc] # grpc ships 
 def _refuse(request: Any, context: grpc.ServicerContext) -> None:  # noqa: ARG001 - the request does not matter
     context.abort(
         grpc.StatusCode.UNAUTHENTICATED,
-        f"this rig is served with a token: put what 'vibench serve-rig' printed into {VARIABLE}",
+        f"this rig is served with a token: put what 'vibench serve-rig' printed into {TOKEN_VARIABLE}",
     )

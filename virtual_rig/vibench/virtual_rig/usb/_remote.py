@@ -12,7 +12,7 @@ from collections.abc import Callable
 import grpc
 
 from vibench.acquisition import InstrumentLost
-from vibench.acquisition.rig import METADATA_KEY, given_token
+from vibench.acquisition.rig import TOKEN_KEY, given_token
 
 from ._device import Identification, Setup, UsbDevice
 
@@ -81,7 +81,7 @@ class RemoteUsbDevice:
 
     def __init__(self, address: str) -> None:
         self._channel = grpc.insecure_channel(address)
-        self._metadata = ((METADATA_KEY, given_token()),)
+        self._metadata = ((TOKEN_KEY, given_token()),)
         self._methods: dict[str, grpc.UnaryUnaryMultiCallable] = {}
         try:
             answer = self._method("Identify")(b"", timeout=CONNECT_TIMEOUT_S, metadata=self._metadata)

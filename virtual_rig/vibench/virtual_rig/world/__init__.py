@@ -10,14 +10,14 @@ from ._time_grid import (
     relative_clock_ppm,
 )
 from ._warm_up import (
-    compile_beforehand,
+    warm_up,
 )
 from ._world import World, virtual_section
 
 __all__ = [
     "FULL_BAND_HZ",
     "World",
-    "compile_beforehand",
+    "warm_up",
     "relative_clock_ppm",
     "virtual_section",
 ]

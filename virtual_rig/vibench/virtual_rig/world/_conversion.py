@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.kernels import compiled
+from vibench.sim.kernels import kernel
 
 from ._decimation import Decimator, decimator
 from ._input_stage import InputStage
@@ -62,7 +62,7 @@ class ConverterInput:
         return samples
 
 
-@compiled
+@kernel
 def _quantise(volts: FloatArray, noise: FloatArray, noise_v: float, count_v: float) -> bool:
     """Add noise and round to whole counts, in place; tell whether one lay beyond the range."""
     most, clips = 2.0 ** (CONVERTER_BITS - 1), False

@@ -12,7 +12,7 @@ from math import ceil, floor
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.kernels import compiled
+from vibench.sim.kernels import kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -149,7 +149,7 @@ def _droop_correction() -> FloatArray:
     return np.concatenate([half[:0:-1], half])
 
 
-@compiled
+@kernel
 def _weigh(weights: FloatArray, phases: FloatArray, result: FloatArray) -> None:
     """Weigh for a whole number of steps per sample; ``phases[i, k]`` is the step i of the k-th sample.
 
@@ -171,7 +171,7 @@ def _weigh(weights: FloatArray, phases: FloatArray, result: FloatArray) -> None:
         result[begin : begin + count] = sums[:count]
 
 
-@compiled
+@kernel
 def _weigh_between(
     table: FloatArray, means: FloatArray, origin: int, centres: FloatArray, result: FloatArray
 ) -> None:
@@ -186,7 +186,7 @@ def _weigh_between(
         result[k] = below + part * (above - below)
 
 
-@compiled
+@kernel
 def _inner_product(weights: FloatArray, means: FloatArray, start: int) -> float:
     a = b = c = d = e = f = g = h = 0.0
     for j in range(0, weights.size, 8):

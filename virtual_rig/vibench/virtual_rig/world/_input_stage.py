@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.kernels import compiled
+from vibench.sim.kernels import kernel
 
 from ..analogue import Coupling, Input
 from ._recursive_filter import RecursiveFilter
@@ -63,7 +63,7 @@ class InputStage:
         return volts, clips
 
 
-@compiled
+@kernel
 def _clipped(signal: FloatArray, gain: float, offset_v: float, clip_v: float, volts: FloatArray) -> bool:
     """Turn a signal into volts and clip them; tell whether it was necessary."""
     clips = False

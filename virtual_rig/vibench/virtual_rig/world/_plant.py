@@ -15,7 +15,7 @@ from scipy.linalg import expm
 from vibench.acquisition import AcquisitionError
 from vibench.acquisition.rig import Rig, RigModel
 from vibench.sim import Specimen
-from vibench.sim.kernels import compiled
+from vibench.sim.kernels import kernel
 from vibench.sim.stepping import IntervalTables, advance_interval, base_reaction, interval_tables, new_state
 
 FloatArray = NDArray[np.float64]
@@ -167,7 +167,7 @@ def _mean_of_decay(steps_per_time_constant: float) -> float:
     )
 
 
-@compiled
+@kernel
 def _move(
     drive: FloatArray,
     noise: FloatArray,
@@ -232,7 +232,7 @@ def _move(
     return int(drive.size)
 
 
-@compiled
+@kernel
 def _amplified(volts: float, state: FloatArray, tables: PlantTables) -> float:
     """Mean output over a step of the amplifier as far as it is linear, its input held."""
     low, high = state[LOW_CUT], state[HIGH_CUT]
@@ -244,7 +244,7 @@ def _amplified(volts: float, state: FloatArray, tables: PlantTables) -> float:
     return float(tables.gain * mean)
 
 
-@compiled
+@kernel
 def _stop_force(displacement: float, velocity: float, tables: PlantTables) -> float:
     """Force of the rubber stops on the table; they push and never pull."""
     if displacement > tables.stroke:

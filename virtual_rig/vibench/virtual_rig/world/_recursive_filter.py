@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vibench.sim.kernels import compiled
+from vibench.sim.kernels import kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ class RecursiveFilter:
         return result
 
 
-@compiled
+@kernel
 def _run(
     numerator: FloatArray, denominator: FloatArray, state: FloatArray, values: FloatArray, result: FloatArray
 ) -> None:

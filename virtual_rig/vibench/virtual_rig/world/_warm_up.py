@@ -10,7 +10,7 @@ from ._world import World, virtual_section
 
 _SAMPLES = 16
 _STEPS_PER_SAMPLE = 4
-_compiled: set[str] = set()
+_warmed_up: set[str] = set()
 """Contact laws whose kernels this process has: they decide what is compiled."""
 
 
@@ -22,9 +22,9 @@ class _Silence:
         return np.zeros(count)
 
 
-def compile_beforehand(rig: Rig) -> None:
+def warm_up(rig: Rig) -> None:
     """Compile what a rig will run, or read it from the cache; once in a process, in a world of its own."""
-    if rig.specimen.contact in _compiled:
+    if rig.specimen.contact in _warmed_up:
         return
     inputs = tuple(
         Input(f"{rig.daq.device}/{each.physical}", each.range_v, Coupling(each.coupling), each.iepe_current_a)
@@ -32,4 +32,4 @@ def compile_beforehand(rig: Rig) -> None:
     )
     world = World(rig, _Silence())
     world.sample(inputs, virtual_section(rig).grid_rate_hz / _STEPS_PER_SAMPLE).read(_SAMPLES)
-    _compiled.add(rig.specimen.contact)
+    _warmed_up.add(rig.specimen.contact)

@@ -31,7 +31,7 @@ from ._time_grid import PPM, USUAL_GRID, TimeGrid
 from ._wiring import OPEN_INPUT, Cable, Signal, amplifier_input, cables_of
 
 
-class Appointments:
+class EventSchedule:
     """Actions by the step at which they are due; those of one step keep the order they were given in."""
 
     def __init__(self, grid: TimeGrid = USUAL_GRID) -> None:
@@ -108,7 +108,7 @@ class World:
         self._outputs: dict[str, AnalogueOutput] = {}
         self._conversions: list[Conversion] = []
         self._history = np.zeros((len(Signal), _history_steps(grid)))
-        self._appointments = Appointments(grid)
+        self._appointments = EventSchedule(grid)
         self._step = 0
         self._unspent_steps = 0.0
         self._truth: list[FloatArray] | None = None

@@ -12,10 +12,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from vibench.analysis import ComparedRecording, Trace, compared_recording
+from vibench.analysis import ComparedRecording, Curve, compare_recording
 
 from ...background import Job
-from ...page import Desk, Page, SideAndPicture
+from ...page import AppContext, Page, SideAndPicture
 from ...widgets import COMPARE, Notice, NoticeKind, Theme, notice_of, push_button
 from ._analysis_panel import AnalysisPanel
 from ._curve_list import CurveList, PairBox
@@ -29,7 +29,7 @@ FILTERS = "SVG (*.svg);;PDF (*.pdf);;PNG (*.png);;Numbers as CSV (*.csv);;Report
 class ComparePage(Page):
     """Curves on the left, their picture on the right, numbers below."""
 
-    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
         super().__init__(desk, parent)
         self.curves = CurveList(desk.theme)
         self.plots = CurvePlots(desk.theme)
@@ -80,7 +80,7 @@ class ComparePage(Page):
             self._asked += 1
             self._jobs.append(
                 self.desk.background.ask(
-                    compared_recording,
+                    compare_recording,
                     self._compared,
                     self._failed,
                     path,
@@ -90,7 +90,7 @@ class ComparePage(Page):
             )
         self._say_progress()
 
-    def add_prediction(self, curves: tuple[Trace, ...]) -> None:
+    def add_prediction(self, curves: tuple[Curve, ...]) -> None:
         """Lay a prediction over what is there."""
         for source in dict.fromkeys(each.source for each in curves):
             self.curves.replace_source(source, tuple(each for each in curves if each.source == source))

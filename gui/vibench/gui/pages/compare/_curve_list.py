@@ -9,14 +9,14 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QFormLayout, QGroupBox, QLabel, QListWidget, QListWidgetItem, QWidget
 
-from vibench.analysis import AnalysisError, Difference, Origin, Response, Trace, trace_difference
+from vibench.analysis import AnalysisError, CurveDifference, CurveOrigin, CurveKind, Curve, curve_difference
 
 from ...forms import Choice
-from ...plots import Dash, Ink, trace
+from ...plots import Dash, LineStyle, curve_style
 from ...widgets import Theme, paint_hint
 
-_DASHES = {Origin.MEASURED: Dash.SOLID, Origin.SIMULATED: Dash.DASHED, Origin.PREDICTED: Dash.DASH_DOTTED}
-_SHOWN_FIRST = {Response.TRANSMISSION, Response.RESPONSE_I}
+_DASHES = {CurveOrigin.MEASURED: Dash.SOLID, CurveOrigin.SIMULATED: Dash.DASHED, CurveOrigin.PREDICTED: Dash.DASH_DOTTED}
+_SHOWN_FIRST = {CurveKind.TRANSMISSION, CurveKind.RESPONSE_I}
 """Of a sweep's two responses the first is shown at once: both lie on one another where nothing collides."""
 _SWATCH = (28, 12)
 
@@ -32,15 +32,15 @@ class CurveList(QListWidget):
         self.setSelectionMode(QListWidget.SelectionMode.ExtendedSelection)
         self.setWordWrap(True)
         self._theme = theme
-        self._traces: list[Trace] = []
+        self._traces: list[Curve] = []
         self.itemChanged.connect(lambda _item: self.changed.emit())
 
     @property
-    def traces(self) -> tuple[Trace, ...]:
+    def traces(self) -> tuple[Curve, ...]:
         """All of them."""
         return tuple(self._traces)
 
-    def shown(self) -> tuple[tuple[Trace, Ink], ...]:
+    def shown(self) -> tuple[tuple[Curve, LineStyle], ...]:
         """Those that are ticked, with the ink they are drawn in."""
         return tuple(
             (each, self.ink(each))
@@ -55,12 +55,12 @@ class CurveList(QListWidget):
             words = "No curves yet: add recordings, or simulate and lay over."
             paint_hint(QPainter(self.viewport()), self.viewport().rect(), words, self._theme.muted)
 
-    def ink(self, curve: Trace) -> Ink:
+    def ink(self, curve: Curve) -> LineStyle:
         """Colour of its source, dash of its origin."""
         sources = list(dict.fromkeys(each.source for each in self._traces))
-        return trace(sources.index(curve.source), _DASHES[curve.origin])
+        return curve_style(sources.index(curve.source), _DASHES[curve.origin])
 
-    def replace_source(self, source: str, curves: tuple[Trace, ...]) -> None:
+    def replace_source(self, source: str, curves: tuple[Curve, ...]) -> None:
         """Put curves of a source in the place of those it had."""
         ticked = {each.name for each, _ in self.shown()}
         known = {each.name for each in self._traces}
@@ -93,7 +93,7 @@ class CurveList(QListWidget):
             self.item(row).setIcon(_swatch(self.ink(each), theme))
         self.blockSignals(blocked)
 
-    def _list(self, is_ticked: Callable[[Trace], bool]) -> None:
+    def _list(self, is_ticked: Callable[[Curve], bool]) -> None:
         blocked = self.blockSignals(True)
         self.clear()
         for each in self._traces:
@@ -108,16 +108,16 @@ class CurveList(QListWidget):
         self.changed.emit()
 
 
-def _is_of(each: Trace, source: str) -> bool:
+def _is_of(each: Curve, source: str) -> bool:
     """Tell whether a curve is a recording's; steps up and down of one are two sources with one beginning."""
     return each.source == source or each.source in (f"{source} up", f"{source} down")
 
 
-def _is_first(each: Trace) -> bool:
+def _is_first(each: Curve) -> bool:
     return each.response in _SHOWN_FIRST
 
 
-def _swatch(ink: Ink, theme: Theme) -> QPixmap:
+def _swatch(ink: LineStyle, theme: Theme) -> QPixmap:
     ratio = QGuiApplication.primaryScreen().devicePixelRatio()
     picture = QPixmap(QSize(*_SWATCH) * ratio)
     picture.setDevicePixelRatio(ratio)
@@ -139,7 +139,7 @@ class PairBox(QGroupBox):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Difference in dB", parent)
-        self._traces: dict[str, Trace] = {}
+        self._traces: dict[str, Curve] = {}
         self._curve, self._reference, self._said = Choice(), Choice(), QLabel("")
         form = QFormLayout(self)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
@@ -160,7 +160,7 @@ class PairBox(QGroupBox):
         """How far the two differ, or why that cannot be said."""
         return self._said.text()
 
-    def offer(self, traces: tuple[Trace, ...], shown: tuple[Trace, ...]) -> None:
+    def offer(self, traces: tuple[Curve, ...], shown: tuple[Curve, ...]) -> None:
         """Let these be chosen; what was chosen stays."""
         self._traces = {each.name: each for each in traces}
         names = list(self._traces)
@@ -175,19 +175,19 @@ class PairBox(QGroupBox):
             box.setCurrentText(chosen if chosen in names else default)
             box.blockSignals(blocked)
 
-    def pair(self) -> tuple[Trace, Trace] | None:
+    def pair(self) -> tuple[Curve, Curve] | None:
         """Give the curve and its reference, if both are chosen and differ."""
         curve, reference = (self._traces.get(box.currentText()) for box in (self._curve, self._reference))
         return None if curve is None or reference is None or curve is reference else (curve, reference)
 
-    def difference(self) -> Difference | None:
+    def difference(self) -> CurveDifference | None:
         """Give how far they differ, and say it; None where nothing can be compared."""
         pair = self.pair()
         self._said.setText("")
         if pair is None:
             return None
         try:
-            found = trace_difference(*pair)
+            found = curve_difference(*pair)
         except AnalysisError as error:
             self._said.setText(str(error))
             return None

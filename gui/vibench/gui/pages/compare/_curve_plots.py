@@ -7,16 +7,16 @@ import pyqtgraph as pg
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 
-from vibench.analysis import Difference, Origin, Trace
+from vibench.analysis import CurveDifference, CurveOrigin, Curve
 
-from ...plots import GUIDE, LOG_FREQUENCY, Axis, Dash, Ink, Plot, Scale, trace
+from ...plots import GUIDE, LOG_FREQUENCY, PlotAxis, Dash, LineStyle, Plot, Scale, curve_style
 from ...widgets import Theme
 
-MAGNITUDE = Axis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
-DIFFERENCE = Axis("Difference", "dB")
-_MARKER = Ink(lambda theme: theme.accent)
+MAGNITUDE = PlotAxis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
+DIFFERENCE = PlotAxis("Difference", "dB")
+_MARKER = LineStyle(lambda theme: theme.accent)
 _BAND, _BAND_COLUMNS = 0.16, 300
-_DOTS = {Origin.MEASURED: 10, Origin.SIMULATED: 6, Origin.PREDICTED: 4}
+_DOTS = {CurveOrigin.MEASURED: 10, CurveOrigin.SIMULATED: 6, CurveOrigin.PREDICTED: 4}
 
 
 class CurvePlots(QWidget):
@@ -53,7 +53,7 @@ class CurvePlots(QWidget):
         """Frequencies of the markers, none when they are hidden."""
         return tuple(sorted(self._marker_hz)) if self._are_marked else ()
 
-    def show_curves(self, curves: tuple[tuple[Trace, Ink], ...], difference: Difference | None) -> None:
+    def show_curves(self, curves: tuple[tuple[Curve, LineStyle], ...], difference: CurveDifference | None) -> None:
         """Draw anew."""
         for plot in (self.magnitudes, self.differences):
             plot.wipe()
@@ -61,7 +61,7 @@ class CurvePlots(QWidget):
             self._draw(curve, ink)
         self.differences.level(GUIDE, 0.0)
         if difference is not None:
-            line = self.differences.curve(trace(0))
+            line = self.differences.curve(curve_style(0))
             line.setData(difference.frequency_hz, difference.decibel, connect="finite")
         self._add_markers()
 
@@ -88,7 +88,7 @@ class CurvePlots(QWidget):
         self.magnitudes.retheme(theme)
         self.differences.retheme(theme)
 
-    def _draw(self, curve: Trace, ink: Ink) -> None:
+    def _draw(self, curve: Curve, ink: LineStyle) -> None:
         lone = curve.frequency_hz.size == 1
         if lone:
             self.magnitudes.dots(ink, curve.name, size=_DOTS[curve.origin]).setData(
@@ -96,7 +96,7 @@ class CurvePlots(QWidget):
             )
             return
         if np.isfinite(curve.relative_sd).any():
-            shade = Ink(ink.colour, Dash.SOLID, _BAND)
+            shade = LineStyle(ink.colour, Dash.SOLID, _BAND)
             self.magnitudes.band(shade).set_data(*curve.band(_BAND_COLUMNS))
         line = self.magnitudes.curve(ink, curve.name)
         line.setData(curve.frequency_hz, curve.magnitude, connect="finite")

@@ -2,17 +2,17 @@
 
 from pathlib import Path
 
-from vibench.analysis import ComparedRecording, Trace
+from vibench.analysis import ComparedRecording, Curve
 
 
 def exported_elsewhere(
     path: Path,
-    traces: tuple[Trace, ...],
+    traces: tuple[Curve, ...],
     recordings: tuple[ComparedRecording, ...],
-    pair: tuple[Trace, Trace] | None,
+    pair: tuple[Curve, Curve] | None,
     markers_hz: tuple[float, ...],
 ) -> Path:
-    """Write what the path's ending names, and give the path written, as `exported` does."""
-    from vibench.analysis.report import exported  # noqa: PLC0415 - loading it takes most of a second
+    """Write what the path's ending names, and give the path written, as `write_comparison` does."""
+    from vibench.analysis.report import write_comparison  # noqa: PLC0415 - loading it takes most of a second
 
-    return exported(path, traces, recordings, pair, markers_hz)
+    return write_comparison(path, traces, recordings, pair, markers_hz)

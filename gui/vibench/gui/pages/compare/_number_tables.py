@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem, QWidget
 
-from vibench.analysis import Trace, readings, trace_peaks
+from vibench.analysis import Curve, readings, curve_peaks
 
 from ...widgets import paint_hint
 
@@ -64,7 +64,7 @@ class NumberTable(QTableWidget):
         return "\n".join("\t".join(cells) for cells in rows.values())
 
 
-def peak_rows(curves: tuple[Trace, ...]) -> list[tuple[str, ...]]:
+def peak_rows(curves: tuple[Curve, ...]) -> list[tuple[str, ...]]:
     """Write the peaks of curves."""
     return [
         (
@@ -76,7 +76,7 @@ def peak_rows(curves: tuple[Trace, ...]) -> list[tuple[str, ...]]:
             "–" if peak.damping_ratio is None else f"{100 * peak.damping_ratio:.3g}",
         )
         for each in curves
-        for peak in trace_peaks(each)
+        for peak in curve_peaks(each)
     ]
 
 
@@ -86,7 +86,7 @@ def marker_headings(markers_hz: tuple[float, ...]) -> tuple[str, ...]:
     return ("Curve", *at, *(("Second over first (dB)",) if len(at) == 2 else ()))
 
 
-def marker_rows(curves: tuple[Trace, ...], markers_hz: tuple[float, ...]) -> list[tuple[str, ...]]:
+def marker_rows(curves: tuple[Curve, ...], markers_hz: tuple[float, ...]) -> list[tuple[str, ...]]:
     """Read curves at the markers."""
     if not markers_hz:
         return []

@@ -18,7 +18,7 @@ from vibench.analysis.live import RecordingOverview, Thumbnail, has_overview, ke
 
 from ...background import Job
 from ...forms import LineField
-from ...page import Desk, Page, Remembered
+from ...page import AppContext, Page, Remembered
 from ...widgets import COMPARE, FILES, Notice, NoticeKind, Theme, notice_of, push_button
 from ._file_words import facts_text
 from ._listing import Levels, Listing, listed, made_levels, thumbnails
@@ -29,7 +29,7 @@ from ._spectrogram_view import Pictures
 class FilesPage(Page):
     """A browser above, the chosen recording below."""
 
-    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
         super().__init__(desk, parent)
         self.table = RecordingTable(desk.theme)
         self.pictures = Pictures(desk.theme, desk.background)

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 from vibench.acquisition.recording import ChannelHeader, Recording
 from vibench.analysis.live import RecordingOverview, zigzag
 
-from ...plots import LIMIT, Axis, Dash, Ink, Plot, trace
+from ...plots import LIMIT, PlotAxis, Dash, LineStyle, Plot, curve_style
 from ...widgets import Theme
 from ._file_words import role_text, unit_text
 
@@ -19,8 +19,8 @@ LEAST_SAMPLES = 8
 """The closest look."""
 _STEP, _ZOOM = 0.2, 0.6
 _LEFT_EM, _TIME_AXIS_EM, _LEAST_EM = 5, 3, 3
-MARKER = Ink(lambda theme: theme.accent)
-SEGMENT = Ink(lambda theme: theme.muted, Dash.DOTTED)
+MARKER = LineStyle(lambda theme: theme.accent)
+SEGMENT = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
 _MOST_KEPT = 12
 """Lanes: to make one takes as long as to draw ten."""
 _LABEL_AT = 0.1
@@ -30,14 +30,14 @@ _NAMED_SHARE = 0.08
 
 
 @dataclass(eq=False)
-class _Lane:
+class _TimeHistory:
     role: str
     plot: Plot
     curve: pg.PlotDataItem
     markers: tuple[pg.InfiniteLine, ...] = ()
 
 
-class RecordingLanes(QWidget):
+class RecordingTimeHistories(QWidget):
     """Lanes over one time axis. Wheel and + - zoom, arrows move, Home shows all, drag moves."""
 
     range_changed = Signal()
@@ -49,8 +49,8 @@ class RecordingLanes(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._theme = theme
         self._overview: RecordingOverview | None = None
-        self._lanes: list[_Lane] = []
-        self._kept: dict[tuple[str, str], _Lane] = {}
+        self._lanes: list[_TimeHistory] = []
+        self._kept: dict[tuple[str, str], _TimeHistory] = {}
         self._marker_s = [0.0, 0.0]
         self._are_marked = False
         self._layout = QVBoxLayout(self)
@@ -170,12 +170,12 @@ class RecordingLanes(QWidget):
                 return
         event.accept()
 
-    def _lane_of(self, channel: ChannelHeader) -> _Lane:
+    def _lane_of(self, channel: ChannelHeader) -> _TimeHistory:
         """Give the lane of a channel, as it was left by another recording, or a new one."""
         kind = (channel.role, channel.unit)
         if kind not in self._kept:
             unit = unit_text(channel.unit)
-            plot = Plot(f"{role_text(channel.role)} over time", Axis("Time", "s"), Axis(unit), self._theme)
+            plot = Plot(f"{role_text(channel.role)} over time", PlotAxis("Time", "s"), PlotAxis(unit), self._theme)
             plot.setMouseEnabled(x=True, y=False)
             plot.setFocusProxy(self)
             left = _LEFT_EM * self.fontMetrics().height()
@@ -186,14 +186,14 @@ class RecordingLanes(QWidget):
             title.setAutoFillBackground(True)
             title.move(left + self.fontMetrics().height(), 2)
             plot.getViewBox().sigXRangeChanged.connect(self._ranged)
-            self._kept[kind] = _Lane(channel.role, plot, plot.curve(trace(0)))
+            self._kept[kind] = _TimeHistory(channel.role, plot, plot.curve(curve_style(0)))
         return self._kept[kind]
 
-    def _begin(self, lane: _Lane, number: int, recording: Recording) -> None:
+    def _begin(self, lane: _TimeHistory, number: int, recording: Recording) -> None:
         """Make a lane ready for a recording: its place, its limits, nothing drawn yet."""
         plot, is_last = lane.plot, number == len(recording.channels) - 1
         plot.wipe()
-        lane.curve = plot.curve(trace(number))
+        lane.curve = plot.curve(curve_style(number))
         lane.markers = self._new_markers(plot)
         em = self.fontMetrics().height()
         plot.setMinimumHeight(_LEAST_EM * em + (_TIME_AXIS_EM * em if is_last else 0))

@@ -9,8 +9,8 @@ from vibench.acquisition.campaign import (
     JOURNAL_SUFFIX,
     UNREADABLE,
     CatalogueEntry,
-    PointState,
-    catalogue,
+    JournalPointState,
+    list_recordings,
     read_journal,
 )
 from vibench.analysis.live import OverviewLevel, Thumbnail, overview_levels, thumbnail
@@ -48,7 +48,7 @@ class ListedCampaign:
     """A campaign as its journal knows it at the moment."""
 
     name: str
-    states: tuple[PointState, ...]
+    states: tuple[JournalPointState, ...]
     """One a point."""
     files: frozenset[Path]
     """Recordings of the last attempts."""
@@ -56,11 +56,11 @@ class ListedCampaign:
     @property
     def text(self) -> str:
         """``"✔ night: 40 of 40 done"``, ``"▲ night: 3 of 40 done, 2 failed, 35 queued"``."""
-        done = self.states.count(PointState.DONE)
+        done = self.states.count(JournalPointState.DONE)
         others = [
             f"{self.states.count(state)} {state.value}"
-            for state in PointState
-            if state is not PointState.DONE and state in self.states
+            for state in JournalPointState
+            if state is not JournalPointState.DONE and state in self.states
         ]
         symbol = "✔" if done == len(self.states) else "▲"
         return ", ".join([f"{symbol} {self.name}: {done} of {len(self.states)} done", *others])
@@ -78,7 +78,7 @@ def listed(folder: Path) -> Listing:
     """List a folder; one that is not there yet is empty."""
     if not folder.is_dir():
         return Listing()
-    recordings = tuple(ListedRecording(folder / each.path, each) for each in catalogue(folder))
+    recordings = tuple(ListedRecording(folder / each.path, each) for each in list_recordings(folder))
     return Listing(recordings, tuple(_campaigns(folder)))
 
 

@@ -22,12 +22,12 @@ from vibench.analysis.live import (
     recording_spectrogram,
 )
 
-from ...background import Background, Latest
+from ...background import Background, LatestRequest
 from ...forms import Choice
 from ...plots import FREQUENCY, LOG_FREQUENCY, TIME, Plot
 from ...widgets import Theme
 from ._file_words import role_text, unit_text
-from ._lanes import RecordingLanes
+from ._lanes import RecordingTimeHistories
 
 _WAIT_MS = 250
 """How long a view stands still before it is worked out."""
@@ -57,7 +57,7 @@ class SpectrogramView(QWidget):
         self._view_s = (0.0, 0.0)
         self._recording: Recording | None = None
         self._asked: SpectrogramRequest | None = None
-        self._latest = Latest(background, recording_spectrogram, self._show, self._fail, _WAIT_MS, self)
+        self._latest = LatestRequest(background, recording_spectrogram, self._show, self._fail, _WAIT_MS, self)
         self._plots = {
             RowSpacing.LINEAR: Plot("Spectrogram", TIME, FREQUENCY, theme),
             RowSpacing.LOGARITHMIC: Plot("Spectrogram, logarithmic", TIME, LOG_FREQUENCY, theme),
@@ -219,7 +219,7 @@ class Pictures(QTabWidget):
         super().__init__(parent)
         self.setAccessibleName("Pictures of the recording")
         self.setDocumentMode(True)
-        self.lanes = RecordingLanes(theme)
+        self.lanes = RecordingTimeHistories(theme)
         self.spectrogram = SpectrogramView(theme, background)
         self.addTab(self.lanes, "Tim&e")
         self.addTab(self.spectrogram, "&Spectrogram")

@@ -24,16 +24,16 @@ from vibench.acquisition import (
     toml_text,
     validated,
 )
-from vibench.acquisition.campaign import Existing
+from vibench.acquisition.campaign import ExistingRecordings
 from vibench.acquisition.engine import EngineState, EngineStatus
-from vibench.acquisition.plan import Axis, Campaign, Range
+from vibench.acquisition.plan import SweepAxis, Campaign, Range
 
-from ...background import Latest
+from ...background import LatestRequest
 from ...forms import Choice
-from ...page import Desk, Orders, Page, Remembered
+from ...page import AppContext, UserActions, Page, Remembered
 from ...widgets import Notice, NoticeKind, ReadTable, clock, notice_of
 from ._draft import moved_up, with_measurement, with_sweep, without
-from ._row_words import CampaignOutlook, campaign_outlook, point_rows
+from ._row_words import CampaignPreview, preview_campaign, point_rows
 from ._sweep_form import SweepForm
 
 LOOK_MS = 50
@@ -43,9 +43,9 @@ LOOK_MS = 50
 class QueuePage(Page):
     """Edits the campaign that is armed here, and shows the one that runs."""
 
-    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
         super().__init__(desk, parent)
-        self._orders = Orders(desk, self)
+        self._orders = UserActions(desk, self)
         self.choice = Choice()
         self.entries = ReadTable(
             "Entries of the campaign",
@@ -72,8 +72,8 @@ class QueuePage(Page):
             "Arm what is missin&g…", "Keep what is complete in its folder, make the rest", self._arm_missing
         )
         self.hold_button = self._button("Pause", "Stay where the run is; the drive stays on", self._hold)
-        self._looking = Latest(
-            desk.background, campaign_outlook, self._looked, self._look_failed, LOOK_MS, self
+        self._looking = LatestRequest(
+            desk.background, preview_campaign, self._looked, self._look_failed, LOOK_MS, self
         )
         self._lay_out()
         self._connect()
@@ -131,7 +131,7 @@ class QueuePage(Page):
         self.summary.setText(f"{campaign.name}: …")
         self._looking.ask((campaign, rig))
 
-    def _looked(self, seen: CampaignOutlook) -> None:
+    def _looked(self, seen: CampaignPreview) -> None:
         campaign = self.desk.intent.campaign
         if campaign is None:
             return
@@ -155,7 +155,7 @@ class QueuePage(Page):
         else:
             self.desk.intent.choose_campaign(with_measurement(self.desk.intent.campaign, measurement))
 
-    def _add_sweep(self, axis: Axis, values: Range) -> None:
+    def _add_sweep(self, axis: SweepAxis, values: Range) -> None:
         measurement = self.desk.intent.measurement
         if measurement is None:
             self._warn("The test is not complete.", "Correct what is marked on the Test page (Ctrl+2).")
@@ -179,10 +179,10 @@ class QueuePage(Page):
             self.entries.setCurrentCell(number - 1, 0)
 
     def _arm(self) -> None:
-        self._orders.arm_campaign(Existing.REFUSE)
+        self._orders.arm_campaign(ExistingRecordings.REFUSE)
 
     def _arm_missing(self) -> None:
-        self._orders.arm_campaign(Existing.RESUME)
+        self._orders.arm_campaign(ExistingRecordings.RESUME)
 
     def _hold(self) -> None:
         self._orders.hold_or_resume()

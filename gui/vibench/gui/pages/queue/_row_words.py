@@ -53,7 +53,7 @@ def point_rows(
 
 
 @dataclass(frozen=True)
-class CampaignOutlook:
+class CampaignPreview:
     """What is shown of a campaign before it runs."""
 
     rows: tuple[tuple[str, str, str, str], ...]
@@ -65,9 +65,9 @@ class CampaignOutlook:
     """None without a rig, which says how many samples a second there will be."""
 
 
-def campaign_outlook(asked: tuple[Campaign, Rig | None]) -> CampaignOutlook:
+def preview_campaign(asked: tuple[Campaign, Rig | None]) -> CampaignPreview:
     """Look ahead."""
     campaign, rig = asked
     size = None if rig is None else campaign.size_bytes(rig.daq.sample_rate_hz, len(rig.daq.channels))
     rows = tuple(entry_rows(campaign))
-    return CampaignOutlook(rows, tuple(campaign.recording_names()), campaign.duration_s, size)
+    return CampaignPreview(rows, tuple(campaign.recording_names()), campaign.duration_s, size)

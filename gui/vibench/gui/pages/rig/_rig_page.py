@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 from vibench.acquisition import BenchReport, Finding, InstrumentList, Verdict, list_rig_instruments, shipped
 from vibench.acquisition.engine import EngineState, EngineStatus
 
-from ...page import Desk, Orders, Page, Remembered
+from ...page import AppContext, UserActions, Page, Remembered
 from ...widgets import ReadTable, moment_text, notice_of
 from ._knob_sheet import KnobSheetForm
 from ._rig_choice import RigChoice
@@ -66,9 +66,9 @@ VERDICTS = {Verdict.OK: "✔ ok", Verdict.WARN: "⚠ look", Verdict.FAIL: "✖ f
 class RigPage(Page):
     """The first step: from a file to a bench that is open and well."""
 
-    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
         super().__init__(desk, parent)
-        self._orders = Orders(desk, self)
+        self._orders = UserActions(desk, self)
         self.choice = RigChoice()
         self.knobs = KnobSheetForm()
         self.about = QLabel()

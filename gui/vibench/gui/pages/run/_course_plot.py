@@ -2,14 +2,14 @@
 
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from vibench.analysis import Foresight
+from vibench.analysis import MeasurementPrediction
 from vibench.analysis.live import LiveView
 
-from ...plots import FREQUENCY, PREDICTED, Axis, Dash, Ink, Plot, Scale, trace
+from ...plots import FREQUENCY, PREDICTED, PlotAxis, Dash, LineStyle, Plot, Scale, curve_style
 from ...widgets import Theme
 
 
-class CoursePlot(QWidget):
+class SweepHistoryPlot(QWidget):
     """Response I and II of a sine or a sweep as it goes."""
 
     title = "Response over frequency"
@@ -17,14 +17,14 @@ class CoursePlot(QWidget):
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        up = Axis("Response I, II", "x / A0", scale=Scale.LOGARITHMIC)
+        up = PlotAxis("Response I, II", "x / A0", scale=Scale.LOGARITHMIC)
         self.plot = Plot("Response over frequency", FREQUENCY, up, theme).with_legend()
         self.plot.with_hint("A point every tenth of a second of a dwell or a sweep; the prediction beneath.")
-        self._stripes = self.plot.stripes(Ink(lambda theme: theme.traces[3], filled=0.15))
+        self._stripes = self.plot.stripes(LineStyle(lambda theme: theme.traces[3], filled=0.15))
         self._predicted = self.plot.curve(PREDICTED, "I, simulated")
-        self._linear = self.plot.curve(trace(2, Dash.DOTTED), "linear, simulated")
-        self._first = self.plot.dots(trace(3), "I, measured", 3)
-        self._second = self.plot.dots(trace(0), "II, measured", 3)
+        self._linear = self.plot.curve(curve_style(2, Dash.DOTTED), "linear, simulated")
+        self._first = self.plot.dots(curve_style(3), "I, measured", 3)
+        self._second = self.plot.dots(curve_style(0), "II, measured", 3)
         self._shown = 0
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -39,7 +39,7 @@ class CoursePlot(QWidget):
         self._first.setData(course.frequency_hz, course.response_i)
         self._second.setData(course.frequency_hz, course.response_ii)
 
-    def show_foresight(self, seen: Foresight | None) -> None:
+    def show_foresight(self, seen: MeasurementPrediction | None) -> None:
         """Lay a prediction beneath, or none."""
         self._stripes.show_bands(() if seen is None else seen.collision_bands_hz)
         if seen is None:
@@ -69,11 +69,11 @@ class SweepEnvelopePlot(QWidget):
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.plot = Plot("Sweep envelope", FREQUENCY, Axis("m0 velocity", "mm/s", 1e3), theme).with_legend()
+        self.plot = Plot("Sweep envelope", FREQUENCY, PlotAxis("m0 velocity", "mm/s", 1e3), theme).with_legend()
         self.plot.with_hint("Largest and smallest velocity of m0 while a sweep passes by.")
-        self._stripes = self.plot.stripes(Ink(lambda theme: theme.traces[3], filled=0.15))
-        self._upper = self.plot.curve(trace(3), "largest")
-        self._lower = self.plot.curve(trace(0), "smallest")
+        self._stripes = self.plot.stripes(LineStyle(lambda theme: theme.traces[3], filled=0.15))
+        self._upper = self.plot.curve(curve_style(3), "largest")
+        self._lower = self.plot.curve(curve_style(0), "smallest")
         self._shown = 0
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -88,7 +88,7 @@ class SweepEnvelopePlot(QWidget):
         self._upper.setData(course.frequency_hz, course.upper)
         self._lower.setData(course.frequency_hz, course.lower)
 
-    def show_foresight(self, seen: Foresight | None) -> None:
+    def show_foresight(self, seen: MeasurementPrediction | None) -> None:
         """Show where collisions are predicted."""
         self._stripes.show_bands(() if seen is None else seen.collision_bands_hz)
 

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from vibench.analysis.live import LiveView, zigzag
 
-from ...plots import Axis, Plot, trace
+from ...plots import PlotAxis, Plot, curve_style
 from ...widgets import Theme
 
 _WORDS = {
@@ -28,13 +28,13 @@ def channel_word(role: str) -> str:
     return _WORDS.get(role, role.replace("_", " "))
 
 
-def channel_axis(role: str, unit: str) -> Axis:
+def channel_axis(role: str, unit: str) -> PlotAxis:
     """Give a channel's axis: its word, in a unit whose numbers are easy to read."""
     shown, factor = _UNITS.get(unit, (unit, 1.0))
-    return Axis(channel_word(role), shown, factor, short=f"{_SHORT.get(role, channel_word(role))} ({shown})")
+    return PlotAxis(channel_word(role), shown, factor, short=f"{_SHORT.get(role, channel_word(role))} ({shown})")
 
 
-AGO = Axis("Time before now", "s")
+AGO = PlotAxis("Time before now", "s")
 """An axis that stands still: one that scrolls would be painted anew in every frame."""
 LEAST_COLUMNS, MOST_COLUMNS = 500, 3000
 """Of a lane: as many as there are lines side by side; between fewer, room would stay empty."""
@@ -44,7 +44,7 @@ USUAL_SPAN_S = 2.0
 """What a lane shows at first."""
 
 
-class Lanes(QWidget):
+class TimeHistoryPlots(QWidget):
     """Lanes over one time axis; they change with the channels of the run."""
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
@@ -99,7 +99,7 @@ class Lanes(QWidget):
             plot = Plot("Lane", AGO, channel_axis(*channels[row]), self._theme)
             plot.setXRange(-USUAL_SPAN_S, 0, padding=0)
             plot.up.setWidth(AXIS_LETTERS * self.fontMetrics().averageCharWidth())
-            self._curves.append(plot.curve(trace(row)))
+            self._curves.append(plot.curve(curve_style(row)))
             self._layout.addWidget(plot, 1)
             self.plots.append(plot)
         for (role, unit), plot, curve in zip(channels, self.plots, self._curves, strict=True):

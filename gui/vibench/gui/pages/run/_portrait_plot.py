@@ -6,11 +6,11 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from vibench.analysis.live import LiveView, Portrait
 
-from ...plots import Axis, Plot, trace
+from ...plots import PlotAxis, Plot, curve_style
 from ...widgets import Theme
 
-_ACROSS = Axis("m0 displacement", "µm", 1e6, short="x (µm)")
-_UP = Axis("m0 velocity", "mm/s", 1e3, short="v (mm/s)")
+_ACROSS = PlotAxis("m0 displacement", "µm", 1e6, short="x (µm)")
+_UP = PlotAxis("m0 velocity", "mm/s", 1e3, short="v (mm/s)")
 
 
 def extent(values: NDArray[np.floating]) -> tuple[float, float]:
@@ -30,9 +30,9 @@ class PortraitPlot(QWidget):
         self.section = Plot("Poincaré section of the run so far", _ACROSS, _UP, theme)
         self.orbit.with_hint("The orbit of the newest periods of a sine.")
         self.section.with_hint("One point a drive period, of the run so far.")
-        self._orbit = self.orbit.curve(trace(0))
-        self._strobe = self.orbit.dots(trace(3), size=6)
-        self._points = self.section.dots(trace(3), size=3)
+        self._orbit = self.orbit.curve(curve_style(0))
+        self._strobe = self.orbit.dots(curve_style(3), size=6)
+        self._points = self.section.dots(curve_style(3), size=3)
         self._shown: Portrait | None = None
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)

@@ -9,18 +9,18 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QTabW
 from vibench.acquisition.engine import EngineState
 from vibench.acquisition.plan import excited_band_hz
 from vibench.acquisition.rig import channels_of
-from vibench.analysis import Foresight
+from vibench.analysis import MeasurementPrediction
 from vibench.analysis.live import LiveView
 
 from ...engine_link import measurement_called
-from ...page import Desk, Orders, Page
+from ...page import AppContext, UserActions, Page
 from ...widgets import FILES, Theme
 from ._arm_card import ArmCard
-from ._course_plot import CoursePlot, SweepEnvelopePlot
-from ._lanes import Lanes
+from ._course_plot import SweepHistoryPlot, SweepEnvelopePlot
+from ._lanes import TimeHistoryPlots
 from ._portrait_plot import PortraitPlot
 from ._spectrum_plot import SpectrumPlot
-from ._transmission_plot import TransmissionPlot
+from ._transmission_plot import TransmissibilityPlot
 from ._watch_card import WatchCard
 
 LEFT_LETTERS = 44
@@ -31,19 +31,19 @@ _TONES = frozenset({"dwell", "sine_sweep", "stepped_sine"})
 class RunPage(Page):
     """Viewer of the engine's run: it keeps nothing but what is on the screen."""
 
-    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
         super().__init__(desk, parent)
         theme = desk.theme
-        self._orders = Orders(desk, self)
+        self._orders = UserActions(desk, self)
         self._view: LiveView | None = None
         self._ended: Path | None = None
         self._drawn: tuple[int, int, int, float] | None = None
         self.arm_card = ArmCard()
         self.watch_card = WatchCard(theme)
-        self.lanes = Lanes(theme)
-        self.transmission = TransmissionPlot(theme)
+        self.lanes = TimeHistoryPlots(theme)
+        self.transmission = TransmissibilityPlot(theme)
         self.spectrum = SpectrumPlot(theme)
-        self.course = CoursePlot(theme)
+        self.course = SweepHistoryPlot(theme)
         self.envelope = SweepEnvelopePlot(theme)
         self.portrait = PortraitPlot(theme)
         self.left_tabs, self.right_tabs = QTabWidget(), QTabWidget()
@@ -88,7 +88,7 @@ class RunPage(Page):
         for tabs in (self.left_tabs, self.right_tabs):
             shown = tabs.currentWidget()
             assert isinstance(
-                shown, TransmissionPlot | SpectrumPlot | CoursePlot | SweepEnvelopePlot | PortraitPlot
+                shown, TransmissibilityPlot | SpectrumPlot | SweepHistoryPlot | SweepEnvelopePlot | PortraitPlot
             )
             shown.show_view(view)
 
@@ -110,7 +110,7 @@ class RunPage(Page):
     @property
     def _pictures(
         self,
-    ) -> tuple[TransmissionPlot, SpectrumPlot, CoursePlot, SweepEnvelopePlot, PortraitPlot]:
+    ) -> tuple[TransmissibilityPlot, SpectrumPlot, SweepHistoryPlot, SweepEnvelopePlot, PortraitPlot]:
         return (self.transmission, self.spectrum, self.course, self.envelope, self.portrait)
 
     def _begin(self, view: LiveView) -> None:
@@ -135,7 +135,7 @@ class RunPage(Page):
         self.left_tabs.setCurrentWidget(self.course if is_tone else self.transmission)
         self.right_tabs.setCurrentWidget(self.portrait if is_tone else self.spectrum)
 
-    def _show_foresight(self, seen: Foresight | None) -> None:
+    def _show_foresight(self, seen: MeasurementPrediction | None) -> None:
         self.transmission.show_foresight(seen)
         self.course.show_foresight(seen)
         self.envelope.show_foresight(seen)

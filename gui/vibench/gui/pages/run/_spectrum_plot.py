@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from vibench.analysis.live import LiveView
 
-from ...plots import LOG_FREQUENCY, Axis, Plot, Scale, trace
+from ...plots import LOG_FREQUENCY, PlotAxis, Plot, Scale, curve_style
 from ...widgets import Theme
 from ._lanes import channel_word
 
@@ -22,7 +22,7 @@ class SpectrumPlot(QWidget):
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        up = Axis("Amplitude density", "channel's unit / √Hz", scale=Scale.LOGARITHMIC, short="unit / √Hz")
+        up = PlotAxis("Amplitude density", "channel's unit / √Hz", scale=Scale.LOGARITHMIC, short="unit / √Hz")
         self.plot = Plot("Spectral density of every channel", LOG_FREQUENCY, up, theme).with_legend()
         self.plot.with_hint("Spectra of all channels, of the newest seconds of a run.")
         self._curves: list[pg.PlotDataItem] = []
@@ -38,7 +38,7 @@ class SpectrumPlot(QWidget):
         for row in range(len(self._curves), len(view.channels)):
             channel = view.channels[row]
             name = f"{channel_word(channel.role)} ({_UNITS.get(channel.unit, channel.unit)})"
-            self._curves.append(self.plot.curve(trace(row), name))
+            self._curves.append(self.plot.curve(curve_style(row), name))
         for curve, density in zip(self._curves, found.amplitude_density, strict=False):
             curve.setData(found.frequency_hz[1:], np.maximum(density[1:], _LEAST))
 

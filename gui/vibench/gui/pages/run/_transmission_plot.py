@@ -2,14 +2,14 @@
 
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from vibench.analysis import Foresight
+from vibench.analysis import MeasurementPrediction
 from vibench.analysis.live import LiveView
 
-from ...plots import FREQUENCY, PREDICTED, Axis, Dash, Ink, Plot, Scale, trace
+from ...plots import FREQUENCY, PREDICTED, PlotAxis, Dash, LineStyle, Plot, Scale, curve_style
 from ...widgets import Theme
 
 
-class TransmissionPlot(QWidget):
+class TransmissibilityPlot(QWidget):
     """|x / U| over frequency."""
 
     title = "Transmission from base to m0"
@@ -17,15 +17,15 @@ class TransmissionPlot(QWidget):
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        up = Axis("|x / U|", scale=Scale.LOGARITHMIC)
+        up = PlotAxis("|x / U|", scale=Scale.LOGARITHMIC)
         self.magnitude = Plot("Transmission from base to m0", FREQUENCY, up, theme).with_legend()
         self.magnitude.with_hint("Response of m0 over motion of the base, with bounds, while a test runs.")
-        self.coherence = Plot("Coherence", FREQUENCY, Axis("Coherence", short="γ²"), theme)
-        self._band = self.magnitude.band(Ink(lambda theme: theme.traces[0], filled=0.25))
+        self.coherence = Plot("Coherence", FREQUENCY, PlotAxis("Coherence", short="γ²"), theme)
+        self._band = self.magnitude.band(LineStyle(lambda theme: theme.traces[0], filled=0.25))
         self._predicted = self.magnitude.curve(PREDICTED, "I under sines, simulated")
-        self._linear = self.magnitude.curve(trace(2, Dash.DOTTED), "linear, simulated")
-        self._measured = self.magnitude.curve(trace(0), "measured, 95 % bounds")
-        self._coherence = self.coherence.curve(trace(0))
+        self._linear = self.magnitude.curve(curve_style(2, Dash.DOTTED), "linear, simulated")
+        self._measured = self.magnitude.curve(curve_style(0), "measured, 95 % bounds")
+        self._coherence = self.coherence.curve(curve_style(0))
         self.coherence.setYRange(0, 1, padding=0.02)
         self.coherence.setXLink(self.magnitude)
         layout = QVBoxLayout(self)
@@ -45,7 +45,7 @@ class TransmissionPlot(QWidget):
         self._band.set_data(found.frequency_hz, found.magnitude_lower, found.magnitude_upper)
         self._coherence.setData(found.frequency_hz, found.coherence)
 
-    def show_foresight(self, seen: Foresight | None) -> None:
+    def show_foresight(self, seen: MeasurementPrediction | None) -> None:
         """Lay a prediction beneath, or none."""
         if seen is None:
             self._predicted.clear()

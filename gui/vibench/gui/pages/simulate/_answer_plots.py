@@ -8,19 +8,19 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtWidgets import QGridLayout, QWidget
 
-from vibench.analysis import THRESHOLD
-from vibench.analysis.simulation import SimulationCourse
+from vibench.analysis import SIMILARITY_THRESHOLD
+from vibench.analysis.simulation import SimulationProgress
 
-from ...plots import GUIDE, LIMIT, LOG_FREQUENCY, Axis, Dash, Ink, Plot, Scale, trace
+from ...plots import GUIDE, LIMIT, LOG_FREQUENCY, PlotAxis, Dash, LineStyle, Plot, Scale, curve_style
 from ...widgets import Theme
 
-RESPONSE = Axis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
-EXPONENT = Axis("Largest Lyapunov exponent", "1/s", short="Exponent (1/s)")
-DIFFERENCE = Axis("Difference of log Response I", short="Difference", scale=Scale.LOGARITHMIC)
-TIME = Axis("Time, to the end of the run", "ms", factor=1e3)
-DISPLACEMENT = Axis("Displacement", "µm", factor=1e6)
-_COLLIDING = Ink(lambda theme: theme.muted, filled=0.14)
-_EDGE = Ink(lambda theme: theme.muted, Dash.DOTTED)
+RESPONSE = PlotAxis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
+EXPONENT = PlotAxis("Largest Lyapunov exponent", "1/s", short="Exponent (1/s)")
+DIFFERENCE = PlotAxis("Difference of log Response I", short="Difference", scale=Scale.LOGARITHMIC)
+TIME = PlotAxis("Time, to the end of the run", "ms", factor=1e3)
+DISPLACEMENT = PlotAxis("Displacement", "µm", factor=1e6)
+_COLLIDING = LineStyle(lambda theme: theme.muted, filled=0.14)
+_EDGE = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
 _HINTS = (
     "Responses I and II of every model, as they are found.",
     "The motion of the masses at the frequency given under Signal.",
@@ -53,12 +53,12 @@ class AnswerPlots(QWidget):
         """All four, row by row."""
         return (self.responses, self.motion, self.exponents, self.likeness)
 
-    def show_course(self, course: SimulationCourse | None) -> None:
+    def show_course(self, course: SimulationProgress | None) -> None:
         """Draw what is there."""
         for step in self.steps(course):
             step()
 
-    def steps(self, course: SimulationCourse | None) -> list[Callable[[], None]]:
+    def steps(self, course: SimulationProgress | None) -> list[Callable[[], None]]:
         """Draw what is there picture by picture: together they take longer than a frame has."""
         draws = (self._responses, self._motion, self._exponents, self._likeness)
         return [partial(_draw_anew, plot, draw, course) for plot, draw in zip(self.plots, draws, strict=True)]
@@ -68,14 +68,14 @@ class AnswerPlots(QWidget):
         for plot in self.plots:
             plot.retheme(theme)
 
-    def _responses(self, course: SimulationCourse) -> None:
+    def _responses(self, course: SimulationProgress) -> None:
         for number, model in enumerate(course.models):
             self._responses_of(course, model, number)
         low, high = course.smallest_and_largest_response
         if high > 0.0:
             self.responses.setYRange(log10(low) - 0.1, log10(high) + 0.1, padding=0.0)
 
-    def _responses_of(self, course: SimulationCourse, model: str, number: int) -> None:
+    def _responses_of(self, course: SimulationProgress, model: str, number: int) -> None:
         if number == 0:
             bands_hz = course.collision_bands_hz(model)
             self.responses.stripes(_COLLIDING).show_bands(bands_hz)
@@ -88,23 +88,23 @@ class AnswerPlots(QWidget):
         ):
             frequency_hz, values = course.column(model, name)
             if frequency_hz.size:
-                line = self.responses.curve(trace(number, dash), f"{label}, {model}")
+                line = self.responses.curve(curve_style(number, dash), f"{label}, {model}")
                 _draw(line, frequency_hz, values)
 
-    def _exponents(self, course: SimulationCourse) -> None:
+    def _exponents(self, course: SimulationProgress) -> None:
         for number, model in enumerate(course.models):
             frequency_hz, values = course.column(model, "lyapunov_per_s")
             if np.isfinite(values).any():
-                _draw(self.exponents.curve(trace(number), model), frequency_hz, values)
+                _draw(self.exponents.curve(curve_style(number), model), frequency_hz, values)
                 if number == 0:
                     self.exponents.level(GUIDE, 0.0)
 
-    def _motion(self, course: SimulationCourse) -> None:
+    def _motion(self, course: SimulationProgress) -> None:
         for number, signal in enumerate(course.signals):
             time_s = signal.time_s - signal.time_s[0]
-            line = self.motion.curve(trace(number), f"x, {signal.model}, {signal.frequency_hz:g} Hz")
+            line = self.motion.curve(curve_style(number), f"x, {signal.model}, {signal.frequency_hz:g} Hz")
             line.setData(time_s, signal.displacement_m)
-            line = self.motion.curve(trace(number, Dash.DOTTED), f"p = y - z, {signal.model}")
+            line = self.motion.curve(curve_style(number, Dash.DOTTED), f"p = y - z, {signal.model}")
             line.setData(time_s, signal.relative_m)
         if course.signals:
             gap_m = course.signals[0].gap_m
@@ -113,17 +113,17 @@ class AnswerPlots(QWidget):
             reach_m = max(gap_m, course.largest_signal_m)
             self.motion.setYRange(-1.1 * reach_m, 1.1 * reach_m, padding=0.0)
 
-    def _likeness(self, course: SimulationCourse) -> None:
+    def _likeness(self, course: SimulationProgress) -> None:
         found = course.similarity()
         if found is None:
             return
         name = f"{100 * found.rate:.0f} % similar ({100 * found.low:.0f} to {100 * found.high:.0f} %)"
         shown = np.maximum(found.difference, _SMALLEST)
-        _draw(self.likeness.curve(trace(2), name), found.frequency_hz, shown)
-        self.likeness.level(LIMIT, THRESHOLD, "limit")
+        _draw(self.likeness.curve(curve_style(2), name), found.frequency_hz, shown)
+        self.likeness.level(LIMIT, SIMILARITY_THRESHOLD, "limit")
 
 
-def _draw_anew(plot: Plot, draw: Callable[[SimulationCourse], None], course: SimulationCourse | None) -> None:
+def _draw_anew(plot: Plot, draw: Callable[[SimulationProgress], None], course: SimulationProgress | None) -> None:
     plot.wipe()
     if course is not None:
         draw(course)

@@ -12,10 +12,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from vibench.analysis.simulation import Piece, SimulationCourse, SimulationRequest, cost_sentences
+from vibench.analysis.simulation import PartialResult, SimulationProgress, SimulationRequest, cost_sentences
 
 from ...forms import JudgedForm
-from ...page import Desk, Page, SideAndPicture
+from ...page import AppContext, Page, SideAndPicture
 from ...widgets import COMPARE, SIMULATE, Notice, NoticeKind, Theme, push_button
 from ._answer_plots import AnswerPlots
 from ._simulator import Simulator
@@ -24,12 +24,12 @@ from ._simulator import Simulator
 class SimulatePage(Page):
     """The form on the left; the answer on the right, as far as it has come."""
 
-    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
         super().__init__(desk, parent)
         self.form: JudgedForm[SimulationRequest] = JudgedForm(SimulationRequest, "simulation")
         self.plots = AnswerPlots(desk.theme)
         self.simulator = Simulator(self)
-        self._course: SimulationCourse | None = None
+        self._course: SimulationProgress | None = None
         self._is_stale = False
         self._undrawn: list[Callable[[], None]] = []
         self._build()
@@ -42,7 +42,7 @@ class SimulatePage(Page):
         self._say_progress("Nothing has been simulated yet.")
 
     @property
-    def course(self) -> SimulationCourse | None:
+    def course(self) -> SimulationProgress | None:
         """What has been found so far."""
         return self._course
 
@@ -76,7 +76,7 @@ class SimulatePage(Page):
             f"A0 = {1e6 * request.amplitude_m:g} µm, gap {1e6 * request.gap_m:g} µm, damping time "
             f"{request.damping_time_s:g} s, {request.duration_s:g} s from rest, {request.accuracy.value}"
         )
-        self._course = SimulationCourse(request.amplitude_m, request.points, note)
+        self._course = SimulationProgress(request.amplitude_m, request.points, note)
         self._is_stale = True
         self.simulator.begin(request)
         self._say_progress("Simulating; the first answer waits for the program to be made ready…")
@@ -86,7 +86,7 @@ class SimulatePage(Page):
         self.simulator.cancel()
         self._say_progress("Cancelled; what had been found is shown.")
 
-    def _grow(self, pieces: tuple[Piece, ...]) -> None:
+    def _grow(self, pieces: tuple[PartialResult, ...]) -> None:
         if self._course is not None:
             self._course.add(pieces)
             self._is_stale = True

@@ -2,24 +2,24 @@
 
 from dataclasses import dataclass
 
-from vibench.acquisition.plan import Measurement, Outlook, outlook
+from vibench.acquisition.plan import Measurement, MeasurementPreview, preview_measurement
 from vibench.acquisition.rig import Rig
-from vibench.analysis import Foresight, foresee
+from vibench.analysis import MeasurementPrediction, predict_measurement
 
 
 @dataclass(frozen=True)
-class Ahead:
+class TestPreview:
     """A test on a rig."""
 
     measurement: Measurement
     rig: Rig
 
 
-def looked_ahead(ahead: Ahead) -> Outlook:
+def preview_test(ahead: TestPreview) -> MeasurementPreview:
     """Work out signal, loads, time and size."""
-    return outlook(ahead.measurement, ahead.rig)
+    return preview_measurement(ahead.measurement, ahead.rig)
 
 
-def foreseen(ahead: Ahead) -> Foresight:
+def predict_test(ahead: TestPreview) -> MeasurementPrediction:
     """Simulate what the specimen will do."""
-    return foresee(ahead.measurement, ahead.rig)
+    return predict_measurement(ahead.measurement, ahead.rig)

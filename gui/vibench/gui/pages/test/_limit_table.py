@@ -3,13 +3,13 @@
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QTableWidgetItem, QWidget
 
-from vibench.acquisition.plan import LimitCheck, Side
+from vibench.acquisition.plan import LimitCheck, LimitSide
 
 from ...plots import SHARE_ROLE, BarDelegate
 from ...widgets import ReadTable
 
 _USED = 0
-_SIGNS = {Side.AT_MOST: "≤", Side.AT_LEAST: "≥"}
+_SIGNS = {LimitSide.AT_MOST: "≤", LimitSide.AT_LEAST: "≥"}
 _UNITS = {"m s-2": "m/s²", "m/s2": "m/s²", "m s-1": "m/s"}
 
 

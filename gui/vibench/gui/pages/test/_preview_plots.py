@@ -6,29 +6,29 @@ What the specimen is predicted to do: Response I and II over frequency, and wher
 import numpy as np
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from vibench.acquisition.plan import Outlook
-from vibench.analysis import Foresight
+from vibench.acquisition.plan import MeasurementPreview
+from vibench.analysis import MeasurementPrediction
 
-from ...plots import FREQUENCY, LOG_FREQUENCY, TIME, Axis, Dash, Ink, Plot, Scale, SignalCurve, trace
+from ...plots import FREQUENCY, LOG_FREQUENCY, TIME, PlotAxis, Dash, LineStyle, Plot, Scale, SignalCurve, curve_style
 from ...widgets import Theme
 
-COLLISION = Ink(lambda theme: theme.traces[3], filled=0.18)
+COLLISION = LineStyle(lambda theme: theme.traces[3], filled=0.18)
 
 
 class PredictionPlot(Plot):
     """Simulated, and labelled so: dashed lines, the model in the legend, collision regions as stripes."""
 
     def __init__(self, theme: Theme) -> None:
-        up = Axis("Response", "x / A0", scale=Scale.LOGARITHMIC)
+        up = PlotAxis("Response", "x / A0", scale=Scale.LOGARITHMIC)
         super().__init__("Predicted response and collision regions", FREQUENCY, up, theme)
         self.with_legend()
         self.with_hint("The specimen is being simulated under this test.")
-        self._first = self.curve(Ink(lambda theme: theme.predicted, Dash.DASHED), "Response I, simulated")
-        self._second = self.curve(Ink(lambda theme: theme.traces[0], Dash.DOTTED), "Response II, simulated")
-        self._linear = self.curve(trace(2, Dash.DOTTED), "without contact")
+        self._first = self.curve(LineStyle(lambda theme: theme.predicted, Dash.DASHED), "Response I, simulated")
+        self._second = self.curve(LineStyle(lambda theme: theme.traces[0], Dash.DOTTED), "Response II, simulated")
+        self._linear = self.curve(curve_style(2, Dash.DOTTED), "without contact")
         self._stripes = self.stripes(COLLISION)
 
-    def show_foresight(self, seen: Foresight | None) -> None:
+    def show_foresight(self, seen: MeasurementPrediction | None) -> None:
         """Draw a prediction; None clears the plot."""
         if seen is None:
             for curve in (self._first, self._second, self._linear):
@@ -55,23 +55,23 @@ class PreviewPlots(QWidget):
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.time = Plot("Signal at the generator, in time", TIME, Axis("Generator", "V"), theme)
+        self.time = Plot("Signal at the generator, in time", TIME, PlotAxis("Generator", "V"), theme)
         self.spectrum = Plot(
             "Spectrum of the signal",
             LOG_FREQUENCY,
-            Axis("Amplitude", "V", scale=Scale.LOGARITHMIC),
+            PlotAxis("Amplitude", "V", scale=Scale.LOGARITHMIC),
             theme,
         )
         for plot in (self.time, self.spectrum):
             plot.setMinimumHeight(_LEAST_LINES * self.fontMetrics().height())
-        self._signal = SignalCurve(self.time, trace(0))
-        self._lines = self.spectrum.curve(trace(0))
+        self._signal = SignalCurve(self.time, curve_style(0))
+        self._lines = self.spectrum.curve(curve_style(0))
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.time, 1)
         layout.addWidget(self.spectrum, 1)
 
-    def show_outlook(self, seen: Outlook) -> None:
+    def show_outlook(self, seen: MeasurementPreview) -> None:
         """Draw another signal."""
         self.time.show_everything()
         self._signal.set_samples(seen.volts, seen.sample_rate_hz)

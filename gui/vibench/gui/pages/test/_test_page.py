@@ -20,15 +20,15 @@ from PySide6.QtWidgets import (
 )
 
 from vibench.acquisition import ConfigurationError, save_toml, toml_text, validated
-from vibench.acquisition.plan import LimitCheck, Measurement, Outlook
+from vibench.acquisition.plan import LimitCheck, Measurement, MeasurementPreview
 from vibench.acquisition.rig import Rig
-from vibench.analysis import Foresight
+from vibench.analysis import MeasurementPrediction
 
-from ...background import Latest
+from ...background import LatestRequest
 from ...forms import Choice
-from ...page import Desk, Orders, Page, Remembered
+from ...page import AppContext, UserActions, Page, Remembered
 from ...widgets import Notice, NoticeKind, Theme, clock, notice_of
-from ._ahead import Ahead, foreseen, looked_ahead
+from ._ahead import TestPreview, predict_test, preview_test
 from ._library import NamedTest, load_test, own_tests, shipped_tests
 from ._limit_table import LimitTable
 from ._preview_plots import PredictionPlot, PreviewPlots
@@ -38,7 +38,7 @@ _SHOWN = ("the stroke", "the table's acceleration", "the force", "the amplifier'
 _UNITS = {"m": ("mm", 1e3), "m/s2": ("m/s²", 1.0), "N": ("N", 1.0), "V": ("V", 1.0)}
 
 
-def summary_text(seen: Outlook) -> str:
+def summary_text(seen: MeasurementPreview) -> str:
     """Peak stroke, acceleration, force and volts beside their limits; then time and size."""
     parts = [_load(check) for name in _SHOWN for check in seen.checks if check.what.startswith(name)]
     parts.append(f"generator {seen.peak_v:.3g} V peak, crest {seen.crest_factor:.2f}")
@@ -59,17 +59,17 @@ def _load(check: LimitCheck) -> str:
     return f"{name} {check.value * factor:.3g} of {check.limit * factor:.3g} {unit}"
 
 
-LOOK_MS, FORESEE_MS = 200, 900
+LOOK_MS, PREDICT_MS = 200, 900
 """How long a test stands unchanged before it is previewed, and before it is simulated."""
 
 
 class TestPage(Page):
     """Edits the test that Arm will arm."""
 
-    def __init__(self, desk: Desk, parent: QWidget | None = None) -> None:
+    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
         super().__init__(desk, parent)
-        self._orders = Orders(desk, self)
-        self._outlook: Outlook | None = None
+        self._orders = UserActions(desk, self)
+        self._outlook: MeasurementPreview | None = None
         self._tests: tuple[NamedTest, ...] = ()
         self.choice = Choice()
         self.form = TestForm()
@@ -85,9 +85,9 @@ class TestPage(Page):
         self.arm_button = QPushButton("A&rm the test…  (Ctrl+Return)")
         self.arm_button.setProperty("rank", "first")
         self.arm_button.setToolTip("Show in words what will happen; nothing plays before Start")
-        self._looking = Latest(desk.background, looked_ahead, self._looked, self._look_failed, LOOK_MS, self)
-        self._foreseeing = Latest(
-            desk.background, foreseen, self._foreseen, self._foresight_failed, FORESEE_MS, self
+        self._looking = LatestRequest(desk.background, preview_test, self._looked, self._look_failed, LOOK_MS, self)
+        self._foreseeing = LatestRequest(
+            desk.background, predict_test, self._foreseen, self._foresight_failed, PREDICT_MS, self
         )
         self._lay_out()
         self._connect()
@@ -129,11 +129,11 @@ class TestPage(Page):
 
     def _look_at(self, measurement: Measurement, rig: Rig) -> None:
         self.summary.setText("…")
-        self._looking.ask(Ahead(measurement, rig))
+        self._looking.ask(TestPreview(measurement, rig))
         self.prediction_note.setText("◌ simulating; the first time compiles the simulation, up to a minute")
-        self._foreseeing.ask(Ahead(measurement, rig))
+        self._foreseeing.ask(TestPreview(measurement, rig))
 
-    def _looked(self, seen: Outlook) -> None:
+    def _looked(self, seen: MeasurementPreview) -> None:
         self._outlook = seen
         self.summary.setText(summary_text(seen))
         self.plots.show_outlook(seen)
@@ -142,7 +142,7 @@ class TestPage(Page):
     def _look_failed(self, error: BaseException) -> None:
         self.summary.setText(f"✖ {error}")
 
-    def _foreseen(self, seen: Foresight) -> None:
+    def _foreseen(self, seen: MeasurementPrediction) -> None:
         self.desk.intent.foresee(seen)
         self.prediction.show_foresight(seen)
         bands = ", ".join(f"{low:.0f}–{high:.0f} Hz" for low, high in seen.collision_bands_hz)
