@@ -11,7 +11,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from vibench.sim import Accuracy, Harmonic, gong2025, integrate
-from vibench.sim.chain import chain_of, chain_response, integrate_chain, chain_lyapunov_exponent
+from vibench.sim.chain import chain_lyapunov_exponent, chain_of, chain_response, integrate_chain
 from vibench.sim.chain._tables import chain_tables
 
 REPEATS = 5

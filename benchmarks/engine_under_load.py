@@ -17,7 +17,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from vibench.acquisition import open_recording
-from vibench.acquisition.engine import Supervision, EngineClient, EngineState, start_engine
+from vibench.acquisition.engine import EngineClient, EngineState, Supervision, start_engine
 from vibench.acquisition.engine._requests import Look
 from vibench.acquisition.engine._wire import Message, send
 from vibench.acquisition.plan import Campaign

@@ -31,11 +31,11 @@ def main() -> None:
     rng = np.random.default_rng(1)
     view = LiveView(CHANNELS, RATE_HZ, band_hz=(150.0, 350.0))
     frames: dict[str, Callable[[], object]] = {
-        "lanes": lambda: view.lanes(SPAN_S, COLUMNS),
+        "lanes": lambda: view.time_histories(SPAN_S, COLUMNS),
         "spectrum": view.spectrum,
         "transmission": view.transmission,
         "phase portrait and section": view.portrait,
-        "course of the sweep": view.course,
+        "course of the sweep": view.history,
     }
     spent = dict.fromkeys(("samples in, points, impacts, meters", *frames), 0.0)
     worst_s = 0.0

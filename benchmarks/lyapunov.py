@@ -76,7 +76,7 @@ def figure_10(contact, frequencies_hz, accuracy, precision, workers):
             order = np.argsort(np.arange(len(frequencies_hz)) % 7, kind="stable")
             found = list(pool.map(point, frequencies_hz[order]))
         taken = time.perf_counter() - start
-        kinds = Counter(each.tendency.name.lower() for each in found)
+        kinds = Counter(each.verdict.name.lower() for each in found)
         largest = max(found, key=lambda each: each.exponent_per_s)
         transients = [each for each in found if each.transient is not None]
         print(

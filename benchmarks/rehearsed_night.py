@@ -20,8 +20,14 @@ from contextlib import closing
 from pathlib import Path
 
 from vibench.acquisition import RecordingError
-from vibench.acquisition.campaign import AfterFailure, PointResult, ExistingRecordings, CampaignEvent, PointOutcome
-from vibench.acquisition.engine import Supervision, Engine, CampaignRequest
+from vibench.acquisition.campaign import (
+    AfterFailure,
+    CampaignEvent,
+    ExistingRecordings,
+    PointOutcome,
+    PointResult,
+)
+from vibench.acquisition.engine import CampaignRequest, Engine, Supervision
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.virtual_rig import load_fault_script
@@ -83,18 +89,18 @@ class Account:
         self._began_s = time.monotonic()
         self._last: dict[str, PointResult] = {}
 
-    def ended(self, item: PointResult) -> None:
+    def ended(self, point_result: PointResult) -> None:
         """Note how a point came out; a resumed campaign tells the earlier ones again."""
-        is_new = self._last.get(item.name) is None
-        self._last[item.name] = item
+        is_new = self._last.get(point_result.name) is None
+        self._last[point_result.name] = point_result
         if is_new and len(self._last) % max(1, len(self._names) // TENTHS) == 0:
             held = f"{resident_mb():6.0f} MB  {open_files():4} files open"
             print(f"{len(self._last):4} points  {held}  {self.wall_s:6.0f} s", flush=True)
 
-    def happened(self, happening: CampaignEvent) -> None:
+    def happened(self, event: CampaignEvent) -> None:
         """Say what happens, where that was asked for."""
         if "--say" in sys.argv:
-            print(f"{self.wall_s:7.1f} s {happening.event}: {happening.text}"[:200], flush=True)
+            print(f"{self.wall_s:7.1f} s {event.kind}: {event.text}"[:200], flush=True)
 
     @property
     def wall_s(self) -> float:
@@ -108,9 +114,9 @@ class Account:
             f"points: {dict(Counter(each.why.value for each in self._last.values()))} of {len(self._names)}"
         )
         print(f"unaccounted for: {sorted(set(self._names) - set(self._last))}")
-        for item in self._last.values():
-            if item.result not in (PointOutcome.RECORDED, PointOutcome.KEPT):
-                print(f"  {item.name}: {item.reason[:200]}")
+        for point_result in self._last.values():
+            if point_result.outcome not in (PointOutcome.RECORDED, PointOutcome.KEPT):
+                print(f"  {point_result.name}: {point_result.reason[:200]}")
         cpu_s = used.user + used.system
         times = self._plan.duration_s / wall_s
         print(f"{wall_s:.0f} s of wall time ({times:.0f} times real time), {cpu_s:.0f} s of processor time")

@@ -21,7 +21,7 @@ import numpy as np
 from PySide6.QtCore import QEventLoop, QTimer
 from PySide6.QtWidgets import QApplication
 
-from vibench.analysis import CurveOrigin, CurveKind, Curve
+from vibench.analysis import Curve, CurveKind, CurveOrigin
 from vibench.analysis.simulation import SimulationProgress
 from vibench.analysis.simulation._request import SimulatedPoint
 from vibench.gui.page import AppContext, Settings
@@ -42,33 +42,33 @@ def main() -> None:
     """Open, zoom, draw."""
     application(["benchmark"])
     with tempfile.TemporaryDirectory() as folder:
-        desk = AppContext(Settings(Path(folder) / "window.ini"))
-        desk.choose_folder(Path(folder))
-        files(desk, Path(sys.argv[1]))
-        compare(desk)
-        simulate(desk)
-        desk.background.close()
+        context = AppContext(Settings(Path(folder) / "window.ini"))
+        context.choose_folder(Path(folder))
+        files(context, Path(sys.argv[1]))
+        compare(context)
+        simulate(context)
+        context.background.close()
 
 
-def files(desk: AppContext, path: Path) -> None:
+def files(context: AppContext, path: Path) -> None:
     """Open the recording and zoom to random places."""
-    page = FilesPage(desk)
+    page = FilesPage(context)
     page.resize(*SIZE)
     page.show()
     for number in ("first", "next"):
-        watch = EventLoopMonitor(lambda: "Files page")
+        monitor = EventLoopMonitor(lambda: "Files page")
         begun = time.monotonic()
-        page.lanes.show_recording(None)
+        page.time_histories.show_recording(None)
         page.open_path(path)
-        until(lambda: bool(page.lanes.plots))
+        until(lambda: bool(page.time_histories.plots))
         print(
             f"{f'Files: {number} recording, click to picture':<44} {time.monotonic() - begun:.2f} s of clock"
         )
-        until(lambda watch=watch: watch.rounds > LOOKS)
-        print(f"{'Files: longest piece of that':<44} {1e3 * watch.busiest_s:.0f} ms")
-        watch.stop()
+        until(lambda monitor=monitor: monitor.rounds > LOOKS)
+        print(f"{'Files: longest piece of that':<44} {1e3 * monitor.busiest_s:.0f} ms")
+        monitor.stop()
     rng = np.random.default_rng(1)
-    _, end_s = page.lanes.view_s
+    _, end_s = page.time_histories.view_s
     for span_s in (each for each in SPANS_S if each <= end_s):
         starts_s = iter(rng.uniform(0, end_s - span_s + 1e-9, 1 + TRIES))
         told(f"Files: zoom to {span_s:g} s", partial(zoom, page, starts_s, span_s))
@@ -87,12 +87,12 @@ def until(is_so: Callable[[], bool]) -> None:
 def zoom(page: FilesPage, starts_s: Iterator[float], span_s: float) -> None:
     """Show the next stretch."""
     start_s = next(starts_s)
-    page.lanes.show_range(start_s, start_s + span_s)
+    page.time_histories.show_range(start_s, start_s + span_s)
 
 
-def compare(desk: AppContext) -> None:
+def compare(context: AppContext) -> None:
     """Lay six curves of 4000 points over one another."""
-    page = ComparePage(desk)
+    page = ComparePage(context)
     page.resize(*SIZE)
     page.show()
     frequency_hz = np.linspace(10.0, 1000.0, 4000)
@@ -100,7 +100,12 @@ def compare(desk: AppContext) -> None:
     for number in range(6):
         values = np.exp(0.2 * rng.standard_normal(4000).cumsum() / 20)
         curve = Curve(
-            f"run {number}", CurveOrigin.MEASURED, CurveKind.TRANSMISSION, frequency_hz, values, np.full(4000, 0.02)
+            f"run {number}",
+            CurveOrigin.MEASURED,
+            CurveKind.TRANSMISSIBILITY,
+            frequency_hz,
+            values,
+            np.full(4000, 0.02),
         )
         told(
             f"Compare: curve {number + 1} of 4000 points", lambda c=curve: page.add_prediction((c,)), tries=1
@@ -108,19 +113,19 @@ def compare(desk: AppContext) -> None:
     page.close()
 
 
-def simulate(desk: AppContext) -> None:
+def simulate(context: AppContext) -> None:
     """Draw a simulation of 2 x 500 points anew, as each tick of the clock does while it grows."""
-    page = SimulatePage(desk)
+    page = SimulatePage(context)
     page.resize(*SIZE)
     page.show()
-    course = SimulationProgress(5e-6, 1000, "")
+    progress = SimulationProgress(5e-6, 1000, "")
     for model in ("a", "b"):
-        course.add(
+        progress.add(
             tuple(
                 SimulatedPoint(model, 10.0 + n, 2.0 + n % 7, 1.0, n % 50, "", 3.0, 1e-6) for n in range(500)
             )
         )
-    told("Simulate: draw 2 x 500 points", lambda: page.plots.show_course(course))
+    told("Simulate: draw 2 x 500 points", lambda: page.plots.show_progress(progress))
     page.close()
 
 

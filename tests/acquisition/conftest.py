@@ -14,10 +14,10 @@ from vibench.acquisition.errors import DataLost
 from vibench.acquisition.instruments import IdleOutput, Samples
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import (
+    BaseQuantity,
     Channel,
     KnobSheet,
     OutputConfig,
-    BaseQuantity,
     Rig,
     RigModel,
     Role,

@@ -11,7 +11,7 @@ from threading import Event
 import pytest
 
 from vibench.acquisition import open_recording
-from vibench.acquisition.engine import Supervision, EngineState, announced_engines, start_engine
+from vibench.acquisition.engine import EngineState, Supervision, announced_engines, start_engine
 from vibench.acquisition.engine._address import EngineAddress
 from vibench.acquisition.engine._announcement import announced
 from vibench.acquisition.plan import Campaign
@@ -76,11 +76,11 @@ def test_a_run_is_held_released_and_ended_from_another_terminal(running, vibench
 def test_watching_shows_the_run_and_its_end(running):
     arguments = [sys.executable, "-m", "vibench.cli", "watch"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
-    with subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, text=True) as watcher:
-        assert f"process {running.pid}" in watcher.stdout.readline()
+    with subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, text=True) as observer:
+        assert f"process {running.pid}" in observer.stdout.readline()
         running.client.stop("ramp", "enough")
-        said = watcher.stdout.read()
-    assert watcher.returncode == 0
+        said = observer.stdout.read()
+    assert observer.returncode == 0
     assert "dwell" in said
 
 

@@ -25,10 +25,10 @@ def qapp():
 
 
 @pytest.fixture
-def desk(qapp, tmp_path):
-    desk = AppContext(Settings(tmp_path / "window.ini"))
-    yield desk
-    desk.background.close()
+def context(qapp, tmp_path):
+    context = AppContext(Settings(tmp_path / "window.ini"))
+    yield context
+    context.background.close()
 
 
 @pytest.fixture(scope="session")
@@ -66,12 +66,12 @@ def held_up(qtbot, _without_leftovers):
 
     def told(window, act, is_done=lambda: True):
         before_s = yardstick()
-        window.loop_watch.begin()
+        window.event_loop_monitor.begin()
         act()
         qtbot.waitUntil(is_done, timeout=120_000)
         # The loop has been round, whatever the act left to it.
-        qtbot.waitUntil(lambda: window.loop_watch.rounds >= 5)
-        busiest_s = window.loop_watch.busiest_s
+        qtbot.waitUntil(lambda: window.event_loop_monitor.rounds >= 5)
+        busiest_s = window.event_loop_monitor.busiest_s
         return busiest_s, BOUND_S * max(1.0, 0.5 * (before_s + yardstick()) / YARDSTICK_S)
 
     return told
@@ -100,10 +100,10 @@ def own_state(tmp_path_factory):
 
 
 @pytest.fixture
-def window(desk, own_state, tmp_path, qapp):
+def window(context, own_state, tmp_path, qapp):
     """The whole window, without a bench."""
-    desk.choose_folder(tmp_path / "recordings")
-    window = Window(desk, PAGES)
+    context.choose_folder(tmp_path / "recordings")
+    window = Window(context, PAGES)
     window.resize(1280, 720)
     window.show()
     yield window
@@ -112,7 +112,7 @@ def window(desk, own_state, tmp_path, qapp):
 
 def end(window, qapp):
     """Close a window, and let Qt forget it: thousands of old widgets would slow down the next one."""
-    window.desk.bridge.close()
+    window.context.bridge.close()
     window.close()
     window.deleteLater()
     qapp.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)

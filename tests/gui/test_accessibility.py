@@ -112,7 +112,7 @@ def cut_off(window):
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
 def test_every_field_has_an_edge_that_is_seen(window, qapp, qtbot, contrast, theme):
     """WCAG 2.1, section 1.4.11: at least 3, against what is inside and what is outside."""
-    window.desk.choose_theme(theme)
+    window.context.choose_theme(theme)
     qtbot.waitUntil(lambda: window.is_themed)
     faint, looked_at = [], 0
     for name in window.pages:
@@ -135,7 +135,7 @@ def test_every_field_has_an_edge_that_is_seen(window, qapp, qtbot, contrast, the
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
 @pytest.mark.parametrize("size", [(1280, 720), (2560, 1440)], ids=lambda size: f"{size[0]}x{size[1]}")
 def test_no_text_is_cut_off(window, qapp, qtbot, theme, size):
-    window.desk.choose_theme(theme)
+    window.context.choose_theme(theme)
     qtbot.waitUntil(lambda: window.is_themed)
     window.resize(*size)
     for name in window.pages:

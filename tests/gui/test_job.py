@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QLineEdit, QMenu, QVBoxLayout
 
 from vibench.acquisition import open_recording
-from vibench.acquisition.engine import Supervision, EngineState, start_engine
+from vibench.acquisition.engine import EngineState, Supervision, start_engine
 from vibench.acquisition.plan import Measurement
 from vibench.gui.page import AppContext, Settings
 from vibench.gui.page._orders import ABORT_KEY
@@ -51,14 +51,14 @@ def bench(qapp, own_state, tmp_path_factory):
     folder = tmp_path_factory.mktemp("job")
     # Unattended: a machine that is busy with other tests must not end a run here; that a window that
     # falls silent does is tested with the engine.
-    desk = AppContext(Settings(folder / "window.ini"), partial(start_engine, Supervision.UNATTENDED))
-    desk.choose_folder(folder / "recordings")
-    window = Window(desk, PAGES)
+    context = AppContext(Settings(folder / "window.ini"), partial(start_engine, Supervision.UNATTENDED))
+    context.choose_folder(folder / "recordings")
+    window = Window(context, PAGES)
     # Free of the clock: a simulated converter that has to keep up with it may overrun on a busy machine.
     window.pages["Rig"].choice.pace.setCurrentIndex(list(PACES).index("free"))
     window.show()
     yield window
-    desk.bridge.close()
+    context.bridge.close()
     window.close()
     window.deleteLater()
 
@@ -66,7 +66,7 @@ def bench(qapp, own_state, tmp_path_factory):
 def reach(qtbot, window, *states):
     def check():
         said = [notice.text for notice in window.strip.notices]
-        assert window.desk.bridge.state in states, said[-2:]
+        assert window.context.bridge.state in states, said[-2:]
 
     qtbot.waitUntil(check, timeout=PATIENCE_MS)
 
@@ -77,7 +77,7 @@ def press(qtbot, window, key, modifier=Qt.KeyboardModifier.NoModifier):
 
 def recorded(window):
     """The newest recording, opened and looked at."""
-    (row,) = window.desk.bridge.status.rows
+    (row,) = window.context.bridge.status.rows
     return row
 
 
@@ -142,11 +142,11 @@ def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path):
     reach(qtbot, bench, EngineState.READY)
     key(Qt.Key.Key_4, CONTROL)
     qtbot.waitUntil(lambda: len(files.table.recordings.entries) == 2, timeout=PATIENCE_MS)
-    qtbot.waitUntil(lambda: bool(files.lanes.plots), timeout=PATIENCE_MS)
-    assert tab_to(qtbot, bench, files.lanes) <= 3
-    whole_s = files.lanes.view_s[1]
+    qtbot.waitUntil(lambda: bool(files.time_histories.plots), timeout=PATIENCE_MS)
+    assert tab_to(qtbot, bench, files.time_histories) <= 3
+    whole_s = files.time_histories.view_s[1]
     key(Qt.Key.Key_Plus)
-    assert files.lanes.view_s[1] - files.lanes.view_s[0] < 0.7 * whole_s
+    assert files.time_histories.view_s[1] - files.time_histories.view_s[0] < 0.7 * whole_s
     key(Qt.Key.Key_Home)
     while QApplication.focusWidget() is not files.table:
         key(Qt.Key.Key_Backtab, Qt.KeyboardModifier.ShiftModifier)
@@ -164,18 +164,18 @@ def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path):
 def start_dwell(bench, qtbot, name):
     bench.pages[TEST].form.show_measurement(dwell(name, 600.0))
     reach(qtbot, bench, EngineState.READY)
-    bench.orders.arm_test()
+    bench.actions.arm_test()
     reach(qtbot, bench, EngineState.ARMED)
-    bench.orders.start()
+    bench.actions.start()
     qtbot.waitUntil(lambda: check_drive_is_on(bench), timeout=PATIENCE_MS)
 
 
 def check_drive_is_on(bench):
-    assert drive_is_on(bench), [(row.state, row.reason) for row in bench.desk.bridge.status.rows]
+    assert drive_is_on(bench), [(row.state, row.reason) for row in bench.context.bridge.status.rows]
 
 
 def drive_is_on(bench):
-    run = bench.desk.bridge.status.run
+    run = bench.context.bridge.status.run
     return run is not None and run.amplitude_vpp >= 1.5
 
 
@@ -186,7 +186,7 @@ def on_the_banner(bench):
 
 def on_a_plot(bench):
     bench.show_page(RUN)
-    plot = bench.pages[RUN].lanes.plots[3]
+    plot = bench.pages[RUN].time_histories.plots[3]
     plot.setFocus()
     return plot
 
@@ -230,11 +230,11 @@ def test_esc_brings_the_drive_to_zero_wherever_the_focus_is(bench, qtbot, place)
 
 def test_a_hold_keeps_the_drive_and_stop_ramps_down(bench, qtbot):
     start_dwell(bench, qtbot, "held")
-    bench.orders.hold_or_resume()
+    bench.actions.hold_or_resume()
     reach(qtbot, bench, EngineState.HELD)
-    qtbot.waitUntil(lambda: bench.banner.face.word == "HELD", timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: bench.banner.indicator.word == "HELD", timeout=PATIENCE_MS)
     assert drive_is_on(bench)
-    bench.orders.hold_or_resume()
+    bench.actions.hold_or_resume()
     reach(qtbot, bench, EngineState.RUNNING)
     bench.banner.stop_wanted.emit()
     reach(qtbot, bench, EngineState.READY)
@@ -245,23 +245,23 @@ def test_the_live_pictures_show_the_run(bench, qtbot):
     bench.show_page(RUN)
     start_dwell(bench, qtbot, "live")
     page = bench.pages[RUN]
-    qtbot.waitUntil(lambda: bench.desk.bridge.view.course().time_s.size > 3, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: bench.context.bridge.view.history().time_s.size > 3, timeout=PATIENCE_MS)
     bench.tick()
-    drawn = [plot.getPlotItem().listDataItems()[0].getData()[1] for plot in page.lanes.plots]
+    drawn = [plot.getPlotItem().listDataItems()[0].getData()[1] for plot in page.time_histories.plots]
     assert all(values is not None and values.size > 100 for values in drawn)
-    assert abs(bench.desk.bridge.view.course().frequency_hz[-1] - 260) < 0.1
-    assert bench.banner.face.word == "RUNNING"
+    assert abs(bench.context.bridge.view.history().frequency_hz[-1] - 260) < 0.1
+    assert bench.banner.indicator.word == "RUNNING"
     assert int(page.watch_card.impacts.text()) > 0
     page.watch_card.freeze.setChecked(True)
-    frozen = page.lanes.plots[0].getPlotItem().listDataItems()[0].getData()[0].copy()
-    samples = bench.desk.bridge.status.samples
-    qtbot.waitUntil(lambda: bench.desk.bridge.status.samples > samples + 20_000, timeout=PATIENCE_MS)
-    assert (page.lanes.plots[0].getPlotItem().listDataItems()[0].getData()[0] == frozen).all()
+    frozen = page.time_histories.plots[0].getPlotItem().listDataItems()[0].getData()[0].copy()
+    samples = bench.context.bridge.status.samples
+    qtbot.waitUntil(lambda: bench.context.bridge.status.samples > samples + 20_000, timeout=PATIENCE_MS)
+    assert (page.time_histories.plots[0].getPlotItem().listDataItems()[0].getData()[0] == frozen).all()
     page.watch_card.freeze.setChecked(False)
     page.watch_card.mark.setText("tapped the table")
     page.watch_card.wish_mark()
-    qtbot.waitUntil(lambda: bench.desk.bridge.status.samples > samples + 60_000, timeout=PATIENCE_MS)
-    bench.orders.abort()
+    qtbot.waitUntil(lambda: bench.context.bridge.status.samples > samples + 60_000, timeout=PATIENCE_MS)
+    bench.actions.abort()
     reach(qtbot, bench, EngineState.READY)
     with open_recording(recorded(bench).file) as recording:
         assert any("tapped the table" in event.text for event in recording.events)
@@ -270,7 +270,7 @@ def test_the_live_pictures_show_the_run(bench, qtbot):
 def test_the_cancel_button_has_the_focus_when_armed_and_disarms(bench, qtbot):
     bench.show_page(RUN)
     reach(qtbot, bench, EngineState.READY)
-    bench.orders.arm_test()
+    bench.actions.arm_test()
     reach(qtbot, bench, EngineState.ARMED)
     bench.tick()
     card = bench.pages[RUN].arm_card
@@ -280,8 +280,8 @@ def test_the_cancel_button_has_the_focus_when_armed_and_disarms(bench, qtbot):
 
 
 def test_an_engine_that_dies_is_told_within_a_moment(bench, qtbot):
-    os.kill(bench.desk.bridge.engine_pid, signal.SIGKILL)
-    qtbot.waitUntil(lambda: bench.desk.bridge.status is None, timeout=5_000)
+    os.kill(bench.context.bridge.engine_pid, signal.SIGKILL)
+    qtbot.waitUntil(lambda: bench.context.bridge.status is None, timeout=5_000)
     assert bench.strip.notices[-1].code == "EngineGone"
     bench.tick()
-    assert bench.banner.face.word == "NO BENCH"
+    assert bench.banner.indicator.word == "NO BENCH"

@@ -27,7 +27,7 @@ def main(folder: Path, config: Path) -> None:
     app = application(["vibench"])
     window = Window(AppContext(Settings(folder / "window.ini")), PAGES)
     window.show()
-    bridge = window.desk.bridge
+    bridge = window.context.bridge
     bridge.open(rig, None)
     done: list[str] = []
 

@@ -22,7 +22,7 @@ from vibench.sim import (
     lyapunov_spectrum,
 )
 from vibench.sim.exponents._dynamical_exponents import map_exponents
-from vibench.sim.exponents._lyapunov import Source, ExponentVerdict
+from vibench.sim.exponents._lyapunov import ExponentVerdict, Source
 from vibench.sim.exponents._settling import FinalMotion
 
 HEAVY, FAST, SLOW = 1e10, 3.0, 2.0
@@ -156,7 +156,7 @@ def test_a_hard_impact_oscillator_has_the_exponent_of_its_closed_form_flow(case)
         RECOMPUTED[case], abs=4.0 * found.standard_error_per_s + 2e-4
     )
     assert found.standard_error_per_s < 0.005
-    assert (found.tendency is ExponentVerdict.CHAOTIC) == (RECOMPUTED[case] > 0.0)
+    assert (found.verdict is ExponentVerdict.CHAOTIC) == (RECOMPUTED[case] > 0.0)
 
 
 def test_each_hard_impact_adds_twice_the_logarithm_of_the_restitution():
@@ -198,7 +198,7 @@ def test_two_attractors_live_side_by_side_just_above_grazing(omega, chaotic, lar
     case, period = soft(omega), 2.0 * math.pi / omega
     chaos = exponent(case, omega, 5000, 1.0)
     allowed = 4.0 * math.hypot(chaos.standard_error_per_s, 5e-4)
-    assert chaos.tendency is ExponentVerdict.CHAOTIC
+    assert chaos.verdict is ExponentVerdict.CHAOTIC
     assert chaos.exponent_per_s == pytest.approx(chaotic, abs=allowed)
     quiet = exponent(case, omega, 2000)
     assert quiet.source is Source.MULTIPLIERS

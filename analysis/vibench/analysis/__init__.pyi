@@ -4,12 +4,12 @@ from .chaos import (
 )
 from .comparison import (
     AnalysisOptions as AnalysisOptions,
-    CurveOrigin as CurveOrigin,
-    CurveKind as CurveKind,
     Curve as Curve,
-    readings as readings,
+    CurveKind as CurveKind,
+    CurveOrigin as CurveOrigin,
     curve_difference as curve_difference,
     curve_peaks as curve_peaks,
+    readings as readings,
 )
 from .errors import (
     AnalysisError as AnalysisError,
@@ -18,10 +18,10 @@ from .errors import (
 )
 from .frequency_response import (
     Estimator as Estimator,
-    MagnitudeScale as MagnitudeScale,
-    FrequencyResponseRequest as FrequencyResponseRequest,
-    Resonance as Resonance,
     FrequencyResponse as FrequencyResponse,
+    FrequencyResponseRequest as FrequencyResponseRequest,
+    MagnitudeScale as MagnitudeScale,
+    Resonance as Resonance,
     quantities_named as quantities_named,
     resonances as resonances,
     transmissibility as transmissibility,
@@ -42,14 +42,14 @@ from .recordings import (
     ProgressObserver as ProgressObserver,
 )
 from .results import (
+    AnalysisFailure as AnalysisFailure,
     CampaignResults as CampaignResults,
     ComparedRecording as ComparedRecording,
-    AnalysisFailure as AnalysisFailure,
     analyse_files as analyse_files,
     analyse_recording as analyse_recording,
-    merged_results as merged_results,
     campaign_summary as campaign_summary,
     compare_recording as compare_recording,
+    merged_results as merged_results,
     recordings_in as recordings_in,
     result_summary as result_summary,
 )

@@ -8,14 +8,14 @@ from typing import Annotated
 import typer
 
 from vibench.analysis import (
+    AnalysisFailure,
     CampaignResults,
     Estimator,
-    AnalysisFailure,
-    MagnitudeScale,
     FrequencyResponseRequest,
-    UpdatedSpecimen,
-    Simulation,
+    MagnitudeScale,
     ProgressObserver,
+    Simulation,
+    UpdatedSpecimen,
     Window,
     analyse_files,
     campaign_summary,
@@ -128,15 +128,15 @@ def analyse(
     has_report = out is not None or not as_json
     if has_report:
         room_for_folder(folder)
-    with reading_bar() as watcher:
+    with reading_bar() as observer:
         simulation = Simulation.LAID_OVER if simulate else Simulation.LEFT_OUT
-        shaken = fitted_to(paths, name, watcher) if fit else None
-        specimen = None if shaken is None else shaken.specimen
-        results = analyse_files(paths, name, simulation, request, watcher, specimen)
-    if shaken is not None:
-        results = replace(results, model_said=shaken.sentences)
+        updated = fitted_to(paths, name, observer) if fit else None
+        specimen = None if updated is None else updated.specimen
+        results = analyse_files(paths, name, simulation, request, observer, specimen)
+    if updated is not None:
+        results = replace(results, model_said=updated.sentences)
     if as_json:
-        fitted = {} if shaken is None else {"specimen_fit": shaken.to_dict()}
+        fitted = {} if updated is None else {"specimen_fit": updated.to_dict()}
         print_json({**campaign_summary(results), **fitted})
     for sentence in () if as_json else results.model_said:
         console.print(sentence)
@@ -147,9 +147,9 @@ def analyse(
     complain_about(results)
 
 
-def fitted_to(paths: Sequence[Path], name: str, watcher: ProgressObserver) -> UpdatedSpecimen:
+def fitted_to(paths: Sequence[Path], name: str, observer: ProgressObserver) -> UpdatedSpecimen:
     """Fit the specimen to recordings, whatever the report is to show of them."""
-    return update_model(analyse_files(paths, name, Simulation.LEFT_OUT, watcher=watcher))
+    return update_model(analyse_files(paths, name, Simulation.LEFT_OUT, observer=observer))
 
 
 def complain_about(results: CampaignResults) -> None:

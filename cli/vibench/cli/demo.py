@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from vibench.acquisition import load_campaign, shipped
-from vibench.acquisition.campaign import PointResult, PointOutcome
+from vibench.acquisition.campaign import PointOutcome, PointResult
 from vibench.acquisition.engine import CampaignRequest
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import campaign_summary
@@ -34,14 +34,20 @@ def demo(
     )
     with second_process(campaign.name) as analyst:
 
-        def recorded(item: PointResult) -> None:
-            if item.result is PointOutcome.RECORDED:
-                analyst.take(item.path)
+        def recorded(point_result: PointResult) -> None:
+            if point_result.outcome is PointOutcome.RECORDED:
+                analyst.take(point_result.path)
 
         rig = shipped("hardware_configs/virtual_rig.toml")
         with the_bench(load_rig(rig), "demo") as engine:
-            items = engine.measure(CampaignRequest(campaign=campaign, folder=folder / "recordings"), recorded)
-        if {item.name for item in items if item.result is PointOutcome.RECORDED} != set(campaign.recording_names()):
+            point_results = engine.measure(
+                CampaignRequest(campaign=campaign, folder=folder / "recordings"), recorded
+            )
+        if {
+            point_result.name
+            for point_result in point_results
+            if point_result.outcome is PointOutcome.RECORDED
+        } != set(campaign.recording_names()):
             raise typer.Exit(STOPPED_EXIT_CODE)
         with analysis_bar(analyst.asked) as step:
             for _ in analyst.results():

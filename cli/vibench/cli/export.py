@@ -38,7 +38,7 @@ def export(
         chosen = excerpt(opened, tuple(channels.split(",")) if channels else (), from_s, to_s)
         path = recording.with_name(f"{chosen.name}.{to.value}") if out is None else out
         included = Results.INCLUDED if results else Results.LEFT_OUT
-        with transfer_bar(f"export as {to.value}", chosen.values) as watcher:
-            written = export_samples(chosen, to, path, included, watcher)
+        with transfer_bar(f"export as {to.value}", chosen.values) as observer:
+            written = export_samples(chosen, to, path, included, observer)
     for each in written:
         console.print(f"wrote {each}")

@@ -37,8 +37,8 @@ def import_file(
     target = file.with_suffix(".h5") if out is None else out
     with opened_source(file) as source:
         longest = max(each.samples for each in source.channels)
-    with transfer_bar("import", longest * len(meaning.channels)) as watcher:
-        made = import_recording(file, meaning, target, watcher)
+    with transfer_bar("import", longest * len(meaning.channels)) as observer:
+        made = import_recording(file, meaning, target, observer)
     if as_json:
         print_json({"recording": str(made)})
     else:

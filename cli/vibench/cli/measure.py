@@ -18,17 +18,17 @@ import typer
 from vibench.acquisition import CheckRule, ConfigurationError, load_campaign, load_toml
 from vibench.acquisition.campaign import (
     AfterFailure,
+    CampaignEstimate,
     ChangedBench,
     CommandMessenger,
-    CampaignEstimate,
     ExistingRecordings,
-    PointOutcome,
     MailMessenger,
     MailSettings,
     Messenger,
+    PointOutcome,
     estimate_campaign,
 )
-from vibench.acquisition.engine import Supervision, RequestHandler, Engine, CampaignRequest, JobQueue, serving
+from vibench.acquisition.engine import CampaignRequest, Engine, JobQueue, RequestHandler, Supervision, serving
 from vibench.acquisition.rig import Rig
 
 from .engine_bars import Watching
@@ -143,10 +143,10 @@ def measure(
         check=check,
     )
     with the_bench(rig, plan.name) as engine:
-        items = engine.measure(orders, messengers=messengers)
+        point_results = engine.measure(orders, messengers=messengers)
     if engine.switch.request is not None:
         raise typer.Exit(STOPPED_EXIT_CODE)
-    if any(item.result is PointOutcome.FAILED for item in items):
+    if any(point_result.outcome is PointOutcome.FAILED for point_result in point_results):
         raise typer.Exit(1)
 
 
@@ -154,8 +154,8 @@ def measure(
 def the_bench(rig: Rig, what: str) -> Iterator[Engine]:
     """Open a bench in this process, with bars on the terminal and a door for whoever watches or stops it."""
     engine = Engine(Supervision.UNATTENDED)
-    desk = RequestHandler(engine, JobQueue(engine))
+    handler = RequestHandler(engine, JobQueue(engine))
     with closing(engine):
         engine.open(rig)
-        with serving(desk, what), Watching(desk.status):
+        with serving(handler, what), Watching(handler.status):
             yield engine

@@ -12,7 +12,15 @@ from rich.table import Table
 
 from vibench.analysis import InvalidRequest
 from vibench.sim import Accuracy, Observable, Rest, ScenePlan, plan_scene
-from vibench.sim.study import ExistingStudy, Start, Study, StudyResults, plausibility_warnings, software, solve_study
+from vibench.sim.study import (
+    ExistingStudy,
+    Start,
+    Study,
+    StudyResults,
+    plausibility_warnings,
+    software,
+    solve_study,
+)
 
 from .frequency_option import frequencies
 from .interruption import told_to_stop
@@ -93,8 +101,8 @@ def predict(
     print_warnings(plausibility_warnings(asked))
     began = time.monotonic()
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
-    with told_to_stop() as is_stopped, study_bar(asked.grid.size) as watcher:
-        results = solve_study(asked, out, existing, workers, cluster, watcher, is_stopped)
+    with told_to_stop() as is_stopped, study_bar(asked.grid.size) as observer:
+        results = solve_study(asked, out, existing, workers, cluster, observer, is_stopped)
     if as_json:
         print_json(document(results, time.monotonic() - began))
     else:

@@ -19,7 +19,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from vibench.sim.study import StudyProgress, StudyObserver
+from vibench.sim.study import StudyObserver, StudyProgress
 
 from .output import console
 

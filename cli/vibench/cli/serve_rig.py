@@ -43,7 +43,9 @@ def serve_rig(
         console.print(f"  {rig.socket_resource}")
         if rig.token is not None:
             console.print("\nIt is heard by other computers, and lets in whoever has the token:")
-            console.print(f"  export {TOKEN_VARIABLE}={rig.token}  # our own programs; others send it as metadata")
+            console.print(
+                f"  export {TOKEN_VARIABLE}={rig.token}  # our own programs; others send it as metadata"
+            )
             console.print(f"  {TOKEN_KEY}: {rig.token}")
         stop.wait()
     console.print("The virtual rig is off.")

@@ -44,8 +44,8 @@ def study(
     asked = load_toml(plan, Study)
     print_warnings(plausibility_warnings(asked))
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
-    with told_to_stop() as is_stopped, study_bar(asked.grid.size) as watcher:
-        results = solve_study(asked, out, existing, workers, cluster, watcher, is_stopped)
+    with told_to_stop() as is_stopped, study_bar(asked.grid.size) as observer:
+        results = solve_study(asked, out, existing, workers, cluster, observer, is_stopped)
     if as_json:
         print_json(document(results, out))
     else:
@@ -88,9 +88,14 @@ def kept_study(study: Study, folder: Path, workers: int | None) -> StudyResults:
     """Solve a study, or what is missing of it: its file is named by everything that it asks."""
     folder.mkdir(parents=True, exist_ok=True)
     digest = hashlib.sha256(study.model_dump_json().encode()).hexdigest()[:_DIGEST]
-    with told_to_stop() as is_stopped, study_bar(study.grid.size) as watcher:
+    with told_to_stop() as is_stopped, study_bar(study.grid.size) as observer:
         results = solve_study(
-            study, folder / f"{digest}.h5", ExistingStudy.RESUME, workers, watcher=watcher, cancelled=is_stopped
+            study,
+            folder / f"{digest}.h5",
+            ExistingStudy.RESUME,
+            workers,
+            observer=observer,
+            cancelled=is_stopped,
         )
     if not results.is_complete:
         typer.echo(

@@ -13,7 +13,13 @@ from rich.table import Table
 from vibench.analysis import InvalidRequest
 from vibench.analysis.report import accuracy_document, tradeoff_figure, worst_error
 from vibench.sim import Accuracy
-from vibench.sim.accuracy_benchmark import MOTIONS, MotionBenchmark, Thoroughness, AccuracyBenchmark, measure_accuracy
+from vibench.sim.accuracy_benchmark import (
+    MOTIONS,
+    AccuracyBenchmark,
+    MotionBenchmark,
+    Thoroughness,
+    measure_accuracy,
+)
 
 from .output import console, print_json
 from .paths import AsJson, room_for_folder
@@ -48,15 +54,15 @@ def tradeoff(
         def step(name: str) -> None:
             bars.update(bar, description=name, advance=0 if bars.tasks[0].description == "" else 1)
 
-        trade = measure_accuracy(Thoroughness(span_s=span), step)
+        benchmark = measure_accuracy(Thoroughness(span_s=span), step)
         bars.update(bar, completed=len(MOTIONS))
     if as_json:
-        print_json(_document(trade))
+        print_json(_document(benchmark))
     else:
-        for each in trade.motions:
+        for each in benchmark.motions:
             _tell(each)
     if folder is not None:
-        _save(trade, folder, markdown)
+        _save(benchmark, folder, markdown)
 
 
 def _folder(out: Path | None, markdown: Path | None) -> Path | None:
@@ -64,11 +70,11 @@ def _folder(out: Path | None, markdown: Path | None) -> Path | None:
     return out if out is not None or markdown is None else markdown.parent / "images"
 
 
-def _save(trade: AccuracyBenchmark, folder: Path, markdown: Path | None) -> None:
-    paths = tradeoff_figure(trade).save(folder)
+def _save(benchmark: AccuracyBenchmark, folder: Path, markdown: Path | None) -> None:
+    paths = tradeoff_figure(benchmark).save(folder)
     if markdown is not None:
         picture = Path(os.path.relpath(paths[0], markdown.parent)).as_posix()
-        markdown.write_text(accuracy_document(trade, picture), encoding="utf-8")
+        markdown.write_text(accuracy_document(benchmark, picture), encoding="utf-8")
 
 
 def _tell(found: MotionBenchmark) -> None:
@@ -92,15 +98,15 @@ def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.1e}"
 
 
-def _document(trade: AccuracyBenchmark) -> dict[str, object]:
+def _document(benchmark: AccuracyBenchmark) -> dict[str, object]:
     return {
-        "machine": trade.machine,
-        "software": trade.software,
+        "machine": benchmark.machine,
+        "software": benchmark.software,
         "motions": [
-            {**asdict(each), "name": each.motion.name, "advice": each.advice} for each in trade.motions
+            {**asdict(each), "name": each.motion.name, "advice": each.advice} for each in benchmark.motions
         ],
         "promises": [
-            {"level": level.value, "promised": level.promise, "worst": worst_error(trade, level)}
+            {"level": level.value, "promised": level.promise, "worst": worst_error(benchmark, level)}
             for level in Accuracy
         ],
     }

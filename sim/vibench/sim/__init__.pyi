@@ -32,8 +32,8 @@ from .motion import (
 )
 from .periodic import (
     PowerSpring as PowerSpring,
-    harmonic_balance_branch as harmonic_balance_branch,
     first_order_states as first_order_states,
+    harmonic_balance_branch as harmonic_balance_branch,
     jump_frequencies as jump_frequencies,
     periodic_branch as periodic_branch,
     periodic_orbit as periodic_orbit,
@@ -42,10 +42,10 @@ from .periodic import (
 )
 from .scene import (
     Observable as Observable,
-    ScenePrediction as ScenePrediction,
     Rest as Rest,
     Scene as Scene,
     ScenePlan as ScenePlan,
+    ScenePrediction as ScenePrediction,
     plan_scene as plan_scene,
     solve_scene as solve_scene,
 )

@@ -81,7 +81,7 @@ def output_of(virtual):
 class TestOpening:
     def test_a_virtual_bench_needs_nothing_but_its_configuration(self, rig):
         with open_bench(rig) as bench:
-            assert bench.reality is BenchKind.SIMULATED
+            assert bench.kind is BenchKind.SIMULATED
             assert bench.identities["generator"].model == "AFG1022"
             assert bench.identities["digitizer"].model == "NI 9234"
             assert bench.confirmations.operator == "simulated"

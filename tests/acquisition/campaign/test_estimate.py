@@ -33,8 +33,8 @@ def test_the_time_is_what_the_recordings_last(bench, rig, tmp_path):
     expected = estimate_campaign(CAMPAIGN, rig, tmp_path / "new" / "folder")
     assert not (tmp_path / "new").exists()
     made_s = 0.0
-    for item in run_campaign(bench, CAMPAIGN, tmp_path / "new" / "folder"):
-        with open_recording(item.path) as recording:
+    for point_result in run_campaign(bench, CAMPAIGN, tmp_path / "new" / "folder"):
+        with open_recording(point_result.path) as recording:
             made_s += recording.duration_s
     assert expected.duration_s == pytest.approx(made_s, abs=1e-3)
     assert expected.lead_in_s == pytest.approx((1 + 2) * 0.25)
@@ -50,9 +50,9 @@ def test_the_bytes_are_those_of_the_samples_and_the_largest_is_the_last(rig, tmp
 
 
 def test_what_is_there_already_is_not_counted(bench, rig, tmp_path):
-    items = run_campaign(bench, CAMPAIGN, tmp_path)
+    point_results = run_campaign(bench, CAMPAIGN, tmp_path)
     with pytest.raises(RecordingError, match="exist already"):
         estimate_campaign(CAMPAIGN, rig, tmp_path)
-    items[0].path.unlink()
+    point_results[0].path.unlink()
     expected = estimate_campaign(CAMPAIGN, rig, tmp_path, ExistingRecordings.RESUME)
     assert (expected.recordings, expected.kept) == (1, 2)

@@ -7,7 +7,15 @@ from time import monotonic
 import pytest
 
 from vibench.acquisition import ConfigurationError, StopSwitch, run_campaign, validated
-from vibench.acquisition.campaign import CampaignEventKind, ExistingRecordings, PointOutcome, ReconnectingBench, JournalPointState, estimate_campaign, read_journal
+from vibench.acquisition.campaign import (
+    CampaignEventKind,
+    ExistingRecordings,
+    JournalPointState,
+    PointOutcome,
+    ReconnectingBench,
+    estimate_campaign,
+    read_journal,
+)
 from vibench.acquisition.campaign._attempts import LOOK_EVERY_S
 from vibench.acquisition.campaign._journal import journal_path
 from vibench.acquisition.errors import DataLost
@@ -33,8 +41,8 @@ def test_the_rig_rests_between_recordings_in_its_own_time_with_nothing_on_the_te
         world = kept._power._virtual.world
         began_s, loudest_v = [], []
 
-        def happened(happening):
-            match happening.event:
+        def happened(event):
+            match event.kind:
                 case CampaignEventKind.RESTING:
                     world.keep_truth()
                     began_s.append(world.time_s)
@@ -43,9 +51,9 @@ def test_the_rig_rests_between_recordings_in_its_own_time_with_nothing_on_the_te
                     loudest_v.append(abs(world.truth()[-1000:, 1]).max())
 
         begun = monotonic()
-        items = run_campaign(kept.bench, campaign("one", "two"), tmp_path, on_happening=happened)
+        point_results = run_campaign(kept.bench, campaign("one", "two"), tmp_path, on_event=happened)
         assert monotonic() - begun < REST_S
-    assert [item.result for item in items] == [PointOutcome.RECORDED] * 2
+    assert [point_result.outcome for point_result in point_results] == [PointOutcome.RECORDED] * 2
     assert len(began_s) == 1
     assert max(loudest_v) < 1e-4  # the table's velocity [m/s]: noise of the amplifier
     told = (tmp_path / "c.status").read_text()
@@ -58,7 +66,9 @@ def test_a_rest_is_told_in_the_plan_and_in_the_estimate(rig, tmp_path):
     assert with_rest.size_bytes(5120, 4) == without.size_bytes(5120, 4)
     expected = estimate_campaign(with_rest, rig, tmp_path)
     assert expected.rest_s == pytest.approx(2 * REST_S)
-    assert expected.duration_s == pytest.approx(estimate_campaign(without, rig, tmp_path).duration_s + 2 * REST_S)
+    assert expected.duration_s == pytest.approx(
+        estimate_campaign(without, rig, tmp_path).duration_s + 2 * REST_S
+    )
 
 
 def test_a_stop_is_heard_in_the_middle_of_a_rest(bench, tmp_path):
@@ -71,9 +81,9 @@ def test_a_stop_is_heard_in_the_middle_of_a_rest(bench, tmp_path):
             switch.ask(StopRequest.by(Cause.OPERATOR, "enough"))
 
     bench.idle = idle_and_stop
-    items = run_campaign(bench, campaign("one", "two"), tmp_path, switch=switch)
+    point_results = run_campaign(bench, campaign("one", "two"), tmp_path, switch=switch)
     assert bench.idled_s == pytest.approx(5.1, abs=0.05)
-    assert [item.name for item in items] == ["one"]
+    assert [point_result.name for point_result in point_results] == ["one"]
     assert [point.state for point in points(tmp_path)] == [JournalPointState.DONE, JournalPointState.QUEUED]
 
 
@@ -86,27 +96,33 @@ def test_a_hold_keeps_a_rest_up_until_it_is_taken_back(bench, tmp_path):
         switch.hold() if bench.idled_s < 2 * REST_S else switch.resume()
 
     bench.idle = idle_and_press
-    items = run_campaign(bench, campaign("one", "two"), tmp_path, switch=switch)
+    point_results = run_campaign(bench, campaign("one", "two"), tmp_path, switch=switch)
     assert bench.idled_s == pytest.approx(2 * REST_S, abs=0.2)
-    assert [item.result for item in items] == [PointOutcome.RECORDED, PointOutcome.RECORDED]
+    assert [point_result.outcome for point_result in point_results] == [
+        PointOutcome.RECORDED,
+        PointOutcome.RECORDED,
+    ]
 
 
 def test_a_campaign_killed_in_a_rest_goes_on_at_the_next_point(bench, new_bench, rig, tmp_path):
-    def as_left_by_a_kill(happening):
-        if happening.event is CampaignEventKind.RESTING:
+    def as_left_by_a_kill(event):
+        if event.kind is CampaignEventKind.RESTING:
             # What a process leaves that is killed now: the files as they are, the journal's log included.
             shutil.copytree(tmp_path / "out", tmp_path / "killed", dirs_exist_ok=True)
 
     plan = campaign("one", "two")
-    run_campaign(bench, plan, tmp_path / "out", on_happening=as_left_by_a_kill)
+    run_campaign(bench, plan, tmp_path / "out", on_event=as_left_by_a_kill)
     killed = tmp_path / "killed"
     assert [(point.state, point.attempts) for point in points(killed)] == [
         (JournalPointState.DONE, 1),
         (JournalPointState.QUEUED, 0),
     ]
     fresh = new_bench(rig)
-    items = run_campaign(fresh, plan, killed, ExistingRecordings.RESUME)
-    assert [item.result for item in items] == [PointOutcome.KEPT, PointOutcome.RECORDED]
+    point_results = run_campaign(fresh, plan, killed, ExistingRecordings.RESUME)
+    assert [point_result.outcome for point_result in point_results] == [
+        PointOutcome.KEPT,
+        PointOutcome.RECORDED,
+    ]
     assert fresh.idled_s == 0.0  # nothing has been played in this session
 
 
@@ -117,8 +133,8 @@ def test_another_attempt_comes_after_a_rest_too(bench, tmp_path):
         if faults and progress.run.state is RunState.RECORDING:
             bench.world.faults["digitizer.read"] = [faults.pop]
 
-    items = run_campaign(bench, campaign("one", attempts=2), tmp_path, on_progress=watch)
-    assert [item.path.name for item in items] == ["one.2.h5"]
+    point_results = run_campaign(bench, campaign("one", attempts=2), tmp_path, on_progress=watch)
+    assert [point_result.path.name for point_result in point_results] == ["one.2.h5"]
     assert bench.idled_s == pytest.approx(LOOK_EVERY_S + REST_S)
 
 

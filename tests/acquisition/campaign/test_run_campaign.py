@@ -32,8 +32,8 @@ def dwell(name, amplitude_vpp=1.0, frequency_hz=260.0):
 CAMPAIGN = Campaign(name="c", measurements=(dwell("one"), dwell("two"), dwell("three")))
 
 
-def results(items):
-    return [(item.name, item.result) for item in items]
+def results(point_results):
+    return [(point_result.name, point_result.outcome) for point_result in point_results]
 
 
 def failing_in(bench, name, fault):
@@ -56,10 +56,10 @@ def test_a_file_where_the_folder_should_be_is_refused_before_anything_plays(benc
 
 
 def test_every_measurement_becomes_one_complete_recording(bench, tmp_path):
-    items = run_campaign(bench, CAMPAIGN, tmp_path / "out")
-    assert results(items) == [(name, PointOutcome.RECORDED) for name in ("one", "two", "three")]
-    for item in items:
-        with open_recording(item.path) as recording:
+    point_results = run_campaign(bench, CAMPAIGN, tmp_path / "out")
+    assert results(point_results) == [(name, PointOutcome.RECORDED) for name in ("one", "two", "three")]
+    for point_result in point_results:
+        with open_recording(point_result.path) as recording:
             assert recording.state is RecordingState.COMPLETE
             assert [segment.label for segment in recording.segments] == [
                 "check",
@@ -67,7 +67,7 @@ def test_every_measurement_becomes_one_complete_recording(bench, tmp_path):
                 "dwell",
                 "ramp_down",
             ]
-            assert recording.plan["name"] == item.name
+            assert recording.plan["name"] == point_result.name
 
 
 def test_progress_counts_the_recordings(bench, tmp_path):
@@ -89,8 +89,12 @@ def test_resuming_keeps_what_is_complete_and_makes_another_attempt_at_what_is_no
         run_campaign(
             bench, CAMPAIGN, tmp_path, on_progress=failing_in(bench, "two", lambda: DataLost("a hole"))
         )
-    items = run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
-    assert results(items) == [("one", PointOutcome.KEPT), ("two", PointOutcome.RECORDED), ("three", PointOutcome.RECORDED)]
+    point_results = run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
+    assert results(point_results) == [
+        ("one", PointOutcome.KEPT),
+        ("two", PointOutcome.RECORDED),
+        ("three", PointOutcome.RECORDED),
+    ]
     assert sorted(path.name for path in tmp_path.glob("*.h5")) == ["one.h5", "three.h5", "two.2.h5", "two.h5"]
     with open_recording(tmp_path / "two.h5") as first:
         assert first.state is RecordingState.FAILED
@@ -108,15 +112,19 @@ def test_resuming_with_another_plan_is_refused(bench, tmp_path):
 
 
 def test_a_campaign_told_to_go_on_passes_a_failed_measurement(bench, tmp_path):
-    items = run_campaign(
+    point_results = run_campaign(
         bench,
         CAMPAIGN,
         tmp_path,
         after_failure=AfterFailure.GO_ON,
         on_progress=failing_in(bench, "one", lambda: DataLost("a hole")),
     )
-    assert results(items) == [("one", PointOutcome.FAILED), ("two", PointOutcome.RECORDED), ("three", PointOutcome.RECORDED)]
-    assert items[0].reason == "a hole"
+    assert results(point_results) == [
+        ("one", PointOutcome.FAILED),
+        ("two", PointOutcome.RECORDED),
+        ("three", PointOutcome.RECORDED),
+    ]
+    assert point_results[0].reason == "a hole"
 
 
 @pytest.mark.parametrize("lost", [InstrumentLost("gone"), RecordingError("the disk is full")])
@@ -148,8 +156,8 @@ def test_ctrl_c_ends_the_measurement_softly_and_the_campaign_with_it(bench, tmp_
             signal.raise_signal(signal.SIGINT)
 
     before = signal.getsignal(signal.SIGINT)
-    items = run_campaign(bench, CAMPAIGN, tmp_path, on_progress=press_once)
-    assert results(items) == [("one", PointOutcome.RECORDED), ("two", PointOutcome.STOPPED)]
+    point_results = run_campaign(bench, CAMPAIGN, tmp_path, on_progress=press_once)
+    assert results(point_results) == [("one", PointOutcome.RECORDED), ("two", PointOutcome.STOPPED)]
     assert not bench.world.is_on
     assert signal.getsignal(signal.SIGINT) is before
     with open_recording(tmp_path / "two.h5") as recording:

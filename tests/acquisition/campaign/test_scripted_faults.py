@@ -33,11 +33,11 @@ def test_every_point_of_a_rehearsed_campaign_is_recorded_past_cable_overrun_serv
         retry=RetryPolicy(attempts=4, on=(*RetryPolicy().on, Retryable.CHECK_FAILED, Retryable.LIMIT)),
     )
     with ReconnectingBench(with_faults(rig, script)) as kept:
-        items = run_campaign(
+        point_results = run_campaign(
             kept.bench, campaign, tmp_path / "out", after_failure=AfterFailure.GO_ON, reopen=kept.reopen
         )
         assert [each.fault for each in kept._power.played_faults] == [each["fault"] for each in SCRIPT]
-    assert [(item.name, item.result) for item in items] == [
+    assert [(point_result.name, point_result.outcome) for point_result in point_results] == [
         (f"point{number}", PointOutcome.RECORDED) for number in range(6)
     ]
     said = " ".join(reason_of(path) for path in sorted((tmp_path / "out").glob("*.h5")))

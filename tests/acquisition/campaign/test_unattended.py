@@ -18,8 +18,8 @@ from vibench.acquisition.campaign import (
     ChangedBench,
     CommandMessenger,
     ExistingRecordings,
-    PointOutcome,
     JournalPointState,
+    PointOutcome,
     ReasonCode,
     read_journal,
 )
@@ -59,13 +59,13 @@ def log(folder):
 
 class TestRetries:
     def test_lost_data_is_measured_again_into_another_file(self, bench, tmp_path):
-        items = run_campaign(
+        point_results = run_campaign(
             bench,
             campaign("one", "two", attempts=2),
             tmp_path,
             on_progress=failing_once(bench, lambda: DataLost("a hole")),
         )
-        assert [(item.path.name, item.result) for item in items] == [
+        assert [(point_result.path.name, point_result.outcome) for point_result in point_results] == [
             ("one.2.h5", PointOutcome.RECORDED),
             ("two.h5", PointOutcome.RECORDED),
         ]
@@ -84,7 +84,7 @@ class TestRetries:
                 on_progress=failing_once(bench, lambda: DataLost("a hole")),
             )
         (point,) = points(tmp_path)
-        assert (point.state, point.why, point.reason, point.attempts) == (
+        assert (point.state, point.reason_code, point.reason, point.attempts) == (
             JournalPointState.FAILED,
             ReasonCode.DATA_LOST,
             "a hole",
@@ -98,14 +98,17 @@ class TestRetries:
             opened.append(new_bench(rig))
             return opened[-1]
 
-        items = run_campaign(
+        point_results = run_campaign(
             bench,
             campaign("one", "two", attempts=2),
             tmp_path,
             on_progress=failing_once(bench, lambda: InstrumentLost("gone")),
             reopen=reopen,
         )
-        assert [item.result for item in items] == [PointOutcome.RECORDED, PointOutcome.RECORDED]
+        assert [point_result.outcome for point_result in point_results] == [
+            PointOutcome.RECORDED,
+            PointOutcome.RECORDED,
+        ]
         assert len(opened) == 1
         assert any(name == "start" for name, _, _ in opened[0].world.calls)
         assert "bench_reopened" in [line["event"] for line in log(tmp_path)]
@@ -124,7 +127,10 @@ class TestRetries:
                 reopen=reopen,
             )
         assert any("still gone" in note for note in ended.value.__notes__)
-        assert [point.state for point in points(tmp_path)] == [JournalPointState.FAILED, JournalPointState.QUEUED]
+        assert [point.state for point in points(tmp_path)] == [
+            JournalPointState.FAILED,
+            JournalPointState.QUEUED,
+        ]
 
     def test_a_bench_that_comes_back_as_another_one_is_not_used(self, bench, new_bench, rig, tmp_path):
         other = new_bench(rig)
@@ -166,10 +172,13 @@ class TestAnotherBench:
     def test_it_is_used_when_accepted_and_then_counts_as_the_campaign_s(self, begun, new_bench, rig):
         bench = new_bench(rig)
         bench.identities = {**bench.identities, "generator": other_serial(bench.identities["generator"])}
-        items = run_campaign(
+        point_results = run_campaign(
             bench, campaign("one", "two"), begun, ExistingRecordings.RESUME, changed_bench=ChangedBench.ACCEPT
         )
-        assert [item.result for item in items] == [PointOutcome.RECORDED, PointOutcome.RECORDED]
+        assert [point_result.outcome for point_result in point_results] == [
+            PointOutcome.RECORDED,
+            PointOutcome.RECORDED,
+        ]
         run_campaign(bench, campaign("one", "two"), begun, ExistingRecordings.RESUME)
 
 
@@ -190,8 +199,10 @@ class TestFurtherMeasurements:
         run_campaign(
             bench, campaign("one", "two"), tmp_path, after=after, on_progress=stop_at_two, switch=stop
         )
-        items = run_campaign(bench, campaign("one", "two"), tmp_path, ExistingRecordings.RESUME, after=after)
-        assert [(item.name, item.result) for item in items] == [
+        point_results = run_campaign(
+            bench, campaign("one", "two"), tmp_path, ExistingRecordings.RESUME, after=after
+        )
+        assert [(point_result.name, point_result.outcome) for point_result in point_results] == [
             ("one", PointOutcome.KEPT),
             ("more", PointOutcome.KEPT),
             ("two", PointOutcome.RECORDED),
@@ -210,25 +221,38 @@ class TestFurtherMeasurements:
             run_campaign(bench, campaign("one"), tmp_path, after=broken)
         assert points(tmp_path)[0].state is JournalPointState.DONE
         names = iter([[dwell("more")], []])
-        items = run_campaign(
-            bench, campaign("one"), tmp_path, ExistingRecordings.RESUME, after=lambda finished, recording: next(names)
+        point_results = run_campaign(
+            bench,
+            campaign("one"),
+            tmp_path,
+            ExistingRecordings.RESUME,
+            after=lambda finished, recording: next(names),
         )
-        assert [(item.name, item.result) for item in items] == [("one", PointOutcome.KEPT), ("more", PointOutcome.RECORDED)]
+        assert [(point_result.name, point_result.outcome) for point_result in point_results] == [
+            ("one", PointOutcome.KEPT),
+            ("more", PointOutcome.RECORDED),
+        ]
 
 
 class TestResuming:
     def test_a_recording_that_was_taken_away_is_made_again(self, bench, tmp_path):
         run_campaign(bench, campaign("one", "two"), tmp_path)
         (tmp_path / "one.h5").unlink()
-        items = run_campaign(bench, campaign("one", "two"), tmp_path, ExistingRecordings.RESUME)
-        assert [item.result for item in items] == [PointOutcome.RECORDED, PointOutcome.KEPT]
+        point_results = run_campaign(bench, campaign("one", "two"), tmp_path, ExistingRecordings.RESUME)
+        assert [point_result.outcome for point_result in point_results] == [
+            PointOutcome.RECORDED,
+            PointOutcome.KEPT,
+        ]
 
     def test_a_lost_journal_is_made_again_from_the_recordings(self, bench, tmp_path):
         run_campaign(bench, campaign("one", "two"), tmp_path)
         journal_path(tmp_path, "c").unlink()
-        items = run_campaign(bench, campaign("one", "two"), tmp_path, ExistingRecordings.RESUME)
-        assert [item.result for item in items] == [PointOutcome.KEPT, PointOutcome.KEPT]
-        assert [point.why for point in points(tmp_path)] == [ReasonCode.FOUND, ReasonCode.FOUND]
+        point_results = run_campaign(bench, campaign("one", "two"), tmp_path, ExistingRecordings.RESUME)
+        assert [point_result.outcome for point_result in point_results] == [
+            PointOutcome.KEPT,
+            PointOutcome.KEPT,
+        ]
+        assert [point.reason_code for point in points(tmp_path)] == [ReasonCode.FOUND, ReasonCode.FOUND]
 
     def test_two_programs_cannot_carry_out_one_campaign(self, bench, tmp_path):
         def second(progress):
@@ -240,15 +264,18 @@ class TestResuming:
 
     def test_a_stop_between_two_points_leaves_the_rest_queued(self, bench, tmp_path):
         stop = StopSwitch()
-        items = run_campaign(
+        point_results = run_campaign(
             bench,
             campaign("one", "two"),
             tmp_path,
-            on_item=lambda item: stop.ask(StopRequest.by(Cause.OPERATOR, "enough")),
+            on_result=lambda point_result: stop.ask(StopRequest.by(Cause.OPERATOR, "enough")),
             switch=stop,
         )
-        assert [item.name for item in items] == ["one"]
-        assert [point.state for point in points(tmp_path)] == [JournalPointState.DONE, JournalPointState.QUEUED]
+        assert [point_result.name for point_result in point_results] == ["one"]
+        assert [point.state for point in points(tmp_path)] == [
+            JournalPointState.DONE,
+            JournalPointState.QUEUED,
+        ]
         assert log(tmp_path)[-1]["text"] == "c was stopped: enough"
 
 

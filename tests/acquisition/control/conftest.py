@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition.control import feedback_controller
-from vibench.acquisition.control._control_action import PhaseSamples, ControlAction
+from vibench.acquisition.control._control_action import ControlAction, PhaseSamples
 from vibench.acquisition.excitation import Tone
 from vibench.acquisition.plan import Measurement, RunState, needed_vpp
 from vibench.acquisition.rig import Rig, Role, channels_of
@@ -65,17 +65,17 @@ class Bench:
 
     def carry_out(self, measurement: Measurement) -> None:
         """Play what is conducted, as a run would, until its end."""
-        conductor = feedback_controller(measurement, self.rig, channels_of(self.rig), RATE_HZ)
+        controller = feedback_controller(measurement, self.rig, channels_of(self.rig), RATE_HZ)
         noise = np.random.default_rng(5)
         level = 0.0
         most_vpp = measurement.excitation.amplitude_vpp
         try:
-            move: ControlAction = next(conductor)
+            action: ControlAction = next(controller)
             while True:
-                self.notes += [(self.sample / RATE_HZ, note.kind, note.text) for note in move.notes]
-                phase = move.phase
+                self.notes += [(self.sample / RATE_HZ, note.kind, note.text) for note in action.notes]
+                phase = action.phase
                 if phase is None:
-                    move = conductor.send(PhaseSamples(0, np.empty((0, 0))))
+                    action = controller.send(PhaseSamples(0, np.empty((0, 0))))
                     continue
                 begin, level = level, phase.end_level
                 first = self.sample
@@ -83,7 +83,7 @@ class Bench:
                 if phase.segment is not None and phase.state is RunState.RECORDING:
                     span = (first / RATE_HZ, self.sample / RATE_HZ)
                     self.segments.append((phase.segment.label, dict(phase.segment.numbers), *span))
-                move = conductor.send(PhaseSamples(first, volts))
+                action = controller.send(PhaseSamples(first, volts))
         except StopIteration:
             pass
 

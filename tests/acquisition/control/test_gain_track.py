@@ -11,23 +11,23 @@ STEP_S = 0.1
 def tracked(gain_of, steps=60, memory_s=0.5, noise=0.0, seed=0):
     """Follow a gain with a setting that is foreseen; returns held over target at every step."""
     random = np.random.default_rng(seed)
-    track = GainEstimator(memory_s)
+    estimator = GainEstimator(memory_s)
     achieved = []
     for step in range(steps):
         time_s = (step + 1) * STEP_S
-        modelled = 10.0 / track.gain_at(time_s)
+        modelled = 10.0 / estimator.gain_at(time_s)
         turned = gain_of(time_s) * np.exp(0.4j) * modelled
         base = turned + 10 * noise * (random.standard_normal(1) + 1j * random.standard_normal(1))
-        track.add(time_s, base, modelled, 10.0)
+        estimator.add(time_s, base, modelled, 10.0)
         achieved.append(abs(turned) / 10.0)
-    return np.array(achieved), track
+    return np.array(achieved), estimator
 
 
 def test_a_constant_answer_is_right_from_the_second_step_on():
-    achieved, track = tracked(lambda time_s: 0.6)
+    achieved, estimator = tracked(lambda time_s: 0.6)
     assert achieved[0] == pytest.approx(0.6)
     np.testing.assert_allclose(achieved[1:], 1.0, rtol=1e-12)
-    assert track.level == pytest.approx(1.0)
+    assert estimator.level == pytest.approx(1.0)
 
 
 def test_a_steady_trend_is_foreseen():
@@ -42,14 +42,14 @@ def test_chance_is_averaged_and_not_chased():
 
 
 def test_a_jump_is_forgotten_within_the_memory():
-    achieved, track = tracked(lambda time_s: 1.0 if time_s < 3 else 1.5)
+    achieved, estimator = tracked(lambda time_s: 1.0 if time_s < 3 else 1.5)
     after = achieved[30:]
     assert np.all(np.abs(after[8:] - 1) < 0.01)
-    assert abs(track.level - 1) < 0.01
+    assert abs(estimator.level - 1) < 0.01
 
 
 def test_nothing_heard_is_nothing_known():
-    track = GainEstimator(0.5)
-    track.add(0.1, np.empty(0, np.complex128), 1.0, 1.0)
-    assert not track.is_known
-    assert track.gain_at(1.0) == track.level == 1.0
+    estimator = GainEstimator(0.5)
+    estimator.add(0.1, np.empty(0, np.complex128), 1.0, 1.0)
+    assert not estimator.is_known
+    assert estimator.gain_at(1.0) == estimator.level == 1.0

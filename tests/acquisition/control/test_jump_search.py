@@ -3,7 +3,14 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.control._jump_search import LocatedJump, Side, SettledPoint, is_on_branch, located, side
+from vibench.acquisition.control._jump_search import (
+    LocatedJump,
+    SettledPoint,
+    Side,
+    is_on_branch,
+    located,
+    side,
+)
 
 
 def found(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=0.4):
@@ -15,7 +22,9 @@ def found(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=0.4):
 
     asked = []
     search = located(
-        SettledPoint(before_hz, response(before_hz)), SettledPoint(after_hz, response(after_hz)), resolution_hz
+        SettledPoint(before_hz, response(before_hz)),
+        SettledPoint(after_hz, response(after_hz)),
+        resolution_hz,
     )
     try:
         frequency_hz = next(search)

@@ -10,11 +10,11 @@ import pytest
 
 from vibench.acquisition import StopLevel
 from vibench.acquisition.engine import (
-    Supervision,
     EngineClient,
     EngineProcess,
     EngineState,
     EngineStatus,
+    Supervision,
     start_engine,
 )
 from vibench.acquisition.plan import Campaign
@@ -41,7 +41,7 @@ def shipped_rig() -> Rig:
 def engine() -> Iterator[Callable[..., EngineProcess]]:
     """Start engines; they are ended with the test."""
     with ExitStack() as running:
-        yield lambda attendance=Supervision.ATTENDED: running.enter_context(start_engine(attendance))
+        yield lambda supervision=Supervision.ATTENDED: running.enter_context(start_engine(supervision))
 
 
 @pytest.fixture(scope="module")

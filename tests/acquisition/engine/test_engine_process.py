@@ -16,13 +16,13 @@ import pytest
 
 from vibench.acquisition import CheckRule, LimitExceeded, RecordingError, StopLevel, open_recording
 from vibench.acquisition.engine import (
-    Supervision,
     BenchLock,
+    CampaignRequest,
     EngineClient,
     EngineGone,
     EngineState,
     MessageKind,
-    CampaignRequest,
+    Supervision,
     start_engine,
 )
 from vibench.acquisition.engine._address import EngineAddress
@@ -88,17 +88,17 @@ class TestTheJob:
 
     def test_the_newest_samples_are_those_of_the_recording(self, client, shipped_rig, tmp_path):
         running(client, shipped_rig, tmp_path)
-        glance = client.look(0, 10_000)
+        newest_samples = client.look(0, 10_000)
         client.stop(StopLevel.ABORT)
         until_state(client, EngineState.READY)
-        assert glance.volts.shape == (4, 10_000)
+        assert newest_samples.volts.shape == (4, 10_000)
         with open_recording(tmp_path / "run.h5") as recording:
-            first, last = glance.first_sample, glance.first_sample + 10_000
+            first, last = newest_samples.first_sample, newest_samples.first_sample + 10_000
             recorded = recording.read("m0_velocity", first, last)
             per_volt = next(
                 each for each in recording.channels if each.role == "m0_velocity"
             ).physical_per_volt
-        np.testing.assert_allclose(glance.volts[3] * per_volt, recorded, rtol=1e-5, atol=1e-8)
+        np.testing.assert_allclose(newest_samples.volts[3] * per_volt, recorded, rtol=1e-5, atol=1e-8)
 
     def test_a_mark_stands_at_its_sample(self, client, shipped_rig, tmp_path):
         before = running(client, shipped_rig, tmp_path).samples
@@ -153,7 +153,7 @@ class TestACheckIsStopped:
         client.open(shipped_rig)
         until_state(client, EngineState.READY)
         orders = CampaignRequest(campaign=campaign("run"), folder=tmp_path, check=CheckRule.NOW)
-        client.arm_orders(orders)
+        client.arm_request(orders)
         client.start()
         client.stop(StopLevel.RAMP, "not yet")
         status = until_state(client, EngineState.READY)

@@ -15,13 +15,13 @@ def test_a_pulse_keeps_a_run_going_that_nobody_else_asks_about(engine, shipped_r
     client.arm(campaign("beaten"), tmp_path)
     client.start()
     until(client, lambda status: status.samples > 0)
-    pulse = Heartbeat(process.address)
+    heartbeat = Heartbeat(process.address)
     clock = Event()
     for _ in range(40):
-        pulse.beat()
+        heartbeat.beat()
         clock.wait(0.05)
     assert client.status().state in DRIVING
     clock.wait(1.0)
     status = until_state(client, EngineState.READY)
-    pulse.close()
+    heartbeat.close()
     assert "nobody has looked" in status.rows[0].reason

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import Block
-from vibench.acquisition.campaign import PointResult, CampaignProgress, PointOutcome, ReasonCode
-from vibench.acquisition.engine import Supervision, BenchFacts
+from vibench.acquisition.campaign import CampaignProgress, PointOutcome, PointResult, ReasonCode
+from vibench.acquisition.engine import BenchFacts, Supervision
 from vibench.acquisition.engine._published_state import PublishedState
 from vibench.acquisition.engine._status import ChannelFacts
 from vibench.acquisition.plan import RunState
@@ -26,45 +26,51 @@ def progress(path, first_sample, volts):
 
 
 @pytest.fixture
-def shown(tmp_path):
-    shown = PublishedState(Supervision.UNATTENDED)
-    shown.begin(campaign("point"), tmp_path)
-    return shown
+def published(tmp_path):
+    published = PublishedState(Supervision.UNATTENDED)
+    published.begin(campaign("point"), tmp_path)
+    return published
 
 
-def test_another_attempt_at_a_point_is_another_run(shown, tmp_path):
-    shown.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
-    shown.tell(progress(tmp_path / "point.h5", 100, 1.0), BENCH)
-    first = shown.status()
-    shown.tell(progress(tmp_path / "point.attempt2.h5", 0, 2.0), BENCH)
-    second = shown.status()
+def test_another_attempt_at_a_point_is_another_run(published, tmp_path):
+    published.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
+    published.tell(progress(tmp_path / "point.h5", 100, 1.0), BENCH)
+    first = published.status()
+    published.tell(progress(tmp_path / "point.attempt2.h5", 0, 2.0), BENCH)
+    second = published.status()
     assert (first.samples, second.samples) == (200, 100)
     assert second.run_id == first.run_id + 1
     assert second.lost_blocks == 0
-    np.testing.assert_array_equal(shown.recent.since(0, 1000).volts, np.full((1, 100), np.float32(2.0)))
+    np.testing.assert_array_equal(
+        published.sample_buffer.since(0, 1000).volts, np.full((1, 100), np.float32(2.0))
+    )
 
 
-def test_the_rows_have_another_number_only_when_one_of_them_has_changed(shown, tmp_path):
-    shown.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
-    running = shown.status().rows_number
-    shown.tell(progress(tmp_path / "point.h5", 100, 1.0), BENCH)
-    assert shown.status().rows_number == running
-    shown.item(PointResult("point", PointOutcome.RECORDED, tmp_path / "point.h5", "", next(iter(ReasonCode))))
-    assert shown.status().rows_number > running
-    assert [row.state for row in shown.status().rows] == ["recorded"]
+def test_the_rows_have_another_number_only_when_one_of_them_has_changed(published, tmp_path):
+    published.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
+    running = published.status().rows_number
+    published.tell(progress(tmp_path / "point.h5", 100, 1.0), BENCH)
+    assert published.status().rows_number == running
+    published.note_result(
+        PointResult("point", PointOutcome.RECORDED, tmp_path / "point.h5", "", next(iter(ReasonCode)))
+    )
+    assert published.status().rows_number > running
+    assert [row.state for row in published.status().rows] == ["recorded"]
 
 
-def test_a_folder_that_went_away_is_a_disk_without_room_and_ends_no_run(shown, tmp_path):
+def test_a_folder_that_went_away_is_a_disk_without_room_and_ends_no_run(published, tmp_path):
     gone = tmp_path / "gone"
-    shown.begin(campaign("point"), gone)
-    shown.tell(progress(gone / "point.h5", 0, 1.0), BENCH)
-    assert shown.status().disk_free_bytes == 0
+    published.begin(campaign("point"), gone)
+    published.tell(progress(gone / "point.h5", 0, 1.0), BENCH)
+    assert published.status().disk_free_bytes == 0
 
 
-def test_what_an_earlier_run_has_made_counts_as_done(shown, tmp_path):
+def test_what_an_earlier_run_has_made_counts_as_done(published, tmp_path):
     twice = campaign("made", "point")
-    shown.begin(twice, tmp_path)
-    shown.item(PointResult("made", PointOutcome.KEPT, tmp_path / "made.h5", "", next(iter(ReasonCode))))
-    shown.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
-    run = shown.status().run
+    published.begin(twice, tmp_path)
+    published.note_result(
+        PointResult("made", PointOutcome.KEPT, tmp_path / "made.h5", "", next(iter(ReasonCode)))
+    )
+    published.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
+    run = published.status().run
     assert run.campaign_elapsed_s == pytest.approx(twice.duration_s / 2 + run.elapsed_s)

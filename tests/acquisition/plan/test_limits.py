@@ -36,7 +36,9 @@ def test_a_sine_s_loads_are_its_amplitude_times_the_model(rig):
 def test_far_above_the_suspension_the_acceleration_is_force_over_mass(rig):
     loads = predicted_loads(Dwell(amplitude_vpp=1.0, frequency_hz=1500, duration_s=1), rig)
     mass = rig.shaker.moving_mass_kg + rig.shaker.fixture_mass_kg
-    assert loads[BaseQuantity.ACCELERATION].peak == pytest.approx(loads[BaseQuantity.FORCE].peak / mass, rel=1e-3)
+    assert loads[BaseQuantity.ACCELERATION].peak == pytest.approx(
+        loads[BaseQuantity.FORCE].peak / mass, rel=1e-3
+    )
 
 
 def test_a_sweep_is_judged_where_the_rig_answers_most(rig):
@@ -95,7 +97,9 @@ def test_a_wrong_load_setting_doubles_every_load(rig):
     at_50_ohm = rig.model_copy(update={"generator": rig.generator.model_copy(update={"load_ohm": 50.0})})
     sine = Dwell(amplitude_vpp=1.0, frequency_hz=260, duration_s=1)
     open_load = predicted_loads(sine, rig)[BaseQuantity.FORCE].peak
-    assert predicted_loads(sine, at_50_ohm)[BaseQuantity.FORCE].peak == pytest.approx(2 * open_load, rel=1e-12)
+    assert predicted_loads(sine, at_50_ohm)[BaseQuantity.FORCE].peak == pytest.approx(
+        2 * open_load, rel=1e-12
+    )
 
 
 def test_a_violation_names_quantity_value_limit_source_and_remedy(rig):

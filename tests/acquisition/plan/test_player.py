@@ -3,10 +3,10 @@
 import pytest
 
 from vibench.acquisition.plan import (
+    DriveSource,
     Dwell,
     Measurement,
     MultisineNoise,
-    DriveSource,
     SineSweep,
     SteppedSine,
     StreamedNoise,
@@ -29,25 +29,25 @@ def with_output(rig, plays):
     return rig.model_copy(update={"daq": rig.daq.model_copy(update={"output": output})})
 
 
-def player(excitation, rig):
+def drive_source(excitation, rig):
     return drive_source_of(Measurement(name="m", excitation=excitation), rig)
 
 
 @pytest.mark.parametrize("tone", TONES, ids=lambda tone: tone.kind)
 def test_a_sine_is_played_by_the_output_only_where_it_is_plugged_in_for_sines(rig, tone):
-    assert player(tone, rig) is DriveSource.GENERATOR
-    assert player(tone, with_output(rig, OutputUse.STREAMS)) is DriveSource.GENERATOR
-    assert player(tone, with_output(rig, OutputUse.TONES_AND_STREAMS)) is DriveSource.OUTPUT
+    assert drive_source(tone, rig) is DriveSource.GENERATOR
+    assert drive_source(tone, with_output(rig, OutputUse.STREAMS)) is DriveSource.GENERATOR
+    assert drive_source(tone, with_output(rig, OutputUse.TONES_AND_STREAMS)) is DriveSource.OUTPUT
 
 
 @pytest.mark.parametrize("plays", list(OutputUse))
 def test_a_stream_is_played_by_the_output_and_a_waveform_by_the_generator(rig, plays):
-    assert player(STREAM, with_output(rig, plays)) is DriveSource.OUTPUT
-    assert player(WAVEFORM, with_output(rig, plays)) is DriveSource.GENERATOR
+    assert drive_source(STREAM, with_output(rig, plays)) is DriveSource.OUTPUT
+    assert drive_source(WAVEFORM, with_output(rig, plays)) is DriveSource.GENERATOR
 
 
 def test_a_stream_needs_an_output_also_on_a_rig_without_one(rig):
-    assert player(STREAM, rig) is DriveSource.OUTPUT
+    assert drive_source(STREAM, rig) is DriveSource.OUTPUT
 
 
 def test_the_outputs_limit_counts_for_what_it_plays_and_for_nothing_else(rig):

@@ -85,7 +85,8 @@ def test_the_state_equations_and_the_transfer_are_the_same_system(frequency_hz):
     voltage = complex(MODEL.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, frequency_hz))
     state = np.linalg.solve(s * np.eye(3) - equations.A, equations.B[:, 0]) * voltage
     expected = [
-        MODEL.transfer(q, frequency_hz) for q in (BaseQuantity.STROKE, BaseQuantity.VELOCITY, BaseQuantity.CURRENT)
+        MODEL.transfer(q, frequency_hz)
+        for q in (BaseQuantity.STROKE, BaseQuantity.VELOCITY, BaseQuantity.CURRENT)
     ]
     assert state == pytest.approx(np.array(expected), rel=1e-9)
 

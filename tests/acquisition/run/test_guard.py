@@ -17,7 +17,7 @@ RATE_HZ = 51_200.0
 BLOCK = 5120
 
 
-def guard_of(rig, **limits):
+def monitor_of(rig, **limits):
     return LimitMonitor(rig, channels_of(rig), InRunLimits(**limits), RATE_HZ)
 
 
@@ -31,14 +31,14 @@ def sine_blocks(rig, frequency_hz, duration_s=3.0, **peaks):
     return [Block(first, volts[:, first : first + BLOCK]) for first in range(0, time_s.size, BLOCK)]
 
 
-def watch(guard, blocks):
+def watch(monitor, blocks):
     for block in blocks:
-        guard.require_safe(block)
+        monitor.require_safe(block)
 
 
-def trip_of(guard, blocks):
+def trip_of(monitor, blocks):
     with pytest.raises(LimitExceeded) as failure:
-        watch(guard, blocks)
+        watch(monitor, blocks)
     return failure.value.trip, str(failure.value)
 
 
@@ -91,7 +91,7 @@ def test_each_limit_ends_the_run_when_it_is_passed_and_is_named(
 ):
     five_per_cent_above = {role: 1.05 * peak for role, peak in peaks.items()}
     blocks = sine_blocks(rig, frequency_hz, **five_per_cent_above)
-    trip, text = trip_of(guard_of(only(rig, kept)), blocks)
+    trip, text = trip_of(monitor_of(only(rig, kept)), blocks)
     assert trip.quantity == quantity
     assert trip.limit == pytest.approx(limit)
     assert trip.value > trip.limit
@@ -103,13 +103,13 @@ def test_each_limit_ends_the_run_when_it_is_passed_and_is_named(
 @pytest.mark.parametrize(("kept", "frequency_hz", "peaks", "quantity", "limit"), CASES)
 def test_a_run_that_keeps_every_limit_goes_on(rig, kept, frequency_hz, peaks, quantity, limit):
     five_per_cent_below = {role: 0.95 * peak for role, peak in peaks.items()}
-    guard = guard_of(only(rig, kept))
-    watch(guard, sine_blocks(rig, frequency_hz, **five_per_cent_below))
+    monitor = monitor_of(only(rig, kept))
+    watch(monitor, sine_blocks(rig, frequency_hz, **five_per_cent_below))
 
 
 def test_a_current_that_is_no_peak_too_high_but_lasts_trips_the_limiters_rms(rig):
     weak = with_limiter(rig, 1.8)
-    trip, _ = trip_of(guard_of(weak), sine_blocks(weak, 300.0, 6.0, amplifier_voltage=7.0))
+    trip, _ = trip_of(monitor_of(weak), sine_blocks(weak, 300.0, 6.0, amplifier_voltage=7.0))
     assert trip.quantity == "coil current (rms)"
     # 7 V over 2.6 ohm: 1.9 A rms, reached only when the fading in is a second or two past.
     assert trip.time_s > 2.0
@@ -118,7 +118,7 @@ def test_a_current_that_is_no_peak_too_high_but_lasts_trips_the_limiters_rms(rig
 def test_the_trip_names_the_first_sample_past_the_limit(rig):
     volts = np.zeros((4, BLOCK))
     volts[2, 1234:1300] = 7.5
-    trip, _ = trip_of(guard_of(rig), [Block(0, np.zeros((4, BLOCK))), Block(BLOCK, volts)])
+    trip, _ = trip_of(monitor_of(rig), [Block(0, np.zeros((4, BLOCK))), Block(BLOCK, volts)])
     assert (trip.sample, trip.value) == (BLOCK + 1234, pytest.approx(750.0))
 
 
@@ -131,37 +131,37 @@ def test_a_vibrometer_at_its_range_is_named_by_its_range_and_a_converter_by_its_
         (Role.DRIVE_VOLTAGE, "range of cDAQ1Mod1/ai0", 10.0),
     ):
         block = Block(0, volts, (Overload(role.value, 100, 120),))
-        trip, text = trip_of(guard_of(rig, on_overload=OnOverload.STOP), [block])
+        trip, text = trip_of(monitor_of(rig, on_overload=OnOverload.STOP), [block])
         assert (trip.channel, trip.quantity, trip.sample) == (role.value, said, 100)
         assert trip.limit == pytest.approx(limit)
         assert "widen the range" in text
 
 
 def test_an_over_range_that_is_only_flagged_is_not_taken_for_an_amplitude(rig):
-    guard = guard_of(rig)
+    monitor = monitor_of(rig)
     for first in range(0, 20 * BLOCK, BLOCK):
         volts = np.zeros((4, BLOCK))
         overloads = ()
         if first // BLOCK in (5, 6):
             volts[3] = 4.0
             overloads = (Overload("m0_velocity", first, first + BLOCK - 1),)
-        guard.require_safe(Block(first, volts, overloads))
+        monitor.require_safe(Block(first, volts, overloads))
 
 
 def test_a_gap_begins_the_integration_anew(rig):
-    guard = guard_of(only(rig, "stroke_m"))
+    monitor = monitor_of(only(rig, "stroke_m"))
     blocks = sine_blocks(rig, 12.0, base_acceleration=20.0)
-    watch(guard, blocks[:20])
-    guard.require_safe(Block(blocks[25].first_sample, np.zeros((4, BLOCK))))
+    watch(monitor, blocks[:20])
+    monitor.require_safe(Block(blocks[25].first_sample, np.zeros((4, BLOCK))))
 
 
 def test_a_block_of_a_tenth_of_a_second_is_watched_in_well_under_a_millisecond(rig):
-    guard = guard_of(rig)
+    monitor = monitor_of(rig)
     blocks = sine_blocks(rig, 100.0, 10.0, base_acceleration=50.0, amplifier_voltage=5.0, m0_velocity=0.1)
     spent_s = []
     for block in blocks:
         began_s = time.perf_counter()
-        guard.require_safe(block)
+        monitor.require_safe(block)
         spent_s.append(time.perf_counter() - began_s)
     # The median, since others share the machine.
     assert np.median(spent_s) < 1e-3
@@ -199,12 +199,12 @@ def test_a_trip_stands_in_the_recording_with_its_numbers(bench, tmp_path):
 
 def test_an_input_that_drifts_to_its_rest_at_the_beginning_is_not_taken_for_a_stroke(rig):
     """An AC-coupled input with a time constant of 0.1 s, half a volt from its rest when the run begins."""
-    guard = guard_of(rig)
+    monitor = monitor_of(rig)
     time_s = np.arange(round(2 * RATE_HZ)) / RATE_HZ
     volts = np.zeros((4, time_s.size))
     volts[2] = 0.5 * np.exp(-time_s / 0.1)
     blocks = [Block(first, volts[:, first : first + BLOCK]) for first in range(0, time_s.size, BLOCK)]
-    watch(guard, blocks[:5])
+    watch(monitor, blocks[:5])
     volts[2, :] = 0.08 * np.sin(2 * np.pi * 6 * time_s)
-    trip, _ = trip_of(guard, blocks[5:])
+    trip, _ = trip_of(monitor, blocks[5:])
     assert trip.quantity == "stroke"

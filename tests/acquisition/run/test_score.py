@@ -27,19 +27,19 @@ def half_cosine(samples):
 
 
 def test_a_stream_is_its_source_times_a_half_cosine_envelope_sample_by_sample():
-    score = OutputSynthesizer(RATE_HZ)
-    score.append(ramped(NOISE))
+    synthesizer = OutputSynthesizer(RATE_HZ)
+    synthesizer.append(ramped(NOISE))
     envelope = np.concatenate([half_cosine(512), np.ones(1536), 1 - half_cosine(512), np.zeros(100)])
     expected = NOISE.source.samples(0, 2660, RATE_HZ) * envelope
-    np.testing.assert_allclose(score.take(2660), expected, atol=1e-14)
-    assert score.is_over
+    np.testing.assert_allclose(synthesizer.take(2660), expected, atol=1e-14)
+    assert synthesizer.is_over
 
 
 @given(cuts=st.lists(st.integers(1, 700), max_size=20))
 def test_the_samples_do_not_depend_on_how_many_are_taken_at_once(cuts):
     whole, pieces = OutputSynthesizer(RATE_HZ), OutputSynthesizer(RATE_HZ)
-    for score in (whole, pieces):
-        score.append([*ramped(Tone(123.4)), *ramped(NOISE)])
+    for synthesizer in (whole, pieces):
+        synthesizer.append([*ramped(Tone(123.4)), *ramped(NOISE)])
     taken = np.concatenate([np.empty(0), *(pieces.take(count) for count in cuts)])
     np.testing.assert_allclose(taken, whole.take(taken.size), atol=1e-11)
 
@@ -49,16 +49,16 @@ def test_the_samples_do_not_depend_on_how_many_are_taken_at_once(cuts):
     hold_s=st.floats(0.001, 0.2),
 )
 def test_a_tone_whose_frequency_changes_never_jumps(frequencies, hold_s):
-    score = OutputSynthesizer(RATE_HZ)
+    synthesizer = OutputSynthesizer(RATE_HZ)
     tones = [Tone(each) for each in frequencies]
-    score.append(
+    synthesizer.append(
         [
             Phase(RunState.RAMPING_UP, tones[0], 0.1),
             *(Phase(RunState.RECORDING, each, hold_s) for each in tones),
             Phase(RunState.RAMPING_DOWN, tones[-1], 0.1),
         ]
     )
-    volts = score.take(round(RATE_HZ * (0.25 + hold_s * len(tones))))
+    volts = synthesizer.take(round(RATE_HZ * (0.25 + hold_s * len(tones))))
     # Slope of the fastest sine, and of the ramp.
     steepest = (2 * np.pi * max(frequencies) + np.pi / 2 / 0.1) / RATE_HZ
     assert np.max(np.abs(np.diff(volts))) <= steepest
@@ -66,57 +66,59 @@ def test_a_tone_whose_frequency_changes_never_jumps(frequencies, hold_s):
 
 @given(durations=st.lists(st.floats(1e-5, 0.05), min_size=1, max_size=40))
 def test_boundaries_lie_at_the_samples_nearest_to_the_sums_of_all_durations(durations):
-    score = OutputSynthesizer(RATE_HZ)
+    synthesizer = OutputSynthesizer(RATE_HZ)
     levels = [1.0 if number % 2 else 0.5 for number in range(len(durations))]
     phases = [
         Phase(RunState.RECORDING, Tone(RATE_HZ / 4, level), duration)
         for level, duration in zip(levels, durations, strict=True)
     ]
-    score.append([Phase(RunState.RAMPING_UP, Tone(RATE_HZ / 4, 1.0), 0.1), *phases])
-    score.take(512)
+    synthesizer.append([Phase(RunState.RAMPING_UP, Tone(RATE_HZ / 4, 1.0), 0.1), *phases])
+    synthesizer.take(512)
     ends = np.round((0.1 + np.cumsum(durations)) * RATE_HZ).astype(int) - 512
     expected = np.repeat(levels, np.diff(ends, prepend=0))
-    volts = score.take(expected.size)
+    volts = synthesizer.take(expected.size)
     # A quarter of the rate is 0, 1, 0, -1: every second sample shows the level.
     np.testing.assert_allclose(np.abs(volts[1::2]), expected[1::2], atol=1e-9)
 
 
 def test_what_sounds_at_the_end_is_released_without_a_step():
-    score = OutputSynthesizer(RATE_HZ)
-    score.append([Phase(RunState.CHECKING, Tone(160.0), 0.2), Phase(RunState.CHECKING, Tone(160.0), 0.3)])
-    volts = score.take(round(RATE_HZ))
+    synthesizer = OutputSynthesizer(RATE_HZ)
+    synthesizer.append(
+        [Phase(RunState.CHECKING, Tone(160.0), 0.2), Phase(RunState.CHECKING, Tone(160.0), 0.3)]
+    )
+    volts = synthesizer.take(round(RATE_HZ))
     release = round(RELEASE_S * RATE_HZ)
     expected = np.sin(2 * np.pi * 160.0 * np.arange(2560, 2560 + release) / RATE_HZ)
     np.testing.assert_allclose(volts[2560 : 2560 + release], expected * (1 - half_cosine(release)), atol=1e-9)
     assert not np.any(volts[2560 + release :])
-    assert score.is_over
+    assert synthesizer.is_over
 
 
 def test_what_is_appended_after_the_end_begins_with_the_next_sample():
-    score = OutputSynthesizer(RATE_HZ)
-    score.append(ramped(NOISE))
-    score.take(4321)
-    score.append(ramped(Tone(100.0)))
+    synthesizer = OutputSynthesizer(RATE_HZ)
+    synthesizer.append(ramped(NOISE))
+    synthesizer.take(4321)
+    synthesizer.append(ramped(Tone(100.0)))
     expected = np.sin(2 * np.pi * 100.0 * np.arange(512) / RATE_HZ) * half_cosine(512)
-    np.testing.assert_allclose(score.take(512), expected, atol=1e-12)
+    np.testing.assert_allclose(synthesizer.take(512), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("taken", [0, 1, 300, 1000, 2300, 2600])
 def test_a_fade_begins_at_the_level_of_now_and_ends_in_silence(taken):
-    score = OutputSynthesizer(RATE_HZ)
-    score.append(ramped(NOISE))
-    score.take(taken)
-    level = score.level
-    score.fade(0.1)
-    faded = score.take(600)
+    synthesizer = OutputSynthesizer(RATE_HZ)
+    synthesizer.append(ramped(NOISE))
+    synthesizer.take(taken)
+    level = synthesizer.level
+    synthesizer.fade(0.1)
+    faded = synthesizer.take(600)
     expected = NOISE.source.samples(taken, 512, RATE_HZ) * level * (1 - half_cosine(512))
     np.testing.assert_allclose(faded[:512], expected, atol=1e-12)
     assert not np.any(faded[512:])
-    assert score.level == 0.0
+    assert synthesizer.level == 0.0
 
 
 def test_a_waveform_is_for_the_generator():
-    score = OutputSynthesizer(RATE_HZ)
-    score.append(ramped(Waveform(np.array([0.0, 1.0]), 1.0)))
+    synthesizer = OutputSynthesizer(RATE_HZ)
+    synthesizer.append(ramped(Waveform(np.array([0.0, 1.0]), 1.0)))
     with pytest.raises(ConfigurationError, match="play it by the function generator"):
-        score.take(10)
+        synthesizer.take(10)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from vibench.analysis import (
+    CurveKind,
+    CurveOrigin,
     Estimator,
     FrequencyResponseRequest,
     NotEnoughData,
-    CurveOrigin,
-    CurveKind,
     Simulation,
     compare_recording,
 )
@@ -21,12 +21,12 @@ def compared(streamed_file):
 
 
 def test_a_transmission_crosses_to_another_process_with_its_spread(compared):
-    (trace,) = pickle.loads(pickle.dumps(compared)).traces
-    assert (trace.origin, trace.response) == (CurveOrigin.MEASURED, CurveKind.TRANSMISSION)
-    assert np.median(trace.magnitude) == pytest.approx(2.0, rel=0.01)
-    assert trace.name == "streamed, transmission, measured"
-    assert (trace.lower < trace.magnitude).all()
-    assert "drive" in trace.note
+    (curve,) = pickle.loads(pickle.dumps(compared)).curves
+    assert (curve.origin, curve.response) == (CurveOrigin.MEASURED, CurveKind.TRANSMISSIBILITY)
+    assert np.median(curve.magnitude) == pytest.approx(2.0, rel=0.01)
+    assert curve.name == "streamed, transmission, measured"
+    assert (curve.lower < curve.magnitude).all()
+    assert "drive" in curve.note
 
 
 def test_the_whole_result_is_kept_for_reports(compared):
@@ -39,7 +39,7 @@ def test_what_is_asked_for_is_what_is_estimated(streamed_file):
     found = compare_recording(
         streamed_file(), FrequencyResponseRequest(estimator=Estimator.H1, averages=10), Simulation.LEFT_OUT
     )
-    assert found.traces[0].note.startswith("h1, ")
+    assert found.curves[0].note.startswith("h1, ")
 
 
 def test_a_recording_that_ended_too_early_says_so(streamed_file):

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from vibench.analysis import NotEnoughData, CurveOrigin, CurveKind, Curve, curve_difference, curve_peaks
+from vibench.analysis import Curve, CurveKind, CurveOrigin, NotEnoughData, curve_difference, curve_peaks
 from vibench.analysis.comparison import sorted_curve
 from vibench.analysis.figures import comparison_figure
 from vibench.analysis.report import ImageKind
@@ -17,7 +17,13 @@ def mode(frequency_hz, scale=1.0, source="run", sd=0.01, origin=CurveOrigin.MEAS
     r = frequency_hz / MODE_HZ
     magnitude = scale * np.abs((1 + 2j * DAMPING * r) / (1 - r**2 + 2j * DAMPING * r))
     return Curve(
-        source, origin, CurveKind.TRANSMISSION, frequency_hz, magnitude, np.full(frequency_hz.shape, sd), "n"
+        source,
+        origin,
+        CurveKind.TRANSMISSIBILITY,
+        frequency_hz,
+        magnitude,
+        np.full(frequency_hz.shape, sd),
+        "n",
     )
 
 
@@ -33,7 +39,12 @@ def test_noise_that_its_own_spread_explains_is_no_peak():
     frequency_hz = np.arange(50.0, 600.0)
     values = np.exp(0.3 * rng.standard_normal(frequency_hz.size))
     flat = Curve(
-        "n", CurveOrigin.MEASURED, CurveKind.TRANSMISSION, frequency_hz, values, np.full(values.shape, 0.3)
+        "n",
+        CurveOrigin.MEASURED,
+        CurveKind.TRANSMISSIBILITY,
+        frequency_hz,
+        values,
+        np.full(values.shape, 0.3),
     )
     assert curve_peaks(flat) == ()
 

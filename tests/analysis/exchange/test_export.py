@@ -138,7 +138,7 @@ def test_a_watcher_hears_of_every_value(known, tmp_path):
     for to in Format:
         heard = []
         chosen = excerpt(known)
-        export_samples(chosen, to, tmp_path / f"a.{to.value}", watcher=heard.append)
+        export_samples(chosen, to, tmp_path / f"a.{to.value}", observer=heard.append)
         assert sum(heard) == chosen.values == 2 * known.samples
 
 
@@ -147,7 +147,7 @@ def test_an_interrupted_export_leaves_no_file(known, tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        export_samples(excerpt(known), Format.CSV, tmp_path / "a.csv", watcher=interrupt)
+        export_samples(excerpt(known), Format.CSV, tmp_path / "a.csv", observer=interrupt)
     assert list(tmp_path.iterdir()) == []
 
 

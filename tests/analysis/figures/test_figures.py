@@ -46,16 +46,18 @@ def test_a_transmission_figure_draws_the_measured_magnitude_under_its_simulation
     drawn = transmission_figure(found.analysis, found.laid)
     top, phase, strip, difference = drawn.figure.axes
     measured = line(top, "measured")
-    np.testing.assert_array_equal(measured.get_ydata(), found.analysis.response.transmission.magnitude)
-    np.testing.assert_array_equal(measured.get_xdata(), found.analysis.response.transmission.frequency_hz)
+    np.testing.assert_array_equal(measured.get_ydata(), found.analysis.response.frequency_response.magnitude)
+    np.testing.assert_array_equal(
+        measured.get_xdata(), found.analysis.response.frequency_response.frequency_hz
+    )
     simulated = line(top, "simulated under the recorded base")
-    np.testing.assert_array_equal(simulated.get_ydata(), found.laid.response.transmission.magnitude)
+    np.testing.assert_array_equal(simulated.get_ydata(), found.laid.response.frequency_response.magnitude)
     assert measured.get_color() != simulated.get_color() == SIMULATED
     assert difference.get_xlabel() == "frequency [Hz]"
     assert phase.get_ylabel() == "phase [°]"
     assert strip.get_ylabel() == "coherence"
     level = [each.get_ydata()[0] for each in strip.get_lines() if each.get_linestyle() == "-."]
-    assert level == [found.analysis.response.transmission.coherence_significance]
+    assert level == [found.analysis.response.frequency_response.coherence_significance]
     assert top.get_legend() is None  # it stands outside, where it covers no data
     assert len(drawn.figure.legends) == 1
 
@@ -74,9 +76,9 @@ def test_files_beside_a_figure_hold_its_numbers(noise_file, tmp_path):
     assert png.read_bytes().startswith(PNG_HEAD)
     assert ET.fromstring(svg.read_text(encoding="utf-8")).tag.endswith("svg")
     columns = numbers(table)
-    transmission = found.analysis.response.transmission
-    np.testing.assert_allclose(columns["magnitude"], transmission.magnitude, rtol=1e-9)
-    np.testing.assert_allclose(columns["magnitude_upper"], transmission.magnitude_upper, rtol=1e-9)
+    frequency_response = found.analysis.response.frequency_response
+    np.testing.assert_allclose(columns["magnitude"], frequency_response.magnitude, rtol=1e-9)
+    np.testing.assert_allclose(columns["magnitude_upper"], frequency_response.magnitude_upper, rtol=1e-9)
     assert numbers(sines)["response_i"].size == found.laid.prediction.frequency_hz.size
 
 

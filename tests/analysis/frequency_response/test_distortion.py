@@ -96,7 +96,7 @@ def test_the_figure_holds_the_lines_and_its_caption_the_levels(analysed):
     np.testing.assert_array_equal(
         shown["even lines, not driven"], periodic.detection.response_amplitude[even]
     )
-    assert shown["nonlinear distortion"].size == periodic.transmission.frequency_hz.size
+    assert shown["nonlinear distortion"].size == periodic.frequency_response.frequency_hz.size
     assert f"{1e6 * distortion(periodic).even_m_per_s:.3g} µm/s on even lines" in drawn.caption
 
 

@@ -7,9 +7,9 @@ from hypothesis import given, strategies as st
 from vibench.acquisition import Overload, open_recording
 from vibench.analysis import (
     Estimator,
+    FrequencyResponseRequest,
     InvalidRequest,
     MagnitudeScale,
-    FrequencyResponseRequest,
     NotEnoughData,
     Window,
     analyse_recording,
@@ -29,12 +29,12 @@ def response(path, **asked):
 def test_streamed_noise_gives_the_exact_ratio_by_every_estimator(streamed_file):
     found = response(streamed_file())
     # Velocity over acceleration bends by 1 % over a line at 40 Hz: leakage leaves some of that.
-    for each in (found.transmission, found.h1, found.h2):
+    for each in (found.frequency_response, found.h1, found.h2):
         np.testing.assert_allclose(each.value, 2, rtol=6e-3)
     hv = response(streamed_file(), estimator=Estimator.HV, noise_ratio=1e-6)
-    np.testing.assert_allclose(hv.transmission.value, 2, rtol=6e-3)
-    assert hv.transmission.settings.estimator is Estimator.HV
-    assert found.transmission.settings.estimator is Estimator.DRIVE
+    np.testing.assert_allclose(hv.frequency_response.value, 2, rtol=6e-3)
+    assert hv.frequency_response.settings.estimator is Estimator.HV
+    assert found.frequency_response.settings.estimator is Estimator.DRIVE
 
 
 def test_a_noisy_vibrometer_biases_h2_and_not_the_estimate_referenced_to_the_drive(
@@ -44,21 +44,21 @@ def test_a_noisy_vibrometer_biases_h2_and_not_the_estimate_referenced_to_the_dri
     extra = np.random.default_rng(3).standard_normal(velocity.size) * 2e-4
     path = streamed_file(velocity=velocity + extra)
     referenced, h2 = response(path), response(path, estimator=Estimator.H2)
-    band = referenced.transmission.frequency_hz < 100
-    assert np.median(h2.transmission.magnitude[band]) > 2.01
-    assert np.median(referenced.transmission.magnitude[band]) == pytest.approx(2, abs=0.005)
+    band = referenced.frequency_response.frequency_hz < 100
+    assert np.median(h2.frequency_response.magnitude[band]) > 2.01
+    assert np.median(referenced.frequency_response.magnitude[band]) == pytest.approx(2, abs=0.005)
 
 
 @pytest.mark.parametrize("window", list(Window))
 def test_the_resolution_asked_for_is_the_noise_bandwidth_of_a_line(streamed_file, window):
-    found = response(streamed_file(), resolution_hz=3.0, window=window).transmission
+    found = response(streamed_file(), resolution_hz=3.0, window=window).frequency_response
     assert found.resolution_hz == pytest.approx(3.0, rel=1e-3)
     assert found.settings.window == window.value
 
 
 @pytest.mark.parametrize("averages", [4.0, 25.0])
 def test_the_averages_asked_for_are_reached_and_hardly_passed(streamed_file, averages):
-    found = response(streamed_file(), averages=averages).transmission
+    found = response(streamed_file(), averages=averages).frequency_response
     assert averages <= found.n_eff < 1.25 * averages
 
 
@@ -84,9 +84,9 @@ def test_segments_that_touch_lost_or_overloaded_samples_are_left_out_and_counted
     elsewhere = Overload("m0_velocity", round(9.5 * RATE), round(9.5 * RATE) + 4)
     found = response(streamed_file(hole=hole, overloads=(overload, elsewhere)), segment_s=0.5, overlap=0.0)
     assert (found.lost_samples, found.overloaded_samples) == (50, 25)
-    assert found.left_out == found.transmission.segments_excluded == 3
-    assert found.transmission.segments_used == 37
-    np.testing.assert_allclose(found.transmission.value, 2, rtol=1.5e-2)
+    assert found.left_out == found.frequency_response.segments_excluded == 3
+    assert found.frequency_response.segments_used == 37
+    np.testing.assert_allclose(found.frequency_response.value, 2, rtol=1.5e-2)
 
 
 def test_an_overloaded_realisation_is_left_out(noise_file):
@@ -101,8 +101,8 @@ def test_an_overloaded_realisation_is_left_out(noise_file):
 
 def test_noise_that_repeats_takes_an_estimator_and_refuses_segments(noise_file):
     found = response(noise_file(), estimator=Estimator.HV, noise_ratio=1e-6, confidence=0.8)
-    assert found.transmission.settings.estimator is Estimator.HV
-    assert found.transmission.settings.confidence == 0.8
+    assert found.frequency_response.settings.estimator is Estimator.HV
+    assert found.frequency_response.settings.confidence == 0.8
     with pytest.raises(InvalidRequest, match=r"repeats every 0\.25 s.*line every 4 Hz.*streamed noise only"):
         response(noise_file(), resolution_hz=1.0)
 
@@ -135,7 +135,7 @@ def test_a_resolution_that_the_record_cannot_give_is_refused_with_its_length(str
 
 
 def test_a_view_turns_displacements_into_what_was_recorded(streamed_file):
-    found = response(streamed_file()).transmission
+    found = response(streamed_file()).frequency_response
     view = quantities_named("velocity/acceleration", MagnitudeScale.DECIBEL)
     shown = view.shown(found)
     np.testing.assert_allclose(shown.value, found.value / (2j * np.pi * found.frequency_hz), rtol=1e-12)

@@ -96,7 +96,7 @@ def test_strong_noise_shows_the_two_terminal_resonances(responses):
         pytest.approx(198, abs=3),
         pytest.approx(423, abs=12),
     ]
-    assert np.median(responses[STRONG_VPP].transmission.coherence) < 0.9
+    assert np.median(responses[STRONG_VPP].frequency_response.coherence) < 0.9
 
 
 def test_the_level_is_the_planned_rms_value_through_the_rigs_model(responses):

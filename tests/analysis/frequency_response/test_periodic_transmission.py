@@ -51,8 +51,10 @@ def test_lines_are_exact_whatever_the_clocks_and_however_fractional_the_period(o
     drive, response = linear_realisation(rng, orders, true_period, samples)
     result = periodic_frequency_response([(drive, drive, response)], RATE, repetition_hz=RATE / period)
     exact = resonator(orders * RATE / true_period)
-    np.testing.assert_allclose(result.transmission.frequency_hz, orders * RATE / true_period, rtol=1e-10)
-    assert np.max(np.abs(result.transmission.value / exact - 1)) < 1e-6
+    np.testing.assert_allclose(
+        result.frequency_response.frequency_hz, orders * RATE / true_period, rtol=1e-10
+    )
+    assert np.max(np.abs(result.frequency_response.value / exact - 1)) < 1e-6
     assert result.repetitions[0].period_samples == pytest.approx(true_period, rel=1e-10)
 
 
@@ -86,10 +88,12 @@ def test_images_of_a_held_waveform_neither_mislead_the_clock_nor_enter_the_band(
     band, image = np.arange(20, 600, 19), 8192 - np.arange(20, 600, 19)
     drive = multisine(band, rng.uniform(0, 6, band.size), period, 102_400)
     drive += 0.3 * multisine(image, rng.uniform(0, 6, image.size), period, 102_400)
-    result = periodic_frequency_response([(drive, drive, drive)], 51200.0, repetition_hz=1.0, band_hz=(20, 600))
+    result = periodic_frequency_response(
+        [(drive, drive, drive)], 51200.0, repetition_hz=1.0, band_hz=(20, 600)
+    )
     assert result.repetitions[0].period_samples == pytest.approx(period, rel=1e-10)
     assert result.repetitions[0].periods == 2
-    np.testing.assert_allclose(result.transmission.frequency_hz, band * 51200 / period)
+    np.testing.assert_allclose(result.frequency_response.frequency_hz, band * 51200 / period)
     with pytest.raises(InvalidRequest, match="no line"):
         periodic_frequency_response([(drive, drive, drive)], 51200.0, repetition_hz=1.0, band_hz=(1e5, 2e5))
 
@@ -101,7 +105,7 @@ def test_the_delay_of_the_response_channel_is_removed():
     result = periodic_frequency_response(
         [(drive, drive, response)], RATE, repetition_hz=RATE / 512, delay_s=2.7 / RATE
     )
-    np.testing.assert_allclose(result.transmission.value, resonator(orders * 10.0), rtol=1e-6)
+    np.testing.assert_allclose(result.frequency_response.value, resonator(orders * 10.0), rtol=1e-6)
 
 
 @pytest.mark.parametrize("count", [2, 3, 8])
@@ -118,7 +122,7 @@ def test_the_bounds_hold_the_truth_as_often_as_they_say(count):
             drive = multisine(orders, rng.uniform(0, 2 * np.pi, orders.size), period, 3 * period)
             response = drive + cube * drive**3 + 0.3 * rng.standard_normal(drive.size)
             sums.add(drive, drive, response)
-        result = sums.transmission().transmission
+        result = sums.frequency_response().frequency_response
         inside_magnitude += np.count_nonzero(
             (result.magnitude_lower <= best) & (result.magnitude_upper >= best)
         )
@@ -139,8 +143,8 @@ def test_a_static_cube_is_approximated_by_the_closed_form(sigma):
         drive = multisine(orders, rng.uniform(0, 2 * np.pi, orders.size), 1024, 2048)
         drive *= sigma / np.sqrt(orders.size / 2)
         sums.add(drive, drive, drive + 0.1 * drive**3)
-    result = sums.transmission()
-    assert np.mean(result.transmission.value.real) == pytest.approx(1 + 0.3 * sigma**2, rel=0.015)
+    result = sums.frequency_response()
+    assert np.mean(result.frequency_response.value.real) == pytest.approx(1 + 0.3 * sigma**2, rel=0.015)
     assert np.all(result.noise_variance < 1e-12)
     assert result.distortion_variance is not None
     assert np.mean(result.distortion_variance) > 1e-6
@@ -157,7 +161,7 @@ def test_noise_and_distortion_are_told_apart():
             drive = multisine(orders, rng.uniform(0, 2 * np.pi, orders.size), period, periods * period)
             response = drive + cube * drive**3 + noise * rng.standard_normal(drive.size)
             sums.add(drive, drive, response)
-        return sums.transmission()
+        return sums.frequency_response()
 
     linear, cubic = realise(0.0), realise(0.01)
     # White noise of variance s^2 puts 4 s^2 / samples on an amplitude.
@@ -192,7 +196,7 @@ def test_noise_on_the_base_does_not_bias_the_drive_referenced_estimate():
     for _ in range(20):
         drive = multisine(orders, rng.uniform(0, 2 * np.pi, orders.size), 512, 1024)
         sums.add(drive, drive + 4 * rng.standard_normal(1024), 2 * drive + 4 * rng.standard_normal(1024))
-    result = sums.transmission().transmission
+    result = sums.frequency_response().frequency_response
     error = (result.value - 2) / (2 * result.relative_sd_magnitude)
     assert abs(np.mean(error.real)) < 4 / np.sqrt(orders.size)
 

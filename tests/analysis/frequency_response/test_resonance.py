@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy import signal
 
-from vibench.analysis import Estimator, InvalidRequest, FrequencyResponse, resonances, transmissibility
+from vibench.analysis import Estimator, FrequencyResponse, InvalidRequest, resonances, transmissibility
 from vibench.analysis.frequency_response import FrequencyResponseSettings
 from vibench.analysis.signals import student_half_width
 

@@ -73,7 +73,7 @@ class Notes:
 def test_a_watcher_hears_every_stage_and_how_far_it_is_read(streamed_file):
     notes = Notes()
     with open_recording(streamed_file()) as recording:
-        analyse_recording(recording, watcher=notes)
+        analyse_recording(recording, observer=notes)
     assert notes.stages == [("streamed.h5", "looking at every channel"), ("streamed.h5", "analysing")]
     for shares in notes.reads:
         assert shares == sorted(shares)

@@ -27,7 +27,9 @@ def test_h1_h2_and_coherence_agree_with_scipy_given_the_same_windows(window, ove
     _, s_yy = signal.welch(y, **how)
     frequency, s_xy = signal.csd(x, y, **how)
     ours = {
-        name: transmissibility(x, y, RATE, segment_samples=300, window=window, overlap=overlap, estimator=name)
+        name: transmissibility(
+            x, y, RATE, segment_samples=300, window=window, overlap=overlap, estimator=name
+        )
         for name in ("h1", "h2")
     }
     np.testing.assert_allclose(ours["h1"].frequency_hz, frequency, rtol=1e-14)
@@ -45,8 +47,8 @@ def test_the_block_size_does_not_change_the_result(cuts, overlap):
     edges = [0, *sorted(cuts), 5000]
     for start, stop in pairwise(edges):
         sums.add(rows[:, start:stop])
-    np.testing.assert_allclose(sums.transmission().value, whole.value, rtol=1e-10, atol=1e-14)
-    assert sums.transmission().n_eff == whole.n_eff
+    np.testing.assert_allclose(sums.frequency_response().value, whole.value, rtol=1e-10, atol=1e-14)
+    assert sums.frequency_response().n_eff == whole.n_eff
 
 
 @pytest.mark.parametrize(
@@ -79,7 +81,9 @@ def test_independent_noises_pass_the_significance_level_one_time_in_twenty():
     passed, lines, mean = 0, 0, 0.0
     for block in range(312):
         part = slice(block * 32 * segment, (block + 1) * 32 * segment)
-        result = transmissibility(x[part], y[part], RATE, segment_samples=segment, window="boxcar", overlap=0.0)
+        result = transmissibility(
+            x[part], y[part], RATE, segment_samples=segment, window="boxcar", overlap=0.0
+        )
         inner = slice(1, -1)
         passed += int(np.count_nonzero(result.is_significant[inner]))
         mean += float(np.sum(result.coherence[inner]))
@@ -134,7 +138,9 @@ def test_hv_does_not_depend_on_the_unit_of_the_response(power):
     x, extra = noise(9, 2, 4000)
     y = 0.4 * x + 0.3 * extra
     base = transmissibility(x, y, RATE, segment_samples=100, estimator="hv", noise_ratio=2.0)
-    scaled = transmissibility(x, scale * y, RATE, segment_samples=100, estimator="hv", noise_ratio=2.0 * scale**2)
+    scaled = transmissibility(
+        x, scale * y, RATE, segment_samples=100, estimator="hv", noise_ratio=2.0 * scale**2
+    )
     np.testing.assert_allclose(scaled.value / scale, base.value, rtol=1e-9)
 
 

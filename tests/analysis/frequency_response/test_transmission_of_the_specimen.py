@@ -59,12 +59,12 @@ def recorded(rms_m, realisations, noise_density=0.0):
         # The delay by Fourier transform wraps the last sample round to the first; keep clear of both.
         noise = noise_density * np.sqrt(RATE / 2) * rng.standard_normal(velocity.size)
         sums.add(voltage[:-300], acceleration[:-300], (velocity + noise)[last][:-300])
-    return sums.transmission(delay_s=DELAY_S), impacts
+    return sums.frequency_response(delay_s=DELAY_S), impacts
 
 
 def as_displacements(result):
     return converted_frequency_response(
-        result.transmission,
+        result.frequency_response,
         drive=(Quantity.ACCELERATION, Quantity.DISPLACEMENT),
         response=(Quantity.VELOCITY, Quantity.DISPLACEMENT),
     )

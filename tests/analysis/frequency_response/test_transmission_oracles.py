@@ -60,7 +60,9 @@ def pyfrf_answer(noisy_pair, request):
 )
 def test_h1_h2_and_hv_are_those_of_pyfrf(noisy_pair, pyfrf_answer, estimator, method, how):
     window, theirs = pyfrf_answer
-    ours = transmissibility(*noisy_pair, RATE, segment_samples=SEGMENT, window=window, estimator=estimator, **how)
+    ours = transmissibility(
+        *noisy_pair, RATE, segment_samples=SEGMENT, window=window, estimator=estimator, **how
+    )
     np.testing.assert_allclose(ours.frequency_hz, theirs.get_f_axis(), rtol=1e-14)
     np.testing.assert_allclose(
         ours.value[WITHOUT_MEAN], getattr(theirs, method)()[0, 0][WITHOUT_MEAN], rtol=1e-10

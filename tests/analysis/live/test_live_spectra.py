@@ -33,9 +33,9 @@ def test_old_samples_are_forgotten():
 
 def test_a_lost_sample_spoils_two_segments_and_no_more():
     samples = np.random.default_rng(3).standard_normal((2, 20_500))
-    whole = fed(samples, 700).transmission((0, 1), low_hz=100.0, high_hz=1000.0)
+    whole = fed(samples, 700).frequency_response((0, 1), low_hz=100.0, high_hz=1000.0)
     samples[0, 10_250] = np.nan
-    torn = fed(samples, 700).transmission((0, 1), low_hz=100.0, high_hz=1000.0)
+    torn = fed(samples, 700).frequency_response((0, 1), low_hz=100.0, high_hz=1000.0)
     assert (whole.segments_used, torn.segments_used, torn.segments_excluded) == (40, 38, 2)
     assert np.isfinite(torn.value).all()
 
@@ -50,7 +50,9 @@ def test_the_transmission_of_an_integrator_is_known_and_within_its_bounds():
     base = np.fft.irfft(spectrum, count)
     velocity = np.fft.irfft(3 * spectrum / omega, count)
     noisy = velocity + 0.02 * velocity.std() * rng.standard_normal(count)
-    found = fed(np.stack((base, noisy, base)), 1000).transmission((0, 1, 2), low_hz=100.0, high_hz=900.0)
+    found = fed(np.stack((base, noisy, base)), 1000).frequency_response(
+        (0, 1, 2), low_hz=100.0, high_hz=900.0
+    )
     assert found.frequency_hz[0] >= 100.0
     assert found.frequency_hz[-1] <= 900.0
     assert np.median(found.magnitude) == pytest.approx(3.0, rel=0.01)
@@ -65,7 +67,7 @@ def test_a_delay_of_the_response_channel_is_taken_off_the_phase():
     samples = np.random.default_rng(5).standard_normal(40_500)
     late = np.stack((samples, np.roll(samples, 3)))
     late = fed(late, 1000)
-    straight = late.transmission((0, 1), low_hz=300.0, high_hz=3000.0, delay_s=3 / RATE)
+    straight = late.frequency_response((0, 1), low_hz=300.0, high_hz=3000.0, delay_s=3 / RATE)
     # a velocity equal to an acceleration: displacement is i w times it
     assert np.allclose(np.abs(straight.phase_rad), np.pi / 2, atol=0.05)
 
@@ -75,7 +77,7 @@ def test_one_segment_has_no_transmission_and_none_no_spectrum():
     assert spectra.spectrum() is None
     spectra.add(np.ones((2, 1000), dtype=np.float32))
     assert spectra.spectrum() is not None
-    assert spectra.transmission((0, 1), low_hz=100.0, high_hz=1000.0) is None
+    assert spectra.frequency_response((0, 1), low_hz=100.0, high_hz=1000.0) is None
 
 
 def test_settings_that_average_nothing_are_refused():

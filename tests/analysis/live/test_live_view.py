@@ -30,21 +30,21 @@ def view():
 
 
 def test_lanes_show_the_newest_seconds_in_the_channels_units(view):
-    lanes = view.lanes(1.0, 800)
-    assert lanes.low.shape == (4, 800)
-    assert lanes.time_s[0] == pytest.approx(1.0)
-    assert lanes.time_s[-1] == pytest.approx(2.0, abs=0.01)
-    assert lanes.high[0].max() == pytest.approx(1.0, rel=1e-3)
-    assert lanes.high[1].max() == pytest.approx(3.0, rel=1e-3)
-    assert lanes.high[3].max() == pytest.approx(3 * A0 * 2 * np.pi * 260, rel=1e-3)
+    time_histories = view.time_histories(1.0, 800)
+    assert time_histories.low.shape == (4, 800)
+    assert time_histories.time_s[0] == pytest.approx(1.0)
+    assert time_histories.time_s[-1] == pytest.approx(2.0, abs=0.01)
+    assert time_histories.high[0].max() == pytest.approx(1.0, rel=1e-3)
+    assert time_histories.high[1].max() == pytest.approx(3.0, rel=1e-3)
+    assert time_histories.high[3].max() == pytest.approx(3 * A0 * 2 * np.pi * 260, rel=1e-3)
 
 
 def test_responses_grow_as_the_run_goes_on(view):
-    course = view.course()
-    assert course.frequency_hz.size >= 10
-    assert np.allclose(course.frequency_hz, 260.0, atol=0.01)
-    assert np.allclose(course.response_ii, 3.0, rtol=3e-3)
-    assert np.allclose(course.response_i, 3.0, rtol=5e-3)
+    history = view.history()
+    assert history.frequency_hz.size >= 10
+    assert np.allclose(history.frequency_hz, 260.0, atol=0.01)
+    assert np.allclose(history.response_ii, 3.0, rtol=3e-3)
+    assert np.allclose(history.response_i, 3.0, rtol=5e-3)
 
 
 def test_a_portrait_keeps_its_section(view):
@@ -53,10 +53,10 @@ def test_a_portrait_keeps_its_section(view):
 
 
 def test_the_transmission_at_the_drive_is_the_ratio_of_displacements(view):
-    found = view.transmission()
+    found = view.frequency_response()
     line = int(np.argmin(np.abs(found.frequency_hz - 260.0)))
     assert found.magnitude[line] == pytest.approx(3.0, rel=0.01)
-    assert view.transmission() is found
+    assert view.frequency_response() is found
     assert view.spectrum() is view.spectrum()
 
 
@@ -74,10 +74,10 @@ def test_blocks_that_overlap_change_nothing(view):
 def test_a_run_without_a_base_channel_is_still_watched():
     found = LiveView(CHANNELS[:2], RATE, band_hz=(150.0, 350.0))
     found.add(0, volts(0, 51_200)[:2])
-    assert found.transmission() is None
+    assert found.frequency_response() is None
     assert found.portrait() is None
-    assert found.course().time_s.size == 0
-    assert found.lanes(0.5, 100).low.shape == (2, 100)
+    assert found.history().time_s.size == 0
+    assert found.time_histories(0.5, 100).low.shape == (2, 100)
 
 
 LEAD_IN_S = 3.2
@@ -106,13 +106,13 @@ def watched_sweep(lead_in_s):
 
 
 def test_what_comes_up_and_rings_before_a_sweep_begins_is_no_point_of_its_course():
-    course = watched_sweep(LEAD_IN_S).course()
-    assert course.frequency_hz[0] == pytest.approx(200.4, abs=0.5)
-    assert course.frequency_hz[-1] == pytest.approx(205.2, abs=0.3)
-    assert course.time_s.size >= 20
-    assert np.all(course.time_s > LEAD_IN_S)
-    assert np.allclose(course.response_i, 1.3, rtol=0.02)
-    everything = watched_sweep(0.0).course()
+    history = watched_sweep(LEAD_IN_S).history()
+    assert history.frequency_hz[0] == pytest.approx(200.4, abs=0.5)
+    assert history.frequency_hz[-1] == pytest.approx(205.2, abs=0.3)
+    assert history.time_s.size >= 20
+    assert np.all(history.time_s > LEAD_IN_S)
+    assert np.allclose(history.response_i, 1.3, rtol=0.02)
+    everything = watched_sweep(0.0).history()
     assert everything.response_i.max() > 2.5
 
 

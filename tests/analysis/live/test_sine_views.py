@@ -21,7 +21,9 @@ def motion(phase, omega):
 
 def sine(frequency_hz, samples, first=0):
     omega = 2 * np.pi * frequency_hz
-    return RingWindow(first, motion(omega * (first + np.arange(samples)) / RATE + 0.4, omega).astype(np.float32))
+    return RingWindow(
+        first, motion(omega * (first + np.arange(samples)) / RATE + 0.4, omega).astype(np.float32)
+    )
 
 
 @pytest.mark.parametrize("frequency_hz", [95.3, 260.01, 499.9])
@@ -143,5 +145,5 @@ def test_a_trace_keeps_the_newest_points_in_order():
     for number in range(23):
         trace.add(SinePoint(float(number), 100.0 + number, 1e-6, -1.0, 1.0, 2.0, 1.5))
     assert trace.points == 5
-    assert np.array_equal(trace.course().time_s, [18, 19, 20, 21, 22])
-    assert np.array_equal(trace.course().frequency_hz, [118, 119, 120, 121, 122])
+    assert np.array_equal(trace.history().time_s, [18, 19, 20, 21, 22])
+    assert np.array_equal(trace.history().frequency_hz, [118, 119, 120, 121, 122])

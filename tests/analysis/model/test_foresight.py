@@ -29,7 +29,9 @@ def test_no_point_inside_is_no_band():
 def test_the_amplitude_of_a_dwell_is_the_stroke_of_its_plan():
     measurement = QUICK["dwell"]
     amplitude_m, _ = base_amplitude_m(measurement, RIG, np.array([260.0]))
-    assert amplitude_m[0] == pytest.approx(predicted_loads(measurement.excitation, RIG)[BaseQuantity.STROKE].peak)
+    assert amplitude_m[0] == pytest.approx(
+        predicted_loads(measurement.excitation, RIG)[BaseQuantity.STROKE].peak
+    )
 
 
 def test_noise_is_stood_for_by_a_sine_of_the_same_rms():

@@ -77,39 +77,39 @@ def measured(recorded):
 
 
 @pytest.fixture(scope="module")
-def shaken(measured):
+def updated(measured):
     return update_model(measured)
 
 
-def test_every_parameter_lies_within_its_interval_and_the_bench_does_not(shaken):
-    assert [each.parameter for each in shaken.values] == [*LINEAR, Parameter.GAP]
-    for each in shaken.values:
+def test_every_parameter_lies_within_its_interval_and_the_bench_does_not(updated):
+    assert [each.parameter for each in updated.values] == [*LINEAR, Parameter.GAP]
+    for each in updated.values:
         truth = parameter_value(TRUE, each.parameter)
         # 95 % of one value; of five at once some lie a little outside of that.
         slack = 0.7 * (each.high - each.low) / 2
         assert each.low - slack <= truth <= each.high + slack, each
         assert not each.low <= each.nominal <= each.high, each
-    assert shaken.not_told == ()
-    assert 0.3 < shaken.reduced_chi_square < 3
+    assert updated.not_told == ()
+    assert 0.3 < updated.reduced_chi_square < 3
 
 
-def test_the_report_says_what_was_fitted_and_what_the_bench_says(measured, shaken):
-    said = list(findings(replace(measured, model_said=shaken.sentences)))
-    assert said[: len(shaken.sentences)] == list(shaken.sentences)
+def test_the_report_says_what_was_fitted_and_what_the_bench_says(measured, updated):
+    said = list(findings(replace(measured, model_said=updated.sentences)))
+    assert said[: len(updated.sentences)] == list(updated.sentences)
     assert [each for each in said if each.startswith("Fitted gap = 5") and "the bench says 45" in each]
 
 
-def test_the_intervals_are_useful(shaken):
-    relative = {each.parameter: (each.high - each.low) / each.value for each in shaken.values}
+def test_the_intervals_are_useful(updated):
+    relative = {each.parameter: (each.high - each.low) / each.value for each in updated.values}
     assert relative[Parameter.DAMPING_TIME] < 0.1
     assert max(relative[each] for each in LINEAR[1:]) < 0.01
     assert relative[Parameter.GAP] < 0.15
 
 
-def test_the_fitted_specimen_lies_on_the_measurement_where_the_nominal_one_does_not(recorded, shaken):
+def test_the_fitted_specimen_lies_on_the_measurement_where_the_nominal_one_does_not(recorded, updated):
     paths = recorded[:2]
     nominal = analyse_files(paths, "nominal")
-    fitted = analyse_files(paths, "fitted", specimen=shaken.specimen)
+    fitted = analyse_files(paths, "fitted", specimen=updated.specimen)
     before, after = nominal.noise[0].laid.difference, fitted.noise[0].laid.difference
     assert after.rms_db < 0.3 < 1.0 < before.rms_db
     assert after.share_within_two > 0.8 > before.share_within_two

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vibench.analysis import Estimator, InvalidRequest, NotEnoughData, FrequencyResponse
+from vibench.analysis import Estimator, FrequencyResponse, InvalidRequest, NotEnoughData
 from vibench.analysis.frequency_response import FrequencyResponseSettings
 from vibench.analysis.model_updating._specimen_fit import (
     LINEAR,

@@ -13,7 +13,7 @@ PAGE = Path(__file__).parents[3] / "docs" / "accuracy.md"
 
 
 @pytest.fixture(scope="module")
-def trade():
+def benchmark():
     return measure_accuracy(Thoroughness(span_s=0.03, solver_span_s=0.01), motions=(MOTIONS[1], MOTIONS[-1]))
 
 
@@ -21,42 +21,42 @@ def headings(text):
     return [line for line in text.splitlines() if line.startswith(("#", "| level", "| motion"))]
 
 
-def test_the_page_holds_every_level_and_solver_of_every_motion(trade):
-    page = accuracy_document(trade, "images/tradeoff.png")
-    for each in trade.motions:
+def test_the_page_holds_every_level_and_solver_of_every_motion(benchmark):
+    page = accuracy_document(benchmark, "images/tradeoff.png")
+    for each in benchmark.motions:
         assert each.motion.name in page
         assert each.advice in page
     assert page.count("| **quick** |") == page.count("| scipy Radau |") == 2
     assert page.count("](images/tradeoff.png)") == 1
 
 
-def test_the_page_says_when_a_promise_is_not_kept(trade):
-    assert worst_error(trade, Accuracy.QUICK) <= Accuracy.QUICK.promise
-    assert "**no**" not in accuracy_document(trade, "x.png")
+def test_the_page_says_when_a_promise_is_not_kept(benchmark):
+    assert worst_error(benchmark, Accuracy.QUICK) <= Accuracy.QUICK.promise
+    assert "**no**" not in accuracy_document(benchmark, "x.png")
 
 
-def test_the_page_names_the_motions_on_which_a_level_buys_nothing(trade):
-    motion = trade.motions[0]
+def test_the_page_names_the_motions_on_which_a_level_buys_nothing(benchmark):
+    motion = benchmark.motions[0]
     quick, standard, reference = motion.levels
     stuck = replace(motion, levels=(quick, replace(standard, state_error=quick.state_error), reference))
     named = f"- standard is no better than quick: {motion.motion.name}"
-    assert named in accuracy_document(replace(trade, motions=(stuck,)), "x.png")
+    assert named in accuracy_document(replace(benchmark, motions=(stuck,)), "x.png")
     better = replace(standard, state_error=0.1 * quick.state_error)
     gained = replace(motion, levels=(quick, better, replace(reference, state_error=0.0)))
-    assert "is no better" not in accuracy_document(replace(trade, motions=(gained,)), "x.png")
+    assert "is no better" not in accuracy_document(replace(benchmark, motions=(gained,)), "x.png")
 
 
-def test_the_page_in_docs_has_the_motions_and_columns_that_this_code_writes(trade):
+def test_the_page_in_docs_has_the_motions_and_columns_that_this_code_writes(benchmark):
     kept = headings(PAGE.read_text(encoding="utf-8"))
-    made = headings(accuracy_document(trade, "x.png"))
+    made = headings(accuracy_document(benchmark, "x.png"))
     assert set(made) <= set(kept)
     assert [line for line in kept if line.startswith("## ") and ":" in line] == [
         f"## {each.regime.value.capitalize()}: {each.name}" for each in MOTIONS
     ]
 
 
-def test_the_figure_draws_every_motion_that_has_an_error(trade):
-    drawn = tradeoff_figure(trade)
+def test_the_figure_draws_every_motion_that_has_an_error(benchmark):
+    drawn = tradeoff_figure(benchmark)
     labels = {line.get_label() for line in drawn.figure.axes[0].get_lines()}
-    assert trade.motions[0].motion.name in labels
-    assert trade.motions[1].motion.name not in labels
+    assert benchmark.motions[0].motion.name in labels
+    assert benchmark.motions[1].motion.name not in labels

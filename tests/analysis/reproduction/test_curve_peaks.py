@@ -5,9 +5,9 @@ import pytest
 
 from vibench.analysis.reproduction._curve_peaks import (
     bound_peaks,
-    response_peaks,
     linear_peaks,
     nearest,
+    response_peaks,
     two_highest,
 )
 from vibench.sim import gong2025

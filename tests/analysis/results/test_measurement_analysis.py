@@ -53,10 +53,10 @@ def test_noise_gives_the_closed_form_on_every_line_by_all_three_estimators(noise
     found = analysed(noise_file())
     assert isinstance(found, NoiseAnalysis)
     estimate = found.response
-    lines = estimate.transmission.frequency_hz
+    lines = estimate.frequency_response.frequency_hz
     assert lines.size == 126
     # What settling leaves of the first mode, exp(-11), shows at its sharp flanks.
-    for each in (estimate.transmission, estimate.h1, estimate.h2):
+    for each in (estimate.frequency_response, estimate.h1, estimate.h2):
         np.testing.assert_allclose(each.value, truth(lines), rtol=2e-3)
     assert estimate.left_out == 0
     assert estimate.used_s == pytest.approx(1.0)
@@ -113,7 +113,9 @@ def test_a_realisation_with_a_hole_is_left_out_and_the_other_one_stands(noise_fi
     assert found.facts.lost_samples == 10
     assert verdict(found, "Lost samples") is Verdict.WARNING
     np.testing.assert_allclose(
-        found.response.transmission.value, truth(found.response.transmission.frequency_hz), rtol=2e-3
+        found.response.frequency_response.value,
+        truth(found.response.frequency_response.frequency_hz),
+        rtol=2e-3,
     )
 
 

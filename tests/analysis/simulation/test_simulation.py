@@ -49,14 +49,14 @@ def test_one_model_named_twice_is_simulated_once():
 
 def test_the_answer_grows_to_the_linear_transmission():
     request = SimulationRequest(**LINEAR)
-    course, counts = SimulationProgress(request.amplitude_m, request.points, "n"), []
-    simulate(request, lambda pieces: (course.add(pieces), counts.append(course.done)), lambda: False, 2)
-    assert counts[-1] == course.asked == 12
-    frequency_hz, found = course.column("linear", "response_ii")
+    progress, counts = SimulationProgress(request.amplitude_m, request.points, "n"), []
+    simulate(request, lambda parts: (progress.add(parts), counts.append(progress.done)), lambda: False, 2)
+    assert counts[-1] == progress.asked == 12
+    frequency_hz, found = progress.column("linear", "response_ii")
     exact = np.abs(base_transmissibility(gong2025(contact="linear"), frequency_hz)[:, 0])
     assert np.array_equal(frequency_hz, np.arange(50.0, 601.0, 50.0))
     assert np.allclose(found, exact, rtol=1e-6)
-    trace = course.traces()[1]
+    trace = progress.curves()[1]
     assert np.array_equal(trace.magnitude, found)
     assert trace.name == "model linear, Response II, predicted"
 
@@ -64,7 +64,7 @@ def test_the_answer_grows_to_the_linear_transmission():
 def test_nothing_is_computed_after_a_cancellation():
     told = []
     simulate(SimulationRequest(**LINEAR), told.append, lambda: True, 1)
-    assert sum(len(pieces) for pieces in told) < 12
+    assert sum(len(parts) for parts in told) < 12
 
 
 def point(model, frequency_hz, response, impacts=0):
@@ -72,19 +72,19 @@ def point(model, frequency_hz, response, impacts=0):
 
 
 def test_similarity_is_of_the_frequencies_that_both_models_have():
-    course = SimulationProgress(5e-6, 10, "n")
-    course.add((point("a", 100.0, 2.0), point("a", 200.0, 4.0), point("b", 200.0, 4.0)))
-    assert course.similarity().rate == 1.0
-    course.add((point("b", 100.0, 200.0), Trouble("b at 300 Hz: no")))
-    assert course.similarity().rate == 0.5
-    assert course.done == 5
-    assert course.troubles == ("b at 300 Hz: no",)
+    progress = SimulationProgress(5e-6, 10, "n")
+    progress.add((point("a", 100.0, 2.0), point("a", 200.0, 4.0), point("b", 200.0, 4.0)))
+    assert progress.similarity().rate == 1.0
+    progress.add((point("b", 100.0, 200.0), Trouble("b at 300 Hz: no")))
+    assert progress.similarity().rate == 0.5
+    assert progress.done == 5
+    assert progress.troubles == ("b at 300 Hz: no",)
 
 
 def test_bands_of_impacts_are_told_apart():
-    course = SimulationProgress(5e-6, 10, "n")
-    course.add(tuple(point("a", float(f), 1.0, int(f in (30, 40, 60))) for f in range(10, 80, 10)))
-    assert course.collision_bands_hz("a") == ((30.0, 40.0), (60.0, 60.0))
+    progress = SimulationProgress(5e-6, 10, "n")
+    progress.add(tuple(point("a", float(f), 1.0, int(f in (30, 40, 60))) for f in range(10, 80, 10)))
+    assert progress.collision_bands_hz("a") == ((30.0, 40.0), (60.0, 60.0))
 
 
 def is_about(found, stated):
@@ -136,7 +136,7 @@ def test_the_process_that_simulates_drops_what_is_no_longer_wanted():
             message = ours.recv()
             match message:
                 case Grown():
-                    counts[message.number] += len(message.pieces)
+                    counts[message.number] += len(message.parts)
                 case Ended(number=2):
                     break
         assert counts[1] < 11_001

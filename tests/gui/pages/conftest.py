@@ -58,11 +58,11 @@ def waited():
 
 
 @pytest.fixture(scope="session")
-def shared_desk(qapp, tmp_path_factory):
+def shared_context(qapp, tmp_path_factory):
     """A desk whose processes serve all tests: they take seconds to begin."""
-    desk = AppContext(Settings(tmp_path_factory.mktemp("settings") / "window.ini"))
-    yield desk
-    desk.background.close()
+    context = AppContext(Settings(tmp_path_factory.mktemp("settings") / "window.ini"))
+    yield context
+    context.background.close()
 
 
 @pytest.fixture(scope="session")

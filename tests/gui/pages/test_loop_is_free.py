@@ -10,7 +10,7 @@ import pytest
 from PySide6.QtCore import QTimer
 
 from vibench.acquisition import Block, Overload, shipped
-from vibench.acquisition.plan import SweepAxis, Measurement, Range, SteppedSine
+from vibench.acquisition.plan import Measurement, Range, SteppedSine, SweepAxis
 from vibench.acquisition.recording import (
     ChannelHeader,
     Origin as RecordingOrigin,
@@ -18,7 +18,7 @@ from vibench.acquisition.recording import (
     RecordingState,
     create_recording,
 )
-from vibench.analysis import CurveOrigin, CurveKind, Curve
+from vibench.analysis import Curve, CurveKind, CurveOrigin
 from vibench.analysis.live import LiveChannel, LiveView
 from vibench.analysis.simulation import SimulationProgress
 from vibench.analysis.simulation._request import SimulatedPoint, SimulatedSignal
@@ -44,7 +44,12 @@ def curve(number):
     frequency_hz = np.linspace(10.0, 1000.0, 4000)
     magnitude = 1.0 + np.random.default_rng(number).random(4000)
     return Curve(
-        f"run {number}", CurveOrigin.MEASURED, CurveKind.TRANSMISSION, frequency_hz, magnitude, np.full(4000, 0.02)
+        f"run {number}",
+        CurveOrigin.MEASURED,
+        CurveKind.TRANSMISSIBILITY,
+        frequency_hz,
+        magnitude,
+        np.full(4000, 0.02),
     )
 
 
@@ -78,15 +83,15 @@ def long_recording(tmp_path):
 
 
 def simulated():
-    course = SimulationProgress(5e-6, 2 * SIMULATED, "")
+    progress = SimulationProgress(5e-6, 2 * SIMULATED, "")
     time_s = np.arange(5000) / 50e3
     for model in ("hertz", "linear"):
         found = [
             SimulatedPoint(model, 10.0 + n, 2.0 + n % 7, 1.0, n % 50, "", 3.0, 1e-6) for n in range(SIMULATED)
         ]
         motion = 4e-5 * np.sin(2e3 * time_s)
-        course.add((*found, SimulatedSignal(model, 260.0, time_s, motion, 0.5 * motion, 4.5e-5)))
-    return course
+        progress.add((*found, SimulatedSignal(model, 260.0, time_s, motion, 0.5 * motion, 4.5e-5)))
+    return progress
 
 
 @dataclass(frozen=True)
@@ -104,7 +109,7 @@ def first_looks(window):
 
 
 def of_files(window, recording, long_recording):
-    files, lanes = window.pages[FILES], window.pages[FILES].lanes
+    files, time_histories = window.pages[FILES], window.pages[FILES].time_histories
     spectrogram = files.pictures.spectrogram
     for place in range(LISTED):
         os.link(recording, recording.with_name(f"night-{place}.h5"))
@@ -114,18 +119,20 @@ def of_files(window, recording, long_recording):
         return table.rowCount() > LISTED and not table.missing_pictures()
 
     yield Action("list the files of a night", files.list_folder, is_listed)
-    yield Action("open a recording", lambda: files.open_path(recording), lambda: bool(lanes.plots))
-    yield Action("zoom", lambda: lanes.show_range(6.0, 6.5))
+    yield Action("open a recording", lambda: files.open_path(recording), lambda: bool(time_histories.plots))
+    yield Action("zoom", lambda: time_histories.show_range(6.0, 6.5))
     yield Action(
-        "open a long recording", lambda: files.open_path(long_recording), lambda: len(lanes.plots) == 4
+        "open a long recording",
+        lambda: files.open_path(long_recording),
+        lambda: len(time_histories.plots) == 4,
     )
-    yield Action("zoom in the long one", lambda: lanes.show_range(6.0, 6.5))
+    yield Action("zoom in the long one", lambda: time_histories.show_range(6.0, 6.5))
     yield Action(
         "show the spectrogram",
         lambda: files.pictures.setCurrentWidget(spectrogram),
         lambda: not spectrogram.is_busy,
     )
-    yield Action("show the lanes again", lambda: files.pictures.setCurrentWidget(lanes))
+    yield Action("show the lanes again", lambda: files.pictures.setCurrentWidget(time_histories))
 
 
 def of_compare(window, recording, folder):
@@ -144,10 +151,10 @@ def of_compare(window, recording, folder):
 
 
 def of_simulate(window):
-    course, simulate = simulated(), window.pages[SIMULATE]
+    progress, simulate = simulated(), window.pages[SIMULATE]
     yield Action("look at Simulate", lambda: window.show_page(SIMULATE))
     for points in ("points", "more points"):
-        for step, plot in zip(simulate.plots.steps(course), simulate.plots.plots, strict=True):
+        for step, plot in zip(simulate.plots.steps(progress), simulate.plots.plots, strict=True):
             yield Action(f"{points} arrive, {plot.accessibleName()}", step)
 
 
@@ -159,7 +166,7 @@ def of_queue(window):
     yield Action("open a campaign", lambda: queue.open_file(paper), lambda: entries.rowCount() > 1)
     yield Action(
         "take over a night",
-        lambda: window.desk.intent.choose_campaign(night),
+        lambda: window.context.selection.choose_campaign(night),
         lambda: rows.rowCount() == MANY,
     )
 
@@ -175,7 +182,7 @@ def of_test(window):
 
 def of_run(window):
     """Watch a sine on four channels, at twenty frames a second."""
-    run, desk = window.pages[RUN], window.desk
+    run, context = window.pages[RUN], window.context
     view = LiveView(
         [LiveChannel(role, "V", 1.0, 10.0) for role, *_ in LONG_CHANNELS], RATE_HZ, band_hz=(150.0, 350.0)
     )
@@ -184,7 +191,7 @@ def of_run(window):
         first, size = view.next_sample, round(RATE_HZ / 20)
         sine = np.sin(2 * np.pi * 260.0 * np.arange(first, first + size) / RATE_HZ)
         view.add(first, np.tile(sine.astype(np.float32), (len(LONG_CHANNELS), 1)))
-        run.lanes.show_view(view, 2.0)
+        run.time_histories.show_view(view, 2.0)
         for picture in (run.watch_card, run.transmission, run.spectrum):
             picture.show_view(view)
 
@@ -194,17 +201,17 @@ def of_run(window):
     timer.timeout.connect(draw)
     yield Action("go to Run", lambda: window.show_page(RUN))
     yield Action("begin to watch", timer.start, lambda: view.next_sample > RATE_HZ)
-    yield Action("dark, in a run", lambda: desk.choose_theme(DARK), lambda: window.is_themed)
-    yield Action("light, in a run", lambda: desk.choose_theme(LIGHT), lambda: window.is_themed)
+    yield Action("dark, in a run", lambda: context.choose_theme(DARK), lambda: window.is_themed)
+    yield Action("light, in a run", lambda: context.choose_theme(LIGHT), lambda: window.is_themed)
     timer.stop()
 
 
 def of_frame(window):
-    desk = window.desk
+    context = window.context
     for page in (RUN, FILES, SIMULATE):
         yield Action(f"back to {page}", lambda page=page: window.show_page(page))
-        yield Action(f"dark, on {page}", lambda: desk.choose_theme(DARK), lambda: window.is_themed)
-        yield Action(f"light, on {page}", lambda: desk.choose_theme(LIGHT), lambda: window.is_themed)
+        yield Action(f"dark, on {page}", lambda: context.choose_theme(DARK), lambda: window.is_themed)
+        yield Action(f"light, on {page}", lambda: context.choose_theme(LIGHT), lambda: window.is_themed)
         yield Action(f"large, on {page}", lambda: window.resize(1920, 1080))
         yield Action(f"small, on {page}", lambda: window.resize(1280, 720))
 
@@ -225,8 +232,8 @@ def actions(window, recording, long_recording, folder):
 def test_nothing_that_is_done_on_a_page_keeps_the_loop_over_the_bound(
     window, record, long_recording, tmp_path, qtbot, held_up
 ):
-    window.desk.folder.mkdir()
-    recording = record(window.desk.folder, "whole")
+    window.context.folder.mkdir()
+    recording = record(window.context.folder, "whole")
     qtbot.waitUntil(lambda: window.pages[TEST].is_done, timeout=120_000)
     slow = {}
     for action in actions(window, recording, long_recording, tmp_path):

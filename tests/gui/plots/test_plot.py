@@ -3,7 +3,7 @@
 import pytest
 from PySide6.QtGui import QColor
 
-from vibench.gui.plots import LOG_FREQUENCY, TIME, PlotAxis, Plot, curve_style
+from vibench.gui.plots import LOG_FREQUENCY, TIME, Plot, PlotAxis, curve_style
 from vibench.gui.plots._axis import thinned
 from vibench.gui.widgets import LIGHT
 

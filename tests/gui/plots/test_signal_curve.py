@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.gui.plots import TIME, PlotAxis, Plot, SignalCurve, curve_style
+from vibench.gui.plots import TIME, Plot, PlotAxis, SignalCurve, curve_style
 from vibench.gui.widgets import LIGHT
 
 RATE_HZ = 51200.0

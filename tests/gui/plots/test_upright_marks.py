@@ -2,7 +2,7 @@
 
 import pytest
 
-from vibench.gui.plots import LOG_FREQUENCY, TIME, PlotAxis, Dash, LineStyle, Plot
+from vibench.gui.plots import LOG_FREQUENCY, TIME, Dash, LineStyle, Plot, PlotAxis
 from vibench.gui.widgets import LIGHT
 
 RED = LineStyle(lambda _theme: "#ff0000", filled=1.0)

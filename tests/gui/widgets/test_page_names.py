@@ -22,8 +22,8 @@ MENU_KEYS = "ftvh"
 
 
 @pytest.fixture(params=PAGES, ids=lambda each: each.__name__)
-def page(request, desk, qtbot):
-    page = request.param(desk)
+def page(request, context, qtbot):
+    page = request.param(context)
     qtbot.addWidget(page)
     page.resize(1200, 700)
     page.show()

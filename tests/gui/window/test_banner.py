@@ -13,7 +13,7 @@ READABLE = 4.5
 def test_a_state_is_shown_by_symbol_and_word_not_by_colour_alone(qtbot):
     banner = Banner()
     qtbot.addWidget(banner)
-    banner.show_face(StateIndicator("▶", "RUNNING", Tone.ACTIVE, "0:42 of 2:00"))
+    banner.show_indicator(StateIndicator("▶", "RUNNING", Tone.ACTIVE, "0:42 of 2:00"))
     label = banner.findChild(QLabel, "face")
     assert label.text() == "▶  RUNNING"
     assert label.accessibleName() == "State: RUNNING"

@@ -14,17 +14,17 @@ def work_for(duration_s):
 
 
 def test_work_that_holds_the_window_up_is_noted_with_what_was_in_sight(qapp, qtbot):
-    watch = EventLoopMonitor(lambda: "Files page")
-    qtbot.waitUntil(lambda: watch.longest_s > 0 or watch.busiest_s > 0)
-    watch.begin()
+    monitor = EventLoopMonitor(lambda: "Files page")
+    qtbot.waitUntil(lambda: monitor.longest_s > 0 or monitor.busiest_s > 0)
+    monitor.begin()
     work_for(1.6 * BOUND_S)
-    qtbot.waitUntil(lambda: bool(watch.noted))
-    (wait,) = watch.noted
+    qtbot.waitUntil(lambda: bool(monitor.noted))
+    (wait,) = monitor.noted
     assert wait.about == "Files page"
     assert wait.busy_s == pytest.approx(1.6 * BOUND_S, abs=0.04)
     assert wait.own_s > BOUND_S
-    assert "Files page: 1" in watch.text
-    watch.stop()
+    assert "Files page: 1" in monitor.text
+    monitor.stop()
 
 
 def test_a_loop_that_is_free_is_told_so_on_the_status_line(window, qtbot):

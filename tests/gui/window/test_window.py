@@ -22,16 +22,16 @@ def test_the_pages_lie_in_the_order_of_the_job(window):
 
 
 def test_theme_page_and_test_are_there_again_and_nothing_is_armed(window, qapp, own_state, tmp_path):
-    window.desk.choose_theme(DARK)
+    window.context.choose_theme(DARK)
     window.show_page(TEST)
     form = window.pages[TEST].form.form
     form.show_content({**form.content(), "name": "kept"})
     window.close()
     again = Window(AppContext(Settings(tmp_path / "window.ini")), PAGES)
-    assert again.desk.theme is DARK
+    assert again.context.theme is DARK
     assert again.page is again.pages[TEST]
-    assert again.desk.intent.measurement.name == "kept"
-    assert again.banner.face.word == "NO BENCH"
+    assert again.context.selection.measurement.name == "kept"
+    assert again.banner.indicator.word == "NO BENCH"
     again.close()
     again.deleteLater()
 
@@ -45,7 +45,7 @@ def test_the_banner_and_stop_are_in_sight_on_every_page(window, qapp):
 
 @pytest.mark.parametrize("order", ["arm_test", "start", "check"])
 def test_an_order_without_a_bench_is_answered_with_what_to_do(window, order):
-    getattr(window.orders, order)()
+    getattr(window.actions, order)()
     newest = window.strip.notices[-1]
     assert newest.next_step
     assert window.page is window.pages[RIG]

@@ -7,7 +7,7 @@ from vibench.sim.accuracy_benchmark import LevelFigures, MotionBenchmark
 from vibench.sim.accuracy_benchmark._figures import Motion, Regime
 
 
-def trade(*state_errors, regime=Regime.PERIODIC):
+def benchmark(*state_errors, regime=Regime.PERIODIC):
     levels = tuple(
         LevelFigures(accuracy, cost, error, 0.0, 0.0, 1.0, 0.032, -2.0, 0.0)
         for accuracy, cost, error in zip(Accuracy, (1e-3, 1.1e-3, 2e-3), state_errors, strict=True)
@@ -26,13 +26,13 @@ def trade(*state_errors, regime=Regime.PERIODIC):
     ],
 )
 def test_a_level_that_is_no_better_than_the_one_before_is_not_said_to_buy_digits(state_errors, said, without):
-    found = trade(*state_errors)
+    found = benchmark(*state_errors)
     assert found.advice.startswith(said)
     assert found.advice.endswith("the last costs 2.0 times the first.")
     assert [level.accuracy.value for level, _ in found.without_gain] == without
 
 
 def test_where_levels_cannot_differ_none_is_reproached_for_it():
-    assert trade(9.9e-14, 9.9e-14, 9.9e-14, regime=Regime.FREE).without_gain == ()
-    assert trade(None, None, None, regime=Regime.CHAOTIC).without_gain == ()
-    assert "scatters by 3.2%" in trade(None, None, None, regime=Regime.CHAOTIC).advice
+    assert benchmark(9.9e-14, 9.9e-14, 9.9e-14, regime=Regime.FREE).without_gain == ()
+    assert benchmark(None, None, None, regime=Regime.CHAOTIC).without_gain == ()
+    assert "scatters by 3.2%" in benchmark(None, None, None, regime=Regime.CHAOTIC).advice

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from vibench.sim import Harmonic, Outcome, gong2025, lyapunov_exponent
-from vibench.sim.chain import chain_of, chain_lyapunov_exponent
+from vibench.sim.chain import chain_lyapunov_exponent, chain_of
 from vibench.sim.chain._modes import chain_modal_form
 
 pytestmark = pytest.mark.timeout(300)

@@ -10,7 +10,7 @@ from vibench.sim.collision import collide, collision_tables, new_collision
 from vibench.sim.collision._tables import DEPTHS, DURATION, HALF_FORCE, SOFTEST, SPACING
 from vibench.sim.contact import begin_contact
 from vibench.sim.kernels import clock_at
-from vibench.sim.scene._followed_run import FollowedRun, Samples, ObservedQuantities
+from vibench.sim.scene._followed_run import FollowedRun, ObservedQuantities, Samples
 from vibench.sim.stepping import harmonic_tables, new_state
 
 DRIVE = Harmonic(130.0, 20e-6)
@@ -29,18 +29,18 @@ def collided(start, tolerance=Accuracy.STANDARD.tolerance, longest=1.0, drive=DR
     tables, state = harmonic_tables(specimen, drive), new_state(specimen, np.zeros(6), Accuracy.STANDARD)
     state[:6] = start
     begin_contact(state, math.copysign(1.0, start[1]), tables.flight.par, tolerance)
-    room = new_collision()
+    workspace = new_collision()
     return (
-        collide(state, clock_at(0.0), longest, tolerance, tables.flight, tables.collisions, room),
+        collide(state, clock_at(0.0), longest, tolerance, tables.flight, tables.collisions, workspace),
         state,
-        room,
+        workspace,
     )
 
 
 def followed(start, until, tolerance, **options):
     """The same by steps, which stricter tolerances than the standard's take."""
     run = FollowedRun(gong2025(**options), DRIVE, tolerance, start)
-    run.carry_tangent()
+    run.follow_tangent()
     seen = run.follow(until, ObservedQuantities.PEAKS_AND_LINES, Samples(0.0, 2e5, 5))
     return run.state, seen
 

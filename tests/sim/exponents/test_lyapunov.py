@@ -7,7 +7,7 @@ import pytest
 
 from vibench.sim import Accuracy, Harmonic, LinearGap, Outcome, Specimen, gong2025, lyapunov_exponent
 from vibench.sim.exponents import Precision
-from vibench.sim.exponents._lyapunov import FEWEST_INTERVALS, Source, ExponentVerdict
+from vibench.sim.exponents._lyapunov import FEWEST_INTERVALS, ExponentVerdict, Source
 from vibench.sim.exponents._settling import FinalMotion
 
 CHAOS = Harmonic(260.0, 5e-6)
@@ -31,7 +31,7 @@ def test_without_impacts_the_exponent_is_the_decay_of_the_slowest_mode(contact):
     found = lyapunov_exponent(specimen, Harmonic(180.0, 1e-6), duration_s=5.0, settle_s=1.0)
     assert found.source is Source.MODES
     assert found.motion is FinalMotion.QUIET
-    assert found.tendency is ExponentVerdict.REGULAR
+    assert found.verdict is ExponentVerdict.REGULAR
     assert found.exponent_per_s == pytest.approx(slowest_decay(specimen), rel=1e-9)
     # The reference's closed form, -time * omega1^2 / 2, and what the run itself measured.
     omega = 2.0 * math.pi * specimen.natural_frequencies_hz[0]
@@ -49,7 +49,7 @@ def test_a_weak_power_law_decays_as_the_linear_structure():
 def test_the_papers_statements_on_chaos_hold():
     # Its section 3.1 and Fig. 10: over 100 per second when colliding at 5 um; near zero or below at 1 um.
     colliding = lyapunov_exponent(gong2025(), CHAOS)
-    assert colliding.tendency is ExponentVerdict.CHAOTIC
+    assert colliding.verdict is ExponentVerdict.CHAOTIC
     assert colliding.exponent_per_s > 100.0
     assert colliding.exponent_per_s - 3.0 * colliding.standard_error_per_s > 90.0
     for frequency_hz in (94.4, 180.0, 260.0, 266.0, 500.0):
@@ -62,7 +62,7 @@ def test_two_halves_of_a_chaotic_run_agree_within_their_errors(contact):
     specimen = gong2025(contact=contact)
     first = lyapunov_exponent(specimen, CHAOS, Accuracy.QUICK)
     second = lyapunov_exponent(specimen, CHAOS, Accuracy.STANDARD, initial_state=first.final_state)
-    assert first.tendency is second.tendency is ExponentVerdict.CHAOTIC
+    assert first.verdict is second.verdict is ExponentVerdict.CHAOTIC
     allowed = math.hypot(first.standard_error_per_s, second.standard_error_per_s)
     assert abs(first.exponent_per_s - second.exponent_per_s) < 4.0 * allowed
     assert allowed < 0.05 * first.exponent_per_s
@@ -92,7 +92,7 @@ def test_a_run_ends_as_soon_as_its_error_is_small_enough():
 def test_a_lost_run_has_no_exponent_and_says_why():
     found = lyapunov_exponent(gong2025(), CHAOS, duration_s=5.0, max_impact_rate_hz=10.0)
     assert found.outcome is Outcome.TOO_MANY_IMPACTS
-    assert found.tendency is ExponentVerdict.UNKNOWN
+    assert found.verdict is ExponentVerdict.UNKNOWN
     assert math.isnan(found.exponent_per_s)
 
 

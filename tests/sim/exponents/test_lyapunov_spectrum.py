@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, lyapunov_exponent, lyapunov_spectrum
-from vibench.sim.exponents._lyapunov import Source, ExponentVerdict
+from vibench.sim.exponents._lyapunov import ExponentVerdict, Source
 from vibench.sim.exponents._lyapunov_spectrum import kaplan_yorke
 from vibench.sim.exponents._tangent_run import interval_for, run_with_tangent
 from vibench.sim.model import state_matrix
@@ -71,7 +71,7 @@ def test_the_first_of_six_is_the_largest_alone():
     one = lyapunov_exponent(gong2025(), CHAOS)
     allowed = math.hypot(six.standard_errors_per_s[0], one.standard_error_per_s)
     assert abs(six.exponents_per_s[0] - one.exponent_per_s) < 4.0 * allowed
-    assert six.tendency is one.tendency is ExponentVerdict.CHAOTIC
+    assert six.verdict is one.verdict is ExponentVerdict.CHAOTIC
     assert 4.0 < six.dimension < 5.0
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, lyapunov_exponent
-from vibench.sim.exponents._lyapunov import Source, ExponentVerdict
+from vibench.sim.exponents._lyapunov import ExponentVerdict, Source
 from vibench.sim.exponents._settling import FinalMotion, settling
 from vibench.sim.exponents._tangent_run import Interval, TangentRun
 
@@ -97,7 +97,7 @@ def test_the_specimens_chaos_that_dies_out_is_told_with_its_time_and_its_exponen
     found = [lyapunov_exponent(gong2025(), drive, Accuracy.QUICK, initial_state=start) for start in starts]
     settled = [each for each in found if each.source is source]
     assert len(settled) >= 4
-    assert all(each.tendency is ExponentVerdict.REGULAR for each in settled)
+    assert all(each.verdict is ExponentVerdict.REGULAR for each in settled)
     exponents = np.array([each.exponent_per_s for each in settled])
     assert exponents == pytest.approx(exponents[0], rel=1e-3)
     chaotic = [each for each in settled if each.transient is not None]

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from vibench.sim.kernels import (
-    kernel,
     eight,
     eight_of_eight,
     eight_of_sixteen,
     eights,
+    kernel,
     largest,
     root,
     sixteen,

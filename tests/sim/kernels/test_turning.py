@@ -6,13 +6,13 @@ from hypothesis import given, settings, strategies as st
 
 from vibench.sim.kernels import (
     STEPS_AHEAD,
-    kernel,
     fill_series,
+    kernel,
     march,
+    propagate_by,
     series_rows,
     steps_ahead,
     sum_now,
-    propagate_by,
 )
 
 RATES = np.array([-3.0 + 600.0j, -20.0 + 1700.0j, -60.0 + 3100.0j, 1630.0j])

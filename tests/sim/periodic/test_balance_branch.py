@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vibench.sim import PowerSpring, harmonic_balance_branch, gong2025, jump_frequencies, spring_of, structure_of
+from vibench.sim import (
+    PowerSpring,
+    gong2025,
+    harmonic_balance_branch,
+    jump_frequencies,
+    spring_of,
+    structure_of,
+)
 from vibench.sim.periodic._balance_branch import raised_balance
 from vibench.sim.periodic._balance_solver import BalanceOptions, balance
 from vibench.sim.periodic._branch import BifurcationKind, Parameter
@@ -54,7 +61,9 @@ def test_between_its_folds_a_duffing_branch_is_unstable_and_a_multiplier_passes_
 def test_a_linear_branch_has_no_events_and_reaches_its_end():
     structure = structure_of(gong2025(contact="linear"))
     start = balance(structure, NoForce(), 50.0, 1e-6, BalanceOptions(fewest=1))
-    branch = harmonic_balance_branch(structure, NoForce(), start, Parameter.FREQUENCY, 80.0, BalanceOptions(fewest=1))
+    branch = harmonic_balance_branch(
+        structure, NoForce(), start, Parameter.FREQUENCY, 80.0, BalanceOptions(fewest=1)
+    )
     assert branch.end is ArcEnd.REACHED_BOUND
     assert branch.events == ()
     assert branch.frequencies_hz[[0, -1]] == pytest.approx([50.0, 80.0])

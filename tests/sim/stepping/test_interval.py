@@ -13,10 +13,10 @@ from vibench.sim.stepping import FAILED, advance_interval, base_reaction, interv
 
 
 @kernel
-def advance_all(state, pieces, tables):
+def advance_all(state, substeps, tables):
     impacts = 0
-    for index in range(len(pieces)):
-        impacts += advance_interval(state, pieces[index], tables)
+    for index in range(len(substeps)):
+        impacts += advance_interval(state, substeps[index], tables)
     return impacts
 
 
@@ -83,9 +83,9 @@ def test_a_mirrored_drive_gives_the_mirrored_motion_to_the_last_bit(
 ):
     specimen = gong2025(damping_time_s)
     tables = interval_tables(specimen, 2e-5)
-    pieces = sine_pieces(frequency_hz, amplitude_m, 0.05, 2e-5)
+    substeps = sine_pieces(frequency_hz, amplitude_m, 0.05, 2e-5)
     here, there = new_state(specimen), new_state(specimen)
-    assert advance_all(here, pieces, tables) == advance_all(there, -pieces, tables)
+    assert advance_all(here, substeps, tables) == advance_all(there, -substeps, tables)
     np.testing.assert_array_equal(here[:6], -there[:6])
 
 

@@ -19,7 +19,7 @@ def main(path):
         sys.stdout.write(f"{progress.kept}\n")
         sys.stdout.flush()
 
-    solve_study(STUDY, Path(path), ExistingStudy.RESUME, workers=2, watcher=tell)
+    solve_study(STUDY, Path(path), ExistingStudy.RESUME, workers=2, observer=tell)
 
 
 if __name__ == "__main__":

@@ -4,10 +4,10 @@ import numpy as np
 from hypothesis import given, settings, strategies as st
 
 from vibench.sim.study._axes import Grid
-from vibench.sim.study._point_scheduler import NOBODY, PointScheduler, Costs
+from vibench.sim.study._point_scheduler import NOBODY, Costs, PointScheduler
 
 
-def agenda_of(planned_s, after=None, is_done=None):
+def scheduler_of(planned_s, after=None, is_done=None):
     points = len(planned_s)
     costs = Costs(Grid((points,), (True,)), np.array(planned_s, dtype=float))
     after = np.full(points, NOBODY) if after is None else np.array(after)
@@ -16,50 +16,50 @@ def agenda_of(planned_s, after=None, is_done=None):
 
 
 def test_the_longest_point_begins_first():
-    agenda = agenda_of([1.0, 5.0, 3.0])
-    assert [agenda.take(0.1, 1) for _ in range(4)] == [(1,), (2,), (0,), ()]
+    scheduler = scheduler_of([1.0, 5.0, 3.0])
+    assert [scheduler.take(0.1, 1) for _ in range(4)] == [(1,), (2,), (0,), ()]
 
 
 def test_short_points_go_together_until_they_are_worth_the_trip():
-    assert agenda_of([1.0, 1.0, 1.0, 1.0]).take(2.5, 10) == (0, 1, 2)
-    assert agenda_of([1.0, 1.0, 1.0, 1.0]).take(2.5, 2) == (0, 1)
+    assert scheduler_of([1.0, 1.0, 1.0, 1.0]).take(2.5, 10) == (0, 1, 2)
+    assert scheduler_of([1.0, 1.0, 1.0, 1.0]).take(2.5, 2) == (0, 1)
 
 
 def test_a_point_counts_with_all_that_wait_for_it():
     # 0 <- 1 <- 2 take 6 s in a row; 3 alone takes 5 s.
-    agenda = agenda_of([1.0, 2.0, 3.0, 5.0], after=[NOBODY, 0, 1, NOBODY])
-    assert agenda.take(0.1, 1) == (0,)
+    scheduler = scheduler_of([1.0, 2.0, 3.0, 5.0], after=[NOBODY, 0, 1, NOBODY])
+    assert scheduler.take(0.1, 1) == (0,)
 
 
 def test_a_follower_waits_until_its_predecessor_is_finished():
-    agenda = agenda_of([1.0, 2.0], after=[NOBODY, 0])
-    assert agenda.take(10.0, 10) == (0,)
-    assert agenda.take(10.0, 10) == ()
-    agenda.finish(0)
-    assert agenda.take(10.0, 10) == (1,)
+    scheduler = scheduler_of([1.0, 2.0], after=[NOBODY, 0])
+    assert scheduler.take(10.0, 10) == (0,)
+    assert scheduler.take(10.0, 10) == ()
+    scheduler.finish(0)
+    assert scheduler.take(10.0, 10) == (1,)
 
 
 def test_a_follower_of_what_was_done_before_may_begin_at_once():
-    agenda = agenda_of([1.0, 2.0, 1.0], after=[NOBODY, 0, 1], is_done=[True, False, False])
-    assert agenda.take(10.0, 10) == (1,)
+    scheduler = scheduler_of([1.0, 2.0, 1.0], after=[NOBODY, 0, 1], is_done=[True, False, False])
+    assert scheduler.take(10.0, 10) == (1,)
 
 
 def test_what_is_learnt_of_a_neighbour_changes_the_order():
-    agenda = agenda_of([1.0, 1.0, 1.0, 2.0])
-    assert agenda.take(0.1, 1) == (3,)
-    agenda.finish(3)
-    agenda.learn(3, 0.5)
-    assert agenda.take(0.1, 1) == (0,)
-    assert agenda.take(0.1, 1) == (1,)
-    assert agenda.take(0.1, 1) == (2,)
+    scheduler = scheduler_of([1.0, 1.0, 1.0, 2.0])
+    assert scheduler.take(0.1, 1) == (3,)
+    scheduler.finish(3)
+    scheduler.learn(3, 0.5)
+    assert scheduler.take(0.1, 1) == (0,)
+    assert scheduler.take(0.1, 1) == (1,)
+    assert scheduler.take(0.1, 1) == (2,)
 
 
 def test_what_came_to_grief_among_others_is_handed_out_by_itself():
-    agenda = agenda_of([1.0, 1.0, 1.0])
-    assert agenda.take(10.0, 10) == (0, 1, 2)
-    agenda.put_back_alone(1)
-    agenda.put_back(2)
-    handed_out = [agenda.take(10.0, 10) for _ in range(3)]
+    scheduler = scheduler_of([1.0, 1.0, 1.0])
+    assert scheduler.take(10.0, 10) == (0, 1, 2)
+    scheduler.put_back_alone(1)
+    scheduler.put_back(2)
+    handed_out = [scheduler.take(10.0, 10) for _ in range(3)]
     assert sorted(handed_out) == [(), (1,), (2,)]
 
 
@@ -73,10 +73,10 @@ def test_every_point_is_handed_out_until_it_is_finished_and_never_after(points, 
     luck = random.Random(seed)
     planned_s, is_chained = zip(*points, strict=True)
     after = [number - 1 if number and chained else NOBODY for number, chained in enumerate(is_chained)]
-    agenda = agenda_of(planned_s, after)
+    scheduler = scheduler_of(planned_s, after)
     out, done = [], set()
-    while agenda.left:
-        taken = agenda.take(luck.uniform(0.0, 5.0) + 1e-9, luck.randint(1, 4))
+    while scheduler.left:
+        taken = scheduler.take(luck.uniform(0.0, 5.0) + 1e-9, luck.randint(1, 4))
         for number in taken:
             assert number not in done
             assert number not in out
@@ -86,12 +86,12 @@ def test_every_point_is_handed_out_until_it_is_finished_and_never_after(points, 
         number = out.pop(luck.randrange(len(out)))
         match luck.randrange(4):
             case 0:
-                agenda.put_back(number)
+                scheduler.put_back(number)
             case 1:
-                agenda.put_back_alone(number)
+                scheduler.put_back_alone(number)
             case _:
-                agenda.finish(number)
+                scheduler.finish(number)
                 done.add(number)
                 if luck.randrange(2):
-                    agenda.learn(number, luck.uniform(1e-4, 10.0))
+                    scheduler.learn(number, luck.uniform(1e-4, 10.0))
     assert done == set(range(len(points)))

@@ -14,7 +14,15 @@ import numpy as np
 import pytest
 
 import vibench.sim
-from vibench.sim.study import ExistingStudy, MemoryStore, PointState, Study, open_study, run_study, solve_study
+from vibench.sim.study import (
+    ExistingStudy,
+    MemoryStore,
+    PointState,
+    Study,
+    open_study,
+    run_study,
+    solve_study,
+)
 from vibench.sim.study._columns import SESSION
 from vibench.sim.study._errors import ClusterLost
 from vibench.sim.study._layout import STATE
@@ -97,7 +105,7 @@ def test_a_worker_killed_half_way_loses_no_point_and_changes_no_answer(
             workers[0].kill()
             kept_at_kill.append(progress.kept)
 
-    results = solve_study(longer, tmp_path / "a.h5", cluster=address, watcher=watch)
+    results = solve_study(longer, tmp_path / "a.h5", cluster=address, observer=watch)
     assert kept_at_kill[0] < longer.grid.size
     assert np.all(results.state == PointState.DONE)
     require_equal(results, truth)

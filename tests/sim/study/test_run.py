@@ -220,7 +220,7 @@ def test_a_cancelled_study_stops_at_once_and_keeps_what_was_done(study, require_
 
 def test_progress_counts_every_point_once_and_ends_with_nothing_left(study):
     seen = []
-    solve_study(study, workers=2, watcher=seen.append)
+    solve_study(study, workers=2, observer=seen.append)
     counts = [each.kept for each in seen]
     assert counts == sorted(set(counts))
     assert counts[-1] == seen[-1].points == study.grid.size

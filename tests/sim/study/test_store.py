@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from vibench.sim import ScenePrediction, Rest, solve_scene
+from vibench.sim import Rest, ScenePrediction, solve_scene
 from vibench.sim.study import (
     ExistingStudy,
     MemoryStore,

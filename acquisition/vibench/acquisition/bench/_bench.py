@@ -73,7 +73,7 @@ class Bench:
         return identities if self.output is None else {**identities, "output": self.output.identity}
 
     @property
-    def reality(self) -> BenchKind:
+    def kind(self) -> BenchKind:
         """Whether the instruments are simulated."""
         return BenchKind.REAL if self.rig.virtual is None else BenchKind.SIMULATED
 

@@ -11,8 +11,8 @@ from ._estimate import (
     estimate_campaign as estimate_campaign,
 )
 from ._event import (
-    CampaignEventKind as CampaignEventKind,
     CampaignEvent as CampaignEvent,
+    CampaignEventKind as CampaignEventKind,
     CampaignListener as CampaignListener,
     ignore_event as ignore_event,
 )
@@ -35,11 +35,11 @@ from ._opening import (
 )
 from ._point_outcome import (
     AfterFailure as AfterFailure,
-    PointResult as PointResult,
     CampaignProgress as CampaignProgress,
     ChangedBench as ChangedBench,
     ExistingRecordings as ExistingRecordings,
     PointOutcome as PointOutcome,
+    PointResult as PointResult,
     ReasonCode as ReasonCode,
     ignore_result as ignore_result,
 )

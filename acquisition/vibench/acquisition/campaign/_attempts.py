@@ -16,11 +16,11 @@ from ..run import BLOCK_S, Outcome, Progress, run_measurement
 from ..stopping import StopSwitch
 from ._attempt_files import next_attempt
 from ._bench_identity import BenchIdentity
-from ._event import CampaignEventKind, CampaignEvent, CampaignListener
+from ._event import CampaignEvent, CampaignEventKind, CampaignListener
 from ._journal import Journal
 from ._journal_point import JournalPointState
 from ._opening import require_same_bench
-from ._point_outcome import PointResult, PointOutcome, ReasonCode, reason_code_of
+from ._point_outcome import PointOutcome, PointResult, ReasonCode, reason_code_of
 
 
 class CoolingPause:
@@ -36,11 +36,11 @@ class CoolingPause:
         self._say = say
         self._is_due = False
 
-    def owe(self) -> None:
+    def require(self) -> None:
         """Have the next recording wait: something has been played."""
         self._is_due = True
 
-    def take(self, bench: RunBench, name: str) -> None:
+    def wait(self, bench: RunBench, name: str) -> None:
         """Rest before the recording of a point, if it is due; the generator is off between recordings."""
         if not self._is_due or not self._rest_s:
             return
@@ -73,7 +73,7 @@ class Attempts:
         policy: RetryPolicy,
         switch: StopSwitch,
         say: CampaignListener,
-        rest: CoolingPause,
+        pause: CoolingPause,
         reopen: Reopen | None,
     ) -> None:
         self._bench = bench
@@ -81,12 +81,12 @@ class Attempts:
         self._policy = policy
         self._switch = switch
         self._say = say
-        self._rest = rest
+        self._pause = pause
         self._reopen = reopen
 
-    def rest_before(self, name: str) -> None:
+    def pause_before(self, name: str) -> None:
         """Leave the time between two recordings that the campaign asks for; a stop ends it."""
-        self._rest.take(self._bench, name)
+        self._pause.wait(self._bench, name)
 
     def carry_out(self, point: Point, tell: Callable[[Path, Progress], None]) -> PointResult:
         """Make one recording of a point that counts; ``tell`` is called after every block.
@@ -99,7 +99,7 @@ class Attempts:
         """
         for left in reversed(range(self._policy.attempts)):
             path = next_attempt(self._journal.path.parent, point.name)
-            self._rest.owe()
+            self._pause.require()
             self._journal.start(point.name, path.name)
             self._tell(CampaignEventKind.POINT_BEGUN, f"{path.name} begins", point, path)
             try:
@@ -117,41 +117,54 @@ class Attempts:
                 self._journal.end(point.name, JournalPointState.INTERRUPTED, ReasonCode.STOPPED, reason)
                 raise
             else:
-                item = self._ended(point, outcome)
-                if not (left and item.why is ReasonCode.OVER_RANGE and self._may_mend(item.why)):
-                    return item
-                self._tell(CampaignEventKind.RETRY, f"{point.name} is tried again: {item.reason}", point, path)
-                self.rest_before(point.name)
+                point_result = self._ended(point, outcome)
+                if not (
+                    left
+                    and point_result.reason_code is ReasonCode.OVER_RANGE
+                    and self._may_mend(point_result.reason_code)
+                ):
+                    return point_result
+                self._tell(
+                    CampaignEventKind.RETRY,
+                    f"{point.name} is tried again: {point_result.reason}",
+                    point,
+                    path,
+                )
+                self.pause_before(point.name)
                 if self._switch.request is not None:
-                    return item
+                    return point_result
         raise AssertionError("the last attempt returns or raises")
 
     def _ended(self, point: Point, outcome: Outcome) -> PointResult:
         if outcome.state is not RunState.FINISHED:
             self._journal.end(point.name, JournalPointState.INTERRUPTED, ReasonCode.STOPPED, outcome.reason)
-            self._tell(CampaignEventKind.POINT_STOPPED, f"{point.name}: {outcome.reason}", point, outcome.path)
-            return PointResult(point.name, PointOutcome.STOPPED, outcome.path, outcome.reason, ReasonCode.STOPPED)
+            self._tell(
+                CampaignEventKind.POINT_STOPPED, f"{point.name}: {outcome.reason}", point, outcome.path
+            )
+            return PointResult(
+                point.name, PointOutcome.STOPPED, outcome.path, outcome.reason, ReasonCode.STOPPED
+            )
         over = _over_range(outcome.path)
-        why = ReasonCode.OVER_RANGE if over else ReasonCode.CARRIED_OUT
+        reason_code = ReasonCode.OVER_RANGE if over else ReasonCode.CARRIED_OUT
         reason = f"{outcome.reason}; {over}" if over else outcome.reason
-        self._journal.end(point.name, JournalPointState.DONE, why, reason)
+        self._journal.end(point.name, JournalPointState.DONE, reason_code, reason)
         self._tell(CampaignEventKind.POINT_DONE, f"{point.name}: {reason}", point, outcome.path)
-        return PointResult(point.name, PointOutcome.RECORDED, outcome.path, reason, why)
+        return PointResult(point.name, PointOutcome.RECORDED, outcome.path, reason, reason_code)
 
     def _failed(self, point: Point, path: Path, error: AcquisitionError) -> None:
-        why = reason_code_of(error)
-        self._journal.end(point.name, JournalPointState.FAILED, why, str(error))
+        reason_code = reason_code_of(error)
+        self._journal.end(point.name, JournalPointState.FAILED, reason_code, str(error))
         self._say(
             CampaignEvent(
                 CampaignEventKind.FAULT,
                 f"{point.name}: {error}",
-                {"point": point.name, "file": path.name, "why": why.value},
+                {"point": point.name, "file": path.name, "why": reason_code.value},
             )
         )
 
-    def _may_mend(self, why: ReasonCode) -> bool:
+    def _may_mend(self, reason_code: ReasonCode) -> bool:
         is_stopping = self._switch.request is not None
-        return not is_stopping and why.value in {each.value for each in self._policy.on}
+        return not is_stopping and reason_code.value in {each.value for each in self._policy.on}
 
     def _made_ready(self, point: Point, path: Path, error: AcquisitionError) -> None:
         """Wait a little, or open the bench again when an instrument failed: another attempt has a chance."""
@@ -166,7 +179,7 @@ class Attempts:
 
     def _rested(self, point: Point, failed: AcquisitionError) -> None:
         """Rest before another attempt; where a stop comes meanwhile there is none."""
-        self.rest_before(point.name)
+        self.pause_before(point.name)
         if self._switch.request is not None:
             raise failed
 
@@ -188,8 +201,8 @@ class Attempts:
                 require_same_bench(self._journal.bench, BenchIdentity.of(bench))
                 return bench
 
-    def _tell(self, event: CampaignEventKind, text: str, point: Point, path: Path) -> None:
-        self._say(CampaignEvent(event, text, {"point": point.name, "file": path.name}))
+    def _tell(self, kind: CampaignEventKind, text: str, point: Point, path: Path) -> None:
+        self._say(CampaignEvent(kind, text, {"point": point.name, "file": path.name}))
 
 
 def _over_range(path: Path) -> str:

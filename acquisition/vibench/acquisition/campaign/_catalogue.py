@@ -1,6 +1,6 @@
 """All recordings of a folder and the folders in it, found without opening the ones that are known already.
 
-The catalogue is a copy of what the files say, kept in ``list_recordings.sqlite`` beside them: it can be deleted
+The catalogue is a copy of what the files say, kept in ``catalogue.sqlite`` beside them: it can be deleted
 and made again at any time.
 """
 
@@ -43,7 +43,7 @@ def list_recordings(folder: Path, refresh: Refresh = Refresh.CHANGED) -> tuple[C
     Raises
     ------
     RecordingError
-        When there is no such folder, or ``list_recordings.sqlite`` is something else.
+        When there is no such folder, or ``catalogue.sqlite`` is something else.
 
     """
     if not folder.is_dir():

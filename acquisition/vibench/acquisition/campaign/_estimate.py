@@ -45,7 +45,9 @@ class CampaignEstimate:
         return self.needed_bytes <= self.free_bytes
 
 
-def estimate_campaign(campaign: Campaign, rig: Rig, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE) -> CampaignEstimate:
+def estimate_campaign(
+    campaign: Campaign, rig: Rig, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE
+) -> CampaignEstimate:
     """Say what a campaign will take on a rig; opens no instrument and writes nothing.
 
     Raises

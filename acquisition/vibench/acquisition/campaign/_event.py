@@ -30,14 +30,14 @@ class CampaignEventKind(StrEnum):
 class CampaignEvent:
     """One thing that happened, as a sentence and as facts."""
 
-    event: CampaignEventKind
+    kind: CampaignEventKind
     text: str
     facts: Mapping[str, str | int | float] = field(default_factory=dict)
 
 
 CampaignListener = Callable[[CampaignEvent], None]
-"""Told of every happening, in order; must not raise."""
+"""Told of every event, in order; must not raise."""
 
 
-def ignore_event(happening: CampaignEvent) -> None:
+def ignore_event(event: CampaignEvent) -> None:
     """Tell nobody."""

@@ -103,20 +103,20 @@ class Journal:
                 (name, file, ReasonCode.RUNNING, _now(), name),
             )
 
-    def end(self, name: str, state: JournalPointState, why: ReasonCode, reason: str) -> None:
+    def end(self, name: str, state: JournalPointState, reason_code: ReasonCode, reason: str) -> None:
         """Say how the running attempt came out."""
         with self._transaction() as connection:
-            self._set(connection, name, state, why, reason)
+            self._set(connection, name, state, reason_code, reason)
             connection.execute(
                 "UPDATE attempts SET state = ?, why = ?, reason = ?, ended_utc = ? "
                 "WHERE name = ? AND state = 'running'",
-                (state, why, reason, _now(), name),
+                (state, reason_code, reason, _now(), name),
             )
 
-    def requeue(self, name: str, why: ReasonCode, reason: str) -> None:
+    def requeue(self, name: str, reason_code: ReasonCode, reason: str) -> None:
         """Put a point back, whose recording is not there after all."""
         with self._transaction() as connection:
-            self._set(connection, name, JournalPointState.QUEUED, why, reason)
+            self._set(connection, name, JournalPointState.QUEUED, reason_code, reason)
 
     def keep(self, name: str, file: str) -> None:
         """Count a recording that lies in the folder already."""
@@ -149,10 +149,16 @@ class Journal:
         return str(value)
 
     def _set(
-        self, connection: sqlite3.Connection, name: str, state: JournalPointState, why: ReasonCode, reason: str
+        self,
+        connection: sqlite3.Connection,
+        name: str,
+        state: JournalPointState,
+        reason_code: ReasonCode,
+        reason: str,
     ) -> None:
         connection.execute(
-            "UPDATE points SET state = ?, why = ?, reason = ? WHERE name = ?", (state, why, reason, name)
+            "UPDATE points SET state = ?, why = ?, reason = ? WHERE name = ?",
+            (state, reason_code, reason, name),
         )
 
     def _insert(

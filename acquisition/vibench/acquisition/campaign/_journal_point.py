@@ -33,7 +33,7 @@ class JournalPoint:
     added_after: str
     """The point whose result asked for this one; empty when it stood in the plan."""
     state: JournalPointState
-    why: ReasonCode
+    reason_code: ReasonCode
     reason: str
     file: str
     """Of the last attempt; a name in the journal's folder, empty before the first."""
@@ -70,7 +70,7 @@ def points_of(connection: sqlite3.Connection) -> tuple[JournalPoint, ...]:
             chain=row["chain"],
             added_after=row["added_after"],
             state=JournalPointState(row["state"]),
-            why=ReasonCode(row["why"]),
+            reason_code=ReasonCode(row["why"]),
             reason=row["reason"],
             file=row["file"],
             attempts=row["attempts"],

@@ -15,7 +15,7 @@ from typing import Self
 
 from ..errors import RecordingError
 from ..plan import measured_s
-from ._event import CampaignEventKind, CampaignEvent
+from ._event import CampaignEvent, CampaignEventKind
 from ._journal_point import JournalPoint, JournalPointState
 from ._point_outcome import CampaignProgress
 
@@ -41,10 +41,10 @@ class CampaignLog:
                 "written"
             ) from error
 
-    def __call__(self, happening: CampaignEvent) -> None:
-        """Write one happening down."""
+    def __call__(self, event: CampaignEvent) -> None:
+        """Write one event down."""
         utc = datetime.now(UTC).isoformat(timespec="milliseconds")
-        line = {"utc": utc, "event": happening.event.value, "text": happening.text, **happening.facts}
+        line = {"utc": utc, "event": event.kind.value, "text": event.text, **event.facts}
         with suppress(OSError):
             self._file.write(json.dumps(line) + "\n")
             self._file.flush()
@@ -88,17 +88,17 @@ class StatusLine:
         self._written = -LINE_EVERY_S
         self._where = ""
 
-    def __call__(self, happening: CampaignEvent) -> None:
+    def __call__(self, event: CampaignEvent) -> None:
         """Write what has happened."""
-        match happening.event:
+        match event.kind:
             case CampaignEventKind.POINT_DONE:
                 self._counts["done"] += 1
                 self._made_s, self._point_s = self._made_s + self._point_s, 0.0
             case CampaignEventKind.RESTING:
-                self._made_s += float(happening.facts["rest_s"])
-            case CampaignEventKind.FAULT if "point" in happening.facts:
+                self._made_s += float(event.facts["rest_s"])
+            case CampaignEventKind.FAULT if "point" in event.facts:
                 self._counts["failed attempts"] += 1
-        self._write(happening.text)
+        self._write(event.text)
 
     def progress(self, stand: CampaignProgress) -> None:
         """Note a block; write a line when the last one is old."""

@@ -21,7 +21,7 @@ from pydantic import Field, PositiveFloat, PositiveInt, SecretStr
 
 from ..errors import ConfigurationError
 from ..host import FrozenModel
-from ._event import CampaignEventKind, CampaignEvent, CampaignListener
+from ._event import CampaignEvent, CampaignEventKind, CampaignListener
 
 
 class Security(StrEnum):
@@ -146,24 +146,26 @@ class CommandMessenger:
 class Notifier:
     """Listens to a campaign, and passes faults and its end on. What fails there harms nothing."""
 
-    def __init__(self, campaign: str, folder: Path, messengers: tuple[Messenger, ...], say: CampaignListener) -> None:
+    def __init__(
+        self, campaign: str, folder: Path, messengers: tuple[Messenger, ...], say: CampaignListener
+    ) -> None:
         """``say``: told how each attempt to reach somebody went."""
         self._campaign = campaign
         self._folder = folder
         self._messengers = messengers
         self._say = say
 
-    def __call__(self, happening: CampaignEvent) -> None:
-        """Pass a happening on, if it is one to be told of."""
-        if happening.event not in TOLD_OF:
+    def __call__(self, event: CampaignEvent) -> None:
+        """Pass an event on, if it is one to be told of."""
+        if event.kind not in TOLD_OF:
             return
         notice = {
             "campaign": self._campaign,
             "folder": str(self._folder.resolve()),
             "utc": datetime.now(UTC).isoformat(timespec="seconds"),
-            "event": happening.event.value,
-            "reason": happening.text,
-            **happening.facts,
+            "event": event.kind.value,
+            "reason": event.text,
+            **event.facts,
         }
         for messenger in self._messengers:
             self._say(CampaignEvent(CampaignEventKind.NOTICE, messenger.send(notice)))

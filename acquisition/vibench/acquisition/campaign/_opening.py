@@ -60,7 +60,11 @@ def _ended(point: JournalPoint, folder: Path) -> tuple[JournalPointState, Reason
             return _judged(path, point.measurement)
     except RecordingError as error:
         return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, f"{PROGRAM_ENDED}; {error}"
-    return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, f"{PROGRAM_ENDED}, before anything was recorded"
+    return (
+        JournalPointState.INTERRUPTED,
+        ReasonCode.PROGRAM_ENDED,
+        f"{PROGRAM_ENDED}, before anything was recorded",
+    )
 
 
 def _judged(path: Path, measurement: Measurement) -> tuple[JournalPointState, ReasonCode, str]:
@@ -107,7 +111,9 @@ def require_all_within_limits(points: tuple[Point, ...], bench: RunBench) -> Non
         raise LimitExceeded(" ".join(complaints))
 
 
-def planned_recordings(campaign: Campaign, folder: Path, existing: ExistingRecordings) -> tuple[PlannedRecording, ...]:
+def planned_recordings(
+    campaign: Campaign, folder: Path, existing: ExistingRecordings
+) -> tuple[PlannedRecording, ...]:
     """Say which recordings are to be made and which are there; touches nothing.
 
     Raises

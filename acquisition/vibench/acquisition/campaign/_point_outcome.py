@@ -65,7 +65,9 @@ _CODE_BY_ERROR: tuple[tuple[type[AcquisitionError], ReasonCode], ...] = (
 
 def reason_code_of(error: AcquisitionError) -> ReasonCode:
     """Name the reason that an error stands for."""
-    return next((why for kind, why in _CODE_BY_ERROR if isinstance(error, kind)), ReasonCode.FAULT)
+    return next(
+        (reason_code for kind, reason_code in _CODE_BY_ERROR if isinstance(error, kind)), ReasonCode.FAULT
+    )
 
 
 class ExistingRecordings(StrEnum):
@@ -108,10 +110,10 @@ class PointResult:
     """One recording of a campaign, as it came out."""
 
     name: str
-    result: PointOutcome
+    outcome: PointOutcome
     path: Path
     reason: str
-    why: ReasonCode
+    reason_code: ReasonCode
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,5 +156,5 @@ def ignore_campaign_progress(progress: CampaignProgress) -> None:
     """Watch nothing."""
 
 
-def ignore_result(item: PointResult) -> None:
+def ignore_result(point_result: PointResult) -> None:
     """Do nothing about a recording."""

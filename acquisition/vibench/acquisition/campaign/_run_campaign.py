@@ -9,7 +9,7 @@ from ..errors import RecordingError
 from ..plan import Campaign
 from ..recording import sole_use
 from ..stopping import StopSwitch, stop_on_signal
-from ._attempts import Attempts, Reopen, CoolingPause
+from ._attempts import Attempts, CoolingPause, Reopen
 from ._event import CampaignEvent, CampaignListener, ignore_event
 from ._log import LOG_SUFFIX, STATUS_SUFFIX, CampaignLog, StatusLine
 from ._notice import Messenger, Notifier
@@ -17,10 +17,10 @@ from ._opening import make_folder, opened_journal, require_all_within_limits, re
 from ._point_outcome import (
     After,
     AfterFailure,
-    PointResult,
     CampaignProgress,
     ChangedBench,
     ExistingRecordings,
+    PointResult,
     ignore_campaign_progress,
     ignore_result,
 )
@@ -34,12 +34,12 @@ def run_campaign(
     existing: ExistingRecordings = ExistingRecordings.REFUSE,
     after_failure: AfterFailure = AfterFailure.STOP,
     on_progress: Callable[[CampaignProgress], None] = ignore_campaign_progress,
-    on_item: Callable[[PointResult], None] = ignore_result,
+    on_result: Callable[[PointResult], None] = ignore_result,
     switch: StopSwitch | None = None,
     after: After | None = None,
     reopen: Reopen | None = None,
     changed_bench: ChangedBench = ChangedBench.REFUSE,
-    on_happening: CampaignListener = ignore_event,
+    on_event: CampaignListener = ignore_event,
     messengers: tuple[Messenger, ...] = (),
 ) -> tuple[PointResult, ...]:
     """Make every recording of ``campaign`` in ``folder``, in order, on an open bench.
@@ -101,18 +101,18 @@ def run_campaign(
         notifier = Notifier(campaign.name, folder, messengers, log)
         session.enter_context(stop_on_signal(stop))
 
-        def say(happening: CampaignEvent) -> None:
-            for listener in (log, status, notifier, on_happening):
-                listener(happening)
+        def say(event: CampaignEvent) -> None:
+            for listener in (log, status, notifier, on_event):
+                listener(event)
 
         def progress(stand: CampaignProgress) -> None:
             status.progress(stand)
             on_progress(stand)
 
-        rest = CoolingPause(campaign.rest_s, stop, say)
-        attempts = Attempts(bench, journal, campaign.retry, stop, say, rest, reopen)
-        course = CampaignRunner(journal, folder, attempts, stop, after_failure, after, say)
-        return course.gone_through(campaign, progress, on_item)
+        pause = CoolingPause(campaign.rest_s, stop, say)
+        attempts = Attempts(bench, journal, campaign.retry, stop, say, pause, reopen)
+        runner = CampaignRunner(journal, folder, attempts, stop, after_failure, after, say)
+        return runner.run(campaign, progress, on_result)
 
 
 @contextmanager

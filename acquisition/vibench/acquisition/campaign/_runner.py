@@ -10,17 +10,17 @@ from ..recording import open_recording
 from ..run import Progress
 from ..stopping import StopSwitch
 from ._attempts import Attempts
-from ._event import CampaignEventKind, CampaignEvent, CampaignListener
+from ._event import CampaignEvent, CampaignEventKind, CampaignListener
 from ._journal import Journal
 from ._journal_point import JournalPoint, JournalPointState
 from ._point_outcome import (
     After,
     AfterFailure,
-    PointResult,
     CampaignProgress,
     DonePoint,
     Finished,
     PointOutcome,
+    PointResult,
     reason_code_of,
 )
 
@@ -47,34 +47,38 @@ class CampaignRunner:
         self._say = say
         self._coming = deque(journal.points())
         self._count = len(self._coming)
-        self._items: list[PointResult] = []
+        self._results: list[PointResult] = []
 
-    def gone_through(
+    def run(
         self,
         campaign: Campaign,
         on_progress: Callable[[CampaignProgress], None],
-        on_item: Callable[[PointResult], None],
+        on_result: Callable[[PointResult], None],
     ) -> tuple[PointResult, ...]:
         """Make the points one after the other; returns how each came out."""
         done = sum(point.state is JournalPointState.DONE for point in self._coming)
-        begun = CampaignEventKind.RESUMED if any(point.attempts for point in self._coming) or done else CampaignEventKind.BEGUN
+        begun = (
+            CampaignEventKind.RESUMED
+            if any(point.attempts for point in self._coming) or done
+            else CampaignEventKind.BEGUN
+        )
         text = f"{campaign.name}: {self._count} points, {done} done before"
         self._say(CampaignEvent(begun, text, {"points": self._count, "done": done}))
         try:
             while self._coming and self._may_begin(self._coming[0]):
                 point = self._coming.popleft()
-                number = len(self._items) + 1
+                number = len(self._results) + 1
 
                 def tell(
                     path: Path, progress: Progress, name: str = point.name, number: int = number
                 ) -> None:
                     on_progress(CampaignProgress(name, number, self._count, path, progress))
 
-                item = self._made(point, tell)
-                self._items.append(item)
-                on_item(item)
-                self._follow_up(point, item)
-                if item.result is PointOutcome.STOPPED:
+                point_result = self._made(point, tell)
+                self._results.append(point_result)
+                on_result(point_result)
+                self._follow_up(point, point_result)
+                if point_result.outcome is PointOutcome.STOPPED:
                     break
         except AcquisitionError as error:
             self._ended(f"{campaign.name} ended: {error}", str(reason_code_of(error)))
@@ -83,18 +87,18 @@ class CampaignRunner:
             self._ended(f"{campaign.name} ended: {type(error).__name__}", "stopped")
             raise
         self._ended(f"{campaign.name} {self._closing()}", "stopped" if self._coming else "carried_out")
-        return tuple(self._items)
+        return tuple(self._results)
 
     def _may_begin(self, point: JournalPoint) -> bool:
         """Rest before a point that is to be made; a stop ends the rest, and the campaign."""
         if point.state is not JournalPointState.DONE and self._stop.request is None:
-            self._attempts.rest_before(point.name)
+            self._attempts.pause_before(point.name)
         return self._stop.request is None
 
     def _made(self, point: JournalPoint, tell: Callable[[Path, Progress], None]) -> PointResult:
         if point.state is JournalPointState.DONE:
             path = self._folder / point.file
-            return PointResult(point.name, PointOutcome.KEPT, path, "complete before", point.why)
+            return PointResult(point.name, PointOutcome.KEPT, path, "complete before", point.reason_code)
         try:
             return self._attempts.carry_out(Point(point.name, point.measurement, point.chain), tell)
         except (InstrumentLost, RecordingError):
@@ -107,9 +111,9 @@ class CampaignRunner:
             )
             return PointResult(point.name, PointOutcome.FAILED, path, str(error), reason_code_of(error))
 
-    def _follow_up(self, point: JournalPoint, item: PointResult) -> None:
+    def _follow_up(self, point: JournalPoint, point_result: PointResult) -> None:
         """Ask what a result asks for, once, and put it next."""
-        is_done = item.result in (PointOutcome.RECORDED, PointOutcome.KEPT)
+        is_done = point_result.outcome in (PointOutcome.RECORDED, PointOutcome.KEPT)
         if not is_done or point.is_followed_up or self._after is None:
             return
         done = tuple(
@@ -118,7 +122,7 @@ class CampaignRunner:
             if each.state is JournalPointState.DONE
         )
         this = next(each for each in done if each.name == point.name)
-        with open_recording(item.path) as recording:
+        with open_recording(point_result.path) as recording:
             asked = tuple(self._after(Finished(this, done), recording))
         further = tuple(Point(name, each) for each in asked for name in _names(each))
         self._journal.follow_up(point.name, further)
@@ -135,12 +139,19 @@ class CampaignRunner:
         request = self._stop.request
         if request is not None:
             return f"was stopped: {request.reason}"
-        failed = sum(item.result is PointOutcome.FAILED for item in self._items)
+        failed = sum(point_result.outcome is PointOutcome.FAILED for point_result in self._results)
         return f"is through, {failed} points failed" if failed else "is through"
 
-    def _ended(self, text: str, why: str) -> None:
-        counts = {each.value: sum(item.result is each for item in self._items) for each in PointOutcome}
-        self._say(CampaignEvent(CampaignEventKind.ENDED, text, {"why": why, "left": len(self._coming), **counts}))
+    def _ended(self, text: str, reason_code: str) -> None:
+        counts = {
+            each.value: sum(point_result.outcome is each for point_result in self._results)
+            for each in PointOutcome
+        }
+        self._say(
+            CampaignEvent(
+                CampaignEventKind.ENDED, text, {"why": reason_code, "left": len(self._coming), **counts}
+            )
+        )
 
 
 def _names(measurement: Measurement) -> tuple[str, ...]:

@@ -19,11 +19,11 @@ from pydantic import ValidationError
 
 from ..bench import (
     Bench,
+    BenchKind,
     BenchReport,
     Bounds,
     CheckResult,
     Finding,
-    BenchKind,
     Verdict,
     ago,
     judged,
@@ -205,7 +205,7 @@ def _fresh(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | None) 
     if last is not None and complaint is None:
         bench.last_check = last
         return last
-    match bench.reality:
+    match bench.kind:
         case BenchKind.SIMULATED:
             return _passed(check_and_keep(bench, folder, clock, switch))
         case BenchKind.REAL:
@@ -228,7 +228,7 @@ def require_on_record(bench: Bench, clock: Clock = utc_now) -> None:
     complaint = why_not(last, bench.rig, clock())
     if complaint is None:
         bench.last_check = last
-    elif bench.reality is BenchKind.REAL:
+    elif bench.kind is BenchKind.REAL:
         raise CheckFailed(f"{complaint}. Nothing was armed; check the bench first")
 
 

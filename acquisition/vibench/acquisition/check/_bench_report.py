@@ -10,7 +10,7 @@ from ..bench import Bench, BenchReport, Bounds, Finding, Verdict, judged
 from ..errors import CheckStopped
 from ..excitation import Dwell, Tone
 from ..instruments import AnalogOutput, IdleOutput, Samples
-from ..plan import CHECK_FREQUENCY_HZ, Measurement, Phase, DriveSource, RunState
+from ..plan import CHECK_FREQUENCY_HZ, DriveSource, Measurement, Phase, RunState
 from ..rig import Channel, calibrations
 from ..run import BLOCK_S, Drive, drive_for
 from ..stopping import StopSwitch
@@ -64,7 +64,7 @@ def check_bench(bench: Bench, folder: Path, switch: StopSwitch | None = None) ->
     quiet = ear.in_silence()
     heard = ear.during_sine(drive)
     after = ear.in_silence()
-    if drive.player is DriveSource.GENERATOR:
+    if drive.drive_source is DriveSource.GENERATOR:
         findings.append(_latency(bench))
     if bench.output is not None:
         findings.append(_idle(bench.output))

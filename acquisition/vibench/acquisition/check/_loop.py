@@ -196,7 +196,9 @@ class LoopCheck:
             (drive.uncertainty / drive.amplitude) ** 2 + (output.uncertainty / output.amplitude) ** 2
         )
         gain_db = _db(output.amplitude / drive.amplitude)
-        expected_db = _db(abs(complex(self._model.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, CHECK_FREQUENCY_HZ))))
+        expected_db = _db(
+            abs(complex(self._model.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, CHECK_FREQUENCY_HZ)))
+        )
         verdict = GAIN_DB.verdict(abs(gain_db - expected_db))
         advice = f"set the gain of the {self._rig.amplifier.model} to {self._rig.amplifier.gain_db:g} dB"
         expected = f"{expected_db:.2f} dB within {GAIN_DB.well:g} dB"

@@ -5,7 +5,7 @@ from ..plan import needed_vpp
 from ..rig import Rig
 
 LEAST_ANSWER = 0.05
-"""Share of the linear model's acceleration below which nobody is taken to be listening. A specimen on its
+"""Share of the linear model's acceleration below which the loop is taken to be open. A specimen on its
 resonance holds a light table back to about a fifth."""
 
 

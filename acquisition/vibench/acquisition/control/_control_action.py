@@ -1,4 +1,4 @@
-"""What passes between a run and who conducts it: a move to make, and what was heard meanwhile."""
+"""What passes between a run and its controller: an action to take, and the samples of it."""
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class PhaseSamples:
 
 Result = TypeVar("Result")
 Controller: TypeAlias = Generator[ControlAction, PhaseSamples, Result]
-"""Yields moves and is sent what was heard during each; returns what it was for."""
+"""Yields actions and is sent the samples of each; returns what it was for."""
 
 SILENCE = PhaseSamples(0, np.empty((0, 0)))
 """What is heard during notes alone."""

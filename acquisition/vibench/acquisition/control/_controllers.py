@@ -1,4 +1,4 @@
-"""Who conducts a measurement whose next step depends on what was heard."""
+"""Controllers of measurements whose next step depends on what was measured."""
 
 from typing import assert_never
 
@@ -17,7 +17,7 @@ from ._sweep_controller import hold_sweep
 def feedback_controller(
     measurement: Measurement, rig: Rig, channels: tuple[Channel, ...], sample_rate_hz: float
 ) -> Controller[None]:
-    """Conduct a measurement with feedback, from its ramp up to its ramp down.
+    """Control a measurement with feedback, from its ramp up to its ramp down.
 
     Raises
     ------
@@ -26,16 +26,16 @@ def feedback_controller(
 
     """
     excitation = measurement.excitation
-    assert isinstance(excitation, AbstractFeedback), "only feedback needs a conductor"
-    play = SineLoop(feedback_channels_of(channels, sample_rate_hz), rig, measurement)
+    assert isinstance(excitation, AbstractFeedback), "only feedback needs a controller"
+    loop = SineLoop(feedback_channels_of(channels, sample_rate_hz), rig, measurement)
     match excitation:
         case SettledSine():
-            return step_settled(play, excitation)
+            return step_settled(loop, excitation)
         case HeldDwell():
-            return hold_dwell(play, excitation)
+            return hold_dwell(loop, excitation)
         case HeldSweep():
-            return hold_sweep(play, excitation)
+            return hold_sweep(loop, excitation)
         case ResonanceTracking():
-            return track_resonance(play, excitation)
+            return track_resonance(loop, excitation)
         case _:
             assert_never(excitation)

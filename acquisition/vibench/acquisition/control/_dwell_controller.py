@@ -13,36 +13,36 @@ from ._sine_loop import SineLoop
 from ._start import started
 
 
-def hold_dwell(play: SineLoop, plan: HeldDwell) -> Controller[None]:
+def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
     """Ramp up to the level, settle, record, ramp down."""
-    settler = SettlingController(play, plan.settling, plan.base_level)
-    yield from started(play, plan.frequency_hz, plan.base_level)
-    yield from settler.settled()
-    control = LevelControl(plan.base_level, play.most_vpp)
+    settling_controller = SettlingController(loop, plan.settling, plan.base_level)
+    yield from started(loop, plan.frequency_hz, plan.base_level)
+    yield from settling_controller.settled()
+    control = LevelControl(plan.base_level, loop.most_vpp)
     target = plan.base_level.acceleration_at(plan.frequency_hz)
     pieces = ceil(plan.duration_s / plan.update_s * (1 - 1e-9))
     outside = 0
-    play.forget()
+    loop.forget()
     for number in range(pieces):
         begun_s = number * plan.update_s
         piece_s = min(plan.update_s, plan.duration_s - begun_s)
-        yield from play.listen(RunState.RECORDING, piece_s, plan.segment)
-        measured = measured_level(play.periods.base)
-        require_answer(play.rig, plan.frequency_hz, play.played.setting_vpp, measured.amplitude)
-        held = settler.held(measured)
+        yield from loop.listen(RunState.RECORDING, piece_s, plan.segment)
+        measured = measured_level(loop.periods.base)
+        require_answer(loop.rig, plan.frequency_hz, loop.setting.setting_vpp, measured.amplitude)
+        held = settling_controller.held(measured)
         outside += held is Held.OUTSIDE
         said = {
             "at_s": shortened(begun_s + piece_s),
             "base_m_per_s2": shortened(measured.amplitude),
             "base_u": shortened(measured.uncertainty),
-            "setting_vpp": shortened(play.played.setting_vpp),
+            "setting_vpp": shortened(loop.setting.setting_vpp),
             "level": held.value,
         }
-        play.note("level", json.dumps(said))
+        loop.note("level", json.dumps(said))
         # The figures of all pieces since the last change are one mean: chaos needs it long.
-        next_vpp = control.next_vpp(play.played.setting_vpp, measured, target)
-        if next_vpp != play.played.setting_vpp and number + 1 < pieces:
-            play.change(plan.frequency_hz, next_vpp)
-    play.note("achieved", json.dumps({"segment": "dwell", "looks": pieces, "looks_outside": outside}))
-    yield from play.ramp_down()
-    yield from play.say()
+        next_vpp = control.next_vpp(loop.setting.setting_vpp, measured, target)
+        if next_vpp != loop.setting.setting_vpp and number + 1 < pieces:
+            loop.change(plan.frequency_hz, next_vpp)
+    loop.note("achieved", json.dumps({"segment": "dwell", "looks": pieces, "looks_outside": outside}))
+    yield from loop.ramp_down()
+    yield from loop.say()

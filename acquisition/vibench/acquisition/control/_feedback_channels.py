@@ -14,7 +14,7 @@ from ._stroboscope import Phasors, Stroboscope
 
 @dataclass(frozen=True)
 class FeedbackChannels:
-    """Finds drive, base and m0 in what was heard."""
+    """Finds drive, base and m0 in the samples."""
 
     drive: int
     """Row of the drive's channel."""
@@ -28,12 +28,12 @@ class FeedbackChannels:
     """Of the vibrometer; taken out of every phase [s]."""
     sample_rate_hz: float
 
-    def rows(self, heard: PhaseSamples) -> tuple[Samples, Samples, Samples]:
+    def rows(self, samples: PhaseSamples) -> tuple[Samples, Samples, Samples]:
         """Give drive [V], base acceleration [m/s2] and m0 velocity [m/s], each of shape (samples,)."""
         return (
-            heard.volts[self.drive],
-            heard.volts[self.base] * self.base_units_per_volt,
-            heard.volts[self.response] * self.response_units_per_volt,
+            samples.volts[self.drive],
+            samples.volts[self.base] * self.base_units_per_volt,
+            samples.volts[self.response] * self.response_units_per_volt,
         )
 
     def stroboscope(self, near_hz: float) -> Stroboscope:

@@ -1,4 +1,4 @@
-"""The base's answer to the generator while the frequency moves: measured, smoothed, and foreseen."""
+"""The base's answer to the generator while the frequency moves: measured, smoothed, and predicted."""
 
 from collections import deque
 from dataclasses import dataclass

@@ -11,7 +11,7 @@ from enum import Enum, auto
 from ..excitation import SEARCH_LABEL, Segment, SettledSine
 from ..plan import RunState
 from ._control_action import Controller
-from ._jump_search import LocatedJump, Side, SettledPoint, is_on_branch, located, side
+from ._jump_search import LocatedJump, SettledPoint, Side, is_on_branch, located, side
 from ._record import recorded
 from ._settle import SettledState, SettlingController, shortened
 from ._sine_loop import SineLoop
@@ -24,16 +24,16 @@ _RUNG_S = 0.1
 _LOWEST_S = 0.5
 
 
-def decay_motion(play: SineLoop) -> Controller[None]:
+def decay_motion(loop: SineLoop) -> Controller[None]:
     """Lower the setting rung by rung, wait, and raise it to what it was."""
-    now = play.played
+    now = loop.setting
     for rung in range(1, RUNGS + 1):
-        play.change(now.frequency_hz, play.bounded_vpp(now.setting_vpp / RUNG**rung))
-        yield from play.listen(RunState.SETTLING, _RUNG_S)
-    yield from play.listen(RunState.SETTLING, _LOWEST_S)
+        loop.change(now.frequency_hz, loop.bounded_vpp(now.setting_vpp / RUNG**rung))
+        yield from loop.listen(RunState.SETTLING, _RUNG_S)
+    yield from loop.listen(RunState.SETTLING, _LOWEST_S)
     for rung in range(RUNGS - 1, -1, -1):
-        play.change(now.frequency_hz, play.bounded_vpp(now.setting_vpp / RUNG**rung))
-        yield from play.listen(RunState.SETTLING, _RUNG_S)
+        loop.change(now.frequency_hz, loop.bounded_vpp(now.setting_vpp / RUNG**rung))
+        yield from loop.listen(RunState.SETTLING, _RUNG_S)
 
 
 _MOST_BRACKETS = 4
@@ -70,26 +70,26 @@ class _JumpSearch:
         """What is known of the jump."""
         return LocatedJump(self.branch[-1], self.after)
 
-    def narrow(self, visit: SettledPoint) -> None:
+    def narrow(self, point: SettledPoint) -> None:
         """Take in a visit between the two ends."""
-        self.here = side(visit, self.branch[-1], self.after)
+        self.here = side(point, self.branch[-1], self.after)
         match self.here:
             case Side.BEFORE:
-                self.branch.append(visit)
+                self.branch.append(point)
             case Side.AFTER:
-                self.after = visit
+                self.after = point
 
-    def left(self, place: int, visit: SettledPoint) -> None:
+    def left(self, place: int, point: SettledPoint) -> None:
         """Take in that the branch was left on the way to its visit number ``place``."""
         del self.branch[place:]
-        self.after = visit
+        self.after = point
 
 
 @dataclass(frozen=True)
 class Arrival:
     """Where a search has ended, at the frequency it was begun for."""
 
-    visit: SettledPoint
+    point: SettledPoint
     branch: Side
     is_jump: bool
 
@@ -97,115 +97,119 @@ class Arrival:
 class JumpLocator:
     """Looks into one jump of a pass."""
 
-    def __init__(self, settler: SettlingController, plan: SettledSine, direction: str, number: int) -> None:
+    def __init__(
+        self, settling_controller: SettlingController, plan: SettledSine, direction: str, number: int
+    ) -> None:
         assert plan.jumps is not None
-        self._settler = settler
+        self._settling_controller = settling_controller
         self._plan = plan
         self._rule = plan.jumps
         self._direction = direction
         self._number = number
-        self._until_s = settler.play.elapsed_s + plan.search_s
+        self._until_s = settling_controller.loop.elapsed_s + plan.search_s
 
-    def localised(self, visited: Sequence[SettledPoint], after: SettledPoint) -> Controller[Arrival]:
+    def localised(self, points: Sequence[SettledPoint], after: SettledPoint) -> Controller[Arrival]:
         """Narrow the bracket between the last of ``visited`` and ``after``; end at ``after``'s frequency.
 
         A response that only changes steeply is no jump: it closes as the bracket does. Where both
         branches are there at ``after``, the way to it may end on either, which is said.
         """
-        hunted = _JumpSearch(list(visited), after, Side.AFTER)
-        found, why = yield from self._bisected(hunted)
+        search = _JumpSearch(list(points), after, Side.AFTER)
+        found, why = yield from self._bisected(search)
         is_jump = found.is_jump(self._rule.factor)
-        end = yield from self._led_to(after.frequency_hz)
-        visit = end.visit
-        has_arrived = is_on_branch(visit, after, self._rule.factor)
+        end = yield from self._moved_to(after.frequency_hz)
+        point = end.point
+        has_arrived = is_on_branch(point, after, self._rule.factor)
         branch = Side.AFTER if has_arrived or not is_jump else Side.BEFORE
         self._say(found, why, branch)
-        return Arrival(visit, branch, is_jump)
+        return Arrival(point, branch, is_jump)
 
-    def _bisected(self, hunted: _JumpSearch) -> Controller[tuple[LocatedJump, str]]:
+    def _bisected(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, str]]:
         for _ in range(_MOST_BRACKETS):
-            found = yield from self._halved(hunted)
+            found = yield from self._halved(search)
             if found is not None:
                 return found
-        return hunted.bracket, "the motion jumped somewhere else each time"
+        return search.bracket, "the motion jumped somewhere else each time"
 
-    def _halved(self, hunted: _JumpSearch) -> Controller[tuple[LocatedJump, str] | None]:
+    def _halved(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, str] | None]:
         """Halve the bracket to its end; None when the motion left its branch earlier: a new bracket."""
-        seek = located(hunted.branch[-1], hunted.after, self._rule.resolution_hz)
+        seek = located(search.branch[-1], search.after, self._rule.resolution_hz)
         try:
             frequency_hz = next(seek)
             while True:
-                if hunted.here is Side.AFTER:
-                    match (yield from self._led_back(hunted)):
+                if search.here is Side.AFTER:
+                    match (yield from self._returned_to_branch(search)):
                         case _Return.NOT_FOUND if not self._is_late():
-                            return hunted.bracket, "its branch was not found again"
+                            return search.bracket, "its branch was not found again"
                         case _Return.LEFT:
                             return None
                 if self._is_late():
-                    return hunted.bracket, "the time for the search was over"
-                visit = yield from self._searched(frequency_hz)
-                hunted.narrow(visit)
-                if not hunted.bracket.is_jump(self._rule.factor):
-                    return hunted.bracket, "steep, but no jump"
-                frequency_hz = seek.send(visit)
+                    return search.bracket, "the time for the search was over"
+                point = yield from self._searched(frequency_hz)
+                search.narrow(point)
+                if not search.bracket.is_jump(self._rule.factor):
+                    return search.bracket, "steep, but no jump"
+                frequency_hz = seek.send(point)
         except StopIteration:
-            return hunted.bracket, "localised"
+            return search.bracket, "localised"
 
-    def _led_back(self, hunted: _JumpSearch) -> Controller[_Return]:
+    def _returned_to_branch(self, search: _JumpSearch) -> Controller[_Return]:
         """Go back along the pass until its branch is found again, then forward to the branch's end.
 
         Forward in one glide, which is quick; if that leaves the branch, step by step, which tells where.
         """
         left: tuple[int, SettledPoint] | None = None
         for pace in _Pace:
-            place = yield from self._rejoined(hunted.branch)
+            place = yield from self._rejoined(search.branch)
             if place is None:
                 return _Return.NOT_FOUND
-            end = len(hunted.branch)
+            end = len(search.branch)
             steps = range(max(place + 1, end - 1), end) if pace is _Pace.GLIDE else range(place + 1, end)
-            left = yield from self._left(hunted.branch, steps)
+            left = yield from self._left(search.branch, steps)
             if left is None:
                 return _Return.BACK
             if self._is_late():
                 return _Return.NOT_FOUND
         assert left is not None, "both paces were gone"
-        hunted.left(*left)
+        search.left(*left)
         return _Return.LEFT
 
-    def _left(self, branch: Sequence[SettledPoint], steps: range) -> Controller[tuple[int, SettledPoint] | None]:
+    def _left(
+        self, branch: Sequence[SettledPoint], steps: range
+    ) -> Controller[tuple[int, SettledPoint] | None]:
         """Go forward; give place and finding where the motion has left the branch."""
         for place in steps:
-            found = yield from self._led_to(branch[place].frequency_hz)
-            if self._is_late() or not is_on_branch(found.visit, branch[place], self._rule.factor):
-                return place, found.visit
+            found = yield from self._moved_to(branch[place].frequency_hz)
+            if self._is_late() or not is_on_branch(found.point, branch[place], self._rule.factor):
+                return place, found.point
         return None
 
     def _rejoined(self, branch: Sequence[SettledPoint]) -> Controller[int | None]:
         """Go back, in longer and longer strides, until a response of the branch is met; give its place."""
-        stride = 1
+        stretch = 1
         place = len(branch) - 1
         while not self._is_late():
-            found = yield from self._led_to(branch[place].frequency_hz)
-            if is_on_branch(found.visit, branch[place], self._rule.factor):
+            found = yield from self._moved_to(branch[place].frequency_hz)
+            if is_on_branch(found.point, branch[place], self._rule.factor):
                 return place
             if place == 0:
                 return (yield from self._revived(branch[0]))
-            place, stride = max(0, place - stride), 2 * stride
+            place, stretch = max(0, place - stretch), 2 * stretch
         return None
 
     def _revived(self, first: SettledPoint) -> Controller[int | None]:
         """Let the motion die at the branch's first frequency: a branch that began from rest is back then."""
-        yield from decay_motion(self._settler.play)
-        found = yield from self._settler.settled()
-        return 0 if is_on_branch(found.visit, first, self._rule.factor) else None
+        yield from decay_motion(self._settling_controller.loop)
+        found = yield from self._settling_controller.settled()
+        return 0 if is_on_branch(found.point, first, self._rule.factor) else None
 
-    def _led_to(self, frequency_hz: float) -> Controller[SettledState]:
+    def _moved_to(self, frequency_hz: float) -> Controller[SettledState]:
         plan = self._plan
-        yield from glided(self._settler.play, frequency_hz, plan.base_level, plan.glide_step_hz)
-        return (yield from self._settler.settled())
+        yield from glided(self._settling_controller.loop, frequency_hz, plan.base_level, plan.glide_step_hz)
+        return (yield from self._settling_controller.settled())
 
     def _searched(self, frequency_hz: float) -> Controller[SettledPoint]:
-        found = yield from self._led_to(frequency_hz)
+        found = yield from self._moved_to(frequency_hz)
         segment = Segment(
             SEARCH_LABEL,
             {
@@ -215,13 +219,13 @@ class JumpLocator:
                 **found.numbers(),
             },
         )
-        yield from recorded(self._settler, found, segment, self._plan.record_s)
-        return found.visit
+        yield from recorded(self._settling_controller, found, segment, self._plan.record_s)
+        return found.point
 
     def _is_late(self) -> bool:
         """Whether the time left is too short for one more step and the way to the end."""
         step_s = self._plan.settling.longest_wait_s
-        return self._settler.play.elapsed_s + 2 * step_s + self._plan.record_s > self._until_s
+        return self._settling_controller.loop.elapsed_s + 2 * step_s + self._plan.record_s > self._until_s
 
     def _say(self, found: LocatedJump, how: str, arrived: Side) -> None:
         said = {
@@ -235,4 +239,4 @@ class JumpLocator:
             "how": how,
             "arrived": arrived.value,
         }
-        self._settler.play.note("jump", json.dumps(said))
+        self._settling_controller.loop.note("jump", json.dumps(said))

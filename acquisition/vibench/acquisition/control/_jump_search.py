@@ -64,14 +64,14 @@ def located(before: SettledPoint, after: SettledPoint, resolution_hz: float) -> 
     return LocatedJump(before, after)
 
 
-def side(visit: SettledPoint, before: SettledPoint, after: SettledPoint) -> Side:
+def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> Side:
     """Say on which side of a jump a response lies that was found between them.
 
     Before it is what is nearer to the response before, and no further from that than the one after: a
     third branch has been jumped to, just as the second.
     """
-    away = ratio(visit, before)
-    return Side.BEFORE if away <= min(ratio(visit, after), ratio(before, after)) else Side.AFTER
+    away = ratio(point, before)
+    return Side.BEFORE if away <= min(ratio(point, after), ratio(before, after)) else Side.AFTER
 
 
 def ratio(one: SettledPoint, other: SettledPoint) -> float:
@@ -81,13 +81,13 @@ def ratio(one: SettledPoint, other: SettledPoint) -> float:
     return float(2.0 ** abs(log(one.response / other.response, 2)))
 
 
-def is_on_branch(visit: SettledPoint, expected: SettledPoint, factor: float) -> bool:
+def is_on_branch(point: SettledPoint, expected: SettledPoint, factor: float) -> bool:
     """Whether a motion is the one that was found before at the same frequency.
 
     It has the same period, or as little of one. The branches differ by ``factor`` at least; half of
     that, in decibels, tells them apart. Two looks at one chaotic motion differ more than two at a
     periodic one: the whole factor is granted to them.
     """
-    if visit.period != expected.period:
+    if point.period != expected.period:
         return False
-    return bool(ratio(visit, expected) < (factor if visit.period == 0 else factor**0.5))
+    return bool(ratio(point, expected) < (factor if point.period == 0 else factor**0.5))

@@ -19,17 +19,19 @@ class Recorded:
     held: Held
 
 
-def recorded(settler: SettlingController, found: SettledState, segment: Segment, duration_s: float) -> Controller[Recorded]:
+def recorded(
+    settling_controller: SettlingController, found: SettledState, segment: Segment, duration_s: float
+) -> Controller[Recorded]:
     """Record a settled motion as a segment, and note the level that was achieved in it."""
-    play = settler.play
-    play.forget()
-    yield from play.listen(RunState.RECORDING, duration_s, segment)
-    measured = measured_level(play.periods.base)
-    result = Recorded(measured, settler.held(measured))
+    loop = settling_controller.loop
+    loop.forget()
+    yield from loop.listen(RunState.RECORDING, duration_s, segment)
+    measured = measured_level(loop.periods.base)
+    result = Recorded(measured, settling_controller.held(measured))
     said = {
         "segment": segment.label,
         "frequency_hz": found.frequency_hz,
-        "drive_hz": play.drive_hz,
+        "drive_hz": loop.drive_hz,
         "base_m_per_s2": shortened(measured.amplitude),
         "base_u": shortened(measured.uncertainty),
         "level": result.held.value,
@@ -37,5 +39,5 @@ def recorded(settler: SettlingController, found: SettledState, segment: Segment,
         "motion": found.judgement.steadiness.value,
         "period": found.judgement.period,
     }
-    play.note("achieved", json.dumps(said))
+    loop.note("achieved", json.dumps(said))
     return result

@@ -205,26 +205,26 @@ class LockResult(StrEnum):
     AT_THE_EDGE = "outside the range"
 
 
-def track_resonance(play: SineLoop, plan: ResonanceTracking) -> Controller[None]:
+def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]:
     """Lock on to the resonance at every level, record there, go on to the next level from there."""
-    yield from started(play, plan.start_hz, plan.base_level(0))
+    yield from started(loop, plan.start_hz, plan.base_level(0))
     frequency_hz = plan.start_hz
     for number in range(len(plan.accelerations_m_per_s2)):
-        frequency_hz = yield from _tracked(play, plan, number, frequency_hz)
-    yield from play.ramp_down()
-    yield from play.say()
+        frequency_hz = yield from _tracked(loop, plan, number, frequency_hz)
+    yield from loop.ramp_down()
+    yield from loop.say()
 
 
-def _tracked(play: SineLoop, plan: ResonanceTracking, number: int, start_hz: float) -> Controller[float]:
+def _tracked(loop: SineLoop, plan: ResonanceTracking, number: int, start_hz: float) -> Controller[float]:
     level = plan.base_level(number)
-    settler = SettlingController(play, plan.settling, level)
+    settling_controller = SettlingController(loop, plan.settling, level)
     search = PhaseSearch(plan.low_hz, plan.high_hz, plan.widest_step_hz)
-    visits: list[SettledState] = []
+    states: list[SettledState] = []
     frequency_hz, lock = start_hz, LockResult.LOST
     for _ in range(plan.most_tries):
-        moved(play, frequency_hz, level)
-        visits.append((yield from settler.settled()))
-        error = _phase_error(play.periods, visits[-1], plan.phase_deg)
+        moved(loop, frequency_hz, level)
+        states.append((yield from settling_controller.settled()))
+        error = _phase_error(loop.periods, states[-1], plan.phase_deg)
         search.tries.append(error)
         if abs(error.error_deg) <= plan.phase_tolerance_deg and len(search.tries) > 1:
             lock = LockResult.LOCKED
@@ -234,14 +234,14 @@ def _tracked(play: SineLoop, plan: ResonanceTracking, number: int, start_hz: flo
             lock = LockResult.AT_THE_EDGE
             break
         frequency_hz = next_hz
-    found = visits[-1]
+    found = states[-1]
     resonance = search.resonance(plan.sensor_phase_deg)
-    yield from recorded(settler, found, plan.segment(number, found.frequency_hz), plan.record_s)
+    yield from recorded(settling_controller, found, plan.segment(number, found.frequency_hz), plan.record_s)
     mode = None
     if lock is LockResult.LOCKED:
-        flanks = yield from _flanks(settler, plan, resonance)
-        mode = _mode([*visits, *flanks], resonance)
-    _say(play, plan, number, found, Tracked(resonance, mode, lock, len(search.tries)))
+        flanks = yield from _flanks(settling_controller, plan, resonance)
+        mode = _mode([*states, *flanks], resonance)
+    _say(loop, plan, number, found, Tracked(resonance, mode, lock, len(search.tries)))
     return found.frequency_hz
 
 
@@ -255,22 +255,24 @@ class Tracked:
     tries: int
 
 
-def _flanks(settler: SettlingController, plan: ResonanceTracking, resonance: PhaseResonance) -> Controller[list[SettledState]]:
+def _flanks(
+    settling_controller: SettlingController, plan: ResonanceTracking, resonance: PhaseResonance
+) -> Controller[list[SettledState]]:
     """Measure on both sides, up to one and a half half-widths away."""
     found: list[SettledState] = []
     pairs = plan.flank_pairs
     for place in (*range(-pairs, 0), *range(1, pairs + 1)):
         frequency_hz = resonance.frequency_hz + _FURTHEST * resonance.half_width_hz * place / pairs
         if plan.low_hz <= frequency_hz <= plan.high_hz:
-            moved(settler.play, frequency_hz, settler.level)
-            found.append((yield from settler.settled()))
+            moved(settling_controller.loop, frequency_hz, settling_controller.level)
+            found.append((yield from settling_controller.settled()))
     return found
 
 
-def _mode(visits: Sequence[SettledState], resonance: PhaseResonance) -> Mode | None:
+def _mode(states: Sequence[SettledState], resonance: PhaseResonance) -> Mode | None:
     """Fit the mode to all that was visited near it."""
     reach_hz = 1.1 * _FURTHEST * resonance.half_width_hz
-    near = [each for each in visits if abs(each.drive_hz - resonance.frequency_hz) <= reach_hz]
+    near = [each for each in states if abs(each.drive_hz - resonance.frequency_hz) <= reach_hz]
     return fitted_mode(
         np.array([each.drive_hz for each in near]), np.array([each.transmissibility for each in near])
     )
@@ -292,7 +294,7 @@ def _phase_error(periods: Periods, found: SettledState, wanted_deg: float) -> Ph
     return PhaseError(found.drive_hz, error_deg, degrees(spread) / sqrt(_BATCHES))
 
 
-def _say(play: SineLoop, plan: ResonanceTracking, number: int, found: SettledState, tracked: Tracked) -> None:
+def _say(loop: SineLoop, plan: ResonanceTracking, number: int, found: SettledState, tracked: Tracked) -> None:
     is_told = tracked.lock is LockResult.LOCKED and found.judgement.steadiness is not Steadiness.UNSETTLED
     said: dict[str, int | float | str | None] = {
         "level": number,
@@ -313,4 +315,4 @@ def _say(play: SineLoop, plan: ResonanceTracking, number: int, found: SettledSta
         said["mode_hz"] = shortened(tracked.mode.frequency_hz)
         said["mode_u_hz"] = shortened(tracked.mode.frequency_u_hz)
         said["damping_ratio"] = shortened(tracked.mode.damping_ratio)
-    play.note("resonance", json.dumps(said))
+    loop.note("resonance", json.dumps(said))

@@ -42,7 +42,7 @@ class SettledState:
         return abs(self.transmissibility)
 
     @property
-    def visit(self) -> SettledPoint:
+    def point(self) -> SettledPoint:
         """What a search for a jump needs of it."""
         return SettledPoint(self.frequency_hz, self.response, self.judgement.period)
 
@@ -67,7 +67,7 @@ class SettledState:
 class SettlingController:
     """Brings the motion at one frequency to rest, as far as it comes to rest."""
 
-    play: SineLoop
+    loop: SineLoop
     rule: Settling
     level: BaseLevel | None
 
@@ -75,8 +75,8 @@ class SettlingController:
         """Wait at the frequency that is played; correct the setting whenever the level is off."""
         waited_s = 0.0
         while True:
-            look_s = max(LOOK_S, LOOK_PERIODS / self.play.played.frequency_hz)
-            yield from self.play.listen(RunState.SETTLING, look_s)
+            look_s = max(LOOK_S, LOOK_PERIODS / self.loop.setting.frequency_hz)
+            yield from self.loop.listen(RunState.SETTLING, look_s)
             waited_s += look_s
             is_late = waited_s + look_s > self.rule.longest_wait_s
             if waited_s < self.rule.shortest_wait_s and not is_late:
@@ -90,7 +90,7 @@ class SettlingController:
 
     def measured(self) -> MeasuredLevel:
         """Measure the base over the newer half of what was seen since the last change."""
-        periods = self.play.periods
+        periods = self.loop.periods
         return measured_level(periods.base[periods.count // 2 :])
 
     def held(self, measured: MeasuredLevel) -> Held:
@@ -103,35 +103,37 @@ class SettlingController:
     def _target(self) -> float:
         """Acceleration that the base should have here [m/s2]."""
         assert self.level is not None
-        return self.level.acceleration_at(self.play.played.frequency_hz)
+        return self.level.acceleration_at(self.loop.setting.frequency_hz)
 
     def _corrected(self) -> bool:
         """Change the setting if the level asks for it; whether it did."""
-        if self.level is None or self.play.periods.count < LOOK_PERIODS:
+        if self.level is None or self.loop.periods.count < LOOK_PERIODS:
             return False
-        now = self.play.played
+        now = self.loop.setting
         measured = self.measured()
-        require_answer(self.play.rig, now.frequency_hz, now.setting_vpp, measured.amplitude)
-        control = LevelControl(self.level, self.play.most_vpp)
+        require_answer(self.loop.rig, now.frequency_hz, now.setting_vpp, measured.amplitude)
+        control = LevelControl(self.level, self.loop.most_vpp)
         next_vpp = control.next_vpp(now.setting_vpp, measured, self._target)
         if next_vpp == now.setting_vpp:
             return False
-        self.play.change(now.frequency_hz, next_vpp)
+        self.loop.change(now.frequency_hz, next_vpp)
         return True
 
     def _found(self, waited_s: float) -> SettledState:
-        play, periods = self.play, self.play.periods
+        loop, periods = self.loop, self.loop.periods
         newest = periods.last(max(self.rule.periods, periods.count // 2))
         measured = measured_level(newest.base)
         return SettledState(
-            frequency_hz=play.played.frequency_hz,
-            drive_hz=play.drive_hz,
-            setting_vpp=play.played.setting_vpp,
+            frequency_hz=loop.setting.frequency_hz,
+            drive_hz=loop.drive_hz,
+            setting_vpp=loop.setting.setting_vpp,
             waited_s=waited_s,
-            judgement=judged(periods.response, self.rule, play.noise),
+            judgement=judged(periods.response, self.rule, loop.noise),
             base=measured,
             held=self.held(measured),
-            transmissibility=play.ears.transmissibility(newest.base, newest.response[:, 1], play.drive_hz),
+            transmissibility=loop.channels.transmissibility(
+                newest.base, newest.response[:, 1], loop.drive_hz
+            ),
         )
 
     def _is_steady(self, found: SettledState) -> bool:
@@ -139,11 +141,11 @@ class SettlingController:
         if self.level is None:
             return True
         is_known = _SURE * found.base.uncertainty <= self.level.tolerance * self._target
-        is_at_the_end = found.setting_vpp >= self.play.most_vpp
+        is_at_the_end = found.setting_vpp >= self.loop.most_vpp
         return is_known and (found.held is Held.WITHIN or is_at_the_end)
 
     def _say(self, found: SettledState) -> None:
-        self.play.note("settled", json.dumps({"frequency_hz": found.frequency_hz, **found.numbers()}))
+        self.loop.note("settled", json.dumps({"frequency_hz": found.frequency_hz, **found.numbers()}))
 
 
 def shortened(value: float) -> float:

@@ -1,4 +1,4 @@
-"""One sine at a time, played and listened to: the moves that all feedback is made of."""
+"""One sine at a time, played and measured: the actions that all feedback is made of."""
 
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 from ..excitation import LOWEST_AMPLITUDE_VPP, Segment, Tone
 from ..plan import HUSH_S, Measurement, Phase, RunState, ramp
 from ..rig import Rig
-from ._control_action import Controller, PhaseSamples, ControlAction, Note
+from ._control_action import ControlAction, Controller, Note, PhaseSamples
 from ._feedback_channels import FeedbackChannels
 from ._stroboscope import Periods, Stroboscope
 
@@ -24,16 +24,16 @@ class DriveSetting:
 class SineLoop:
     """Knows what is played, and looks at it once a period."""
 
-    def __init__(self, ears: FeedbackChannels, rig: Rig, measurement: Measurement) -> None:
+    def __init__(self, channels: FeedbackChannels, rig: Rig, measurement: Measurement) -> None:
         self._measurement = measurement
         self._notes: list[Note] = []
         self._scope: Stroboscope
         self._silence = np.zeros(0)
-        self.ears = ears
+        self.channels = channels
         self.rig = rig
         self.most_vpp = measurement.excitation.amplitude_vpp
         """Largest setting of the plan [V]."""
-        self.played = DriveSetting(0.0, LOWEST_AMPLITUDE_VPP)
+        self.setting = DriveSetting(0.0, LOWEST_AMPLITUDE_VPP)
         self.elapsed_s = 0.0
         """Listened so far [s]."""
 
@@ -50,20 +50,20 @@ class SineLoop:
     @property
     def noise(self) -> float:
         """Rms of the response channel's own noise, in the orders seen at the frequency of now [m/s]."""
-        return Stroboscope.noise_of(self._silence, self.played.frequency_hz, self.ears.sample_rate_hz)
+        return Stroboscope.noise_of(self._silence, self.setting.frequency_hz, self.channels.sample_rate_hz)
 
-    def hush(self) -> Controller[None]:
+    def listen_to_silence(self) -> Controller[None]:
         """Listen to silence: what the response shows then is noise."""
-        heard = yield from self._move(Phase(RunState.ARMED, None, HUSH_S))
-        _, _, response = self.ears.rows(heard)
+        samples = yield from self._run_phase(Phase(RunState.ARMED, None, HUSH_S))
+        _, _, response = self.channels.rows(samples)
         # The first half lets the bench check ring out.
         self._silence = response[len(response) // 2 :]
 
     def change(self, frequency_hz: float, setting_vpp: float) -> None:
         """Play something else from the next move on."""
-        if frequency_hz != self.played.frequency_hz:
-            self._scope = self.ears.stroboscope(frequency_hz)
-        self.played = DriveSetting(frequency_hz, setting_vpp)
+        if frequency_hz != self.setting.frequency_hz:
+            self._scope = self.channels.stroboscope(frequency_hz)
+        self.setting = DriveSetting(frequency_hz, setting_vpp)
         self.forget()
 
     def bounded_vpp(self, setting_vpp: float) -> float:
@@ -80,24 +80,24 @@ class SineLoop:
 
     def ramp_up(self) -> Controller[None]:
         """Begin to play."""
-        yield from self._move(ramp(RunState.RAMPING_UP, self._tone, self._measurement))
+        yield from self._run_phase(ramp(RunState.RAMPING_UP, self._tone, self._measurement))
 
     def ramp_down(self) -> Controller[None]:
         """End the play."""
-        yield from self._move(ramp(RunState.RAMPING_DOWN, self._tone, self._measurement))
+        yield from self._run_phase(ramp(RunState.RAMPING_DOWN, self._tone, self._measurement))
 
     def listen(self, state: RunState, duration_s: float, segment: Segment | None = None) -> Controller[None]:
         """Play on for a while, and look."""
-        heard = yield from self._move(Phase(state, self._tone, duration_s, segment))
+        samples = yield from self._run_phase(Phase(state, self._tone, duration_s, segment))
         self.elapsed_s += duration_s
-        self._scope.add(heard.first_sample, *self.ears.rows(heard))
+        self._scope.add(samples.first_sample, *self.channels.rows(samples))
 
     def say(self) -> Controller[None]:
         """Have everything noted that is still to be noted."""
         if self._notes:
             yield ControlAction(None, self._taken_notes())
 
-    def _move(self, phase: Phase) -> Generator[ControlAction, PhaseSamples, PhaseSamples]:
+    def _run_phase(self, phase: Phase) -> Generator[ControlAction, PhaseSamples, PhaseSamples]:
         return (yield ControlAction(phase, self._taken_notes()))
 
     def _taken_notes(self) -> tuple[Note, ...]:
@@ -107,4 +107,4 @@ class SineLoop:
 
     @property
     def _tone(self) -> Tone:
-        return Tone(self.played.frequency_hz, self.played.setting_vpp / self.most_vpp)
+        return Tone(self.setting.frequency_hz, self.setting.setting_vpp / self.most_vpp)

@@ -15,73 +15,73 @@ _GLIDE_MEMORY_S = 0.5
 """Over which a glide averages the base's answer [s]."""
 
 
-def started(play: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Controller[None]:
+def started(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Controller[None]:
     """Ramp up at a frequency: to the level, as the rig's model has it, or to the plan's setting."""
-    setting_vpp = play.most_vpp
+    setting_vpp = loop.most_vpp
     if level is not None:
-        guess_vpp = needed_vpp(play.rig, level.acceleration_at(frequency_hz), frequency_hz)
-        setting_vpp = play.bounded_vpp(guess_vpp)
-    play.change(frequency_hz, setting_vpp)
-    yield from play.hush()
-    yield from play.ramp_up()
+        guess_vpp = needed_vpp(loop.rig, level.acceleration_at(frequency_hz), frequency_hz)
+        setting_vpp = loop.bounded_vpp(guess_vpp)
+    loop.change(frequency_hz, setting_vpp)
+    yield from loop.listen_to_silence()
+    yield from loop.ramp_up()
 
 
-def glided(play: SineLoop, frequency_hz: float, level: BaseLevel | None, step_hz: float) -> Controller[None]:
+def glided(loop: SineLoop, frequency_hz: float, level: BaseLevel | None, step_hz: float) -> Controller[None]:
     """Go to another frequency through others at most ``step_hz`` apart: a large step would be a kick."""
-    begin_hz = play.played.frequency_hz
+    begin_hz = loop.setting.frequency_hz
     tones = max(1, ceil(abs(frequency_hz - begin_hz) / step_hz * (1 - 1e-9)))
-    track = GainEstimator(_GLIDE_MEMORY_S)
+    estimator = GainEstimator(_GLIDE_MEMORY_S)
     for tone in range(1, tones):
-        tracked(play, begin_hz + (frequency_hz - begin_hz) * tone / tones, level, track, GLIDE_TONE_S)
-        yield from play.listen(RunState.SETTLING, GLIDE_TONE_S)
-        followed(play, level, track)
-    tracked(play, frequency_hz, level, track, GLIDE_TONE_S)
+        tracked(loop, begin_hz + (frequency_hz - begin_hz) * tone / tones, level, estimator, GLIDE_TONE_S)
+        yield from loop.listen(RunState.SETTLING, GLIDE_TONE_S)
+        followed(loop, level, estimator)
+    tracked(loop, frequency_hz, level, estimator, GLIDE_TONE_S)
 
 
-def moved(play: SineLoop, frequency_hz: float, level: BaseLevel | None) -> None:
+def moved(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> None:
     """Play another frequency: the setting follows the rig's model from where it is."""
-    setting_vpp = play.played.setting_vpp
+    setting_vpp = loop.setting.setting_vpp
     if level is not None:
-        setting_vpp *= needed_vpp(play.rig, level.acceleration_at(frequency_hz), frequency_hz)
-        setting_vpp /= _modelled_vpp(play, level)
-    _change(play, frequency_hz, setting_vpp, level)
+        setting_vpp *= needed_vpp(loop.rig, level.acceleration_at(frequency_hz), frequency_hz)
+        setting_vpp /= _modelled_vpp(loop, level)
+    _change(loop, frequency_hz, setting_vpp, level)
 
 
 def tracked(
-    play: SineLoop, frequency_hz: float, level: BaseLevel | None, track: GainEstimator, duration_s: float
+    loop: SineLoop, frequency_hz: float, level: BaseLevel | None, estimator: GainEstimator, duration_s: float
 ) -> None:
     """Play another frequency for ``duration_s``, at the setting that the track foresees for its middle."""
-    if level is None or not track.is_known:
-        moved(play, frequency_hz, level)
+    if level is None or not estimator.is_known:
+        moved(loop, frequency_hz, level)
         return
-    modelled_vpp = needed_vpp(play.rig, level.acceleration_at(frequency_hz), frequency_hz)
-    gain = track.gain_at(play.elapsed_s + 0.5 * duration_s)
-    _change(play, frequency_hz, modelled_vpp / gain, level)
+    modelled_vpp = needed_vpp(loop.rig, level.acceleration_at(frequency_hz), frequency_hz)
+    gain = estimator.gain_at(loop.elapsed_s + 0.5 * duration_s)
+    _change(loop, frequency_hz, modelled_vpp / gain, level)
 
 
-def followed(play: SineLoop, level: BaseLevel | None, track: GainEstimator) -> None:
+def followed(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimator) -> None:
     """Take what was just heard into the track."""
     if level is None:
         return
-    now = play.played
-    if play.periods.count:
-        acceleration = abs(complex(np.mean(play.periods.base)))
-        require_answer(play.rig, now.frequency_hz, now.setting_vpp, acceleration)
+    now = loop.setting
+    if loop.periods.count:
+        acceleration = abs(complex(np.mean(loop.periods.base)))
+        require_answer(loop.rig, now.frequency_hz, now.setting_vpp, acceleration)
     target = level.acceleration_at(now.frequency_hz)
-    modelled = target * now.setting_vpp / _modelled_vpp(play, level)
-    track.add(play.elapsed_s, play.periods.base, modelled, target)
+    modelled = target * now.setting_vpp / _modelled_vpp(loop, level)
+    estimator.add(loop.elapsed_s, loop.periods.base, modelled, target)
 
 
-def _modelled_vpp(play: SineLoop, level: BaseLevel) -> float:
+def _modelled_vpp(loop: SineLoop, level: BaseLevel) -> float:
     """Give the setting that the model needs for the level at the frequency of now [V]."""
-    frequency_hz = play.played.frequency_hz
-    return needed_vpp(play.rig, level.acceleration_at(frequency_hz), frequency_hz)
+    frequency_hz = loop.setting.frequency_hz
+    return needed_vpp(loop.rig, level.acceleration_at(frequency_hz), frequency_hz)
 
 
-def _change(play: SineLoop, frequency_hz: float, wanted_vpp: float, level: BaseLevel | None) -> None:
+def _change(loop: SineLoop, frequency_hz: float, wanted_vpp: float, level: BaseLevel | None) -> None:
     """Change frequency and setting, the latter by no more than the level allows at once."""
     if level is not None:
-        now_vpp = play.played.setting_vpp
+        now_vpp = loop.setting.setting_vpp
         slow_vpp = min(max(wanted_vpp, now_vpp / level.most_change), now_vpp * level.most_change)
-        wanted_vpp = play.bounded_vpp(slow_vpp)
-    play.change(frequency_hz, wanted_vpp)
+        wanted_vpp = loop.bounded_vpp(slow_vpp)
+    loop.change(frequency_hz, wanted_vpp)

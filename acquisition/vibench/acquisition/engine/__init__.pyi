@@ -39,8 +39,8 @@ from ._start import (
 )
 from ._state import (
     DRIVING as DRIVING,
-    Supervision as Supervision,
     EngineState as EngineState,
+    Supervision as Supervision,
 )
 from ._status import (
     ArmedPlan as ArmedPlan,

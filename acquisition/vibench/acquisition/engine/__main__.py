@@ -24,16 +24,16 @@ def main() -> None:
     """Serve until told to end, by a request, a signal, or the end of the one that started it."""
     options = _options()
     engine = Engine(options.attendance)
-    work = JobQueue(engine)
-    desk = RequestHandler(engine, work)
-    _heed_signals(desk)
-    with serving(desk, options.what, options.host) as server:
+    jobs = JobQueue(engine)
+    handler = RequestHandler(engine, jobs)
+    _heed_signals(handler)
+    with serving(handler, options.what, options.host) as server:
         print(spoken(server.address), flush=True)  # noqa: T201 - this line is the handshake
         if options.attendance is Supervision.ATTENDED:
-            Thread(target=_follow_parent, args=(desk,), name="engine parent", daemon=True).start()
+            Thread(target=_follow_parent, args=(handler,), name="engine parent", daemon=True).start()
         else:
-            _end_when_forgotten(desk, options.forgotten_s)
-        work.run()
+            _end_when_forgotten(handler, options.forgotten_s)
+        jobs.run()
 
 
 def _options() -> argparse.Namespace:
@@ -50,32 +50,32 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _heed_signals(desk: RequestHandler) -> None:
+def _heed_signals(handler: RequestHandler) -> None:
     def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
-        desk.shutdown(Cause.TERMINATED, f"{signal.Signals(number).name}: ended by the system")
+        handler.shutdown(Cause.TERMINATED, f"{signal.Signals(number).name}: ended by the system")
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
 
 
-def _end_when_forgotten(desk: RequestHandler, after_s: float) -> None:
+def _end_when_forgotten(handler: RequestHandler, after_s: float) -> None:
     """End an engine that does nothing when whoever started it has gone away: it may hold a bench."""
 
     def look() -> None:
         pause = Event()
-        while not desk.is_forgotten(after_s):
+        while not handler.is_forgotten(after_s):
             pause.wait(after_s / 10)
-        desk.shutdown(Cause.PARENT_GONE, f"nobody has asked for {after_s:g} s, and nothing was to be done")
+        handler.shutdown(Cause.PARENT_GONE, f"nobody has asked for {after_s:g} s, and nothing was to be done")
 
     Thread(target=look, name="engine forgotten", daemon=True).start()
 
 
-def _follow_parent(desk: RequestHandler) -> None:
+def _follow_parent(handler: RequestHandler) -> None:
     """End with whoever started the engine: standard input is a pipe from there."""
     # Not through sys.stdin: a buffer that a thread waits in cannot be torn down at the process's end.
     while os.read(sys.stdin.fileno(), 4096):
         pass
-    desk.shutdown(Cause.PARENT_GONE, "the program that started the engine has ended")
+    handler.shutdown(Cause.PARENT_GONE, "the program that started the engine has ended")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Where an engine can be asked: all that a viewer needs to know of its door."""
+"""Where an engine can be asked: all that a viewer needs to know of its server."""
 
 from ..host import FrozenModel
 

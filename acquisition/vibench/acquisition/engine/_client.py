@@ -44,7 +44,7 @@ class EngineClient:
         self._rows: tuple[int, tuple[RowStatus, ...]] = (-1, ())
 
     @classmethod
-    def attach(cls, address: EngineAddress, visit: ConnectionRole = ConnectionRole.VISITING) -> "EngineClient":
+    def attach(cls, address: EngineAddress, role: ConnectionRole = ConnectionRole.VISITING) -> "EngineClient":
         """Connect to a running engine, for a look or to attend to its run."""
         try:
             connection = socket.create_connection((address.host, address.port), PATIENCE_S)
@@ -56,7 +56,7 @@ class EngineClient:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         client = cls(connection)
         try:
-            client._do(ask.Hello(token=address.token, visit=visit))
+            client._do(ask.Hello(token=address.token, role=role))
         except AcquisitionError:
             client.close()
             raise
@@ -89,14 +89,16 @@ class EngineClient:
         """Check the bench; the status will hold what was found."""
         self._do(ask.Check(folder=str(folder.absolute())))
 
-    def arm(self, campaign: Campaign, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE) -> ArmedPlan:
+    def arm(
+        self, campaign: Campaign, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE
+    ) -> ArmedPlan:
         """Get ready to carry out a campaign, or be refused with the reasons."""
-        return self.arm_orders(CampaignRequest(campaign=campaign, folder=folder, existing=existing))
+        return self.arm_request(CampaignRequest(campaign=campaign, folder=folder, existing=existing))
 
-    def arm_orders(self, orders: CampaignRequest) -> ArmedPlan:
+    def arm_request(self, campaign_request: CampaignRequest) -> ArmedPlan:
         """Get ready as `arm` does, with everything said that can be said."""
-        absolute = orders.model_copy(update={"folder": orders.folder.absolute()})
-        return self._told(ask.Arm(orders=absolute), ArmedPlan)
+        absolute = campaign_request.model_copy(update={"folder": campaign_request.folder.absolute()})
+        return self._told(ask.Arm(campaign_request=absolute), ArmedPlan)
 
     def disarm(self) -> None:
         """Take back what was armed."""

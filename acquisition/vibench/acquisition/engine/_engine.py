@@ -8,14 +8,14 @@ from pathlib import Path
 
 from ..bench import Bench
 from ..campaign import (
-    PointResult,
-    CampaignProgress,
-    CampaignEventKind,
     CampaignEvent,
-    PointOutcome,
-    ReconnectingBench,
+    CampaignEventKind,
     CampaignListener,
+    CampaignProgress,
     Messenger,
+    PointOutcome,
+    PointResult,
+    ReconnectingBench,
     ignore_event,
     ignore_result,
     make_folder,
@@ -28,7 +28,7 @@ from ..stopping import StopSwitch, stop_on_signal
 from ._lock import BenchLock
 from ._published_state import PublishedState
 from ._requests import CampaignRequest
-from ._state import Supervision, EngineState
+from ._state import EngineState, Supervision
 from ._status import BenchFacts, ChannelFacts
 
 
@@ -58,43 +58,43 @@ class Engine:
     shown it; leave the engine through a ``with``, and the bench is silent and closed.
     """
 
-    def __init__(self, attendance: Supervision) -> None:
-        self.attendance = attendance
-        self.shown = PublishedState(attendance)
+    def __init__(self, supervision: Supervision) -> None:
+        self.supervision = supervision
+        self.published = PublishedState(supervision)
         self.switch = StopSwitch()
         """Holds or ends what runs; a new one for every campaign."""
-        self._kept: ReconnectingBench | None = None
+        self._reconnecting: ReconnectingBench | None = None
         self._lock: BenchLock | None = None
 
     @property
     def bench(self) -> Bench:
         """The open bench; others may look at its rig, where the state says that there is one."""
-        assert self._kept is not None, f"no bench is open while {self.shown.state}"
-        return self._kept.bench
+        assert self._reconnecting is not None, f"no bench is open while {self.published.state}"
+        return self._reconnecting.bench
 
     @property
     def played_faults(self) -> tuple[str, ...]:
         """What a script of faults has done to a virtual rig so far, in order."""
-        return () if self._kept is None else self._kept.played_faults
+        return () if self._reconnecting is None else self._reconnecting.played_faults
 
     def open(self, rig: Rig, confirm: Confirm | None = None) -> None:
         """Open the bench of a rig; ``confirm`` as `vibench.acquisition.bench.open_bench` takes it."""
         try:
             self._lock = BenchLock.of(rig)
-            self._kept = ReconnectingBench(rig, confirm)
-            self._kept.__enter__()
+            self._reconnecting = ReconnectingBench(rig, confirm)
+            self._reconnecting.__enter__()
         except AcquisitionError as error:
-            self._kept = None
+            self._reconnecting = None
             self._fails(error, EngineState.FAULT)
             raise
-        self.shown.bench(bench_facts(self.bench))
-        self.shown.messages.info(f"{rig.name} is open")
-        self.shown.enter(EngineState.READY)
+        self.published.bench(bench_facts(self.bench))
+        self.published.messages.info(f"{rig.name} is open")
+        self.published.enter(EngineState.READY)
 
     def close(self) -> None:
         """Silence the bench and close it. Legal at any time."""
         self._release()
-        self.shown.enter(EngineState.CLOSED)
+        self.published.enter(EngineState.CLOSED)
 
     def check(self, folder: Path) -> None:
         """Check the bench with a small sine, and keep what was found."""
@@ -106,66 +106,66 @@ class Engine:
         except AcquisitionError as error:
             self._fails(error, EngineState.READY)
             raise
-        self.shown.checked(result.report, result.checked.isoformat(timespec="seconds"))
-        self.shown.enter(EngineState.READY)
+        self.published.checked(result.report, result.checked.isoformat(timespec="seconds"))
+        self.published.enter(EngineState.READY)
 
     def measure(
         self,
-        orders: CampaignRequest,
-        on_item: Callable[[PointResult], None] = ignore_result,
-        on_happening: CampaignListener = ignore_event,
+        request: CampaignRequest,
+        on_result: Callable[[PointResult], None] = ignore_result,
+        on_event: CampaignListener = ignore_event,
         messengers: tuple[Messenger, ...] = (),
     ) -> tuple[PointResult, ...]:
         """Make the recordings of a campaign; see `run_campaign`, which calls what is given here."""
-        assert self._kept is not None
+        assert self._reconnecting is not None
         facts = bench_facts(self.bench)
 
         def tell(progress: CampaignProgress) -> None:
-            self.shown.tell(progress, facts)
+            self.published.tell(progress, facts)
 
-        def ended(item: PointResult) -> None:
-            self.shown.item(item)
-            on_item(item)
+        def ended(point_result: PointResult) -> None:
+            self.published.note_result(point_result)
+            on_result(point_result)
 
-        def happened(happening: CampaignEvent) -> None:
-            if happening.event is CampaignEventKind.RESTING:
-                self.shown.rests(orders.campaign.rest_s, happening.text)
-            on_happening(happening)
+        def on_campaign_event(event: CampaignEvent) -> None:
+            if event.kind is CampaignEventKind.RESTING:
+                self.published.note_pause(request.campaign.rest_s, event.text)
+            on_event(event)
 
-        self.shown.begin(orders.campaign, orders.folder)
+        self.published.begin(request.campaign, request.folder)
         try:
-            make_folder(orders.folder)
+            make_folder(request.folder)
             with stop_on_signal(self.switch):
-                require_fresh(self.bench, orders.folder, orders.check, switch=self.switch)
-            items = run_campaign(
+                require_fresh(self.bench, request.folder, request.check, switch=self.switch)
+            point_results = run_campaign(
                 self.bench,
-                orders.campaign,
-                orders.folder,
-                orders.existing,
-                orders.after_failure,
+                request.campaign,
+                request.folder,
+                request.existing,
+                request.after_failure,
                 on_progress=tell,
-                on_item=ended,
+                on_result=ended,
                 switch=self.switch,
-                reopen=self._kept.reopen,
-                changed_bench=orders.changed_bench,
-                on_happening=happened,
+                reopen=self._reconnecting.reopen,
+                changed_bench=request.changed_bench,
+                on_event=on_campaign_event,
                 messengers=messengers,
             )
         except CheckStopped as stopped:
             self._check_ended(stopped)
             return ()
         except AcquisitionError as error:
-            self.shown.failed(str(error))
+            self.published.failed(str(error))
             self._fails(error, EngineState.READY)
             raise
-        self.shown.messages.info(_told(items))
-        self.shown.enter(EngineState.READY)
-        return items
+        self.published.messages.info(_told(point_results))
+        self.published.enter(EngineState.READY)
+        return point_results
 
     def _check_ended(self, stopped: CheckStopped) -> None:
         """Show that somebody wanted the check to end; nothing is wrong."""
-        self.shown.messages.info(str(stopped))
-        self.shown.enter(EngineState.READY)
+        self.published.messages.info(str(stopped))
+        self.published.enter(EngineState.READY)
 
     def fault(self, error: Exception) -> None:
         """Show what nobody has foreseen, and let the bench go."""
@@ -173,27 +173,30 @@ class Engine:
 
     def _fails(self, error: Exception, otherwise: EngineState) -> None:
         """Show what went wrong; a bench that has lost an instrument is closed."""
-        self.shown.messages.fault(error)
+        self.published.messages.fault(error)
         state = EngineState.FAULT if isinstance(error, InstrumentLost) else otherwise
         if state is EngineState.FAULT:
             self._release()
-        self.shown.enter(state)
+        self.published.enter(state)
 
     def _release(self) -> None:
-        kept, self._kept = self._kept, None
+        reconnecting, self._reconnecting = self._reconnecting, None
         lock, self._lock = self._lock, None
         try:
-            if kept is not None:
-                kept.close()
+            if reconnecting is not None:
+                reconnecting.close()
         except AcquisitionError as error:
-            self.shown.messages.fault(error)
+            self.published.messages.fault(error)
         finally:
-            self.shown.bench(None)
+            self.published.bench(None)
             if lock is not None:
                 lock.close()
 
 
-def _told(items: tuple[PointResult, ...]) -> str:
+def _told(point_results: tuple[PointResult, ...]) -> str:
     """Say in a line how a campaign came out."""
-    counts = {result: sum(item.result is result for item in items) for result in PointOutcome}
+    counts = {
+        result: sum(point_result.outcome is result for point_result in point_results)
+        for result in PointOutcome
+    }
     return "Campaign ended: " + ", ".join(f"{count} {each.value}" for each, count in counts.items() if count)

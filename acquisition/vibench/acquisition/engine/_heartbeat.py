@@ -1,4 +1,6 @@
-"""A pulse: tells an engine, from whoever must not freeze unnoticed, that it is alive; waits for nothing."""
+"""A heartbeat: tells an engine, from whoever must not freeze unnoticed, that it is alive; waits for
+nothing.
+"""
 
 import socket
 from contextlib import suppress
@@ -22,7 +24,7 @@ class Heartbeat:
     """
 
     def __init__(self, address: EngineAddress) -> None:
-        hello = ask.Hello(token=address.token, visit=ConnectionRole.ATTENDING)
+        hello = ask.Hello(token=address.token, role=ConnectionRole.ATTENDING)
         try:
             self._connection = socket.create_connection((address.host, address.port), PATIENCE_S)
             send(self._connection, Message(hello.model_dump_json().encode()))

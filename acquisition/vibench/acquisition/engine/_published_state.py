@@ -13,12 +13,12 @@ from time import monotonic
 import numpy as np
 
 from ..bench import BenchReport
-from ..campaign import PointResult, CampaignProgress, PointOutcome
+from ..campaign import CampaignProgress, PointOutcome, PointResult
 from ..errors import AcquisitionError
 from ..instruments import Block
 from ..plan import Campaign, RunState, measured_s
 from ._sample_buffer import SampleBuffer
-from ._state import Supervision, EngineState
+from ._state import EngineState, Supervision
 from ._status import (
     ArmedPlan,
     BenchFacts,
@@ -94,11 +94,11 @@ _STATES = {RunState.HELD: EngineState.HELD, RunState.RAMPING_DOWN: EngineState.R
 class PublishedState:
     """The newest of everything. Each value is replaced as a whole, so that no reader sees half of it."""
 
-    def __init__(self, attendance: Supervision) -> None:
-        self.recent = SampleBuffer()
+    def __init__(self, supervision: Supervision) -> None:
+        self.sample_buffer = SampleBuffer()
         self.messages = Messages()
         self._lock = threading.Lock()
-        self._status = EngineStatus(state=EngineState.CLOSED, attendance=attendance)
+        self._status = EngineStatus(state=EngineState.CLOSED, attendance=supervision)
         self._armed_until_s = 0.0
         self._folder = Path()
         self._disk_due_s = 0.0
@@ -124,9 +124,9 @@ class PublishedState:
             update={
                 "armed": armed,
                 "messages": self.messages.kept,
-                "samples": self.recent.samples,
-                "run_id": self.recent.run_id,
-                "lost_blocks": self.recent.gaps,
+                "samples": self.sample_buffer.samples,
+                "run_id": self.sample_buffer.run_id,
+                "lost_blocks": self.sample_buffer.gaps,
             }
         )
 
@@ -164,7 +164,7 @@ class PublishedState:
         run = progress.run
         if progress.path != self._file:  # another attempt at one point is another recording
             self._begin(progress, bench)
-        self.recent.add(run.block)
+        self.sample_buffer.add(run.block)
         self._overloads += len(run.block.overloads)
         self._put(
             state=_STATES.get(run.state, EngineState.RUNNING),
@@ -174,18 +174,18 @@ class PublishedState:
             **self._disk(),
         )
 
-    def rests(self, rest_s: float, text: str) -> None:
+    def note_pause(self, rest_s: float, text: str) -> None:
         """Show that the campaign rests between two recordings."""
         self._done_s += rest_s
         self.messages.info(text)
 
-    def item(self, item: PointResult) -> None:
+    def note_result(self, point_result: PointResult) -> None:
         """Show how a recording came out; what an earlier run has made is done already."""
-        if item.result is PointOutcome.KEPT:
-            self._done_s += self._planned_s.get(item.name, 0.0)
-        elif self._status.run is not None and item.name == self._status.run.name:
+        if point_result.outcome is PointOutcome.KEPT:
+            self._done_s += self._planned_s.get(point_result.name, 0.0)
+        elif self._status.run is not None and point_result.name == self._status.run.name:
             self._done_s += self._status.run.total_s
-        self._row(item.name, item.result.value, item.reason, str(item.path))
+        self._row(point_result.name, point_result.outcome.value, point_result.reason, str(point_result.path))
 
     def failed(self, reason: str) -> None:
         """Show that the recording that was running has failed."""
@@ -196,7 +196,7 @@ class PublishedState:
     def _begin(self, progress: CampaignProgress, bench: BenchFacts) -> None:
         self._file = progress.path
         self._overloads = 0
-        self.recent.begin(len(bench.channels), bench.sample_rate_hz)
+        self.sample_buffer.begin(len(bench.channels), bench.sample_rate_hz)
         self._row(progress.name, "running", "", str(progress.path))
 
     def _row(self, name: str, state: str, reason: str, file: str) -> None:

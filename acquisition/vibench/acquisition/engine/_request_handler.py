@@ -1,4 +1,5 @@
-"""The engine's desk: every request is answered at once, from any thread, and none touches an instrument.
+"""The engine's request handler: every request is answered at once, from any thread, and none touches an
+instrument.
 
 Arming: a campaign is refused with reasons, or put into words that an experimenter can check.
 
@@ -23,14 +24,14 @@ from ._errors import EngineError
 from ._job_queue import JobQueue
 from ._requests import CampaignRequest
 from ._sample_buffer import SampleSlice
-from ._state import DRIVING, SOUNDING, VIEWER_PATIENCE_S, Supervision, EngineState
+from ._state import DRIVING, SOUNDING, VIEWER_PATIENCE_S, EngineState, Supervision
 from ._status import ArmedPlan, EngineStatus
 
 ARMED_S = 60.0
 """An armed engine disarms itself after this long [s]."""
 
 
-def armed_plan(bench: Bench, orders: CampaignRequest) -> ArmedPlan:
+def armed_plan(bench: Bench, request: CampaignRequest) -> ArmedPlan:
     """Hold a campaign against bench and folder; nothing is played and nothing written.
 
     Raises
@@ -39,15 +40,15 @@ def armed_plan(bench: Bench, orders: CampaignRequest) -> ArmedPlan:
         With every reason why it cannot be carried out.
 
     """
-    if orders.check is CheckRule.FRESH:
+    if request.check is CheckRule.FRESH:
         require_on_record(bench)
     checks: list[tuple[str, LimitCheck]] = []
-    campaign, folder = orders.campaign, orders.folder
+    campaign, folder = request.campaign, request.folder
     points = campaign.points()
     for name, measurement in ((point.name, point.measurement) for point in points):
         checks += [(name, check) for check in require_within_limits(measurement, bench.rig)]
         drive_for(bench, measurement)  # refuses what nothing on this bench can play
-    planned = planned_recordings(campaign, folder, orders.existing)
+    planned = planned_recordings(campaign, folder, request.existing)
     missing = [each for each in planned if not each.is_complete]
     tightest, closest = max(checks, key=lambda named: named[1].use)
     loudest = max(point.measurement.excitation.highest_amplitude_vpp for point in points)
@@ -97,33 +98,33 @@ class RequestHandler:
     raises `EngineError` with one sentence when the engine's state does not allow what was asked.
     """
 
-    def __init__(self, engine: Engine, work: JobQueue) -> None:
+    def __init__(self, engine: Engine, jobs: JobQueue) -> None:
         self._engine = engine
-        self._work = work
+        self._jobs = jobs
         self._asking = Lock()
-        self._orders: CampaignRequest | None = None
+        self._request: CampaignRequest | None = None
         self._armed_s = 0.0
-        self._heard_s = self._looked_s = monotonic()
+        self._last_request_s = self._last_round_s = monotonic()
 
-    def heard(self) -> None:
+    def note_presence(self) -> None:
         """Note that somebody is there."""
-        self._heard_s = monotonic()
+        self._last_request_s = monotonic()
 
     def status(self) -> EngineStatus:
         """Say where the engine stands."""
-        return self._engine.shown.status()
+        return self._engine.published.status()
 
     def look(self, since_sample: int, most: int) -> SampleSlice:
         """Give the newest samples of the run."""
-        return self._engine.shown.recent.since(since_sample, most)
+        return self._engine.published.sample_buffer.since(since_sample, most)
 
     def open(self, rig: Rig, confirmations: KnobSheet | None = None) -> None:
         """Open the bench of a rig."""
         with self._asking:
             self._require("open a bench", EngineState.CLOSED, EngineState.FAULT)
-            self._engine.shown.enter(EngineState.OPENING)
+            self._engine.published.enter(EngineState.OPENING)
             confirm = None if rig.virtual is not None else confirmed_by(confirmations)
-            self._work.put(lambda: self._engine.open(rig, confirm))
+            self._jobs.put(lambda: self._engine.open(rig, confirm))
 
     def close(self) -> None:
         """Close the bench."""
@@ -132,24 +133,24 @@ class RequestHandler:
                 "close the bench", EngineState.READY, EngineState.ARMED, EngineState.FAULT, EngineState.CLOSED
             )
             self._disarm()
-            self._work.put(self._engine.close)
+            self._jobs.put(self._engine.close)
 
     def check(self, folder: Path = Path()) -> None:
         """Check the bench with a small sine; ``folder`` is where recordings will go."""
         with self._asking:
             self._require("check the bench", EngineState.READY)
             self._engine.switch = StopSwitch()
-            self._engine.shown.enter(EngineState.CHECKING)
-            self._work.put(lambda: self._engine.check(folder))
+            self._engine.published.enter(EngineState.CHECKING)
+            self._jobs.put(lambda: self._engine.check(folder))
 
-    def arm(self, orders: CampaignRequest) -> ArmedPlan:
+    def arm(self, request: CampaignRequest) -> ArmedPlan:
         """Get ready to carry out a campaign; raises AcquisitionError with the reasons when it cannot be."""
         with self._asking:
             self._require("arm", EngineState.READY, EngineState.ARMED)
-            plan = armed_plan(self._engine.bench, orders)
-            self._orders = orders
+            plan = armed_plan(self._engine.bench, request)
+            self._request = request
             self._armed_s = monotonic()
-            self._engine.shown.arm(plan, orders.campaign)
+            self._engine.published.arm(plan, request.campaign)
             return plan
 
     def disarm(self) -> None:
@@ -161,17 +162,17 @@ class RequestHandler:
         """Carry out what is armed."""
         with self._asking:
             self._require("start", EngineState.ARMED)
-            assert self._orders is not None
-            orders, self._orders = self._orders, None
+            assert self._request is not None
+            request, self._request = self._request, None
             self._engine.switch = StopSwitch()
-            self._engine.shown.enter(EngineState.RUNNING)
-            self._work.put(lambda: self._engine.measure(orders))
+            self._engine.published.enter(EngineState.RUNNING)
+            self._jobs.put(lambda: self._engine.measure(request))
 
     def stop(self, request: StopRequest) -> None:
         """Hold or end what runs, and disarm what is armed. Legal in every state, and never refused."""
         # Without the lock: whatever else is being asked, a stop gets through.
         self._engine.switch.ask(request)
-        if request.level is not StopLevel.HOLD and self._engine.shown.state is EngineState.ARMED:
+        if request.level is not StopLevel.HOLD and self._engine.published.state is EngineState.ARMED:
             self.disarm()
 
     def resume(self) -> None:
@@ -180,26 +181,28 @@ class RequestHandler:
 
     def mark(self, text: str) -> None:
         """Note an event at the next sample of the recording."""
-        if self._engine.shown.state not in DRIVING:
+        if self._engine.published.state not in DRIVING:
             raise EngineError("nothing is being recorded that could be marked; start a measurement first")
         self._engine.switch.mark(text)
 
     def shutdown(self, cause: Cause, reason: str) -> None:
         """End what runs, silence everything, and let the engine end. Legal in every state."""
         self.stop(StopRequest.by(cause, reason))
-        self._work.leave()
+        self._jobs.leave()
 
-    def look_after(self) -> None:
+    def enforce_deadlines(self) -> None:
         """Do what time asks for: disarm what nobody starts, abort what nobody attends."""
         engine, now_s = self._engine, monotonic()
-        since_s, self._looked_s = now_s - self._looked_s, now_s
+        since_s, self._last_round_s = now_s - self._last_round_s, now_s
         if since_s > STALL_S:  # whoever asked while this process did not run is not to blame
-            self._heard_s += since_s
-        if engine.shown.state is EngineState.ARMED and now_s - self._armed_s > ARMED_S:
+            self._last_request_s += since_s
+        if engine.published.state is EngineState.ARMED and now_s - self._armed_s > ARMED_S:
             self.disarm()
-            engine.shown.messages.warn(f"Armed for {ARMED_S:g} s and not started.", "Disarmed.", "Arm again.")
-        alone_s = now_s - self._heard_s
-        if engine.attendance is Supervision.ATTENDED and alone_s > VIEWER_PATIENCE_S:
+            engine.published.messages.warn(
+                f"Armed for {ARMED_S:g} s and not started.", "Disarmed.", "Arm again."
+            )
+        alone_s = now_s - self._last_request_s
+        if engine.supervision is Supervision.ATTENDED and alone_s > VIEWER_PATIENCE_S:
             self._act_alone(f"nobody has looked for {alone_s:.1f} s")
 
     def is_forgotten(self, after_s: float) -> bool:
@@ -209,25 +212,25 @@ class RequestHandler:
         return (
             is_idle
             and all(row.state == "queued" for row in status.rows)
-            and monotonic() - self._heard_s > after_s
+            and monotonic() - self._last_request_s > after_s
         )
 
     def _act_alone(self, reason: str) -> None:
         engine = self._engine
-        if engine.shown.state is EngineState.ARMED:
+        if engine.published.state is EngineState.ARMED:
             self.disarm()
-        elif engine.shown.state in SOUNDING and engine.switch.request is None:
+        elif engine.published.state in SOUNDING and engine.switch.request is None:
             engine.switch.ask(StopRequest.by(Cause.VIEWER_GONE, reason))
-            kept = "; the recording is kept" if engine.shown.state in DRIVING else ""
-            engine.shown.messages.warn(f"The viewer is gone: {reason}.", f"Ramped down{kept}.")
+            kept = "; the recording is kept" if engine.published.state in DRIVING else ""
+            engine.published.messages.warn(f"The viewer is gone: {reason}.", f"Ramped down{kept}.")
 
     def _disarm(self) -> None:
-        if self._engine.shown.state is EngineState.ARMED:
-            self._orders = None
-            self._engine.shown.enter(EngineState.READY)
+        if self._engine.published.state is EngineState.ARMED:
+            self._request = None
+            self._engine.published.enter(EngineState.READY)
 
     def _require(self, wanted: str, *allowed: EngineState) -> None:
-        state = self._engine.shown.state
+        state = self._engine.published.state
         if state not in allowed:
             raise EngineError(
                 f"the engine is {state.value.replace('_', ' ')} and cannot {wanted} now; "

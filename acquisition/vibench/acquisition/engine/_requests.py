@@ -34,7 +34,7 @@ class Hello(FrozenModel):
 
     ask: Literal["hello"] = "hello"
     token: str
-    visit: ConnectionRole = ConnectionRole.VISITING
+    role: ConnectionRole = ConnectionRole.VISITING
 
 
 class Open(FrozenModel):
@@ -64,7 +64,7 @@ class Arm(FrozenModel):
     """Get ready to carry out a campaign, or refuse it with reasons."""
 
     ask: Literal["arm"] = "arm"
-    orders: CampaignRequest
+    campaign_request: CampaignRequest
 
 
 class Disarm(FrozenModel):

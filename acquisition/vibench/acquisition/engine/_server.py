@@ -1,10 +1,10 @@
-"""The engine's door: loopback, a token, and one thread a connection, which alone may wait for its viewer.
+"""The engine's server: loopback, a token, and one thread a connection, which alone may wait for its viewer.
 
 From a request as it came over the wire to the answer that goes back.
 
-The engine's watchman: looks after attendance while the engine's own thread is at work.
+The engine's watchdog: enforces its deadlines while the engine's own thread is at work.
 
-An engine with its door open: others find it, ask it, and are looked after, while inside.
+An engine that is being served: others find it and ask it, and the watchdog runs, while inside.
 """
 
 import hmac
@@ -33,11 +33,11 @@ from ._wire import Message, WireError, receive, send
 DONE = Message(b'{"ok": true}')
 
 
-def answered(desk: RequestHandler, message: Message) -> Message:
+def answered(handler: RequestHandler, message: Message) -> Message:
     """Do what a message asks for; what is refused comes back as one sentence."""
     try:
         request = ask.REQUEST.validate_json(message.text)
-        return _answer(desk, request)
+        return _answer(handler, request)
     except ValidationError as error:
         detail = error.errors()[0]
         where = ".".join(str(part) for part in detail["loc"])
@@ -53,33 +53,33 @@ def refused(sentence: str, error: Exception) -> Message:
     return Message(json.dumps({"refused": sentence, "kind": type(error).__name__}).encode())
 
 
-def _answer(desk: RequestHandler, request: ask.Request) -> Message:
+def _answer(handler: RequestHandler, request: ask.Request) -> Message:
     match request:
         case ask.Status(known_rows=known):
-            status = desk.status()
+            status = handler.status()
             is_known = status.rows_number == known
             return _model(status.model_copy(update={"rows": ()}) if is_known else status)
         case ask.Look(since_sample=since, most=most):
-            return _slice_message(desk.look(since, most))
-        case ask.Arm(orders=orders):
-            return _model(desk.arm(orders))
+            return _slice_message(handler.look(since, most))
+        case ask.Arm(campaign_request=campaign_request):
+            return _model(handler.arm(campaign_request))
         case _:
-            _ACTIONS[type(request)](desk, request)
+            _ACTIONS[type(request)](handler, request)
             return DONE
 
 
 _ACTIONS: Mapping[type, Callable[[RequestHandler, Any], None]] = {
-    ask.Hello: lambda _desk, _order: None,
-    ask.Beat: lambda _desk, _order: None,
-    ask.Open: lambda desk, order: desk.open(order.rig, order.confirmations),
-    ask.Close: lambda desk, _order: desk.close(),
-    ask.Check: lambda desk, order: desk.check(Path(order.folder)),
-    ask.Disarm: lambda desk, _order: desk.disarm(),
-    ask.Start: lambda desk, _order: desk.start(),
-    ask.Stop: lambda desk, order: desk.stop(StopRequest(Cause.OPERATOR, order.level, order.reason)),
-    ask.Resume: lambda desk, _order: desk.resume(),
-    ask.Mark: lambda desk, order: desk.mark(order.text),
-    ask.Shutdown: lambda desk, _order: desk.shutdown(Cause.OPERATOR, "the engine was told to end"),
+    ask.Hello: lambda _handler, _asked: None,
+    ask.Beat: lambda _handler, _asked: None,
+    ask.Open: lambda handler, asked: handler.open(asked.rig, asked.confirmations),
+    ask.Close: lambda handler, _asked: handler.close(),
+    ask.Check: lambda handler, asked: handler.check(Path(asked.folder)),
+    ask.Disarm: lambda handler, _asked: handler.disarm(),
+    ask.Start: lambda handler, _asked: handler.start(),
+    ask.Stop: lambda handler, asked: handler.stop(StopRequest(Cause.OPERATOR, asked.level, asked.reason)),
+    ask.Resume: lambda handler, _asked: handler.resume(),
+    ask.Mark: lambda handler, asked: handler.mark(asked.text),
+    ask.Shutdown: lambda handler, _asked: handler.shutdown(Cause.OPERATOR, "the engine was told to end"),
 }
 """What is done, and answered with no more than that it was."""
 
@@ -88,14 +88,14 @@ def _model(model: BaseModel) -> Message:
     return Message(model.model_dump_json().encode())
 
 
-def _slice_message(glance: SampleSlice) -> Message:
+def _slice_message(newest_samples: SampleSlice) -> Message:
     facts = {
-        "run_id": glance.run_id,
-        "first_sample": glance.first_sample,
-        "sample_rate_hz": glance.sample_rate_hz,
-        "shape": glance.volts.shape,
+        "run_id": newest_samples.run_id,
+        "first_sample": newest_samples.first_sample,
+        "sample_rate_hz": newest_samples.sample_rate_hz,
+        "shape": newest_samples.volts.shape,
     }
-    return Message(json.dumps(facts).encode(), glance.volts.astype("<f4").tobytes())
+    return Message(json.dumps(facts).encode(), newest_samples.volts.astype("<f4").tobytes())
 
 
 LOOPBACK = "127.0.0.1"
@@ -104,13 +104,15 @@ GREETING_S = 5.0
 
 
 class Server:
-    """Answers for a desk. Nobody is let in without the token, from this computer or another."""
+    """Answers through a request handler. Nobody is let in without the token, from this computer or
+    another.
+    """
 
-    def __init__(self, desk: RequestHandler, host: str = LOOPBACK, port: int = 0) -> None:
-        self._desk = desk
+    def __init__(self, handler: RequestHandler, host: str = LOOPBACK, port: int = 0) -> None:
+        self._handler = handler
         self._token = secrets.token_urlsafe(32)
         self._listening = socket.create_server((host, port))
-        Thread(target=self._accept, name="engine door", daemon=True).start()
+        Thread(target=self._accept, name="engine server", daemon=True).start()
 
     @property
     def address(self) -> EngineAddress:
@@ -135,15 +137,15 @@ class Server:
         """Answer one viewer until it goes. A viewer that does not read blocks this thread, and no other."""
         with connection, suppress(WireError, OSError):
             connection.settimeout(GREETING_S)
-            visit = self._let_in(connection)
-            if visit is None:
+            role = self._let_in(connection)
+            if role is None:
                 return
             connection.settimeout(None)
             while True:
                 message = receive(connection)
-                if visit is ConnectionRole.ATTENDING:
-                    self._desk.heard()
-                send(connection, answered(self._desk, message))
+                if role is ConnectionRole.ATTENDING:
+                    self._handler.note_presence()
+                send(connection, answered(self._handler, message))
 
     def _let_in(self, connection: socket.socket) -> ConnectionRole | None:
         """Say what the connection is for, or turn it away."""
@@ -152,10 +154,10 @@ class Server:
         except ValidationError:
             hello = ask.Hello(token="")
         if hmac.compare_digest(hello.token.encode(), self._token.encode()):
-            if hello.visit is ConnectionRole.ATTENDING:
-                self._desk.heard()
+            if hello.role is ConnectionRole.ATTENDING:
+                self._handler.note_presence()
             send(connection, DONE)
-            return hello.visit
+            return hello.role
         send(connection, refused("the token is not this engine's; nobody was let in", EngineError()))
         return None
 
@@ -166,16 +168,16 @@ def spoken(address: EngineAddress) -> str:
 
 
 INTERVAL_S = 0.05
-"""How often attendance is looked at [s]."""
+"""How often deadlines are looked at [s]."""
 
 
 class Watchdog:
-    """Lets a desk look after its engine at every `INTERVAL_S`, until closed."""
+    """Lets the request handler enforce its deadlines at every `INTERVAL_S`, until closed."""
 
-    def __init__(self, desk: RequestHandler) -> None:
-        self._desk = desk
+    def __init__(self, handler: RequestHandler) -> None:
+        self._handler = handler
         self._closing = Event()
-        self._thread = Thread(target=self._run, name="engine watch", daemon=True)
+        self._thread = Thread(target=self._run, name="engine watchdog", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
@@ -185,14 +187,14 @@ class Watchdog:
 
     def _run(self) -> None:
         while not self._closing.wait(INTERVAL_S):
-            self._desk.look_after()
+            self._handler.enforce_deadlines()
 
 
 @contextmanager
-def serving(desk: RequestHandler, what: str, host: str = LOOPBACK) -> Iterator[Server]:
-    """Serve a desk; ``what`` is shown to those who look for an engine."""
+def serving(handler: RequestHandler, what: str, host: str = LOOPBACK) -> Iterator[Server]:
+    """Serve a request handler; ``what`` is shown to those who look for an engine."""
     with ExitStack() as inside:
-        server = inside.enter_context(closing(Server(desk, host)))
-        inside.enter_context(closing(Watchdog(desk)))
+        server = inside.enter_context(closing(Server(handler, host)))
+        inside.enter_context(closing(Watchdog(handler)))
         inside.enter_context(announced(server.address, what))
         yield server

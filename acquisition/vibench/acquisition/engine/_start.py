@@ -8,7 +8,7 @@ from typing import Self
 from ._address import EngineAddress
 from ._client import EngineClient
 from ._errors import EngineGone
-from ._state import Supervision, ConnectionRole
+from ._state import ConnectionRole, Supervision
 
 LEAVING_S = 10.0
 """How long an engine may take to ramp down, finish its recording and end [s]."""
@@ -60,7 +60,7 @@ class EngineProcess:
         self.close()
 
 
-def start_engine(attendance: Supervision = Supervision.ATTENDED) -> EngineProcess:
+def start_engine(supervision: Supervision = Supervision.ATTENDED) -> EngineProcess:
     """Start an engine of this installation, with no bench open.
 
     Raises
@@ -70,8 +70,8 @@ def start_engine(attendance: Supervision = Supervision.ATTENDED) -> EngineProces
 
     """
     process = subprocess.Popen(  # noqa: S603 - this interpreter, and nothing of a user's
-        [sys.executable, "-m", "vibench.acquisition.engine", "--attendance", attendance.value],
-        stdin=subprocess.PIPE if attendance is Supervision.ATTENDED else subprocess.DEVNULL,
+        [sys.executable, "-m", "vibench.acquisition.engine", "--attendance", supervision.value],
+        stdin=subprocess.PIPE if supervision is Supervision.ATTENDED else subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         text=True,
         # Ctrl-C in a terminal is for whoever shows the run: that one decides what the engine is told.

@@ -1,4 +1,4 @@
-"""Where an engine stands, and whether somebody has to look at it."""
+"""Where an engine stands, and whether its run is supervised."""
 
 from enum import StrEnum
 

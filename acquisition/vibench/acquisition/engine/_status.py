@@ -6,7 +6,7 @@ from enum import StrEnum
 from ..bench import BenchReport
 from ..host import FrozenModel
 from ..plan import RunState
-from ._state import Supervision, EngineState
+from ._state import EngineState, Supervision
 
 
 class ChannelFacts(FrozenModel):

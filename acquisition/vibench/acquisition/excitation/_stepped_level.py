@@ -82,7 +82,9 @@ class SteppedLevel(AbstractExcitation):
 
     def preview(self, sample_rate_hz: float) -> SignalPreview:
         """All levels, waits included."""
-        return signal_preview(self.steps(), self.amplitude_vpp, sample_rate_hz, self.frequency_hz, self.playing_s)
+        return signal_preview(
+            self.steps(), self.amplitude_vpp, sample_rate_hz, self.frequency_hz, self.playing_s
+        )
 
     def _steps(self) -> int:
         # Counted before any list of them is made: a wrong step could ask for millions.

@@ -2,10 +2,10 @@
 
 A `Measurement` is one excitation with its ramps and limits while running; a `Campaign` an ordered list of
 them and of nested sweeps, read from TOML. Before anything moves, a plan is held against the limits of the
-rig by its linear model (`predicted_loads`, `MeasurementPreview`) and laid out in phases of time (`duration_s`). All
-are frozen and validated. Frequencies in Hz, times in s, amplitudes peak to peak in V. Plans open no
-instrument and know no bench and no run. Chains of points: docs/decisions/0014-chains-of-points.md.
-Feedback: docs/feedback.md.
+rig by its linear model (`predicted_loads`, `MeasurementPreview`) and laid out in phases of time
+(`duration_s`). All are frozen and validated. Frequencies in Hz, times in s, amplitudes peak to peak in V.
+Plans open no instrument and know no bench and no run. Chains of points:
+docs/decisions/0014-chains-of-points.md. Feedback: docs/feedback.md.
 
 >>> from vibench.acquisition.plan import Measurement, SineSweep, duration_s
 >>> sweep = SineSweep(amplitude_vpp=1.5, start_hz=220, stop_hz=310, duration_s=6)
@@ -27,10 +27,10 @@ from ..excitation import (
     LeadIn,
     MultisineNoise,
     OddMultisine,
-    SignalPreview,
     ResonanceTracking,
     Segment,
     SettledSine,
+    SignalPreview,
     SineSweep,
     Step,
     SteppedLevel,
@@ -93,9 +93,9 @@ __all__ = [
     "RESONANCE_LABEL",
     "STEP_LABEL",
     "AbstractExcitation",
-    "SweepAxis",
     "Campaign",
     "Direction",
+    "DriveSource",
     "Dwell",
     "Excitation",
     "FrequencySteps",
@@ -104,15 +104,14 @@ __all__ = [
     "InRunLimits",
     "LeadIn",
     "LimitCheck",
+    "LimitSide",
     "Measurement",
+    "MeasurementPreview",
     "MultisineNoise",
     "OddMultisine",
     "OnOverload",
-    "MeasurementPreview",
     "Phase",
-    "DriveSource",
     "Point",
-    "SignalPreview",
     "Range",
     "RangeSpacing",
     "ResonanceTracking",
@@ -121,14 +120,16 @@ __all__ = [
     "RunState",
     "Segment",
     "SettledSine",
-    "LimitSide",
+    "SignalPreview",
     "SineSweep",
     "Step",
     "SteppedLevel",
     "SteppedSine",
     "StreamedNoise",
+    "SweepAxis",
     "check_amplitude_vpp",
     "check_phases",
+    "drive_source_of",
     "duration_s",
     "excited_band_hz",
     "half_cosine",
@@ -137,10 +138,9 @@ __all__ = [
     "load_campaign",
     "measured_s",
     "needed_vpp",
-    "preview_measurement",
     "phases",
-    "drive_source_of",
     "predicted_loads",
+    "preview_measurement",
     "ramp",
     "require_within_limits",
     "shortest_ramp_s",

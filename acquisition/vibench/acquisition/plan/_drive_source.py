@@ -17,8 +17,8 @@ class DriveSource(StrEnum):
 def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
     """Say what plays a measurement on a rig; a stream needs an output, also where there is none."""
     use = OutputUse.STREAMS if rig.daq.output is None else rig.daq.output.plays
-    players = {_source_of(step.play, use) for step in measurement.excitation.steps()}
-    return DriveSource.OUTPUT if DriveSource.OUTPUT in players else DriveSource.GENERATOR
+    drive_sources = {_source_of(step.play, use) for step in measurement.excitation.steps()}
+    return DriveSource.OUTPUT if DriveSource.OUTPUT in drive_sources else DriveSource.GENERATOR
 
 
 def _source_of(play: Play, use: OutputUse) -> DriveSource:

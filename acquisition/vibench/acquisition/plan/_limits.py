@@ -9,8 +9,8 @@ import numpy as np
 from ..errors import LimitExceeded
 from ..rig import (
     LARGEST_LEVEL_ERROR,
-    OutputConfig,
     BaseQuantity,
+    OutputConfig,
     Rig,
     Role,
     channels_of,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..excitation import Excitation, Play, SampleSource, Stream, Tone, Waveform, held_lines
-from ..rig import ComplexArray, BaseQuantity, Rig, RigModel
+from ..rig import BaseQuantity, ComplexArray, Rig, RigModel
 
 HELD_SPANS = 4
 """A held waveform is followed to twice its playback rate: the images above are below 1/20 of the band

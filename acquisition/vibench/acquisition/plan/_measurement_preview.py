@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..excitation import SignalPreview, Samples
+from ..excitation import Samples, SignalPreview
 from ..rig import Rig
 from ._campaign import BYTES_PER_SAMPLE
 from ._limits import LimitCheck, limit_checks

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vibench.sim import BaseResponse, NoContact, Specimen, base_response
 
 from ..excitation import Excitation, SampleSource, Tone, Waveform
-from ..rig import ComplexArray, BaseQuantity, Rig, RigModel, specimen_of
+from ..rig import BaseQuantity, ComplexArray, Rig, RigModel, specimen_of
 from ._loads import BAND_POINTS, Load, of_source, of_waveform, plays_of, terminal_volts
 
 Floats = NDArray[np.float64]

@@ -29,7 +29,13 @@ class SweepAxis(StrEnum):
     FREQUENCY = "frequency_hz"
 
 
-USUAL_ORDER = (SweepAxis.REPETITION, SweepAxis.EXCITATION, SweepAxis.LEVEL, SweepAxis.DIRECTION, SweepAxis.FREQUENCY)
+USUAL_ORDER = (
+    SweepAxis.REPETITION,
+    SweepAxis.EXCITATION,
+    SweepAxis.LEVEL,
+    SweepAxis.DIRECTION,
+    SweepAxis.FREQUENCY,
+)
 _UNITS = {SweepAxis.LEVEL: "vpp", SweepAxis.FREQUENCY: "hz"}
 _TURNING = frozenset({Direction.UP_THEN_DOWN, Direction.DOWN_THEN_UP})
 

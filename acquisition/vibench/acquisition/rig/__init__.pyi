@@ -29,8 +29,8 @@ from ._knobs import (
     save_knob_sheet as save_knob_sheet,
 )
 from ._model import (
-    ComplexArray as ComplexArray,
     BaseQuantity as BaseQuantity,
+    ComplexArray as ComplexArray,
     RigModel as RigModel,
     specimen_of as specimen_of,
     suspended_mass_kg as suspended_mass_kg,
@@ -42,8 +42,8 @@ from ._output import (
 from ._virtual import (
     LARGEST_LEVEL_ERROR as LARGEST_LEVEL_ERROR,
     TOKEN_KEY as TOKEN_KEY,
-    USUAL_GRID_RATE_HZ as USUAL_GRID_RATE_HZ,
     TOKEN_VARIABLE as TOKEN_VARIABLE,
+    USUAL_GRID_RATE_HZ as USUAL_GRID_RATE_HZ,
     VirtualConfig as VirtualConfig,
     fastest_sample_rate_hz as fastest_sample_rate_hz,
     given_token as given_token,

@@ -11,9 +11,9 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
 
 from ..host import FrozenModel
 
-TOKEN_KEY = "vibench-token"
+TOKEN_KEY = "vibench-token"  # noqa: S105 - a name, not a password
 """Where a gRPC call carries it."""
-TOKEN_VARIABLE = "VIBENCH_RIG_TOKEN"
+TOKEN_VARIABLE = "VIBENCH_RIG_TOKEN"  # noqa: S105 - as above
 """Where our own programs find it: the environment, never a command line that others can read."""
 
 

@@ -40,9 +40,9 @@ class SampleSink(Protocol):
 class AcquisitionLoop:
     """The recording as it runs. Its clock is the number of samples read: to wait is to read."""
 
-    def __init__(self, digitizer: Digitizer, recorder: SampleSink) -> None:
+    def __init__(self, digitizer: Digitizer, sink: SampleSink) -> None:
         self._digitizer = digitizer
-        self._recorder = recorder
+        self._sink = sink
         self._segment: Segment | None = None
         self._samples = 0
         self._due_s = 0.0
@@ -77,7 +77,7 @@ class AcquisitionLoop:
 
     def _next(self, samples: int) -> Block:
         block = self._digitizer.read(samples)
-        self._recorder.append(block)
+        self._sink.append(block)
         self._samples = block.first_sample + block.volts.shape[1]
         return block
 
@@ -90,16 +90,16 @@ class AcquisitionLoop:
         if segment == self._segment:
             return
         if self._segment is not None:
-            self._recorder.end_segment()
+            self._sink.end_segment()
         if segment is not None:
-            self._recorder.begin_segment(segment.label, **segment.numbers)
+            self._sink.begin_segment(segment.label, **segment.numbers)
         self._segment = segment
 
     def log(self, kind: str, text: str) -> None:
         """Note an event at the next sample."""
-        self._recorder.log(kind, text, self._samples)
+        self._sink.log(kind, text, self._samples)
 
-    def log_trip(self, error: LimitExceeded) -> None:
+    def log_limit_trip(self, error: LimitExceeded) -> None:
         """Note the numbers of a limit that was passed, at the sample where it was."""
         if error.trip is not None:
-            self._recorder.log(LIMIT_KIND, json.dumps(asdict(error.trip)), error.trip.sample)
+            self._sink.log(LIMIT_KIND, json.dumps(asdict(error.trip)), error.trip.sample)

@@ -5,7 +5,7 @@ from typing import Protocol
 
 from ..bench import RunBench
 from ..errors import ConfigurationError
-from ..plan import Measurement, Phase, DriveSource, drive_source_of
+from ..plan import DriveSource, Measurement, Phase, drive_source_of
 from ._generator_drive import GeneratorDrive
 from ._stream_drive import StreamDrive
 
@@ -18,7 +18,7 @@ class Drive(Protocol):
     """
 
     @property
-    def player(self) -> DriveSource:
+    def drive_source(self) -> DriveSource:
         """The instrument that is heard."""
 
     @property

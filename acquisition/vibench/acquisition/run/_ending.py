@@ -75,10 +75,10 @@ class Ending:
         """Tell how it ended."""
         return Outcome(self.state, self.reason, path, self._cause)
 
-    def leave(self, drive: Drive, digitizer: Digitizer, recorder: SampleSink) -> None:
+    def leave(self, drive: Drive, digitizer: Digitizer, sink: SampleSink) -> None:
         """Silence, end sampling, finish the recording: each of them, whatever the others do."""
         with ExitStack() as leaving:
-            leaving.callback(self._finish, recorder)
+            leaving.callback(self._finish, sink)
             leaving.callback(self._stop_listening, digitizer)
             leaving.callback(self._silence, drive)
 
@@ -98,9 +98,9 @@ class Ending:
             if not has_failed_already:  # else the first failure is the cause, and must stay in front
                 raise
 
-    def _finish(self, recorder: SampleSink) -> None:
+    def _finish(self, sink: SampleSink) -> None:
         try:
-            recorder.finish(_RECORDED_AS[self.state], self.reason)
+            sink.finish(_RECORDED_AS[self.state], self.reason)
         except AcquisitionError as failure:
             self._add(failure)
             raise

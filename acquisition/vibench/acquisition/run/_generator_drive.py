@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import AcquisitionError, ConfigurationError
 from ..excitation import LOWEST_AMPLITUDE_VPP, Play, Stream, Tone, Waveform
 from ..instruments import FunctionGenerator
-from ..plan import Measurement, Phase, DriveSource, RunState, half_cosine, stairs
+from ..plan import DriveSource, Measurement, Phase, RunState, half_cosine, stairs
 
 QUIET_VPP = 1.25 * LOWEST_AMPLITUDE_VPP
 """Amplitude of level 0 for a waveform that reaches full range: where ramps begin and end, safely above
@@ -18,7 +18,7 @@ the smallest setting that the generator takes."""
 class GeneratorDrive:
     """A `Drive` whose commands take effect when they are given: each phase is commanded as it begins."""
 
-    player = DriveSource.GENERATOR
+    drive_source = DriveSource.GENERATOR
     pause_s = 0.0
     """A generator need not know what is coming."""
     can_hold = True

@@ -1,4 +1,4 @@
-"""The watch over the running measurement: every block against the limits of the rig.
+"""The limit monitor of the running measurement: every block against the limits of the rig.
 
 Where base and specimen are, from what is measured: integrated block by block, and high-passed.
 """
@@ -137,8 +137,8 @@ class LimitMonitor:
         if block.first_sample != self._next_sample:
             self._begin(block.first_sample)
         self._next_sample = block.first_sample + block.volts.shape[1]
-        for watched in self._watched(block):
-            self._require(watched, block.first_sample)
+        for monitored in self._monitored_quantities(block):
+            self._require(monitored, block.first_sample)
         if block.overloads and self._limits.on_overload is OnOverload.STOP:
             raise self._overloaded(block, block.overloads[0])
 
@@ -148,7 +148,7 @@ class LimitMonitor:
         self._specimen = SpecimenTracker(self._rate_hz)
         self._mean_square_a2 = 0.0
 
-    def _watched(self, block: Block) -> Iterator[_MonitoredQuantity]:
+    def _monitored_quantities(self, block: Block) -> Iterator[_MonitoredQuantity]:
         """Everything with a limit: what is measured comes before what follows from it."""
         rows = {
             channel.role: volts * channel.units_per_volt
@@ -183,7 +183,9 @@ class LimitMonitor:
             ("the base velocity", base.velocity, v, share.base_velocity, "m/s"),
             ("the stroke", base.displacement, x, share.stroke, "m"),
         ):
-            yield _MonitoredQuantity(Role.BASE_ACCELERATION, what, values, limit.value * fraction, unit, limit.source)
+            yield _MonitoredQuantity(
+                Role.BASE_ACCELERATION, what, values, limit.value * fraction, unit, limit.source
+            )
 
     def _table(self, acceleration: Samples, base: BaseMotion) -> _MonitoredQuantity:
         """Force that moves the table: mass times acceleration, and what its suspension takes."""
@@ -213,7 +215,9 @@ class LimitMonitor:
         # The coil's inductance is left out, which makes the current too large, by 3 % at 1 kHz.
         current = (voltage - shaker.force_constant_n_per_a * base.velocity) / shaker.coil_resistance_ohm
         peak, force, limiter = shaker.limits.current_a, shaker.limits.force_n, rig.amplifier.current_limit_a
-        yield _MonitoredQuantity(role, "the coil current", current, peak.value * share.current, "A", peak.source)
+        yield _MonitoredQuantity(
+            role, "the coil current", current, peak.value * share.current, "A", peak.source
+        )
         yield _MonitoredQuantity(
             role,
             "the coil's force",
@@ -236,26 +240,28 @@ class LimitMonitor:
         limit = self._rig.specimen.amplitude_limit_m
         stretched = self._specimen.follow(velocity, base.velocity, _blind(block))
         allowed = limit.value * self._limits.specimen_amplitude
-        return _MonitoredQuantity(Role.M0_VELOCITY, "the specimen's amplitude", stretched, allowed, "m", limit.source)
+        return _MonitoredQuantity(
+            Role.M0_VELOCITY, "the specimen's amplitude", stretched, allowed, "m", limit.source
+        )
 
-    def _require(self, watched: _MonitoredQuantity, first_sample: int) -> None:
-        peak = float(np.max(np.abs(watched.values)))
-        if peak <= watched.limit:
+    def _require(self, monitored: _MonitoredQuantity, first_sample: int) -> None:
+        peak = float(np.max(np.abs(monitored.values)))
+        if peak <= monitored.limit:
             return
-        sample = first_sample + int(np.argmax(np.abs(watched.values) > watched.limit))
+        sample = first_sample + int(np.argmax(np.abs(monitored.values) > monitored.limit))
         trip = LimitTrip(
-            channel=watched.role.value,
-            quantity=watched.what.removeprefix("the "),
+            channel=monitored.role.value,
+            quantity=monitored.what.removeprefix("the "),
             value=peak,
-            limit=watched.limit,
-            unit=watched.unit,
+            limit=monitored.limit,
+            unit=monitored.unit,
             sample=sample,
             time_s=sample / self._rate_hz,
         )
         raise LimitExceeded(
-            f"{watched.what} reached {peak:.4g} {watched.unit}, allowed is {watched.limit:.4g} "
-            f"{watched.unit} ({watched.source}), on {watched.role.value} at {trip.time_s:.4f} s (sample "
-            f"{sample}). {_OFF}",
+            f"{monitored.what} reached {peak:.4g} {monitored.unit}, allowed is {monitored.limit:.4g} "
+            f"{monitored.unit} ({monitored.source}), on {monitored.role.value} at {trip.time_s:.4f} s "
+            f"(sample {sample}). {_OFF}",
             trip,
         )
 

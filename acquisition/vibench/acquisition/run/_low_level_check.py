@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import CheckFailed
 from ..instruments import Samples
 from ..plan import CHECK_FREQUENCY_HZ
-from ..rig import Channel, BaseQuantity, Rig, RigModel, Role
+from ..rig import BaseQuantity, Channel, Rig, RigModel, Role
 
 DRIVE_TOLERANCE = 0.15
 """How far the measured drive may lie from the setting: a wrong load is a factor of 2, a cable is nothing."""

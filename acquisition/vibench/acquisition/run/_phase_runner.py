@@ -31,21 +31,28 @@ class PhaseRunner:
     and it is up to the run to let it ramp down.
     """
 
-    def __init__(self, drive: Drive, tape: AcquisitionLoop, guard: LimitMonitor, switch: StopSwitch, total_s: float) -> None:
+    def __init__(
+        self,
+        drive: Drive,
+        loop: AcquisitionLoop,
+        limit_monitor: LimitMonitor,
+        switch: StopSwitch,
+        total_s: float,
+    ) -> None:
         self.state = RunState.CHECKING
-        self.tape = tape
+        self.loop = loop
         self._drive = drive
-        self._guard = guard
+        self._limit_monitor = limit_monitor
         self._switch = switch
         self._total_s = total_s
         self._look: Callable[[Block], None] = self._go_on
         self._held_s = 0.0
         self._play: Play | None = None
 
-    def perform(self, phase: Phase, into: list[Block] | None = None) -> Iterator[Progress]:
+    def run_phase(self, phase: Phase, into: list[Block] | None = None) -> Iterator[Progress]:
         """Play a phase; what is heard goes ``into`` a list as well, if one is given."""
         self._enter(phase.state)
-        self.tape.enter(phase.segment)
+        self.loop.enter(phase.segment)
         self._play = phase.play
         for wait_s in self._drive.perform(phase):
             yield from self._read(wait_s, into)
@@ -58,9 +65,9 @@ class PhaseRunner:
         A harder stop that is asked for on the way takes over. ``ramp_s`` tells how long each takes [s].
         """
         self._look = _look_away
-        self.tape.log("end", reason)
-        self.tape.cut()
-        since_s = self.tape.elapsed_s
+        self.loop.log("end", reason)
+        self.loop.cut()
+        since_s = self.loop.elapsed_s
         if self._drive.is_heard:
             self._enter(RunState.RAMPING_DOWN)
         while level is not StopLevel.OFF and self._drive.is_heard:
@@ -68,15 +75,15 @@ class PhaseRunner:
                 yield from self._read(wait_s)
                 if (harder := self._switch.harder_than(level)) is not None:
                     level = harder.level
-                    self.tape.log("end", harder.reason)
+                    self.loop.log("end", harder.reason)
                     break
         if level is StopLevel.OFF:
             self._drive.cut()
-        took_s = self.tape.elapsed_s - since_s
-        self.tape.log("silence", f"{level.value}: {took_s:.3f} s after the stop was seen")
+        took_s = self.loop.elapsed_s - since_s
+        self.loop.log("silence", f"{level.value}: {took_s:.3f} s after the stop was seen")
 
     def _read(self, duration_s: float, into: list[Block] | None = None) -> Iterator[Progress]:
-        for block in self.tape.read_for(duration_s):
+        for block in self.loop.read_for(duration_s):
             if into is not None:
                 into.append(block)
             yield self._told(block)
@@ -91,7 +98,7 @@ class PhaseRunner:
         ramped down.
         """
         if not self._drive.can_hold:
-            reason = f"a stream from the {self._drive.player.value} cannot be held: it was ramped down"
+            reason = f"a stream from the {self._drive.drive_source.value} cannot be held: it was ramped down"
             raise Stopped(StopRequest.by(Cause.OPERATOR, reason))
         before = self.state
         self._enter(RunState.HELD)
@@ -100,32 +107,32 @@ class PhaseRunner:
             if self._held_s > HOLD_LONGEST_S:
                 reason = f"held for {HOLD_LONGEST_S:g} s, the longest that its recording has room for"
                 raise Stopped(StopRequest.by(Cause.OPERATOR, reason))
-            block = self.tape.linger(BLOCK_S)
+            block = self.loop.linger(BLOCK_S)
             yield self._told(block)
             self._look(block)
         self._enter(before)
 
     def _go_on(self, block: Block) -> None:
         """Raise what ends the run early: a limit, or somebody's wish."""
-        self._guard.require_safe(block)
+        self._limit_monitor.require_safe(block)
         if (request := self._switch.request) is not None:
             raise Stopped(request)
 
     def _told(self, block: Block) -> Progress:
         """Note what others want to be noted, and tell where the run stands."""
-        tape = self.tape
+        loop = self.loop
         for text in self._switch.take_marks():
-            tape.log("mark", text)
+            loop.log("mark", text)
         level_vpp = self._drive.setting_vpp
         frequency_hz = self._play.frequency_hz if isinstance(self._play, Tone) else None
         return Progress(
-            self.state, tape.segment, block, tape.elapsed_s, self._total_s, level_vpp, frequency_hz
+            self.state, loop.segment, block, loop.elapsed_s, self._total_s, level_vpp, frequency_hz
         )
 
     def _enter(self, state: RunState) -> None:
         if state is not self.state:
             self.state = state
-            self.tape.log("state", state.value)
+            self.loop.log("state", state.value)
 
 
 def _look_away(block: Block) -> None:

@@ -18,23 +18,23 @@ from ..excitation import AbstractFeedback
 from ..instruments import Block
 from ..plan import (
     CHECK_S,
+    DriveSource,
     Measurement,
     Phase,
-    DriveSource,
     RunState,
     check_amplitude_vpp,
     check_phases,
+    drive_source_of,
     duration_s,
     known_phases,
     phases,
-    drive_source_of,
     require_within_limits,
     shortest_ramp_s,
 )
 from ..recording import ChannelHeader, Origin, RecordingHeader, create_recording
 from ..rig import Channel, KnobSheet
 from ..stopping import LEVELS, Cause, StopLevel, StopRequest, StopSwitch
-from ._acquisition_loop import SampleSink, AcquisitionLoop
+from ._acquisition_loop import AcquisitionLoop, SampleSink
 from ._drive import Drive, drive_for
 from ._ending import Ending, Outcome, Progress
 from ._limit_monitor import LimitMonitor
@@ -143,18 +143,20 @@ class Run:
         self._bench_check = bench_check
         self._create = create
         self._drive: Drive  # chosen when the plan is admitted; nothing plays before
-        self._conductor: Controller[None] | None = None
-        self._guard = LimitMonitor(bench.rig, bench.channels, measurement.limits, bench.digitizer.sample_rate_hz)
+        self._controller: Controller[None] | None = None
+        self._limit_monitor = LimitMonitor(
+            bench.rig, bench.channels, measurement.limits, bench.digitizer.sample_rate_hz
+        )
         self._total_s = duration_s(measurement)
         self._state = RunState.IDLE
         self._ending = Ending()
-        self._performance: PhaseRunner | None = None
+        self._runner: PhaseRunner | None = None
         self._blocks = self._carry_out()
 
     @property
     def state(self) -> RunState:
         """Where the run stands."""
-        return self._state if self._performance is None else self._performance.state
+        return self._state if self._runner is None else self._runner.state
 
     @property
     def outcome(self) -> Outcome:
@@ -189,11 +191,11 @@ class Run:
         self.close()
 
     def _carry_out(self) -> Generator[Progress, None, None]:
-        recorder = self._admitted()
-        tape = AcquisitionLoop(self._bench.digitizer, recorder)
-        self._performance = PhaseRunner(self._drive, tape, self._guard, self._switch, self._total_s)
+        sink = self._admitted()
+        loop = AcquisitionLoop(self._bench.digitizer, sink)
+        self._runner = PhaseRunner(self._drive, loop, self._limit_monitor, self._switch, self._total_s)
         try:
-            yield from self._played_or_stopped(self._performance)
+            yield from self._played_or_stopped(self._runner)
         except (GeneratorExit, LimitExceeded):
             raise
         except KeyboardInterrupt:
@@ -204,26 +206,26 @@ class Run:
             raise
         finally:
             try:
-                self._ending.leave(self._drive, self._bench.digitizer, recorder)
+                self._ending.leave(self._drive, self._bench.digitizer, sink)
             finally:
-                self._performance.state = self._ending.state
+                self._runner.state = self._ending.state
 
-    def _played_or_stopped(self, performance: PhaseRunner) -> Iterator[Progress]:
+    def _played_or_stopped(self, runner: PhaseRunner) -> Iterator[Progress]:
         """Play the plan; where somebody or a limit ends it, ramp down as hard as the cause asks for."""
         try:
-            yield from self._played(performance)
+            yield from self._played(runner)
             self._ending.is_finished()
         except Stopped as stop:
             self._ending.is_stopped(str(stop), stop.request.cause)
-            yield from self._ramped_down_early(performance, stop.request.level)
+            yield from self._ramped_down_early(runner, stop.request.level)
         except LimitExceeded as error:
             self._ending.is_failed(error, str(error))
-            performance.tape.log_trip(error)
-            yield from self._ramped_down_early(performance, LEVELS[Cause.LIMIT])
+            runner.loop.log_limit_trip(error)
+            yield from self._ramped_down_early(runner, LEVELS[Cause.LIMIT])
             raise
         except GeneratorExit:
             self._ending.is_stopped("the program that carried it out left it", Cause.PROGRAM)
-            deque(self._ramped_down_early(performance, LEVELS[Cause.PROGRAM]), maxlen=0)
+            deque(self._ramped_down_early(runner, LEVELS[Cause.PROGRAM]), maxlen=0)
             raise
 
     def _admitted(self) -> SampleSink:
@@ -233,7 +235,7 @@ class Run:
             require_checkable(self._bench.channels)
             require_within_limits(self._measurement, self._bench.rig)
             self._drive = drive_for(self._bench, self._measurement)
-            self._conductor = controller_for(self._bench, self._measurement)
+            self._controller = controller_for(self._bench, self._measurement)
             self._total_s += self._before_s()
             return self._create(self._path, run_header(self._bench, self._measurement, self._total_s))
         except AcquisitionError as error:
@@ -241,26 +243,26 @@ class Run:
             self._state = RunState.FAILED
             raise
 
-    def _played(self, performance: PhaseRunner) -> Iterator[Progress]:
-        tape = performance.tape
-        tape.log("player", self._drive.player.value)
+    def _played(self, runner: PhaseRunner) -> Iterator[Progress]:
+        loop = runner.loop
+        loop.log("player", self._drive.drive_source.value)
         match self._bench_check:
             case LowLevelCheck.AT_LOW_LEVEL:
                 self._begin(check_phases(self._measurement))
-                yield from self._checked(performance)
+                yield from self._checked(runner)
                 self._drive.announce(known_phases(self._measurement))
                 pause_s = self._drive.pause_s
             case LowLevelCheck.RECENTLY_PASSED:
                 self._begin(known_phases(self._measurement))
-                tape.log("check", "left out: the bench was checked shortly before")
+                loop.log("check", "left out: the bench was checked shortly before")
                 pause_s = 0.0
-        yield from performance.perform(Phase(RunState.ARMED, None, pause_s))
-        if self._conductor is None:
+        yield from runner.run_phase(Phase(RunState.ARMED, None, pause_s))
+        if self._controller is None:
             for phase in phases(self._measurement):
-                yield from performance.perform(phase)
+                yield from runner.run_phase(phase)
         else:
-            yield from _controlled(performance, self._conductor)
-        tape.enter(None)
+            yield from _controlled(runner, self._controller)
+        loop.enter(None)
 
     def _before_s(self) -> float:
         """Time before the first ramp [s]: what comes is told when the check has passed, and not before."""
@@ -275,13 +277,13 @@ class Run:
         self._drive.arm(coming)
         self._bench.digitizer.start()
 
-    def _checked(self, performance: PhaseRunner) -> Iterator[Progress]:
+    def _checked(self, runner: PhaseRunner) -> Iterator[Progress]:
         before: list[Block] = []
         during: list[Block] = []
         listening, settling, measuring = check_phases(self._measurement)
-        yield from performance.perform(listening, before)
-        yield from performance.perform(settling)
-        yield from performance.perform(measuring, during)
+        yield from runner.run_phase(listening, before)
+        yield from runner.run_phase(settling)
+        yield from runner.run_phase(measuring, during)
         figures = judged(
             self._bench.rig,
             self._bench.channels,
@@ -290,10 +292,10 @@ class Run:
             self._bench.digitizer.sample_rate_hz,
             check_amplitude_vpp(self._measurement.excitation.amplitude_vpp),
         )
-        performance.tape.log("check", figures.text())
+        runner.loop.log("check", figures.text())
 
-    def _ramped_down_early(self, performance: PhaseRunner, level: StopLevel) -> Iterator[Progress]:
-        return performance.ramp_down_early(self._ending.reason, level, self._ramp_s)
+    def _ramped_down_early(self, runner: PhaseRunner, level: StopLevel) -> Iterator[Progress]:
+        return runner.ramp_down_early(self._ending.reason, level, self._ramp_s)
 
     def _ramp_s(self, level: StopLevel) -> float:
         """How long the ramp of a stop takes [s]."""
@@ -301,16 +303,16 @@ class Run:
         return planned_s if level is StopLevel.RAMP else min(planned_s, shortest_ramp_s(self._bench.rig))
 
 
-def _controlled(performance: PhaseRunner, conductor: Controller[None]) -> Iterator[Progress]:
-    """Carry out moves one by one; what was heard during each decides the next."""
+def _controlled(runner: PhaseRunner, controller: Controller[None]) -> Iterator[Progress]:
+    """Carry out actions one by one; the samples of each decide the next."""
     try:
-        move = next(conductor)
+        action = next(controller)
         while True:
-            for note in move.notes:
-                performance.tape.log(note.kind, note.text)
+            for note in action.notes:
+                runner.loop.log(note.kind, note.text)
             blocks: list[Block] = []
-            if move.phase is not None:
-                yield from performance.perform(move.phase, blocks)
-            move = conductor.send(phase_samples(blocks))
+            if action.phase is not None:
+                yield from runner.run_phase(action.phase, blocks)
+            action = controller.send(phase_samples(blocks))
     except StopIteration:
         pass

@@ -14,11 +14,11 @@ import numpy as np
 from ..errors import AcquisitionError, ConfigurationError
 from ..excitation import Play, Stream, Tone, Waveform
 from ..instruments import AnalogOutput, Samples
-from ..plan import Measurement, Phase, DriveSource, half_cosine
+from ..plan import DriveSource, Measurement, Phase, half_cosine
 from ._acquisition_loop import BLOCK_S
 
 RELEASE_S = 0.05
-"""How long the last sound fades when a score ends while something sounds [s]."""
+"""How long the last sound fades when a sequence ends while something sounds [s]."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,9 @@ class _Stretch:
     end_level: float
 
     def levels(self, first: int, count: int) -> Samples:
-        """Level of ``count`` samples from number ``first`` of the score on; the first has ``begin_level``."""
+        """Level of ``count`` samples from number ``first`` of the sequence on; the first has
+        ``begin_level``.
+        """
         progress = (first - self.begin + np.arange(count)) / (self.end - self.begin)
         rise = self.end_level - self.begin_level
         return np.asarray(self.begin_level + rise * 0.5 * (1 - np.cos(np.pi * progress)))
@@ -50,7 +52,7 @@ class OutputSynthesizer:
     def __init__(self, sample_rate_hz: float) -> None:
         self._rate_hz = sample_rate_hz
         self._coming: Iterator[Phase] = iter(())
-        self._piece = _Stretch(None, 0, 0, 0.0, 0.0)
+        self._stretch = _Stretch(None, 0, 0, 0.0, 0.0)
         self._sample = 0
         self._due_s = 0.0
         self._level = 0.0
@@ -65,7 +67,7 @@ class OutputSynthesizer:
     @property
     def is_over(self) -> bool:
         """Whether all that was appended has been handed out, and silence too."""
-        return self._piece.play is None and self._level == 0.0 and self._sample == self._piece.end
+        return self._stretch.play is None and self._level == 0.0 and self._sample == self._stretch.end
 
     def append(self, phases: Iterable[Phase]) -> None:
         """Play ``phases`` after what is there; at once when all of it has been handed out."""
@@ -81,23 +83,23 @@ class OutputSynthesizer:
         taken = np.empty(count)
         done = 0
         while done < count:
-            self._turn_the_page(count - done)
-            piece = self._piece
-            stretch = min(count - done, piece.end - self._sample)
-            levels = piece.levels(self._sample, stretch + 1)
-            taken[done : done + stretch] = self._sound(piece.play, stretch) * levels[:-1]
+            self._advance_to_next(count - done)
+            current = self._stretch
+            stretch = min(count - done, current.end - self._sample)
+            levels = current.levels(self._sample, stretch + 1)
+            taken[done : done + stretch] = self._sound(current.play, stretch) * levels[:-1]
             self._level = float(levels[-1])
             self._sample += stretch
             done += stretch
         return taken
 
-    def _turn_the_page(self, wanted: int) -> None:
+    def _advance_to_next(self, wanted: int) -> None:
         """Find the piece that the next sample belongs to; phases shorter than a sample are passed over.
 
         When nothing is coming, silence lasts for the ``wanted`` samples and no longer, so that what is
         appended then begins with the next one.
         """
-        while self._sample >= self._piece.end:
+        while self._sample >= self._stretch.end:
             phase = next(self._coming, None)
             if phase is not None:
                 self._begin(phase)
@@ -109,16 +111,16 @@ class OutputSynthesizer:
     def _begin(self, phase: Phase) -> None:
         self._due_s += phase.duration_s
         end = round(self._due_s * self._rate_hz)
-        self._piece = _Stretch(phase.play, self._sample, end, self._level, phase.end_level)
+        self._stretch = _Stretch(phase.play, self._sample, end, self._level, phase.end_level)
 
     def _fade(self, duration_s: float) -> None:
         end = self._sample + max(1, round(duration_s * self._rate_hz))
-        self._piece = _Stretch(self._piece.play, self._sample, end, self._level, 0.0)
+        self._stretch = _Stretch(self._stretch.play, self._sample, end, self._level, 0.0)
         self._due_s = end / self._rate_hz
 
     def _rest(self, samples: int) -> None:
-        self._piece = _Stretch(None, self._sample, self._sample + samples, 0.0, 0.0)
-        self._due_s = self._piece.end / self._rate_hz
+        self._stretch = _Stretch(None, self._sample, self._sample + samples, 0.0, 0.0)
+        self._due_s = self._stretch.end / self._rate_hz
 
     def _sound(self, play: Play | None, count: int) -> Samples:
         match play:
@@ -152,7 +154,7 @@ class StreamDrive:
     so breaking off takes effect after at most that long.
     """
 
-    player = DriveSource.OUTPUT
+    drive_source = DriveSource.OUTPUT
     can_hold = False
 
     def __init__(self, output: AnalogOutput, measurement: Measurement, terminal_factor: float) -> None:
@@ -160,7 +162,7 @@ class StreamDrive:
         self._output = output
         self._amplitude_vpp = measurement.excitation.amplitude_vpp
         self._full_v = 0.5 * self._amplitude_vpp * terminal_factor
-        self._score = OutputSynthesizer(output.sample_rate_hz)
+        self._synthesizer = OutputSynthesizer(output.sample_rate_hz)
         self._read_s = 0.0
         self._written = 0
         self._sounds_until = 0
@@ -185,14 +187,14 @@ class StreamDrive:
 
     def arm(self, coming: Iterable[Phase]) -> None:
         """Write the first stretch, and wait for the digitizer's start."""
-        self._score.append(coming)
+        self._synthesizer.append(coming)
         self._write_ahead()
         self._output.arm()
 
     def announce(self, coming: Iterable[Phase]) -> None:
         """Let ``coming`` follow the silence that has been written already."""
-        assert self._score.is_over, "what was told before is shorter than what is written ahead"
-        self._score.append(coming)
+        assert self._synthesizer.is_over, "what was told before is shorter than what is written ahead"
+        self._synthesizer.append(coming)
 
     def perform(self, phase: Phase) -> Iterator[float]:
         """Write ahead while a phase, written before, is heard; yields how long to read until more fits."""
@@ -201,9 +203,9 @@ class StreamDrive:
 
     def ramp_down(self, ramp_s: float) -> Iterator[float]:
         """Let what is written play out, then fade; yields as `perform` does."""
-        fade_s = ramp_s if self._score.level > 0.0 else 0.0
+        fade_s = ramp_s if self._synthesizer.level > 0.0 else 0.0
         written_s = self._written / self._output.sample_rate_hz - self._read_s
-        self._score.fade(ramp_s)
+        self._synthesizer.fade(ramp_s)
         yield from self._listened(written_s, self._heard_vpp)
         yield from self._listened(fade_s, 0.0)
 
@@ -253,7 +255,7 @@ class StreamDrive:
             self._write(room)
 
     def _write(self, count: int) -> None:
-        volts = self._full_v * self._score.take(count)
+        volts = self._full_v * self._synthesizer.take(count)
         self._output.write(volts)
         sounding = np.flatnonzero(volts)
         if sounding.size:
@@ -263,7 +265,7 @@ class StreamDrive:
     def _fade_blindly(self) -> None:
         if not self.is_heard:
             return
-        self._score.fade(BLIND_FADE_S)
+        self._synthesizer.fade(BLIND_FADE_S)
         ahead = self._output.ahead_samples
         # Writing waits for room: when the last silence has gone in, the fade has been played.
         left = ceil(BLIND_FADE_S * self._output.sample_rate_hz) + ahead

@@ -16,26 +16,26 @@ from ._recording_traces import (
     transmission_trace,
 )
 from ._trace import (
-    CurveOrigin,
-    CurveKind,
     Curve,
-    sorted_curve,
+    CurveKind,
+    CurveOrigin,
     curve_difference,
+    sorted_curve,
 )
-from ._trace_peaks import readings, curve_peaks
+from ._trace_peaks import curve_peaks, readings
 
 __all__ = [
     "AnalysisOptions",
-    "CurveOrigin",
-    "CurveKind",
     "Curve",
+    "CurveKind",
+    "CurveOrigin",
+    "curve_difference",
+    "curve_peaks",
     "dwell_traces",
     "predicted_curves",
     "readings",
     "sorted_curve",
     "stepped_traces",
     "sweep_traces",
-    "curve_difference",
-    "curve_peaks",
     "transmission_trace",
 ]

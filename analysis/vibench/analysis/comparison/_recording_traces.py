@@ -8,7 +8,7 @@ from ..frequency_response import FrequencyResponse
 from ..model import ResponsePrediction
 from ..signals import Reals
 from ..sine import DwellResponse, SteppedResponse, SweepResponse
-from ._trace import CurveOrigin, CurveKind, Curve
+from ._trace import Curve, CurveKind, CurveOrigin
 
 SAME_HZ = 0.01
 """Frequencies that lie within this are one [Hz]."""
@@ -24,7 +24,13 @@ def predicted_curves(name: str, found: ResponsePrediction) -> Iterator[Curve]:
         name, CurveOrigin.PREDICTED, CurveKind.RESPONSE_I, found.frequency_hz, found.response_i, unknown, note
     )
     yield Curve(
-        name, CurveOrigin.PREDICTED, CurveKind.RESPONSE_II, found.frequency_hz, found.response_ii, unknown, note
+        name,
+        CurveOrigin.PREDICTED,
+        CurveKind.RESPONSE_II,
+        found.frequency_hz,
+        found.response_ii,
+        unknown,
+        note,
     )
 
 
@@ -35,7 +41,7 @@ def transmission_trace(name: str, origin: CurveOrigin, found: FrequencyResponse)
     return Curve(
         name,
         origin,
-        CurveKind.TRANSMISSION,
+        CurveKind.TRANSMISSIBILITY,
         found.frequency_hz,
         found.magnitude,
         found.relative_sd_magnitude,

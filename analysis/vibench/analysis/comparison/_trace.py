@@ -29,7 +29,7 @@ class CurveOrigin(StrEnum):
 class CurveKind(StrEnum):
     """What a curve tells of the motion."""
 
-    TRANSMISSION = "transmission"
+    TRANSMISSIBILITY = "transmission"
     RESPONSE_I = "Response I"
     RESPONSE_II = "Response II"
 
@@ -93,18 +93,18 @@ class Curve:
         return replace(self, frequency_hz=frequency_hz, magnitude=np.exp(magnitude), relative_sd=spread)
 
 
-def sorted_curve(trace: Curve) -> Curve:
+def sorted_curve(curve: Curve) -> Curve:
     """Bring the points into ascending order, each frequency once: sweeps downwards come the other way."""
-    frequency_hz, first = np.unique(trace.frequency_hz, return_index=True)
+    frequency_hz, first = np.unique(curve.frequency_hz, return_index=True)
     return replace(
-        trace,
+        curve,
         frequency_hz=frequency_hz,
-        magnitude=trace.magnitude[first],
-        relative_sd=trace.relative_sd[first],
+        magnitude=curve.magnitude[first],
+        relative_sd=curve.relative_sd[first],
     )
 
 
-def curve_difference(trace: Curve, reference: Curve) -> CurveDifference:
+def curve_difference(curve: Curve, reference: Curve) -> CurveDifference:
     """Say how far a curve lies above another, at its own frequencies within both.
 
     Raises
@@ -113,17 +113,17 @@ def curve_difference(trace: Curve, reference: Curve) -> CurveDifference:
         When the two have no frequency in common.
 
     """
-    low = max(trace.frequency_hz[0], reference.frequency_hz[0])
-    high = min(trace.frequency_hz[-1], reference.frequency_hz[-1])
-    shared = (trace.frequency_hz >= low) & (trace.frequency_hz <= high) & np.isfinite(trace.magnitude)
+    low = max(curve.frequency_hz[0], reference.frequency_hz[0])
+    high = min(curve.frequency_hz[-1], reference.frequency_hz[-1])
+    shared = (curve.frequency_hz >= low) & (curve.frequency_hz <= high) & np.isfinite(curve.magnitude)
     if not shared.any():
         raise NotEnoughData(
-            f"{trace.name} and {reference.name} have no frequency in common; compare curves that overlap"
+            f"{curve.name} and {reference.name} have no frequency in common; compare curves that overlap"
         )
-    place = trace.frequency_hz[shared]
+    place = curve.frequency_hz[shared]
     other = reference.at(place)
     return logarithmic_difference(
         place,
-        (trace.magnitude[shared], np.nan_to_num(trace.relative_sd[shared])),
+        (curve.magnitude[shared], np.nan_to_num(curve.relative_sd[shared])),
         (other.magnitude, np.nan_to_num(other.relative_sd)),
     )

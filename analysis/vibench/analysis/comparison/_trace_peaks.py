@@ -24,15 +24,15 @@ class Reading:
     """The last over the first; NaN where either is missing."""
 
 
-def readings(traces: Sequence[Curve], frequencies_hz: Sequence[float]) -> tuple[Reading, ...]:
+def readings(curves: Sequence[Curve], frequencies_hz: Sequence[float]) -> tuple[Reading, ...]:
     """Read every curve at every frequency."""
-    return tuple(_reading(each, np.asarray(frequencies_hz, dtype=np.float64)) for each in traces)
+    return tuple(_reading(each, np.asarray(frequencies_hz, dtype=np.float64)) for each in curves)
 
 
-def _reading(trace: Curve, frequency_hz: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> Reading:
-    values = trace.at(frequency_hz).magnitude
+def _reading(curve: Curve, frequency_hz: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> Reading:
+    values = curve.at(frequency_hz).magnitude
     ratio = float(20 * np.log10(values[-1] / values[0])) if values.size else float("nan")
-    return Reading(trace.name, tuple(float(value) for value in values), ratio)
+    return Reading(curve.name, tuple(float(value) for value in values), ratio)
 
 
 _LEAST_RISE_DB = 3.0
@@ -62,18 +62,18 @@ class CurvePeak:
         return None if width_hz is None else 0.5 * width_hz / self.frequency_hz
 
 
-def curve_peaks(trace: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
+def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
     """Find the highest peaks, in the order of frequency."""
-    known = np.isfinite(trace.magnitude) & (trace.magnitude > 0)
-    frequency_hz, height = trace.frequency_hz[known], np.log(trace.magnitude[known])
+    known = np.isfinite(curve.magnitude) & (curve.magnitude > 0)
+    frequency_hz, height = curve.frequency_hz[known], np.log(curve.magnitude[known])
     if height.size < 3:
         return ()
-    spread = np.nan_to_num(trace.relative_sd[known])
+    spread = np.nan_to_num(curve.relative_sd[known])
     least = _LEAST_RISE_DB / _PER_NEPER_DB
     places, found = find_peaks(height, prominence=least)
     clear = found["prominences"] > np.maximum(least, _LEAST_RISE_SD * spread[places])
     highest = sorted(places[clear], key=lambda place: -height[place])[:most]
-    return tuple(_peak(frequency_hz, height, trace.relative_sd[known], int(p)) for p in sorted(highest))
+    return tuple(_peak(frequency_hz, height, curve.relative_sd[known], int(p)) for p in sorted(highest))
 
 
 def _peak(frequency_hz: Reals, height: Reals, spread: Reals, place: int) -> CurvePeak:

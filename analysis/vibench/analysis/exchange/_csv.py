@@ -22,7 +22,7 @@ VALUE_FORMAT = "%.10g"
 """One more digit than 2^-30 of the range needs; lost samples read ``nan``."""
 
 
-def write_csv_samples(excerpt: Excerpt, path: Path, watcher: TransferObserver = unobserved) -> None:
+def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver = unobserved) -> None:
     """Write time and channels, a block at a time."""
     headings = ["time [s]", *(f"{each.role} [{each.unit}]" for each in excerpt.channels)]
     row = ",".join([TIME_FORMAT, *(VALUE_FORMAT for _ in excerpt.channels)]) + "\n"
@@ -34,7 +34,7 @@ def write_csv_samples(excerpt: Excerpt, path: Path, watcher: TransferObserver = 
             time_s = np.arange(block.first_sample, block.first_sample + samples) / rate
             cells = np.column_stack((time_s, block.values.T))
             file.write(row * samples % tuple(cells.ravel().tolist()))
-            watcher(block.values.size)
+            observer(block.values.size)
 
 
 LONGEST_HEAD = 200

@@ -38,7 +38,7 @@ def export_samples(
     to: Format,
     path: Path,
     results: Results = Results.LEFT_OUT,
-    watcher: TransferObserver = unobserved,
+    observer: TransferObserver = unobserved,
 ) -> tuple[Path, ...]:
     """Write the excerpt as ``path``, and what its format has no place for as ``PATH.facts.json`` beside it.
 
@@ -59,7 +59,7 @@ def export_samples(
         require_small(excerpt)
         structs = matlab_results(recording) if are_included else {}
         with new_file(path) as unfinished:
-            write_mat(excerpt, unfinished, structs, watcher)
+            write_mat(excerpt, unfinished, structs, observer)
         return (path,)
     facts = facts_path(path)
     require_unused(facts)
@@ -70,11 +70,11 @@ def export_samples(
     with new_file(path) as unfinished:
         match to:
             case Format.CSV:
-                write_csv_samples(excerpt, unfinished, watcher)
+                write_csv_samples(excerpt, unfinished, observer)
             case Format.UFF:
-                write_uff(excerpt, unfinished, watcher)
+                write_uff(excerpt, unfinished, observer)
             case Format.WAV:
-                write_wav(excerpt, unfinished, watcher)
+                write_wav(excerpt, unfinished, observer)
     with new_file(facts) as unfinished:
         write_facts(excerpt, unfinished)
     tables = write_result_tables(recording, path) if are_included else ()

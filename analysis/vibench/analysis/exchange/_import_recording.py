@@ -127,7 +127,9 @@ class _Wanted:
     source: SourceChannel
 
 
-def import_recording(path: Path, mapping: ImportMapping, out: Path, watcher: TransferObserver = unobserved) -> Path:
+def import_recording(
+    path: Path, mapping: ImportMapping, out: Path, observer: TransferObserver = unobserved
+) -> Path:
     """Make the recording ``out`` from a file, a block at a time.
 
     Values that are no finite numbers count as lost samples, of all channels. The stored "volts" are the
@@ -164,7 +166,7 @@ def import_recording(path: Path, mapping: ImportMapping, out: Path, watcher: Tra
         )
         writer = create_recording(out, header)
         try:
-            _write(writer, source, wanted, parts, samples, watcher)
+            _write(writer, source, wanted, parts, samples, observer)
         except BaseException:
             # Half an import is worth nothing: the file it came from is still there.
             writer.finish(RecordingState.FAILED, "the import was not completed")
@@ -264,7 +266,7 @@ def _write(
     wanted: Sequence[_Wanted],
     parts: Sequence[LaidPart],
     samples: int,
-    watcher: TransferObserver,
+    observer: TransferObserver,
 ) -> None:
     starts = {each.start: each.segment for each in parts}
     stops = {each.stop for each in parts}
@@ -278,7 +280,7 @@ def _write(
         values = np.stack([source.read(each.source, start, stop) for each in wanted])
         for block in _blocks(values, start, wanted):
             writer.append(block)
-        watcher(values.size)
+        observer(values.size)
     if samples in stops:
         writer.end_segment()
 

@@ -45,7 +45,9 @@ def require_small(excerpt: Excerpt) -> None:
         )
 
 
-def write_mat(excerpt: Excerpt, path: Path, results: Mapping[str, Any], watcher: TransferObserver = unobserved) -> None:
+def write_mat(
+    excerpt: Excerpt, path: Path, results: Mapping[str, Any], observer: TransferObserver = unobserved
+) -> None:
     """Write one variable after the other, so that one channel at a time is in memory.
 
     Raises
@@ -61,7 +63,7 @@ def write_mat(excerpt: Excerpt, path: Path, results: Mapping[str, Any], watcher:
             _save(file, {"results": results})
         _save(file, {"time_s": excerpt.recording.time_s(excerpt.start, excerpt.stop)[:, np.newaxis]})
         for channel in excerpt.channels:
-            values = _whole(excerpt, channel.role, watcher)
+            values = _whole(excerpt, channel.role, observer)
             _save(file, {channel.role[:LONGEST_NAME]: _channel(channel, values)})
 
 
@@ -69,13 +71,13 @@ def _save(file: Any, variables: dict[str, Any]) -> None:
     savemat(file, variables, long_field_names=True, oned_as="column")
 
 
-def _whole(excerpt: Excerpt, role: str, watcher: TransferObserver) -> Reals:
+def _whole(excerpt: Excerpt, role: str, observer: TransferObserver) -> Reals:
     values = np.empty(excerpt.samples)
     done = 0
     for block in excerpt.channel_blocks(role):
         values[done : done + block.size] = block
         done += block.size
-        watcher(block.size)
+        observer(block.size)
     return values
 
 

@@ -76,7 +76,7 @@ SCALAR = 0
 """Direction of the response: the recording does not say how a sensor points."""
 
 
-def write_uff(excerpt: Excerpt, path: Path, watcher: TransferObserver = unobserved) -> None:
+def write_uff(excerpt: Excerpt, path: Path, observer: TransferObserver = unobserved) -> None:
     """Write one dataset for each channel, a block at a time; lost samples are NaN."""
     with path.open("xb") as file:
         file.write(SI_UNITS.encode("ascii"))
@@ -85,7 +85,7 @@ def write_uff(excerpt: Excerpt, path: Path, watcher: TransferObserver = unobserv
             file.write(lines.encode("ascii", "replace"))
             for values in excerpt.channel_blocks(channel.role):
                 file.write(values.astype("<f8").tobytes())
-                watcher(values.size)
+                observer(values.size)
             file.write(f"{DELIMITER}\n".encode("ascii"))
 
 

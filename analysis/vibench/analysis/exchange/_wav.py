@@ -42,7 +42,7 @@ def require_sound(excerpt: Excerpt) -> None:
         )
 
 
-def write_wav(excerpt: Excerpt, path: Path, watcher: TransferObserver = unobserved) -> None:
+def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = unobserved) -> None:
     """Write all channels, a block at a time; lost samples are silent, and past full scale is full scale.
 
     Counts of a converter of up to 32 bits stay exact: only zeros are put behind them.
@@ -57,7 +57,7 @@ def write_wav(excerpt: Excerpt, path: Path, watcher: TransferObserver = unobserv
             counts = np.rint(np.nan_to_num(block.values) / full_scales * FULL_COUNT)
             inside = np.clip(counts, -FULL_COUNT, FULL_COUNT - 1)
             file.writeframesraw(inside.T.astype("<i4").tobytes())
-            watcher(block.values.size)
+            observer(block.values.size)
 
 
 OFFSETS = {"u": 128.0}

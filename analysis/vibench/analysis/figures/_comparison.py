@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..comparison import CurveOrigin, Curve, curve_difference, curve_peaks
+from ..comparison import Curve, CurveOrigin, curve_difference, curve_peaks
 from ..errors import InvalidRequest
 from ..model import CurveDifference
 from ..tables import Table, table
@@ -22,7 +22,7 @@ _SINGLE_BAND = 0.2
 
 def comparison_figure(
     name: str,
-    traces: Sequence[Curve],
+    curves: Sequence[Curve],
     pair: tuple[Curve, Curve] | None = None,
     markers_hz: Sequence[float] = (),
 ) -> DrawnFigure:
@@ -43,7 +43,7 @@ def comparison_figure(
         When the pair has no frequency in common.
 
     """
-    if not traces:
+    if not curves:
         raise InvalidRequest("a figure of no curves was asked for; choose one or more")
     difference = None if pair is None else curve_difference(*pair)
     with styled():
@@ -51,10 +51,10 @@ def comparison_figure(
         figure = new_figure(_HEIGHT_IN + (rows - 1) * _DIFFERENCE_IN)
         panels = figure.subplots(rows, 1, sharex=True, height_ratios=(3.2, 1.0)[:rows], squeeze=False)[:, 0]
         top: Axes = panels[0]
-        for number, trace in enumerate(traces):
-            _curve(top, trace, LEVELS[number % len(LEVELS)])
+        for number, curve in enumerate(curves):
+            _curve(top, curve, LEVELS[number % len(LEVELS)])
         magnitude_axis(top)
-        top.set_ylim(*_heights(traces))
+        top.set_ylim(*_heights(curves))
         top.set_ylabel("|x / U|  (m0 over base)")
         if difference is not None and pair is not None:
             _difference(panels[1], difference)
@@ -62,35 +62,35 @@ def comparison_figure(
             for axes in panels:
                 axes.axvline(marker_hz, color=BOUNDS, linewidth=0.8, linestyle="-.")
         panels[-1].set_xlabel("frequency [Hz]")
-        frequency_axis(top, *_span(traces))
+        frequency_axis(top, *_span(curves))
         legend_above(figure, [top], columns=2)
         figure.align_ylabels()
     return DrawnFigure(
         name=name,
         title="Comparison",
-        caption=comparison_caption(traces, pair),
+        caption=comparison_caption(curves, pair),
         figure=figure,
-        tables=comparison_tables(name, traces, pair),
+        tables=comparison_tables(name, curves, pair),
     )
 
 
-def _curve(axes: Axes, trace: Curve, colour: str) -> None:
-    lone = trace.frequency_hz.size <= _LONE
-    known = np.isfinite(trace.relative_sd)
+def _curve(axes: Axes, curve: Curve, colour: str) -> None:
+    lone = curve.frequency_hz.size <= _LONE
+    known = np.isfinite(curve.relative_sd)
     if known.any() and not lone:
         axes.fill_between(
-            trace.frequency_hz, trace.lower, trace.upper, color=colour, alpha=0.18, linewidth=0, where=known
+            curve.frequency_hz, curve.lower, curve.upper, color=colour, alpha=0.18, linewidth=0, where=known
         )
     axes.plot(
-        trace.frequency_hz,
-        trace.magnitude,
+        curve.frequency_hz,
+        curve.magnitude,
         color=colour,
-        linestyle="none" if lone else _STYLES[trace.origin],
+        linestyle="none" if lone else _STYLES[curve.origin],
         marker="o" if lone else None,
         markersize=5,
         linewidth=1.0,
-        label=trace.name,
-        gid=trace.name,
+        label=curve.name,
+        gid=curve.name,
     )
 
 
@@ -100,22 +100,22 @@ def _difference(axes: Axes, difference: CurveDifference) -> None:
     axes.set_ylabel("difference\n[dB]")
 
 
-def _heights(traces: Sequence[Curve]) -> tuple[float, float]:
+def _heights(curves: Sequence[Curve]) -> tuple[float, float]:
     """Let the curves fill the picture, not their bounds."""
-    known = np.concatenate([each.magnitude[np.isfinite(each.magnitude)] for each in traces])
+    known = np.concatenate([each.magnitude[np.isfinite(each.magnitude)] for each in curves])
     positive = known[known > 0]
     return (float(positive.min()) / 2, 2 * float(positive.max())) if positive.size else (0.1, 10.0)
 
 
-def _span(traces: Sequence[Curve]) -> tuple[float, float]:
-    low = min(float(each.frequency_hz[0]) for each in traces)
-    high = max(float(each.frequency_hz[-1]) for each in traces)
+def _span(curves: Sequence[Curve]) -> tuple[float, float]:
+    low = min(float(each.frequency_hz[0]) for each in curves)
+    high = max(float(each.frequency_hz[-1]) for each in curves)
     return (low, high) if high > low else (low * (1 - _SINGLE_BAND), high * (1 + _SINGLE_BAND))
 
 
-def comparison_caption(traces: Sequence[Curve], pair: tuple[Curve, Curve] | None) -> str:
+def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None) -> str:
     """Say what each curve is, with its numbers."""
-    said = [f"{each.name}: {each.note}." if each.note else f"{each.name}." for each in traces]
+    said = [f"{each.name}: {each.note}." if each.note else f"{each.name}." for each in curves]
     said.append("Shaded: two standard deviations.")
     if pair is not None:
         difference = curve_difference(*pair)
@@ -127,19 +127,19 @@ def comparison_caption(traces: Sequence[Curve], pair: tuple[Curve, Curve] | None
 
 
 def comparison_tables(
-    name: str, traces: Sequence[Curve], pair: tuple[Curve, Curve] | None = None
+    name: str, curves: Sequence[Curve], pair: tuple[Curve, Curve] | None = None
 ) -> tuple[Table, ...]:
     """Give every curve, the difference, and the peaks, with units in the headings."""
     found = [
         table(
-            f"{name}_{number}_{_file_word(trace)}",
-            frequency_hz=trace.frequency_hz,
-            magnitude_displacement_over_displacement=trace.magnitude,
-            relative_standard_deviation=trace.relative_sd,
+            f"{name}_{number}_{_file_word(curve)}",
+            frequency_hz=curve.frequency_hz,
+            magnitude_displacement_over_displacement=curve.magnitude,
+            relative_standard_deviation=curve.relative_sd,
         )
-        for number, trace in enumerate(traces, start=1)
+        for number, curve in enumerate(curves, start=1)
     ]
-    peaks = [(trace.name, peak) for trace in traces for peak in curve_peaks(trace)]
+    peaks = [(curve.name, peak) for curve in curves for peak in curve_peaks(curve)]
     if peaks:
         found.append(
             table(
@@ -163,6 +163,6 @@ def comparison_tables(
     return tuple(found)
 
 
-def _file_word(trace: Curve) -> str:
-    kept = (each if each.isalnum() or each in "-_" else "_" for each in trace.name.replace(", ", "_"))
+def _file_word(curve: Curve) -> str:
+    kept = (each if each.isalnum() or each in "-_" else "_" for each in curve.name.replace(", ", "_"))
     return "".join(kept)

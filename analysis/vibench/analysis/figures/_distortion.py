@@ -3,7 +3,13 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..frequency_response import Distortion, NoiseAnalysis, PeriodicFrequencyResponse, distortion, is_even_line
+from ..frequency_response import (
+    Distortion,
+    NoiseAnalysis,
+    PeriodicFrequencyResponse,
+    distortion,
+    is_even_line,
+)
 from ..signals import Reals
 from ..tables import table
 from ._drawn import DrawnFigure
@@ -35,7 +41,7 @@ def distortion_figure(analysis: NoiseAnalysis, periodic: PeriodicFrequencyRespon
         if has_quiet_lines:
             _detection(panels[1], periodic)
         panels[-1].set_xlabel("frequency [Hz]")
-        driven_hz = periodic.transmission.frequency_hz
+        driven_hz = periodic.frequency_response.frequency_hz
         frequency_axis(panels[0], float(driven_hz[0]), float(driven_hz[-1]))
         legend_above(figure, panels)
         figure.align_ylabels()
@@ -60,11 +66,11 @@ def distortion_figure(analysis: NoiseAnalysis, periodic: PeriodicFrequencyRespon
 
 
 def _share(variance: Reals, periodic: PeriodicFrequencyResponse) -> Reals:
-    return np.asarray(np.sqrt(variance) / periodic.transmission.magnitude)
+    return np.asarray(np.sqrt(variance) / periodic.frequency_response.magnitude)
 
 
 def _shares(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
-    frequency_hz = periodic.transmission.frequency_hz
+    frequency_hz = periodic.frequency_response.frequency_hz
     axes.plot(
         frequency_hz,
         _share(periodic.noise_variance, periodic),

@@ -14,9 +14,9 @@ _LEAST = 1e-14
 """An error below this is rounding."""
 
 
-def tradeoff_figure(trade: AccuracyBenchmark) -> DrawnFigure:
+def tradeoff_figure(benchmark: AccuracyBenchmark) -> DrawnFigure:
     """Draw the state's error over processor time per simulated second, both logarithmic."""
-    shown = [each for each in trade.motions if each.levels[0].state_error is not None]
+    shown = [each for each in benchmark.motions if each.levels[0].state_error is not None]
     rows: list[tuple[str, str, float, float]] = []
     with styled():
         figure = new_figure(4.6)
@@ -58,7 +58,7 @@ def tradeoff_figure(trade: AccuracyBenchmark) -> DrawnFigure:
         title="Speed against accuracy",
         caption=(
             "Error of the state over processor time: three levels of each motion (lines, from quick to "
-            f"reference) and scipy's solvers on the plain equations. {trade.machine}."
+            f"reference) and scipy's solvers on the plain equations. {benchmark.machine}."
         ),
         figure=figure,
         tables=(

@@ -49,7 +49,7 @@ def transmission_figure(analysis: NoiseAnalysis, laid: NoiseOverlay | None = Non
         if laid is not None:
             _differences(panels[3, 0], laid, at)
         panels[-1, 0].set_xlabel("frequency [Hz]")
-        found = analysis.response.transmission.frequency_hz
+        found = analysis.response.frequency_response.frequency_hz
         frequency_axis(top, float(found[0]), float(found[-1]))
         label_resonances(top, at)
         legend_above(figure, [top], columns=2)
@@ -65,7 +65,7 @@ def transmission_figure(analysis: NoiseAnalysis, laid: NoiseOverlay | None = Non
 
 def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, at: ModelResonances) -> None:
     view = analysis.request.view
-    measured = view.shown(analysis.response.transmission)
+    measured = view.shown(analysis.response.frequency_response)
     size = measured.magnitude
     low = np.maximum(measured.magnitude_lower, size / _LARGEST_BOUND_RATIO)
     high = np.minimum(measured.magnitude_upper, size * _LARGEST_BOUND_RATIO)
@@ -80,7 +80,7 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, 
         label=f"{100 * measured.settings.confidence:g} % bounds",
     )
     if laid is not None:
-        simulated, sines = view.shown(laid.response.transmission), laid.prediction
+        simulated, sines = view.shown(laid.response.frequency_response), laid.prediction
         fine_hz = np.geomspace(measured.frequency_hz[0], measured.frequency_hz[-1], _LINEAR_POINTS)
         linear = linear_transmissibility(laid.run.specimen, fine_hz)
         linear = view.drawn(linear * view.factor(fine_hz))
@@ -129,12 +129,12 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, 
 def _phases(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, at: ModelResonances) -> None:
     """Draw the phase in degrees, -180 to 180, with its bounds where they say anything."""
     view = analysis.request.view
-    measured = view.shown(analysis.response.transmission)
+    measured = view.shown(analysis.response.frequency_response)
     mark_resonances(axes, at)
     low, high = np.rad2deg(measured.phase_lower), np.rad2deg(measured.phase_upper)
     axes.fill_between(measured.frequency_hz, low, high, color=BOUNDS, alpha=0.45, linewidth=0)
     if laid is not None:
-        simulated = view.shown(laid.response.transmission)
+        simulated = view.shown(laid.response.frequency_response)
         axes.plot(
             *_unbroken(simulated.frequency_hz, np.rad2deg(simulated.phase_rad)),
             color=SIMULATED,
@@ -157,7 +157,7 @@ def _unbroken(frequency_hz: Reals, phase_deg: Reals) -> tuple[Reals, Reals]:
 
 
 def _coherence(axes: Axes, analysis: NoiseAnalysis, at: ModelResonances) -> None:
-    measured = analysis.response.transmission
+    measured = analysis.response.frequency_response
     mark_resonances(axes, at)
     axes.plot(measured.frequency_hz, measured.coherence, color=MEASURED, linewidth=0.8)
     axes.axhline(measured.coherence_significance, color=SIMULATED, linewidth=0.9, linestyle="-.")
@@ -185,13 +185,13 @@ def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> 
         f"{each.peak_magnitude * float(view.factor(np.array([each.peak_frequency_hz]))[0]):.3g}{unit})"
         for each in response.resonances
     )
-    median = float(np.median(response.transmission.coherence))
+    median = float(np.median(response.frequency_response.coherence))
     said = [
         (
             f"Noise at {analysis.excitation.amplitude_vpp:g} Vpp, base acceleration "
             f"{response.base_level.rms_acceleration:.3g} m/s² rms between {response.base_level.low_hz:g} and "
-            f"{response.base_level.high_hz:g} Hz; {response.transmission.n_eff:.3g} independent averages of "
-            f"{response.used_s:.0f} s in all."
+            f"{response.base_level.high_hz:g} Hz; {response.frequency_response.n_eff:.3g} independent "
+            f"averages of {response.used_s:.0f} s in all."
         ),
         estimate_sentence(response),
         f"Resonances found: {found}." if found else "No resonance stands above its uncertainty.",
@@ -210,7 +210,7 @@ def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> 
 
 def estimate_sentence(response: NoiseResponse) -> str:
     """Say how a transmission was estimated, how fine its lines are, and what had to be left out."""
-    found = response.transmission
+    found = response.frequency_response
     how = found.settings
     ratio = "" if how.noise_ratio is None else f" with a noise ratio of {how.noise_ratio:g} s²"
     if response.periodic is None:
@@ -232,7 +232,7 @@ def estimate_sentence(response: NoiseResponse) -> str:
 
 def _tables(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> tuple[Table, ...]:
     view = analysis.request.view
-    measured = view.shown(analysis.response.transmission)
+    measured = view.shown(analysis.response.frequency_response)
     name = f"transmission_{analysis.facts.name}"
     columns = {
         "frequency_hz": measured.frequency_hz,
@@ -249,7 +249,7 @@ def _tables(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> tuple[Table, 
     }
     if laid is None:
         return (table(name, **columns),)
-    columns["magnitude_simulated"] = view.shown(laid.response.transmission).magnitude
+    columns["magnitude_simulated"] = view.shown(laid.response.frequency_response).magnitude
     columns["difference_db"] = laid.difference.decibel
     columns["difference_standard_errors"] = laid.difference.standard_errors
     sines = laid.prediction

@@ -22,7 +22,7 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> DrawnFigure
         axes = figure.subplots()
         mark_resonances(axes, at)
         for number, each in enumerate(rising):
-            found = view.shown(each.response.transmission)
+            found = view.shown(each.response.frequency_response)
             level = each.response.base_level.rms_acceleration
             axes.plot(
                 found.frequency_hz,
@@ -36,15 +36,15 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> DrawnFigure
             magnitude_axis(axes)
         axes.set_ylabel(view.label)
         axes.set_xlabel("frequency [Hz]")
-        lows = [float(each.response.transmission.frequency_hz[0]) for each in rising]
-        highs = [float(each.response.transmission.frequency_hz[-1]) for each in rising]
+        lows = [float(each.response.frequency_response.frequency_hz[0]) for each in rising]
+        highs = [float(each.response.frequency_response.frequency_hz[-1]) for each in rising]
         frequency_axis(axes, min(lows), max(highs))
         label_resonances(axes, at)
         legend_above(figure, [axes], columns=2)
     columns = {}
     for each in rising:
-        columns[f"frequency_hz_{each.facts.name}"] = each.response.transmission.frequency_hz
-        columns[f"magnitude_{each.facts.name}"] = view.shown(each.response.transmission).magnitude
+        columns[f"frequency_hz_{each.facts.name}"] = each.response.frequency_response.frequency_hz
+        columns[f"magnitude_{each.facts.name}"] = view.shown(each.response.frequency_response).magnitude
     return DrawnFigure(
         name="transmission_levels",
         title="Transmission at all noise levels",

@@ -11,7 +11,7 @@ from ._distortion import (
     distortion,
     is_even_line,
 )
-from ._noise_request import MagnitudeScale, FrequencyResponseRequest, quantities_named
+from ._noise_request import FrequencyResponseRequest, MagnitudeScale, quantities_named
 from ._noise_response import (
     DEFAULT_REQUEST,
     Noise,
@@ -31,29 +31,29 @@ from ._results import (
     converted_frequency_response,
 )
 from ._transmission import (
-    transmissibility,
     frequency_response_of,
+    transmissibility,
 )
 
 __all__ = [
     "DEFAULT_REQUEST",
     "Distortion",
     "Estimator",
+    "FrequencyResponse",
+    "FrequencyResponseRequest",
+    "FrequencyResponseSettings",
     "MagnitudeScale",
     "Noise",
     "NoiseAnalysis",
-    "FrequencyResponseRequest",
     "NoiseResponse",
     "PeriodicFrequencyResponse",
     "Resonance",
-    "FrequencyResponse",
-    "FrequencyResponseSettings",
     "converted_frequency_response",
     "distortion",
+    "frequency_response_of",
     "is_even_line",
     "noise_response",
     "quantities_named",
     "resonances",
     "transmissibility",
-    "frequency_response_of",
 ]

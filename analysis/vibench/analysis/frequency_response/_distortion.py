@@ -30,7 +30,7 @@ def distortion(periodic: PeriodicFrequencyResponse) -> Distortion:
     The quiet lines hold whatever is not linear between the drive voltage and the response: amplifier and
     shaker as well as the specimen.
     """
-    magnitude = periodic.transmission.magnitude
+    magnitude = periodic.frequency_response.magnitude
     varied = periodic.distortion_variance
     quiet = periodic.detection
     is_even = is_even_line(quiet)

@@ -72,10 +72,10 @@ class FrequencyResponseView:
         steps = (start, stop) if self.power >= 0 else (stop, start)
         return np.asarray(np.abs(derivative_factor(frequency_hz, *steps)))
 
-    def shown(self, transmission: FrequencyResponse) -> FrequencyResponse:
+    def shown(self, frequency_response: FrequencyResponse) -> FrequencyResponse:
         """Turn displacement over displacement into the view's quantities, bounds included."""
         return converted_frequency_response(
-            transmission,
+            frequency_response,
             drive=(Quantity.DISPLACEMENT, self.base),
             response=(Quantity.DISPLACEMENT, self.response),
         )
@@ -120,7 +120,7 @@ _PROXY_SAMPLES = 4096
 
 @dataclass(frozen=True)
 class FrequencyResponseRequest:
-    """How to estimate a transmission; the defaults suit the paper's specimen.
+    """How to estimate a frequency response; the defaults suit the paper's specimen.
 
     At most one of resolution, segment length and averages can be chosen: the other two follow.
     """

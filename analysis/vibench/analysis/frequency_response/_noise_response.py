@@ -17,7 +17,7 @@ from ..spectra import DensitySums
 from ..tones import NoiseDriveLevel, noise_drive_level
 from ._estimators import coherence, least_squares
 from ._noise_request import FrequencyResponseRequest
-from ._periodic_transmission import PeriodicSums, PeriodicFrequencyResponse
+from ._periodic_transmission import PeriodicFrequencyResponse, PeriodicSums
 from ._repetition import period_spectra
 from ._resonance import Resonance, resonances
 from ._results import Estimator, FrequencyResponse, converted_frequency_response
@@ -35,7 +35,7 @@ _LEAST_PERIODS = 2
 class NoiseResponse:
     """Transmission of base displacement to m0's displacement, and what was found in it."""
 
-    transmission: FrequencyResponse
+    frequency_response: FrequencyResponse
     """The estimate to use: by default referenced to the drive voltage, so that noise biases it nowhere."""
     h1: FrequencyResponse
     h2: FrequencyResponse
@@ -104,22 +104,22 @@ def _repeated(
             f"none of the {noise.realisations} planned realisations of noise holds two whole periods of "
             f"{1 / noise.repetition_hz:g} s without a fault{bad.text}; measure again"
         )
-    periodic = sums.transmission(
+    periodic = sums.frequency_response(
         delay_s=channels.response_delay_s, band_hz=(noise.band_start_hz, noise.band_stop_hz)
     )
-    order = np.rint(periodic.transmission.frequency_hz / noise.repetition_hz).astype(int)
+    order = np.rint(periodic.frequency_response.frequency_hz / noise.repetition_hz).astype(int)
     motion = np.stack([each[:, order] for each in means])
 
     def by(estimator: Estimator) -> FrequencyResponse:
         if estimator is Estimator.DRIVE:
-            return as_displacements(periodic.transmission)
+            return as_displacements(periodic.frequency_response)
         return _least_squares(
-            periodic.transmission, motion, estimator, channels.response_delay_s, request.noise_ratio
+            periodic.frequency_response, motion, estimator, channels.response_delay_s, request.noise_ratio
         )
 
     chosen = by(request.estimator)
     return NoiseResponse(
-        transmission=chosen,
+        frequency_response=chosen,
         h1=by(Estimator.H1),
         h2=by(Estimator.H2),
         resonances=_resonances(chosen),
@@ -175,7 +175,11 @@ def _mean_spectra(data: Reals, nominal_period: float) -> Complexes:
 
 
 def _least_squares(
-    like: FrequencyResponse, motion: Complexes, estimator: Estimator, delay_s: float, noise_ratio: float | None
+    like: FrequencyResponse,
+    motion: Complexes,
+    estimator: Estimator,
+    delay_s: float,
+    noise_ratio: float | None,
 ) -> FrequencyResponse:
     """h1, h2 or hv over realisations; ``motion`` has the shape (realisations, 2, lines)."""
     s_xx = np.sum(np.abs(motion[:, 0]) ** 2, axis=0)
@@ -233,7 +237,7 @@ def _streamed(channels: Channels, noise: StreamedNoise, request: FrequencyRespon
 
     chosen = by(request.estimator)
     return NoiseResponse(
-        transmission=chosen,
+        frequency_response=chosen,
         h1=by(Estimator.H1),
         h2=by(Estimator.H2),
         resonances=_resonances(chosen),
@@ -246,18 +250,18 @@ def _streamed(channels: Channels, noise: StreamedNoise, request: FrequencyRespon
     )
 
 
-def as_displacements(transmission: FrequencyResponse) -> FrequencyResponse:
+def as_displacements(frequency_response: FrequencyResponse) -> FrequencyResponse:
     """Turn m0 velocity over base acceleration into displacement over displacement."""
     return converted_frequency_response(
-        transmission,
+        frequency_response,
         drive=(Quantity.ACCELERATION, Quantity.DISPLACEMENT),
         response=(Quantity.VELOCITY, Quantity.DISPLACEMENT),
     )
 
 
-def _resonances(transmission: FrequencyResponse) -> tuple[Resonance, ...]:
-    low, high = float(transmission.frequency_hz[0]), float(transmission.frequency_hz[-1])
-    return resonances(transmission, low_hz=low, high_hz=high)
+def _resonances(frequency_response: FrequencyResponse) -> tuple[Resonance, ...]:
+    low, high = float(frequency_response.frequency_hz[0]), float(frequency_response.frequency_hz[-1])
+    return resonances(frequency_response, low_hz=low, high_hz=high)
 
 
 @dataclass(frozen=True, eq=False)

@@ -125,7 +125,7 @@ class DetectionLines:
 class PeriodicFrequencyResponse:
     """Best linear approximation of response over drive, and where its scatter comes from."""
 
-    transmission: FrequencyResponse
+    frequency_response: FrequencyResponse
     noise_variance: Reals
     """Complex variance of one realisation's estimate that noise explains [(unit of the value)^2]."""
     distortion_variance: Reals | None
@@ -211,7 +211,7 @@ class PeriodicSums:
             )
         )
 
-    def transmission(
+    def frequency_response(
         self, *, delay_s: float = 0.0, band_hz: tuple[float, float] = EVERYTHING
     ) -> PeriodicFrequencyResponse:
         """Give the transmission of the realisations added so far.
@@ -240,7 +240,9 @@ class PeriodicSums:
             drive[:, driven], base[:, driven], response[:, driven], covariance[:, :, driven], periods
         )
         return PeriodicFrequencyResponse(
-            transmission=self._transmission(frequency_hz[driven], estimate, period).without_delay(delay_s),
+            frequency_response=self._frequency_response(frequency_hz[driven], estimate, period).without_delay(
+                delay_s
+            ),
             noise_variance=estimate.noise_variance,
             distortion_variance=estimate.distortion_variance,
             scatter=estimate.scatter,
@@ -249,7 +251,7 @@ class PeriodicSums:
             detection=_detection(frequency_hz, driven, response, covariance[1, 1].real),
         )
 
-    def _transmission(
+    def _frequency_response(
         self, frequency_hz: Reals, estimate: BestLinearApproximation, period: float
     ) -> FrequencyResponse:
         quantile = float(stats.t.ppf((1 + self._confidence) / 2, 2 * (estimate.averages - 1)))
@@ -307,7 +309,7 @@ def periodic_frequency_response(
     sums = PeriodicSums(sample_rate_hz, repetition_hz, confidence=confidence)
     for drive, base, response in realisations:
         sums.add(drive, base, response)
-    return sums.transmission(delay_s=delay_s, band_hz=band_hz)
+    return sums.frequency_response(delay_s=delay_s, band_hz=band_hz)
 
 
 def _within(frequency_hz: Reals, band_hz: tuple[float, float], spacing_hz: float) -> Flags:

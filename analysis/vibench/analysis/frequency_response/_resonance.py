@@ -72,7 +72,9 @@ class Resonance:
         return self.half_power_bandwidth_hz * self.sd_damping_ratio / self.damping_ratio
 
 
-def resonances(transmission: FrequencyResponse, *, low_hz: float, high_hz: float) -> tuple[Resonance, ...]:
+def resonances(
+    frequency_response: FrequencyResponse, *, low_hz: float, high_hz: float
+) -> tuple[Resonance, ...]:
     """Find and fit the resonances of a transmission in a band, in the order of frequency.
 
     Each significant peak is fitted, weighted by the stated spreads, with
@@ -87,7 +89,7 @@ def resonances(transmission: FrequencyResponse, *, low_hz: float, high_hz: float
         When fewer than eight lines lie in the band.
 
     """
-    band = transmission.between(low_hz, high_hz)
+    band = frequency_response.between(low_hz, high_hz)
     if band.frequency_hz.size < _LEAST_LINES:
         raise InvalidRequest(
             f"{band.frequency_hz.size} lines lie between {low_hz:g} and {high_hz:g} Hz; a fit needs at least "

@@ -1,4 +1,4 @@
-"""Transmissions: the shape every estimator of response over drive hands on to figures and reports."""
+"""Frequency responses: the shape every estimator of response over drive hands on to figures and reports."""
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -24,7 +24,7 @@ class Estimator(StrEnum):
 
 @dataclass(frozen=True)
 class FrequencyResponseSettings:
-    """What made a transmission, kept beside it."""
+    """What made a frequency response, kept beside it."""
 
     estimator: Estimator
     sample_rate_hz: float

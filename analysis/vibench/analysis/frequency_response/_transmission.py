@@ -70,7 +70,7 @@ class FrequencyResponseSums:
             )
         self._spectra.add(block, valid)
 
-    def transmission(self) -> FrequencyResponse:
+    def frequency_response(self) -> FrequencyResponse:
         """Give the transmission of everything added so far.
 
         Raises
@@ -155,7 +155,7 @@ def transmissibility(
     )
     for block, marks in pieces(signals, valid):
         sums.add(block, marks)
-    return sums.transmission()
+    return sums.frequency_response()
 
 
 def _check(settings: FrequencyResponseSettings) -> None:
@@ -176,7 +176,9 @@ def _check(settings: FrequencyResponseSettings) -> None:
         raise InvalidRequest(f"sample_rate_hz is {settings.sample_rate_hz:g}; it is more than 0")
 
 
-def frequency_response_of(averages: SpectralAverages, settings: FrequencyResponseSettings) -> FrequencyResponse:
+def frequency_response_of(
+    averages: SpectralAverages, settings: FrequencyResponseSettings
+) -> FrequencyResponse:
     """Form the transmission of averaged products, rows drive, response and perhaps reference, with bounds."""
     products = averages.products
     s_xx, s_yy = products[_DRIVE, _DRIVE].real, products[_RESPONSE, _RESPONSE].real

@@ -11,8 +11,8 @@ of three samples is in every picture. Samples come in volts or channel units; no
 >>> view = LiveView([channel], 25600.0, band_hz=(10.0, 600.0))
 >>> volts = 5.0 * np.sin(2 * np.pi * 50.0 * np.arange(25600) / 25600.0)
 >>> view.add(0, volts[np.newaxis].astype(np.float32))
->>> lanes = view.lanes(span_s=1.0, columns=4)
->>> lanes.high.round(3).tolist()
+>>> histories = view.time_histories(span_s=1.0, columns=4)
+>>> histories.high.round(3).tolist()
 [[0.5, 0.5, 0.5, 0.5]]
 >>> view.levels[0].verdict.name
 'GOOD'

@@ -128,7 +128,7 @@ class LiveSpectra:
             n_eff=effective_averages(self._taper, self._hop, used),
         )
 
-    def transmission(
+    def frequency_response(
         self,
         rows: Sequence[int],
         *,

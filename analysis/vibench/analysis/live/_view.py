@@ -1,6 +1,6 @@
 """One run as it is watched: samples go in, and every picture of a frame is asked for when it is drawn.
 
-The course of a sine or a sweep so far: responses and extremes against the frequency really played.
+The history of a sine or a sweep so far: responses and extremes against the frequency really played.
 """
 
 from collections.abc import Sequence
@@ -61,7 +61,7 @@ class SweepTrace:
         self._end += 1
         self._begin = max(self._begin, self._end - self._most)
 
-    def course(self) -> SweepHistory:
+    def history(self) -> SweepHistory:
         """Give all points."""
         return SweepHistory(*self._rows[:, self._begin : self._end].copy())
 
@@ -136,12 +136,12 @@ class LiveView:
         self._pointed = 0
         self._section = PoincareSection()
         self._portrait: tuple[int, Portrait | None] = (-(10**12), None)
-        self._transmission: tuple[int, FrequencyResponse | None] = (0, None)
+        self._frequency_response: tuple[int, FrequencyResponse | None] = (0, None)
         self._spectrum: tuple[int, LiveSpectrum | None] = (0, None)
 
     @property
     def channels(self) -> tuple[LiveChannel, ...]:
-        """In the order of the lanes."""
+        """In the order of the time histories."""
         return self._channels
 
     @property
@@ -163,7 +163,7 @@ class LiveView:
         if self._has(DRIVE, BASE, RESPONSE) and self._is_point_due():
             self._add_point()
 
-    def lanes(self, span_s: float, columns: int) -> TimeHistories:
+    def time_histories(self, span_s: float, columns: int) -> TimeHistories:
         """Give the newest seconds as columns of a picture."""
         window = self._ring.newest(round(span_s * self._rate_hz))
         low, high = outline(window.values, columns)
@@ -176,16 +176,18 @@ class LiveView:
             self._spectrum = (self._spectra.segments, self._spectra.spectrum())
         return self._spectrum[1]
 
-    def transmission(self) -> FrequencyResponse | None:
+    def frequency_response(self) -> FrequencyResponse | None:
         """Give |x / U| of the newest segments, with coherence and bounds; None before two of them."""
         if not self._has(BASE, RESPONSE):
             return None
-        if self._transmission[0] != self._spectra.segments:
+        if self._frequency_response[0] != self._spectra.segments:
             rows = [self._rows[role] for role in _FREQUENCY_RESPONSE_ROLES if role in self._rows]
             low_hz, high_hz = self._band_hz
-            found = self._spectra.transmission(rows, low_hz=low_hz, high_hz=high_hz, delay_s=self._delay_s)
-            self._transmission = (self._spectra.segments, found)
-        return self._transmission[1]
+            found = self._spectra.frequency_response(
+                rows, low_hz=low_hz, high_hz=high_hz, delay_s=self._delay_s
+            )
+            self._frequency_response = (self._spectra.segments, found)
+        return self._frequency_response[1]
 
     def portrait(self) -> Portrait | None:
         """Give the orbit of the newest periods, and keep its Poincaré points; None without a sine."""
@@ -212,9 +214,9 @@ class LiveView:
         """The Poincaré points of all portraits so far."""
         return self._section
 
-    def course(self) -> SweepHistory:
+    def history(self) -> SweepHistory:
         """Give Responses I and II and extremes against the frequency really played, so far."""
-        return self._trace.course()
+        return self._trace.history()
 
     @property
     def impacts(self) -> int:

@@ -39,7 +39,7 @@ class MeasurementPrediction:
     prediction: ResponsePrediction
     basis: str
     """Where the base amplitude comes from."""
-    lead: Approach
+    approach: Approach
     """Where each simulated point begins."""
 
     @property
@@ -58,15 +58,15 @@ def predict_measurement(measurement: Measurement, rig: Rig) -> MeasurementPredic
     """Simulate the specimen of a rig over the band that a measurement excites."""
     specimen = specimen_of({"specimen": rig.specimen.model_dump()})
     low_hz, high_hz = excited_band_hz(measurement.excitation)
-    lead = approach_of(measurement.excitation)
-    match lead:
+    approach = approach_of(measurement.excitation)
+    match approach:
         case Approach.REST:
             grid, each_s = _thinned(prediction_grid(specimen, low_hz, high_hz)), SIMULATED_S
         case Approach.UP | Approach.DOWN:
             grid, each_s = np.linspace(low_hz, high_hz, FOLLOWED_POINTS, dtype=np.float64), FOLLOWED_S
     amplitude_m, basis = base_amplitude_m(measurement, rig, grid)
-    prediction = predicted(specimen, grid, amplitude_m, duration_s=each_s, lead=lead)
-    return MeasurementPrediction(measurement, prediction, basis, lead)
+    prediction = predicted(specimen, grid, amplitude_m, duration_s=each_s, approach=approach)
+    return MeasurementPrediction(measurement, prediction, basis, approach)
 
 
 def approach_of(excitation: Excitation) -> Approach:

@@ -127,7 +127,7 @@ def noise_overlay(analysis: NoiseAnalysis, channels: SimulatedChannels) -> Noise
     """Estimate from simulated channels what was estimated from the recorded ones."""
     noise = analysis.excitation
     response = noise_response(channels, noise, analysis.request)
-    measured, simulated = analysis.response.transmission, response.transmission
+    measured, simulated = analysis.response.frequency_response, response.frequency_response
     amplitude_m, basis = equivalent_amplitude(analysis)
     stop_hz = min(noise.band_stop_hz, _HIGHEST_PREDICTED_HZ)
     grid = prediction_grid(channels.simulated.specimen, noise.band_start_hz, stop_hz)

@@ -81,7 +81,7 @@ def predicted(
     accuracy: Accuracy = Accuracy.QUICK,
     *,
     duration_s: float = PREDICTION_S,
-    lead: Approach = Approach.REST,
+    approach: Approach = Approach.REST,
     progress: Progress = ignore_points,
 ) -> ResponsePrediction:
     """Simulate a sine at each frequency: from rest on all cores, or one after the other as a sweep comes by.
@@ -100,13 +100,13 @@ def predicted(
     amplitudes = np.broadcast_to(np.asarray(amplitude_m, dtype=np.float64), frequency_hz.shape)
     drives = [Harmonic(float(f), float(a)) for f, a in zip(frequency_hz, amplitudes, strict=True)]
     # Led, half of the time is for the step from the last frequency to die away in.
-    window_s = min(WINDOW_S, duration_s if lead is Approach.REST else duration_s / 2)
+    window_s = min(WINDOW_S, duration_s if approach is Approach.REST else duration_s / 2)
 
     def point(drive: Harmonic, state: Reals | None = None, for_s: float = duration_s) -> Response:
         return steady_response(specimen, drive, accuracy, for_s, window_s, state)
 
     points: list[Response] = []
-    match lead:
+    match approach:
         case Approach.REST:
             with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
                 for found in pool.map(point, drives):

@@ -204,7 +204,7 @@ def _linear(
         return None, ""
     weakest = results.noise[0].analysis
     try:
-        return fit_specimen(weakest.response.transmission, nominal), Path(weakest.facts.name).name
+        return fit_specimen(weakest.response.frequency_response, nominal), Path(weakest.facts.name).name
     except AnalysisError as error:
         not_told.append(f"Damping and frequencies stay as the bench says: {error}.")
         return None, ""

@@ -123,7 +123,7 @@ class SpecimenFit:
 
 
 def fit_specimen(
-    transmission: FrequencyResponse,
+    frequency_response: FrequencyResponse,
     nominal: Specimen,
     free: Sequence[Parameter] = LINEAR,
     confidence: float = DEFAULT_CONFIDENCE,
@@ -161,7 +161,7 @@ def fit_specimen(
             f"{', '.join(free) or 'nothing'} was to be fitted to a transmission; it tells any of "
             f"{', '.join(LINEAR)}"
         )
-    lines = _lines(transmission, nominal, free)
+    lines = _lines(frequency_response, nominal, free)
     freedom = 2 * lines.frequency_hz.size - lines.start.size
     found = _descended(lines.residuals, lines.start)
     if 2.0 * found.cost > POOR * freedom:
@@ -220,19 +220,21 @@ class _Lines:
         return np.asarray(self.weights * np.concatenate([apart.real, apart.imag - channels]))
 
 
-def _lines(transmission: FrequencyResponse, nominal: Specimen, free: tuple[Parameter, ...]) -> _Lines:
+def _lines(frequency_response: FrequencyResponse, nominal: Specimen, free: tuple[Parameter, ...]) -> _Lines:
     """Take the lines that stand above their uncertainty; NotEnoughData where they are too few."""
-    used = transmission.is_significant & np.isfinite(transmission.relative_sd_magnitude)
+    used = frequency_response.is_significant & np.isfinite(frequency_response.relative_sd_magnitude)
     count, needed = int(np.count_nonzero(used)), 2 * (len(free) + CHANNEL_PHASES)
     if count < needed:
         raise NotEnoughData(
             f"{count} lines of the transmission stand above their uncertainty, and {len(free)} parameters "
             f"need {needed}; measure longer or with more drive"
         )
-    spreads = np.concatenate([transmission.relative_sd_magnitude[used], transmission.sd_phase_rad[used]])
+    spreads = np.concatenate(
+        [frequency_response.relative_sd_magnitude[used], frequency_response.sd_phase_rad[used]]
+    )
     return _Lines(
-        frequency_hz=transmission.frequency_hz[used],
-        measured=transmission.value[used],
+        frequency_hz=frequency_response.frequency_hz[used],
+        measured=frequency_response.value[used],
         weights=1.0 / np.maximum(spreads, LEAST_RELATIVE_SD),
         nominal=nominal,
         free=free,

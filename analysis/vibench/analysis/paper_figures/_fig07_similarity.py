@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from vibench.sim.study import Study, StudyResults
 
 from ..figures import LEVEL_STYLES, LEVELS, MEASURED, SIMULATED, DrawnFigure, legend_above, new_figure, styled
-from ..model import SimilarityCurve, Similarity, similarity
+from ..model import Similarity, SimilarityCurve, similarity
 from ..signals import Reals
 from ..tables import table
 from ._options import AMPLITUDES_M, CASES, FigureOptions

@@ -155,7 +155,7 @@ class ObservedChannels:
     """Channels whose reading is watched."""
 
     channels: Channels
-    watcher: ProgressObserver
+    observer: ProgressObserver
 
     @property
     def sample_rate_hz(self) -> float:
@@ -179,7 +179,7 @@ class ObservedChannels:
     def read(self, start: int, stop: int) -> Reals:
         """Give drive, base and response, shape (3, samples), and say how far the record is read."""
         data = self.channels.read(start, stop)
-        self.watcher.read(stop, self.samples)
+        self.observer.read(stop, self.samples)
         return data
 
     def overloaded(self, start: int, stop: int) -> Flags:

@@ -45,11 +45,11 @@ __all__ = [
     "FrequencyGrid",
     "ImageKind",
     "accuracy_document",
-    "write_comparison",
     "levels_figure",
     "recording_figures",
     "result_figures",
     "tradeoff_figure",
     "worst_error",
+    "write_comparison",
     "write_report",
 ]

@@ -3,7 +3,13 @@
 from collections.abc import Iterator
 
 from vibench.sim import Accuracy
-from vibench.sim.accuracy_benchmark import LEAST_GAIN, LevelFigures, MotionBenchmark, SolverFigures, AccuracyBenchmark
+from vibench.sim.accuracy_benchmark import (
+    LEAST_GAIN,
+    AccuracyBenchmark,
+    LevelFigures,
+    MotionBenchmark,
+    SolverFigures,
+)
 
 _HEAD = (
     "| level or solver | simulated s per s | error of the state "
@@ -13,7 +19,7 @@ _RULE = "|---|---|---|---|---|---|"
 ABSENT = "–"
 
 
-def accuracy_document(trade: AccuracyBenchmark, picture: str) -> str:
+def accuracy_document(benchmark: AccuracyBenchmark, picture: str) -> str:
     """Write the page.
 
     Parameters
@@ -24,15 +30,15 @@ def accuracy_document(trade: AccuracyBenchmark, picture: str) -> str:
         Path of the figure, relative to the page.
 
     """
-    return "\n".join(_lines(trade, picture)) + "\n"
+    return "\n".join(_lines(benchmark, picture)) + "\n"
 
 
-def _lines(trade: AccuracyBenchmark, picture: str) -> Iterator[str]:
+def _lines(benchmark: AccuracyBenchmark, picture: str) -> Iterator[str]:
     yield from (
         "# Speed and accuracy, measured",
         "",
         "Made by `vibench tradeoff --markdown docs/accuracy.md`; not edited by hand.",
-        f"Machine: {trade.machine}. {trade.software}.",
+        f"Machine: {benchmark.machine}. {benchmark.software}.",
         "",
         "Errors of the state are the largest of six parts, in units of 100 µm and 0.1 m/s, against an",
         "independent solution of the plain equations (scipy's DOP853 at 1e-12, begun anew at every touch).",
@@ -41,9 +47,9 @@ def _lines(trade: AccuracyBenchmark, picture: str) -> Iterator[str]:
         "",
         f"![Error of the state over cost, for every level and solver]({picture})",
     )
-    for each in trade.motions:
+    for each in benchmark.motions:
         yield from _motion(each)
-    yield from _promises(trade)
+    yield from _promises(benchmark)
 
 
 def _motion(found: MotionBenchmark) -> Iterator[str]:
@@ -81,13 +87,13 @@ def _number(value: float | None) -> str:
     return ABSENT if value is None else f"{value:.1e}"
 
 
-def _promises(trade: AccuracyBenchmark) -> Iterator[str]:
+def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
     yield from ("", "## Promises", "", "| level | promised | worst above | kept |", "|---|---|---|---|")
     for accuracy in Accuracy:
-        worst = worst_error(trade, accuracy)
+        worst = worst_error(benchmark, accuracy)
         kept = "yes" if worst <= accuracy.promise else "**no**"
         yield f"| {accuracy.value} | {accuracy.promise:.0e} | {worst:.1e} | {kept} |"
-    yield from _without_gain(trade)
+    yield from _without_gain(benchmark)
     yield from (
         "",
         "## Times of scipy's DOP853 over the standard level",
@@ -95,27 +101,27 @@ def _promises(trade: AccuracyBenchmark) -> Iterator[str]:
         "| motion | ratio |",
         "|---|---|",
     )
-    for name, ratio in trade.solver_ratio("DOP853", Accuracy.STANDARD).items():
+    for name, ratio in benchmark.solver_ratio("DOP853", Accuracy.STANDARD).items():
         yield f"| {name} | {ratio:.0f} |"
 
 
-def _without_gain(trade: AccuracyBenchmark) -> Iterator[str]:
+def _without_gain(benchmark: AccuracyBenchmark) -> Iterator[str]:
     """Name the motions on which a level buys nothing."""
     lines = [
         f"- {level.accuracy.value} is no better than {before.accuracy.value}: {each.motion.name}"
-        for each in trade.motions
+        for each in benchmark.motions
         for level, before in each.without_gain
     ]
     if lines:
         yield from ("", f"Errors that a level does not lessen by a factor of {LEAST_GAIN:g}:", "", *lines)
 
 
-def worst_error(trade: AccuracyBenchmark, accuracy: Accuracy) -> float:
+def worst_error(benchmark: AccuracyBenchmark, accuracy: Accuracy) -> float:
     """Give the largest error of the state that a level made on any motion that is not chaotic."""
     return max(
         (
             level.state_error
-            for each in trade.motions
+            for each in benchmark.motions
             for level in each.levels
             if level.accuracy is accuracy and level.state_error is not None
         ),

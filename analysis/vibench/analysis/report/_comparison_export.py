@@ -30,7 +30,7 @@ class ExportKind(StrEnum):
 
 def write_comparison(
     path: Path,
-    traces: Sequence[Curve],
+    curves: Sequence[Curve],
     recordings: Sequence[ComparedRecording],
     pair: Pair | None = None,
     markers_hz: Sequence[float] = (),
@@ -53,13 +53,13 @@ def write_comparison(
         case ExportKind.HTML:
             _report(target, recordings)
         case ExportKind.CSV:
-            write_csv(comparison_table(target.stem, traces, pair), target)
+            write_csv(comparison_table(target.stem, curves, pair), target)
         case ExportKind.PNG:
-            target.write_bytes(comparison_figure(target.stem, traces, pair, markers_hz).png)
+            target.write_bytes(comparison_figure(target.stem, curves, pair, markers_hz).png)
         case ExportKind.SVG:
-            target.write_bytes(comparison_figure(target.stem, traces, pair, markers_hz).svg)
+            target.write_bytes(comparison_figure(target.stem, curves, pair, markers_hz).svg)
         case ExportKind.PDF:
-            target.write_bytes(comparison_figure(target.stem, traces, pair, markers_hz).pdf)
+            target.write_bytes(comparison_figure(target.stem, curves, pair, markers_hz).pdf)
     return target
 
 
@@ -71,12 +71,12 @@ def _report(target: Path, recordings: Sequence[ComparedRecording]) -> None:
     write_report(CampaignResults(target.stem, tuple(result for result, _ in kept), failures), target)
 
 
-def comparison_table(name: str, traces: Sequence[Curve], pair: Pair | None) -> Table:
+def comparison_table(name: str, curves: Sequence[Curve], pair: Pair | None) -> Table:
     """Lay all curves side by side; headings name the curve and the unit."""
-    if not traces:
+    if not curves:
         raise InvalidRequest("numbers of no curves were asked for; choose one or more")
     columns: list[tuple[str, tuple[float | str, ...]]] = []
-    for each in traces:
+    for each in curves:
         columns += [
             (f"frequency [Hz] ({each.name})", _cells(each.frequency_hz)),
             (f"|x / U| [1] ({each.name})", _cells(each.magnitude)),

@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from ..errors import NotEnoughData
 from ..figures import DrawnFigure
 from ..recordings import RecordingFacts, Verdict
-from ..results import CampaignResults, AnalysisFailure, Result
+from ..results import AnalysisFailure, CampaignResults, Result
 from ._figure_choice import recording_figures, result_figures
 from ._findings import findings, limits
 from ._recording_section import (

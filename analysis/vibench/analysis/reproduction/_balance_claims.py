@@ -8,7 +8,7 @@ from ..model import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
 from ..signals import Reals
 from ._case import DAMPINGS, Case
 from ._claim import Claim, about, at_least, at_most
-from ._curve_peaks import response_peaks, nearest, two_highest
+from ._curve_peaks import nearest, response_peaks, two_highest
 from ._evidence import CONTINUOUS, STRONG_M, WEAK_M, Evidence, level
 
 AGREES = 0.1

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from vibench.sim import Observable, Specimen, gong2025
-from vibench.sim.study import StudyObservable, Study, StudyResults
+from vibench.sim.study import Study, StudyObservable, StudyResults
 
 from ..paper_figures import AMPLITUDES_M, Responses, responses
 from ._case import Case

@@ -8,7 +8,7 @@ from ..model import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
 from ..paper_figures import GAPS_M, clearance_studies, responses
 from ._case import DAMPINGS, Case
 from ._claim import Claim, Expectation, about, at_most
-from ._curve_peaks import bound_peaks, response_peaks, linear_peaks, nearest, two_highest
+from ._curve_peaks import bound_peaks, linear_peaks, nearest, response_peaks, two_highest
 from ._evidence import PIECE_WISE, STRONG_M, WEAK_M, Evidence, level, model_study, specimen_under
 
 _STRONGER_M = 100e-6

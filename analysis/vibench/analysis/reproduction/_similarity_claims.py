@@ -4,7 +4,7 @@ import numpy as np
 
 from vibench.sim import gong2025, spring_of
 
-from ..model import SimilarityCurve, LogarithmOf, similarity
+from ..model import LogarithmOf, SimilarityCurve, similarity
 from ..paper_figures import AMPLITUDES_M
 from ..signals import Reals
 from ._case import DAMPINGS, EQUAL_PARTS, Alternative, Case, compared_up_to, logarithm, summed

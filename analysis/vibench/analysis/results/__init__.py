@@ -6,9 +6,9 @@ with its unit in its name and its uncertainty beside it, and the curves of a com
 """
 
 from ._campaign_results import (
+    AnalysisFailure,
     CampaignResults,
     DwellResult,
-    AnalysisFailure,
     NoiseResult,
     Overlay,
     Result,
@@ -37,10 +37,10 @@ from ._summary import (
 
 __all__ = [
     "UNOBSERVED",
+    "AnalysisFailure",
     "CampaignResults",
     "ComparedRecording",
     "DwellResult",
-    "AnalysisFailure",
     "NoiseResult",
     "Overlay",
     "RecordingAnalysis",
@@ -49,10 +49,10 @@ __all__ = [
     "SweepResult",
     "analyse_files",
     "analyse_recording",
-    "merged_results",
     "campaign_summary",
     "compare_recording",
     "kept_result",
+    "merged_results",
     "overlay",
     "recordings_in",
     "result_of",

@@ -10,7 +10,7 @@ from vibench.acquisition.recording import Recording
 from vibench.sim import Accuracy, Specimen
 
 from ..errors import AnalysisError, NotEnoughData
-from ..frequency_response import DEFAULT_REQUEST, NoiseAnalysis, FrequencyResponseRequest
+from ..frequency_response import DEFAULT_REQUEST, FrequencyResponseRequest, NoiseAnalysis
 from ..model import (
     DwellOverlay,
     NoiseOverlay,
@@ -24,7 +24,7 @@ from ..model import (
     stepped_overlay,
     sweep_overlay,
 )
-from ..recordings import RecordedChannels, RecordingFacts, ProgressObserver, specimen_of
+from ..recordings import ProgressObserver, RecordedChannels, RecordingFacts, specimen_of
 from ..sine import (
     DwellAnalysis,
     SteppedSineAnalysis,
@@ -180,7 +180,7 @@ def analyse_files(
     name: str,
     simulation: Simulation = Simulation.LAID_OVER,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
-    watcher: ProgressObserver = UNOBSERVED,
+    observer: ProgressObserver = UNOBSERVED,
     specimen: Specimen | None = None,
 ) -> CampaignResults:
     """Analyse recordings one after the other, each with the model laid over it, as `analyse_recording` does.
@@ -200,7 +200,7 @@ def analyse_files(
     for path in paths:
         try:
             with open_recording(path) as recording:
-                result, failed = result_of(recording, simulation, request, watcher, specimen)
+                result, failed = result_of(recording, simulation, request, observer, specimen)
         except (AnalysisError, RecordingError) as error:
             failures.append(AnalysisFailure(path.name, "analysis", str(error)))
             continue
@@ -222,7 +222,7 @@ def result_of(
     recording: Recording,
     simulation: Simulation = Simulation.LAID_OVER,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
-    watcher: ProgressObserver = UNOBSERVED,
+    observer: ProgressObserver = UNOBSERVED,
     specimen: Specimen | None = None,
 ) -> tuple[Result, tuple[AnalysisFailure, ...]]:
     """Analyse one recording; a simulation that fails leaves the measured result standing.
@@ -234,11 +234,13 @@ def result_of(
 
     """
     name = recording.path.name
-    analysis = analyse_recording(recording, request, watcher)
+    analysis = analyse_recording(recording, request, observer)
     if simulation is Simulation.LEFT_OUT:
         return _paired(analysis, None), ()
     try:
-        laid = overlay(recording, analysis, specimen=specimen, stage=lambda stage: watcher.begin(name, stage))
+        laid = overlay(
+            recording, analysis, specimen=specimen, stage=lambda stage: observer.begin(name, stage)
+        )
     except AnalysisError as error:
         return _paired(analysis, None), (AnalysisFailure(name, "simulation", str(error)),)
     return _paired(analysis, laid), ()

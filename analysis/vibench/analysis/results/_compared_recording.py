@@ -8,8 +8,8 @@ from pathlib import Path
 from vibench.acquisition import open_recording
 
 from ..comparison import (
-    CurveOrigin,
     Curve,
+    CurveOrigin,
     dwell_traces,
     predicted_curves,
     sorted_curve,
@@ -20,8 +20,8 @@ from ..comparison import (
 from ..frequency_response import FrequencyResponseRequest
 from ..model import Simulation
 from ._campaign_results import (
-    DwellResult,
     AnalysisFailure,
+    DwellResult,
     NoiseResult,
     Result,
     SteppedSineResult,
@@ -36,7 +36,7 @@ class ComparedRecording:
 
     path: Path
     name: str
-    traces: tuple[Curve, ...]
+    curves: tuple[Curve, ...]
     failures: tuple[str, ...]
     """Sentences on what could not be analysed or simulated."""
     warnings: tuple[str, ...]
@@ -45,7 +45,9 @@ class ComparedRecording:
     """The whole result, for reports: only they open it, with `kept_result`."""
 
 
-def compare_recording(path: Path, request: FrequencyResponseRequest, simulation: Simulation) -> ComparedRecording:
+def compare_recording(
+    path: Path, request: FrequencyResponseRequest, simulation: Simulation
+) -> ComparedRecording:
     """Analyse a recording for a comparison.
 
     Raises
@@ -60,7 +62,7 @@ def compare_recording(path: Path, request: FrequencyResponseRequest, simulation:
     return ComparedRecording(
         path=path,
         name=name,
-        traces=tuple(sorted_curve(each) for each in _curves(result, name)),
+        curves=tuple(sorted_curve(each) for each in _curves(result, name)),
         failures=tuple(each.sentence for each in failures),
         warnings=tuple(each.text for each in result.analysis.checks if each.verdict.value == "warning"),
         kept=pickle.dumps((result, failures)),
@@ -76,9 +78,9 @@ def kept_result(compared: ComparedRecording) -> tuple[Result, tuple[AnalysisFail
 def _curves(result: Result, name: str) -> Iterator[Curve]:
     match result:
         case NoiseResult(analysis=noise, laid=laid):
-            yield transmission_trace(name, CurveOrigin.MEASURED, noise.response.transmission)
+            yield transmission_trace(name, CurveOrigin.MEASURED, noise.response.frequency_response)
             if laid is not None:
-                yield transmission_trace(name, CurveOrigin.SIMULATED, laid.response.transmission)
+                yield transmission_trace(name, CurveOrigin.SIMULATED, laid.response.frequency_response)
         case SweepResult(analysis=sweep, laid=laid):
             yield from sweep_traces(name, CurveOrigin.MEASURED, sweep.response)
             if laid is not None:

@@ -16,14 +16,14 @@ from vibench.acquisition.plan import (
 from vibench.acquisition.recording import Recording
 
 from ..errors import AnalysisError
-from ..frequency_response import DEFAULT_REQUEST, NoiseAnalysis, FrequencyResponseRequest, noise_response
+from ..frequency_response import DEFAULT_REQUEST, FrequencyResponseRequest, NoiseAnalysis, noise_response
 from ..recordings import (
     Channels,
+    ObservedChannels,
+    ProgressObserver,
     RecordedChannels,
     RecordingFacts,
     Unobserved,
-    ObservedChannels,
-    ProgressObserver,
     measurement_checks,
     recording_facts,
     require_moving_channels,
@@ -48,7 +48,9 @@ RecordingAnalysis = NoiseAnalysis | SweepAnalysis | DwellAnalysis | SteppedSineA
 
 
 def analyse_recording(
-    recording: Recording, request: FrequencyResponseRequest = DEFAULT_REQUEST, watcher: ProgressObserver = UNOBSERVED
+    recording: Recording,
+    request: FrequencyResponseRequest = DEFAULT_REQUEST,
+    observer: ProgressObserver = UNOBSERVED,
 ) -> RecordingAnalysis:
     """Analyse a recording, complete or not, by the excitation that its plan names.
 
@@ -68,17 +70,19 @@ def analyse_recording(
 
     """
     name = recording.path.name
-    watcher.begin(name, "looking at every channel")
-    facts = recording_facts(recording, watcher.read)
-    watcher.begin(name, "analysing")
+    observer.begin(name, "looking at every channel")
+    facts = recording_facts(recording, observer.read)
+    observer.begin(name, "analysing")
     try:
-        return _analysed(facts, ObservedChannels(RecordedChannels(recording), watcher), request)
+        return _analysed(facts, ObservedChannels(RecordedChannels(recording), observer), request)
     except AnalysisError as error:
         ended = f"{facts.state.value}" + (f": {facts.reason}" if facts.reason else "")
         raise type(error)(f"{recording.path.name} ({ended}): {error}") from error
 
 
-def _analysed(facts: RecordingFacts, channels: Channels, request: FrequencyResponseRequest) -> RecordingAnalysis:
+def _analysed(
+    facts: RecordingFacts, channels: Channels, request: FrequencyResponseRequest
+) -> RecordingAnalysis:
     checks = measurement_checks(facts)
     require_moving_channels(facts.channels)
     match facts.measurement.excitation:

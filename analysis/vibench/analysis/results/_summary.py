@@ -79,23 +79,23 @@ def _noise(result: NoiseResult) -> Json:
     found = result.analysis.response
     return {
         "resonances": [_resonance(each) for each in found.resonances],
-        "transmission": _transmission(result.analysis),
+        "transmission": _frequency_response(result.analysis),
         "distortion": None if found.periodic is None else _distortion(found.periodic),
-        "independent_averages": found.transmission.n_eff,
+        "independent_averages": found.frequency_response.n_eff,
         "used_s": found.used_s,
         "left_out": found.left_out,
         "lost_samples": found.lost_samples,
         "overloaded_samples": found.overloaded_samples,
-        "median_coherence": float(np.median(found.transmission.coherence)),
+        "median_coherence": float(np.median(found.frequency_response.coherence)),
         "base_rms_acceleration_m_per_s2": found.base_level.rms_acceleration,
         "base_rms_displacement_m": found.base_level.rms_displacement_m,
         "relative_sd_base_rms": found.base_level.relative_sd,
     }
 
 
-def _transmission(analysis: NoiseAnalysis) -> Json:
+def _frequency_response(analysis: NoiseAnalysis) -> Json:
     view = analysis.request.view
-    found = view.shown(analysis.response.transmission)
+    found = view.shown(analysis.response.frequency_response)
     how = found.settings
     return {
         "quantity": view.name,

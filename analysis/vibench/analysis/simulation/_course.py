@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..comparison import CurveOrigin, CurveKind, Curve
+from ..comparison import Curve, CurveKind, CurveOrigin
 from ..errors import AnalysisError
-from ..model import SimilarityCurve, Similarity, similarity
+from ..model import Similarity, SimilarityCurve, similarity
 from ..signals import Reals
 from ._request import PartialResult, SimulatedPoint, SimulatedSignal, Trouble
 
@@ -20,16 +20,16 @@ class SimulationProgress:
         self._signals: dict[str, SimulatedSignal] = {}
         self._troubles: list[str] = []
 
-    def add(self, pieces: tuple[PartialResult, ...]) -> None:
+    def add(self, parts: tuple[PartialResult, ...]) -> None:
         """Take what has come."""
-        for piece in pieces:
-            match piece:
+        for part in parts:
+            match part:
                 case SimulatedPoint():
-                    self._found.setdefault(piece.model, {})[piece.frequency_hz] = piece
+                    self._found.setdefault(part.model, {})[part.frequency_hz] = part
                 case SimulatedSignal():
-                    self._signals[piece.model] = piece
+                    self._signals[part.model] = part
                 case Trouble():
-                    self._troubles.append(piece.sentence)
+                    self._troubles.append(part.sentence)
 
     @property
     def asked(self) -> int:
@@ -83,7 +83,7 @@ class SimulationProgress:
         groups = np.split(striking, np.flatnonzero(np.diff(striking) > 1) + 1) if striking.size else []
         return tuple((float(frequency_hz[each[0]]), float(frequency_hz[each[-1]])) for each in groups)
 
-    def traces(self) -> tuple[Curve, ...]:
+    def curves(self) -> tuple[Curve, ...]:
         """Give Responses I and II of every model, to be laid over recordings."""
         return tuple(
             Curve(
@@ -96,7 +96,10 @@ class SimulationProgress:
             )
             for model in self.models
             if model in self._found
-            for response, name in ((CurveKind.RESPONSE_I, "response_i"), (CurveKind.RESPONSE_II, "response_ii"))
+            for response, name in (
+                (CurveKind.RESPONSE_I, "response_i"),
+                (CurveKind.RESPONSE_II, "response_ii"),
+            )
         )
 
     def similarity(self) -> Similarity | None:

@@ -145,7 +145,7 @@ class Grown:
     """More of an answer."""
 
     number: int
-    pieces: tuple[PartialResult, ...]
+    parts: tuple[PartialResult, ...]
 
 
 @dataclass(frozen=True)
@@ -187,8 +187,8 @@ def _computed(connection: "Connection[Grown | Ended, Order]", begin: Begin) -> B
             is_over = True
         return is_over
 
-    def tell(pieces: tuple[PartialResult, ...]) -> None:
-        connection.send(Grown(begin.number, pieces))
+    def tell(parts: tuple[PartialResult, ...]) -> None:
+        connection.send(Grown(begin.number, parts))
 
     try:
         simulate(begin.request, tell, is_cancelled)

@@ -70,7 +70,7 @@ class Bridge(QObject):
         self._view_run = 0
         self._rig: Rig | None = None
         self._campaign: Campaign | None = None
-        self._heard = 0
+        self._last_message = 0
         self._ended: frozenset[str] = frozenset()
         self._is_looking = False
         self._beaten_s = 0.0
@@ -126,10 +126,10 @@ class Bridge(QObject):
         It may be called while something is painted: no answer is fetched, so nothing is changed.
         """
         now_s = monotonic()
-        pulse = None if self._line is None else self._line.pulse
-        if pulse is not None and now_s - self._beaten_s > BEAT_S:
+        heartbeat = None if self._line is None else self._line.heartbeat
+        if heartbeat is not None and now_s - self._beaten_s > BEAT_S:
             self._beaten_s = now_s
-            pulse.beat()
+            heartbeat.beat()
 
     def open(self, rig: Rig, confirmations: KnobSheet | None) -> None:
         """Open the bench of a rig, with an engine of its own if there is none yet."""
@@ -146,7 +146,9 @@ class Bridge(QObject):
         """Check the bench; ``folder`` is where recordings will go."""
         self._order(lambda client: client.check(folder))
 
-    def arm(self, campaign: Campaign, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE) -> None:
+    def arm(
+        self, campaign: Campaign, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE
+    ) -> None:
         """Get ready to carry out a campaign; `armed` or a notice follows."""
 
         def keep(plan: ArmedPlan) -> None:
@@ -208,21 +210,21 @@ class Bridge(QObject):
 
         return look
 
-    def _looked(self, glimpse: Snapshot) -> None:
-        self._status, glance = glimpse
-        if glance is None or self._status.bench is None or glance.volts.shape[1] == 0:
+    def _looked(self, snapshot: Snapshot) -> None:
+        self._status, newest_samples = snapshot
+        if newest_samples is None or self._status.bench is None or newest_samples.volts.shape[1] == 0:
             self._is_looking = False
         else:
-            self._begin_taking(self._status, self._status.bench, glance)
+            self._begin_taking(self._status, self._status.bench, newest_samples)
         self._tell(self._status)
 
-    def _begin_taking(self, status: EngineStatus, bench: BenchFacts, glance: SampleSlice) -> None:
-        if self._view is None or glance.run_id != self._view_run:
+    def _begin_taking(self, status: EngineStatus, bench: BenchFacts, newest_samples: SampleSlice) -> None:
+        if self._view is None or newest_samples.run_id != self._view_run:
             name = "" if status.run is None else status.run.name
             self._view = live_view(bench, self._rig, self._campaign, name)
-            self._view_run = glance.run_id
+            self._view_run = newest_samples.run_id
         size = max(1, round(PIECE_S * bench.sample_rate_hz))
-        self._take(self._view, glance.first_sample, glance.volts, size)
+        self._take(self._view, newest_samples.first_sample, newest_samples.volts, size)
 
     def _take(self, view: LiveView, first_sample: int, volts: NDArray[np.float32], size: int) -> None:
         """Take in a piece: all that comes after a pause, or from a fast simulation, is too much at once."""
@@ -236,8 +238,8 @@ class Bridge(QObject):
 
     def _tell(self, status: EngineStatus) -> None:
         for message in status.messages:
-            if message.number > self._heard:
-                self._heard = message.number
+            if message.number > self._last_message:
+                self._last_message = message.number
                 self.noticed.emit(_notice(message))
         ended = frozenset(
             row.file for row in status.rows if row.file and row.state not in ("queued", "running")
@@ -261,7 +263,7 @@ class Bridge(QObject):
         if self._line is None:
             return
         line, self._line = self._line, None
-        self._status, self._heard, self._ended = None, 0, frozenset()
+        self._status, self._last_message, self._ended = None, 0, frozenset()
         line.leave()
         self.noticed.emit(notice_of(error, "Look at the bench, then open it again on the Rig page."))
 

@@ -46,7 +46,7 @@ class EngineLine:
         self._answers: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._numbers = count()
         self._engine: EngineProcess | None = None
-        self._pulse: Heartbeat | None = None
+        self._heartbeat: Heartbeat | None = None
         self._thread = threading.Thread(target=self._run, name="engine line", daemon=True)
         self._thread.start()
 
@@ -56,9 +56,9 @@ class EngineLine:
         return None if self._engine is None else self._engine.pid
 
     @property
-    def pulse(self) -> Heartbeat | None:
+    def heartbeat(self) -> Heartbeat | None:
         """Tells the engine that the window is alive; None before there is an engine."""
-        return self._pulse
+        return self._heartbeat
 
     def ask(
         self,
@@ -91,8 +91,8 @@ class EngineLine:
     def _run(self) -> None:
         while (call := self._calls.get()).urgency is not Urgency.END:
             self._answer(call)
-        if self._pulse is not None:
-            self._pulse.close()
+        if self._heartbeat is not None:
+            self._heartbeat.close()
         if self._engine is not None:
             self._engine.close()
 
@@ -100,7 +100,7 @@ class EngineLine:
         try:
             if self._engine is None:
                 self._engine = self._start()
-                self._pulse = Heartbeat(self._engine.address)
+                self._heartbeat = Heartbeat(self._engine.address)
             answer = call.question(self._engine.client)
         except AcquisitionError as error:
             refusal = error

@@ -32,9 +32,9 @@ def warm_up() -> None:
     time_s = np.arange(round(WARM_S * WARM_RATE_HZ)) / WARM_RATE_HZ
     sine = np.sin(2 * np.pi * WARM_HZ * time_s)
     view.add(0, np.tile(sine, (len(roles), 1)).astype(np.float32))
-    view.lanes(1.0, 100)
+    view.time_histories(1.0, 100)
     view.spectrum()
-    view.transmission()
+    view.frequency_response()
     view.portrait()
 
 

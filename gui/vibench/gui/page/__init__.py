@@ -21,10 +21,10 @@ from ._settings import (
 
 __all__ = [
     "AppContext",
-    "UserActions",
     "Page",
     "Remembered",
     "Settings",
     "SideAndPicture",
+    "UserActions",
     "default_settings_path",
 ]

@@ -39,7 +39,7 @@ class AppContext(QObject):
     ) -> None:
         super().__init__(parent)
         self.settings = settings
-        self.intent = Selection(self)
+        self.selection = Selection(self)
         self.bridge = Bridge(start, self)
         self.bridge.noticed.connect(self.noticed)
         self.bridge.recording_ended.connect(self.recording_made)

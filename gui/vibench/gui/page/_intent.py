@@ -22,7 +22,7 @@ class Selection(QObject):
         self._rig_path: Path | None = None
         self._measurement: Measurement | None = None
         self._campaign: Campaign | None = None
-        self._foresight: MeasurementPrediction | None = None
+        self._prediction: MeasurementPrediction | None = None
 
     @property
     def rig(self) -> Rig | None:
@@ -40,9 +40,9 @@ class Selection(QObject):
         return self._measurement
 
     @property
-    def foresight(self) -> MeasurementPrediction | None:
+    def prediction(self) -> MeasurementPrediction | None:
         """What the specimen is predicted to do under the test; None while nobody knows."""
-        return self._foresight
+        return self._prediction
 
     @property
     def campaign(self) -> Campaign | None:
@@ -57,12 +57,12 @@ class Selection(QObject):
     def choose_measurement(self, measurement: Measurement | None) -> None:
         """Mean another test."""
         if measurement != self._measurement:
-            self._measurement, self._foresight = measurement, None
+            self._measurement, self._prediction = measurement, None
             self.measurement_changed.emit()
 
-    def foresee(self, foresight: MeasurementPrediction) -> None:
+    def keep_prediction(self, prediction: MeasurementPrediction) -> None:
         """Keep what is predicted of the test."""
-        self._foresight = foresight
+        self._prediction = prediction
 
     def choose_campaign(self, campaign: Campaign | None) -> None:
         """Mean another campaign."""

@@ -14,9 +14,9 @@ from ._settings import Remembered
 class Page(QWidget):
     """One step of the job. It keeps no truth of its own: what is shown is asked for at every tick."""
 
-    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
+    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.desk = desk
+        self.context = context
 
     @property
     def is_done(self) -> bool:
@@ -39,9 +39,9 @@ class Page(QWidget):
 class SideAndPicture(QSplitter):
     """Keeps for each page where the line between its parts was put."""
 
-    def __init__(self, desk: AppContext, page: str, side: QWidget, picture: QWidget) -> None:
+    def __init__(self, context: AppContext, page: str, side: QWidget, picture: QWidget) -> None:
         super().__init__(Qt.Orientation.Horizontal)
-        self._settings, self._page = desk.settings, page
+        self._settings, self._page = context.settings, page
         self.setAccessibleName(f"Parts of the {page} page")
         self.addWidget(_scrolled(page, side))
         self.addWidget(picture)

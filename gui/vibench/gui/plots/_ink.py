@@ -31,7 +31,7 @@ class LineStyle:
 
 
 def curve_style(number: int, dash: Dash = Dash.SOLID) -> LineStyle:
-    """Ink of the trace with this number."""
+    """Style of the curve with this number."""
     return LineStyle(lambda theme: theme.traces[number % len(theme.traces)], dash)
 
 
@@ -41,25 +41,25 @@ GUIDE = LineStyle(lambda theme: theme.line, Dash.DOTTED)
 SIGNS = {Dash.SOLID: "━━━", Dash.DASHED: "╍╍╍", Dash.DOTTED: "┉┉┉", Dash.DASH_DOTTED: "━╸╺"}
 
 
-def straight_pen(ink: LineStyle, theme: Theme, ratio: float) -> QPen:
+def straight_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
     """Give the pen of a straight line, as wide as a pixel of the layout: so many of the screen."""
-    pen: QPen = pg.mkPen(ink.colour(theme), width=ratio, style=ink.dash.value)
+    pen: QPen = pg.mkPen(line_style.colour(theme), width=ratio, style=line_style.dash.value)
     return pen
 
 
-def curve_pen(ink: LineStyle, theme: Theme, ratio: float) -> QPen:
+def curve_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
     """Give the pen of a curve, one pixel of the screen wide; `logical_line` draws it wider.
 
     Its dashes are as long on a fine screen as on a coarse one.
     """
-    pen: QPen = pg.mkPen(ink.colour(theme), width=1, style=ink.dash.value)
-    if ink.dash is not Dash.SOLID and ratio > 1.0:
+    pen: QPen = pg.mkPen(line_style.colour(theme), width=1, style=line_style.dash.value)
+    if line_style.dash is not Dash.SOLID and ratio > 1.0:
         pen.setDashPattern([ratio * part for part in pen.dashPattern()])
     return pen
 
 
-def shade_of(ink: LineStyle, theme: Theme) -> QColor:
+def shade_of(line_style: LineStyle, theme: Theme) -> QColor:
     """Give the colour of an area."""
-    colour: QColor = pg.mkColor(ink.colour(theme))
-    colour.setAlphaF(ink.filled or 0.25)
+    colour: QColor = pg.mkColor(line_style.colour(theme))
+    colour.setAlphaF(line_style.filled or 0.25)
     return colour

@@ -12,7 +12,7 @@ from PySide6.QtGui import QGuiApplication, QKeyEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from ..widgets import Theme, paint_hint
-from ._axis import PlotAxis, AxisItem, Blankness, Grid, Scale
+from ._axis import AxisItem, Blankness, Grid, PlotAxis, Scale
 from ._band import Band
 from ._ink import SIGNS, LineStyle, curve_pen, shade_of, straight_pen
 from ._legend import LegendEntry, LegendLine
@@ -115,56 +115,62 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.across.blank(Blankness.WRITTEN)
         return self
 
-    def curve(self, ink: LineStyle, name: str = "") -> pg.PlotDataItem:
+    def curve(self, line_style: LineStyle, name: str = "") -> pg.PlotDataItem:
         """Add a line; ``setData(x, y)`` draws it."""
         item = LogicalLine()
         item.setSkipFiniteCheck(False)
         self._add(item)
         if name:
-            self._legend_entries.append((ink, SIGNS[ink.dash], name))
-        self._ink(ink, lambda theme: item.setPen(curve_pen(ink, theme, self.devicePixelRatioF())))
+            self._legend_entries.append((line_style, SIGNS[line_style.dash], name))
+        self._line_style(
+            line_style, lambda theme: item.setPen(curve_pen(line_style, theme, self.devicePixelRatioF()))
+        )
         self._relegend()
         return item
 
-    def dots(self, ink: LineStyle, name: str = "", size: int = 4) -> pg.PlotDataItem:
+    def dots(self, line_style: LineStyle, name: str = "", size: int = 4) -> pg.PlotDataItem:
         """Add points without a line."""
         item = pg.PlotDataItem(pen=None, symbol="o", symbolSize=size, symbolPen=None)
         self._add(item)
         if name:
-            self._legend_entries.append((ink, _DOT, name))
-        self._ink(ink, lambda theme: item.setSymbolBrush(pg.mkBrush(ink.colour(theme))))
+            self._legend_entries.append((line_style, _DOT, name))
+        self._line_style(line_style, lambda theme: item.setSymbolBrush(pg.mkBrush(line_style.colour(theme))))
         self._relegend()
         return item
 
-    def band(self, ink: LineStyle) -> Band:
+    def band(self, line_style: LineStyle) -> Band:
         """Add an area between two lines, for uncertainties and envelopes."""
         band = Band()
         self.addItem(band.item)
-        self._ink(ink, lambda theme: band.paint(shade_of(ink, theme)))
+        self._line_style(line_style, lambda theme: band.paint(shade_of(line_style, theme)))
         return band
 
-    def stripes(self, ink: LineStyle) -> Stripes:
+    def stripes(self, line_style: LineStyle) -> Stripes:
         """Add upright stripes: where something happens, or is predicted to."""
         item = Stripes(self._across)
         self.addItem(item, ignoreBounds=True)
-        self._ink(ink, lambda theme: item.dress(shade_of(ink, theme)))
+        self._line_style(line_style, lambda theme: item.dress(shade_of(line_style, theme)))
         return item
 
-    def rules(self, ink: LineStyle) -> Rules:
+    def rules(self, line_style: LineStyle) -> Rules:
         """Add upright lines without labels."""
         item = Rules(self._across)
         self.addItem(item, ignoreBounds=True)
-        self._ink(ink, lambda theme: item.dress(straight_pen(ink, theme, self.devicePixelRatioF())))
+        self._line_style(
+            line_style, lambda theme: item.dress(straight_pen(line_style, theme, self.devicePixelRatioF()))
+        )
         return item
 
-    def upright(self, ink: LineStyle, value: float, label: str = "", label_at: float = 0.92) -> pg.InfiniteLine:
+    def upright(
+        self, line_style: LineStyle, value: float, label: str = "", label_at: float = 0.92
+    ) -> pg.InfiniteLine:
         """Add an upright line at a value; its label stands at a share of the height."""
-        return self._line(ink, self._across(value), 90, label, label_at)
+        return self._line(line_style, self._across(value), 90, label, label_at)
 
-    def level(self, ink: LineStyle, value: float, label: str = "") -> pg.InfiniteLine:
+    def level(self, line_style: LineStyle, value: float, label: str = "") -> pg.InfiniteLine:
         """Add a level line at a value."""
         shown = log10(value) if self._scales[1] is Scale.LOGARITHMIC else value
-        return self._line(ink, shown, 0, label, 0.92)
+        return self._line(line_style, shown, 0, label, 0.92)
 
     def wipe(self) -> None:
         """Take every curve, band and line away, for others."""
@@ -261,22 +267,24 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def _across(self, value: float) -> float:
         return log10(value) if self._scales[0] is Scale.LOGARITHMIC else value
 
-    def _line(self, ink: LineStyle, position: float, angle: float, label: str, at: float) -> pg.InfiniteLine:
+    def _line(
+        self, line_style: LineStyle, position: float, angle: float, label: str, at: float
+    ) -> pg.InfiniteLine:
         options = {"position": at, "movable": False}
         item = pg.InfiniteLine(position, angle, label=label or None, labelOpts=options if label else None)
         self.addItem(item, ignoreBounds=True)
 
         def paint(theme: Theme) -> None:
-            item.setPen(straight_pen(ink, theme, self.devicePixelRatioF()))
+            item.setPen(straight_pen(line_style, theme, self.devicePixelRatioF()))
             if label:
-                item.label.setColor(ink.colour(theme))
+                item.label.setColor(line_style.colour(theme))
                 item.label.fill = pg.mkBrush(theme.base)
 
-        self._ink(ink, paint)
+        self._line_style(line_style, paint)
         return item
 
-    def _ink(self, ink: LineStyle, paint: Callable[[Theme], None]) -> None:
-        self._inked.append((ink, paint))
+    def _line_style(self, line_style: LineStyle, paint: Callable[[Theme], None]) -> None:
+        self._inked.append((line_style, paint))
         paint(self._theme)
 
     def _add(self, item: pg.PlotDataItem) -> None:
@@ -301,7 +309,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._legend.setStyleSheet(f"background: {self._theme.base}; color: {self._theme.text}")
         self._legend.show_entries(
             tuple(
-                LegendEntry(sign, ink.colour(self._theme), name) for ink, sign, name in self._legend_entries
+                LegendEntry(sign, line_style.colour(self._theme), name)
+                for line_style, sign, name in self._legend_entries
             )
         )
         self._place_legend()

@@ -14,9 +14,9 @@ MOST_COLUMNS = 3000
 class SignalCurve:
     """Draws what of a signal is in sight, from its samples: an impact of three samples is never lost."""
 
-    def __init__(self, plot: Plot, ink: LineStyle, name: str = "") -> None:
+    def __init__(self, plot: Plot, line_style: LineStyle, name: str = "") -> None:
         self._plot = plot
-        self._curve = plot.curve(ink, name)
+        self._curve = plot.curve(line_style, name)
         self._samples: NDArray[np.float64] = np.empty(0)
         self._rate_hz, self._start_s = 1.0, 0.0
         self._drawn: tuple[int, int, int] | None = None

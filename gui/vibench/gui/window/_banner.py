@@ -24,7 +24,7 @@ CLOSED = StateIndicator("○", "NO BENCH", Tone.CALM, "Open one on the Rig page"
 
 
 class Banner(QFrame):
-    """One face at a time; a change of its word is announced to screen readers."""
+    """One indicator at a time; a change of its word is announced to screen readers."""
 
     stop_wanted = Signal()
     """Ramp down smoothly, as the plan says; pressed a second time: at once."""
@@ -33,7 +33,7 @@ class Banner(QFrame):
         super().__init__(parent)
         self.setObjectName("banner")
         self.setAccessibleName("State of the rig")
-        self._face = CLOSED
+        self._indicator = CLOSED
         self._label = QLabel()
         self._label.setObjectName("face")
         self._detail = QLabel()
@@ -55,25 +55,25 @@ class Banner(QFrame):
         self._paint()
 
     @property
-    def face(self) -> StateIndicator:
+    def indicator(self) -> StateIndicator:
         """What is shown."""
-        return self._face
+        return self._indicator
 
-    def show_face(self, face: StateIndicator) -> None:
+    def show_indicator(self, indicator: StateIndicator) -> None:
         """Show a state; nothing is repainted while nothing changes."""
-        if face == self._face:
+        if indicator == self._indicator:
             return
-        announced = face.word != self._face.word
-        self._face = face
+        announced = indicator.word != self._indicator.word
+        self._indicator = indicator
         self._paint()
         if announced:
             QAccessible.updateAccessibility(QAccessibleEvent(self._label, QAccessible.Event.Alert))
 
     def _paint(self) -> None:
-        face = self._face
-        self._label.setText(f"{face.symbol}  {face.word}")
-        self._label.setAccessibleName(f"State: {face.word}")
-        self._detail.setText(face.detail)
-        if self._label.property("tone") != face.tone.value:
-            self._label.setProperty("tone", face.tone.value)
+        indicator = self._indicator
+        self._label.setText(f"{indicator.symbol}  {indicator.word}")
+        self._label.setAccessibleName(f"State: {indicator.word}")
+        self._detail.setText(indicator.detail)
+        if self._label.property("tone") != indicator.tone.value:
+            self._label.setProperty("tone", indicator.tone.value)
             self._label.style().polish(self._label)

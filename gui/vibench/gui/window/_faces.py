@@ -18,7 +18,9 @@ _INDICATORS = {
     EngineState.HELD: StateIndicator("❚❚", "HELD", Tone.CAUTION),
     EngineState.RAMPING_DOWN: StateIndicator("▼", "RAMPING DOWN", Tone.CAUTION),
     EngineState.CHECKING: StateIndicator("◍", "CHECKING", Tone.ACTIVE, "A small sine plays for some seconds"),
-    EngineState.FAULT: StateIndicator("✖", "FAULT", Tone.DANGER, "Silent; open the bench again on the Rig page"),
+    EngineState.FAULT: StateIndicator(
+        "✖", "FAULT", Tone.DANGER, "Silent; open the bench again on the Rig page"
+    ),
 }
 _BYTES_PER_SAMPLE = 4
 _LITTLE_ROOM_S = 3600.0

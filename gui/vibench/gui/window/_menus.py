@@ -77,36 +77,40 @@ EMERGENCY = "STOP is not an emergency stop: in an emergency, switch the amplifie
 
 
 def build_menus(
-    window: QMainWindow, desk: AppContext, orders: UserActions, pages: tuple[str, ...], reset_layout: Callable[[], None]
+    window: QMainWindow,
+    context: AppContext,
+    actions: UserActions,
+    pages: tuple[str, ...],
+    reset_layout: Callable[[], None],
 ) -> None:
     """Put the menus on a window."""
     bar = window.menuBar()
     bar.setAccessibleName("Menus")
     file = bar.addMenu("&File")
-    _add(file.addAction("Recordings &folder…"), "", lambda: choose_folder(window, desk))
+    _add(file.addAction("Recordings &folder…"), "", lambda: choose_folder(window, context))
     _add(file.addAction("&Quit"), "Ctrl+Q", window.close)
     test = bar.addMenu("&Test")
-    _add(test.addAction("&Check the bench"), "F6", orders.check)
-    _add(test.addAction("&Arm the test"), "Ctrl+Return", orders.arm_test)
-    _add(test.addAction("S&tart"), "F5", orders.start)
-    _add(test.addAction("&Hold or go on"), "", orders.hold_or_resume)
-    _add(test.addAction("&Stop (ramp down)"), "", orders.stop)
-    _add(test.addAction("A&bort (Esc)"), "", orders.abort)
+    _add(test.addAction("&Check the bench"), "F6", actions.check)
+    _add(test.addAction("&Arm the test"), "Ctrl+Return", actions.arm_test)
+    _add(test.addAction("S&tart"), "F5", actions.start)
+    _add(test.addAction("&Hold or go on"), "", actions.hold_or_resume)
+    _add(test.addAction("&Stop (ramp down)"), "", actions.stop)
+    _add(test.addAction("A&bort (Esc)"), "", actions.abort)
     view = bar.addMenu("&View")
     for number, name in enumerate(pages, start=1):
-        _add(view.addAction(f"&{number}  {name}"), f"Ctrl+{number}", _showing(desk, name))
+        _add(view.addAction(f"&{number}  {name}"), f"Ctrl+{number}", _showing(context, name))
     view.addSeparator()
-    _add(view.addAction("&Light or dark"), "Ctrl+T", lambda: desk.choose_theme(_other(desk)))
+    _add(view.addAction("&Light or dark"), "Ctrl+T", lambda: context.choose_theme(_other(context)))
     _add(view.addAction("&Reset layout"), "", reset_layout)
     help_menu = bar.addMenu("Hel&p")
     _add(help_menu.addAction("&Keys"), "F1", lambda: show_keys(window))
 
 
-def choose_folder(window: QMainWindow, desk: AppContext) -> None:
+def choose_folder(window: QMainWindow, context: AppContext) -> None:
     """Ask where recordings go from now on."""
-    chosen = QFileDialog.getExistingDirectory(window, "Folder for recordings", str(desk.folder))
+    chosen = QFileDialog.getExistingDirectory(window, "Folder for recordings", str(context.folder))
     if chosen:
-        desk.choose_folder(Path(chosen))
+        context.choose_folder(Path(chosen))
 
 
 def show_keys(window: QMainWindow) -> None:
@@ -122,9 +126,9 @@ def _add(action: QAction, key: str, act: Callable[[], object]) -> None:
     action.triggered.connect(lambda _checked=False: act())
 
 
-def _showing(desk: AppContext, name: str) -> Callable[[], None]:
-    return lambda: desk.page_wanted.emit(name)
+def _showing(context: AppContext, name: str) -> Callable[[], None]:
+    return lambda: context.page_wanted.emit(name)
 
 
-def _other(desk: AppContext) -> Theme:
-    return DARK if desk.theme is LIGHT else LIGHT
+def _other(context: AppContext) -> Theme:
+    return DARK if context.theme is LIGHT else LIGHT

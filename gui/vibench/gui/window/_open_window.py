@@ -51,5 +51,5 @@ def open_window(bench: Path | None, settings: Path | None) -> int:
     # None of all this ever is garbage: a collector that looked through it would hold the window up.
     gc.freeze()
     window.show()
-    QTimer.singleShot(0, window.desk.background.prepare)
+    QTimer.singleShot(0, window.context.background.prepare)
     return app.exec()

@@ -1,4 +1,4 @@
-"""The rail: the job in order, page by page, with ticks; no page is ever locked."""
+"""The navigation bar: the job in order, page by page, with ticks; no page is ever locked."""
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QSizePolicy, QWidget

@@ -13,7 +13,7 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 
 from vibench.acquisition import shipped
-from vibench.acquisition.engine import Supervision, EngineState, start_engine
+from vibench.acquisition.engine import EngineState, Supervision, start_engine
 from vibench.acquisition.plan import Measurement
 from vibench.analysis.live import RowSpacing
 
@@ -72,9 +72,9 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
         if bench is not None:
             settings.keep_text(Remembered.BENCH, str(bench.resolve()))
         # Unattended: to change the theme and to write pictures takes longer than an attended run waits.
-        desk = AppContext(settings, partial(start_engine, Supervision.UNATTENDED))
-        desk.choose_folder(Path(scratch) / "recordings")
-        window = Window(desk, PAGES)
+        context = AppContext(settings, partial(start_engine, Supervision.UNATTENDED))
+        context.choose_folder(Path(scratch) / "recordings")
+        window = Window(context, PAGES)
         # As in `vibench.gui.window`: pictures are to show what a person would see.
         gc.freeze()
         window.resize(*SIZE)
@@ -95,23 +95,23 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
 
 
 def _open_and_check(window: Window) -> None:
-    bridge, rig = window.desk.bridge, window.desk.intent.rig
+    bridge, rig = window.context.bridge, window.context.selection.rig
     assert rig is not None
     bridge.open(rig, None)
     _wait(lambda: bridge.state is EngineState.READY)
-    window.orders.check()
+    window.user_actions.check()
     _wait(lambda: bridge.status is not None and bridge.status.check is not None)
 
 
 def _measure(window: Window, measurement: Measurement, during: Callable[[], None]) -> None:
     """Arm and start; ``during`` happens when so much of the run is over that the masses collide."""
-    bridge, test = window.desk.bridge, window.pages[TEST]
+    bridge, test = window.context.bridge, window.pages[TEST]
     assert isinstance(test, TestPage)
     test.form.show_measurement(measurement)
     _wait(lambda: not test.is_busy and bridge.state is EngineState.READY)
-    window.orders.arm_test()
+    window.user_actions.arm_test()
     _wait(lambda: bridge.state is EngineState.ARMED)
-    window.orders.start()
+    window.user_actions.start()
     _wait(lambda: bridge.state is EngineState.RUNNING)
     _wait(lambda: _elapsed_s(window) > SHOWN_AT_S or bridge.state is EngineState.READY)
     during()
@@ -119,7 +119,7 @@ def _measure(window: Window, measurement: Measurement, during: Callable[[], None
 
 
 def _elapsed_s(window: Window) -> float:
-    status = window.desk.bridge.status
+    status = window.context.bridge.status
     return 0.0 if status is None or status.run is None else status.run.elapsed_s
 
 
@@ -130,18 +130,18 @@ def _fill(window: Window) -> None:
     assert isinstance(simulation, SimulatePage)
     assert isinstance(queue, QueuePage)
     simulation.begin()
-    compare.add_recordings(tuple(sorted(window.desk.folder.glob("sweep*.h5"))))
+    compare.add_recordings(tuple(sorted(window.context.folder.glob("sweep*.h5"))))
     queue.open_file(shipped(CAMPAIGN))
     _wait(lambda: not simulation.simulator.is_busy and not compare.is_busy)
-    for path in window.desk.folder.glob("sweep*.h5"):
-        window.desk.recording_wanted.emit(path)
-    if simulation.course is not None:
-        compare.add_prediction(simulation.course.traces())
+    for path in window.context.folder.glob("sweep*.h5"):
+        window.context.recording_wanted.emit(path)
+    if simulation.progress is not None:
+        compare.add_prediction(simulation.progress.curves())
 
 
 def _picture(window: Window, pages: tuple[str, ...], folder: Path) -> None:
     """Save each page in each theme."""
-    first = window.desk.theme
+    first = window.context.theme
     for page in pages:
         window.show_page(page)
         _save(window, folder, page.lower())
@@ -159,14 +159,14 @@ def _picture_spectrogram(window: Window, folder: Path) -> None:
     _pass_ms(STILL_MS)
     _wait(lambda: not files.pictures.spectrogram.is_busy)
     _save(window, folder, "files_spectrogram")
-    files.pictures.setCurrentWidget(files.lanes)
+    files.pictures.setCurrentWidget(files.time_histories)
 
 
 def _save(window: Window, folder: Path, name: str) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for theme in THEMES.values():
         _themed(window, theme)
-        window.loop_watch.begin()
+        window.event_loop_monitor.begin()
         _pass_ms(STILL_MS)
         _write(window.grab().toImage(), folder / f"{name}_{theme.name}.png")
 
@@ -183,8 +183,8 @@ def _write(picture: QImage, path: Path) -> None:
 
 
 def _themed(window: Window, theme: Theme) -> None:
-    if window.desk.theme is not theme:
-        window.desk.choose_theme(theme)
+    if window.context.theme is not theme:
+        window.context.choose_theme(theme)
         _wait(lambda: window.is_themed)
 
 

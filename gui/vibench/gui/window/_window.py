@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from ..engine_link import SignOfLife
-from ..page import AppContext, UserActions, Page, Remembered
+from ..page import AppContext, Page, Remembered, UserActions
 from ..widgets import RUN, Theme, palette, style_sheet
 from ._banner import Banner
 from ._faces import indicator_of, status_fields
@@ -57,32 +57,32 @@ TICK_MS = 50
 class Window(QMainWindow):
     """Holds the pages; what they show, and what the banner shows, comes from the engine at every tick."""
 
-    def __init__(self, desk: AppContext, entries: tuple[PageEntry, ...]) -> None:
+    def __init__(self, context: AppContext, entries: tuple[PageEntry, ...]) -> None:
         super().__init__()
-        self.desk = desk
+        self.context = context
         self.setWindowTitle("vibench")
         self.banner = Banner()
         self.strip = MessageStrip()
         self.status_line = StatusLine()
         ordered = sorted(entries, key=lambda entry: entry.number)
-        self.pages: dict[str, Page] = {entry.name: entry.make(desk) for entry in ordered}
-        self.rail = NavigationBar(tuple(self.pages))
-        self.rail.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.pages: dict[str, Page] = {entry.name: entry.make(context) for entry in ordered}
+        self.navigation = NavigationBar(tuple(self.pages))
+        self.navigation.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._stack = QStackedWidget()
         self._unthemed: list[Callable[[], None]] = []
         for name, page in self.pages.items():
             page.setAccessibleName(f"{name} page")
             self._stack.addWidget(page)
         self._lay_out()
-        self.orders = UserActions(desk, self)
-        build_menus(self, desk, self.orders, tuple(self.pages), self._reset_layout)
+        self.user_actions = UserActions(context, self)
+        build_menus(self, context, self.user_actions, tuple(self.pages), self._reset_layout)
         self._connect()
         self._restore()
         self._timer = QTimer(self, interval=TICK_MS)
         self._timer.timeout.connect(self.tick)
         self._timer.start()
         self._frames = FrameCount()
-        self.loop_watch = EventLoopMonitor(lambda: f"{self.rail.chosen_name} page", self)
+        self.event_loop_monitor = EventLoopMonitor(lambda: f"{self.navigation.chosen_name} page", self)
 
     @property
     def page(self) -> Page:
@@ -98,34 +98,34 @@ class Window(QMainWindow):
             return
         self.page.left()
         self._stack.setCurrentWidget(page)
-        self.rail.choose(name)
-        self.desk.settings.keep_text(Remembered.PAGE, name)
+        self.navigation.choose(name)
+        self.context.settings.keep_text(Remembered.PAGE, name)
         page.entered()
         page.refresh()
 
     def tick(self) -> None:
         """Show what is true now, and let the engine know that somebody looks."""
-        self.desk.bridge.tick()
-        status = self.desk.bridge.status
-        self.banner.show_face(indicator_of(status))
+        self.context.bridge.tick()
+        status = self.context.bridge.status
+        self.banner.show_indicator(indicator_of(status))
         self.status_line.show_fields(
-            *status_fields(status, self._frames.counted(), self.loop_watch.longest_s)
+            *status_fields(status, self._frames.counted(), self.event_loop_monitor.longest_s)
         )
-        self.status_line.explain(StatusField.FRAMES, self.loop_watch.text)
+        self.status_line.explain(StatusField.FRAMES, self.event_loop_monitor.text)
         self.page.refresh()
-        self.rail.show_done({name: page.is_done for name, page in self.pages.items()})
+        self.navigation.show_done({name: page.is_done for name, page in self.pages.items()})
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Ask first while something runs; then let the engine end, and keep the shape of the window."""
-        if self.desk.bridge.is_driving and not self._may_close():
+        if self.context.bridge.is_driving and not self._may_close():
             event.ignore()
             return
         self._timer.stop()
-        self.loop_watch.stop()
-        self.desk.bridge.close()
+        self.event_loop_monitor.stop()
+        self.context.bridge.close()
         self.page.left()
-        self.desk.settings.keep_state(Remembered.GEOMETRY, self.saveGeometry())
-        self.desk.background.close()
+        self.context.settings.keep_state(Remembered.GEOMETRY, self.saveGeometry())
+        self.context.background.close()
         super().closeEvent(event)
 
     def _may_close(self) -> bool:
@@ -143,7 +143,7 @@ class Window(QMainWindow):
         body = QHBoxLayout()
         body.setContentsMargins(0, 0, 0, 0)
         body.setSpacing(0)
-        body.addWidget(self.rail)
+        body.addWidget(self.navigation)
         body.addWidget(self._stack, 1)
         middle = QWidget()
         layout = QVBoxLayout(middle)
@@ -156,30 +156,30 @@ class Window(QMainWindow):
         self.setCentralWidget(middle)
 
     def _connect(self) -> None:
-        self.rail.chosen.connect(self.show_page)
-        self.desk.page_wanted.connect(self.show_page)
-        self.desk.noticed.connect(self.strip.say)
-        self.desk.theme_changed.connect(self._retheme)
+        self.navigation.chosen.connect(self.show_page)
+        self.context.page_wanted.connect(self.show_page)
+        self.context.noticed.connect(self.strip.say)
+        self.context.theme_changed.connect(self._retheme)
         application = QApplication.instance()
         assert isinstance(application, QApplication)
         self.abort_key = AbortKey(application, self)
-        self.sign_of_life = SignOfLife(application, self.desk.bridge, self)
-        self.abort_key.pressed.connect(self.orders.abort)
-        self.banner.stop_wanted.connect(self.orders.stop)
-        self.desk.bridge.armed.connect(lambda _plan: self.show_page(RUN))
-        self.desk.bridge.armed.connect(lambda _plan: self.strip.give_way())
+        self.sign_of_life = SignOfLife(application, self.context.bridge, self)
+        self.abort_key.pressed.connect(self.user_actions.abort)
+        self.banner.stop_wanted.connect(self.user_actions.stop)
+        self.context.bridge.armed.connect(lambda _plan: self.show_page(RUN))
+        self.context.bridge.armed.connect(lambda _plan: self.strip.give_way())
 
     def _restore(self) -> None:
         self.resize(1280, 800)
-        geometry = self.desk.settings.state(Remembered.GEOMETRY)
+        geometry = self.context.settings.state(Remembered.GEOMETRY)
         if not geometry.isEmpty():
             self.restoreGeometry(geometry)
         first = next(iter(self.pages))
-        wanted = self.desk.settings.text(Remembered.PAGE, first)
+        wanted = self.context.settings.text(Remembered.PAGE, first)
         name = wanted if wanted in self.pages else first
         self._stack.setCurrentWidget(self.pages[name])
-        self.rail.choose(name)
-        self._prepare_theme(self.desk.theme)
+        self.navigation.choose(name)
+        self._prepare_theme(self.context.theme)
         while self._unthemed:
             self._unthemed.pop(0)()
 
@@ -194,7 +194,7 @@ class Window(QMainWindow):
         application.setPalette(palette(theme))
         sheet = style_sheet(theme)
         # A style sheet for the whole application would hold the window up for a third of a second.
-        for part in (self.banner, self.strip, self.rail, self.status_line):
+        for part in (self.banner, self.strip, self.navigation, self.status_line):
             part.setStyleSheet(sheet)
         pages = sorted(self.pages.values(), key=lambda each: each is not self._stack.currentWidget())
         self._unthemed = [
@@ -211,10 +211,10 @@ class Window(QMainWindow):
     def _theme_next(self) -> None:
         if self._unthemed:
             self._unthemed.pop(0)()
-            self.desk.bridge.beat()
+            self.context.bridge.beat()
             QTimer.singleShot(0, self, self._theme_next)
 
     def _reset_layout(self) -> None:
-        self.desk.settings.forget_layout()
+        self.context.settings.forget_layout()
         self.showNormal()
         self.resize(1280, 800)

@@ -14,7 +14,7 @@ periodic - hertz, 130 Hz, 20 µm
 periodic - linear_gap, 130 Hz, 20 µm
 """
 
-from ._figures import LEAST_GAIN, MOTIONS, LevelFigures, MotionBenchmark, SolverFigures, AccuracyBenchmark
+from ._figures import LEAST_GAIN, MOTIONS, AccuracyBenchmark, LevelFigures, MotionBenchmark, SolverFigures
 from ._measuring import (
     Thoroughness,
     measure_accuracy,
@@ -23,10 +23,10 @@ from ._measuring import (
 __all__ = [
     "LEAST_GAIN",
     "MOTIONS",
+    "AccuracyBenchmark",
     "LevelFigures",
     "MotionBenchmark",
     "SolverFigures",
     "Thoroughness",
-    "AccuracyBenchmark",
     "measure_accuracy",
 ]

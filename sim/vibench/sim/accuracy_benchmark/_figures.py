@@ -1,4 +1,4 @@
-"""What a measurement of the trade says: cost and error of each level, and of general solvers beside them.
+"""What the accuracy benchmark says: cost and error of each level, and of general solvers beside them.
 
 The motions on which the trade is measured: one of each kind, named by how it is driven.
 """

@@ -17,7 +17,7 @@ from ..kernels import Floats
 from ..model import Accuracy
 from ..motion import integrate, smallest_period, state_scales, steady_response, stroboscopic_section
 from ..study import software
-from ._figures import MOTIONS, LevelFigures, Motion, MotionBenchmark, Regime, SolverFigures, AccuracyBenchmark
+from ._figures import MOTIONS, AccuracyBenchmark, LevelFigures, Motion, MotionBenchmark, Regime, SolverFigures
 from ._independent_solution import independent_state, state_error
 from ._plain_equations import Place, law_of, numbers_of, rates_at
 
@@ -54,7 +54,7 @@ def measure_accuracy(
     step: Step = lambda _: None,
     motions: tuple[Motion, ...] = MOTIONS,
 ) -> AccuracyBenchmark:
-    """Measure the trade on every motion.
+    """Measure cost and error on every motion.
 
     Raises
     ------

@@ -42,9 +42,9 @@ __all__ = [
     "Chain",
     "band_gaps",
     "bloch_factor",
+    "chain_lyapunov_exponent",
     "chain_of",
     "chain_response",
     "chain_transmissibility",
     "integrate_chain",
-    "chain_lyapunov_exponent",
 ]

@@ -28,7 +28,7 @@ from ..contact import (
     step_factor,
 )
 from ..flight import polynomial_at
-from ..kernels import Table, Vector, kernel, inlined, kernel_without_refcount
+from ..kernels import Table, Vector, inlined, kernel, kernel_without_refcount
 from ._cell_flow import (
     MEMORY,
     MOMENT,

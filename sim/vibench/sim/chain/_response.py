@@ -88,7 +88,7 @@ def chain_response(
     cells, phasors = start_chain(chain, initial_state, 0.0, tables, accuracy)
     clock, line_s = clock_at(0.0), periods / drive.frequency_hz
     record = new_chain_record(chain, 0.0, duration_s, None, max_impact_rate_hz)
-    tally, before, line_start = new_observations(chain, NOTHING), 0, phasors
+    observations, before, line_start = new_observations(chain, NOTHING), 0, phasors
     code = int(Outcome.REACHED_END)
     ends = (duration_s - window_s, duration_s - line_s, duration_s)
     for mode, until in zip((NOTHING, PEAKS, PEAKS_AND_LINES), ends, strict=True):
@@ -96,12 +96,19 @@ def chain_response(
             before = int(record.counts[IMPACTS]) if mode == PEAKS else before
             line_start = phasors.copy()
             code = advance_chain(
-                cells, phasors, clock, until, tables, accuracy.tolerance, record, tally._replace(mode=mode)
+                cells,
+                phasors,
+                clock,
+                until,
+                tables,
+                accuracy.tolerance,
+                record,
+                observations._replace(mode=mode),
             )
     start = _state_against_drive(line_start, tables.shapes)
     change = _state_against_drive(phasors, tables.shapes) - start
-    lines = _lines(chain, drive, tally.forces, change, line_s)
-    largest = np.column_stack([*tally.peaks[1:], tally.peaks[0]])
+    lines = _lines(chain, drive, observations.forces, change, line_s)
+    largest = np.column_stack([*observations.peaks[1:], observations.peaks[0]])
     void = 1.0 if code == Outcome.REACHED_END else math.nan
     impacts = impacts_of(chain, record).cells
     return ChainResponse(

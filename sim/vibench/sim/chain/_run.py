@@ -31,10 +31,10 @@ from ._windows import (
     neighbours_clash,
     place_motion,
     place_observed,
-    set_ceilings,
-    workspace_for,
     propagate_window,
+    set_ceilings,
     weigh,
+    workspace_for,
 )
 
 REACHED_END = int(Outcome.REACHED_END)
@@ -69,11 +69,11 @@ def advance_chain(  # noqa: C901 - the kinds of window and their ends are one lo
     tables: ChainTables,
     tolerance: float,
     record: ChainRecord,
-    tally: ChainObservations,
+    observations: ChainObservations,
 ) -> int:
     """Advance cells, phasors and clock in place to the instant ``until`` [s]; returns an `Outcome` code."""
-    space = workspace_for(tables)
-    observed = 1 if tally.mode == NOTHING else OBSERVED
+    workspace = workspace_for(tables)
+    observed = 1 if observations.mode == NOTHING else OBSERVED
     count, drive = len(cells), len(phasors) - 1
     phasors[drive] = drive_term(clock, 0.0, tables)
     while True:
@@ -82,24 +82,26 @@ def advance_chain(  # noqa: C901 - the kinds of window and their ends are one lo
             return REACHED_END
         if count > 0:
             # A force has acted: what was known of the paths to come is void.
-            place_observed(space.motion, phasors, observed, tables)
-            weigh(space, phasors, observed, tables)
-            if is_bounded(space) == 0:
+            place_observed(workspace.motion, phasors, observed, tables)
+            weigh(workspace, phasors, observed, tables)
+            if is_bounded(workspace) == 0:
                 return LOST
-            if is_quiet(space, cells, tables) == 1:
-                _go_quietly(space, phasors, cells, clock, until, tables, tolerance, record, tally)
+            if is_quiet(workspace, cells, tables) == 1:
+                _go_quietly(workspace, phasors, cells, clock, until, tables, tolerance, record, observations)
                 return REACHED_END
-        if _march_on(space, phasors, cells, clock, longest, tally, record, tables) > 0:
+        if _march_on(workspace, phasors, cells, clock, longest, observations, record, tables) > 0:
             count = 0
             continue
-        length, count = _choose_window(space, cells, phasors, clock, longest, observed, tables)
-        code = _cross(space, cells, phasors, count, length, clock, tables, tolerance, record, tally)
+        length, count = _choose_window(workspace, cells, phasors, clock, longest, observed, tables)
+        code = _cross(
+            workspace, cells, phasors, count, length, clock, tables, tolerance, record, observations
+        )
         if record.counts[NEXT_SAMPLE] < len(record.samples):
-            _sample(space, phasors, clock, length, tables, tolerance, record)
+            _sample(workspace, phasors, clock, length, tables, tolerance, record)
         for k in range(count):
-            deposit(space.turned, cells[space.busy[k]], space.busy[k], tables)
-        copy_terms(phasors, space.turned)
-        copy_motion(space.motion, space.motion_end, observed)
+            deposit(workspace.turned, cells[workspace.busy[k]], workspace.busy[k], tables)
+        copy_terms(phasors, workspace.turned)
+        copy_motion(workspace.motion, workspace.motion_end, observed)
         if length >= longest:
             clock[0], clock[1] = until, 0.0
         else:
@@ -110,7 +112,7 @@ def advance_chain(  # noqa: C901 - the kinds of window and their ends are one lo
 
 @kernel
 def _go_quietly(
-    space: Workspace,
+    workspace: Workspace,
     phasors: Complex,
     cells: Table,
     clock: Vector,
@@ -118,48 +120,48 @@ def _go_quietly(
     tables: ChainTables,
     tolerance: float,
     record: ChainRecord,
-    tally: ChainObservations,
+    observations: ChainObservations,
 ) -> None:
     """Go to the end in one step when no cell can ever touch; who watches looks at every window."""
     longest, drive = time_until(clock, until), len(phasors) - 1
-    space.busy_count[0] = 0
-    copy_terms(space.start, phasors)
+    workspace.busy_count[0] = 0
+    copy_terms(workspace.start, phasors)
     if record.counts[NEXT_SAMPLE] < len(record.samples):
-        _sample(space, phasors, clock, longest, tables, tolerance, record)
-    if tally.mode != NOTHING:
+        _sample(workspace, phasors, clock, longest, tables, tolerance, record)
+    if observations.mode != NOTHING:
         then = np.zeros(2)
         then[0], then[1] = clock[0], clock[1]
         left = longest
         while left > 0.0:
-            if _march_on(space, phasors, cells, then, left, tally, record, tables) == 0:
+            if _march_on(workspace, phasors, cells, then, left, observations, record, tables) == 0:
                 length = min(left, tables.windows[0])
-                propagate_window(space, phasors, then, length, 0, tables)
-                place_observed(space.motion_end, space.turned, OBSERVED, tables)
+                propagate_window(workspace, phasors, then, length, 0, tables)
+                place_observed(workspace.motion_end, workspace.turned, OBSERVED, tables)
                 for i in range(len(cells)):
-                    observe_idle(tally, i, space, phasors, length, tables)
-                copy_terms(phasors, space.turned)
-                copy_motion(space.motion, space.motion_end, OBSERVED)
+                    observe_idle(observations, i, workspace, phasors, length, tables)
+                copy_terms(phasors, workspace.turned)
+                copy_motion(workspace.motion, workspace.motion_end, OBSERVED)
                 advance_clock(then, length)
             left = time_until(then, until)
     for j in range(drive):
-        phasors[j] = space.start[j] * np.exp(tables.rates[j] * longest)
+        phasors[j] = workspace.start[j] * np.exp(tables.rates[j] * longest)
     clock[0], clock[1] = until, 0.0
     phasors[drive] = drive_term(clock, 0.0, tables)
 
 
 @kernel_without_refcount
 def _march_on(
-    space: Workspace,
+    workspace: Workspace,
     phasors: Complex,
     cells: Table,
     clock: Vector,
     longest: float,
-    tally: ChainObservations,
+    observations: ChainObservations,
     record: ChainRecord,
     tables: ChainTables,
 ) -> int:
     """Advance over whole windows in which nothing can happen; gives how many there were."""
-    observed = 1 if tally.mode == NOTHING else OBSERVED
+    observed = 1 if observations.mode == NOTHING else OBSERVED
     for i in range(len(cells)):
         if cells[i, SIDE] != 0.0:
             return 0
@@ -170,17 +172,17 @@ def _march_on(
     steps = int(free / window) - 1
     if steps <= 0:
         return 0
-    set_ceilings(space, tally.peaks, observed, window, tables)
+    set_ceilings(workspace, observations.peaks, observed, window, tables)
     for what in range(observed):
         for i in range(len(cells)):
-            if not space.floor[what, i] < space.motion[what, i] < space.ceiling[what, i]:
+            if not workspace.floor[what, i] < workspace.motion[what, i] < workspace.ceiling[what, i]:
                 return 0
-    return march(space, phasors, clock, observed, steps, tables)
+    return march(workspace, phasors, clock, observed, steps, tables)
 
 
 @kernel_without_refcount
 def _choose_window(
-    space: Workspace,
+    workspace: Workspace,
     cells: Table,
     phasors: Complex,
     clock: Vector,
@@ -195,27 +197,31 @@ def _choose_window(
     length, count = longest, 0
     for level in range(len(tables.windows)):
         length = min(longest, tables.windows[level])
-        propagate_window(space, phasors, clock, length, level, tables)
-        place_observed(space.motion_end, space.turned, observed, tables)
-        count = find_busy(space, cells, length, tables)
-        if neighbours_clash(space.busy, count, tables.clash[level]) == 0:
+        propagate_window(workspace, phasors, clock, length, level, tables)
+        place_observed(workspace.motion_end, workspace.turned, observed, tables)
+        count = find_busy(workspace, cells, length, tables)
+        if neighbours_clash(workspace.busy, count, tables.clash[level]) == 0:
             break
     return length, count
 
 
 @kernel_without_refcount
-def is_quiet(space: Workspace, cells: Table, tables: ChainTables) -> int:
+def is_quiet(workspace: Workspace, cells: Table, tables: ChainTables) -> int:
     """Say (1 or 0) whether no cell can ever touch: free phasors only shrink."""
     for i in range(len(cells)):
         law = tables.laws[i]
-        if cells[i, SIDE] != 0.0 or law[KIND] == POWER or space.reach[PATH, i] >= min(law[LOWER], law[UPPER]):
+        if (
+            cells[i, SIDE] != 0.0
+            or law[KIND] == POWER
+            or workspace.reach[PATH, i] >= min(law[LOWER], law[UPPER])
+        ):
             return 0
     return 1
 
 
 @kernel_without_refcount
 def _cross(
-    space: Workspace,
+    workspace: Workspace,
     cells: Table,
     phasors: Complex,
     count: int,
@@ -224,38 +230,38 @@ def _cross(
     tables: ChainTables,
     tolerance: float,
     record: ChainRecord,
-    tally: ChainObservations,
+    observations: ChainObservations,
 ) -> int:
     """Take every cell through the window and observe it."""
-    observed = 1 if tally.mode == NOTHING else OBSERVED
-    log = space.no_log if tally.mode == NOTHING else space.log
+    observed = 1 if observations.mode == NOTHING else OBSERVED
+    log = workspace.no_log if observations.mode == NOTHING else workspace.log
     worst, busy = REACHED_END, 0
     for i in range(len(cells)):
-        if busy == count or space.busy[busy] != i:
-            if tally.mode != NOTHING:
-                observe_idle(tally, i, space, phasors, length, tables)
+        if busy == count or workspace.busy[busy] != i:
+            if observations.mode != NOTHING:
+                observe_idle(observations, i, workspace, phasors, length, tables)
             continue
         busy += 1
-        cell, series, markov = cells[i], space.series[i], tables.markov[i, PATH]
+        cell, series, markov = cells[i], workspace.series[i], tables.markov[i, PATH]
         law = law_of(tables.laws[i])
-        fill_observed(series, phasors, i, observed, space.terms, tables)
+        fill_observed(series, phasors, i, observed, workspace.terms, tables)
         for k in range(MEMORY, CELL_SIZE):
             cell[k] = 0.0
         if law.kind == POWER:
             begin_power(cell, series[PATH], markov, law, length)
         for k in range(CELL_SIZE):
-            space.before[i, k] = cell[k]
-        space.touches[COUNT] = 0.0
+            workspace.before[i, k] = cell[k]
+        workspace.touches[COUNT] = 0.0
         code = cross_window(
-            cell, 0.0, length, series[PATH], markov, space.reach[PATH, i], law, tolerance,
-            space.later, space.work, space.touches, log,
+            cell, 0.0, length, series[PATH], markov, workspace.reach[PATH, i], law, tolerance,
+            workspace.later, workspace.work, workspace.touches, log,
         )  # fmt: skip
         if code == REACHED_END:
-            code = _record_touches(space.touches, i, clock, record)
-        if tally.mode != NOTHING:
-            observe_busy(tally, i, series, log, tables)
-        if tally.mode == PEAKS_AND_LINES:
-            observe_forces(tally, cell, i, space.turned[len(phasors) - 1], tables.omega)
+            code = _record_touches(workspace.touches, i, clock, record)
+        if observations.mode != NOTHING:
+            observe_busy(observations, i, series, log, tables)
+        if observations.mode == PEAKS_AND_LINES:
+            observe_forces(observations, cell, i, workspace.turned[len(phasors) - 1], tables.omega)
         worst = max(worst, code)
     return worst
 
@@ -274,7 +280,7 @@ def _record_touches(touches: Vector, place: int, clock: Vector, record: ChainRec
 
 @kernel
 def _sample(
-    space: Workspace,
+    workspace: Workspace,
     phasors: Complex,
     clock: Vector,
     length: float,
@@ -283,26 +289,26 @@ def _sample(
     record: ChainRecord,
 ) -> None:
     """Keep the samples that fall into a window, by a second run of the busy cells that lands on each."""
-    counts, reached, count = record.counts, 0.0, space.busy_count[0]
+    counts, reached, count = record.counts, 0.0, workspace.busy_count[0]
     drive = len(phasors) - 1
     while counts[NEXT_SAMPLE] < len(record.samples):
         later = time_until(clock, record.start + counts[NEXT_SAMPLE] / record.sample_rate)
         if later > length:
             return
-        now = space.terms
+        now = workspace.terms
         for j in range(drive):
             now[j] = phasors[j] * np.exp(tables.rates[j] * later)
         now[drive] = drive_term(clock, later, tables)
         for k in range(count):
-            i = space.busy[k]
-            space.touches[COUNT] = 0.0
+            i = workspace.busy[k]
+            workspace.touches[COUNT] = 0.0
             if later > reached:
                 cross_window(
-                    space.before[i], reached, later, space.series[i, PATH], tables.markov[i, PATH],
-                    space.reach[PATH, i], law_of(tables.laws[i]), tolerance,
-                    space.later, space.work, space.touches, space.no_log,
+                    workspace.before[i], reached, later, workspace.series[i, PATH], tables.markov[i, PATH],
+                    workspace.reach[PATH, i], law_of(tables.laws[i]), tolerance,
+                    workspace.later, workspace.work, workspace.touches, workspace.no_log,
                 )  # fmt: skip
-            deposit(now, space.before[i], i, tables)
+            deposit(now, workspace.before[i], i, tables)
         reached = max(reached, later)
         place_motion(record.samples[counts[NEXT_SAMPLE]], now, tables)
         counts[NEXT_SAMPLE] += 1

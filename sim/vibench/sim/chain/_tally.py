@@ -31,32 +31,44 @@ class ChainObservations(NamedTuple):
 
 
 @kernel_without_refcount
-def observe_forces(tally: ChainObservations, cell: Vector, place: int, end: complex, omega: float) -> None:
+def observe_forces(
+    observations: ChainObservations, cell: Vector, place: int, end: complex, omega: float
+) -> None:
     """Add the moments of a window's force; ``end`` is the drive's term at the window's end."""
     total = complex(0.0, 0.0)
     for k in range(MOMENTS - 1, -1, -1):
         total = total * complex(0.0, omega) + cell[MEMORY + k]
-    tally.forces[place] += end.conjugate() * total
+    observations.forces[place] += end.conjugate() * total
 
 
 @kernel_without_refcount
 def observe_idle(
-    tally: ChainObservations, place: int, space: Workspace, phasors: Complex, length: float, tables: ChainTables
+    observations: ChainObservations,
+    place: int,
+    workspace: Workspace,
+    phasors: Complex,
+    length: float,
+    tables: ChainTables,
 ) -> None:
     """Look for larger motions of a cell without a force; its row of ``space.series`` is overwritten.
 
     A window is looked at only if the bounds let it hold a larger value than the largest so far.
     """
-    series = space.series[place]
+    series = workspace.series[place]
     is_filled = False
     for what in range(OBSERVED):
-        at_ends = max(abs(space.motion[what, place]), abs(space.motion_end[what, place]))
-        if at_ends + space.curvature[what, place] * length * length / 8.0 <= tally.peaks[what, place]:
+        at_ends = max(abs(workspace.motion[what, place]), abs(workspace.motion_end[what, place]))
+        if (
+            at_ends + workspace.curvature[what, place] * length * length / 8.0
+            <= observations.peaks[what, place]
+        ):
             continue
         if not is_filled:
-            fill_observed(series, phasors, place, OBSERVED, space.terms, tables)
+            fill_observed(series, phasors, place, OBSERVED, workspace.terms, tables)
             is_filled = True
-        tally.peaks[what, place] = series_peak(tally.peaks[what, place], series[what], 0.0, length)
+        observations.peaks[what, place] = series_peak(
+            observations.peaks[what, place], series[what], 0.0, length
+        )
 
 
 @kernel_without_refcount
@@ -70,18 +82,20 @@ def _node(series: Vector, markov: Vector, at: Vector) -> tuple[float, float]:
 
 
 @kernel_without_refcount
-def observe_busy(tally: ChainObservations, place: int, series: Table, log: Table, tables: ChainTables) -> None:
+def observe_busy(
+    observations: ChainObservations, place: int, series: Table, log: Table, tables: ChainTables
+) -> None:
     """Look for larger motions of a cell between the logged instants of its window."""
-    tally.peaks[PATH, place] = max(tally.peaks[PATH, place], log[0, DEEPEST])
+    observations.peaks[PATH, place] = max(observations.peaks[PATH, place], log[0, DEEPEST])
     for what in range(OBSERVED):
-        markov, best = tables.markov[place, what], tally.peaks[what, place]
+        markov, best = tables.markov[place, what], observations.peaks[what, place]
         value, slope = _node(series[what], markov, log[1])
         for row in range(2, int(log[0, LOGGED]) + 1):
             step = log[row, T] - log[row - 1, T]
             value_end, slope_end = _node(series[what], markov, log[row])
             best = _cubic_peak(best, value, step * slope, value_end, step * slope_end)
             value, slope = value_end, slope_end
-        tally.peaks[what, place] = best
+        observations.peaks[what, place] = best
 
 
 @kernel_without_refcount

@@ -7,7 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..flight import LARGEST_BOUND, SERIES_TERMS
-from ..kernels import Complex, Table, Vector, advance_clock, angle_at, kernel, inlined, kernel_without_refcount
+from ..kernels import (
+    Complex,
+    Table,
+    Vector,
+    advance_clock,
+    angle_at,
+    inlined,
+    kernel,
+    kernel_without_refcount,
+)
 from ..model import MOST_TERMS
 from ..slots import PowerTerms
 from ._cell_contact import cell_workspace
@@ -145,69 +154,71 @@ def copy_motion(to: Table, source: Table, observed: int) -> None:
 
 
 @inlined
-def is_bounded(space: Workspace) -> int:
+def is_bounded(workspace: Workspace) -> int:
     """Say (1 or 0) whether the motion is small enough for statements about touches."""
-    for i in range(space.curvature.shape[1]):
-        if not space.curvature[PATH, i] < LARGEST_BOUND:
+    for i in range(workspace.curvature.shape[1]):
+        if not workspace.curvature[PATH, i] < LARGEST_BOUND:
             return 0
     return 1
 
 
 @inlined
-def weigh(space: Workspace, phasors: Complex, observed: int, tables: ChainTables) -> None:
+def weigh(workspace: Workspace, phasors: Complex, observed: int, tables: ChainTables) -> None:
     """Bound the motion and acceleration of the first ``observed`` of p, x, y, z, until a force acts."""
     for what in range(observed):
-        for i in range(space.reach.shape[1]):
-            space.reach[what, i] = space.curvature[what, i] = 0.0
+        for i in range(workspace.reach.shape[1]):
+            workspace.reach[what, i] = workspace.curvature[what, i] = 0.0
     for j in range(len(phasors)):
         weight = abs(phasors[j])
-        space.weights[j] = weight
+        workspace.weights[j] = weight
         for what in range(observed):
-            for i in range(space.reach.shape[1]):
-                space.reach[what, i] += weight * tables.reaches[j, what, i]
-                space.curvature[what, i] += weight * tables.curvatures[j, what, i]
+            for i in range(workspace.reach.shape[1]):
+                workspace.reach[what, i] += weight * tables.reaches[j, what, i]
+                workspace.curvature[what, i] += weight * tables.curvatures[j, what, i]
 
 
 @inlined
 def propagate_window(
-    space: Workspace, phasors: Complex, clock: Vector, length: float, level: int, tables: ChainTables
+    workspace: Workspace, phasors: Complex, clock: Vector, length: float, level: int, tables: ChainTables
 ) -> None:
     """Write the phasors at the window's end, as if no force acted in it."""
     modes = len(phasors) - 1
     if length == tables.windows[level]:
         for j in range(modes):
-            space.turned[j] = phasors[j] * tables.factors[level, j]
+            workspace.turned[j] = phasors[j] * tables.factors[level, j]
     else:
         for j in range(modes):
-            space.turned[j] = phasors[j] * cmath.exp(tables.rates[j] * length)
-    space.turned[modes] = drive_term(clock, length, tables)
+            workspace.turned[j] = phasors[j] * cmath.exp(tables.rates[j] * length)
+    workspace.turned[modes] = drive_term(clock, length, tables)
 
 
 @inlined
-def set_ceilings(space: Workspace, peaks: Table, observed: int, length: float, tables: ChainTables) -> None:
+def set_ceilings(
+    workspace: Workspace, peaks: Table, observed: int, length: float, tables: ChainTables
+) -> None:
     """Work out between which values at the ends of windows of ``length`` nothing can happen within them.
 
     Nothing is: no touch, and no motion larger than the largest so far, if that is observed.
     """
     for what in range(observed):
         for i in range(peaks.shape[1]):
-            margin = space.curvature[what, i] * length * length / 8.0
-            space.ceiling[what, i] = np.inf if observed == 1 else peaks[what, i] - margin
-            space.floor[what, i] = -space.ceiling[what, i]
+            margin = workspace.curvature[what, i] * length * length / 8.0
+            workspace.ceiling[what, i] = np.inf if observed == 1 else peaks[what, i] - margin
+            workspace.floor[what, i] = -workspace.ceiling[what, i]
             if what == PATH:
                 law = tables.laws[i]
-                space.ceiling[what, i] = min(space.ceiling[what, i], law[UPPER] - margin)
-                space.floor[what, i] = max(space.floor[what, i], margin - law[LOWER])
+                workspace.ceiling[what, i] = min(workspace.ceiling[what, i], law[UPPER] - margin)
+                workspace.floor[what, i] = max(workspace.floor[what, i], margin - law[LOWER])
 
 
 @kernel_without_refcount
 def march(
-    space: Workspace, phasors: Complex, clock: Vector, observed: int, steps: int, tables: ChainTables
+    workspace: Workspace, phasors: Complex, clock: Vector, observed: int, steps: int, tables: ChainTables
 ) -> int:
     """Advance over long windows in which nothing can happen, at most ``steps``; gives how many there were."""
     window, factors, drive = tables.windows[0], tables.factors[0], len(phasors) - 1
-    real, imaginary, turned = tables.real, tables.imaginary, space.turned
-    motion, floor, ceiling = space.motion_end, space.floor, space.ceiling
+    real, imaginary, turned = tables.real, tables.imaginary, workspace.turned
+    motion, floor, ceiling = workspace.motion_end, workspace.floor, workspace.ceiling
     for made in range(steps):
         for what in range(observed):
             for i in range(motion.shape[1]):
@@ -223,24 +234,24 @@ def march(
                 if not floor[what, i] < motion[what, i] < ceiling[what, i]:
                     return made
         copy_terms(phasors, turned)
-        copy_motion(space.motion, motion, observed)
+        copy_motion(workspace.motion, motion, observed)
         advance_clock(clock, window)
     return steps
 
 
 @inlined
-def find_busy(space: Workspace, cells: Table, length: float, tables: ChainTables) -> int:
+def find_busy(workspace: Workspace, cells: Table, length: float, tables: ChainTables) -> int:
     """List the cells that press, or whose touch within the window is not excluded; gives how many."""
     count = 0
     for i in range(len(cells)):
         law = tables.laws[i]
-        margin = space.curvature[PATH, i] * length * length / 8.0
+        margin = workspace.curvature[PATH, i] * length * length / 8.0
         low, high = margin - law[LOWER], law[UPPER] - margin
-        is_clear = low < space.motion[PATH, i] < high and low < space.motion_end[PATH, i] < high
+        is_clear = low < workspace.motion[PATH, i] < high and low < workspace.motion_end[PATH, i] < high
         if cells[i, SIDE] != 0.0 or law[KIND] == POWER or not is_clear:
-            space.busy[count] = i
+            workspace.busy[count] = i
             count += 1
-    space.busy_count[0] = count
+    workspace.busy_count[0] = count
     return count
 
 

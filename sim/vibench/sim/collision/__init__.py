@@ -20,17 +20,17 @@ from ._tables import (
     collision_tables,
 )
 from ._variation import (
-    propagate_tangent_collision,
     collision_memory,
+    propagate_tangent_collision,
 )
 
 __all__ = [
     "Collision",
     "CollisionTables",
-    "propagate_tangent_collision",
     "collide",
     "collision_memory",
     "collision_tables",
     "new_collision",
     "observe_collision",
+    "propagate_tangent_collision",
 ]

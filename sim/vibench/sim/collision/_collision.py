@@ -74,7 +74,7 @@ watches."""
 class Collision(NamedTuple):
     """One collision, seen from its own side: whatever the stop, p is positive."""
 
-    room: Table
+    workspace: Table
     motion: Vector
     """When it begins, shape (WIDE,)."""
     course: Vector
@@ -157,7 +157,7 @@ def _leave(state: Vector, after: Vector, par: Parameters) -> None:
 @inlined
 def _press(collision: Collision, depths: SimdVector, stiff: float, collisions: CollisionTables) -> None:
     """Write the force at the points, and what comes of it by the end."""
-    force = collision.room[FORCE]
+    force = collision.workspace[FORCE]
     store(force, 0, stiff * depths * root(depths))
     store(collision.moments, 0, eight_of_sixteen(collisions.ends, 0, force))
 
@@ -186,7 +186,7 @@ def _begin(
     damper, spring = collisions.struck[2, P] * turn * kick, collisions.struck[3, P] * turn * turn * kick
     depths = sixteen(shape, SHAPE_DEPTHS) + beside * sixteen(shape, BY_PRESS) + jerk * sixteen(shape, BY_JERK)
     depths += damper * sixteen(shape, BY_DAMPER) + spring * sixteen(shape, BY_SPRING)
-    store(collision.room, DEPTHS, depths)
+    store(collision.workspace, DEPTHS, depths)
     later = beside * known[LASTS_BY] + jerk * known[LASTS_BY + 1]
     later += damper * known[LASTS_BY + 2] + spring * known[LASTS_BY + 3]
     collision.deepest[0], collision.deepest[1] = deepest, known[DEEPER]
@@ -205,7 +205,7 @@ def _duration(
     collisions: CollisionTables,
 ) -> float:
     """Find the depths at the points and the duration; zero where the corrections do not end."""
-    room, fastest, unit = collision.room, collisions.fastest, deepest / speed
+    workspace, fastest, unit = collision.workspace, collisions.fastest, deepest / speed
     press = 2.0 * collision.course[2] * fastest * fastest * unit / speed
     if not SOFTEST <= press <= HARDEST:
         return 0.0
@@ -214,23 +214,23 @@ def _duration(
     place = int((press - SOFTEST) / SPACING + 0.5)
     shape, end_onto_duration = collisions.shapes[place], collisions.durations[place, END_ONTO_DURATION]
     begun, over, changed = collision.motion[P] - gap, 1.0 / deepest, 1.0
-    depths = sixteen(room, DEPTHS)
+    depths = sixteen(workspace, DEPTHS)
     slow = 0.0 * depths
     for _ in range(MOST_CORRECTIONS):
         _press(collision, depths, stiff, collisions)
         if changed > LAG * LAG:
-            slow = pushed(room[FORCE], 2, SLOW_TERMS, P, duration, collisions)
+            slow = pushed(workspace[FORCE], 2, SLOW_TERMS, P, duration, collisions)
         end = over * (begun + _end_depth(collision, duration, collisions))
         free = at_heights(collision.course, fastest * duration * sixteen(collisions.heights, 0))
-        there = begun + free + slow + pushed(room[FORCE], 1, 2, P, duration, collisions)
+        there = begun + free + slow + pushed(workspace[FORCE], 1, 2, P, duration, collisions)
         misfit = over * there - depths
-        store(room, MISFIT, misfit)
+        store(workspace, MISFIT, misfit)
         later = end_onto_duration * end + total(sixteen(shape, ONTO_DURATION) * misfit)
-        change = sixteen_of_sixteen(shape, 0, room[MISFIT]) + end * sixteen(shape, TO_DURATION)
+        change = sixteen_of_sixteen(shape, 0, workspace[MISFIT]) + end * sixteen(shape, TO_DURATION)
         depths, changed = depths - change, total(change * change)
         duration -= unit * later
         if not changed > close * close:
-            store(room, DEPTHS, depths)
+            store(workspace, DEPTHS, depths)
             _press(collision, depths, stiff, collisions)
             return duration if changed <= close * close else 0.0
     return 0.0

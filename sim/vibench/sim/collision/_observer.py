@@ -7,8 +7,8 @@ from ..kernels import (
     Vector,
     eight_of_eight,
     inlined,
-    largest,
     kernel_without_refcount,
+    largest,
     sixteen,
     sixteen_of_sixteen,
     store,
@@ -28,7 +28,7 @@ ABOVE_POINTS = 1.03
 
 @inlined
 def observe_collision(
-    tally: Vector,
+    observations: Vector,
     collision: Collision,
     duration: float,
     gap: float,
@@ -38,19 +38,19 @@ def observe_collision(
     """Add a collision that lasted for ``duration``; what is odd in the side has both signs squared away."""
     motion, after = collision.motion, collision.after
     store(collision.course, 0, eight_of_eight(collisions.onto_x, 0, motion))
-    tally[PEAK_X] = max(tally[PEAK_X], abs(motion[AT_X]), abs(after[AT_X]))
+    observations[PEAK_X] = max(observations[PEAK_X], abs(motion[AT_X]), abs(after[AT_X]))
     if motion[X_RATE] * after[X_RATE] < 0.0:
-        tally[PEAK_X] = _turning_peak(tally[PEAK_X], collision, duration, collisions)
-    unit, depths = collision.deepest[0] * collision.deepest[1], collision.room[DEPTHS]
-    if gap + unit * ABOVE_POINTS * largest(sixteen(depths, 0)) > tally[PEAK_P]:
-        tally[PEAK_P] = max(tally[PEAK_P], gap + unit * deepest_of(depths))
-    if tally[MODE] == PEAKS_AND_LINES:
-        _add_lines(tally, collision, duration, gap, omega, collisions)
+        observations[PEAK_X] = _turning_peak(observations[PEAK_X], collision, duration, collisions)
+    unit, depths = collision.deepest[0] * collision.deepest[1], collision.workspace[DEPTHS]
+    if gap + unit * ABOVE_POINTS * largest(sixteen(depths, 0)) > observations[PEAK_P]:
+        observations[PEAK_P] = max(observations[PEAK_P], gap + unit * deepest_of(depths))
+    if observations[MODE] == PEAKS_AND_LINES:
+        _add_lines(observations, collision, duration, gap, omega, collisions)
 
 
 @inlined
 def _add_lines(
-    tally: Vector,
+    observations: Vector,
     collision: Collision,
     duration: float,
     gap: float,
@@ -59,7 +59,7 @@ def _add_lines(
 ) -> None:
     """Add the integrals of x and p against the drive, by Gauss's sums in phi."""
     _fill_across(collision, duration, collisions)
-    room, drive = collision.room, collision.motion
+    workspace, drive = collision.workspace, collision.motion
     angle, weight = (
         omega * duration * sixteen(collisions.heights, 0),
         duration * sixteen(collisions.weights, 0),
@@ -68,11 +68,11 @@ def _add_lines(
     cosine, sine = weight * cosine_of(square), weight * (angle * sine_over(square))
     along = drive[COSINE] * cosine - drive[SINE] * sine
     across = drive[COSINE] * sine + drive[SINE] * cosine
-    x, p = sixteen(room, ACROSS), gap + collision.deepest[0] * sixteen(room, DEPTHS)
-    tally[LINE_X_RE] += total(x * along)
-    tally[LINE_X_IM] -= total(x * across)
-    tally[LINE_P_RE] += total(p * along)
-    tally[LINE_P_IM] -= total(p * across)
+    x, p = sixteen(workspace, ACROSS), gap + collision.deepest[0] * sixteen(workspace, DEPTHS)
+    observations[LINE_X_RE] += total(x * along)
+    observations[LINE_X_IM] -= total(x * across)
+    observations[LINE_P_RE] += total(p * along)
+    observations[LINE_P_IM] -= total(p * across)
 
 
 @inlined
@@ -94,39 +94,39 @@ def sine_over(square: SimdVector) -> SimdVector:
 @inlined
 def _fill_across(collision: Collision, duration: float, collisions: CollisionTables) -> None:
     """Write x at the points."""
-    room, turn = collision.room, collisions.fastest * duration
+    workspace, turn = collision.workspace, collisions.fastest * duration
     free = collision.motion[AT_X] + at_heights(collision.course, turn * sixteen(collisions.heights, 0))
     store(
-        room,
+        workspace,
         ACROSS,
-        free + pushed(room[FORCE], FIRST_OF_FORCE, LAST_OF_FORCE, AT_X, duration, collisions),
+        free + pushed(workspace[FORCE], FIRST_OF_FORCE, LAST_OF_FORCE, AT_X, duration, collisions),
     )
 
 
 @inlined
 def _fill_across_rate(collision: Collision, duration: float, collisions: CollisionTables) -> None:
     """Write vx at the points."""
-    room, turn, course = collision.room, collisions.fastest * duration, collision.course
+    workspace, turn, course = collision.workspace, collisions.fastest * duration, collision.course
     turns, factor = turn * sixteen(collisions.heights, 0), turn
     rate = 0.0 * turns
     for term in range(TERMS - 1, 0, -1):
         rate = rate * turns + term * collisions.fastest * course[term]
     for term in range(FIRST_OF_FORCE, LAST_OF_FORCE):
         factor *= turn
-        onto = sixteen_of_sixteen(collisions.shares[term - 1], 0, room[FORCE])
+        onto = sixteen_of_sixteen(collisions.shares[term - 1], 0, workspace[FORCE])
         rate += term * factor * collisions.struck[term, AT_X] * onto
-    store(room, ACROSS_RATE, rate)
+    store(workspace, ACROSS_RATE, rate)
 
 
 @kernel_without_refcount
 def _turning_peak(best: float, collision: Collision, duration: float, collisions: CollisionTables) -> float:
     """Largest magnitude of x in a collision in which it turns."""
-    room, motion, after = collision.room, collision.motion, collision.after
+    workspace, motion, after = collision.workspace, collision.motion, collision.after
     _fill_across(collision, duration, collisions)
     _fill_across_rate(collision, duration, collisions)
     before, x, rate = 0.0, motion[AT_X], motion[X_RATE]
     for i in range(POINTS):
         step = duration * (collisions.heights[i] - before)
-        best = hermite_peak(best, x, rate, room[ACROSS, i], room[ACROSS_RATE, i], step)
-        before, x, rate = collisions.heights[i], room[ACROSS, i], room[ACROSS_RATE, i]
+        best = hermite_peak(best, x, rate, workspace[ACROSS, i], workspace[ACROSS_RATE, i], step)
+        before, x, rate = collisions.heights[i], workspace[ACROSS, i], workspace[ACROSS_RATE, i]
     return hermite_peak(best, x, rate, after[AT_X], after[X_RATE], duration * (1.0 - before))

@@ -37,7 +37,9 @@ def propagate_tangent_collision(
     slopes, before, after, equations = memory[SLOPES], memory[BEFORE], memory[AFTER], memory[EQUATIONS:]
     turn, deepest = collisions.fastest * duration, collision.deepest[0]
     for k in range(POINTS):
-        slopes[k] = 1.5 * par.contact_stiffness * math.sqrt(max(deepest * collision.room[DEPTHS, k], 0.0))
+        slopes[k] = (
+            1.5 * par.contact_stiffness * math.sqrt(max(deepest * collision.workspace[DEPTHS, k], 0.0))
+        )
         for i in range(POINTS):
             gain, factor = 0.0, duration
             for term in range(1, TERMS):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ..kernels import Table, Vector, kernel, copy_row, inlined, kernel_without_refcount
+from ..kernels import Table, Vector, copy_row, inlined, kernel, kernel_without_refcount
 from ..model import VX, VY, VZ, X, Y, Z
 from ..slots import PACE, RATE, RATE_SCALE, ROOT, ROOT_SCALE, SIDE, STEP, Parameters
 from ._end import step_to_exit, step_to_time
@@ -74,13 +74,13 @@ def contact_workspace() -> Table:
     return np.zeros((WORK_ROWS, WIDTH))
 
 
-def log_for(tally: Vector, tangent: Table | None) -> Table:
+def log_for(observations: Vector, tangent: Table | None) -> Table:
     """Make the log of contacts that a tally (as `vibench.sim.flight` says) or a tangent needs."""
     if tangent is not None and len(tangent) > 0:
         wide = np.zeros((LOG_ROWS, WIDE_LOG_COLUMNS))
-        wide[0, STAGES_ONLY] = 1.0 if tally[0] == 0.0 else 0.0
+        wide[0, STAGES_ONLY] = 1.0 if observations[0] == 0.0 else 0.0
         return wide
-    return np.zeros((LOG_ROWS if tally[0] != 0.0 else 0, LOG_COLUMNS))
+    return np.zeros((LOG_ROWS if observations[0] != 0.0 else 0, LOG_COLUMNS))
 
 
 @kernel_without_refcount

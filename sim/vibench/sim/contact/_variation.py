@@ -17,7 +17,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from ..flight import FORCE_TERMS
-from ..kernels import Table, Vector, kernel, inlined, kernel_without_refcount
+from ..kernels import Table, Vector, inlined, kernel, kernel_without_refcount
 from ..model import VX, VY, VZ, X, Y, Z
 from ..slots import Parameters, keep_in_range
 from ._contact import LOG_STAGE_T, LOG_STAGE_W, LOG_STEP, LOGGED

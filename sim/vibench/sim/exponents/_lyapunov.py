@@ -85,7 +85,7 @@ class LyapunovEstimate:
     exponent_per_s: float
     standard_error_per_s: float
     """Of a mean: from blocks; of multipliers: how far two cycles differ; of modes: zero."""
-    tendency: ExponentVerdict
+    verdict: ExponentVerdict
     source: Source
     motion: FinalMotion
     """What the run ended in."""
@@ -248,7 +248,7 @@ def _described(
         accuracy=accuracy,
         exponent_per_s=taken.mean,
         standard_error_per_s=taken.error,
-        tendency=_verdict(taken),
+        verdict=_verdict(taken),
         source=taken.source,
         motion=end.motion,
         since_s=since * length,

@@ -17,7 +17,7 @@ from ..model import Accuracy, Harmonic, Outcome, Specimen, state_matrix
 from ..motion import MAX_IMPACT_RATE_HZ, state_scales
 from ..slots import UNITS
 from ._blocking import blocked_mean
-from ._lyapunov import Source, ExponentVerdict, intervals_to_skip, verdict_of
+from ._lyapunov import ExponentVerdict, Source, intervals_to_skip, verdict_of
 from ._settling import FinalMotion, settling
 from ._tangent_run import TangentRun, interval_for, run_with_tangent
 
@@ -32,7 +32,7 @@ class LyapunovSpectrum:
     """Descending, shape (6,); minus infinity for a direction that a stop which holds m1 has taken away."""
     standard_errors_per_s: Floats
     """Shape (6,); zero where the exponents are those of the modes."""
-    tendency: ExponentVerdict
+    verdict: ExponentVerdict
     """Of the largest."""
     source: Source
     motion: FinalMotion
@@ -83,14 +83,14 @@ def lyapunov_spectrum(
         parts = (nothing, nothing, ExponentVerdict.UNKNOWN, Source.AVERAGE, FinalMotion.THROUGHOUT, 0)
     else:
         parts = _taken(specimen, drive, run, skipped)
-    exponents, errors, tendency, source, motion, since = parts
+    exponents, errors, verdict, source, motion, since = parts
     lasting = (len(run.growth) - since) * length
     return LyapunovSpectrum(
         drive=drive,
         accuracy=accuracy,
         exponents_per_s=exponents,
         standard_errors_per_s=errors,
-        tendency=tendency,
+        verdict=verdict,
         source=source,
         motion=motion,
         since_s=since * length,
@@ -109,15 +109,15 @@ def _taken(
     if end.motion is FinalMotion.QUIET:
         system, _ = state_matrix(specimen)
         decays = np.sort(np.linalg.eigvals(system).real)[::-1]
-        tendency = verdict_of(float(decays[0]), 0.0)
-        return decays, np.zeros(UNITS), tendency, Source.MODES, end.motion, end.since
+        verdict = verdict_of(float(decays[0]), 0.0)
+        return decays, np.zeros(UNITS), verdict, Source.MODES, end.motion, end.since
     # A motion that settles late may leave little to average: never less than half of what was asked for.
     since = min(max(skipped, end.since), (len(run.growth) + skipped) // 2)
     means = [_mean(rates) for rates in run.rates[since:].T]
     exponents, errors = np.array([mean for mean, _ in means]), np.array([error for _, error in means])
     order = np.argsort(-exponents, kind="stable")
-    tendency = verdict_of(float(exponents[order[0]]), float(errors[order[0]]))
-    return exponents[order], errors[order], tendency, Source.AVERAGE, end.motion, since
+    verdict = verdict_of(float(exponents[order[0]]), float(errors[order[0]]))
+    return exponents[order], errors[order], verdict, Source.AVERAGE, end.motion, since
 
 
 def _mean(rates: Floats) -> tuple[float, float]:

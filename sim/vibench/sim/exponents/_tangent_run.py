@@ -119,7 +119,7 @@ def run_with_tangent(
     record = record._replace(tangent=tangent)
     readings = Readings(np.zeros((count, changes)), np.zeros(count, np.int64), np.zeros((count, 6)))
     clock = clock_at(0.0)
-    room = workspace_for(len(tables.flight.rates), record.tally, tangent)
+    workspace = workspace_for(len(tables.flight.rates), record.observations, tangent)
     parts = _parts(tables.flight, interval.length_s) if changes > 1 else 1
     made, code = 0, REACHED_END
     stride = count if enough is None else math.ceil(count / CHECKS)
@@ -138,7 +138,7 @@ def run_with_tangent(
             tangent,
             metric,
             readings,
-            room,
+            workspace,
         )
         if enough is not None and enough(readings.growth[:made]):
             break
@@ -191,7 +191,7 @@ def _take_readings(
     tangent: Table,
     metric: Table,
     readings: Readings,
-    room: Workspace,
+    workspace: Workspace,
 ) -> tuple[int, int]:
     """Advance from interval to interval; returns an `Outcome` code and the first that was not completed."""
     laws = (tables.power, tables.steps, tables.held, tables.collisions)
@@ -199,7 +199,9 @@ def _take_readings(
         before = record.counts[IMPACTS]
         for part in range(parts):
             until = (k + (part + 1.0) / parts) * interval
-            code = advance_by_law(state, clock, until, tables.flight, tolerance, record, *laws, tangent, room)
+            code = advance_by_law(
+                state, clock, until, tables.flight, tolerance, record, *laws, tangent, workspace
+            )
             if code != REACHED_END:
                 return code, k
             readings.growth[k] += tangent[:, GROWTH]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels import Floats, Table, Vector, clock_at, kernel, dot
+from ..kernels import Floats, Table, Vector, clock_at, dot, kernel
 from ..model import Accuracy, Harmonic, Outcome, Specimen
 from ..motion import MAX_IMPACT_RATE_HZ, new_record, start_motion
 from ..slots import REACHED_END, Record
@@ -77,9 +77,9 @@ def two_trajectory_exponent(
     growth = np.zeros(count)
     record = new_record(0.0, 2.0 * (settle_s + duration_s), None, max_impact_rate_hz)
     tables = harmonic_tables(specimen, drive)
-    room = workspace_for(len(tables.flight.rates), record.tally, None)
+    workspace = workspace_for(len(tables.flight.rates), record.observations, None)
     code = _part(
-        first, second, interval.length_s, tables, accuracy.tolerance, record, metric, size, growth, room
+        first, second, interval.length_s, tables, accuracy.tolerance, record, metric, size, growth, workspace
     )
     rates = growth / interval.length_s
     if code != Outcome.REACHED_END:
@@ -99,7 +99,7 @@ def _part(
     metric: Table,
     size: float,
     growth: Vector,
-    room: Workspace,
+    workspace: Workspace,
 ) -> int:
     """Advance two motions interval by interval, each time bringing the second back to its distance."""
     here, there, apart = clock_at(0.0), clock_at(0.0), np.zeros(HALF)
@@ -107,10 +107,10 @@ def _part(
     laws = (power, tables.steps, tables.held, tables.collisions)
     for k in range(len(growth)):
         until = (k + 1.0) * interval
-        code = advance_by_law(first, here, until, flight, tolerance, record, *laws, None, room)
+        code = advance_by_law(first, here, until, flight, tolerance, record, *laws, None, workspace)
         code = max(
             code,
-            advance_by_law(second, there, until, flight, tolerance, record, *laws, None, room),
+            advance_by_law(second, there, until, flight, tolerance, record, *laws, None, workspace),
         )
         if code != REACHED_END:
             return code

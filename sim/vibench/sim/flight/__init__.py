@@ -26,8 +26,8 @@ from ._detection import (
 )
 from ._flight import (
     CLEAR,
-    LIFTS_OFF,
     GRID_TURN,
+    LIFTS_OFF,
     OUT_OF_RANGE,
     RUN_OF_STEPS,
     TOUCHES,
@@ -38,8 +38,8 @@ from ._flight import (
     flight_tables,
     fly,
     place_on_phasors,
-    start_flight,
     propagate_phasors,
+    start_flight,
 )
 from ._linear_series import (
     AT_X,
@@ -56,8 +56,8 @@ from ._linear_series import (
     write_change,
 )
 from ._observer import (
-    series_peak,
     observe_flight,
+    series_peak,
 )
 from ._series import (
     fill_flight_series,
@@ -72,10 +72,10 @@ __all__ = [
     "AT_Z",
     "CLEAR",
     "COSINE",
-    "LIFTS_OFF",
     "FORCE_TERMS",
     "GRID_TURN",
     "LARGEST_BOUND",
+    "LIFTS_OFF",
     "LONGEST_TURN",
     "NEVER",
     "OUT_OF_RANGE",
@@ -94,7 +94,6 @@ __all__ = [
     "P",
     "base_force",
     "begin_terms",
-    "propagate_tangent_flight",
     "derivative_bound",
     "drive_phasor",
     "fill_base_force",
@@ -103,15 +102,16 @@ __all__ = [
     "flight_tables",
     "fly",
     "linear_series",
+    "observe_flight",
     "place_on_phasors",
     "place_on_series",
     "polynomial_at",
+    "propagate_phasors",
+    "propagate_tangent_flight",
     "read_change",
     "series_peak",
     "shifted",
     "start_flight",
-    "observe_flight",
     "touched_side",
-    "propagate_phasors",
     "write_change",
 ]

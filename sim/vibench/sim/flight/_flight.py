@@ -22,10 +22,10 @@ from ..kernels import (
     fill_series,
     inlined,
     march,
+    propagate_by,
     series_rows,
     steps_ahead,
     sum_now,
-    propagate_by,
 )
 from ..model import VX, VY, VZ, Harmonic, Specimen, X, Y, Z, harmonic_motion, modal_form
 from ..slots import Parameters, parameters

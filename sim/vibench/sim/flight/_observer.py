@@ -5,7 +5,17 @@ exp(-i (omega t + phase)). The peaks are extremes of the motion itself, not of s
 closed form over flights, and by the corrected trapezoidal rule (error ~ step^4) over the steps of contacts.
 """
 
-from ..kernels import Complex, Vector, copy_row, fill_series, inlined, kernel_without_refcount, march, sum_now, propagate_by
+from ..kernels import (
+    Complex,
+    Vector,
+    copy_row,
+    fill_series,
+    inlined,
+    kernel_without_refcount,
+    march,
+    propagate_by,
+    sum_now,
+)
 from ..slots import (
     LINE_P_IM,
     LINE_P_RE,
@@ -27,7 +37,7 @@ SMALL_EXPONENT = 1e-3
 
 @inlined
 def observe_flight(
-    tally: Vector,
+    observations: Vector,
     phasors: Complex,
     landed: Complex,
     now: Complex,
@@ -38,13 +48,15 @@ def observe_flight(
     tables: FlightTables,
 ) -> None:
     """Add a flight of ``length`` seconds from clock time, from ``phasors`` to ``landed``."""
-    if tally[MODE] == NOTHING:
+    if observations[MODE] == NOTHING:
         return
     for place in (PEAK_X, PEAK_P):
         shape = tables.across if place == PEAK_X else tables.path
-        tally[place] = _flight_peak(tally[place], shape, phasors, now, terms, series, clock, length, tables)
-    if tally[MODE] == PEAKS_AND_LINES:
-        _add_flight_lines(tally, phasors, landed, length, tables)
+        observations[place] = _flight_peak(
+            observations[place], shape, phasors, now, terms, series, clock, length, tables
+        )
+    if observations[MODE] == PEAKS_AND_LINES:
+        _add_flight_lines(observations, phasors, landed, length, tables)
 
 
 @kernel_without_refcount
@@ -112,7 +124,7 @@ def _flight_peak(
 
 @inlined
 def _add_flight_lines(
-    tally: Vector, phasors: Complex, landed: Complex, length: float, tables: FlightTables
+    observations: Vector, phasors: Complex, landed: Complex, length: float, tables: FlightTables
 ) -> None:
     """Add the integrals of x and p against the drive over a flight, term by term in closed form."""
     drive, terms = complex(0.0, tables.omega), len(phasors)
@@ -126,10 +138,10 @@ def _add_flight_lines(
         )
         line_x += tables.across[j] * along + tables.across[j].conjugate() * against
         line_p += tables.path[j] * along + tables.path[j].conjugate() * against
-    tally[LINE_X_RE] += line_x.real
-    tally[LINE_X_IM] += line_x.imag
-    tally[LINE_P_RE] += line_p.real
-    tally[LINE_P_IM] += line_p.imag
+    observations[LINE_X_RE] += line_x.real
+    observations[LINE_X_IM] += line_x.imag
+    observations[LINE_P_RE] += line_p.real
+    observations[LINE_P_IM] += line_p.imag
 
 
 @inlined

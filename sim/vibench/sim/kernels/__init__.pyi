@@ -12,8 +12,8 @@ from ._clock import (
 )
 from ._compile import (
     SOURCES as SOURCES,
-    kernel as kernel,
     inlined as inlined,
+    kernel as kernel,
     kernel_without_refcount as kernel_without_refcount,
 )
 from ._elimination import (
@@ -28,10 +28,10 @@ from ._phasor_sum import (
     STEPS_AHEAD as STEPS_AHEAD,
     fill_series as fill_series,
     march as march,
+    propagate_by as propagate_by,
     series_rows as series_rows,
     steps_ahead as steps_ahead,
     sum_now as sum_now,
-    propagate_by as propagate_by,
 )
 from ._row import (
     copy_row as copy_row,

@@ -61,32 +61,32 @@ _COUNTING, _WITHOUT_REFCOUNT = ({**_OPTIONS, "_nrt": counts} for counts in (True
 """With numba's memory and without. Said outright, or a kernel would take after the first that calls it."""
 
 
-def kernel(kernel: Kernel) -> Kernel:
+def kernel(function: Kernel) -> Kernel:
     """Compile with numba: cached on disk, without the interpreter lock, IEEE division.
 
     ``error_model="numpy"`` divides as the processor does (x/0 is inf): kernels guard their own
     denominators and must not raise. ``fastmath`` stays off: it may assume that no NaN exists,
     and the step control must see one.
     """
-    with _cache_of(kernel):
-        return cast("Kernel", njit(**_COUNTING)(kernel))
+    with _cache_of(function):
+        return cast("Kernel", njit(**_COUNTING)(function))
 
 
-def kernel_without_refcount(kernel: Kernel) -> Kernel:
+def kernel_without_refcount(function: Kernel) -> Kernel:
     """Compile like `kernel` what makes no array and hands none back.
 
     Such a kernel need not count references to the arrays that it is given. Counting is atomic, twice for
     every array of a named tuple in every call: more than half of the time of a step under a power law.
     """
-    with _cache_of(kernel):
-        return cast("Kernel", njit(**_WITHOUT_REFCOUNT)(kernel))
+    with _cache_of(function):
+        return cast("Kernel", njit(**_WITHOUT_REFCOUNT)(function))
 
 
-def inlined(kernel: Kernel) -> Kernel:
+def inlined(function: Kernel) -> Kernel:
     """Copy into every caller, before it is compiled: for what costs less than its call.
 
     numba hands a named tuple of arrays to a call as hundreds of numbers, each copied; a run with impacts took
     twice as long for that alone. What is copied as source has no arguments.
     """
-    with _cache_of(kernel):
-        return cast("Kernel", njit(**_WITHOUT_REFCOUNT, inline="always")(kernel))
+    with _cache_of(function):
+        return cast("Kernel", njit(**_WITHOUT_REFCOUNT, inline="always")(function))

@@ -50,8 +50,8 @@ class _SimdVectorType(types.Type):
 
 @register_model(_SimdVectorType)
 class _SimdVectorModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, lanes: _SimdVectorType) -> None:
-        super().__init__(manager, lanes, lanes.vector)
+    def __init__(self, manager: Any, simd: _SimdVectorType) -> None:
+        super().__init__(manager, simd, simd.vector)
 
 
 _EIGHT, _SIXTEEN = _SimdVectorType(8), _SimdVectorType(16)
@@ -82,35 +82,35 @@ def _is_array(kind: Any) -> bool:
     return isinstance(kind, types.Array) and kind.dtype == types.float64 and kind.layout == "C"
 
 
-def _loading(lanes: _SimdVectorType) -> Any:
+def _loading(simd: _SimdVectorType) -> Any:
     @intrinsic
     def load(_context: Any, array: Any, row: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-            first = _begins(context, builder, signature.args[0], given[0], given[1], lanes.vector)
-            return _load(builder, first, 0, lanes.vector)
+            first = _begins(context, builder, signature.args[0], given[0], given[1], simd.vector)
+            return _load(builder, first, 0, simd.vector)
 
         fits = _is_array(array) and isinstance(row, types.Integer)
-        return (lanes(array, types.intp), code) if fits else None
+        return (simd(array, types.intp), code) if fits else None
 
     return load
 
 
-def _spreading(lanes: _SimdVectorType) -> Any:
+def _spreading(simd: _SimdVectorType) -> Any:
     @intrinsic
     def spread(_context: Any, value: Any) -> Any:
         def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
-            return _spread(builder, given[0], lanes.vector)
+            return _spread(builder, given[0], simd.vector)
 
-        return (lanes(types.float64), code) if isinstance(value, types.Float) else None
+        return (simd(types.float64), code) if isinstance(value, types.Float) else None
 
     return spread
 
 
-def _weighing(lanes: _SimdVectorType, rows: int) -> Any:
+def _weighing(simd: _SimdVectorType, rows: int) -> Any:
     @intrinsic
     def weigh(_context: Any, table: Any, first: Any, weights: Any) -> Any:  # noqa: ARG001 - numba's names
         def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-            vector = lanes.vector
+            vector = simd.vector
             top = _begins(context, builder, signature.args[0], given[0], given[1], vector)
             weight = _numbers(context, builder, weights, given[2])
             parts = (
@@ -124,7 +124,7 @@ def _weighing(lanes: _SimdVectorType, rows: int) -> Any:
             return builder.fadd(one, two)
 
         fits = _is_array(table) and (_is_array(weights) or isinstance(weights, _SimdVectorType))
-        return (lanes(table, types.intp, weights), code) if fits else None
+        return (simd(table, types.intp, weights), code) if fits else None
 
     return weigh
 
@@ -153,13 +153,13 @@ sixteen_of_sixteen = cast("Weigh", _weighing(_SIXTEEN, 16))
 
 
 @intrinsic
-def _store(_context: Any, array: Any, row: Any, lanes: Any) -> Any:  # noqa: ARG001 - numba's names
+def _store(_context: Any, array: Any, row: Any, simd: Any) -> Any:  # noqa: ARG001 - numba's names
     def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        begins = _begins(context, builder, signature.args[0], given[0], given[1], lanes.vector)
-        builder.store(given[2], builder.bitcast(begins, lanes.vector.as_pointer()), align=_ALIGNED)
+        begins = _begins(context, builder, signature.args[0], given[0], given[1], simd.vector)
+        builder.store(given[2], builder.bitcast(begins, simd.vector.as_pointer()), align=_ALIGNED)
         return context.get_dummy_value()
 
-    return types.none(array, types.intp, lanes), code
+    return types.none(array, types.intp, simd), code
 
 
 store = cast("Callable[[Table | Vector, int, SimdVector], None]", _store)
@@ -167,14 +167,14 @@ store = cast("Callable[[Table | Vector, int, SimdVector], None]", _store)
 
 
 @intrinsic
-def _root(_context: Any, lanes: Any) -> Any:
+def _root(_context: Any, simd: Any) -> Any:
     def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
-        nothing = ir.Constant(lanes.vector, [0.0] * lanes.vector.count)
+        nothing = ir.Constant(simd.vector, [0.0] * simd.vector.count)
         positive = builder.select(builder.fcmp_ordered(">", given[0], nothing), given[0], nothing)
-        name, kind = f"llvm.sqrt.v{lanes.vector.count}f64", ir.FunctionType(lanes.vector, [lanes.vector])
+        name, kind = f"llvm.sqrt.v{simd.vector.count}f64", ir.FunctionType(simd.vector, [simd.vector])
         return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [positive])
 
-    return lanes(lanes), code
+    return simd(simd), code
 
 
 root = cast("Callable[[SimdVector], SimdVector]", _root)
@@ -198,11 +198,11 @@ def _by_halves(builder: Any, part: Any, join: Callable[[Any, Any], Any]) -> Any:
 
 
 @intrinsic
-def _total(_context: Any, lanes: Any) -> Any:
+def _total(_context: Any, simd: Any) -> Any:
     def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
         return _by_halves(builder, given[0], builder.fadd)
 
-    return types.float64(lanes), code
+    return types.float64(simd), code
 
 
 total = cast("Callable[[SimdVector], float]", _total)
@@ -210,9 +210,9 @@ total = cast("Callable[[SimdVector], float]", _total)
 
 
 @intrinsic
-def _largest(_context: Any, lanes: Any) -> Any:
+def _largest(_context: Any, simd: Any) -> Any:
     def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
-        size, count = ir.FunctionType(lanes.vector, [lanes.vector]), lanes.vector.count
+        size, count = ir.FunctionType(simd.vector, [simd.vector]), simd.vector.count
         positive = cgutils.get_or_insert_function(builder.module, size, f"llvm.fabs.v{count}f64")
 
         def larger(one: Any, other: Any) -> Any:
@@ -222,7 +222,7 @@ def _largest(_context: Any, lanes: Any) -> Any:
 
         return _by_halves(builder, builder.call(positive, [given[0]]), larger)
 
-    return types.float64(lanes), code
+    return types.float64(simd), code
 
 
 largest = cast("Callable[[SimdVector], float]", _largest)
@@ -230,9 +230,9 @@ largest = cast("Callable[[SimdVector], float]", _largest)
 
 
 @intrinsic
-def _first_outside(_context: Any, lanes: Any, low: Any, high: Any) -> Any:  # noqa: ARG001 - numba's names
+def _first_outside(_context: Any, simd: Any, low: Any, high: Any) -> Any:  # noqa: ARG001 - numba's names
     def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
-        vector = lanes.vector
+        vector = simd.vector
         above = builder.fcmp_ordered(">", given[0], _spread(builder, given[1], vector))
         below = builder.fcmp_ordered("<", given[0], _spread(builder, given[2], vector))
         outside = builder.bitcast(builder.not_(builder.and_(above, below)), ir.IntType(vector.count))
@@ -240,7 +240,7 @@ def _first_outside(_context: Any, lanes: Any, low: Any, high: Any) -> Any:  # no
         # A bit beyond the last lane stands for none.
         return builder.cttz(builder.or_(wide, ir.Constant(wide.type, 1 << vector.count)), ir.IntType(1)(1))
 
-    return types.intp(lanes, types.float64, types.float64), code
+    return types.intp(simd, types.float64, types.float64), code
 
 
 first_outside = cast("Callable[[SimdVector, float, float], int]", _first_outside)
@@ -263,7 +263,11 @@ def _give_operator(function: Callable[..., object], name: str) -> None:
         return getattr(builder, name)(*(_spread(builder, each, vector) for each in pair))
 
     type_callable(function)(typer)
-    for one, other in ((_SimdVectorType, _SimdVectorType), (_SimdVectorType, types.Float), (types.Float, _SimdVectorType)):
+    for one, other in (
+        (_SimdVectorType, _SimdVectorType),
+        (_SimdVectorType, types.Float),
+        (types.Float, _SimdVectorType),
+    ):
         lower_builtin(function, one, other)(lowered)
 
 

@@ -187,7 +187,7 @@ def new_record(
         samples=np.zeros((count, 6)),
         impact_times=np.zeros(min(math.ceil(impact_rate_hz * duration_s) + SPARE_IMPACTS, MOST_IMPACTS)),
         counts=np.zeros(2, np.int64),
-        tally=np.zeros(OBSERVATIONS_SIZE),
+        observations=np.zeros(OBSERVATIONS_SIZE),
         tangent=None,
     )
 

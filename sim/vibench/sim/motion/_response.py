@@ -104,9 +104,11 @@ def steady_response(
     before = int(record.counts[IMPACTS])
     for mode, until in ((PEAKS, duration_s - line_s), (PEAKS_AND_LINES, float(duration_s))):
         if code == Outcome.REACHED_END:
-            record.tally[MODE] = mode
+            record.observations[MODE] = mode
             code = advance_harmonic(state, clock, until, tables, accuracy.tolerance, record)
-    tally = record.tally if code == Outcome.REACHED_END else np.full_like(record.tally, np.nan)
+    observations = (
+        record.observations if code == Outcome.REACHED_END else np.full_like(record.observations, np.nan)
+    )
     # A line is the mean of twice the motion against the drive.
     scale = 2.0 / line_s
     return Response(
@@ -115,10 +117,10 @@ def steady_response(
         duration_s=duration_s,
         window_s=window_s,
         line_periods=periods,
-        largest_x_m=float(tally[PEAK_X]),
-        largest_p_m=float(tally[PEAK_P]),
-        line_x_m=scale * complex(tally[LINE_X_RE], tally[LINE_X_IM]),
-        line_p_m=scale * complex(tally[LINE_P_RE], tally[LINE_P_IM]),
+        largest_x_m=float(observations[PEAK_X]),
+        largest_p_m=float(observations[PEAK_P]),
+        line_x_m=scale * complex(observations[LINE_X_RE], observations[LINE_X_IM]),
+        line_p_m=scale * complex(observations[LINE_P_RE], observations[LINE_P_IM]),
         impacts=int(record.counts[IMPACTS]) - before,
         impacts_before=before,
         final_state=state[:6].copy(),

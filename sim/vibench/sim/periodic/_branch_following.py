@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ._branch import Branch, BranchEvent, BifurcationKind, Parameter
+from ._branch import BifurcationKind, Branch, BranchEvent, Parameter
 from ._continuation import ArcEnd, ArcPoint, ArcSteps, Curve, correct, locate, trace
 from ._orbit_events import OrbitSigns, bifurcations_between, sign_of
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..flight import AT_X, COSINE, P_RATE, SINE, WIDE, X_RATE, P
-from ..kernels import Table, Vector, kernel, eight, eight_of_eight, kernel_without_refcount, store, time_until
+from ..kernels import Table, Vector, eight, eight_of_eight, kernel, kernel_without_refcount, store, time_until
 from ..slots import (
     LINE_P_IM,
     LINE_P_RE,
@@ -33,7 +33,7 @@ SECANTS = 6
 
 
 class PowerObserver(NamedTuple):
-    """Workspaces of who watches steps."""
+    """Workspaces of the observer of steps."""
 
     course: Table
     """The motion at the instants of a step, shape (instants, WIDE)."""
@@ -56,26 +56,28 @@ def new_power_observer() -> PowerObserver:
 
 
 @kernel_without_refcount
-def observe_step(tally: Vector, stride: PowerStepState, numbers: Table, length: float, watcher: PowerObserver) -> None:
+def observe_step(
+    observations: Vector, step: PowerStepState, numbers: Table, length: float, observer: PowerObserver
+) -> None:
     """Add a step that was tried and found good: its peaks, and its lines by Gauss's sums."""
-    course = watcher.course
-    motion, force = eight(stride.motion, 0), eight(stride.force, 0)
+    course = observer.course
+    motion, force = eight(step.motion, 0), eight(step.force, 0)
     store(course, 0, motion)
-    store(course, POINTS + 1, eight(stride.ahead, 0))
+    store(course, POINTS + 1, eight(step.ahead, 0))
     for i in range(POINTS):
         first = INNER + 2 * WIDE * i
         free = eight_of_eight(numbers, first, motion)
         store(course, i + 1, free + eight_of_eight(numbers, first + WIDE, force))
-    tally[PEAK_X] = _peak(tally[PEAK_X], course, AT_X, X_RATE, length)
-    tally[PEAK_P] = _peak(tally[PEAK_P], course, P, P_RATE, length)
-    if tally[MODE] != PEAKS_AND_LINES:
+    observations[PEAK_X] = _peak(observations[PEAK_X], course, AT_X, X_RATE, length)
+    observations[PEAK_P] = _peak(observations[PEAK_P], course, P, P_RATE, length)
+    if observations[MODE] != PEAKS_AND_LINES:
         return
     for i in range(POINTS):
         at, weight = course[i + 1], WEIGHTS[i] * length
-        tally[LINE_X_RE] += weight * at[AT_X] * at[COSINE]
-        tally[LINE_X_IM] -= weight * at[AT_X] * at[SINE]
-        tally[LINE_P_RE] += weight * at[P] * at[COSINE]
-        tally[LINE_P_IM] -= weight * at[P] * at[SINE]
+        observations[LINE_X_RE] += weight * at[AT_X] * at[COSINE]
+        observations[LINE_X_IM] -= weight * at[AT_X] * at[SINE]
+        observations[LINE_P_RE] += weight * at[P] * at[COSINE]
+        observations[LINE_P_IM] -= weight * at[P] * at[SINE]
 
 
 @kernel_without_refcount
@@ -141,45 +143,45 @@ def _within_exactly(course: Table, at: float, value: int, rate: int, length: flo
 
 @kernel_without_refcount
 def sample_step(
-    stride: PowerStepState,
+    step: PowerStepState,
     clock: Vector,
     length: float,
     power: PowerTerms,
     steps: PowerTables,
     record: Record,
-    watcher: PowerObserver,
+    observer: PowerObserver,
 ) -> None:
     """Keep the samples that fall into the step just tried, which begins at clock time."""
-    counts, numbers = record.counts, watcher.numbers
+    counts, numbers = record.counts, observer.numbers
     while counts[NEXT_SAMPLE] < len(record.samples):
         later = time_until(clock, record.start + counts[NEXT_SAMPLE] / record.sample_rate)
         if later > length:
             return
         if later <= 0.0:
-            write_motion(record.samples[counts[NEXT_SAMPLE]], stride.motion)
+            write_motion(record.samples[counts[NEXT_SAMPLE]], step.motion)
         else:
             fill_ends(numbers, later, steps.series)
-            _move_within(stride, later / length, power, watcher)
-            write_motion(record.samples[counts[NEXT_SAMPLE]], watcher.motion)
+            _move_within(step, later / length, power, observer)
+            write_motion(record.samples[counts[NEXT_SAMPLE]], observer.motion)
         counts[NEXT_SAMPLE] += 1
 
 
 @kernel_without_refcount
-def _move_within(stride: PowerStepState, ratio: float, power: PowerTerms, watcher: PowerObserver) -> None:
+def _move_within(step: PowerStepState, ratio: float, power: PowerTerms, observer: PowerObserver) -> None:
     """Make the part of a step that the watcher has numbers for; the force is known but for one refinement."""
-    guess, motion, numbers = watcher.force, eight(stride.motion, 0), watcher.numbers
+    guess, motion, numbers = observer.force, eight(step.motion, 0), observer.numbers
     for i in range(POINTS):
         at, value, norm = ratio * INSTANTS[i + 1], 0.0, 0.0
         for k in range(POINTS):
             off = at - INSTANTS[k + 1]
             if off == 0.0:
-                value, norm = stride.force[k], 1.0
+                value, norm = step.force[k], 1.0
                 break
             part = POINT_WEIGHTS[k] / off
             norm += part
-            value += part * stride.force[k]
+            value += part * step.force[k]
         guess[i] = value / norm
     free = eight_of_eight(numbers, FREE, motion)
     force = power_forces(free + eight_of_eight(numbers, GAIN, guess), power)
     moved = motion + eight_of_eight(numbers, MOVE, motion)
-    store(watcher.motion, 0, moved + eight_of_eight(numbers, FEED, force))
+    store(observer.motion, 0, moved + eight_of_eight(numbers, FEED, force))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..flight import AT_X, AT_Z, COSINE, P_RATE, SINE, WIDE, X_RATE, Z_RATE, FlightTables, P, drive_phasor
-from ..kernels import Table, Vector, kernel, eight, eight_of_eight, eights, inlined, largest, store, total
+from ..kernels import Table, Vector, eight, eight_of_eight, eights, inlined, kernel, largest, store, total
 from ..model import VX, VY, VZ, X, Y, Z
 from ..slots import LEVEL, SCALES, SIDE, Parameters, PowerTerms
 from ._flow import power_force, power_forces, stiffest_rate
@@ -86,15 +86,15 @@ def new_power_step() -> PowerStepState:
 
 
 @inlined
-def begin_power_step(stride: PowerStepState, state: Vector, power: PowerTerms) -> None:
+def begin_power_step(step: PowerStepState, state: Vector, power: PowerTerms) -> None:
     """Stand at a state; the drive's phase is not its concern."""
-    motion = stride.motion
+    motion = step.motion
     motion[P], motion[P_RATE] = state[Y] - state[Z], state[VY] - state[VZ]
     motion[AT_X], motion[X_RATE] = state[X], state[VX]
     motion[AT_Z], motion[Z_RATE] = state[Z], state[VZ]
-    stride.push[PUSH_NOW] = power_force(motion[P], power)
-    stride.push[LAST_LENGTH] = 0.0
-    stride.sizes[0], stride.sizes[1], stride.sizes[2] = state[SIZE_P], state[SIZE_X], state[SIZE_Z]
+    step.push[PUSH_NOW] = power_force(motion[P], power)
+    step.push[LAST_LENGTH] = 0.0
+    step.sizes[0], step.sizes[1], step.sizes[2] = state[SIZE_P], state[SIZE_X], state[SIZE_Z]
 
 
 @inlined
@@ -105,11 +105,11 @@ def write_motion(out: Vector, motion: Vector) -> None:
 
 
 @inlined
-def end_power_step(stride: PowerStepState, state: Vector, level: int) -> None:
+def end_power_step(step: PowerStepState, state: Vector, level: int) -> None:
     """Leave a state behind from which `begin_power_step` goes on."""
-    write_motion(state, stride.motion)
+    write_motion(state, step.motion)
     state[SIDE], state[LEVEL] = 1.0, level + 1.0
-    state[SIZE_P], state[SIZE_X], state[SIZE_Z] = stride.sizes[0], stride.sizes[1], stride.sizes[2]
+    state[SIZE_P], state[SIZE_X], state[SIZE_Z] = step.sizes[0], step.sizes[1], step.sizes[2]
 
 
 @inlined
@@ -140,35 +140,35 @@ def level_that_sees(
 
 
 @inlined
-def _guess_force(stride: PowerStepState, length: float) -> None:
+def _guess_force(step: PowerStepState, length: float) -> None:
     """Guess F in a step of ``length`` [s]: its course in the last one goes on."""
-    course, last = stride.course, stride.push[LAST_LENGTH]
+    course, last = step.course, step.push[LAST_LENGTH]
     if last == NO_COURSE:
-        store(stride.force, 0, eights(stride.push[PUSH_NOW]))
+        store(step.force, 0, eights(step.push[PUSH_NOW]))
         return
     s = (length / last) * eight(POINTS_AT, 0)
     value = eights(course[COURSE_DEGREE])
     for degree in range(COURSE_DEGREE - 1, -1, -1):
         value = value * s + course[degree]
-    store(stride.force, 0, value)
+    store(step.force, 0, value)
 
 
 @inlined
-def _keep_course(stride: PowerStepState, length: float) -> None:
+def _keep_course(step: PowerStepState, length: float) -> None:
     """Remember how F went in the step just made."""
-    end = stride.push[PUSH_AHEAD] * eight(COURSE, POINTS)
-    store(stride.course, 0, end + eight_of_eight(COURSE, 0, stride.force))
-    stride.push[LAST_LENGTH] = length
+    end = step.push[PUSH_AHEAD] * eight(COURSE, POINTS)
+    store(step.course, 0, end + eight_of_eight(COURSE, 0, step.force))
+    step.push[LAST_LENGTH] = length
 
 
 @inlined
-def substitute(stride: PowerStepState, numbers: Table, weight: float, close: float, power: PowerTerms) -> bool:
+def substitute(step: PowerStepState, numbers: Table, weight: float, close: float, power: PowerTerms) -> bool:
     """Find the force at the points of a step from its guess; false when it does not settle, or overflows.
 
     ``weight`` says how far a newton moves p over the step [m/N], ``close`` how far is nothing.
     """
-    free = eight_of_eight(numbers, FREE, stride.motion)
-    force, place, settled = eight(stride.force, 0), free, False
+    free = eight_of_eight(numbers, FREE, step.motion)
+    force, place, settled = eight(step.force, 0), free, False
     for _ in range(MOST_SUBSTITUTIONS):
         place = free + eight_of_eight(numbers, GAIN, force)
         push = power_forces(place, power)
@@ -177,15 +177,15 @@ def substitute(stride: PowerStepState, numbers: Table, weight: float, close: flo
         if not change > close:
             settled = change <= close
             break
-    store(stride.force, 0, force)
-    store(stride.place, 0, place)
+    store(step.force, 0, force)
+    store(step.place, 0, place)
     return settled
 
 
 @inlined
-def largest_unseen(stride: PowerStepState) -> float:
+def largest_unseen(step: PowerStepState) -> float:
     """Size against which errors count: of the smallest of the three displacements, up to the step's end."""
-    motion, ahead, sizes = stride.motion, stride.ahead, stride.sizes
+    motion, ahead, sizes = step.motion, step.ahead, step.sizes
     p = max(sizes[0], abs(motion[P]), abs(ahead[P]))
     x = max(sizes[1], abs(motion[AT_X]), abs(ahead[AT_X]))
     z = max(sizes[2], abs(motion[AT_Z]), abs(ahead[AT_Z]))
@@ -195,36 +195,36 @@ def largest_unseen(stride: PowerStepState) -> float:
 
 @inlined
 def try_step(
-    stride: PowerStepState, numbers: Table, length: float, tolerance: float, par: Parameters, power: PowerTerms
+    step: PowerStepState, numbers: Table, length: float, tolerance: float, par: Parameters, power: PowerTerms
 ) -> float:
     """Try a step and write where it leads to ``stride.ahead``; gives its misfit over what is allowed."""
-    motion, ahead, force = stride.motion, stride.ahead, stride.force
+    motion, ahead, force = step.motion, step.ahead, step.force
     weight = length * length * par.inverse_pair
     free = eight(motion, 0) + eight_of_eight(numbers, MOVE, motion)
     store(ahead, 0, free)
-    close = largest_unseen(stride) * max(CLOSE * tolerance, CLOSEST)
-    _guess_force(stride, length)
-    if not substitute(stride, numbers, weight, close, power):
+    close = largest_unseen(step) * max(CLOSE * tolerance, CLOSEST)
+    _guess_force(step, length)
+    if not substitute(step, numbers, weight, close, power):
         return math.inf
     push = eight(force, 0)
     store(ahead, 0, free + eight_of_eight(numbers, FEED, push))
     end = power_force(ahead[P], power)
-    before = total(eight(AT_START, 0) * push) - stride.push[PUSH_NOW]
+    before = total(eight(AT_START, 0) * push) - step.push[PUSH_NOW]
     after = total(eight(AT_END, 0) * push) - end
-    stride.push[PUSH_AHEAD] = end
-    misfit: float = weight * max(abs(before), abs(after)) / (FIT * tolerance * largest_unseen(stride))
+    step.push[PUSH_AHEAD] = end
+    misfit: float = weight * max(abs(before), abs(after)) / (FIT * tolerance * largest_unseen(step))
     return misfit
 
 
 @inlined
-def accept_step(stride: PowerStepState, length: float) -> None:
+def accept_step(step: PowerStepState, length: float) -> None:
     """Stand where the step just tried has led; the drive's phase is to be set."""
-    motion, ahead, sizes = stride.motion, stride.ahead, stride.sizes
+    motion, ahead, sizes = step.motion, step.ahead, step.sizes
     sizes[0] = _widen(sizes[0], motion[P], ahead[P])
     sizes[1] = _widen(sizes[1], motion[AT_X], ahead[AT_X])
     sizes[2] = _widen(sizes[2], motion[AT_Z], ahead[AT_Z])
-    _keep_course(stride, length)
-    stride.push[PUSH_NOW] = stride.push[PUSH_AHEAD]
+    _keep_course(step, length)
+    step.push[PUSH_NOW] = step.push[PUSH_AHEAD]
     store(motion, 0, eight(ahead, 0))
 
 

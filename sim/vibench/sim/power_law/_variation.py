@@ -8,7 +8,16 @@ anew, and what holds for the step, such as being symplectic without damping, hol
 import numpy as np
 
 from ..flight import read_change, write_change
-from ..kernels import Table, kernel, eight, eight_of_eight, inlined, kernel_without_refcount, solve_in_place, store
+from ..kernels import (
+    Table,
+    eight,
+    eight_of_eight,
+    inlined,
+    kernel,
+    kernel_without_refcount,
+    solve_in_place,
+    store,
+)
 from ..model import MOST_TERMS
 from ..slots import UNITS, PowerTerms, keep_in_range
 from ._flow import whole_power
@@ -41,12 +50,12 @@ def power_stiffness(p: float, power: PowerTerms) -> float:
 
 @kernel_without_refcount
 def propagate_tangent_power(
-    tangent: Table, stride: PowerStepState, numbers: Table, power: PowerTerms, memory: Table
+    tangent: Table, step: PowerStepState, numbers: Table, power: PowerTerms, memory: Table
 ) -> None:
     """Carry every change over the step just tried and found good."""
     slopes, before, after, equations = memory[SLOPES], memory[BEFORE], memory[AFTER], memory[EQUATIONS:]
     for k in range(POINTS):
-        slopes[k] = power_stiffness(stride.place[k], power)
+        slopes[k] = power_stiffness(step.place[k], power)
         for i in range(POINTS):
             equations[i, k] = (1.0 if i == k else 0.0) - numbers[GAIN + k, i] * slopes[k]
     for column in range(len(tangent)):

@@ -19,9 +19,9 @@ from ._variation import (
 
 __all__ = [
     "RESOLVED",
-    "propagate_tangent_impact",
     "closed_gap",
     "is_resolved",
     "place_between_rigid_stops",
+    "propagate_tangent_impact",
     "rebound",
 ]

@@ -32,10 +32,10 @@ __all__ = [
     "Method",
     "MotionKind",
     "Observable",
-    "ScenePrediction",
     "Rest",
     "Scene",
     "ScenePlan",
+    "ScenePrediction",
     "plan_scene",
     "solve_scene",
 ]

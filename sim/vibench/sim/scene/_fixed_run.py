@@ -19,12 +19,12 @@ import numpy as np
 
 from ..kernels import Floats
 from ..model import Accuracy, Outcome, PowerLaw, Specimen
-from ._followed_run import FollowedRun, Stretch, ObservedQuantities
+from ._followed_run import FollowedRun, ObservedQuantities, Stretch
 from ._observed_window import (
     ObservedWindow,
     follow_strobed,
-    states_of,
     observe_window,
+    states_of,
     whole_periods,
     window_of,
 )
@@ -110,7 +110,7 @@ def run_for(run: FollowedRun, duration_s: float, window_s: float, pace: Pace) ->
     """Follow a motion that is at time zero for a while, and observe the last ``window_s`` of it."""
     last = _last_section(run, duration_s - window_s, pace)
     if pace.repeats([last]) is None:
-        run.carry_tangent()
+        run.follow_tangent()
     window = observe_window(run, window_s)
     return judged(run, window, [last], pace, f"the {duration_s:g} s asked for are over")
 
@@ -194,7 +194,7 @@ def run_until_settled(run: FollowedRun, window_s: float, longest_s: float, pace:
             early.append(follow_strobed(run, end_s))
             continue
         if not late:
-            run.carry_tangent()
+            run.follow_tangent()
         starts.append(run.apart())
         late.append(follow_strobed(run, end_s, ObservedQuantities.PEAKS_AND_LINES))
     before = late or early

@@ -118,12 +118,17 @@ class FollowedRun:
         )
         return twin
 
-    def carry_tangent(self) -> None:
+    def follow_tangent(self) -> None:
         """Carry a small change along from now on, in no special direction."""
         self._tangent = np.zeros((1, TANGENT_SIZE))
         self._tangent[0, :GROWTH] = self._scales * np.linspace(1.0, 2.0, GROWTH)
 
-    def follow(self, until_s: float, watch: ObservedQuantities = ObservedQuantities.NOTHING, samples: Samples | None = None) -> Stretch:
+    def follow(
+        self,
+        until_s: float,
+        observe: ObservedQuantities = ObservedQuantities.NOTHING,
+        samples: Samples | None = None,
+    ) -> Stretch:
         """Advance to an instant; a run that has failed stays where it is."""
         start_s, before = self.time_s, self._size()
         kept = Samples(start_s, 1.0, 0) if samples is None else samples
@@ -133,8 +138,8 @@ class FollowedRun:
             samples=np.zeros((kept.count, GROWTH)),
             tangent=self._tangent,
         )
-        tally = record.tally
-        tally[MODE] = watch.value
+        observations = record.observations
+        observations[MODE] = observe.value
         if self.outcome is Outcome.REACHED_END:
             code = advance_harmonic(self._state, self._clock, until_s, self._tables, self._tolerance, record)
             self.outcome = Outcome(code)
@@ -146,10 +151,10 @@ class FollowedRun:
             end_s=self.time_s,
             outcome=self.outcome,
             impacts=int(record.counts[IMPACTS]),
-            peak_x_m=float(tally[PEAK_X]),
-            peak_p_m=float(tally[PEAK_P]),
-            area_x=complex(tally[LINE_X_RE], tally[LINE_X_IM]),
-            area_p=complex(tally[LINE_P_RE], tally[LINE_P_IM]),
+            peak_x_m=float(observations[PEAK_X]),
+            peak_p_m=float(observations[PEAK_P]),
+            area_x=complex(observations[LINE_X_RE], observations[LINE_X_IM]),
+            area_p=complex(observations[LINE_P_RE], observations[LINE_P_IM]),
             states=record.samples,
             growth=self._size() - before,
         )

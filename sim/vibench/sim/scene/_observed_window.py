@@ -8,7 +8,7 @@ import numpy as np
 
 from ..kernels import Floats
 from ..motion import WHOLE
-from ._followed_run import FollowedRun, Samples, Stretch, ObservedQuantities
+from ._followed_run import FollowedRun, ObservedQuantities, Samples, Stretch
 
 BLOCKS = 10
 """Parts of a window whose extremes are kept apart: what the scatter of the whole is found from."""
@@ -62,10 +62,12 @@ def samples_between(rate_hz: float, start_s: float, end_s: float) -> Samples:
     return Samples((first + 1) / rate_hz, rate_hz, max(0, last - first))
 
 
-def follow_strobed(run: FollowedRun, until_s: float, watch: ObservedQuantities = ObservedQuantities.NOTHING) -> Stretch:
+def follow_strobed(
+    run: FollowedRun, until_s: float, observe: ObservedQuantities = ObservedQuantities.NOTHING
+) -> Stretch:
     """Follow a motion to an instant, and keep its states once a drive period."""
     end_s = max(until_s, run.time_s)
-    return run.follow(end_s, watch, samples_between(run.drive.frequency_hz, run.time_s, end_s))
+    return run.follow(end_s, observe, samples_between(run.drive.frequency_hz, run.time_s, end_s))
 
 
 def observe_window(run: FollowedRun, window_s: float) -> ObservedWindow:
@@ -76,7 +78,9 @@ def observe_window(run: FollowedRun, window_s: float) -> ObservedWindow:
     edges = [start_s + window_s * k / BLOCKS for k in range(1, BLOCKS)] + [end_s]
     stretches, peaks = [], []
     for edge in edges:
-        parts = [follow_strobed(run, min(line_s, edge), ObservedQuantities.PEAKS)] if run.time_s < line_s else []
+        parts = (
+            [follow_strobed(run, min(line_s, edge), ObservedQuantities.PEAKS)] if run.time_s < line_s else []
+        )
         if edge > line_s:
             parts.append(follow_strobed(run, edge, ObservedQuantities.PEAKS_AND_LINES))
         stretches += parts

@@ -21,7 +21,7 @@ from ._fixed_run import Pace, SceneRun, pace_of, run_for, run_until_settled
 from ._followed_run import FollowedRun, ObservedQuantities
 from ._linear_motion import LinearMotion, linear_motion
 from ._observed_window import ObservedWindow, samples_between, states_of, whole_periods
-from ._plan import transient_decay_s, plan_of
+from ._plan import plan_of, transient_decay_s
 from ._prediction import Method, MotionKind, ScenePrediction, State
 from ._scatter import WindowScatter, response_ensemble, window_scatter
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene

@@ -29,7 +29,7 @@ class Record(NamedTuple):
     """Shape (most impacts,) [s]; a run ends when it is full."""
     counts: NDArray[np.int64]
     """Samples and impacts so far."""
-    tally: Vector
+    observations: Vector
     tangent: Table | None
     """Small changes of the state that are carried along, as `vibench.sim.slots` says, shape (m,
     TANGENT_SIZE). m = 0 carries none; None carries none either, and tells a kernel so by its type."""

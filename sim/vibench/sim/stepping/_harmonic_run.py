@@ -27,9 +27,9 @@ def advance_harmonic(
     tangent = record.tangent
     if power is not None and steps is not None:
         return advance_under_power(state, clock, until, flight, tolerance, record, power, steps, tangent)
-    room = workspace_for(len(flight.rates), record.tally, tangent)
+    workspace = workspace_for(len(flight.rates), record.observations, tangent)
     return advance_between_stops(
-        state, clock, until, flight, tolerance, record, held, collisions, tangent, room
+        state, clock, until, flight, tolerance, record, held, collisions, tangent, workspace
     )
 
 
@@ -46,7 +46,7 @@ def advance_by_law(
     held: HeldTables | None,
     collisions: CollisionTables | None,
     tangent: Table | None,
-    room: Workspace,
+    workspace: Workspace,
 ) -> int:
     """Do the same within a kernel; what may be None is given once more.
 
@@ -55,5 +55,5 @@ def advance_by_law(
     if power is not None and steps is not None:
         return advance_under_power(state, clock, until, tables, tolerance, record, power, steps, tangent)
     return advance_between_stops(
-        state, clock, until, tables, tolerance, record, held, collisions, tangent, room
+        state, clock, until, tables, tolerance, record, held, collisions, tangent, workspace
     )

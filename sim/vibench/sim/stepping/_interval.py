@@ -24,7 +24,7 @@ from ..model import VX, VY, VZ, Accuracy, Specimen, X, Y, Z, state_matrix
 from ..power_law import begin_smooth
 from ..rigid import place_between_rigid_stops
 from ..slots import SIDE, STATE_SIZE, Parameters, PowerTerms, parameters, power_terms
-from ._substep import FAILED, IntervalTables, advance_substep, advance_if_clear
+from ._substep import FAILED, IntervalTables, advance_if_clear, advance_substep
 
 CUBIC_TERMS = 4
 INSIDE = 1e-9
@@ -44,13 +44,13 @@ def interval_tables(
     par = parameters(specimen)
     system, entry = state_matrix(specimen)
     fastest = float(np.max(np.abs(np.linalg.eigvals(system))))
-    pieces = max(1, math.ceil(interval_s * fastest / LONGEST_TURN))
-    length = interval_s / pieces
+    substeps = max(1, math.ceil(interval_s * fastest / LONGEST_TURN))
+    length = interval_s / substeps
     return IntervalTables(
         par=par,
         power=power_terms(specimen),
         length=length,
-        pieces=pieces,
+        substeps=substeps,
         transition=_transition(system, entry, length),
         bound_per_root_energy=_bound_per_root_energy(specimen, system),
         tolerance=accuracy.tolerance,
@@ -138,8 +138,8 @@ def advance_interval(state: Vector, base: Vector, tables: IntervalTables) -> int
     """
     force = base_force(base, tables.par)
     impacts = 0
-    for piece in range(tables.pieces):
-        if piece > 0:
+    for substep in range(tables.substeps):
+        if substep > 0:
             force = shifted(force, tables.length)
         if not advance_if_clear(state, force, tables):
             fresh = advance_substep(state, force, tables.length, tables, np.empty(0))

@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from ..flight import Cubic, base_force, shifted
-from ..kernels import Table, Vector, advance_clock, kernel, copy_row, kernel_without_refcount, time_until
+from ..kernels import Table, Vector, advance_clock, copy_row, kernel, kernel_without_refcount, time_until
 from ..slots import IMPACTS, LOST, NEXT_SAMPLE, REACHED_END, TOO_MANY_IMPACTS, Record
-from ._substep import IntervalTables, advance_substep, advance_if_clear
+from ._substep import IntervalTables, advance_if_clear, advance_substep
 
 ALMOST = 1.0 - 1e-12
 """An interval is whole although its length, cut into pieces and joined, rounds differently."""
@@ -39,13 +39,13 @@ def advance_intervals(
         Filled on the way; its tally is left alone, for a drive without one frequency has no line.
 
     """
-    whole = tables.length * tables.pieces
+    whole = tables.length * tables.substeps
     # The force is a cubic in the time since the interval's start; each step shifts it to its own start.
     for index in range(len(pieces)):
         begin = first_from if index == 0 else 0.0
         end = last_to if index + 1 == len(pieces) else whole
         is_whole = begin == 0.0 and end >= whole * ALMOST
-        steps = tables.pieces if is_whole else math.ceil((end - begin) / tables.length)
+        steps = tables.substeps if is_whole else math.ceil((end - begin) / tables.length)
         for step in range(steps):
             length = tables.length if is_whole else (end - begin) / steps
             force = _base_force(pieces[index], begin + step * length, tables)

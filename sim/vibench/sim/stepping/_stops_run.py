@@ -7,33 +7,43 @@ import math
 
 import numpy as np
 
-from ..collision import CollisionTables, propagate_tangent_collision, collide, observe_collision
+from ..collision import CollisionTables, collide, observe_collision, propagate_tangent_collision
 from ..contact import (
     HELD,
     LEFT,
     LOG_COLUMNS,
     NOT_FINITE,
     advance_contact,
-    propagate_tangent_steps,
     gap_of,
     observe_contact,
+    propagate_tangent_steps,
 )
 from ..flight import (
     CLEAR,
     LIFTS_OFF,
     OUT_OF_RANGE,
     FlightTables,
-    propagate_tangent_flight,
     fill_base_force,
     fly,
-    place_on_phasors,
-    start_flight,
     observe_flight,
+    place_on_phasors,
     propagate_phasors,
+    propagate_tangent_flight,
+    start_flight,
 )
-from ..kernels import Complex, Table, Vector, advance_clock, kernel, copy_row, inlined, kernel_without_refcount, time_until
+from ..kernels import (
+    Complex,
+    Table,
+    Vector,
+    advance_clock,
+    copy_row,
+    inlined,
+    kernel,
+    kernel_without_refcount,
+    time_until,
+)
 from ..model import X, Y, Z
-from ..rigid import propagate_tangent_impact, is_resolved
+from ..rigid import is_resolved, propagate_tangent_impact
 from ..slots import (
     CLOSED,
     IMPACTS,
@@ -48,7 +58,7 @@ from ..slots import (
     Parameters,
     Record,
 )
-from ..sticking import HeldTables, closed_for, lift_off, hold, place_held, observe_held
+from ..sticking import HeldTables, closed_for, hold, lift_off, observe_held, place_held
 from ._touch import contact_onset
 from ._workspace import Workspace
 
@@ -111,16 +121,22 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
     held: HeldTables | None,
     collisions: CollisionTables | None,
     tangent: Table | None,
-    room: Workspace,
+    workspace: Workspace,
 ) -> int:
     """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code.
 
     ``held`` is how m1 moves on a stop that holds it, None where stops yield; ``collisions`` are known of
     Hertz's stops alone.
     """
-    phasors, landed, now = room.phasors, room.landed, room.now
-    workspace, series = room.terms, room.series
-    force, work, shadow, log, memory = room.force, room.work, room.shadow, room.log, room.memory
+    phasors, landed, now = workspace.phasors, workspace.landed, workspace.now
+    scratch, series = workspace.terms, workspace.series
+    force, work, shadow, log, memory = (
+        workspace.force,
+        workspace.work,
+        workspace.shadow,
+        workspace.log,
+        workspace.memory,
+    )
     counts = record.counts
     while True:
         longest = time_until(clock, until)
@@ -130,12 +146,14 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
             return LOST
         if state[SIDE] == 0.0:
             start_flight(phasors, state, clock, tables)
-            ends, length = _fly_on(phasors, now, workspace, series, clock, longest, tables, held)
+            ends, length = _fly_on(phasors, now, scratch, series, clock, longest, tables, held)
             if ends == OUT_OF_RANGE:
                 return LOST
             propagate_phasors(landed, phasors, length, clock, tables)
-            if record.tally[MODE] != NOTHING:
-                observe_flight(record.tally, phasors, landed, now, workspace, series, clock, length, tables)
+            if record.observations[MODE] != NOTHING:
+                observe_flight(
+                    record.observations, phasors, landed, now, scratch, series, clock, length, tables
+                )
             if tangent is not None and len(tangent) > 0:
                 propagate_tangent_flight(tangent, length, tables)
             if counts[NEXT_SAMPLE] < len(record.samples):
@@ -169,10 +187,10 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
         else:
             copy_row(shadow, state)
             if collisions is not None:
-                length = collide(state, clock, longest, tolerance, tables, collisions, room.collision)
+                length = collide(state, clock, longest, tolerance, tables, collisions, workspace.collision)
                 if length > 0.0:
                     _observe_collision_in_full(
-                        shadow, clock, length, tables, tolerance, record, collisions, tangent, room
+                        shadow, clock, length, tables, tolerance, record, collisions, tangent, workspace
                     )
                     advance_clock(clock, length)
                     continue
@@ -184,8 +202,8 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
                 return LOST
             if code not in (LEFT, HELD):
                 return STUCK
-            if record.tally[MODE] != NOTHING:
-                observe_contact(record.tally, log, clock, tables)
+            if record.observations[MODE] != NOTHING:
+                observe_contact(record.observations, log, clock, tables)
             if tangent is not None and len(tangent) > 0:
                 propagate_tangent_steps(tangent, log, tables.par, memory)
             if counts[NEXT_SAMPLE] < len(record.samples):
@@ -227,18 +245,20 @@ def _observe_collision_in_full(
     record: Record,
     collisions: CollisionTables,
     tangent: Table | None,
-    room: Workspace,
+    workspace: Workspace,
 ) -> None:
     """Observe a collision that began in the state ``shadow`` at clock time."""
-    par, collision = tables.par, room.collision
-    if record.tally[MODE] != NOTHING:
+    par, collision = tables.par, workspace.collision
+    if record.observations[MODE] != NOTHING:
         gap = gap_of(shadow[SIDE], par)
-        observe_collision(record.tally, collision, length, gap, tables.omega, collisions)
+        observe_collision(record.observations, collision, length, gap, tables.omega, collisions)
     if tangent is not None and len(tangent) > 0:
-        propagate_tangent_collision(tangent, collision, length, par, collisions, room.equations)
+        propagate_tangent_collision(tangent, collision, length, par, collisions, workspace.equations)
     if record.counts[NEXT_SAMPLE] < len(record.samples):
-        fill_base_force(room.force, clock, 0.5 * length, tables)
-        sample_contact(shadow, clock, length, room.force, 0.5 * length, tables, tolerance, room.work, record)
+        fill_base_force(workspace.force, clock, 0.5 * length, tables)
+        sample_contact(
+            shadow, clock, length, workspace.force, 0.5 * length, tables, tolerance, workspace.work, record
+        )
 
 
 @kernel_without_refcount
@@ -263,14 +283,14 @@ def _stay_held(
     flight = held.flight
     terms, side, first = len(flight.rates), state[SIDE], record.counts[NEXT_SAMPLE]
     phasors, now = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
-    landed, workspace = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
+    landed, scratch = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
     start_flight(phasors, state, clock, flight)
-    ends, length = hold(side, phasors, now, workspace, series, clock, longest, flight, held.pulls)
+    ends, length = hold(side, phasors, now, scratch, series, clock, longest, flight, held.pulls)
     if ends == OUT_OF_RANGE:
         return ends, length
     propagate_phasors(landed, phasors, length, clock, flight)
-    observe_flight(record.tally, phasors, landed, now, workspace, series, clock, length, flight)
-    observe_held(record.tally, side, clock, length, flight)
+    observe_flight(record.observations, phasors, landed, now, scratch, series, clock, length, flight)
+    observe_held(record.observations, side, clock, length, flight)
     if tangent is not None and len(tangent) > 0:
         propagate_tangent_flight(tangent, length, flight)
     sample_flight(phasors, now, clock, length, flight, record)

@@ -1,4 +1,4 @@
-"""One piece of an interval: one matrix product if clear of the stops, else resolved in full. SI units."""
+"""One substep of an interval: one matrix product if clear of the stops, else resolved in full. SI units."""
 
 import math
 from typing import NamedTuple
@@ -8,9 +8,9 @@ import numpy as np
 from ..contact import HELD, LEFT, LOG_COLUMNS, contact_workspace
 from ..flight import (
     CLEAR,
-    LIFTS_OFF,
     FORCE_TERMS,
     LARGEST_BOUND,
+    LIFTS_OFF,
     NEVER,
     OUT_OF_RANGE,
     SERIES_TERMS,
@@ -43,7 +43,7 @@ class IntervalTables(NamedTuple):
     """Of a power law; None for other laws, which a kernel tells by the type."""
     length: float
     """One piece of the interval [s]: short enough for the Taylor series of detection."""
-    pieces: int
+    substeps: int
     transition: Table
     """Shape (6, 10): state and force coefficients before -> (x, y, z, vx, vy, vz) after one piece."""
     bound_per_root_energy: float

@@ -28,7 +28,7 @@ class Workspace(NamedTuple):
     equations: Table
 
 
-def workspace_for(terms: int, tally: Vector, tangent: Table | None) -> Workspace:
+def workspace_for(terms: int, observations: Vector, tangent: Table | None) -> Workspace:
     """Make the memory of a run whose flights have so many terms."""
     return Workspace(
         np.zeros(terms, np.complex128),
@@ -39,7 +39,7 @@ def workspace_for(terms: int, tally: Vector, tangent: Table | None) -> Workspace
         np.zeros(FORCE_TERMS),
         contact_workspace(),
         np.zeros(STATE_SIZE),
-        log_for(tally, tangent),
+        log_for(observations, tangent),
         tangent_workspace(),
         new_collision(),
         collision_memory(),

@@ -15,18 +15,18 @@ from ._sticking import (
     held_tables,
     hold,
     hold_on_series,
-    place_held,
     observe_held,
+    place_held,
 )
 
 __all__ = [
     "HeldTables",
     "closed_for",
-    "lift_off",
     "held_tables",
     "hold",
     "hold_on_series",
-    "place_held",
+    "lift_off",
     "observe_held",
+    "place_held",
     "time_to_lift_off",
 ]

@@ -1,4 +1,5 @@
-"""m1 held by a rigid stop: exact motion of two bodies, up to where the stop would have to pull. SI units.
+"""Sticking, m1 held by a rigid stop: exact motion of two bodies, up to where the stop would have to pull.
+SI units.
 
 `vibench.sim.model` says what moves. The stop lets go where the acceleration that presses m1 on
 it
@@ -30,7 +31,17 @@ from ..flight import (
     place_on_series,
     propagate_phasors,
 )
-from ..kernels import Complex, Table, Vector, fill_series, kernel_without_refcount, march, series_rows, steps_ahead, sum_now
+from ..kernels import (
+    Complex,
+    Table,
+    Vector,
+    fill_series,
+    kernel_without_refcount,
+    march,
+    series_rows,
+    steps_ahead,
+    sum_now,
+)
 from ..model import PULL, RATE, ROW, SHAPE, VX, VY, VZ, X, Y, Z
 from ..slots import LINE_P_IM, LINE_P_RE, MODE, NOTHING, PEAK_P, PEAKS_AND_LINES, SIDE, Parameters
 
@@ -115,22 +126,22 @@ def place_held(state: Vector, side: float, phasors: Complex, held: FlightTables)
 
 
 @kernel_without_refcount
-def observe_held(tally: Vector, side: float, clock: Vector, length: float, held: FlightTables) -> None:
+def observe_held(observations: Vector, side: float, clock: Vector, length: float, held: FlightTables) -> None:
     """Add what the constant p does to its peak and line; `vibench.sim.flight.tally_flight` does the
     rest.
     """
-    if tally[MODE] == NOTHING:
+    if observations[MODE] == NOTHING:
         return
     gap = gap_of(side, held.par)
-    tally[PEAK_P] = max(tally[PEAK_P], gap)
-    if tally[MODE] == PEAKS_AND_LINES:
+    observations[PEAK_P] = max(observations[PEAK_P], gap)
+    if observations[MODE] == PEAKS_AND_LINES:
         # The integral of exp(-i (omega t + phase)): its middle value times sin(q)/q, q half the turn.
         half = 0.5 * held.omega * length
         line = (
             side * gap * length * math.sin(half) / half * drive_phasor(clock, 0.5 * length, held).conjugate()
         )
-        tally[LINE_P_RE] += line.real
-        tally[LINE_P_IM] += line.imag
+        observations[LINE_P_RE] += line.real
+        observations[LINE_P_IM] += line.imag
 
 
 @kernel_without_refcount

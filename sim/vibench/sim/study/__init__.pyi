@@ -20,8 +20,8 @@ from ._plausibility_warnings import (
     plausibility_warnings as plausibility_warnings,
 )
 from ._progress import (
-    StudyProgress as StudyProgress,
     StudyObserver as StudyObserver,
+    StudyProgress as StudyProgress,
 )
 from ._results import (
     StudyResults as StudyResults,
@@ -45,9 +45,9 @@ from ._structure import (
     Structure as Structure,
 )
 from ._study import (
-    StudyObservable as StudyObservable,
     Start as Start,
     Study as Study,
+    StudyObservable as StudyObservable,
 )
 from ._threads import (
     ThreadExecutor as ThreadExecutor,

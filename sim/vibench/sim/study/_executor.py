@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..scene import ScenePrediction, Scene
+from ..scene import Scene, ScenePrediction
 
 
 @dataclass(frozen=True)

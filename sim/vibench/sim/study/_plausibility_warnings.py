@@ -1,4 +1,4 @@
-"""What of a study is allowed and yet looks like a slip of the pen, one sentence each."""
+"""Plausibility warnings: what of a study is allowed and yet looks like a slip of the pen."""
 
 from collections.abc import Iterator
 

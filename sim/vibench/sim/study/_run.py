@@ -12,8 +12,8 @@ from ._columns import TAKEN
 from ._executor import Bundle, Executor, Reply
 from ._expansion import Expansion
 from ._layout import PointState
-from ._point_scheduler import PointScheduler, Costs
-from ._progress import Cancelled, StudyProgress, StudyObserver
+from ._point_scheduler import Costs, PointScheduler
+from ._progress import Cancelled, StudyObserver, StudyProgress
 from ._store import Store
 from ._study import Study
 
@@ -40,7 +40,7 @@ def run_study(
     study: Study,
     executor: Executor,
     store: Store,
-    watcher: StudyObserver | None = None,
+    observer: StudyObserver | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
     """Compute every point that the store misses, longest first.
@@ -61,8 +61,8 @@ def run_study(
         session.feed()
         replies = executor.replies(LOOK_S)
         session.keep(replies)
-        if replies and watcher is not None:
-            watcher(session.progress())
+        if replies and observer is not None:
+            observer(session.progress())
         if cancelled is not None and cancelled():
             session.keep(executor.cancel())
             return StudyEnd.COMPLETE if not session.is_unfinished else StudyEnd.CANCELLED
@@ -81,7 +81,7 @@ class _Session:
         for number in np.flatnonzero(is_done & np.isfinite(store.arrays[TAKEN].astype(float))):
             for _ in self._costs.learn(int(number), float(store.arrays[TAKEN][number])):
                 pass
-        self._agenda = PointScheduler(self._expansion.after, is_done, self._costs)
+        self._scheduler = PointScheduler(self._expansion.after, is_done, self._costs)
         self._points = study.grid.size
         self._failed = int(np.count_nonzero(states(store.arrays) > PointState.DONE))
         self._out = 0
@@ -94,7 +94,7 @@ class _Session:
     @property
     def is_unfinished(self) -> bool:
         """Whether points are missing."""
-        return self._agenda.left > 0
+        return self._scheduler.left > 0
 
     def feed(self) -> None:
         """Hand bundles to the executor until every worker has enough."""
@@ -102,7 +102,7 @@ class _Session:
         slots = self._executor.slots
         while self._out < slots * QUEUED_PER_SLOT:
             worth_s = min(BUNDLE_S, self._work_left_s / (slots * SHARE))
-            numbers = self._agenda.take(worth_s, MOST_IN_BUNDLE)
+            numbers = self._scheduler.take(worth_s, MOST_IN_BUNDLE)
             if not numbers:
                 return
             scenes = tuple(self._expansion.scene(number, self._store.arrays) for number in numbers)
@@ -115,12 +115,12 @@ class _Session:
         if answers:
             self._store.keep(answers)
         for answer in answers:
-            self._agenda.finish(answer.number)
+            self._scheduler.finish(answer.number)
             self._failed += answer.state > PointState.DONE
         for number, taken_s in [
             (each.number, each.taken_s) for each in answers if math.isfinite(each.taken_s)
         ]:
-            self._agenda.learn(number, taken_s)
+            self._scheduler.learn(number, taken_s)
             self._taken_s += taken_s
         if answers and math.isnan(self._first_s):
             # Workers spend their first moments on compiling: what comes after tells their pace.
@@ -130,7 +130,7 @@ class _Session:
         """Where it stands."""
         return StudyProgress(
             points=self._points,
-            kept=self._points - self._agenda.left,
+            kept=self._points - self._scheduler.left,
             failed=self._failed,
             elapsed_s=time.monotonic() - self._began_s,
             left_s=self._left_s(),
@@ -149,7 +149,7 @@ class _Session:
         now_s = time.monotonic()
         if now_s - self._looked_s >= LOOK_S:
             self._looked_s = now_s
-            self._work_left_s = self._costs.left_s(self._agenda.is_missing)
+            self._work_left_s = self._costs.left_s(self._scheduler.is_missing)
 
     def _answers(self, reply: Reply) -> Iterable[PointAnswer]:
         """Take a reply apart; what has no answer goes back to the agenda."""
@@ -161,9 +161,9 @@ class _Session:
         match reply.error, rest:
             case None, _:
                 for number in rest:
-                    self._agenda.put_back(number)
+                    self._scheduler.put_back(number)
             case error, (number,) if len(numbers) == 1:
                 yield self._expansion.failure(number, error)
             case _:
                 for number in rest:
-                    self._agenda.put_back_alone(number)
+                    self._scheduler.put_back_alone(number)

@@ -28,7 +28,7 @@ def solve_study(
     existing: ExistingStudy = ExistingStudy.REFUSE,
     workers: int | None = None,
     cluster: str | None = None,
-    watcher: StudyObserver | None = None,
+    observer: StudyObserver | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyResults:
     """Compute what a study asks for, and what its file does not hold yet.
@@ -63,10 +63,10 @@ def solve_study(
     with _executor(workers, cluster) as executor:
         if out is None:
             store = MemoryStore(study)
-            run_study(study, executor, store, watcher, cancelled)
+            run_study(study, executor, store, observer, cancelled)
             return results_of(study, store.arrays)
         with _file_store(study, out, existing) as kept:
-            run_study(study, executor, kept, watcher, cancelled)
+            run_study(study, executor, kept, observer, cancelled)
         return open_study(out)
 
 

@@ -17,7 +17,7 @@ from pydantic import (
 
 from ..model import Accuracy, Harmonic
 from ..scene import AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
-from ._axes import FREQUENCY, MODEL, START, StudyAxis, Grid, grid_of
+from ._axes import FREQUENCY, MODEL, START, Grid, StudyAxis, grid_of
 from ._frequency_range import listed
 from ._structure import Structure
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
-from vibench.analysis import CurveOrigin, CurveKind, Curve
+from vibench.analysis import Curve, CurveKind, CurveOrigin
 from vibench.gui.pages.compare import ComparePage
 from vibench.gui.widgets import DARK
 
@@ -16,12 +16,14 @@ def mode(source, scale=1.0, low_hz=50.0, high_hz=600.0):
     r = frequency_hz / 266.0
     magnitude = scale * np.abs((1 + 0.02j * r) / (1 - r**2 + 0.02j * r))
     spread = np.full(frequency_hz.shape, 0.01)
-    return Curve(source, CurveOrigin.PREDICTED, CurveKind.RESPONSE_I, frequency_hz, magnitude, spread, "a note")
+    return Curve(
+        source, CurveOrigin.PREDICTED, CurveKind.RESPONSE_I, frequency_hz, magnitude, spread, "a note"
+    )
 
 
 @pytest.fixture
-def page(desk, qtbot):
-    page = ComparePage(desk)
+def page(context, qtbot):
+    page = ComparePage(context)
     qtbot.addWidget(page)
     page.resize(1300, 800)
     page.show()
@@ -29,9 +31,9 @@ def page(desk, qtbot):
 
 
 @pytest.fixture(scope="module")
-def working(shared_desk):
+def working(shared_context):
     """A page whose processes serve the tests that need them."""
-    page = ComparePage(shared_desk)
+    page = ComparePage(shared_context)
     page.resize(1300, 800)
     page.show()
     yield page
@@ -80,7 +82,7 @@ def test_the_second_curve_is_compared_with_the_first(laid):
 def test_a_curve_that_is_not_ticked_is_neither_drawn_nor_listed(laid):
     laid.curves.tick("half, Response I, predicted", Qt.CheckState.Unchecked)
     assert len(texts(laid.peaks)) == 1
-    assert len(laid.curves.traces) == 2
+    assert len(laid.curves.curves) == 2
 
 
 def test_markers_read_every_curve(laid):
@@ -97,7 +99,7 @@ def test_markers_read_every_curve(laid):
 def test_removed_curves_are_gone(laid):
     laid.curves.setCurrentRow(0)
     laid._remove()
-    assert [each.source for each in laid.curves.traces] == ["half"]
+    assert [each.source for each in laid.curves.curves] == ["half"]
     assert laid.pair_box.pair() is None
 
 
@@ -120,12 +122,12 @@ def test_recordings_are_analysed_elsewhere_laid_over_and_written(working, record
     """The road of the page: two recordings, their curves, a picture with a known point, a report."""
     paths = (record_noise(tmp_path, "twice", 2.0), record_noise(tmp_path, "thrice", 3.0))
     notices = []
-    working.desk.noticed.connect(notices.append)
-    working.desk.comparison_wanted.emit(paths)
+    working.context.noticed.connect(notices.append)
+    working.context.comparison_wanted.emit(paths)
     assert working.is_busy
     waited(lambda: not working.is_busy, 90.0)
     assert notices == []
-    by_name = {each.name: each for each in working.curves.traces}
+    by_name = {each.name: each for each in working.curves.curves}
     for name, factor in (("twice", 2.0), ("thrice", 3.0)):
         curve = by_name[f"{name}, transmission, measured"]
         assert np.median(curve.magnitude) == pytest.approx(factor, rel=0.01)
@@ -144,13 +146,13 @@ def test_recordings_are_analysed_elsewhere_laid_over_and_written(working, record
 
 def test_what_cannot_be_analysed_or_written_says_so_and_spoils_nothing(working, tmp_path, waited):
     notices = []
-    working.desk.noticed.connect(notices.append)
+    working.context.noticed.connect(notices.append)
     working.add_prediction((mode("model"),))
-    known = len(working.curves.traces)
+    known = len(working.curves.curves)
     working.add_recordings((tmp_path / "missing.h5",))
     working.export_to(tmp_path / "out.docx")
     waited(lambda: len(notices) == 2, 60.0)
     said = " ".join(each.what for each in notices)
     assert "missing.h5 does not exist" in said
     assert ".png, .svg" in said
-    assert len(working.curves.traces) == known
+    assert len(working.curves.curves) == known

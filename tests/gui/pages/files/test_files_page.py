@@ -54,25 +54,25 @@ def folder(tmp_path_factory, record):
 
 
 @pytest.fixture(scope="module")
-def shown(shared_desk, folder, waited):
+def shown(shared_context, folder, waited):
     """One page for all tests: its processes take seconds to begin."""
-    shared_desk.choose_folder(folder)
-    page = FilesPage(shared_desk)
+    shared_context.choose_folder(folder)
+    page = FilesPage(shared_context)
     page.resize(1200, 800)
     page.show()
     page.entered()
-    waited(lambda: len(page.table.recordings.entries) == 4 and not shared_desk.background.is_busy)
+    waited(lambda: len(page.table.recordings.entries) == 4 and not shared_context.background.is_busy)
     yield page
-    page.lanes.show_recording(None)
+    page.time_histories.show_recording(None)
     page.close()
 
 
 @pytest.fixture
 def page(shown, folder, waited):
-    if shown.desk.folder != folder:
-        shown.desk.choose_folder(folder)
+    if shown.context.folder != folder:
+        shown.context.choose_folder(folder)
         shown.list_folder()
-    waited(lambda: not shown.desk.background.is_busy)
+    waited(lambda: not shown.context.background.is_busy)
     shown.table.search("")
     return shown
 
@@ -83,7 +83,7 @@ def opened(page, folder, waited):
 
     def open_row(name):
         page.table.choose(folder / name)
-        waited(lambda: bool(page.lanes.plots) and page._opened.path == folder / name)
+        waited(lambda: bool(page.time_histories.plots) and page._opened.path == folder / name)
         return page
 
     return open_row
@@ -98,7 +98,7 @@ def cell(page, name, heading):
 
 
 def drawn(page, number):
-    (curve, *_) = page.lanes.plots[number].getPlotItem().listDataItems()
+    (curve, *_) = page.time_histories.plots[number].getPlotItem().listDataItems()
     return curve.getData()
 
 
@@ -124,13 +124,13 @@ def test_every_readable_recording_has_a_picture(page):
 def test_an_impact_of_three_samples_is_seen_in_the_whole_and_when_zoomed_to(opened):
     page = opened("whole.h5")
     for low_s, high_s in ((0.0, 10.0), (IMPACT_S - 0.5, IMPACT_S + 0.5), (IMPACT_S - 2e-3, IMPACT_S + 2e-3)):
-        page.lanes.show_range(low_s, high_s)
-        page.lanes._draw()
+        page.time_histories.show_range(low_s, high_s)
+        page.time_histories._draw()
         time_s, values = drawn(page, 2)
         assert np.nanmax(values) == pytest.approx(0.4, rel=1e-5)
         assert np.nanmin(values) == pytest.approx(-0.5, rel=1e-5)
         assert time_s[0] <= low_s + 0.01
-        assert len(time_s) <= 2.1 * page.lanes.width()
+        assert len(time_s) <= 2.1 * page.time_histories.width()
 
 
 def test_a_recording_without_overview_is_opened_all_the_same(opened):
@@ -139,41 +139,41 @@ def test_a_recording_without_overview_is_opened_all_the_same(opened):
 
 
 def test_a_broken_file_says_why_and_what_to_do(page, opened, folder, qtbot):
-    with qtbot.waitSignal(page.desk.noticed) as said:
+    with qtbot.waitSignal(page.context.noticed) as said:
         page.table.choose(folder / "broken.h5")
     assert "no readable HDF5 file" in said.args[0].what
-    assert page.lanes.plots == ()
-    assert len(opened("whole.h5").lanes.plots) == 3
+    assert page.time_histories.plots == ()
+    assert len(opened("whole.h5").time_histories.plots) == 3
 
 
 def test_keys_zoom_move_and_show_all(opened, qtbot):
     page = opened("whole.h5")
-    qtbot.keyClick(page.lanes, Qt.Key.Key_Plus)
-    low_s, high_s = page.lanes.view_s
+    qtbot.keyClick(page.time_histories, Qt.Key.Key_Plus)
+    low_s, high_s = page.time_histories.view_s
     assert high_s - low_s == pytest.approx(6.0)
-    qtbot.keyClick(page.lanes, Qt.Key.Key_Right)
-    assert page.lanes.view_s[0] == pytest.approx(low_s + 1.2)
-    qtbot.keyClick(page.lanes, Qt.Key.Key_Home)
-    assert page.lanes.view_s == pytest.approx((0.0, 10.0))
+    qtbot.keyClick(page.time_histories, Qt.Key.Key_Right)
+    assert page.time_histories.view_s[0] == pytest.approx(low_s + 1.2)
+    qtbot.keyClick(page.time_histories, Qt.Key.Key_Home)
+    assert page.time_histories.view_s == pytest.approx((0.0, 10.0))
 
 
 def test_no_view_goes_past_the_ends_or_closer_than_a_few_samples(opened):
     page = opened("whole.h5")
-    page.lanes.show_range(-50.0, 100.0)
-    assert page.lanes.view_s == (0.0, 10.0)
-    page.lanes.show_range(5.0, 5.0 + 1e-9)
-    low_s, high_s = page.lanes.view_s
+    page.time_histories.show_range(-50.0, 100.0)
+    assert page.time_histories.view_s == (0.0, 10.0)
+    page.time_histories.show_range(5.0, 5.0 + 1e-9)
+    low_s, high_s = page.time_histories.view_s
     assert high_s - low_s == pytest.approx(8 / 6400.0, rel=1e-3)
 
 
 def test_markers_measure_between_two_moments(opened):
     page = opened("whole.h5")
     page._markers.setChecked(True)
-    first, second = page.lanes._lanes[1].markers
+    first, second = page.time_histories._histories[1].markers
     first.setValue(2.0)
     second.setValue(2.5)
-    assert page.lanes.markers_s == (2.0, 2.5)
-    assert page.lanes._lanes[0].markers[0].value() == 2.0
+    assert page.time_histories.markers_s == (2.0, 2.5)
+    assert page.time_histories._histories[0].markers[0].value() == 2.0
     assert "0.5 s apart = 1 / 2 Hz" in page._view.text()
 
 
@@ -197,7 +197,7 @@ def test_a_campaign_says_how_far_it_is_and_shows_its_own_recordings(page):
 
 def test_chosen_recordings_are_handed_to_compare(page, folder, qtbot):
     page.table.selectAll()
-    with qtbot.waitSignals([page.desk.comparison_wanted, page.desk.page_wanted]):
+    with qtbot.waitSignals([page.context.comparison_wanted, page.context.page_wanted]):
         page._compare.click()
     assert set(page.table.chosen_paths()) == {
         folder / f"{n}.h5" for n in ("whole", "stopped", "old", "broken")
@@ -206,7 +206,7 @@ def test_chosen_recordings_are_handed_to_compare(page, folder, qtbot):
 
 def test_a_recording_from_another_folder_is_opened_when_somebody_wants_it(page, record, tmp_path, qtbot):
     path = record(tmp_path, "elsewhere")
-    page.desk.recording_wanted.emit(path)
+    page.context.recording_wanted.emit(path)
     assert page._opened.path == path
     qtbot.waitUntil(lambda: page.table.chosen_paths() == (path,), timeout=20_000)
 
@@ -227,44 +227,44 @@ def test_the_spectrogram_of_what_is_in_sight_shows_the_drive_and_the_impact(open
         at_s = box.left() + (struck + 0.5) / shown.image.shape[1] * box.width()
         assert at_s == pytest.approx(IMPACT_S, abs=0.1)
     assert "dB re 1 (m/s)²/Hz" in view.image.bar.axis.labelText
-    page.pictures.setCurrentWidget(page.lanes)
+    page.pictures.setCurrentWidget(page.time_histories)
 
 
 def test_a_recording_that_is_finished_while_it_is_looked_at_is_no_fault(
     page, begin_recording, tmp_path, waited
 ):
     writer, part = begin_recording(tmp_path, "growing")
-    page.desk.choose_folder(tmp_path)
+    page.context.choose_folder(tmp_path)
     page.list_folder()
     waited(lambda: [entry.path for entry in page.table.recordings.entries] == [part])
     said = []
-    page.desk.noticed.connect(said.append)
+    page.context.noticed.connect(said.append)
     final = writer.finish(RecordingState.COMPLETE, "the plan was carried out")
     page.open_path(part)
-    waited(lambda: len(page.lanes.plots) == 3 and page.table.chosen_paths() == (final,))
+    waited(lambda: len(page.time_histories.plots) == 3 and page.table.chosen_paths() == (final,))
     assert page._opened.path == final
     assert set(made_levels(part)) == set(page._opened.roles)
     assert thumbnail(part) is not None
-    page.desk.noticed.disconnect(said.append)
+    page.context.noticed.disconnect(said.append)
     assert said == []
 
 
 def test_lanes_follow_the_theme_and_name_their_channels_and_units(opened):
     page = opened("whole.h5")
     page.retheme(DARK)
-    assert [plot.accessibleName() for plot in page.lanes.plots] == [
+    assert [plot.accessibleName() for plot in page.time_histories.plots] == [
         "drive voltage over time",
         "base acceleration over time",
         "m0 velocity over time",
     ]
-    assert [plot.up.labelText for plot in page.lanes.plots] == ["V", "m/s²", "m/s"]
-    assert page.lanes.plots[0].backgroundBrush().color().name() == DARK.base
+    assert [plot.up.labelText for plot in page.time_histories.plots] == ["V", "m/s²", "m/s"]
+    assert page.time_histories.plots[0].backgroundBrush().color().name() == DARK.base
 
 
-def test_a_list_that_comes_late_keeps_what_was_chosen_meanwhile(page, shared_desk, waited):
+def test_a_list_that_comes_late_keeps_what_was_chosen_meanwhile(page, shared_context, waited):
     page.table.selectAll()
     chosen = page.table.chosen_paths()
     assert len(chosen) > 1
     page.list_folder()
-    waited(lambda: not shared_desk.background.is_busy)
+    waited(lambda: not shared_context.background.is_busy)
     assert page.table.chosen_paths() == chosen

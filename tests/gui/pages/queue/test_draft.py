@@ -3,7 +3,7 @@
 import pytest
 
 from vibench.acquisition import ConfigurationError, load_campaign, save_toml
-from vibench.acquisition.plan import SweepAxis, Measurement, Range
+from vibench.acquisition.plan import Measurement, Range, SweepAxis
 from vibench.gui.pages.queue._draft import moved_up, with_measurement, with_sweep, without
 
 DWELL = Measurement.model_validate(

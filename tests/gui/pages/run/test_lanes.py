@@ -15,7 +15,7 @@ OTHERS = (("base_acceleration", "m/s²"), ("m0_velocity", "V"))
 
 
 @pytest.fixture
-def lanes(qapp, qtbot):
+def time_histories(qapp, qtbot):
     made = TimeHistoryPlots(LIGHT)
     qtbot.addWidget(made)
     made.resize(1000, 700)
@@ -24,18 +24,18 @@ def lanes(qapp, qtbot):
 
 
 @pytest.mark.parametrize("channels", [(FOUR,), (FOUR, OTHERS), (OTHERS, FOUR)])
-def test_each_lane_is_labelled_with_its_channel(lanes, qapp, channels):
+def test_each_lane_is_labelled_with_its_channel(time_histories, qapp, channels):
     for shown in channels:
-        lanes.show_channels(shown)
+        time_histories.show_channels(shown)
         qapp.processEvents()
     wanted = [channel_axis(*channel).text for channel in channels[-1]]
-    assert [plot.up.labelText for plot in lanes.plots] == wanted
-    assert all(plot.up.label.isVisible() for plot in lanes.plots)
+    assert [plot.up.labelText for plot in time_histories.plots] == wanted
+    assert all(plot.up.label.isVisible() for plot in time_histories.plots)
 
 
-def test_the_last_lane_alone_has_the_time(lanes, qapp):
+def test_the_last_lane_alone_has_the_time(time_histories, qapp):
     for channels in (OTHERS, FOUR, OTHERS):
-        lanes.show_channels(channels)
+        time_histories.show_channels(channels)
         qapp.processEvents()
-        labelled = [plot.across.label.isVisible() for plot in lanes.plots]
+        labelled = [plot.across.label.isVisible() for plot in time_histories.plots]
         assert labelled == [False] * (len(channels) - 1) + [True]

@@ -14,9 +14,9 @@ LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "start_hz":
 
 
 @pytest.fixture(scope="module")
-def page(shared_desk):
+def page(shared_context):
     """One page, whose process serves all tests."""
-    page = SimulatePage(shared_desk)
+    page = SimulatePage(shared_context)
     page.resize(1300, 800)
     page.show()
     yield page
@@ -43,7 +43,7 @@ def test_a_simulation_is_complete_and_drawn(page, waited):
     waited(lambda: not page.simulator.is_busy, 60.0)
     for _ in page.plots.plots:
         page.refresh()
-    assert page.course.done == page.course.asked == 56
+    assert page.progress.done == page.progress.asked == 56
     assert page._state.text() == "Complete."
     assert page._bar.value() == 56
     first, _second = lines(page.plots.responses)
@@ -54,29 +54,29 @@ def test_a_simulation_is_complete_and_drawn(page, waited):
 
 def test_cancelling_is_at_once_and_keeps_what_was_found(page, waited):
     asked(page, step_hz=0.05)
-    waited(lambda: page.course.done > 0, 60.0)
+    waited(lambda: page.progress.done > 0, 60.0)
     page.cancel()
     assert not page.simulator.is_busy
-    found = page.course.done
-    assert 0 < found < page.course.asked
+    found = page.progress.done
+    assert 0 < found < page.progress.asked
     assert page._state.text().startswith("Cancelled")
     asked(page, step_hz=100.0)
     waited(lambda: not page.simulator.is_busy, 60.0)
-    assert page.course.done == page.course.asked == 6
+    assert page.progress.done == page.progress.asked == 6
 
 
 def test_a_dead_process_is_told_and_the_next_request_begins_another(page, waited):
     said = []
-    page.desk.noticed.connect(said.append)
+    page.context.noticed.connect(said.append)
     asked(page, step_hz=0.05)
-    waited(lambda: page.course.done > 0, 60.0)
+    waited(lambda: page.progress.done > 0, 60.0)
     page.simulator._process.kill()
     waited(lambda: bool(said), 30.0)
     assert "has ended" in said[0].what
     assert not page.simulator.is_busy
     asked(page, step_hz=100.0)
     waited(lambda: not page.simulator.is_busy, 60.0)
-    assert page.course.done == 6
+    assert page.progress.done == 6
 
 
 def test_what_is_not_allowed_cannot_be_begun(page):
@@ -119,7 +119,7 @@ def test_exponents_similarity_impacts_and_motion_are_drawn_as_they_come(page):
 
 def test_points_that_failed_are_told_at_the_end(page):
     said = []
-    page.desk.noticed.connect(said.append)
+    page.context.noticed.connect(said.append)
     page._grow((Trouble("a at 300 Hz: a contact made no progress"),))
     page._end()
     assert "no progress" in said[-1].what
@@ -127,7 +127,7 @@ def test_points_that_failed_are_told_at_the_end(page):
 
 def test_the_curves_go_to_compare(page, qtbot):
     page._grow((point("a", 100.0), point("a", 200.0)))
-    with qtbot.waitSignal(page.desk.prediction_made) as made:
+    with qtbot.waitSignal(page.context.prediction_made) as made:
         page._compare.click()
     assert {each.name for each in made.args[0]} >= {"model a, Response I, predicted"}
 

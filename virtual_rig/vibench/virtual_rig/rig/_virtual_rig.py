@@ -13,7 +13,7 @@ from vibench.acquisition.rig import Rig, VirtualConfig
 from ..daqmx import LOOPBACK, DaqServer, OnDemandPace, Pace, WallPace, catalogue_with, serve, token_for
 from ..generator import AFG1022, Panel, Quirks, ScpiSocket, Terminal
 from ..usb import UsbTmcInstrument, plug_in, unplug, usb_service
-from ..world import FULL_BAND_HZ, World, warm_up, relative_clock_ppm, virtual_section
+from ..world import FULL_BAND_HZ, World, relative_clock_ppm, virtual_section, warm_up
 from ._fault_script import DISK_FAULTS, FaultPlay, FaultScript, PlayedFault, load_fault_script
 from ._faults import RigFaults
 

@@ -17,7 +17,7 @@ from ._world import World, virtual_section
 __all__ = [
     "FULL_BAND_HZ",
     "World",
-    "warm_up",
     "relative_clock_ppm",
     "virtual_section",
+    "warm_up",
 ]

@@ -39,11 +39,11 @@ class EventSchedule:
         self._due: list[tuple[int, int, Callable[[], None]]] = []
         self._number = count()
 
-    def make(self, time_s: float, action: Callable[[], None]) -> None:
+    def add(self, time_s: float, action: Callable[[], None]) -> None:
         """Let ``action`` happen at a rig time; one that has passed is kept at the next step."""
         heapq.heappush(self._due, (self._grid.step_at(time_s), next(self._number), action))
 
-    def keep(self, step: int) -> None:
+    def run_due(self, step: int) -> None:
         """Do everything that is due at a step."""
         while self._due and self._due[0][0] <= step:
             heapq.heappop(self._due)[2]()
@@ -108,7 +108,7 @@ class World:
         self._outputs: dict[str, AnalogueOutput] = {}
         self._conversions: list[Conversion] = []
         self._history = np.zeros((len(Signal), _history_steps(grid)))
-        self._appointments = EventSchedule(grid)
+        self._schedule = EventSchedule(grid)
         self._step = 0
         self._unspent_steps = 0.0
         self._truth: list[FloatArray] | None = None
@@ -130,7 +130,7 @@ class World:
     def at(self, time_s: float, action: Callable[[], None]) -> None:
         """Let something happen at a rig time, to the step; a time that has passed is the next step."""
         with self._turn:
-            self._appointments.make(time_s, action)
+            self._schedule.add(time_s, action)
 
     def sample(self, inputs: tuple[Input, ...], sample_rate_hz: float) -> Conversion:
         """Begin a conversion now.
@@ -250,8 +250,8 @@ class World:
 
     def _compute_to(self, step: int) -> None:
         while self._step < step:
-            self._appointments.keep(self._step)
-            stop = self._appointments.stop_before(step)
+            self._schedule.run_due(self._step)
+            stop = self._schedule.stop_before(step)
             self._compute(min(stop - self._step, _STRETCH_STEPS))
 
     def _compute(self, steps: int) -> None:

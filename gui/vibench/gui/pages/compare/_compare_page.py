@@ -29,10 +29,10 @@ FILTERS = "SVG (*.svg);;PDF (*.pdf);;PNG (*.png);;Numbers as CSV (*.csv);;Report
 class ComparePage(Page):
     """Curves on the left, their picture on the right, numbers below."""
 
-    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(desk, parent)
-        self.curves = CurveList(desk.theme)
-        self.plots = CurvePlots(desk.theme)
+    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
+        super().__init__(context, parent)
+        self.curves = CurveList(context.theme)
+        self.plots = CurvePlots(context.theme)
         self.panel = AnalysisPanel()
         self.pair_box = PairBox()
         self.peaks = NumberTable("Peaks of the curves", "Peaks of the ticked curves: place, height, damping.")
@@ -48,8 +48,8 @@ class ComparePage(Page):
         self.plots.markers_moved.connect(self._read)
         self.panel.wanted.connect(self.analyse_again)
         self.panel.cancelled.connect(self.cancel)
-        desk.comparison_wanted.connect(self.add_recordings)
-        desk.prediction_made.connect(self.add_prediction)
+        context.comparison_wanted.connect(self.add_recordings)
+        context.prediction_made.connect(self.add_prediction)
 
     @property
     def is_done(self) -> bool:
@@ -79,7 +79,7 @@ class ComparePage(Page):
             self._recordings.setdefault(path, None)
             self._asked += 1
             self._jobs.append(
-                self.desk.background.ask(
+                self.context.background.ask(
                     compare_recording,
                     self._compared,
                     self._failed,
@@ -114,19 +114,21 @@ class ComparePage(Page):
         recordings = tuple(each for each in self._recordings.values() if each is not None)
         pair = None if self.pair_box.difference() is None else self.pair_box.pair()
         marked = self.plots.markers_hz
-        ask = self.desk.background.ask
+        ask = self.context.background.ask
         ask(exported_elsewhere, self._exported, self._refused, path, shown, recordings, pair, marked)
 
     def _compared(self, found: ComparedRecording) -> None:
         self._recordings[found.path] = found
-        self.curves.replace_source(found.name, found.traces)
+        self.curves.replace_source(found.name, found.curves)
         for sentence in found.failures:
-            self.desk.say(Notice(NoticeKind.WARNING, sentence, "The measured curves are shown without it."))
+            self.context.say(
+                Notice(NoticeKind.WARNING, sentence, "The measured curves are shown without it.")
+            )
         self._end_job()
 
     def _failed(self, error: BaseException) -> None:
         self._recordings = {path: each for path, each in self._recordings.items() if each is not None}
-        self.desk.say(notice_of(error))
+        self.context.say(notice_of(error))
         self._end_job()
 
     def _end_job(self) -> None:
@@ -139,14 +141,14 @@ class ComparePage(Page):
         self.panel.show_progress(self._asked - len(self._jobs), self._asked)
 
     def _exported(self, path: Path) -> None:
-        self.desk.say(Notice(NoticeKind.INFO, f"Written: {path}"))
+        self.context.say(Notice(NoticeKind.INFO, f"Written: {path}"))
 
     def _refused(self, error: BaseException) -> None:
-        self.desk.say(notice_of(error))
+        self.context.say(notice_of(error))
 
     def _draw(self) -> None:
         shown = self.curves.shown()
-        self.pair_box.offer(self.curves.traces, tuple(each for each, _ in shown))
+        self.pair_box.offer(self.curves.curves, tuple(each for each, _ in shown))
         self.plots.show_curves(shown, self.pair_box.difference())
         self.peaks.show_rows(PEAK_HEADINGS, peak_rows(tuple(each for each, _ in shown)))
         self._export.setEnabled(bool(shown))
@@ -159,7 +161,7 @@ class ComparePage(Page):
 
     def _choose_recordings(self) -> None:
         chosen, _ = QFileDialog.getOpenFileNames(
-            self, "Recordings to compare", str(self.desk.folder), "Recordings (*.h5 *.h5.part)"
+            self, "Recordings to compare", str(self.context.folder), "Recordings (*.h5 *.h5.part)"
         )
         if chosen:
             self.add_recordings(tuple(Path(each) for each in chosen))
@@ -171,7 +173,7 @@ class ComparePage(Page):
         }
 
     def _choose_export(self) -> None:
-        start = str(self.desk.folder / "comparison.svg")
+        start = str(self.context.folder / "comparison.svg")
         options = QFileDialog.Option.DontConfirmOverwrite
         chosen, kind = QFileDialog.getSaveFileName(self, "Export", start, FILTERS, options=options)
         if chosen:
@@ -180,7 +182,7 @@ class ComparePage(Page):
             self.export_to(path if path.suffix else path.with_suffix(suffix))
 
     def _build(self) -> None:
-        self._parts = SideAndPicture(self.desk, COMPARE, self._side(), self._picture())
+        self._parts = SideAndPicture(self.context, COMPARE, self._side(), self._picture())
         layout = QVBoxLayout(self)
         layout.addWidget(self._parts)
 

@@ -9,14 +9,18 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QFormLayout, QGroupBox, QLabel, QListWidget, QListWidgetItem, QWidget
 
-from vibench.analysis import AnalysisError, CurveDifference, CurveOrigin, CurveKind, Curve, curve_difference
+from vibench.analysis import AnalysisError, Curve, CurveDifference, CurveKind, CurveOrigin, curve_difference
 
 from ...forms import Choice
 from ...plots import Dash, LineStyle, curve_style
 from ...widgets import Theme, paint_hint
 
-_DASHES = {CurveOrigin.MEASURED: Dash.SOLID, CurveOrigin.SIMULATED: Dash.DASHED, CurveOrigin.PREDICTED: Dash.DASH_DOTTED}
-_SHOWN_FIRST = {CurveKind.TRANSMISSION, CurveKind.RESPONSE_I}
+_DASHES = {
+    CurveOrigin.MEASURED: Dash.SOLID,
+    CurveOrigin.SIMULATED: Dash.DASHED,
+    CurveOrigin.PREDICTED: Dash.DASH_DOTTED,
+}
+_SHOWN_FIRST = {CurveKind.TRANSMISSIBILITY, CurveKind.RESPONSE_I}
 """Of a sweep's two responses the first is shown at once: both lie on one another where nothing collides."""
 _SWATCH = (28, 12)
 
@@ -32,56 +36,56 @@ class CurveList(QListWidget):
         self.setSelectionMode(QListWidget.SelectionMode.ExtendedSelection)
         self.setWordWrap(True)
         self._theme = theme
-        self._traces: list[Curve] = []
+        self._curves: list[Curve] = []
         self.itemChanged.connect(lambda _item: self.changed.emit())
 
     @property
-    def traces(self) -> tuple[Curve, ...]:
+    def curves(self) -> tuple[Curve, ...]:
         """All of them."""
-        return tuple(self._traces)
+        return tuple(self._curves)
 
     def shown(self) -> tuple[tuple[Curve, LineStyle], ...]:
         """Those that are ticked, with the ink they are drawn in."""
         return tuple(
-            (each, self.ink(each))
-            for row, each in enumerate(self._traces)
+            (each, self.line_style(each))
+            for row, each in enumerate(self._curves)
             if self.item(row).checkState() is Qt.CheckState.Checked
         )
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Say what will be here."""
         super().paintEvent(event)
-        if not self._traces:
+        if not self._curves:
             words = "No curves yet: add recordings, or simulate and lay over."
             paint_hint(QPainter(self.viewport()), self.viewport().rect(), words, self._theme.muted)
 
-    def ink(self, curve: Curve) -> LineStyle:
+    def line_style(self, curve: Curve) -> LineStyle:
         """Colour of its source, dash of its origin."""
-        sources = list(dict.fromkeys(each.source for each in self._traces))
+        sources = list(dict.fromkeys(each.source for each in self._curves))
         return curve_style(sources.index(curve.source), _DASHES[curve.origin])
 
     def replace_source(self, source: str, curves: tuple[Curve, ...]) -> None:
         """Put curves of a source in the place of those it had."""
         ticked = {each.name for each, _ in self.shown()}
-        known = {each.name for each in self._traces}
-        others = [each for each in self._traces if not _is_of(each, source)]
-        place = next((n for n, each in enumerate(self._traces) if _is_of(each, source)), len(others))
+        known = {each.name for each in self._curves}
+        others = [each for each in self._curves if not _is_of(each, source)]
+        place = next((n for n, each in enumerate(self._curves) if _is_of(each, source)), len(others))
         place = min(place, len(others))
-        self._traces = [*others[:place], *curves, *others[place:]]
+        self._curves = [*others[:place], *curves, *others[place:]]
         self._list(lambda each: each.name in ticked or (each.name not in known and _is_first(each)))
 
     def remove_chosen(self) -> tuple[str, ...]:
         """Take the chosen curves away; gives the sources that have none left."""
-        before = {each.source for each in self._traces}
+        before = {each.source for each in self._curves}
         ticked = {each.name for each, _ in self.shown()}
         rows = {index.row() for index in self.selectedIndexes()}
-        self._traces = [each for row, each in enumerate(self._traces) if row not in rows]
+        self._curves = [each for row, each in enumerate(self._curves) if row not in rows]
         self._list(lambda each: each.name in ticked)
-        return tuple(before - {each.source for each in self._traces})
+        return tuple(before - {each.source for each in self._curves})
 
     def tick(self, name: str, state: Qt.CheckState) -> None:
         """Show or hide a curve."""
-        for row, each in enumerate(self._traces):
+        for row, each in enumerate(self._curves):
             if each.name == name:
                 self.item(row).setCheckState(state)
 
@@ -89,20 +93,20 @@ class CurveList(QListWidget):
         """Draw the swatches in other colours."""
         self._theme = theme
         blocked = self.blockSignals(True)
-        for row, each in enumerate(self._traces):
-            self.item(row).setIcon(_swatch(self.ink(each), theme))
+        for row, each in enumerate(self._curves):
+            self.item(row).setIcon(_swatch(self.line_style(each), theme))
         self.blockSignals(blocked)
 
     def _list(self, is_ticked: Callable[[Curve], bool]) -> None:
         blocked = self.blockSignals(True)
         self.clear()
-        for each in self._traces:
+        for each in self._curves:
             item = QListWidgetItem(each.name)
             item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
             wanted = is_ticked(each)
             item.setCheckState(Qt.CheckState.Checked if wanted else Qt.CheckState.Unchecked)
             item.setToolTip(each.note)
-            item.setIcon(_swatch(self.ink(each), self._theme))
+            item.setIcon(_swatch(self.line_style(each), self._theme))
             self.addItem(item)
         self.blockSignals(blocked)
         self.changed.emit()
@@ -117,13 +121,13 @@ def _is_first(each: Curve) -> bool:
     return each.response in _SHOWN_FIRST
 
 
-def _swatch(ink: LineStyle, theme: Theme) -> QPixmap:
+def _swatch(line_style: LineStyle, theme: Theme) -> QPixmap:
     ratio = QGuiApplication.primaryScreen().devicePixelRatio()
     picture = QPixmap(QSize(*_SWATCH) * ratio)
     picture.setDevicePixelRatio(ratio)
     picture.fill(QColor(theme.base))
     painter = QPainter(picture)
-    painter.setPen(QPen(QColor(ink.colour(theme)), 2, ink.dash.value))
+    painter.setPen(QPen(QColor(line_style.colour(theme)), 2, line_style.dash.value))
     painter.drawLine(1, _SWATCH[1] // 2, _SWATCH[0] - 1, _SWATCH[1] // 2)
     painter.end()
     return picture
@@ -139,7 +143,7 @@ class PairBox(QGroupBox):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Difference in dB", parent)
-        self._traces: dict[str, Curve] = {}
+        self._curves: dict[str, Curve] = {}
         self._curve, self._reference, self._said = Choice(), Choice(), QLabel("")
         form = QFormLayout(self)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
@@ -160,10 +164,10 @@ class PairBox(QGroupBox):
         """How far the two differ, or why that cannot be said."""
         return self._said.text()
 
-    def offer(self, traces: tuple[Curve, ...], shown: tuple[Curve, ...]) -> None:
+    def offer(self, curves: tuple[Curve, ...], shown: tuple[Curve, ...]) -> None:
         """Let these be chosen; what was chosen stays."""
-        self._traces = {each.name: each for each in traces}
-        names = list(self._traces)
+        self._curves = {each.name: each for each in curves}
+        names = list(self._curves)
         for place, box in enumerate((self._reference, self._curve)):
             if names == [box.itemText(number) for number in range(1, box.count())]:
                 continue
@@ -177,7 +181,7 @@ class PairBox(QGroupBox):
 
     def pair(self) -> tuple[Curve, Curve] | None:
         """Give the curve and its reference, if both are chosen and differ."""
-        curve, reference = (self._traces.get(box.currentText()) for box in (self._curve, self._reference))
+        curve, reference = (self._curves.get(box.currentText()) for box in (self._curve, self._reference))
         return None if curve is None or reference is None or curve is reference else (curve, reference)
 
     def difference(self) -> CurveDifference | None:

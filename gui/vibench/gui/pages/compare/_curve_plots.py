@@ -7,9 +7,9 @@ import pyqtgraph as pg
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 
-from vibench.analysis import CurveDifference, CurveOrigin, Curve
+from vibench.analysis import Curve, CurveDifference, CurveOrigin
 
-from ...plots import GUIDE, LOG_FREQUENCY, PlotAxis, Dash, LineStyle, Plot, Scale, curve_style
+from ...plots import GUIDE, LOG_FREQUENCY, Dash, LineStyle, Plot, PlotAxis, Scale, curve_style
 from ...widgets import Theme
 
 MAGNITUDE = PlotAxis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
@@ -53,12 +53,14 @@ class CurvePlots(QWidget):
         """Frequencies of the markers, none when they are hidden."""
         return tuple(sorted(self._marker_hz)) if self._are_marked else ()
 
-    def show_curves(self, curves: tuple[tuple[Curve, LineStyle], ...], difference: CurveDifference | None) -> None:
+    def show_curves(
+        self, curves: tuple[tuple[Curve, LineStyle], ...], difference: CurveDifference | None
+    ) -> None:
         """Draw anew."""
         for plot in (self.magnitudes, self.differences):
             plot.wipe()
-        for curve, ink in curves:
-            self._draw(curve, ink)
+        for curve, line_style in curves:
+            self._draw(curve, line_style)
         self.differences.level(GUIDE, 0.0)
         if difference is not None:
             line = self.differences.curve(curve_style(0))
@@ -88,17 +90,17 @@ class CurvePlots(QWidget):
         self.magnitudes.retheme(theme)
         self.differences.retheme(theme)
 
-    def _draw(self, curve: Curve, ink: LineStyle) -> None:
+    def _draw(self, curve: Curve, line_style: LineStyle) -> None:
         lone = curve.frequency_hz.size == 1
         if lone:
-            self.magnitudes.dots(ink, curve.name, size=_DOTS[curve.origin]).setData(
+            self.magnitudes.dots(line_style, curve.name, size=_DOTS[curve.origin]).setData(
                 curve.frequency_hz, curve.magnitude
             )
             return
         if np.isfinite(curve.relative_sd).any():
-            shade = LineStyle(ink.colour, Dash.SOLID, _BAND)
+            shade = LineStyle(line_style.colour, Dash.SOLID, _BAND)
             self.magnitudes.band(shade).set_data(*curve.band(_BAND_COLUMNS))
-        line = self.magnitudes.curve(ink, curve.name)
+        line = self.magnitudes.curve(line_style, curve.name)
         line.setData(curve.frequency_hz, curve.magnitude, connect="finite")
 
     def _add_markers(self) -> None:

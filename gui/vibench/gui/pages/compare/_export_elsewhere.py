@@ -7,7 +7,7 @@ from vibench.analysis import ComparedRecording, Curve
 
 def exported_elsewhere(
     path: Path,
-    traces: tuple[Curve, ...],
+    curves: tuple[Curve, ...],
     recordings: tuple[ComparedRecording, ...],
     pair: tuple[Curve, Curve] | None,
     markers_hz: tuple[float, ...],
@@ -15,4 +15,4 @@ def exported_elsewhere(
     """Write what the path's ending names, and give the path written, as `write_comparison` does."""
     from vibench.analysis.report import write_comparison  # noqa: PLC0415 - loading it takes most of a second
 
-    return write_comparison(path, traces, recordings, pair, markers_hz)
+    return write_comparison(path, curves, recordings, pair, markers_hz)

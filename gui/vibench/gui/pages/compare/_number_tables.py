@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem, QWidget
 
-from vibench.analysis import Curve, readings, curve_peaks
+from vibench.analysis import Curve, curve_peaks, readings
 
 from ...widgets import paint_hint
 

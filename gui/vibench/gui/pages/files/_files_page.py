@@ -29,11 +29,11 @@ from ._spectrogram_view import Pictures
 class FilesPage(Page):
     """A browser above, the chosen recording below."""
 
-    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(desk, parent)
-        self.table = RecordingTable(desk.theme)
-        self.pictures = Pictures(desk.theme, desk.background)
-        self.lanes = self.pictures.lanes
+    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
+        super().__init__(context, parent)
+        self.table = RecordingTable(context.theme)
+        self.pictures = Pictures(context.theme, context.background)
+        self.time_histories = self.pictures.time_histories
         self.campaigns = CampaignChoice()
         self.campaigns.chosen.connect(self.table.show_only)
         self._opened: Recording | None = None
@@ -42,8 +42,8 @@ class FilesPage(Page):
         self._wanted: Path | None = None
         self._build()
         self.table.selectionModel().selectionChanged.connect(lambda *_: self._open_chosen())
-        desk.recording_wanted.connect(self.open_path)
-        desk.recording_made.connect(lambda _path: self.list_folder())
+        context.recording_wanted.connect(self.open_path)
+        context.recording_made.connect(lambda _path: self.list_folder())
 
     @property
     def is_done(self) -> bool:
@@ -57,7 +57,7 @@ class FilesPage(Page):
 
     def left(self) -> None:
         """Keep how the page is divided."""
-        self.desk.settings.keep_state(Remembered.SPLITTERS, self._splitter.saveState(), FILES)
+        self.context.settings.keep_state(Remembered.SPLITTERS, self._splitter.saveState(), FILES)
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
@@ -66,17 +66,17 @@ class FilesPage(Page):
 
     def list_folder(self) -> None:
         """Look at the files of the folder, elsewhere."""
-        folder = self.desk.folder
+        folder = self.context.folder
         self._folder_line.setText(str(folder))
         if self._listing is not None:
             self._listing.drop()
-        self._listing = self.desk.background.ask(listed, self._listed, self._failed, folder)
+        self._listing = self.context.background.ask(listed, self._listed, self._failed, folder)
 
     def open_path(self, path: Path) -> None:
         """Show a recording, whatever folder it lies in."""
-        self.desk.page_wanted.emit(FILES)
+        self.context.page_wanted.emit(FILES)
         self._wanted = path
-        if path.parent != self.desk.folder and self.desk.folder not in path.parents:
+        if path.parent != self.context.folder and self.context.folder not in path.parents:
             self._go_to(path.parent)
         self.table.choose(path)
         self._open(path)
@@ -92,7 +92,7 @@ class FilesPage(Page):
         self._count.setText(count)
         missing = self.table.recordings.missing_pictures()
         if missing:
-            self.desk.background.ask(thumbnails, self._pictured, self._failed, missing)
+            self.context.background.ask(thumbnails, self._pictured, self._failed, missing)
         if chosen:
             # What grew when it was chosen may have got its final name since.
             self.table.choose(*map(name_now, chosen))
@@ -103,7 +103,7 @@ class FilesPage(Page):
         self.table.recordings.show_thumbnails(found)
 
     def _failed(self, error: BaseException) -> None:
-        self.desk.say(notice_of(error))
+        self.context.say(notice_of(error))
 
     def _open_chosen(self) -> None:
         paths = self.table.chosen_paths()
@@ -122,7 +122,7 @@ class FilesPage(Page):
         except RecordingError as error:
             self._title.setText(path.name)
             self._facts.setText(str(error))
-            self.desk.say(notice_of(error))
+            self.context.say(notice_of(error))
             return
         self._opened = recording
         self._title.setText(recording.path.name)
@@ -136,7 +136,7 @@ class FilesPage(Page):
             self._take_next(recording, {})
         else:
             self._facts.setText("Reading all samples, for this file keeps no overview…")
-            self._making = self.desk.background.ask(made_levels, self._show, self._failed, path)
+            self._making = self.context.background.ask(made_levels, self._show, self._failed, path)
 
     def _take_next(self, recording: Recording, levels: Levels) -> None:
         """Take one channel's overview at a time: all of a long recording's would hold the window up."""
@@ -144,7 +144,7 @@ class FilesPage(Page):
             return
         role = recording.roles[len(levels)]
         levels[role] = kept_levels(recording, role)
-        self.lanes.prepare(recording.channel(role))
+        self.time_histories.prepare(recording.channel(role))
         if len(levels) == len(recording.roles):
             self._show(levels)
         else:
@@ -167,28 +167,28 @@ class FilesPage(Page):
     def _say_view(self) -> None:
         if self._opened is None:
             return
-        low_s, high_s = self.lanes.view_s
+        low_s, high_s = self.time_histories.view_s
         text = f"In sight: {low_s:.6g} to {high_s:.6g} s"
         if self._markers.isChecked():
-            early_s, late_s = self.lanes.markers_s
+            early_s, late_s = self.time_histories.markers_s
             between_s = late_s - early_s
             rate = f" = 1 / {1 / between_s:.5g} Hz" if between_s > 0 else ""
             text += f"      Markers: {early_s:.6g} s, {late_s:.6g} s, {between_s:.6g} s apart{rate}"
         self._view.setText(text)
 
     def _choose_folder(self) -> None:
-        chosen = QFileDialog.getExistingDirectory(self, "Folder with recordings", str(self.desk.folder))
+        chosen = QFileDialog.getExistingDirectory(self, "Folder with recordings", str(self.context.folder))
         if chosen:
             self._go_to(Path(chosen))
 
     def _typed_folder(self) -> None:
         folder = Path(self._folder_line.text()).expanduser()
-        if folder == self.desk.folder:
+        if folder == self.context.folder:
             return
         if folder.is_dir():
             self._go_to(folder)
         else:
-            self.desk.say(
+            self.context.say(
                 Notice(
                     NoticeKind.WARNING,
                     f"{folder} is no folder.",
@@ -196,17 +196,17 @@ class FilesPage(Page):
                     "Type another one, or choose it.",
                 )
             )
-            self._folder_line.setText(str(self.desk.folder))
+            self._folder_line.setText(str(self.context.folder))
 
     def _go_to(self, folder: Path) -> None:
-        self.desk.choose_folder(folder)
+        self.context.choose_folder(folder)
         self.list_folder()
 
     def _hand_to_compare(self) -> None:
         paths = self.table.chosen_paths()
         if paths:
-            self.desk.comparison_wanted.emit(paths)
-            self.desk.page_wanted.emit(COMPARE)
+            self.context.comparison_wanted.emit(paths)
+            self.context.page_wanted.emit(COMPARE)
 
     def _build(self) -> None:
         self._splitter = QSplitter(Qt.Orientation.Vertical)
@@ -218,18 +218,18 @@ class FilesPage(Page):
         self._splitter.setChildrenCollapsible(False)
         layout = QVBoxLayout(self)
         layout.addWidget(self._splitter)
-        kept = self.desk.settings.state(Remembered.SPLITTERS, FILES)
+        kept = self.context.settings.state(Remembered.SPLITTERS, FILES)
         if not kept.isEmpty():
             self._splitter.restoreState(kept)
-        self.lanes.range_changed.connect(self._say_view)
-        self.lanes.markers_moved.connect(self._say_view)
+        self.time_histories.range_changed.connect(self._say_view)
+        self.time_histories.markers_moved.connect(self._say_view)
 
     def _browser(self) -> QWidget:
         browser = QWidget()
         browser.setAccessibleName("Browser")
         bar = QHBoxLayout()
         label = QLabel("F&older")
-        self._folder_line = LineField(str(self.desk.folder))
+        self._folder_line = LineField(str(self.context.folder))
         self._folder_line.setAccessibleName("Folder of the recordings")
         self._folder_line.editingFinished.connect(self._typed_folder)
         label.setBuddy(self._folder_line)
@@ -272,12 +272,14 @@ class FilesPage(Page):
         self._view = QLabel("")
         self._markers = push_button("Mar&kers", "Show two markers to measure between", lambda: None)
         self._markers.setCheckable(True)
-        self._markers.toggled.connect(self.lanes.show_markers)
+        self._markers.toggled.connect(self.time_histories.show_markers)
         bar.addWidget(self._view, 1)
         bar.addWidget(self._markers)
-        bar.addWidget(push_button("Show &all", "Show the whole recording (Home)", self.lanes.show_all))
-        bar.addWidget(push_button("Zoom &in", "Show less, closer (+)", lambda: self.lanes.zoom(0.5)))
-        bar.addWidget(push_button("Zoom o&ut", "Show more (-)", lambda: self.lanes.zoom(2.0)))
+        bar.addWidget(
+            push_button("Show &all", "Show the whole recording (Home)", self.time_histories.show_all)
+        )
+        bar.addWidget(push_button("Zoom &in", "Show less, closer (+)", lambda: self.time_histories.zoom(0.5)))
+        bar.addWidget(push_button("Zoom o&ut", "Show more (-)", lambda: self.time_histories.zoom(2.0)))
         layout = QVBoxLayout(viewer)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._title)

@@ -1,4 +1,4 @@
-"""A recording as lanes, one a channel: any zoom, drawn from what is in sight."""
+"""A recording as time histories, one a channel: any zoom, drawn from what is in sight."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 from vibench.acquisition.recording import ChannelHeader, Recording
 from vibench.analysis.live import RecordingOverview, zigzag
 
-from ...plots import LIMIT, PlotAxis, Dash, LineStyle, Plot, curve_style
+from ...plots import LIMIT, Dash, LineStyle, Plot, PlotAxis, curve_style
 from ...widgets import Theme
 from ._file_words import role_text, unit_text
 
@@ -49,7 +49,7 @@ class RecordingTimeHistories(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._theme = theme
         self._overview: RecordingOverview | None = None
-        self._lanes: list[_TimeHistory] = []
+        self._histories: list[_TimeHistory] = []
         self._kept: dict[tuple[str, str], _TimeHistory] = {}
         self._marker_s = [0.0, 0.0]
         self._are_marked = False
@@ -62,20 +62,20 @@ class RecordingTimeHistories(QWidget):
 
     def prepare(self, channel: ChannelHeader) -> None:
         """Have a lane for a channel ready: to make all lanes at once would hold the window up."""
-        self._lane_of(channel)
+        self._history_of(channel)
 
     def show_recording(self, overview: RecordingOverview | None) -> None:
         """Show another recording whole, or none."""
-        for lane in self._lanes:
-            self._layout.removeWidget(lane.plot)
-            lane.plot.hide()
-        self._lanes = []
+        for history in self._histories:
+            self._layout.removeWidget(history.plot)
+            history.plot.hide()
+        self._histories = []
         self._overview = overview
         if overview is None or overview.recording.samples == 0:
             return
-        self._lanes = [self._lane_of(channel) for channel in overview.recording.channels]
-        for number, lane in enumerate(self._lanes):
-            self._begin(lane, number, overview.recording)
+        self._histories = [self._history_of(channel) for channel in overview.recording.channels]
+        for number, history in enumerate(self._histories):
+            self._begin(history, number, overview.recording)
         self._forget_others()
         self._mark_segments(overview)
         self._mark_overloads(overview)
@@ -89,9 +89,9 @@ class RecordingTimeHistories(QWidget):
     @property
     def view_s(self) -> tuple[float, float]:
         """What is in sight, in seconds since the first sample."""
-        if not self._lanes or self._overview is None:
+        if not self._histories or self._overview is None:
             return (0.0, 0.0)
-        low, high = self._lanes[0].plot.getViewBox().viewRange()[0]
+        low, high = self._histories[0].plot.getViewBox().viewRange()[0]
         return (max(0.0, float(low)), min(float(high), self._overview.recording.duration_s))
 
     @property
@@ -103,7 +103,7 @@ class RecordingTimeHistories(QWidget):
     @property
     def plots(self) -> tuple[Plot, ...]:
         """One for each channel."""
-        return tuple(lane.plot for lane in self._lanes)
+        return tuple(history.plot for history in self._histories)
 
     def show_all(self) -> None:
         """Show the whole recording."""
@@ -112,8 +112,8 @@ class RecordingTimeHistories(QWidget):
 
     def show_range(self, low_s: float, high_s: float) -> None:
         """Show a stretch."""
-        if self._lanes:
-            self._lanes[0].plot.setXRange(low_s, high_s, padding=0.0)
+        if self._histories:
+            self._histories[0].plot.setXRange(low_s, high_s, padding=0.0)
 
     def zoom(self, factor: float) -> None:
         """Show ``factor`` times as much, around the middle."""
@@ -134,8 +134,8 @@ class RecordingTimeHistories(QWidget):
         low_s, high_s = self.view_s
         if are_shown and not all(low_s <= each <= high_s for each in self._marker_s) and high_s > low_s:
             self._marker_s = [low_s + (high_s - low_s) / 3, low_s + 2 * (high_s - low_s) / 3]
-        for lane in self._lanes:
-            for marker, moment_s in zip(lane.markers, self._marker_s, strict=True):
+        for history in self._histories:
+            for marker, moment_s in zip(history.markers, self._marker_s, strict=True):
                 marker.setVisible(are_shown)
                 marker.setValue(moment_s)
         self.markers_moved.emit()
@@ -143,8 +143,8 @@ class RecordingTimeHistories(QWidget):
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
         self._theme = theme
-        for lane in self._kept.values():
-            lane.plot.retheme(theme)
+        for history in self._kept.values():
+            history.plot.retheme(theme)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Draw for the new width."""
@@ -170,12 +170,14 @@ class RecordingTimeHistories(QWidget):
                 return
         event.accept()
 
-    def _lane_of(self, channel: ChannelHeader) -> _TimeHistory:
+    def _history_of(self, channel: ChannelHeader) -> _TimeHistory:
         """Give the lane of a channel, as it was left by another recording, or a new one."""
         kind = (channel.role, channel.unit)
         if kind not in self._kept:
             unit = unit_text(channel.unit)
-            plot = Plot(f"{role_text(channel.role)} over time", PlotAxis("Time", "s"), PlotAxis(unit), self._theme)
+            plot = Plot(
+                f"{role_text(channel.role)} over time", PlotAxis("Time", "s"), PlotAxis(unit), self._theme
+            )
             plot.setMouseEnabled(x=True, y=False)
             plot.setFocusProxy(self)
             left = _LEFT_EM * self.fontMetrics().height()
@@ -189,12 +191,12 @@ class RecordingTimeHistories(QWidget):
             self._kept[kind] = _TimeHistory(channel.role, plot, plot.curve(curve_style(0)))
         return self._kept[kind]
 
-    def _begin(self, lane: _TimeHistory, number: int, recording: Recording) -> None:
+    def _begin(self, history: _TimeHistory, number: int, recording: Recording) -> None:
         """Make a lane ready for a recording: its place, its limits, nothing drawn yet."""
-        plot, is_last = lane.plot, number == len(recording.channels) - 1
+        plot, is_last = history.plot, number == len(recording.channels) - 1
         plot.wipe()
-        lane.curve = plot.curve(curve_style(number))
-        lane.markers = self._new_markers(plot)
+        history.curve = plot.curve(curve_style(number))
+        history.markers = self._new_markers(plot)
         em = self.fontMetrics().height()
         plot.setMinimumHeight(_LEAST_EM * em + (_TIME_AXIS_EM * em if is_last else 0))
         plot.across.setStyle(showValues=is_last)
@@ -205,16 +207,16 @@ class RecordingTimeHistories(QWidget):
         box.setLimits(xMin=0.0, xMax=recording.duration_s, minXRange=least_s)
         box.enableAutoRange(x=False, y=False)
         if number:
-            box.setXLink(self._lanes[0].plot.getViewBox())
+            box.setXLink(self._histories[0].plot.getViewBox())
         self._layout.addWidget(plot, 1)
         plot.show()
 
     def _forget_others(self) -> None:
         """Let lanes go that neither this recording nor, perhaps, the next one needs."""
-        for kind, lane in list(self._kept.items()):
-            if len(self._kept) > _MOST_KEPT and lane not in self._lanes:
+        for kind, history in list(self._kept.items()):
+            if len(self._kept) > _MOST_KEPT and history not in self._histories:
                 del self._kept[kind]
-                lane.plot.deleteLater()
+                history.plot.deleteLater()
 
     def _new_markers(self, plot: Plot) -> tuple[pg.InfiniteLine, ...]:
         made = []
@@ -230,63 +232,63 @@ class RecordingTimeHistories(QWidget):
         if not self._are_marked or self._marker_s[number] == moment_s:
             return
         self._marker_s[number] = moment_s
-        for lane in self._lanes:
-            lane.markers[number].setValue(moment_s)
+        for history in self._histories:
+            history.markers[number].setValue(moment_s)
         self.markers_moved.emit()
 
     def _mark_segments(self, overview: RecordingOverview) -> None:
         """Draw a line where each segment begins; long ones are named in the first lane."""
         recording = overview.recording
         begun_s = [each.first_sample / recording.sample_rate_hz for each in recording.segments]
-        for lane in self._lanes:
-            lane.plot.rules(SEGMENT).show_at(begun_s)
+        for history in self._histories:
+            history.plot.rules(SEGMENT).show_at(begun_s)
         for segment, at_s in zip(recording.segments, begun_s, strict=True):
             if segment.stop - segment.start > _NAMED_SHARE * recording.samples:
                 label = segment.label.replace("_", " ")
-                self._lanes[0].plot.upright(SEGMENT, at_s, label, _LABEL_AT)
+                self._histories[0].plot.upright(SEGMENT, at_s, label, _LABEL_AT)
 
     def _mark_overloads(self, overview: RecordingOverview) -> None:
         rate_hz = overview.recording.sample_rate_hz
-        for lane in self._lanes:
-            lane.plot.stripes(LIMIT).show_bands(
+        for history in self._histories:
+            history.plot.stripes(LIMIT).show_bands(
                 (each.first_sample / rate_hz, (each.last_sample + 1) / rate_hz)
                 for each in overview.recording.overloads
-                if each.channel == lane.role
+                if each.channel == history.role
             )
 
     def _share_height(self) -> None:
         """Give all lanes the same height; the last has the time axis on top of it."""
         axis = _TIME_AXIS_EM * self.fontMetrics().height()
-        lane = max(1, (self.height() - axis) // max(1, len(self._lanes)))
-        for place in range(len(self._lanes)):
-            self._layout.setStretch(place, lane + (axis if place == len(self._lanes) - 1 else 0))
+        history = max(1, (self.height() - axis) // max(1, len(self._histories)))
+        for place in range(len(self._histories)):
+            self._layout.setStretch(place, history + (axis if place == len(self._histories) - 1 else 0))
         # At once: a layout that comes after the first picture has everything painted twice.
         self._layout.activate()
 
     def _ranged(self, view: pg.ViewBox, _range: object) -> None:
-        if not self._lanes or view is not self._lanes[0].plot.getViewBox():
+        if not self._histories or view is not self._histories[0].plot.getViewBox():
             return
         self._later.start()
         self.range_changed.emit()
 
     def _draw(self) -> None:
-        if self._overview is None or not self._lanes:
+        if self._overview is None or not self._histories:
             return
         rate_hz = self._overview.recording.sample_rate_hz
         low_s, high_s = self.view_s
         start, stop = int(low_s * rate_hz), int(np.ceil(high_s * rate_hz)) + 1
         # A few more columns than pixels: with fewer, a pixel between two columns would stay empty.
-        columns = max(100, int(1.02 * self._lanes[0].plot.lines_across) + 2)
-        picture = self._overview.picture([lane.role for lane in self._lanes], start, stop, columns)
-        for row, lane in enumerate(self._lanes):
+        columns = max(100, int(1.02 * self._histories[0].plot.lines_across) + 2)
+        picture = self._overview.picture([history.role for history in self._histories], start, stop, columns)
+        for row, history in enumerate(self._histories):
             low, high = picture.low[row], picture.high[row]
             if picture.samples_per_column > 1:
-                lane.curve.setData(np.repeat(picture.time_s, 2), zigzag(low, high), connect="finite")
+                history.curve.setData(np.repeat(picture.time_s, 2), zigzag(low, high), connect="finite")
             else:
-                lane.curve.setData(picture.time_s, low, connect="finite")
+                history.curve.setData(picture.time_s, low, connect="finite")
             known = low[np.isfinite(low)], high[np.isfinite(high)]
             if known[0].size:
                 bottom, top = float(known[0].min()), float(known[1].max())
                 height = (top - bottom) or 1e-9
                 # Room above for the lane's name, which must not lie on the signal.
-                lane.plot.setYRange(bottom - 0.06 * height, top + 0.3 * height, padding=0.0)
+                history.plot.setYRange(bottom - 0.06 * height, top + 0.3 * height, padding=0.0)

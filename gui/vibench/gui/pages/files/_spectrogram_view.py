@@ -57,7 +57,9 @@ class SpectrogramView(QWidget):
         self._view_s = (0.0, 0.0)
         self._recording: Recording | None = None
         self._asked: SpectrogramRequest | None = None
-        self._latest = LatestRequest(background, recording_spectrogram, self._show, self._fail, _WAIT_MS, self)
+        self._latest_request = LatestRequest(
+            background, recording_spectrogram, self._show, self._fail, _WAIT_MS, self
+        )
         self._plots = {
             RowSpacing.LINEAR: Plot("Spectrogram", TIME, FREQUENCY, theme),
             RowSpacing.LOGARITHMIC: Plot("Spectrogram, logarithmic", TIME, LOG_FREQUENCY, theme),
@@ -70,7 +72,7 @@ class SpectrogramView(QWidget):
     @property
     def is_busy(self) -> bool:
         """Whether a picture is still to come."""
-        return self._latest.is_busy
+        return self._latest_request.is_busy
 
     @property
     def plot(self) -> Plot:
@@ -85,7 +87,7 @@ class SpectrogramView(QWidget):
     def show_recording(self, recording: Recording | None) -> None:
         """Picture another recording from now on, or none."""
         self._recording = recording
-        self._latest.drop()
+        self._latest_request.drop()
         for image in self._images.values():
             image.clear("Choose a recording in the list above.")
         roles = () if recording is None else recording.roles
@@ -135,7 +137,7 @@ class SpectrogramView(QWidget):
             spacing=self._spacing,
         )
         self.said.setText("working it out…")
-        self._latest.ask(asked)
+        self._latest_request.ask(asked)
 
     def _show(self, found: DensityPicture) -> None:
         self._images[found.request.spacing].show_picture(found)
@@ -219,19 +221,21 @@ class Pictures(QTabWidget):
         super().__init__(parent)
         self.setAccessibleName("Pictures of the recording")
         self.setDocumentMode(True)
-        self.lanes = RecordingTimeHistories(theme)
+        self.time_histories = RecordingTimeHistories(theme)
         self.spectrogram = SpectrogramView(theme, background)
-        self.addTab(self.lanes, "Tim&e")
+        self.addTab(self.time_histories, "Tim&e")
         self.addTab(self.spectrogram, "&Spectrogram")
-        self.lanes.range_changed.connect(lambda: self.spectrogram.show_view(*self.lanes.view_s))
+        self.time_histories.range_changed.connect(
+            lambda: self.spectrogram.show_view(*self.time_histories.view_s)
+        )
 
     def show_recording(self, overview: RecordingOverview | None) -> None:
         """Show another recording, or none."""
         self.spectrogram.show_recording(None if overview is None else overview.recording)
-        self.lanes.show_recording(overview)
-        self.spectrogram.show_view(*self.lanes.view_s)
+        self.time_histories.show_recording(overview)
+        self.spectrogram.show_view(*self.time_histories.view_s)
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
-        self.lanes.retheme(theme)
+        self.time_histories.retheme(theme)
         self.spectrogram.retheme(theme)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pydantic import BaseModel
 
 from vibench.acquisition import validated
-from vibench.acquisition.plan import SweepAxis, Campaign, Measurement, Range
+from vibench.acquisition.plan import Campaign, Measurement, Range, SweepAxis
 
 USUAL_NAME = "queue"
 
@@ -19,7 +19,9 @@ def with_measurement(campaign: Campaign | None, measurement: Measurement) -> Cam
     return _changed(campaign, measurements=[*_dumped(campaign.measurements), _dump(named)])
 
 
-def with_sweep(campaign: Campaign | None, measurement: Measurement, axis: SweepAxis, values: Range) -> Campaign:
+def with_sweep(
+    campaign: Campaign | None, measurement: Measurement, axis: SweepAxis, values: Range
+) -> Campaign:
     """Add a sweep of a test along an axis; raises ConfigurationError when a point of it is not allowed."""
     taken = set() if campaign is None else {sweep.name.lower() for sweep in campaign.sweeps}
     template = _dump(measurement)

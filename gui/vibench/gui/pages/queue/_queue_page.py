@@ -26,14 +26,14 @@ from vibench.acquisition import (
 )
 from vibench.acquisition.campaign import ExistingRecordings
 from vibench.acquisition.engine import EngineState, EngineStatus
-from vibench.acquisition.plan import SweepAxis, Campaign, Range
+from vibench.acquisition.plan import Campaign, Range, SweepAxis
 
 from ...background import LatestRequest
 from ...forms import Choice
-from ...page import AppContext, UserActions, Page, Remembered
+from ...page import AppContext, Page, Remembered, UserActions
 from ...widgets import Notice, NoticeKind, ReadTable, clock, notice_of
 from ._draft import moved_up, with_measurement, with_sweep, without
-from ._row_words import CampaignPreview, preview_campaign, point_rows
+from ._row_words import CampaignPreview, point_rows, preview_campaign
 from ._sweep_form import SweepForm
 
 LOOK_MS = 50
@@ -43,9 +43,9 @@ LOOK_MS = 50
 class QueuePage(Page):
     """Edits the campaign that is armed here, and shows the one that runs."""
 
-    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(desk, parent)
-        self._orders = UserActions(desk, self)
+    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
+        super().__init__(context, parent)
+        self._actions = UserActions(context, self)
         self.choice = Choice()
         self.entries = ReadTable(
             "Entries of the campaign",
@@ -73,7 +73,7 @@ class QueuePage(Page):
         )
         self.hold_button = self._button("Pause", "Stay where the run is; the drive stays on", self._hold)
         self._looking = LatestRequest(
-            desk.background, preview_campaign, self._looked, self._look_failed, LOOK_MS, self
+            context.background, preview_campaign, self._looked, self._look_failed, LOOK_MS, self
         )
         self._lay_out()
         self._connect()
@@ -82,15 +82,15 @@ class QueuePage(Page):
     @property
     def is_done(self) -> bool:
         """Every recording of the campaign is there."""
-        status = self.desk.bridge.status
+        status = self.context.bridge.status
         rows = () if status is None else status.rows
         return len(rows) > 1 and all(row.state in ("recorded", "kept") for row in rows)
 
     def refresh(self) -> None:
         """Show how the recordings stand."""
-        status = self.desk.bridge.status
-        state = self.desk.bridge.state
-        campaign = self.desk.intent.campaign
+        status = self.context.bridge.status
+        state = self.context.bridge.state
+        campaign = self.context.selection.campaign
         for button in (self.arm_button, self.resume_button):
             button.setEnabled(state is EngineState.READY and campaign is not None)
         self.hold_button.setEnabled(state in (EngineState.RUNNING, EngineState.HELD))
@@ -100,15 +100,15 @@ class QueuePage(Page):
 
     def left(self) -> None:
         """Keep the campaign for next time."""
-        campaign = self.desk.intent.campaign
-        self.desk.settings.keep_text(Remembered.CAMPAIGN, "" if campaign is None else toml_text(campaign))
+        campaign = self.context.selection.campaign
+        self.context.settings.keep_text(Remembered.CAMPAIGN, "" if campaign is None else toml_text(campaign))
 
     def open_file(self, path: Path) -> None:
         """Take over the campaign of a file."""
         try:
-            self.desk.intent.choose_campaign(load_campaign(path))
+            self.context.selection.choose_campaign(load_campaign(path))
         except ConfigurationError as error:
-            self.desk.say(notice_of(error))
+            self.context.say(notice_of(error))
 
     def _show_progress(self, status: EngineStatus | None) -> None:
         run = None if status is None else status.run
@@ -122,7 +122,7 @@ class QueuePage(Page):
         self.progress.setFormat(f"{run.number} of {run.count}, {clock(left_s)} left, ends about {end:%H:%M}")
 
     def _show_campaign(self) -> None:
-        campaign, rig = self.desk.intent.campaign, self.desk.intent.rig
+        campaign, rig = self.context.selection.campaign, self.context.selection.rig
         if campaign is None:
             self._looking.drop()
             self.entries.show_rows(())
@@ -132,7 +132,7 @@ class QueuePage(Page):
         self._looking.ask((campaign, rig))
 
     def _looked(self, seen: CampaignPreview) -> None:
-        campaign = self.desk.intent.campaign
+        campaign = self.context.selection.campaign
         if campaign is None:
             return
         row = self.entries.currentRow()
@@ -142,92 +142,94 @@ class QueuePage(Page):
         end = datetime.now().astimezone() + timedelta(seconds=seen.duration_s)
         self.summary.setText(
             f"{campaign.name}: {len(seen.names)} recordings   ·   takes {clock(seen.duration_s)}   ·   "
-            f"started now, it ends about {end:%H:%M}{size}   ·   in {self.desk.folder / campaign.name}"
+            f"started now, it ends about {end:%H:%M}{size}   ·   in {self.context.folder / campaign.name}"
         )
 
     def _look_failed(self, error: BaseException) -> None:
-        self.desk.say(notice_of(error))
+        self.context.say(notice_of(error))
 
     def _add_test(self) -> None:
-        measurement = self.desk.intent.measurement
+        measurement = self.context.selection.measurement
         if measurement is None:
             self._warn("The test is not complete.", "Correct what is marked on the Test page (Ctrl+2).")
         else:
-            self.desk.intent.choose_campaign(with_measurement(self.desk.intent.campaign, measurement))
+            self.context.selection.choose_campaign(
+                with_measurement(self.context.selection.campaign, measurement)
+            )
 
     def _add_sweep(self, axis: SweepAxis, values: Range) -> None:
-        measurement = self.desk.intent.measurement
+        measurement = self.context.selection.measurement
         if measurement is None:
             self._warn("The test is not complete.", "Correct what is marked on the Test page (Ctrl+2).")
             return
         try:
-            campaign = with_sweep(self.desk.intent.campaign, measurement, axis, values)
+            campaign = with_sweep(self.context.selection.campaign, measurement, axis, values)
         except ConfigurationError as error:
-            self.desk.say(notice_of(error))
+            self.context.say(notice_of(error))
         else:
-            self.desk.intent.choose_campaign(campaign)
+            self.context.selection.choose_campaign(campaign)
 
     def _remove(self) -> None:
-        campaign, number = self.desk.intent.campaign, self.entries.currentRow()
+        campaign, number = self.context.selection.campaign, self.entries.currentRow()
         if campaign is not None and number >= 0:
-            self.desk.intent.choose_campaign(without(campaign, number))
+            self.context.selection.choose_campaign(without(campaign, number))
 
     def _move_up(self) -> None:
-        campaign, number = self.desk.intent.campaign, self.entries.currentRow()
+        campaign, number = self.context.selection.campaign, self.entries.currentRow()
         if campaign is not None and number > 0:
-            self.desk.intent.choose_campaign(moved_up(campaign, number))
+            self.context.selection.choose_campaign(moved_up(campaign, number))
             self.entries.setCurrentCell(number - 1, 0)
 
     def _arm(self) -> None:
-        self._orders.arm_campaign(ExistingRecordings.REFUSE)
+        self._actions.arm_campaign(ExistingRecordings.REFUSE)
 
     def _arm_missing(self) -> None:
-        self._orders.arm_campaign(ExistingRecordings.RESUME)
+        self._actions.arm_campaign(ExistingRecordings.RESUME)
 
     def _hold(self) -> None:
-        self._orders.hold_or_resume()
+        self._actions.hold_or_resume()
 
     def _open(self) -> None:
         given, _ = QFileDialog.getOpenFileName(
-            self, "Open a campaign", str(self.desk.folder), "Campaigns (*.toml)"
+            self, "Open a campaign", str(self.context.folder), "Campaigns (*.toml)"
         )
         if given:
             self.open_file(Path(given))
 
     def _save(self) -> None:
-        campaign = self.desk.intent.campaign
+        campaign = self.context.selection.campaign
         if campaign is None:
             self._warn("There is no campaign to save.", "Add a test first.")
             return
-        wish = str(self.desk.folder / f"{campaign.name}.toml")
+        wish = str(self.context.folder / f"{campaign.name}.toml")
         given, _ = QFileDialog.getSaveFileName(self, "Save the campaign", wish, "Campaigns (*.toml)")
         if given:
             try:
                 save_toml(campaign, Path(given))
             except ConfigurationError as error:
-                self.desk.say(notice_of(error))
+                self.context.say(notice_of(error))
 
     def _take(self, row: int) -> None:
         if row > 0:
             self.open_file(all_shipped("campaigns")[row - 1])
 
     def _restore(self) -> None:
-        kept = self.desk.settings.text(Remembered.CAMPAIGN)
+        kept = self.context.settings.text(Remembered.CAMPAIGN)
         if kept:
             try:
                 campaign = validated(tomllib.loads(kept), Campaign, "the last campaign")
             except (ConfigurationError, tomllib.TOMLDecodeError) as error:
-                self.desk.say(notice_of(error, "It was left out; open or make another one."))
+                self.context.say(notice_of(error, "It was left out; open or make another one."))
             else:
-                self.desk.intent.choose_campaign(campaign)
+                self.context.selection.choose_campaign(campaign)
         self._show_campaign()
 
     def _warn(self, what: str, next_step: str) -> None:
-        self.desk.say(Notice(NoticeKind.WARNING, what, next_step=next_step))
+        self.context.say(Notice(NoticeKind.WARNING, what, next_step=next_step))
 
     def _connect(self) -> None:
-        self.desk.intent.campaign_changed.connect(self._show_campaign)
-        self.desk.intent.rig_changed.connect(self._show_campaign)
+        self.context.selection.campaign_changed.connect(self._show_campaign)
+        self.context.selection.rig_changed.connect(self._show_campaign)
         self.choice.activated.connect(self._take)
         self.sweep.wanted.connect(self._add_sweep)
         self.sweep.refused.connect(lambda text: self._warn(text, "Correct the sweep."))
@@ -264,10 +266,10 @@ class QueuePage(Page):
         left.addWidget(self.sweep)
         right = QVBoxLayout()
         right.addWidget(self.summary)
-        orders = QHBoxLayout()
+        actions = QHBoxLayout()
         for button in (self.arm_button, self.resume_button, self.hold_button):
-            orders.addWidget(button)
-        right.addLayout(orders)
+            actions.addWidget(button)
+        right.addLayout(actions)
         right.addWidget(self.progress)
         right.addWidget(_boxed("Recordings", self.rows), 1)
         layout = QHBoxLayout(self)

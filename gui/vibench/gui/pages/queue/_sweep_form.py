@@ -4,11 +4,14 @@ from pydantic import ValidationError
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFormLayout, QGroupBox, QLabel, QPushButton, QWidget
 
-from vibench.acquisition.plan import SweepAxis, Range, RangeSpacing
+from vibench.acquisition.plan import Range, RangeSpacing, SweepAxis
 
 from ...forms import Choice, QuantityEdit
 
-_AXES = {SweepAxis.LEVEL: ("level", "Vpp", 0.05, 10.0), SweepAxis.FREQUENCY: ("frequency", "Hz", 150.0, 350.0)}
+_AXES = {
+    SweepAxis.LEVEL: ("level", "Vpp", 0.05, 10.0),
+    SweepAxis.FREQUENCY: ("frequency", "Hz", 150.0, 350.0),
+}
 
 
 class SweepForm(QGroupBox):

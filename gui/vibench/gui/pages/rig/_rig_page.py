@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 from vibench.acquisition import BenchReport, Finding, InstrumentList, Verdict, list_rig_instruments, shipped
 from vibench.acquisition.engine import EngineState, EngineStatus
 
-from ...page import AppContext, UserActions, Page, Remembered
+from ...page import AppContext, Page, Remembered, UserActions
 from ...widgets import ReadTable, moment_text, notice_of
 from ._knob_sheet import KnobSheetForm
 from ._rig_choice import RigChoice
@@ -66,9 +66,9 @@ VERDICTS = {Verdict.OK: "✔ ok", Verdict.WARN: "⚠ look", Verdict.FAIL: "✖ f
 class RigPage(Page):
     """The first step: from a file to a bench that is open and well."""
 
-    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(desk, parent)
-        self._orders = UserActions(desk, self)
+    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
+        super().__init__(context, parent)
+        self._actions = UserActions(context, self)
         self.choice = RigChoice()
         self.knobs = KnobSheetForm()
         self.about = QLabel()
@@ -103,15 +103,15 @@ class RigPage(Page):
     @property
     def is_done(self) -> bool:
         """The bench is open, and no check has forbidden to use it."""
-        status = self.desk.bridge.status
+        status = self.context.bridge.status
         if status is None or status.bench is None:
             return False
         return status.check is None or status.check.verdict is not Verdict.FAIL
 
     def refresh(self) -> None:
         """Show what is open and what the check has found."""
-        status = self.desk.bridge.status
-        state = self.desk.bridge.state
+        status = self.context.bridge.status
+        state = self.context.bridge.state
         may_open = state in (EngineState.CLOSED, EngineState.FAULT)
         knobs_missing = self._rig_needs_knobs() and self.knobs.sheet() is None
         self.open_button.setEnabled(may_open and self.choice.rig is not None and not knobs_missing)
@@ -133,7 +133,7 @@ class RigPage(Page):
         rig = self.choice.rig
         if rig is not None:
             self.instruments.show_rows([])
-            self.desk.bridge.open(rig, self.knobs.sheet())
+            self.context.bridge.open(rig, self.knobs.sheet())
 
     def _show_check(self, status: EngineStatus | None) -> None:
         report: BenchReport | None = None if status is None else status.check
@@ -171,12 +171,12 @@ class RigPage(Page):
             chain = (rig.generator.resource, rig.amplifier.model, rig.shaker.model, rig.vibrometer.model)
             kind = "Every instrument is simulated." if rig.virtual is not None else "Real instruments."
             self.about.setText(f"{rig.name}. {kind} {' → '.join(chain)} → {rig.daq.product}")
-            self.desk.settings.keep_text(Remembered.BENCH, str(self.choice.path))
-        self.desk.intent.choose_rig(rig, self.choice.path)
+            self.context.settings.keep_text(Remembered.BENCH, str(self.choice.path))
+        self.context.selection.choose_rig(rig, self.choice.path)
 
     def _choose_first(self) -> None:
         otherwise = str(shipped("hardware_configs/virtual_rig.toml"))
-        self.choice.choose(Path(self.desk.settings.text(Remembered.BENCH, otherwise)))
+        self.choice.choose(Path(self.context.settings.text(Remembered.BENCH, otherwise)))
 
     def _find(self) -> None:
         rig = self.choice.rig
@@ -184,7 +184,7 @@ class RigPage(Page):
             return
         self.find_button.setEnabled(False)
         self.instruments.show_rows([("looking", "some seconds; a simulated rig is switched on for it")])
-        self.desk.background.ask(list_rig_instruments, self._found, self._not_found, rig)
+        self.context.background.ask(list_rig_instruments, self._found, self._not_found, rig)
 
     def _found(self, found: InstrumentList) -> None:
         self.find_button.setEnabled(True)
@@ -196,18 +196,18 @@ class RigPage(Page):
     def _not_found(self, error: BaseException) -> None:
         self.find_button.setEnabled(True)
         self.instruments.show_rows([])
-        self.desk.say(notice_of(error))
+        self.context.say(notice_of(error))
 
     def _close(self) -> None:
-        self.desk.bridge.close_bench()
+        self.context.bridge.close_bench()
         self.instruments.show_rows([])
 
     def _connect(self) -> None:
         self.choice.chosen.connect(self._chosen)
-        self.choice.refused.connect(lambda error: self.desk.say(notice_of(error)))
+        self.choice.refused.connect(lambda error: self.context.say(notice_of(error)))
         self.open_button.clicked.connect(self.open_bench)
         self.close_button.clicked.connect(self._close)
-        self.check_button.clicked.connect(self._orders.check)
+        self.check_button.clicked.connect(self._actions.check)
         self.find_button.clicked.connect(self._find)
 
     def _button(self, text: str, tip: str) -> QPushButton:

@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from vibench.analysis import MeasurementPrediction
 from vibench.analysis.live import LiveView
 
-from ...plots import FREQUENCY, PREDICTED, PlotAxis, Dash, LineStyle, Plot, Scale, curve_style
+from ...plots import FREQUENCY, PREDICTED, Dash, LineStyle, Plot, PlotAxis, Scale, curve_style
 from ...widgets import Theme
 
 
@@ -32,14 +32,14 @@ class SweepHistoryPlot(QWidget):
 
     def show_view(self, view: LiveView) -> None:
         """Draw all points so far."""
-        course = view.course()
-        if len(course.time_s) == self._shown:
+        history = view.history()
+        if len(history.time_s) == self._shown:
             return
-        self._shown = len(course.time_s)
-        self._first.setData(course.frequency_hz, course.response_i)
-        self._second.setData(course.frequency_hz, course.response_ii)
+        self._shown = len(history.time_s)
+        self._first.setData(history.frequency_hz, history.response_i)
+        self._second.setData(history.frequency_hz, history.response_ii)
 
-    def show_foresight(self, seen: MeasurementPrediction | None) -> None:
+    def show_prediction(self, seen: MeasurementPrediction | None) -> None:
         """Lay a prediction beneath, or none."""
         self._stripes.show_bands(() if seen is None else seen.collision_bands_hz)
         if seen is None:
@@ -69,7 +69,9 @@ class SweepEnvelopePlot(QWidget):
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.plot = Plot("Sweep envelope", FREQUENCY, PlotAxis("m0 velocity", "mm/s", 1e3), theme).with_legend()
+        self.plot = Plot(
+            "Sweep envelope", FREQUENCY, PlotAxis("m0 velocity", "mm/s", 1e3), theme
+        ).with_legend()
         self.plot.with_hint("Largest and smallest velocity of m0 while a sweep passes by.")
         self._stripes = self.plot.stripes(LineStyle(lambda theme: theme.traces[3], filled=0.15))
         self._upper = self.plot.curve(curve_style(3), "largest")
@@ -81,14 +83,14 @@ class SweepEnvelopePlot(QWidget):
 
     def show_view(self, view: LiveView) -> None:
         """Draw all points so far, in the order of time."""
-        course = view.course()
-        if len(course.time_s) == self._shown:
+        history = view.history()
+        if len(history.time_s) == self._shown:
             return
-        self._shown = len(course.time_s)
-        self._upper.setData(course.frequency_hz, course.upper)
-        self._lower.setData(course.frequency_hz, course.lower)
+        self._shown = len(history.time_s)
+        self._upper.setData(history.frequency_hz, history.upper)
+        self._lower.setData(history.frequency_hz, history.lower)
 
-    def show_foresight(self, seen: MeasurementPrediction | None) -> None:
+    def show_prediction(self, seen: MeasurementPrediction | None) -> None:
         """Show where collisions are predicted."""
         self._stripes.show_bands(() if seen is None else seen.collision_bands_hz)
 

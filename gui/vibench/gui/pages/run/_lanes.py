@@ -1,4 +1,4 @@
-"""The newest seconds of every channel, one lane each: smallest and largest sample of every column.
+"""The newest seconds of every channel, one time history each: smallest and largest sample of every column.
 
 Channels as people call them, and the units that suit them.
 """
@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from vibench.analysis.live import LiveView, zigzag
 
-from ...plots import PlotAxis, Plot, curve_style
+from ...plots import Plot, PlotAxis, curve_style
 from ...widgets import Theme
 
 _WORDS = {
@@ -31,7 +31,9 @@ def channel_word(role: str) -> str:
 def channel_axis(role: str, unit: str) -> PlotAxis:
     """Give a channel's axis: its word, in a unit whose numbers are easy to read."""
     shown, factor = _UNITS.get(unit, (unit, 1.0))
-    return PlotAxis(channel_word(role), shown, factor, short=f"{_SHORT.get(role, channel_word(role))} ({shown})")
+    return PlotAxis(
+        channel_word(role), shown, factor, short=f"{_SHORT.get(role, channel_word(role))} ({shown})"
+    )
 
 
 AGO = PlotAxis("Time before now", "s")
@@ -69,7 +71,7 @@ class TimeHistoryPlots(QWidget):
         self.show_channels(tuple((channel.role, channel.unit) for channel in view.channels))
         if not self.plots:
             return
-        seen = view.lanes(span_s, min(max(LEAST_COLUMNS, self.plots[0].lines_across), MOST_COLUMNS))
+        seen = view.time_histories(span_s, min(max(LEAST_COLUMNS, self.plots[0].lines_across), MOST_COLUMNS))
         if len(seen.time_s) == 0:
             return
         time_s = np.repeat(seen.time_s - seen.time_s[-1], 2)
@@ -96,7 +98,7 @@ class TimeHistoryPlots(QWidget):
             plot.deleteLater()
         del self.plots[len(channels) :], self._curves[len(channels) :]
         for row in range(len(self.plots), len(channels)):
-            plot = Plot("Lane", AGO, channel_axis(*channels[row]), self._theme)
+            plot = Plot("Time history", AGO, channel_axis(*channels[row]), self._theme)
             plot.setXRange(-USUAL_SPAN_S, 0, padding=0)
             plot.up.setWidth(AXIS_LETTERS * self.fontMetrics().averageCharWidth())
             self._curves.append(plot.curve(curve_style(row)))
@@ -104,7 +106,7 @@ class TimeHistoryPlots(QWidget):
             self.plots.append(plot)
         for (role, unit), plot, curve in zip(channels, self.plots, self._curves, strict=True):
             curve.clear()
-            plot.setAccessibleName(f"Lane of {channel_word(role)}")
+            plot.setAccessibleName(f"Time history of {channel_word(role)}")
             plot.with_hint(f"The newest seconds of {channel_word(role)}, while a test runs.")
             plot.up.show_unit(channel_axis(role, unit))
             is_last = plot is self.plots[-1]

@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from vibench.analysis.live import LiveView, Portrait
 
-from ...plots import PlotAxis, Plot, curve_style
+from ...plots import Plot, PlotAxis, curve_style
 from ...widgets import Theme
 
 _ACROSS = PlotAxis("m0 displacement", "µm", 1e6, short="x (µm)")

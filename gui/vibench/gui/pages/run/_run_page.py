@@ -13,10 +13,10 @@ from vibench.analysis import MeasurementPrediction
 from vibench.analysis.live import LiveView
 
 from ...engine_link import measurement_called
-from ...page import AppContext, UserActions, Page
+from ...page import AppContext, Page, UserActions
 from ...widgets import FILES, Theme
 from ._arm_card import ArmCard
-from ._course_plot import SweepHistoryPlot, SweepEnvelopePlot
+from ._course_plot import SweepEnvelopePlot, SweepHistoryPlot
 from ._lanes import TimeHistoryPlots
 from ._portrait_plot import PortraitPlot
 from ._spectrum_plot import SpectrumPlot
@@ -31,19 +31,19 @@ _TONES = frozenset({"dwell", "sine_sweep", "stepped_sine"})
 class RunPage(Page):
     """Viewer of the engine's run: it keeps nothing but what is on the screen."""
 
-    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(desk, parent)
-        theme = desk.theme
-        self._orders = UserActions(desk, self)
+    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
+        super().__init__(context, parent)
+        theme = context.theme
+        self._actions = UserActions(context, self)
         self._view: LiveView | None = None
         self._ended: Path | None = None
         self._drawn: tuple[int, int, int, float] | None = None
         self.arm_card = ArmCard()
         self.watch_card = WatchCard(theme)
-        self.lanes = TimeHistoryPlots(theme)
-        self.transmission = TransmissibilityPlot(theme)
+        self.time_histories = TimeHistoryPlots(theme)
+        self.frequency_response = TransmissibilityPlot(theme)
         self.spectrum = SpectrumPlot(theme)
-        self.course = SweepHistoryPlot(theme)
+        self.history = SweepHistoryPlot(theme)
         self.envelope = SweepEnvelopePlot(theme)
         self.portrait = PortraitPlot(theme)
         self.left_tabs, self.right_tabs = QTabWidget(), QTabWidget()
@@ -63,8 +63,8 @@ class RunPage(Page):
 
     def refresh(self) -> None:
         """Draw the newest samples, unless the picture is frozen."""
-        status = self.desk.bridge.status
-        measurement = self.desk.intent.measurement
+        status = self.context.bridge.status
+        measurement = self.context.selection.measurement
         test = (
             ""
             if measurement is None
@@ -73,7 +73,7 @@ class RunPage(Page):
         reason = "" if measurement is not None else "The test is not complete; see the Test page (Ctrl+2)."
         self.arm_card.show_status(status, test, reason)
         self.watch_card.show_status(status)
-        view = self.desk.bridge.view
+        view = self.context.bridge.view
         if view is None or self.watch_card.freeze.isChecked():
             return
         if view is not self._view:
@@ -84,17 +84,18 @@ class RunPage(Page):
             return
         self._drawn = wanted
         self.watch_card.show_view(view)
-        self.lanes.show_view(view, self.watch_card.span_s)
+        self.time_histories.show_view(view, self.watch_card.span_s)
         for tabs in (self.left_tabs, self.right_tabs):
             shown = tabs.currentWidget()
             assert isinstance(
-                shown, TransmissibilityPlot | SpectrumPlot | SweepHistoryPlot | SweepEnvelopePlot | PortraitPlot
+                shown,
+                TransmissibilityPlot | SpectrumPlot | SweepHistoryPlot | SweepEnvelopePlot | PortraitPlot,
             )
             shown.show_view(view)
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
-        for part in (self.lanes, self.watch_card, *self._pictures):
+        for part in (self.time_histories, self.watch_card, *self._pictures):
             part.retheme(theme)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -111,38 +112,38 @@ class RunPage(Page):
     def _pictures(
         self,
     ) -> tuple[TransmissibilityPlot, SpectrumPlot, SweepHistoryPlot, SweepEnvelopePlot, PortraitPlot]:
-        return (self.transmission, self.spectrum, self.course, self.envelope, self.portrait)
+        return (self.frequency_response, self.spectrum, self.history, self.envelope, self.portrait)
 
     def _begin(self, view: LiveView) -> None:
         """Another run: clear the pictures, lay its prediction beneath, show what suits its excitation."""
         self._view = view
-        status = self.desk.bridge.status
+        status = self.context.bridge.status
         name = "" if status is None or status.run is None else status.run.name
-        measurement = measurement_called(self.desk.bridge.campaign, name)
-        foresight = self.desk.intent.foresight
-        if foresight is not None and (
-            measurement is None or foresight.measurement.excitation != measurement.excitation
+        measurement = measurement_called(self.context.bridge.campaign, name)
+        prediction = self.context.selection.prediction
+        if prediction is not None and (
+            measurement is None or prediction.measurement.excitation != measurement.excitation
         ):
-            foresight = None
+            prediction = None
         for picture in self._pictures:
             picture.clear()
-        self._show_foresight(foresight)
+        self._show_prediction(prediction)
         if measurement is not None:
-            for plot in (self.course.plot, self.envelope.plot, self.transmission.magnitude):
+            for plot in (self.history.plot, self.envelope.plot, self.frequency_response.magnitude):
                 # What the check plays before the run lies outside, and would make the band small.
                 plot.setXRange(*excited_band_hz(measurement.excitation), padding=0.03)
         is_tone = measurement is not None and measurement.excitation.kind in _TONES
-        self.left_tabs.setCurrentWidget(self.course if is_tone else self.transmission)
+        self.left_tabs.setCurrentWidget(self.history if is_tone else self.frequency_response)
         self.right_tabs.setCurrentWidget(self.portrait if is_tone else self.spectrum)
 
-    def _show_foresight(self, seen: MeasurementPrediction | None) -> None:
-        self.transmission.show_foresight(seen)
-        self.course.show_foresight(seen)
-        self.envelope.show_foresight(seen)
+    def _show_prediction(self, seen: MeasurementPrediction | None) -> None:
+        self.frequency_response.show_prediction(seen)
+        self.history.show_prediction(seen)
+        self.envelope.show_prediction(seen)
 
     def _recorded(self, path: Path) -> None:
         self._ended = path
-        status = self.desk.bridge.status
+        status = self.context.bridge.status
         rows = () if status is None else status.rows
         told = next((f"{row.state}: {row.reason}" for row in rows if row.file == str(path)), "")
         self.summary.setText(f"Last run: {path.name}, {told}")
@@ -150,28 +151,30 @@ class RunPage(Page):
 
     def _show_channels(self) -> None:
         """Have the lanes before the first sample: to make them in a run would cost it a moment."""
-        rig = self.desk.intent.rig
+        rig = self.context.selection.rig
         if rig is not None:
-            self.lanes.show_channels(tuple((each.role.value, each.unit) for each in channels_of(rig)))
+            self.time_histories.show_channels(
+                tuple((each.role.value, each.unit) for each in channels_of(rig))
+            )
 
     def _look(self) -> None:
         if self._ended is not None:
-            self.desk.recording_wanted.emit(self._ended)
-            self.desk.page_wanted.emit(FILES)
+            self.context.recording_wanted.emit(self._ended)
+            self.context.page_wanted.emit(FILES)
 
     def _mark(self, text: str) -> None:
-        if self.desk.bridge.state in (EngineState.RUNNING, EngineState.HELD):
-            self.desk.bridge.mark(text)
+        if self.context.bridge.state in (EngineState.RUNNING, EngineState.HELD):
+            self.context.bridge.mark(text)
 
     def _connect(self) -> None:
-        self.arm_card.arm_wanted.connect(self._orders.arm_test)
-        self.arm_card.start_wanted.connect(self._orders.start)
-        self.arm_card.cancel_wanted.connect(self.desk.bridge.disarm)
-        self.arm_card.hold_wanted.connect(self._orders.hold_or_resume)
+        self.arm_card.arm_wanted.connect(self._actions.arm_test)
+        self.arm_card.start_wanted.connect(self._actions.start)
+        self.arm_card.cancel_wanted.connect(self.context.bridge.disarm)
+        self.arm_card.hold_wanted.connect(self._actions.hold_or_resume)
         self.watch_card.mark_wanted.connect(self._mark)
         self.look_button.clicked.connect(self._look)
-        self.desk.recording_made.connect(self._recorded)
-        self.desk.intent.rig_changed.connect(self._show_channels)
+        self.context.recording_made.connect(self._recorded)
+        self.context.selection.rig_changed.connect(self._show_channels)
 
     def _lay_out(self) -> None:
         title = QLabel("Run")
@@ -183,7 +186,7 @@ class RunPage(Page):
         column.addStretch(1)
         self.look_button.hide()
         for tabs, name, pictures in (
-            (self.left_tabs, "Pictures on the left", (self.transmission, self.course, self.envelope)),
+            (self.left_tabs, "Pictures on the left", (self.frequency_response, self.history, self.envelope)),
             (self.right_tabs, "Pictures on the right", (self.spectrum, self.portrait)),
         ):
             tabs.setAccessibleName(name)
@@ -196,7 +199,7 @@ class RunPage(Page):
         below.addWidget(self.right_tabs)
         below.setSizes([500, 500])
         right = QSplitter(Qt.Orientation.Vertical)
-        right.addWidget(self.lanes)
+        right.addWidget(self.time_histories)
         right.addWidget(below)
         right.setSizes([600, 400])
         right.setStretchFactor(0, 3)

@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from vibench.analysis.live import LiveView
 
-from ...plots import LOG_FREQUENCY, PlotAxis, Plot, Scale, curve_style
+from ...plots import LOG_FREQUENCY, Plot, PlotAxis, Scale, curve_style
 from ...widgets import Theme
 from ._lanes import channel_word
 
@@ -22,7 +22,9 @@ class SpectrumPlot(QWidget):
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        up = PlotAxis("Amplitude density", "channel's unit / √Hz", scale=Scale.LOGARITHMIC, short="unit / √Hz")
+        up = PlotAxis(
+            "Amplitude density", "channel's unit / √Hz", scale=Scale.LOGARITHMIC, short="unit / √Hz"
+        )
         self.plot = Plot("Spectral density of every channel", LOG_FREQUENCY, up, theme).with_legend()
         self.plot.with_hint("Spectra of all channels, of the newest seconds of a run.")
         self._curves: list[pg.PlotDataItem] = []

@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from vibench.analysis import MeasurementPrediction
 from vibench.analysis.live import LiveView
 
-from ...plots import FREQUENCY, PREDICTED, PlotAxis, Dash, LineStyle, Plot, Scale, curve_style
+from ...plots import FREQUENCY, PREDICTED, Dash, LineStyle, Plot, PlotAxis, Scale, curve_style
 from ...widgets import Theme
 
 
@@ -38,14 +38,14 @@ class TransmissibilityPlot(QWidget):
 
     def show_view(self, view: LiveView) -> None:
         """Draw what is known by now."""
-        found = view.transmission()
+        found = view.frequency_response()
         if found is None:
             return
         self._measured.setData(found.frequency_hz, found.magnitude)
         self._band.set_data(found.frequency_hz, found.magnitude_lower, found.magnitude_upper)
         self._coherence.setData(found.frequency_hz, found.coherence)
 
-    def show_foresight(self, seen: MeasurementPrediction | None) -> None:
+    def show_prediction(self, seen: MeasurementPrediction | None) -> None:
         """Lay a prediction beneath, or none."""
         if seen is None:
             self._predicted.clear()

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QGridLayout, QWidget
 from vibench.analysis import SIMILARITY_THRESHOLD
 from vibench.analysis.simulation import SimulationProgress
 
-from ...plots import GUIDE, LIMIT, LOG_FREQUENCY, PlotAxis, Dash, LineStyle, Plot, Scale, curve_style
+from ...plots import GUIDE, LIMIT, LOG_FREQUENCY, Dash, LineStyle, Plot, PlotAxis, Scale, curve_style
 from ...widgets import Theme
 
 RESPONSE = PlotAxis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
@@ -53,31 +53,33 @@ class AnswerPlots(QWidget):
         """All four, row by row."""
         return (self.responses, self.motion, self.exponents, self.likeness)
 
-    def show_course(self, course: SimulationProgress | None) -> None:
+    def show_progress(self, progress: SimulationProgress | None) -> None:
         """Draw what is there."""
-        for step in self.steps(course):
+        for step in self.steps(progress):
             step()
 
-    def steps(self, course: SimulationProgress | None) -> list[Callable[[], None]]:
+    def steps(self, progress: SimulationProgress | None) -> list[Callable[[], None]]:
         """Draw what is there picture by picture: together they take longer than a frame has."""
         draws = (self._responses, self._motion, self._exponents, self._likeness)
-        return [partial(_draw_anew, plot, draw, course) for plot, draw in zip(self.plots, draws, strict=True)]
+        return [
+            partial(_draw_anew, plot, draw, progress) for plot, draw in zip(self.plots, draws, strict=True)
+        ]
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
         for plot in self.plots:
             plot.retheme(theme)
 
-    def _responses(self, course: SimulationProgress) -> None:
-        for number, model in enumerate(course.models):
-            self._responses_of(course, model, number)
-        low, high = course.smallest_and_largest_response
+    def _responses(self, progress: SimulationProgress) -> None:
+        for number, model in enumerate(progress.models):
+            self._responses_of(progress, model, number)
+        low, high = progress.smallest_and_largest_response
         if high > 0.0:
             self.responses.setYRange(log10(low) - 0.1, log10(high) + 0.1, padding=0.0)
 
-    def _responses_of(self, course: SimulationProgress, model: str, number: int) -> None:
+    def _responses_of(self, progress: SimulationProgress, model: str, number: int) -> None:
         if number == 0:
-            bands_hz = course.collision_bands_hz(model)
+            bands_hz = progress.collision_bands_hz(model)
             self.responses.stripes(_COLLIDING).show_bands(bands_hz)
             self.responses.rules(_EDGE).show_at(low_hz for low_hz, _ in bands_hz[1:])
             if bands_hz:
@@ -86,35 +88,35 @@ class AnswerPlots(QWidget):
             ("response_i", "Response I", Dash.SOLID),
             ("response_ii", "Response II", Dash.DOTTED),
         ):
-            frequency_hz, values = course.column(model, name)
+            frequency_hz, values = progress.column(model, name)
             if frequency_hz.size:
                 line = self.responses.curve(curve_style(number, dash), f"{label}, {model}")
                 _draw(line, frequency_hz, values)
 
-    def _exponents(self, course: SimulationProgress) -> None:
-        for number, model in enumerate(course.models):
-            frequency_hz, values = course.column(model, "lyapunov_per_s")
+    def _exponents(self, progress: SimulationProgress) -> None:
+        for number, model in enumerate(progress.models):
+            frequency_hz, values = progress.column(model, "lyapunov_per_s")
             if np.isfinite(values).any():
                 _draw(self.exponents.curve(curve_style(number), model), frequency_hz, values)
                 if number == 0:
                     self.exponents.level(GUIDE, 0.0)
 
-    def _motion(self, course: SimulationProgress) -> None:
-        for number, signal in enumerate(course.signals):
+    def _motion(self, progress: SimulationProgress) -> None:
+        for number, signal in enumerate(progress.signals):
             time_s = signal.time_s - signal.time_s[0]
             line = self.motion.curve(curve_style(number), f"x, {signal.model}, {signal.frequency_hz:g} Hz")
             line.setData(time_s, signal.displacement_m)
             line = self.motion.curve(curve_style(number, Dash.DOTTED), f"p = y - z, {signal.model}")
             line.setData(time_s, signal.relative_m)
-        if course.signals:
-            gap_m = course.signals[0].gap_m
+        if progress.signals:
+            gap_m = progress.signals[0].gap_m
             for stop_m in (gap_m, -gap_m):
                 self.motion.level(LIMIT, stop_m, "stop")
-            reach_m = max(gap_m, course.largest_signal_m)
+            reach_m = max(gap_m, progress.largest_signal_m)
             self.motion.setYRange(-1.1 * reach_m, 1.1 * reach_m, padding=0.0)
 
-    def _likeness(self, course: SimulationProgress) -> None:
-        found = course.similarity()
+    def _likeness(self, progress: SimulationProgress) -> None:
+        found = progress.similarity()
         if found is None:
             return
         name = f"{100 * found.rate:.0f} % similar ({100 * found.low:.0f} to {100 * found.high:.0f} %)"
@@ -123,10 +125,12 @@ class AnswerPlots(QWidget):
         self.likeness.level(LIMIT, SIMILARITY_THRESHOLD, "limit")
 
 
-def _draw_anew(plot: Plot, draw: Callable[[SimulationProgress], None], course: SimulationProgress | None) -> None:
+def _draw_anew(
+    plot: Plot, draw: Callable[[SimulationProgress], None], progress: SimulationProgress | None
+) -> None:
     plot.wipe()
-    if course is not None:
-        draw(course)
+    if progress is not None:
+        draw(progress)
 
 
 def _draw(

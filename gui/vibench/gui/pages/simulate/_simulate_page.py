@@ -24,12 +24,12 @@ from ._simulator import Simulator
 class SimulatePage(Page):
     """The form on the left; the answer on the right, as far as it has come."""
 
-    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(desk, parent)
+    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
+        super().__init__(context, parent)
         self.form: JudgedForm[SimulationRequest] = JudgedForm(SimulationRequest, "simulation")
-        self.plots = AnswerPlots(desk.theme)
+        self.plots = AnswerPlots(context.theme)
         self.simulator = Simulator(self)
-        self._course: SimulationProgress | None = None
+        self._progress: SimulationProgress | None = None
         self._is_stale = False
         self._undrawn: list[Callable[[], None]] = []
         self._build()
@@ -42,20 +42,20 @@ class SimulatePage(Page):
         self._say_progress("Nothing has been simulated yet.")
 
     @property
-    def course(self) -> SimulationProgress | None:
+    def progress(self) -> SimulationProgress | None:
         """What has been found so far."""
-        return self._course
+        return self._progress
 
     @property
     def is_done(self) -> bool:
         """Ticked once there is a whole answer."""
-        return self._course is not None and not self.simulator.is_busy and self._course.done > 0
+        return self._progress is not None and not self.simulator.is_busy and self._progress.done > 0
 
     def refresh(self) -> None:
         """Draw what has come since the last time, a picture a tick."""
         if self._is_stale and not self._undrawn:
             self._is_stale = False
-            self._undrawn = self.plots.steps(self._course)
+            self._undrawn = self.plots.steps(self._progress)
         if self._undrawn:
             self._undrawn.pop(0)()
 
@@ -76,7 +76,7 @@ class SimulatePage(Page):
             f"A0 = {1e6 * request.amplitude_m:g} µm, gap {1e6 * request.gap_m:g} µm, damping time "
             f"{request.damping_time_s:g} s, {request.duration_s:g} s from rest, {request.accuracy.value}"
         )
-        self._course = SimulationProgress(request.amplitude_m, request.points, note)
+        self._progress = SimulationProgress(request.amplitude_m, request.points, note)
         self._is_stale = True
         self.simulator.begin(request)
         self._say_progress("Simulating; the first answer waits for the program to be made ready…")
@@ -86,21 +86,21 @@ class SimulatePage(Page):
         self.simulator.cancel()
         self._say_progress("Cancelled; what had been found is shown.")
 
-    def _grow(self, pieces: tuple[PartialResult, ...]) -> None:
-        if self._course is not None:
-            self._course.add(pieces)
+    def _grow(self, parts: tuple[PartialResult, ...]) -> None:
+        if self._progress is not None:
+            self._progress.add(parts)
             self._is_stale = True
             self._say_progress("Simulating…")
 
     def _end(self) -> None:
         self._is_stale = True
-        troubles = () if self._course is None else self._course.troubles
+        troubles = () if self._progress is None else self._progress.troubles
         self._say_progress("Complete." if not troubles else f"Complete but for {len(troubles)} points.")
         if troubles:
-            self.desk.say(Notice(NoticeKind.WARNING, troubles[0], details="\n".join(troubles[1:])))
+            self.context.say(Notice(NoticeKind.WARNING, troubles[0], details="\n".join(troubles[1:])))
 
     def _die(self, what: str) -> None:
-        self.desk.say(
+        self.context.say(
             Notice(NoticeKind.FAULT, what, "What had been found is shown.", "Simulate again.", "SIMULATOR")
         )
         self._say_progress("The simulation broke off.")
@@ -115,21 +115,21 @@ class SimulatePage(Page):
 
     def _say_progress(self, text: str) -> None:
         is_busy = self.simulator.is_busy
-        done, asked = (0, 1) if self._course is None else (self._course.done, self._course.asked)
+        done, asked = (0, 1) if self._progress is None else (self._progress.done, self._progress.asked)
         self._bar.setMaximum(asked)
         self._bar.setValue(done)
-        self._bar.setFormat("no points yet" if self._course is None else "%v of %m points")
+        self._bar.setFormat("no points yet" if self._progress is None else "%v of %m points")
         self._state.setText(text)
         self._cancel.setEnabled(is_busy)
-        self._compare.setEnabled(self._course is not None and bool(self._course.traces()))
+        self._compare.setEnabled(self._progress is not None and bool(self._progress.curves()))
 
     def _hand_to_compare(self) -> None:
-        if self._course is not None:
-            self.desk.prediction_made.emit(self._course.traces())
-            self.desk.page_wanted.emit(COMPARE)
+        if self._progress is not None:
+            self.context.prediction_made.emit(self._progress.curves())
+            self.context.page_wanted.emit(COMPARE)
 
     def _build(self) -> None:
-        self._parts = SideAndPicture(self.desk, SIMULATE, self._side(), self._answer())
+        self._parts = SideAndPicture(self.context, SIMULATE, self._side(), self._answer())
         layout = QVBoxLayout(self)
         layout.addWidget(self._parts)
 

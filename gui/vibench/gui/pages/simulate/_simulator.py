@@ -102,7 +102,7 @@ class Simulator(QObject):
             return
         match message:
             case Grown():
-                self.grown.emit(message.pieces)
+                self.grown.emit(message.parts)
             case Ended():
                 self._is_busy = False
                 self.ended.emit()

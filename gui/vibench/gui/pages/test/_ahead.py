@@ -15,11 +15,11 @@ class TestPreview:
     rig: Rig
 
 
-def preview_test(ahead: TestPreview) -> MeasurementPreview:
+def preview_test(test: TestPreview) -> MeasurementPreview:
     """Work out signal, loads, time and size."""
-    return preview_measurement(ahead.measurement, ahead.rig)
+    return preview_measurement(test.measurement, test.rig)
 
 
-def predict_test(ahead: TestPreview) -> MeasurementPrediction:
+def predict_test(test: TestPreview) -> MeasurementPrediction:
     """Simulate what the specimen will do."""
-    return predict_measurement(ahead.measurement, ahead.rig)
+    return predict_measurement(test.measurement, test.rig)

@@ -9,7 +9,18 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 from vibench.acquisition.plan import MeasurementPreview
 from vibench.analysis import MeasurementPrediction
 
-from ...plots import FREQUENCY, LOG_FREQUENCY, TIME, PlotAxis, Dash, LineStyle, Plot, Scale, SignalCurve, curve_style
+from ...plots import (
+    FREQUENCY,
+    LOG_FREQUENCY,
+    TIME,
+    Dash,
+    LineStyle,
+    Plot,
+    PlotAxis,
+    Scale,
+    SignalCurve,
+    curve_style,
+)
 from ...widgets import Theme
 
 COLLISION = LineStyle(lambda theme: theme.traces[3], filled=0.18)
@@ -23,12 +34,16 @@ class PredictionPlot(Plot):
         super().__init__("Predicted response and collision regions", FREQUENCY, up, theme)
         self.with_legend()
         self.with_hint("The specimen is being simulated under this test.")
-        self._first = self.curve(LineStyle(lambda theme: theme.predicted, Dash.DASHED), "Response I, simulated")
-        self._second = self.curve(LineStyle(lambda theme: theme.traces[0], Dash.DOTTED), "Response II, simulated")
+        self._first = self.curve(
+            LineStyle(lambda theme: theme.predicted, Dash.DASHED), "Response I, simulated"
+        )
+        self._second = self.curve(
+            LineStyle(lambda theme: theme.traces[0], Dash.DOTTED), "Response II, simulated"
+        )
         self._linear = self.curve(curve_style(2, Dash.DOTTED), "without contact")
         self._stripes = self.stripes(COLLISION)
 
-    def show_foresight(self, seen: MeasurementPrediction | None) -> None:
+    def show_prediction(self, seen: MeasurementPrediction | None) -> None:
         """Draw a prediction; None clears the plot."""
         if seen is None:
             for curve in (self._first, self._second, self._linear):
@@ -71,7 +86,7 @@ class PreviewPlots(QWidget):
         layout.addWidget(self.time, 1)
         layout.addWidget(self.spectrum, 1)
 
-    def show_outlook(self, seen: MeasurementPreview) -> None:
+    def show_preview(self, seen: MeasurementPreview) -> None:
         """Draw another signal."""
         self.time.show_everything()
         self._signal.set_samples(seen.volts, seen.sample_rate_hz)

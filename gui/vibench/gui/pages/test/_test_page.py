@@ -26,7 +26,7 @@ from vibench.analysis import MeasurementPrediction
 
 from ...background import LatestRequest
 from ...forms import Choice
-from ...page import AppContext, UserActions, Page, Remembered
+from ...page import AppContext, Page, Remembered, UserActions
 from ...widgets import Notice, NoticeKind, Theme, clock, notice_of
 from ._ahead import TestPreview, predict_test, preview_test
 from ._library import NamedTest, load_test, own_tests, shipped_tests
@@ -66,28 +66,30 @@ LOOK_MS, PREDICT_MS = 200, 900
 class TestPage(Page):
     """Edits the test that Arm will arm."""
 
-    def __init__(self, desk: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(desk, parent)
-        self._orders = UserActions(desk, self)
-        self._outlook: MeasurementPreview | None = None
+    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
+        super().__init__(context, parent)
+        self._actions = UserActions(context, self)
+        self._preview: MeasurementPreview | None = None
         self._tests: tuple[NamedTest, ...] = ()
         self.choice = Choice()
         self.form = TestForm()
         self.summary = QLabel("")
         self.summary.setWordWrap(True)
         self.summary.setAccessibleName("Summary of the test")
-        self.plots = PreviewPlots(desk.theme)
+        self.plots = PreviewPlots(context.theme)
         self.limits = LimitTable()
-        self.prediction = PredictionPlot(desk.theme)
+        self.prediction = PredictionPlot(context.theme)
         self.prediction_note = QLabel()
         self.prediction_note.setWordWrap(True)
         self.prediction_note.setProperty("rank", "second")
         self.arm_button = QPushButton("A&rm the test…  (Ctrl+Return)")
         self.arm_button.setProperty("rank", "first")
         self.arm_button.setToolTip("Show in words what will happen; nothing plays before Start")
-        self._looking = LatestRequest(desk.background, preview_test, self._looked, self._look_failed, LOOK_MS, self)
+        self._looking = LatestRequest(
+            context.background, preview_test, self._looked, self._look_failed, LOOK_MS, self
+        )
         self._foreseeing = LatestRequest(
-            desk.background, predict_test, self._foreseen, self._foresight_failed, PREDICT_MS, self
+            context.background, predict_test, self._predicted, self._prediction_failed, PREDICT_MS, self
         )
         self._lay_out()
         self._connect()
@@ -97,7 +99,7 @@ class TestPage(Page):
     @property
     def is_done(self) -> bool:
         """The test is complete and keeps every limit."""
-        return self._outlook is not None and self._outlook.is_allowed
+        return self._preview is not None and self._preview.is_allowed
 
     @property
     def is_busy(self) -> bool:
@@ -113,12 +115,12 @@ class TestPage(Page):
         """Keep the test for next time."""
         measurement = self.form.measurement
         if measurement is not None:
-            self.desk.settings.keep_text(Remembered.TEST, toml_text(measurement))
+            self.context.settings.keep_text(Remembered.TEST, toml_text(measurement))
 
     def _changed(self) -> None:
-        measurement, rig = self.form.measurement, self.desk.intent.rig
-        self.desk.intent.choose_measurement(measurement)
-        self._outlook = None
+        measurement, rig = self.form.measurement, self.context.selection.rig
+        self.context.selection.choose_measurement(measurement)
+        self._preview = None
         if measurement is None or rig is None:
             self._looking.drop()
             self._foreseeing.drop()
@@ -134,25 +136,25 @@ class TestPage(Page):
         self._foreseeing.ask(TestPreview(measurement, rig))
 
     def _looked(self, seen: MeasurementPreview) -> None:
-        self._outlook = seen
+        self._preview = seen
         self.summary.setText(summary_text(seen))
-        self.plots.show_outlook(seen)
+        self.plots.show_preview(seen)
         self.limits.show_checks(seen.checks)
 
     def _look_failed(self, error: BaseException) -> None:
         self.summary.setText(f"✖ {error}")
 
-    def _foreseen(self, seen: MeasurementPrediction) -> None:
-        self.desk.intent.foresee(seen)
-        self.prediction.show_foresight(seen)
+    def _predicted(self, seen: MeasurementPrediction) -> None:
+        self.context.selection.keep_prediction(seen)
+        self.prediction.show_prediction(seen)
         bands = ", ".join(f"{low:.0f}–{high:.0f} Hz" for low, high in seen.collision_bands_hz)
         collides = f"Collides at {bands}." if bands else "No collision is predicted."
         self.prediction_note.setText(
-            f"Simulated ({seen.model}), {seen.lead.value}, base amplitude from {seen.basis}. {collides}"
+            f"Simulated ({seen.model}), {seen.approach.value}, base amplitude from {seen.basis}. {collides}"
         )
 
-    def _foresight_failed(self, error: BaseException) -> None:
-        self.prediction.show_foresight(None)
+    def _prediction_failed(self, error: BaseException) -> None:
+        self.prediction.show_prediction(None)
         self.prediction_note.setText(f"No prediction: {error}")
 
     def _list_tests(self) -> None:
@@ -166,20 +168,20 @@ class TestPage(Page):
 
     @property
     def _own_folder(self) -> Path:
-        return self.desk.folder / "tests"
+        return self.context.folder / "tests"
 
     def _take(self, row: int) -> None:
         if row > 0:
             self.form.show_measurement(self._tests[row - 1].measurement)
 
     def _restore(self) -> None:
-        kept = self.desk.settings.text(Remembered.TEST)
+        kept = self.context.settings.text(Remembered.TEST)
         self.form.show_measurement(_kept_test(kept) or self._tests[0].measurement)
 
     def _save(self) -> None:
         measurement = self.form.measurement
         if measurement is None:
-            self.desk.say(
+            self.context.say(
                 Notice(NoticeKind.WARNING, "The test is not complete.", next_step=self.form.complaint)
             )
             return
@@ -193,9 +195,9 @@ class TestPage(Page):
         try:
             save_toml(measurement, path)
         except ConfigurationError as error:
-            self.desk.say(notice_of(error))
+            self.context.say(notice_of(error))
         else:
-            self.desk.say(Notice(NoticeKind.INFO, f"The test was saved as {path}."))
+            self.context.say(Notice(NoticeKind.INFO, f"The test was saved as {path}."))
             self._list_tests()
 
     def _open(self) -> None:
@@ -208,13 +210,13 @@ class TestPage(Page):
         try:
             self.form.show_measurement(load_test(path))
         except ConfigurationError as error:
-            self.desk.say(notice_of(error))
+            self.context.say(notice_of(error))
 
     def _connect(self) -> None:
         self.choice.activated.connect(self._take)
         self.form.changed.connect(self._changed)
-        self.desk.intent.rig_changed.connect(self._changed)
-        self.arm_button.clicked.connect(self._orders.arm_test)
+        self.context.selection.rig_changed.connect(self._changed)
+        self.arm_button.clicked.connect(self._actions.arm_test)
 
     def _lay_out(self) -> None:
         title = QLabel("Test")
