@@ -28,7 +28,7 @@ from vibench.gui.page import AppContext, Settings
 from vibench.gui.pages.compare import ComparePage
 from vibench.gui.pages.files import FilesPage
 from vibench.gui.pages.simulate import SimulatePage
-from vibench.gui.window._loop_watch import EventLoopMonitor
+from vibench.gui.window._event_loop_monitor import EventLoopMonitor
 from vibench.gui.window._open_window import application
 
 SIZE = (1400, 900)

@@ -9,7 +9,7 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QColor, QImage, QPainter
 
 from vibench.gui.page import AppContext, Settings
-from vibench.gui.window._loop_watch import BOUND_S
+from vibench.gui.window._event_loop_monitor import BOUND_S
 from vibench.gui.window._open_window import application
 from vibench.gui.window._page_catalogue import PAGES
 from vibench.gui.window._window import Window

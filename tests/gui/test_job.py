@@ -13,7 +13,7 @@ from vibench.acquisition import open_recording
 from vibench.acquisition.engine import EngineState, Supervision, start_engine
 from vibench.acquisition.plan import Measurement
 from vibench.gui.page import AppContext, Settings
-from vibench.gui.page._orders import ABORT_KEY
+from vibench.gui.page._user_actions import ABORT_KEY
 from vibench.gui.pages.rig._rig_choice import PACES
 from vibench.gui.widgets import COMPARE, FILES, RUN, TEST
 from vibench.gui.window._page_catalogue import PAGES

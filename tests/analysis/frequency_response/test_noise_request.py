@@ -15,7 +15,7 @@ from vibench.analysis import (
     analyse_recording,
     quantities_named,
 )
-from vibench.analysis.frequency_response._noise_request import longest_segment
+from vibench.analysis.frequency_response._request import longest_segment
 from vibench.analysis.signals import effective_averages, hop_samples, taper
 
 RATE = 6400.0

@@ -6,11 +6,7 @@ from hypothesis import given, settings, strategies as st
 
 from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.frequency_response._periodic_transmission import (
-    PeriodicSums,
-    Scatter,
-    periodic_frequency_response,
-)
+from vibench.analysis.frequency_response._periodic import PeriodicSums, Scatter, periodic_frequency_response
 
 RATE = 5120.0
 

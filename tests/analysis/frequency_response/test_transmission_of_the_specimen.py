@@ -5,7 +5,7 @@ import pytest
 
 from vibench.analysis import resonances
 from vibench.analysis.frequency_response import converted_frequency_response
-from vibench.analysis.frequency_response._periodic_transmission import PeriodicSums
+from vibench.analysis.frequency_response._periodic import PeriodicSums
 from vibench.analysis.signals import Quantity
 from vibench.sim import Sampled, gong2025, integrate
 

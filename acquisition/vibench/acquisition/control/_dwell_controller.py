@@ -8,7 +8,7 @@ from ..plan import RunState
 from ._closed_loop_check import require_answer
 from ._control_action import Controller
 from ._level_control import Held, LevelControl, measured_level
-from ._settle import SettlingController, shortened
+from ._settling_controller import SettlingController, shortened
 from ._sine_loop import SineLoop
 from ._start import started
 

@@ -13,7 +13,7 @@ from ..plan import RunState
 from ._control_action import Controller
 from ._jump_search import LocatedJump, SettledPoint, Side, is_on_branch, located, side
 from ._record import recorded
-from ._settle import SettledState, SettlingController, shortened
+from ._settling_controller import SettledState, SettlingController, shortened
 from ._sine_loop import SineLoop
 from ._start import glided
 

@@ -7,7 +7,7 @@ from ..excitation import Segment
 from ..plan import RunState
 from ._control_action import Controller
 from ._level_control import Held, MeasuredLevel, measured_level
-from ._settle import SettledState, SettlingController, shortened
+from ._settling_controller import SettledState, SettlingController, shortened
 
 
 @dataclass(frozen=True)

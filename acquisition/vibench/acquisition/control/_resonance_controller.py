@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..excitation import ResonanceTracking
 from ._control_action import Controller
 from ._record import recorded
-from ._settle import SettledState, SettlingController, shortened
+from ._settling_controller import SettledState, SettlingController, shortened
 from ._sine_loop import SineLoop
 from ._start import moved, started
 from ._steadiness import Steadiness

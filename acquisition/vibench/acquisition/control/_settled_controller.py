@@ -7,7 +7,7 @@ from ._control_action import Controller
 from ._jump_controller import JumpLocator
 from ._jump_search import SettledPoint, Side, ratio
 from ._record import recorded
-from ._settle import SettlingController
+from ._settling_controller import SettlingController
 from ._sine_loop import SineLoop
 from ._start import glided, started
 

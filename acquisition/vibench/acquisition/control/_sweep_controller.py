@@ -8,7 +8,7 @@ from ..plan import RunState
 from ._control_action import Controller
 from ._gain_estimator import GainEstimator
 from ._level_control import Held
-from ._settle import SettlingController, shortened
+from ._settling_controller import SettlingController, shortened
 from ._sine_loop import SineLoop
 from ._start import followed, started, tracked
 

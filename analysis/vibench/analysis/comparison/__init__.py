@@ -5,24 +5,18 @@ standard deviation; a transmission, Response I or Response II, measured, simulat
 readings at markers and differences of curves; how recordings are analysed for it. Nothing is drawn here.
 """
 
+from ._curve import Curve, CurveKind, CurveOrigin, curve_difference, sorted_curve
+from ._curve_peaks import curve_peaks, readings
 from ._options import (
     AnalysisOptions,
 )
-from ._recording_traces import (
+from ._recording_curves import (
     dwell_traces,
     predicted_curves,
     stepped_traces,
     sweep_traces,
     transmission_trace,
 )
-from ._trace import (
-    Curve,
-    CurveKind,
-    CurveOrigin,
-    curve_difference,
-    sorted_curve,
-)
-from ._trace_peaks import curve_peaks, readings
 
 __all__ = [
     "AnalysisOptions",

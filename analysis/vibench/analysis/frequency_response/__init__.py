@@ -11,7 +11,6 @@ from ._distortion import (
     distortion,
     is_even_line,
 )
-from ._noise_request import FrequencyResponseRequest, MagnitudeScale, quantities_named
 from ._noise_response import (
     DEFAULT_REQUEST,
     Noise,
@@ -19,7 +18,8 @@ from ._noise_response import (
     NoiseResponse,
     noise_response,
 )
-from ._periodic_transmission import PeriodicFrequencyResponse
+from ._periodic import PeriodicFrequencyResponse
+from ._request import FrequencyResponseRequest, MagnitudeScale, quantities_named
 from ._resonance import (
     Resonance,
     resonances,
@@ -30,10 +30,7 @@ from ._results import (
     FrequencyResponseSettings,
     converted_frequency_response,
 )
-from ._transmission import (
-    frequency_response_of,
-    transmissibility,
-)
+from ._transmissibility import frequency_response_of, transmissibility
 
 __all__ = [
     "DEFAULT_REQUEST",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..signals import Flags, Reals
-from ._periodic_transmission import DetectionLines, PeriodicFrequencyResponse
+from ._periodic import DetectionLines, PeriodicFrequencyResponse
 
 
 @dataclass(frozen=True)

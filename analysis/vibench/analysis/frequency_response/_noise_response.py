@@ -16,12 +16,12 @@ from ..signals import Complexes, Flags, Quantity, Reals, relative_sd, student_ha
 from ..spectra import DensitySums
 from ..tones import NoiseDriveLevel, noise_drive_level
 from ._estimators import coherence, least_squares
-from ._noise_request import FrequencyResponseRequest
-from ._periodic_transmission import PeriodicFrequencyResponse, PeriodicSums
+from ._periodic import PeriodicFrequencyResponse, PeriodicSums
 from ._repetition import period_spectra
+from ._request import FrequencyResponseRequest
 from ._resonance import Resonance, resonances
 from ._results import Estimator, FrequencyResponse, converted_frequency_response
-from ._transmission import FrequencyResponseSums
+from ._transmissibility import FrequencyResponseSums
 
 Noise = MultisineNoise | OddMultisine | StreamedNoise
 _BLOCK = 1 << 19

@@ -10,10 +10,7 @@ from ._difference import (
     CurveDifference,
     logarithmic_difference,
 )
-from ._foresight import (
-    MeasurementPrediction,
-    predict_measurement,
-)
+from ._measurement_prediction import MeasurementPrediction, predict_measurement
 from ._overlay import (
     DwellOverlay,
     NoiseOverlay,

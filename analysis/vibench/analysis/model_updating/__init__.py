@@ -4,7 +4,7 @@ Damping and frequencies come from the weakest noise, the gap from where sweeps b
 two dwells that bracket it. Every value has its bounds; what could not be told is said.
 """
 
-from ._shaken_specimen import UpdatedSpecimen, update_model
+from ._updated_specimen import UpdatedSpecimen, update_model
 
 __all__ = [
     "UpdatedSpecimen",

@@ -1,7 +1,7 @@
 from ._accuracy_cost import (
     cost_sentences as cost_sentences,
 )
-from ._course import (
+from ._progress import (
     SimulationProgress as SimulationProgress,
 )
 from ._request import (

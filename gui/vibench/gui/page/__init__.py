@@ -6,18 +6,14 @@ sent yet; `Orders` carries out what keys, menus and buttons ask for.
 Pages know each other by name only.
 """
 
-from ._desk import (
-    AppContext,
-)
-from ._orders import (
-    UserActions,
-)
+from ._app_context import AppContext
 from ._page import Page, SideAndPicture
 from ._settings import (
     Remembered,
     Settings,
     default_settings_path,
 )
+from ._user_actions import UserActions
 
 __all__ = [
     "AppContext",

@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QScrollArea, QSplitter, QVBoxLayout, QWidget
 
 from ..widgets import Theme
-from ._desk import AppContext
+from ._app_context import AppContext
 from ._settings import Remembered
 
 

@@ -10,14 +10,7 @@ from ._bar_delegate import (
     SHARE_ROLE,
     BarDelegate,
 )
-from ._ink import (
-    GUIDE,
-    LIMIT,
-    PREDICTED,
-    Dash,
-    LineStyle,
-    curve_style,
-)
+from ._line_style import GUIDE, LIMIT, PREDICTED, Dash, LineStyle, curve_style
 from ._plot import Plot
 from ._signal_curve import (
     SignalCurve,

@@ -14,8 +14,8 @@ from PySide6.QtWidgets import QWidget
 from ..widgets import Theme, paint_hint
 from ._axis import AxisItem, Blankness, Grid, PlotAxis, Scale
 from ._band import Band
-from ._ink import SIGNS, LineStyle, curve_pen, shade_of, straight_pen
 from ._legend import LegendEntry, LegendLine
+from ._line_style import SIGNS, LineStyle, curve_pen, shade_of, straight_pen
 from ._logical_line import LogicalLine
 from ._upright_marks import Rules, Stripes
 

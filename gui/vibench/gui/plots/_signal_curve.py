@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from vibench.analysis.live import outline, zigzag
 
-from ._ink import LineStyle
+from ._line_style import LineStyle
 from ._plot import Plot
 
 MOST_COLUMNS = 3000

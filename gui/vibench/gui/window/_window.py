@@ -24,12 +24,12 @@ from ..engine_link import SignOfLife
 from ..page import AppContext, Page, Remembered, UserActions
 from ..widgets import RUN, Theme, palette, style_sheet
 from ._banner import Banner
-from ._faces import indicator_of, status_fields
-from ._loop_watch import EventLoopMonitor
+from ._event_loop_monitor import EventLoopMonitor
 from ._menus import AbortKey, build_menus
 from ._message_strip import MessageStrip
+from ._navigation_bar import NavigationBar
 from ._page_catalogue import PageEntry
-from ._rail import NavigationBar
+from ._state_indicator import indicator_of, status_fields
 from ._status_line import StatusField, StatusLine
 
 SPAN_S = 1.0

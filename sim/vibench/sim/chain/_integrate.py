@@ -13,9 +13,9 @@ from ..motion import MAX_IMPACT_RATE_HZ, ROUNDING, SPARE_IMPACTS
 from ._cell_contact import begin_pressing
 from ._cell_flow import CURVATURE_TERMS, POWER, SIDE, fill_curvature
 from ._chain import MASSES_PER_CELL, Chain
+from ._observer import NOTHING, ChainObservations
 from ._run import IMPACTS, NEXT_SAMPLE, ChainRecord, advance_chain, chain_cells
 from ._tables import OBSERVED, PATH, ChainTables, chain_tables
-from ._tally import NOTHING, ChainObservations
 from ._windows import drive_term, fill_observed, law_of
 
 STATES_PER_CELL = 2 * MASSES_PER_CELL

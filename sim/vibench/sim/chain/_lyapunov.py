@@ -18,9 +18,9 @@ from ..model import Accuracy, Harmonic, Outcome
 from ..motion import MAX_IMPACT_RATE_HZ
 from ._chain import MASSES_PER_CELL, Chain
 from ._integrate import integrate_chain, new_chain_record, new_observations, start_chain, state_of_phasors
+from ._observer import NOTHING
 from ._run import IMPACTS, advance_chain
 from ._tables import ChainTables, chain_tables
-from ._tally import NOTHING
 
 NEARNESS = 1e-6
 """Distance of the two motions over the size of the first."""

@@ -12,9 +12,9 @@ from ..motion import MAX_IMPACT_RATE_HZ, whole_periods
 from ._chain import MASSES_PER_CELL, Chain
 from ._integrate import impacts_of, new_chain_record, new_observations, start_chain, state_of_phasors
 from ._modes import chain_impulses, chain_state_matrix
+from ._observer import NOTHING, PEAKS, PEAKS_AND_LINES
 from ._run import IMPACTS, advance_chain
 from ._tables import chain_tables
-from ._tally import NOTHING, PEAKS, PEAKS_AND_LINES
 
 OF_P = 3
 """Column of p in `ChainResponse`, after x, y, z."""

@@ -2,7 +2,7 @@
 
 import pytest
 
-from vibench.gui.pages.run._lanes import TimeHistoryPlots, channel_axis
+from vibench.gui.pages.run._time_histories import TimeHistoryPlots, channel_axis
 from vibench.gui.widgets import LIGHT
 
 FOUR = (

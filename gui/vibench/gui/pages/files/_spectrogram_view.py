@@ -27,7 +27,7 @@ from ...forms import Choice
 from ...plots import FREQUENCY, LOG_FREQUENCY, TIME, Plot
 from ...widgets import Theme
 from ._file_words import role_text, unit_text
-from ._lanes import RecordingTimeHistories
+from ._time_histories import RecordingTimeHistories
 
 _WAIT_MS = 250
 """How long a view stands still before it is worked out."""

@@ -16,11 +16,11 @@ from ...engine_link import measurement_called
 from ...page import AppContext, Page, UserActions
 from ...widgets import FILES, Theme
 from ._arm_card import ArmCard
-from ._course_plot import SweepEnvelopePlot, SweepHistoryPlot
-from ._lanes import TimeHistoryPlots
 from ._portrait_plot import PortraitPlot
 from ._spectrum_plot import SpectrumPlot
-from ._transmission_plot import TransmissibilityPlot
+from ._sweep_history_plot import SweepEnvelopePlot, SweepHistoryPlot
+from ._time_histories import TimeHistoryPlots
+from ._transmissibility_plot import TransmissibilityPlot
 from ._watch_card import WatchCard
 
 LEFT_LETTERS = 44

@@ -8,7 +8,7 @@ from vibench.analysis.live import LiveView
 
 from ...plots import LOG_FREQUENCY, Plot, PlotAxis, Scale, curve_style
 from ...widgets import Theme
-from ._lanes import channel_word
+from ._time_histories import channel_word
 
 _UNITS = {"m s-2": "m/s²", "m s-1": "m/s"}
 _LEAST = 1e-12

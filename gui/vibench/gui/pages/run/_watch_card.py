@@ -23,7 +23,7 @@ from vibench.analysis.live import OVER_SHARE, Level, LevelVerdict, LiveView
 
 from ...forms import Choice, LineField
 from ...widgets import Theme, Tone, clock, paint_hint
-from ._lanes import USUAL_SPAN_S, channel_word
+from ._time_histories import USUAL_SPAN_S, channel_word
 
 _ROW = 1.9
 """Height of a meter, in heights of the font."""

@@ -28,11 +28,11 @@ from ...background import LatestRequest
 from ...forms import Choice
 from ...page import AppContext, Page, Remembered, UserActions
 from ...widgets import Notice, NoticeKind, Theme, clock, notice_of
-from ._ahead import TestPreview, predict_test, preview_test
 from ._library import NamedTest, load_test, own_tests, shipped_tests
 from ._limit_table import LimitTable
 from ._preview_plots import PredictionPlot, PreviewPlots
 from ._test_form import TestForm
+from ._test_preview import TestPreview, predict_test, preview_test
 
 _SHOWN = ("the stroke", "the table's acceleration", "the force", "the amplifier's voltage")
 _UNITS = {"m": ("mm", 1e3), "m/s2": ("m/s²", 1.0), "N": ("N", 1.0), "V": ("V", 1.0)}

@@ -9,7 +9,7 @@ from vibench.acquisition.engine import start_engine
 from ..background import Background
 from ..engine_link import Bridge, Starter
 from ..widgets import LIGHT, THEMES, Notice, Theme
-from ._intent import Selection
+from ._selection import Selection
 from ._settings import Remembered, Settings
 
 WORKERS = 2

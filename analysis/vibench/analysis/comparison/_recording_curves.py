@@ -8,7 +8,7 @@ from ..frequency_response import FrequencyResponse
 from ..model import ResponsePrediction
 from ..signals import Reals
 from ..sine import DwellResponse, SteppedResponse, SweepResponse
-from ._trace import Curve, CurveKind, CurveOrigin
+from ._curve import Curve, CurveKind, CurveOrigin
 
 SAME_HZ = 0.01
 """Frequencies that lie within this are one [Hz]."""

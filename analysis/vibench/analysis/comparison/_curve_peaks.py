@@ -10,7 +10,7 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from ..signals import Reals
-from ._trace import Curve
+from ._curve import Curve
 
 
 @dataclass(frozen=True)

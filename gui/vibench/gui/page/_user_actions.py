@@ -10,7 +10,7 @@ from vibench.acquisition.engine import EngineState
 from vibench.acquisition.plan import Campaign, Measurement
 
 from ..widgets import Notice, NoticeKind
-from ._desk import AppContext
+from ._app_context import AppContext
 
 OPERATOR_STOP = "stopped by the operator, in the window"
 ABORT_KEY = "aborted by the key, in the window"
