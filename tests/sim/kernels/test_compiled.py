@@ -7,8 +7,8 @@ from pathlib import Path
 import vibench.sim
 
 KERNELS = Path(vibench.sim.__file__).parent / "kernels"
-IMPORT = "from .kernels._compile import compiled\n"
-INNER = IMPORT + "\n@compiled\ndef inner(x):\n    return {factor} * x\n"
+IMPORT = "from .kernels._compile import kernel\n"
+INNER = IMPORT + "\n@kernel\ndef inner(x):\n    return {factor} * x\n"
 
 
 def test_a_kernel_is_recompiled_when_a_kernel_that_it_calls_changes_in_another_file(tmp_path):
@@ -19,7 +19,7 @@ def test_a_kernel_is_recompiled_when_a_kernel_that_it_calls_changes_in_another_f
     inner = package / "inner.py"
     (package / "outer.py").write_text(
         f"{IMPORT}from .inner import inner\n\n"
-        "@compiled\ndef outer(x):\n    return inner(x)\n\nprint(outer(1.0))\n"
+        "@kernel\ndef outer(x):\n    return inner(x)\n\nprint(outer(1.0))\n"
     )
     answers = []
     for factor in (2.0, 3.0):
@@ -45,7 +45,7 @@ def test_importing_vibench_leaves_the_cache_of_other_peoples_kernels_alone():
     subprocess.run([sys.executable, "-c", program], check=True)
 
 
-ARRAYS = {"Vector", "Table", "Complex", "Stride", "Watcher", "Space", "FlightTables"}
+ARRAYS = {"Vector", "Table", "Complex", "PowerStepState", "PowerObserver", "Workspace", "FlightTables"}
 
 
 def kernels():
@@ -54,7 +54,7 @@ def kernels():
         for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef):
                 decorators = {each.id for each in node.decorator_list if isinstance(each, ast.Name)}
-                for kind in decorators & {"compiled", "lean", "inlined"}:
+                for kind in decorators & {"kernel", "kernel_without_refcount", "inlined"}:
                     yield node.name, kind, node
 
 
@@ -64,9 +64,9 @@ def test_no_kernel_without_memory_makes_an_array_or_is_handed_one():
     makers = {
         name for name, _, node in found if ARRAYS & {getattr(n, "id", "") for n in ast.walk(node.returns)}
     }
-    assert {"clock_at", "contact_workspace", "space_for"} <= makers
+    assert {"clock_at", "contact_workspace", "workspace_for"} <= makers
     for name, kind, node in found:
-        if kind == "compiled":
+        if kind == "kernel":
             continue
         called = [call.func for call in ast.walk(node) if isinstance(call, ast.Call)]
         assert not makers & {each.id for each in called if isinstance(each, ast.Name)}, name

@@ -8,7 +8,13 @@ ROOT = Path(__file__).parents[3]
 PROGRAM = """
 from pathlib import Path
 from vibench.acquisition import open_bench
-from vibench.virtual_rig.world import conversion, decimation, input_stage, plant, recursive_filter
+from vibench.virtual_rig.world import (
+    _conversion as conversion,
+    _decimation as decimation,
+    _input_stage as input_stage,
+    _plant as plant,
+    _recursive_filter as recursive_filter,
+)
 
 kernels = (
     plant._move, decimation._weigh, input_stage._clipped, conversion._quantise, recursive_filter._run

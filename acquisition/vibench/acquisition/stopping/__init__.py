@@ -4,22 +4,6 @@
 second insists. Knows neither runs nor instruments.
 """
 
-from ._stop import (
-    LEVELS,
-    Cause,
-    StopLevel,
-    StopRequest,
-    StopSwitch,
-)
-from ._stop_on_signal import (
-    stop_on_signal,
-)
+import lazy_loader
 
-__all__ = [
-    "LEVELS",
-    "Cause",
-    "StopLevel",
-    "StopRequest",
-    "StopSwitch",
-    "stop_on_signal",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,14 +5,6 @@ witnesses agree: the 0-1 test (Gottwald & Melbourne 2009), surrogates (Kantz & S
 curve, far above the noise; otherwise undecided. The largest exponent from data: Rosenstein et al. 1993.
 """
 
-from ._period import (
-    Points,
-)
-from ._verdict import MotionKind, MotionVerdict, motion_verdict
+import lazy_loader
 
-__all__ = [
-    "MotionKind",
-    "MotionVerdict",
-    "Points",
-    "motion_verdict",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

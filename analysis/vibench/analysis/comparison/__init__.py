@@ -5,31 +5,6 @@ standard deviation; a transmission, Response I or Response II, measured, simulat
 readings at markers and differences of curves; how recordings are analysed for it. Nothing is drawn here.
 """
 
-from ._curve import Curve, CurveKind, CurveOrigin, curve_difference, sorted_curve
-from ._curve_peaks import curve_peaks, readings
-from ._options import (
-    AnalysisOptions,
-)
-from ._recording_curves import (
-    dwell_traces,
-    predicted_curves,
-    stepped_traces,
-    sweep_traces,
-    transmission_trace,
-)
+import lazy_loader
 
-__all__ = [
-    "AnalysisOptions",
-    "Curve",
-    "CurveKind",
-    "CurveOrigin",
-    "curve_difference",
-    "curve_peaks",
-    "dwell_traces",
-    "predicted_curves",
-    "readings",
-    "sorted_curve",
-    "stepped_traces",
-    "sweep_traces",
-    "transmission_trace",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

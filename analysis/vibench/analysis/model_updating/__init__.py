@@ -4,9 +4,6 @@ Damping and frequencies come from the weakest noise, the gap from where sweeps b
 two dwells that bracket it. Every value has its bounds; what could not be told is said.
 """
 
-from ._updated_specimen import UpdatedSpecimen, update_model
+import lazy_loader
 
-__all__ = [
-    "UpdatedSpecimen",
-    "update_model",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

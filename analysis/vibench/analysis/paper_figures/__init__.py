@@ -4,39 +4,6 @@ What the paper leaves open (damping, grid, logarithm, similarity's upper end) is
 kept with every figure. Figures 12 to 14 show the experiment and are drawn from recordings, in figures.
 """
 
-from ._catalogue import (
-    PAPER_FIGURES,
-)
-from ._fig03_levels import (
-    levels_figure,
-)
-from ._fig11_clearance import (
-    GAPS_M,
-    clearance_studies,
-)
-from ._options import (
-    AMPLITUDES_M,
-    FigureOptions,
-    FrequencyGrid,
-)
-from ._responses import (
-    Responses,
-    drive_at,
-    responses,
-)
-from ._time_signal import TimeSignal, time_signal
+import lazy_loader
 
-__all__ = [
-    "AMPLITUDES_M",
-    "GAPS_M",
-    "PAPER_FIGURES",
-    "FigureOptions",
-    "FrequencyGrid",
-    "Responses",
-    "TimeSignal",
-    "clearance_studies",
-    "drive_at",
-    "levels_figure",
-    "responses",
-    "time_signal",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,46 +5,6 @@ Facts are what was measured, with what, and how it ended, with what feedback not
 say what to look at before trusting it. The format: docs/recording-format.md. Nothing is estimated here.
 """
 
-from ._channel_levels import ChannelLevel, require_moving_channels
-from ._channels import (
-    BASE,
-    DRIVE,
-    RESPONSE,
-    Channels,
-    ObservedChannels,
-    ProgressObserver,
-    RecordedChannels,
-    Stretch,
-    Unobserved,
-    only_stretch,
-    read_whole,
-)
-from ._checks import (
-    Check,
-    Verdict,
-    measurement_checks,
-)
-from ._facts import FeedbackNote, RecordingFacts, recording_facts, specimen_of
+import lazy_loader
 
-__all__ = [
-    "BASE",
-    "DRIVE",
-    "RESPONSE",
-    "ChannelLevel",
-    "Channels",
-    "Check",
-    "FeedbackNote",
-    "ObservedChannels",
-    "ProgressObserver",
-    "RecordedChannels",
-    "RecordingFacts",
-    "Stretch",
-    "Unobserved",
-    "Verdict",
-    "measurement_checks",
-    "only_stretch",
-    "read_whole",
-    "recording_facts",
-    "require_moving_channels",
-    "specimen_of",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

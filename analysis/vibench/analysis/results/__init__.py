@@ -5,56 +5,6 @@ that cannot be analysed says why and stops no other. A result is also one JSON d
 with its unit in its name and its uncertainty beside it, and the curves of a comparison.
 """
 
-from ._campaign_results import (
-    AnalysisFailure,
-    CampaignResults,
-    DwellResult,
-    NoiseResult,
-    Overlay,
-    Result,
-    SteppedSineResult,
-    SweepResult,
-    analyse_files,
-    merged_results,
-    overlay,
-    recordings_in,
-    result_of,
-)
-from ._compared_recording import (
-    ComparedRecording,
-    compare_recording,
-    kept_result,
-)
-from ._measurement_analysis import (
-    UNOBSERVED,
-    RecordingAnalysis,
-    analyse_recording,
-)
-from ._summary import (
-    campaign_summary,
-    result_summary,
-)
+import lazy_loader
 
-__all__ = [
-    "UNOBSERVED",
-    "AnalysisFailure",
-    "CampaignResults",
-    "ComparedRecording",
-    "DwellResult",
-    "NoiseResult",
-    "Overlay",
-    "RecordingAnalysis",
-    "Result",
-    "SteppedSineResult",
-    "SweepResult",
-    "analyse_files",
-    "analyse_recording",
-    "campaign_summary",
-    "compare_recording",
-    "kept_result",
-    "merged_results",
-    "overlay",
-    "recordings_in",
-    "result_of",
-    "result_summary",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,32 +4,6 @@ Records arrive block by block, and memory does not grow with them. Segments that
 are left out and counted. An amplitude spectrum reads a sine as its amplitude.
 """
 
-from ._segment_spectra import (
-    SegmentSpectra,
-    SpectralAverages,
-    pieces,
-)
-from ._spectra import (
-    AmplitudeSpectrum,
-    DensitySums,
-    SpectralDensity,
-    amplitude_spectrum,
-    spectral_density,
-)
-from ._spectrogram import (
-    Spectrogram,
-    SpectrogramSums,
-)
+import lazy_loader
 
-__all__ = [
-    "AmplitudeSpectrum",
-    "DensitySums",
-    "SegmentSpectra",
-    "SpectralAverages",
-    "SpectralDensity",
-    "Spectrogram",
-    "SpectrogramSums",
-    "amplitude_spectrum",
-    "pieces",
-    "spectral_density",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,44 +4,6 @@ Here the drive amplitude A0 of the paper, base displacement [m], is found from r
 and how far noise lifts the largest value of a window.
 """
 
-from ._drive_level import (
-    DriveLevel,
-    NoiseDriveLevel,
-    drive_level,
-    noise_drive_level,
-)
-from ._noise_bias import (
-    noise_bias,
-)
-from ._order_tracking import (
-    ALL_ORDERS,
-    ORDERS,
-    TrackedOrders,
-    cycles_needed,
-    order_label,
-    tracked_orders,
-)
-from ._peaks import (
-    peaks,
-)
-from ._sine_fit import (
-    fitted_sine,
-    steady_phase,
-)
+import lazy_loader
 
-__all__ = [
-    "ALL_ORDERS",
-    "ORDERS",
-    "DriveLevel",
-    "NoiseDriveLevel",
-    "TrackedOrders",
-    "cycles_needed",
-    "drive_level",
-    "fitted_sine",
-    "noise_bias",
-    "noise_drive_level",
-    "order_label",
-    "peaks",
-    "steady_phase",
-    "tracked_orders",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,10 +5,6 @@ question. Functions, arguments and answers must be importable and picklable, and
 free of Qt widgets: every process that calls them imports them.
 """
 
-from ._background import Background, Job, LatestRequest
+import lazy_loader
 
-__all__ = [
-    "Background",
-    "Job",
-    "LatestRequest",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,17 +6,6 @@ heartbeat goes out here: an engine that misses it ramps down (docs/engine.md).
 A `LiveView` of the newest samples is kept for each run.
 """
 
-from ._bridge import Bridge, SignOfLife
-from ._engine_line import (
-    Starter,
-)
-from ._live_run import (
-    measurement_called,
-)
+import lazy_loader
 
-__all__ = [
-    "Bridge",
-    "SignOfLife",
-    "Starter",
-    "measurement_called",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,20 +5,6 @@ what was typed. An editor for each type of value; quantities are typed with unit
 It knows no particular model.
 """
 
-from ._editor import (
-    Choice,
-)
-from ._field_edge import (
-    LineField,
-)
-from ._model_form import JudgedForm, Loc, ModelForm
-from ._quantity_edit import QuantityEdit
+import lazy_loader
 
-__all__ = [
-    "Choice",
-    "JudgedForm",
-    "LineField",
-    "Loc",
-    "ModelForm",
-    "QuantityEdit",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

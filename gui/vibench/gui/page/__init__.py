@@ -6,21 +6,6 @@ sent yet; `Orders` carries out what keys, menus and buttons ask for.
 Pages know each other by name only.
 """
 
-from ._app_context import AppContext
-from ._page import Page, SideAndPicture
-from ._settings import (
-    Remembered,
-    Settings,
-    default_settings_path,
-)
-from ._user_actions import UserActions
+import lazy_loader
 
-__all__ = [
-    "AppContext",
-    "Page",
-    "Remembered",
-    "Settings",
-    "SideAndPicture",
-    "UserActions",
-    "default_settings_path",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,31 +5,6 @@ largest sample of every column of pixels, so that no impact is lost.
 It knows nothing of what is drawn.
 """
 
-from ._axis import FREQUENCY, LOG_FREQUENCY, TIME, PlotAxis, Scale
-from ._bar_delegate import (
-    SHARE_ROLE,
-    BarDelegate,
-)
-from ._line_style import GUIDE, LIMIT, PREDICTED, Dash, LineStyle, curve_style
-from ._plot import Plot
-from ._signal_curve import (
-    SignalCurve,
-)
+import lazy_loader
 
-__all__ = [
-    "FREQUENCY",
-    "GUIDE",
-    "LIMIT",
-    "LOG_FREQUENCY",
-    "PREDICTED",
-    "SHARE_ROLE",
-    "TIME",
-    "BarDelegate",
-    "Dash",
-    "LineStyle",
-    "Plot",
-    "PlotAxis",
-    "Scale",
-    "SignalCurve",
-    "curve_style",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

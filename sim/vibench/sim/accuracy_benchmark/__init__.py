@@ -14,19 +14,6 @@ periodic - hertz, 130 Hz, 20 µm
 periodic - linear_gap, 130 Hz, 20 µm
 """
 
-from ._figures import LEAST_GAIN, MOTIONS, AccuracyBenchmark, LevelFigures, MotionBenchmark, SolverFigures
-from ._measuring import (
-    Thoroughness,
-    measure_accuracy,
-)
+import lazy_loader
 
-__all__ = [
-    "LEAST_GAIN",
-    "MOTIONS",
-    "AccuracyBenchmark",
-    "LevelFigures",
-    "MotionBenchmark",
-    "SolverFigures",
-    "Thoroughness",
-    "measure_accuracy",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

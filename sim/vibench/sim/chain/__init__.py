@@ -17,34 +17,6 @@ no orbits and no branches of chains. Exponents are those of two neighbouring mot
 [0.1206, 0.0145, 0.0018, 0.0002]
 """
 
-from ._chain import (
-    Chain,
-    chain_of,
-)
-from ._dispersion import (
-    band_gaps,
-    bloch_factor,
-)
-from ._integrate import (
-    integrate_chain,
-)
-from ._lyapunov import (
-    chain_lyapunov_exponent,
-)
-from ._modes import (
-    chain_transmissibility,
-)
-from ._response import (
-    chain_response,
-)
+import lazy_loader
 
-__all__ = [
-    "Chain",
-    "band_gaps",
-    "bloch_factor",
-    "chain_lyapunov_exponent",
-    "chain_of",
-    "chain_response",
-    "chain_transmissibility",
-    "integrate_chain",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

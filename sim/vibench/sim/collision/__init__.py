@@ -7,30 +7,6 @@ springs as fast as the collision, an instant to stop at in the midst of it) noth
 `contact` resolves it in steps. Peaks, lines and the variation follow from the sixteen points.
 """
 
-from ._collision import (
-    Collision,
-    collide,
-    new_collision,
-)
-from ._observer import (
-    observe_collision,
-)
-from ._tables import (
-    CollisionTables,
-    collision_tables,
-)
-from ._variation import (
-    collision_memory,
-    propagate_tangent_collision,
-)
+import lazy_loader
 
-__all__ = [
-    "Collision",
-    "CollisionTables",
-    "collide",
-    "collision_memory",
-    "collision_tables",
-    "new_collision",
-    "observe_collision",
-    "propagate_tangent_collision",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,24 +6,6 @@ run that comes to rest in a repeating motion gets the exponents of that motion; 
 reported as a transient. `lyapunov_spectrum` gives all six and the Kaplan-Yorke dimension.
 """
 
-from ._blocking import (
-    BlockedMean,
-    blocked_mean,
-)
-from ._lyapunov import (
-    LyapunovEstimate,
-    Precision,
-    lyapunov_exponent,
-)
-from ._lyapunov_spectrum import (
-    lyapunov_spectrum,
-)
+import lazy_loader
 
-__all__ = [
-    "BlockedMean",
-    "LyapunovEstimate",
-    "Precision",
-    "blocked_mean",
-    "lyapunov_exponent",
-    "lyapunov_spectrum",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

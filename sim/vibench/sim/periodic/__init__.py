@@ -7,33 +7,6 @@ multipliers of the variational equation, which also tell folds, period doublings
 The spring is a `RestoringForce` of p, the rest a linear structure condensed to p (Krack and Gross 2019).
 """
 
-from ._balance_branch import harmonic_balance_branch
-from ._condensation import (
-    structure_of,
-)
-from ._first_order_balance import first_order_states, jump_frequencies
-from ._floquet import (
-    multipliers,
-)
-from ._orbit_branch import (
-    periodic_branch,
-)
-from ._restoring_force import (
-    PowerSpring,
-    spring_of,
-)
-from ._shooting import (
-    periodic_orbit,
-)
+import lazy_loader
 
-__all__ = [
-    "PowerSpring",
-    "first_order_states",
-    "harmonic_balance_branch",
-    "jump_frequencies",
-    "multipliers",
-    "periodic_branch",
-    "periodic_orbit",
-    "spring_of",
-    "structure_of",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,52 +6,6 @@ and Prince's order 8(5,3) in time (`smooth`). Peaks, lines, samples and the vari
 itself.
 """
 
-from ._flow import (
-    PowerSystem,
-    power_force,
-    whole_power,
-)
-from ._numbers import (
-    FEED,
-    FREE,
-    GAIN,
-    MOVE,
-    POINTS,
-)
-from ._run import (
-    advance_under_power,
-)
-from ._smooth import (
-    MOST_SHORTENINGS,
-    SHORTENING,
-    WALL_TURN,
-    advance_smooth,
-    begin_smooth,
-)
-from ._step import (
-    PowerStepState,
-)
-from ._tables import (
-    PowerTables,
-    power_tables,
-)
+import lazy_loader
 
-__all__ = [
-    "FEED",
-    "FREE",
-    "GAIN",
-    "MOST_SHORTENINGS",
-    "MOVE",
-    "POINTS",
-    "SHORTENING",
-    "WALL_TURN",
-    "PowerStepState",
-    "PowerSystem",
-    "PowerTables",
-    "advance_smooth",
-    "advance_under_power",
-    "begin_smooth",
-    "power_force",
-    "power_tables",
-    "whole_power",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,22 +6,6 @@ variation of an impact is Mueller's correction, the saltation matrix (Leine and 
 7.3); none at grazing.
 """
 
-from ._stop import (
-    RESOLVED,
-    closed_gap,
-    is_resolved,
-    place_between_rigid_stops,
-    rebound,
-)
-from ._variation import (
-    propagate_tangent_impact,
-)
+import lazy_loader
 
-__all__ = [
-    "RESOLVED",
-    "closed_gap",
-    "is_resolved",
-    "place_between_rigid_stops",
-    "propagate_tangent_impact",
-    "rebound",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,36 +6,6 @@ integration error against stricter steps and the scatter of chaotic windows (doc
 `Prediction`, is one flat frozen value. Many scenes at once are the business of `study`.
 """
 
-from ._plan import (
-    ScenePlan,
-    plan_scene,
-)
-from ._prediction import (
-    Method,
-    MotionKind,
-    ScenePrediction,
-)
-from ._scene import (
-    AutomaticDuration,
-    FixedDuration,
-    Given,
-    Observable,
-    Rest,
-    Scene,
-)
-from ._solve import solve_scene
+import lazy_loader
 
-__all__ = [
-    "AutomaticDuration",
-    "FixedDuration",
-    "Given",
-    "Method",
-    "MotionKind",
-    "Observable",
-    "Rest",
-    "Scene",
-    "ScenePlan",
-    "ScenePrediction",
-    "plan_scene",
-    "solve_scene",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

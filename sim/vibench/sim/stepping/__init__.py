@@ -21,46 +21,6 @@ kernel (`kernel`). Tables may be shared by threads.
 0.23
 """
 
-from ._harmonic_run import (
-    advance_by_law,
-    advance_harmonic,
-)
-from ._harmonic_tables import (
-    HarmonicTables,
-    harmonic_tables,
-)
-from ._interval import (
-    advance_interval,
-    base_reaction,
-    interval_tables,
-    new_state,
-    place_on_its_side,
-)
-from ._interval_run import (
-    advance_intervals,
-)
-from ._substep import (
-    FAILED,
-    IntervalTables,
-)
-from ._workspace import (
-    Workspace,
-    workspace_for,
-)
+import lazy_loader
 
-__all__ = [
-    "FAILED",
-    "HarmonicTables",
-    "IntervalTables",
-    "Workspace",
-    "advance_by_law",
-    "advance_harmonic",
-    "advance_interval",
-    "advance_intervals",
-    "base_reaction",
-    "harmonic_tables",
-    "interval_tables",
-    "new_state",
-    "place_on_its_side",
-    "workspace_for",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,28 +5,6 @@ After lift-off the gap grows from nothing, so that the first moment of the fligh
 searched.
 """
 
-from ._lift_off import (
-    closed_for,
-    lift_off,
-    time_to_lift_off,
-)
-from ._sticking import (
-    HeldTables,
-    held_tables,
-    hold,
-    hold_on_series,
-    observe_held,
-    place_held,
-)
+import lazy_loader
 
-__all__ = [
-    "HeldTables",
-    "closed_for",
-    "held_tables",
-    "hold",
-    "hold_on_series",
-    "lift_off",
-    "observe_held",
-    "place_held",
-    "time_to_lift_off",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

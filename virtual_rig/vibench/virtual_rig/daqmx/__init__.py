@@ -6,36 +6,6 @@ played goes through `vibench.virtual_rig.analogue`: it does not know the world b
 of the device table stand in it.
 """
 
-from ._devices import (
-    catalogue_with,
-)
-from ._faults import (
-    Fault,
-    ServerGone,
-)
-from ._pace import (
-    OnDemandPace,
-    Pace,
-    WallPace,
-)
-from ._server import (
-    LOOPBACK,
-    DaqServer,
-    serve,
-)
-from ._token import (
-    token_for,
-)
+import lazy_loader
 
-__all__ = [
-    "LOOPBACK",
-    "DaqServer",
-    "Fault",
-    "OnDemandPace",
-    "Pace",
-    "ServerGone",
-    "WallPace",
-    "catalogue_with",
-    "serve",
-    "token_for",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

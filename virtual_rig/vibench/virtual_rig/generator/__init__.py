@@ -6,40 +6,6 @@ driver tkafg1k and public drivers and measurements; not compared with the labora
 cable and no world.
 """
 
-from ._afg1022 import (
-    AFG1022,
-    MAKER,
-    MODEL,
-    Reply,
-)
-from ._output_signal import (
-    Panel,
-)
-from ._scpi_command import (
-    Quirks,
-)
-from ._scpi_socket import (
-    ScpiSocket,
-)
-from ._scpi_status import (
-    BYTE,
-    ErrorCode,
-    StatusByte,
-)
-from ._terminal_voltage import (
-    Terminal,
-)
+import lazy_loader
 
-__all__ = [
-    "AFG1022",
-    "BYTE",
-    "MAKER",
-    "MODEL",
-    "ErrorCode",
-    "Panel",
-    "Quirks",
-    "Reply",
-    "ScpiSocket",
-    "StatusByte",
-    "Terminal",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,14 +4,6 @@
 on demand, a fault script plays it by rig time (docs/faults.md).
 """
 
-from ._fault_script import load_fault_script
-from ._virtual_rig import (
-    DiskFaults,
-    VirtualRig,
-)
+import lazy_loader
 
-__all__ = [
-    "DiskFaults",
-    "VirtualRig",
-    "load_fault_script",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

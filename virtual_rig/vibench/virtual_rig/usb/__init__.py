@@ -5,22 +5,6 @@ instead of the machine's own devices. Transfers fail as real ones do (errno). So
 9.6, USBTMC 1.0, USB488 1.0.
 """
 
-from ._bus import (
-    plug_in,
-    plug_in_remote,
-    unplug,
-)
-from ._remote import (
-    usb_service,
-)
-from ._usbtmc import (
-    UsbTmcInstrument,
-)
+import lazy_loader
 
-__all__ = [
-    "UsbTmcInstrument",
-    "plug_in",
-    "plug_in_remote",
-    "unplug",
-    "usb_service",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

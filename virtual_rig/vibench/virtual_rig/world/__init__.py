@@ -5,19 +5,6 @@ accelerometer, cables, input stages, anti-alias filter, noise from seeds. Quanti
 step, SI units; rig time counts by the converter's clock. Knows neither SCPI nor DAQmx.
 """
 
-from ._time_grid import (
-    FULL_BAND_HZ,
-    relative_clock_ppm,
-)
-from ._warm_up import (
-    warm_up,
-)
-from ._world import World, virtual_section
+import lazy_loader
 
-__all__ = [
-    "FULL_BAND_HZ",
-    "World",
-    "relative_clock_ppm",
-    "virtual_section",
-    "warm_up",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,71 @@
+from ._dwell import (
+    LEAD_IN_LABEL as LEAD_IN_LABEL,
+    MOST_LEAD_INS as MOST_LEAD_INS,
+    Dwell as Dwell,
+    LeadIn as LeadIn,
+)
+from ._feedback import (
+    BaseLevel as BaseLevel,
+    Settling as Settling,
+)
+from ._held_dwell import (
+    HeldDwell as HeldDwell,
+)
+from ._held_sweep import (
+    HeldSweep as HeldSweep,
+)
+from ._kinds import (
+    KINDS as KINDS,
+    Excitation as Excitation,
+)
+from ._multisine import (
+    held_lines as held_lines,
+)
+from ._multisine_noise import (
+    MultisineNoise as MultisineNoise,
+)
+from ._odd_multisine import (
+    OddMultisine as OddMultisine,
+)
+from ._plan import (
+    LOWEST_AMPLITUDE_VPP as LOWEST_AMPLITUDE_VPP,
+    AbstractExcitation as AbstractExcitation,
+    AbstractFeedback as AbstractFeedback,
+)
+from ._preview import (
+    SignalPreview as SignalPreview,
+)
+from ._resonance_tracking import (
+    RESONANCE_LABEL as RESONANCE_LABEL,
+    ResonanceTracking as ResonanceTracking,
+)
+from ._settled_sine import (
+    GLIDE_TONE_S as GLIDE_TONE_S,
+    SEARCH_LABEL as SEARCH_LABEL,
+    STEP_LABEL as STEP_LABEL,
+    SettledSine as SettledSine,
+)
+from ._sine_sweep import (
+    SineSweep as SineSweep,
+)
+from ._stepped_level import (
+    SteppedLevel as SteppedLevel,
+)
+from ._stepped_sine import (
+    Direction as Direction,
+    FrequencySteps as FrequencySteps,
+    SteppedSine as SteppedSine,
+)
+from ._steps import (
+    Play as Play,
+    Samples as Samples,
+    SampleSource as SampleSource,
+    Segment as Segment,
+    Step as Step,
+    Stream as Stream,
+    Tone as Tone,
+    Waveform as Waveform,
+)
+from ._streamed_noise import (
+    StreamedNoise as StreamedNoise,
+)

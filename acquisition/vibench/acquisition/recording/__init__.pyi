@@ -1,0 +1,52 @@
+from ._disk import (
+    sole_use as sole_use,
+)
+from ._disk_trouble import (
+    DiskTrouble as DiskTrouble,
+    troubled_disks as troubled_disks,
+)
+from ._header import (
+    ROLE_PATTERN as ROLE_PATTERN,
+    ChannelHeader as ChannelHeader,
+    RecordingHeader as RecordingHeader,
+)
+from ._layout import (
+    CHUNK_SAMPLES as CHUNK_SAMPLES,
+    MISSING_COUNT as MISSING_COUNT,
+    PART_SUFFIX as PART_SUFFIX,
+    SUFFIX as SUFFIX,
+    Origin as Origin,
+    RecordingState as RecordingState,
+    part_of as part_of,
+    tmp_of as tmp_of,
+)
+from ._opening import (
+    name_now as name_now,
+)
+from ._overview import (
+    BIN_SAMPLES as BIN_SAMPLES,
+    CountOverview as CountOverview,
+    OverviewSums as OverviewSums,
+)
+from ._preallocate import (
+    HOLD_ROOM_S as HOLD_ROOM_S,
+)
+from ._provenance import (
+    collect_provenance as collect_provenance,
+)
+from ._reader import (
+    RecordedBlock as RecordedBlock,
+    Recording as Recording,
+    open_recording as open_recording,
+)
+from ._recover import (
+    recover as recover,
+)
+from ._results import (
+    ResultArray as ResultArray,
+    SavedResult as SavedResult,
+)
+from ._writer import (
+    RecordingWriter as RecordingWriter,
+    create_recording as create_recording,
+)

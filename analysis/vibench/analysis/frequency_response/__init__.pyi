@@ -1,0 +1,34 @@
+from ._distortion import (
+    Distortion as Distortion,
+    distortion as distortion,
+    is_even_line as is_even_line,
+)
+from ._noise_response import (
+    DEFAULT_REQUEST as DEFAULT_REQUEST,
+    Noise as Noise,
+    NoiseAnalysis as NoiseAnalysis,
+    NoiseResponse as NoiseResponse,
+    noise_response as noise_response,
+)
+from ._periodic import (
+    PeriodicFrequencyResponse as PeriodicFrequencyResponse,
+)
+from ._request import (
+    FrequencyResponseRequest as FrequencyResponseRequest,
+    MagnitudeScale as MagnitudeScale,
+    quantities_named as quantities_named,
+)
+from ._resonance import (
+    Resonance as Resonance,
+    resonances as resonances,
+)
+from ._results import (
+    Estimator as Estimator,
+    FrequencyResponse as FrequencyResponse,
+    FrequencyResponseSettings as FrequencyResponseSettings,
+    converted_frequency_response as converted_frequency_response,
+)
+from ._transmissibility import (
+    frequency_response_of as frequency_response_of,
+    transmissibility as transmissibility,
+)

@@ -1,0 +1,4 @@
+from ._updated_specimen import (
+    UpdatedSpecimen as UpdatedSpecimen,
+    update_model as update_model,
+)

@@ -1,0 +1,28 @@
+from ._channel_levels import (
+    ChannelLevel as ChannelLevel,
+    require_moving_channels as require_moving_channels,
+)
+from ._channels import (
+    BASE as BASE,
+    DRIVE as DRIVE,
+    RESPONSE as RESPONSE,
+    Channels as Channels,
+    ObservedChannels as ObservedChannels,
+    ProgressObserver as ProgressObserver,
+    RecordedChannels as RecordedChannels,
+    Stretch as Stretch,
+    Unobserved as Unobserved,
+    only_stretch as only_stretch,
+    read_whole as read_whole,
+)
+from ._checks import (
+    Check as Check,
+    Verdict as Verdict,
+    measurement_checks as measurement_checks,
+)
+from ._facts import (
+    FeedbackNote as FeedbackNote,
+    RecordingFacts as RecordingFacts,
+    recording_facts as recording_facts,
+    specimen_of as specimen_of,
+)

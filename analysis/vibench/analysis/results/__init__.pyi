@@ -1,0 +1,29 @@
+from ._campaign_results import (
+    AnalysisFailure as AnalysisFailure,
+    CampaignResults as CampaignResults,
+    DwellResult as DwellResult,
+    NoiseResult as NoiseResult,
+    Overlay as Overlay,
+    Result as Result,
+    SteppedSineResult as SteppedSineResult,
+    SweepResult as SweepResult,
+    analyse_files as analyse_files,
+    merged_results as merged_results,
+    overlay as overlay,
+    recordings_in as recordings_in,
+    result_of as result_of,
+)
+from ._compared_recording import (
+    ComparedRecording as ComparedRecording,
+    compare_recording as compare_recording,
+    kept_result as kept_result,
+)
+from ._measurement_analysis import (
+    UNOBSERVED as UNOBSERVED,
+    RecordingAnalysis as RecordingAnalysis,
+    analyse_recording as analyse_recording,
+)
+from ._summary import (
+    campaign_summary as campaign_summary,
+    result_summary as result_summary,
+)

@@ -1,0 +1,61 @@
+from ._collision_region import (
+    CollisionRegion as CollisionRegion,
+    Collisions as Collisions,
+    Edge as Edge,
+    collisions as collisions,
+)
+from ._dwell import (
+    DwellResponse as DwellResponse,
+    dwell_response as dwell_response,
+)
+from ._dwell_analysis import (
+    DwellAnalysis as DwellAnalysis,
+    bound_frequencies_hz as bound_frequencies_hz,
+    measured_dwell as measured_dwell,
+    settled_envelope as settled_envelope,
+)
+from ._dwell_motion import (
+    DwellMotion as DwellMotion,
+    dwell_motion as dwell_motion,
+)
+from ._hysteresis import (
+    Hysteresis as Hysteresis,
+    hysteresis as hysteresis,
+)
+from ._jumps import (
+    Jump as Jump,
+    jumps as jumps,
+)
+from ._level_jumps import (
+    hysteresis_vpp as hysteresis_vpp,
+    level_jumps as level_jumps,
+    level_summary as level_summary,
+)
+from ._stepped_response import (
+    SteppedResponse as SteppedResponse,
+    SteppedSineAnalysis as SteppedSineAnalysis,
+    Steps as Steps,
+    step_label as step_label,
+    stepped_response as stepped_response,
+)
+from ._sweep import (
+    SweepResponse as SweepResponse,
+    SweepSums as SweepSums,
+)
+from ._sweep_analysis import (
+    SweepAnalysis as SweepAnalysis,
+    measured_sweep as measured_sweep,
+    smooth_jumps as smooth_jumps,
+)
+from ._terminal_level import (
+    TerminalLevel as TerminalLevel,
+    terminal_levels as terminal_levels,
+)
+from ._tracked_resonance import (
+    TrackedResonance as TrackedResonance,
+    backbone_sentence as backbone_sentence,
+    feedback_sentences as feedback_sentences,
+    lost_levels as lost_levels,
+    noted_jumps as noted_jumps,
+    tracked_resonances as tracked_resonances,
+)

@@ -1,0 +1,10 @@
+from ._bridge import (
+    Bridge as Bridge,
+    SignOfLife as SignOfLife,
+)
+from ._engine_line import (
+    Starter as Starter,
+)
+from ._live_run import (
+    measurement_called as measurement_called,
+)

@@ -1,0 +1,15 @@
+from ._app_context import (
+    AppContext as AppContext,
+)
+from ._page import (
+    Page as Page,
+    SideAndPicture as SideAndPicture,
+)
+from ._settings import (
+    Remembered as Remembered,
+    Settings as Settings,
+    default_settings_path as default_settings_path,
+)
+from ._user_actions import (
+    UserActions as UserActions,
+)

@@ -1,0 +1,12 @@
+from ._figures import (
+    LEAST_GAIN as LEAST_GAIN,
+    MOTIONS as MOTIONS,
+    AccuracyBenchmark as AccuracyBenchmark,
+    LevelFigures as LevelFigures,
+    MotionBenchmark as MotionBenchmark,
+    SolverFigures as SolverFigures,
+)
+from ._measuring import (
+    Thoroughness as Thoroughness,
+    measure_accuracy as measure_accuracy,
+)

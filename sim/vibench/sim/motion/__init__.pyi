@@ -1,0 +1,31 @@
+from ._flow_derivative import (
+    flow_derivative as flow_derivative,
+)
+from ._integrate import (
+    MAX_IMPACT_RATE_HZ as MAX_IMPACT_RATE_HZ,
+    ROUNDING as ROUNDING,
+    SPARE_IMPACTS as SPARE_IMPACTS,
+    integrate as integrate,
+    new_record as new_record,
+    start_motion as start_motion,
+)
+from ._poincare import (
+    smallest_period as smallest_period,
+    state_scales as state_scales,
+    stroboscopic_section as stroboscopic_section,
+)
+from ._response import (
+    WHOLE as WHOLE,
+    Response as Response,
+    steady_response as steady_response,
+    whole_periods as whole_periods,
+)
+from ._response_curve import (
+    response_curve as response_curve,
+)
+from ._sample_by_sample import (
+    follow_samples as follow_samples,
+)
+from ._trajectory import (
+    Trajectory as Trajectory,
+)

@@ -1,0 +1,20 @@
+from ._plan import (
+    ScenePlan as ScenePlan,
+    plan_scene as plan_scene,
+)
+from ._prediction import (
+    Method as Method,
+    MotionKind as MotionKind,
+    ScenePrediction as ScenePrediction,
+)
+from ._scene import (
+    AutomaticDuration as AutomaticDuration,
+    FixedDuration as FixedDuration,
+    Given as Given,
+    Observable as Observable,
+    Rest as Rest,
+    Scene as Scene,
+)
+from ._solve import (
+    solve_scene as solve_scene,
+)

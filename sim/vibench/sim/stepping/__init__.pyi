@@ -1,0 +1,26 @@
+from ._harmonic_run import (
+    advance_by_law as advance_by_law,
+    advance_harmonic as advance_harmonic,
+)
+from ._harmonic_tables import (
+    HarmonicTables as HarmonicTables,
+    harmonic_tables as harmonic_tables,
+)
+from ._interval import (
+    advance_interval as advance_interval,
+    base_reaction as base_reaction,
+    interval_tables as interval_tables,
+    new_state as new_state,
+    place_on_its_side as place_on_its_side,
+)
+from ._interval_run import (
+    advance_intervals as advance_intervals,
+)
+from ._substep import (
+    FAILED as FAILED,
+    IntervalTables as IntervalTables,
+)
+from ._workspace import (
+    Workspace as Workspace,
+    workspace_for as workspace_for,
+)

@@ -1,0 +1,23 @@
+from ._afg1022 import (
+    AFG1022 as AFG1022,
+    MAKER as MAKER,
+    MODEL as MODEL,
+    Reply as Reply,
+)
+from ._output_signal import (
+    Panel as Panel,
+)
+from ._scpi_command import (
+    Quirks as Quirks,
+)
+from ._scpi_socket import (
+    ScpiSocket as ScpiSocket,
+)
+from ._scpi_status import (
+    BYTE as BYTE,
+    ErrorCode as ErrorCode,
+    StatusByte as StatusByte,
+)
+from ._terminal_voltage import (
+    Terminal as Terminal,
+)
