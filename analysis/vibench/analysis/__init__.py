@@ -9,13 +9,13 @@ no instrument, no window. Names below are looked up on first use.
 A mass on a base that shakes as noise, resonant at 95 Hz with a damping ratio of 0.01:
 
 >>> import numpy as np
->>> from vibench.analysis import resonances, transmission
+>>> from vibench.analysis import resonances, transmissibility
 >>> rate_hz = 2048.0
 >>> base = np.random.default_rng(1).standard_normal(60 * 2048)
 >>> ratio = np.fft.rfftfreq(base.size, 1 / rate_hz) / 95.0
 >>> factor = (1 + 0.02j * ratio) / (1 + 0.02j * ratio - ratio**2)
 >>> mass = np.fft.irfft(factor * np.fft.rfft(base), base.size)
->>> found = transmission(base, mass, rate_hz, segment_samples=8192)
+>>> found = transmissibility(base, mass, rate_hz, segment_samples=8192)
 >>> (peak,) = resonances(found, low_hz=60.0, high_hz=140.0)
 >>> print(f"{peak.frequency_hz:.1f} Hz, damping ratio {peak.damping_ratio:.2f}")
 95.0 Hz, damping ratio 0.01

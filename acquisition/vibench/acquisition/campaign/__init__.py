@@ -10,12 +10,12 @@ docs/decisions/0014-chains-of-points.md.
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory
 >>> from vibench.acquisition import load_campaign, shipped
->>> from vibench.acquisition.campaign import estimate
+>>> from vibench.acquisition.campaign import estimate_campaign
 >>> from vibench.acquisition.rig import load_rig
 >>> campaign = load_campaign(shipped("campaigns/quick.toml"))
 >>> rig = load_rig(shipped("hardware_configs/virtual_rig.toml"))
 >>> with TemporaryDirectory() as folder:
-...     needed = estimate(campaign, rig, Path(folder))
+...     needed = estimate_campaign(campaign, rig, Path(folder))
 >>> needed.recordings, needed.kept, round(needed.duration_s)
 (15, 0, 63)
 """

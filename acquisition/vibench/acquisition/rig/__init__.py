@@ -9,9 +9,9 @@ docs/hardware.md.
 The peak acceleration of the table [m/s2] for one volt at the generator, at 260 Hz:
 
 >>> from vibench.acquisition import shipped
->>> from vibench.acquisition.rig import Quantity, RigModel, channels_of, load_rig
+>>> from vibench.acquisition.rig import BaseQuantity, RigModel, channels_of, load_rig
 >>> rig = load_rig(shipped("hardware_configs/virtual_rig.toml"))
->>> f"{abs(RigModel(rig).transfer(Quantity.ACCELERATION, 260.0)):.1f}"
+>>> f"{abs(RigModel(rig).transfer(BaseQuantity.ACCELERATION, 260.0)):.1f}"
 '65.9'
 >>> [channel.role.value for channel in channels_of(rig)]
 ['drive_voltage', 'amplifier_voltage', 'base_acceleration', 'm0_velocity']

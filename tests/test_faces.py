@@ -1,0 +1,155 @@
+"""What stands on a face may be imported; what stands behind it is private to its room."""
+
+import ast
+import doctest
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PORTIONS = ("sim", "acquisition", "virtual_rig", "analysis", "gui", "cli")
+FOR_PEOPLE = (
+    "vibench.sim",
+    "vibench.sim.study",
+    "vibench.sim.chain",
+    "vibench.virtual_rig",
+    "vibench.acquisition",
+    "vibench.acquisition.plan",
+    "vibench.acquisition.rig",
+    "vibench.acquisition.recording",
+    "vibench.acquisition.campaign",
+    "vibench.acquisition.engine",
+    "vibench.analysis",
+    "vibench.analysis.live",
+    "vibench.analysis.report",
+    "vibench.analysis.exchange",
+)
+FOR_OUR_PROGRAMS = (
+    "vibench.sim.kernels",
+    "vibench.sim.stepping",
+    "vibench.sim.accuracy_benchmark",
+    "vibench.analysis.simulation",
+    "vibench.analysis.reproduction",
+)
+ONE_FILE_ROOMS = ("errors", "instruments", "tables", "analogue")
+
+
+def sources():
+    """Every source file of ours: its package, the module's dotted name, its room, its path."""
+    for portion in PORTIONS:
+        for path in sorted((ROOT / portion / "vibench").rglob("*.py")):
+            parts = path.relative_to(ROOT / portion).with_suffix("").parts
+            yield (
+                portion,
+                ".".join(parts[:-1] if parts[-1] == "__init__" else parts),
+                ".".join(parts[:-1]),
+                path,
+            )
+
+
+MODULES = {name: path for _, name, _, path in sources()}
+
+
+def imports_of(path, room):
+    """Absolute module and names of every import of ours in a file."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if not isinstance(node, ast.ImportFrom):
+            continue
+        base = room.split(".")[: len(room.split(".")) - node.level + 1] if node.level else []
+        target = ".".join([*base, *([node.module] if node.module else [])])
+        if target.startswith("vibench"):
+            yield node.lineno, target, [each.name for each in node.names]
+
+
+def trespasses(room, package, target, names):
+    """Say what an import reaches that is not shown to it."""
+    other = ".".join(target.split(".")[:2])
+    if other != package:
+        if target not in FOR_PEOPLE + FOR_OUR_PROGRAMS:
+            yield f"{target} is no public face"
+        return
+    own = target == room or target.rpartition(".")[0] == room
+    private = target.rpartition(".")[2].startswith("_") and not target.endswith("__main__")
+    if private and not own:
+        yield f"{target} is private to its room"
+    yield from (
+        f"{target}.{name} is private to its room"
+        for name in names
+        if name.startswith("_") and f"{target}.{name}" in MODULES and target != room
+    )
+
+
+def test_nobody_reaches_past_a_face():
+    found = [
+        f"{path.relative_to(ROOT)}:{line}: {trespass}"
+        for portion, _, room, path in sources()
+        for line, target, names in imports_of(path, room)
+        for trespass in trespasses(room, f"vibench.{portion}", target, names)
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    ("room", "package", "target", "names"),
+    [
+        ("vibench.analysis.sine", "vibench.analysis", "vibench.sim.flight", ["fly"]),
+        ("vibench.analysis.sine", "vibench.analysis", "vibench.analysis.chaos._verdict", ["motion_verdict"]),
+        ("vibench.analysis.sine", "vibench.analysis", "vibench.analysis.chaos", ["_verdict"]),
+    ],
+)
+def test_a_planted_trespass_is_found(room, package, target, names):
+    assert list(trespasses(room, package, target, names))
+
+
+def test_every_module_in_a_room_is_private_or_a_program_or_a_room_of_one_file():
+    loose = [
+        name
+        for _, name, room, path in sources()
+        if path.name != "__init__.py"
+        and not name.rpartition(".")[2].startswith("_")
+        and not room.startswith("vibench.cli")  # commands are loaded by their names
+        and name.rpartition(".")[2] not in ONE_FILE_ROOMS
+    ]
+    assert loose == []
+
+
+@pytest.mark.parametrize("room", sorted({room for _, _, room, _ in sources()} - {"vibench"}))
+def test_a_room_says_what_it_is_for_and_every_name_on_its_face_is_there(room):
+    face = importlib.import_module(room)
+    assert len(face.__doc__.split()) > 5
+    names = getattr(face, "__all__", [])
+    assert sorted(set(names)) == sorted(names)
+    for name in names:
+        getattr(face, name)
+
+
+@pytest.mark.parametrize("face", FOR_PEOPLE)
+def test_the_example_of_a_face_runs(face):
+    result = doctest.testmod(importlib.import_module(face))
+    assert result.attempted
+    assert result.failed == 0
+
+
+def loaded_by(program):
+    """Names of modules that a program of its own has loaded at its end."""
+    program += "\nimport sys; print(*sorted(sys.modules))"
+    return subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    ).stdout.split()
+
+
+@pytest.mark.parametrize(
+    ("program", "heavy"),
+    [
+        ("import vibench.sim, vibench.sim.study, vibench.acquisition.rig", {"numba", "scipy", "h5py"}),
+        ("from vibench.acquisition.plan import Measurement", {"numba", "pyvisa", "nidaqmx", "grpc"}),
+        ("from vibench.acquisition.engine import EngineClient", {"pyvisa", "nidaqmx", "grpc", "numba"}),
+        ("from vibench.virtual_rig import plug_in_remote", {"numba", "nidaqmx"}),
+        ("import vibench.cli", {"numpy", "typer"}),
+    ],
+)
+def test_importing_a_face_loads_no_driver_and_nothing_that_a_name_does_not_need(program, heavy):
+    assert heavy.isdisjoint(loaded_by(program))
