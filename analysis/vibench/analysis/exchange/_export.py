@@ -1,7 +1,11 @@
 """An excerpt of a recording becomes a file that other programs read."""
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from enum import Enum, StrEnum, auto
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Protocol
 
 from ._csv import write_csv_samples
 from ._excerpt import Excerpt, TransferObserver, unobserved
@@ -53,29 +57,72 @@ def export_samples(
         When results are asked for and none is saved.
 
     """
-    recording = excerpt.recording
-    are_included = results is Results.INCLUDED
-    if to is Format.MAT:
-        require_small(excerpt)
-        structs = matlab_results(recording) if are_included else {}
+    return EXPORTERS[to].export(excerpt, path, results, observer)
+
+
+class Exporter(Protocol):
+    """A row of `EXPORTERS`: how an excerpt becomes files of one format."""
+
+    def export(
+        self, excerpt: Excerpt, path: Path, results: Results, observer: TransferObserver
+    ) -> tuple[Path, ...]:
+        """Write the files; gives them. Nothing is left of what could not be written whole."""
+
+
+def _accept(_excerpt: Excerpt) -> None:
+    """Take an excerpt of any length."""
+
+
+@dataclass(frozen=True)
+class SamplesFile:
+    """A format for samples alone: the facts go into a document beside it, results into tables."""
+
+    write: Callable[[Excerpt, Path, TransferObserver], None]
+    require: Callable[[Excerpt], None] = _accept
+    """Raises InvalidRequest for what the format cannot hold."""
+
+    def export(
+        self, excerpt: Excerpt, path: Path, results: Results, observer: TransferObserver
+    ) -> tuple[Path, ...]:
+        """Write samples, facts and tables, once every name is known to be free."""
+        recording, facts = excerpt.recording, facts_path(path)
+        are_included = results is Results.INCLUDED
+        require_unused(facts)
+        self.require(excerpt)
+        if are_included:
+            result_paths(recording, path)
         with new_file(path) as unfinished:
-            write_mat(excerpt, unfinished, structs, observer)
+            self.write(excerpt, unfinished, observer)
+        with new_file(facts) as unfinished:
+            write_facts(excerpt, unfinished)
+        tables = write_result_tables(recording, path) if are_included else ()
+        return path, facts, *tables
+
+
+@dataclass(frozen=True)
+class WholeFile:
+    """A format with a place for facts and results too."""
+
+    write: Callable[[Excerpt, Path, Mapping[str, Any], TransferObserver], None]
+    require: Callable[[Excerpt], None] = _accept
+
+    def export(
+        self, excerpt: Excerpt, path: Path, results: Results, observer: TransferObserver
+    ) -> tuple[Path, ...]:
+        """Write everything into one file."""
+        self.require(excerpt)
+        structs = matlab_results(excerpt.recording) if results is Results.INCLUDED else {}
+        with new_file(path) as unfinished:
+            self.write(excerpt, unfinished, structs, observer)
         return (path,)
-    facts = facts_path(path)
-    require_unused(facts)
-    if to is Format.WAV:
-        require_sound(excerpt)
-    if are_included:
-        result_paths(recording, path)
-    with new_file(path) as unfinished:
-        match to:
-            case Format.CSV:
-                write_csv_samples(excerpt, unfinished, observer)
-            case Format.UFF:
-                write_uff(excerpt, unfinished, observer)
-            case Format.WAV:
-                write_wav(excerpt, unfinished, observer)
-    with new_file(facts) as unfinished:
-        write_facts(excerpt, unfinished)
-    tables = write_result_tables(recording, path) if are_included else ()
-    return path, facts, *tables
+
+
+EXPORTERS: Mapping[Format, Exporter] = MappingProxyType(
+    {
+        Format.CSV: SamplesFile(write_csv_samples),
+        Format.UFF: SamplesFile(write_uff),
+        Format.MAT: WholeFile(write_mat, require_small),
+        Format.WAV: SamplesFile(write_wav, require_sound),
+    }
+)
+"""How each format is written: a new one is a file with its writer, its word above, and its row here."""
