@@ -33,7 +33,7 @@ def main() -> None:
     frames: dict[str, Callable[[], object]] = {
         "lanes": lambda: view.time_histories(SPAN_S, COLUMNS),
         "spectrum": view.spectrum,
-        "transmission": view.transmission,
+        "transmission": view.frequency_response,
         "phase portrait and section": view.portrait,
         "course of the sweep": view.history,
     }

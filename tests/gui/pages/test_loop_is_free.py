@@ -143,7 +143,7 @@ def of_compare(window, recording, folder):
     yield Action(
         "analyse a recording",
         lambda: compare.add_recordings((recording,)),
-        lambda: len(compare.curves.traces) > 3 and not compare.is_busy,
+        lambda: len(compare.curves.curves) > 3 and not compare.is_busy,
     )
     for ending in ("svg", "html"):
         path = folder / f"comparison.{ending}"
@@ -192,7 +192,7 @@ def of_run(window):
         sine = np.sin(2 * np.pi * 260.0 * np.arange(first, first + size) / RATE_HZ)
         view.add(first, np.tile(sine.astype(np.float32), (len(LONG_CHANNELS), 1)))
         run.time_histories.show_view(view, 2.0)
-        for picture in (run.watch_card, run.transmission, run.spectrum):
+        for picture in (run.watch_card, run.frequency_response, run.spectrum):
             picture.show_view(view)
 
     # As the bridge does when a bench is opened.
