@@ -18,8 +18,8 @@ from pathlib import Path
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.engine import EngineClient, EngineState, Supervision, start_engine
-from vibench.acquisition.engine._requests import Look
-from vibench.acquisition.engine._wire import Message, send
+from vibench.acquisition.engine._verbs import VERBS
+from vibench.acquisition.engine._wire import send
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
 
@@ -40,7 +40,7 @@ def frozen_viewer(stack: ExitStack, client: EngineClient) -> None:
     stack.callback(client.close)
     try:
         while True:
-            send(connection, Message(Look(most=512_000).model_dump_json().encode()))
+            send(connection, VERBS["look"].message(most=512_000))
     except BlockingIOError:
         return
 

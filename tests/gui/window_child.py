@@ -5,7 +5,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QTimer
 
-from vibench.acquisition.engine import EngineState
+from vibench.acquisition.engine import EngineClient, EngineState
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
 from vibench.gui.page import AppContext, Settings
@@ -40,7 +40,7 @@ def main(folder: Path, config: Path) -> None:
                 bridge.arm(Campaign.model_validate(PLAN), folder / "recordings")
             case ["armed"], EngineState.ARMED:
                 done.append("started")
-                bridge.start()
+                bridge.order(EngineClient.start)
             case ["armed", "started"], EngineState.RUNNING if run is not None and run.segment == "dwell":
                 done.append("told")
                 print("running", flush=True)  # noqa: T201 - its word to the test

@@ -27,9 +27,9 @@ from vibench.acquisition.engine import (
 )
 from vibench.acquisition.engine._address import EngineAddress
 from vibench.acquisition.engine._errors import EngineError
-from vibench.acquisition.engine._requests import Look
 from vibench.acquisition.engine._state import ConnectionRole
-from vibench.acquisition.engine._wire import Message, send
+from vibench.acquisition.engine._verbs import VERBS
+from vibench.acquisition.engine._wire import send
 from vibench.acquisition.errors import InstrumentBusy
 from vibench.acquisition.recording import RecordingState
 from vibench.virtual_rig import VirtualRig
@@ -88,7 +88,7 @@ class TestTheJob:
 
     def test_the_newest_samples_are_those_of_the_recording(self, client, shipped_rig, tmp_path):
         running(client, shipped_rig, tmp_path)
-        newest_samples = client.look(0, 10_000)
+        newest_samples = client.look(most=10_000)
         client.stop(StopLevel.ABORT)
         until_state(client, EngineState.READY)
         assert newest_samples.volts.shape == (4, 10_000)
@@ -166,7 +166,7 @@ class TestRefusals:
     def test_what_the_state_does_not_allow_is_refused_with_a_sentence(self, client, tmp_path):
         with pytest.raises(EngineError, match=r"is closed and cannot start now; it can when it is armed"):
             client.start()
-        with pytest.raises(EngineError, match="nothing is being recorded"):
+        with pytest.raises(EngineError, match="cannot mark now"):
             client.mark("too early")
         client.stop(StopLevel.OFF)
         client.disarm()
@@ -263,7 +263,7 @@ class TestNobodyLooks:
         with EngineClient.attach(process.address) as frozen:
             # Asks for much, and reads nothing of it.
             for _ in range(20):
-                send(frozen._connection, Message(Look(most=500_000).model_dump_json().encode()))
+                send(frozen._connection, VERBS["look"].message(most=500_000))
             before = client.status().samples
             until(client, lambda status: status.samples > before + 500_000)
 

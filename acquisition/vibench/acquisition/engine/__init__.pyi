@@ -3,6 +3,9 @@ from ._announcement import (
     announced_engines as announced_engines,
     the_engine as the_engine,
 )
+from ._campaign_request import (
+    CampaignRequest as CampaignRequest,
+)
 from ._client import (
     EngineClient as EngineClient,
 )
@@ -23,9 +26,6 @@ from ._lock import (
 )
 from ._request_handler import (
     RequestHandler as RequestHandler,
-)
-from ._requests import (
-    CampaignRequest as CampaignRequest,
 )
 from ._sample_buffer import (
     SampleSlice as SampleSlice,

@@ -25,9 +25,9 @@ from ..check import check_and_keep, require_fresh
 from ..errors import AcquisitionError, CheckStopped, InstrumentLost
 from ..rig import Confirm, Rig
 from ..stopping import StopSwitch, stop_on_signal
+from ._campaign_request import CampaignRequest
 from ._lock import BenchLock
 from ._published_state import PublishedState
-from ._requests import CampaignRequest
 from ._state import EngineState, Supervision
 from ._status import BenchFacts, ChannelFacts
 

@@ -1,19 +1,15 @@
-"""A heartbeat: tells an engine, from whoever must not freeze unnoticed, that it is alive; waits for
-nothing.
-"""
+"""A heartbeat: tells an engine, from whoever must not freeze unnoticed, that it is alive."""
 
-import socket
 from contextlib import suppress
 
-from . import _requests as ask
 from ._address import EngineAddress
-from ._client import PATIENCE_S
-from ._errors import EngineGone
+from ._connection import connected
 from ._state import ConnectionRole
-from ._wire import Message, receive, send
+from ._verbs import VERBS
+from ._wire import send
 
 READ_BYTES = 1 << 20
-_BEAT = Message(ask.Beat().model_dump_json().encode())
+_BEAT = VERBS["beat"].message()
 
 
 class Heartbeat:
@@ -24,17 +20,7 @@ class Heartbeat:
     """
 
     def __init__(self, address: EngineAddress) -> None:
-        hello = ask.Hello(token=address.token, role=ConnectionRole.ATTENDING)
-        try:
-            self._connection = socket.create_connection((address.host, address.port), PATIENCE_S)
-            send(self._connection, Message(hello.model_dump_json().encode()))
-            receive(self._connection)
-        except OSError as error:
-            raise EngineGone(
-                f"no engine answers at {address.host}:{address.port} ({error}); start one, or see whether it "
-                "has ended"
-            ) from error
-        self._connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._connection = connected(address, ConnectionRole.ATTENDING)
         self._connection.settimeout(0)
 
     def beat(self) -> None:

@@ -1,15 +1,11 @@
-"""The engine's request handler: every request is answered at once, from any thread, and none touches an
-instrument.
+"""The engine's request handler: answers at once, from any thread, and touches no instrument."""
 
-Arming: a campaign is refused with reasons, or put into words that an experimenter can check.
-
-Confirming knobs with a sheet that was filled in before, in a window or a file.
-"""
-
+from collections.abc import Callable, Mapping
 from datetime import timedelta
 from pathlib import Path
 from threading import Lock
 from time import monotonic
+from typing import TypeVar
 
 from ..bench import Bench
 from ..campaign import planned_recordings
@@ -19,13 +15,16 @@ from ..plan import LimitCheck, require_within_limits
 from ..rig import Confirm, Knob, KnobSheet, Rig
 from ..run import drive_for
 from ..stopping import Cause, StopLevel, StopRequest, StopSwitch
+from ._campaign_request import CampaignRequest
 from ._engine import Engine
 from ._errors import EngineError
 from ._job_queue import JobQueue
-from ._requests import CampaignRequest
 from ._sample_buffer import SampleSlice
 from ._state import DRIVING, SOUNDING, VIEWER_PATIENCE_S, EngineState, Supervision
 from ._status import ArmedPlan, EngineStatus
+from ._verbs import Verb
+
+Answer = TypeVar("Answer")
 
 ARMED_S = 60.0
 """An armed engine disarms itself after this long [s]."""
@@ -94,8 +93,9 @@ STALL_S = 0.2
 class RequestHandler:
     """Takes what is asked of an engine.
 
-    It answers from what is known, puts a job into the engine's queue or presses its switch. A method
-    raises `EngineError` with one sentence when the engine's state does not allow what was asked.
+    It answers from what is known, puts a job into the engine's queue or presses its switch. `carry_out` is
+    the way in for whoever asks: it raises `EngineError` with one sentence when the engine's state does not
+    permit what was asked. Each verb has a method here, with the parameters of `EngineVerbs`.
     """
 
     def __init__(self, engine: Engine, jobs: JobQueue) -> None:
@@ -106,88 +106,94 @@ class RequestHandler:
         self._armed_s = 0.0
         self._last_request_s = self._last_round_s = monotonic()
 
+    def carry_out(self, verb: Verb[Answer], arguments: Mapping[str, object]) -> Answer:
+        """Do what a verb asks for, if the engine's state permits it."""
+        method: Callable[..., Answer] = getattr(self, verb.method)
+        if not verb.states:  # a stop gets through, whatever else is being asked
+            return method(**arguments)
+        with self._asking:
+            state = self._engine.published.state
+            if state not in verb.states:
+                now, *permitted = (each.value.replace("_", " ") for each in (state, *verb.states))
+                allowed = " or ".join(permitted)
+                raise EngineError(
+                    f"the engine is {now} and cannot {verb.word} now; it can when it is {allowed}"
+                )
+            return method(**arguments)
+
     def note_presence(self) -> None:
         """Note that somebody is there."""
         self._last_request_s = monotonic()
+
+    def beat(self) -> None:
+        """Do nothing: who asks has been noted."""
 
     def status(self) -> EngineStatus:
         """Say where the engine stands."""
         return self._engine.published.status()
 
-    def look(self, since_sample: int, most: int) -> SampleSlice:
+    def status_since(self, known_rows: int = -1) -> EngineStatus:
+        """Say where the engine stands, and leave out rows that are known."""
+        status = self.status()
+        return status.model_copy(update={"rows": ()}) if status.rows_number == known_rows else status
+
+    def look(self, since_sample: int = 0, *, most: int) -> SampleSlice:
         """Give the newest samples of the run."""
         return self._engine.published.sample_buffer.since(since_sample, most)
 
     def open(self, rig: Rig, confirmations: KnobSheet | None = None) -> None:
         """Open the bench of a rig."""
-        with self._asking:
-            self._require("open a bench", EngineState.CLOSED, EngineState.FAULT)
-            self._engine.published.enter(EngineState.OPENING)
-            confirm = None if rig.virtual is not None else confirmed_by(confirmations)
-            self._jobs.put(lambda: self._engine.open(rig, confirm))
+        self._engine.published.enter(EngineState.OPENING)
+        confirm = None if rig.virtual is not None else confirmed_by(confirmations)
+        self._jobs.put(lambda: self._engine.open(rig, confirm))
 
-    def close(self) -> None:
+    def close_bench(self) -> None:
         """Close the bench."""
-        with self._asking:
-            self._require(
-                "close the bench", EngineState.READY, EngineState.ARMED, EngineState.FAULT, EngineState.CLOSED
-            )
-            self._disarm()
-            self._jobs.put(self._engine.close)
+        self._disarm()
+        self._jobs.put(self._engine.close)
 
     def check(self, folder: Path = Path()) -> None:
         """Check the bench with a small sine; ``folder`` is where recordings will go."""
-        with self._asking:
-            self._require("check the bench", EngineState.READY)
-            self._engine.switch = StopSwitch()
-            self._engine.published.enter(EngineState.CHECKING)
-            self._jobs.put(lambda: self._engine.check(folder))
+        self._engine.switch = StopSwitch()
+        self._engine.published.enter(EngineState.CHECKING)
+        self._jobs.put(lambda: self._engine.check(folder))
 
-    def arm(self, request: CampaignRequest) -> ArmedPlan:
+    def arm_request(self, campaign_request: CampaignRequest) -> ArmedPlan:
         """Get ready to carry out a campaign; raises AcquisitionError with the reasons when it cannot be."""
-        with self._asking:
-            self._require("arm", EngineState.READY, EngineState.ARMED)
-            plan = armed_plan(self._engine.bench, request)
-            self._request = request
-            self._armed_s = monotonic()
-            self._engine.published.arm(plan, request.campaign)
-            return plan
+        plan = armed_plan(self._engine.bench, campaign_request)
+        self._request = campaign_request
+        self._armed_s = monotonic()
+        self._engine.published.arm(plan, campaign_request.campaign)
+        return plan
 
     def disarm(self) -> None:
-        """Take back what was armed. Legal in every state."""
+        """Take back what was armed."""
         with self._asking:
             self._disarm()
 
     def start(self) -> None:
         """Carry out what is armed."""
-        with self._asking:
-            self._require("start", EngineState.ARMED)
-            assert self._request is not None
-            request, self._request = self._request, None
-            self._engine.switch = StopSwitch()
-            self._engine.published.enter(EngineState.RUNNING)
-            self._jobs.put(lambda: self._engine.measure(request))
+        assert self._request is not None
+        request, self._request = self._request, None
+        self._engine.switch = StopSwitch()
+        self._engine.published.enter(EngineState.RUNNING)
+        self._jobs.put(lambda: self._engine.measure(request))
 
-    def stop(self, request: StopRequest) -> None:
-        """Hold or end what runs, and disarm what is armed. Legal in every state, and never refused."""
-        # Without the lock: whatever else is being asked, a stop gets through.
-        self._engine.switch.ask(request)
-        if request.level is not StopLevel.HOLD and self._engine.published.state is EngineState.ARMED:
-            self.disarm()
+    def stop(self, level: StopLevel, reason: str = "stopped by the operator") -> None:
+        """Hold or end what runs, and disarm what is armed."""
+        self._stop(StopRequest(Cause.OPERATOR, level, reason))
 
     def resume(self) -> None:
-        """Go on after a hold. Legal in every state."""
+        """Go on after a hold."""
         self._engine.switch.resume()
 
     def mark(self, text: str) -> None:
         """Note an event at the next sample of the recording."""
-        if self._engine.published.state not in DRIVING:
-            raise EngineError("nothing is being recorded that could be marked; start a measurement first")
         self._engine.switch.mark(text)
 
-    def shutdown(self, cause: Cause, reason: str) -> None:
+    def shutdown(self, cause: Cause = Cause.OPERATOR, reason: str = "the engine was told to end") -> None:
         """End what runs, silence everything, and let the engine end. Legal in every state."""
-        self.stop(StopRequest.by(cause, reason))
+        self._stop(StopRequest.by(cause, reason))
         self._jobs.leave()
 
     def enforce_deadlines(self) -> None:
@@ -224,15 +230,12 @@ class RequestHandler:
             kept = "; the recording is kept" if engine.published.state in DRIVING else ""
             engine.published.messages.warn(f"The viewer is gone: {reason}.", f"Ramped down{kept}.")
 
+    def _stop(self, request: StopRequest) -> None:
+        self._engine.switch.ask(request)
+        if request.level is not StopLevel.HOLD and self._engine.published.state is EngineState.ARMED:
+            self.disarm()
+
     def _disarm(self) -> None:
         if self._engine.published.state is EngineState.ARMED:
             self._request = None
             self._engine.published.enter(EngineState.READY)
-
-    def _require(self, wanted: str, *allowed: EngineState) -> None:
-        state = self._engine.published.state
-        if state not in allowed:
-            raise EngineError(
-                f"the engine is {state.value.replace('_', ' ')} and cannot {wanted} now; "
-                f"it can when it is {' or '.join(each.value for each in allowed)}"
-            )

@@ -1,43 +1,36 @@
 """The engine's server: loopback, a token, and one thread a connection, which alone may wait for its viewer.
 
-From a request as it came over the wire to the answer that goes back.
-
-The engine's watchdog: enforces its deadlines while the engine's own thread is at work.
-
-An engine that is being served: others find it and ask it, and the watchdog runs, while inside.
+`serving` makes an engine one that others find and ask, with a watchdog that enforces deadlines while the
+engine's own thread is at work.
 """
 
 import hmac
 import json
 import secrets
 import socket
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
-from pathlib import Path
 from threading import Event, Thread
-from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from ..errors import AcquisitionError
-from ..stopping import Cause, StopRequest
-from . import _requests as ask
 from ._address import EngineAddress
 from ._announcement import announced
+from ._connection import Hello
 from ._errors import EngineError
 from ._request_handler import RequestHandler
-from ._sample_buffer import SampleSlice
 from ._state import ConnectionRole
+from ._verbs import DONE, REQUEST, VERBS
 from ._wire import Message, WireError, receive, send
-
-DONE = Message(b'{"ok": true}')
 
 
 def answered(handler: RequestHandler, message: Message) -> Message:
     """Do what a message asks for; what is refused comes back as one sentence."""
     try:
-        request = ask.REQUEST.validate_json(message.text)
-        return _answer(handler, request)
+        arguments = dict(REQUEST.validate_json(message.text))
+        verb = VERBS[arguments.pop("ask")]
+        return verb.answer.written(handler.carry_out(verb, arguments))
     except ValidationError as error:
         detail = error.errors()[0]
         where = ".".join(str(part) for part in detail["loc"])
@@ -53,60 +46,13 @@ def refused(sentence: str, error: Exception) -> Message:
     return Message(json.dumps({"refused": sentence, "kind": type(error).__name__}).encode())
 
 
-def _answer(handler: RequestHandler, request: ask.Request) -> Message:
-    match request:
-        case ask.Status(known_rows=known):
-            status = handler.status()
-            is_known = status.rows_number == known
-            return _model(status.model_copy(update={"rows": ()}) if is_known else status)
-        case ask.Look(since_sample=since, most=most):
-            return _slice_message(handler.look(since, most))
-        case ask.Arm(campaign_request=campaign_request):
-            return _model(handler.arm(campaign_request))
-        case _:
-            _ACTIONS[type(request)](handler, request)
-            return DONE
-
-
-_ACTIONS: Mapping[type, Callable[[RequestHandler, Any], None]] = {
-    ask.Hello: lambda _handler, _asked: None,
-    ask.Beat: lambda _handler, _asked: None,
-    ask.Open: lambda handler, asked: handler.open(asked.rig, asked.confirmations),
-    ask.Close: lambda handler, _asked: handler.close(),
-    ask.Check: lambda handler, asked: handler.check(Path(asked.folder)),
-    ask.Disarm: lambda handler, _asked: handler.disarm(),
-    ask.Start: lambda handler, _asked: handler.start(),
-    ask.Stop: lambda handler, asked: handler.stop(StopRequest(Cause.OPERATOR, asked.level, asked.reason)),
-    ask.Resume: lambda handler, _asked: handler.resume(),
-    ask.Mark: lambda handler, asked: handler.mark(asked.text),
-    ask.Shutdown: lambda handler, _asked: handler.shutdown(Cause.OPERATOR, "the engine was told to end"),
-}
-"""What is done, and answered with no more than that it was."""
-
-
-def _model(model: BaseModel) -> Message:
-    return Message(model.model_dump_json().encode())
-
-
-def _slice_message(newest_samples: SampleSlice) -> Message:
-    facts = {
-        "run_id": newest_samples.run_id,
-        "first_sample": newest_samples.first_sample,
-        "sample_rate_hz": newest_samples.sample_rate_hz,
-        "shape": newest_samples.volts.shape,
-    }
-    return Message(json.dumps(facts).encode(), newest_samples.volts.astype("<f4").tobytes())
-
-
 LOOPBACK = "127.0.0.1"
 GREETING_S = 5.0
 """How long a connection may take to say who it is [s]."""
 
 
 class Server:
-    """Answers through a request handler. Nobody is let in without the token, from this computer or
-    another.
-    """
+    """Answers through a request handler. Nobody is let in without the token."""
 
     def __init__(self, handler: RequestHandler, host: str = LOOPBACK, port: int = 0) -> None:
         self._handler = handler
@@ -150,13 +96,13 @@ class Server:
     def _let_in(self, connection: socket.socket) -> ConnectionRole | None:
         """Say what the connection is for, or turn it away."""
         try:
-            hello = ask.Hello.model_validate_json(receive(connection).text)
+            hello = Hello.model_validate_json(receive(connection).text)
         except ValidationError:
-            hello = ask.Hello(token="")
+            hello = Hello(token="")
         if hmac.compare_digest(hello.token.encode(), self._token.encode()):
             if hello.role is ConnectionRole.ATTENDING:
                 self._handler.note_presence()
-            send(connection, DONE)
+            send(connection, DONE.written(None))
             return hello.role
         send(connection, refused("the token is not this engine's; nobody was let in", EngineError()))
         return None

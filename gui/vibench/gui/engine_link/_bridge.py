@@ -6,7 +6,7 @@ A sign of life for the engine while the window paints: that may take longer than
 from collections.abc import Callable
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import Any, Concatenate, ParamSpec
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,7 @@ PIECE_S = 0.2
 BEAT_S = 0.04
 """The engine is not told more often than this that the window lives; it waits for half a second."""
 
+P = ParamSpec("P")
 Snapshot = tuple[EngineStatus, SampleSlice | None]
 
 
@@ -138,13 +139,11 @@ class Bridge(QObject):
         self._rig = rig
         self._order(lambda client: _open(client, rig, confirmations))
 
-    def close_bench(self) -> None:
-        """Close the bench."""
-        self._order(lambda client: client.close_bench())
-
-    def check(self, folder: Path) -> None:
-        """Check the bench; ``folder`` is where recordings will go."""
-        self._order(lambda client: client.check(folder))
+    def order(
+        self, verb: Callable[Concatenate[EngineClient, P], object], *args: P.args, **kwargs: P.kwargs
+    ) -> None:
+        """Have the engine carry out a verb of its client, such as ``EngineClient.start``."""
+        self._order(lambda client: verb(client, *args, **kwargs))
 
     def arm(
         self, campaign: Campaign, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE
@@ -157,26 +156,10 @@ class Bridge(QObject):
 
         self._order(lambda client: client.arm(campaign, folder, existing), keep)
 
-    def disarm(self) -> None:
-        """Take back what was armed."""
-        self._order(lambda client: client.disarm())
-
-    def start(self) -> None:
-        """Carry out what is armed."""
-        self._order(lambda client: client.start())
-
     def stop(self, level: StopLevel, reason: str) -> None:
         """Hold or end what runs; goes before everything else that waits."""
         if self._line is not None:
             self._line.ask(Urgency.STOP, lambda client: client.stop(level, reason), _done, self._refused)
-
-    def resume(self) -> None:
-        """Go on after a hold."""
-        self._order(lambda client: client.resume())
-
-    def mark(self, text: str) -> None:
-        """Note an event in the recording."""
-        self._order(lambda client: client.mark(text))
 
     def close(self) -> None:
         """Let the engine ramp down and end."""
@@ -206,7 +189,7 @@ class Bridge(QObject):
             since = view.next_sample if view is not None and now.run_id == run else 0
             if now.samples <= since or rate_hz == 0.0:
                 return now, None
-            return now, client.look(since, round(CATCH_UP_S * rate_hz))
+            return now, client.look(since, most=round(CATCH_UP_S * rate_hz))
 
         return look
 

@@ -6,7 +6,7 @@ from PySide6.QtCore import QObject
 
 from vibench.acquisition import StopLevel
 from vibench.acquisition.campaign import ExistingRecordings
-from vibench.acquisition.engine import EngineState
+from vibench.acquisition.engine import EngineClient, EngineState
 from vibench.acquisition.plan import Campaign, Measurement
 
 from ..widgets import Notice, NoticeKind
@@ -28,7 +28,7 @@ class UserActions(QObject):
         """Check the bench."""
         folder = self._context.folder
         folder.mkdir(parents=True, exist_ok=True)
-        self._context.bridge.check(folder)
+        self._context.bridge.order(EngineClient.check, folder)
 
     def arm_test(self) -> None:
         """Arm the test of the Test page, under a name that is free."""
@@ -48,12 +48,16 @@ class UserActions(QObject):
             return
         self._context.bridge.arm(campaign, self._context.folder / campaign.name, existing)
 
+    def disarm(self) -> None:
+        """Take back what is armed."""
+        self._context.bridge.order(EngineClient.disarm)
+
     def start(self) -> None:
         """Start what is armed."""
         if self._context.bridge.state is not EngineState.ARMED:
             self._warn("Nothing is armed.", "Arm the test first (Ctrl+Return).")
             return
-        self._context.bridge.start()
+        self._context.bridge.order(EngineClient.start)
 
     def stop(self) -> None:
         """Ramp down as planned; asked again while ramping down: as fast as the shaker bears."""
@@ -67,7 +71,7 @@ class UserActions(QObject):
     def hold_or_resume(self) -> None:
         """Stay where the run is, drive included; or go on."""
         if self._context.bridge.state is EngineState.HELD:
-            self._context.bridge.resume()
+            self._context.bridge.order(EngineClient.resume)
         else:
             self._context.bridge.stop(StopLevel.HOLD, "held by the operator, in the window")
 

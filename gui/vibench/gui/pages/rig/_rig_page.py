@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from vibench.acquisition import BenchReport, Finding, InstrumentList, Verdict, list_rig_instruments, shipped
-from vibench.acquisition.engine import EngineState, EngineStatus
+from vibench.acquisition.engine import EngineClient, EngineState, EngineStatus
 
 from ...page import AppContext, Page, Remembered, UserActions
 from ...widgets import ReadTable, moment_text, notice_of
@@ -199,7 +199,7 @@ class RigPage(Page):
         self.context.say(notice_of(error))
 
     def _close(self) -> None:
-        self.context.bridge.close_bench()
+        self.context.bridge.order(EngineClient.close_bench)
         self.instruments.show_rows([])
 
     def _connect(self) -> None:

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
 
-from vibench.acquisition.engine import EngineState
+from vibench.acquisition.engine import EngineClient, EngineState
 from vibench.acquisition.plan import excited_band_hz
 from vibench.acquisition.rig import channels_of
 from vibench.analysis import MeasurementPrediction
@@ -164,12 +164,12 @@ class RunPage(Page):
 
     def _mark(self, text: str) -> None:
         if self.context.bridge.state in (EngineState.RUNNING, EngineState.HELD):
-            self.context.bridge.mark(text)
+            self.context.bridge.order(EngineClient.mark, text)
 
     def _connect(self) -> None:
         self.arm_card.arm_wanted.connect(self._actions.arm_test)
         self.arm_card.start_wanted.connect(self._actions.start)
-        self.arm_card.cancel_wanted.connect(self.context.bridge.disarm)
+        self.arm_card.cancel_wanted.connect(self._actions.disarm)
         self.arm_card.hold_wanted.connect(self._actions.hold_or_resume)
         self.watch_card.mark_wanted.connect(self._mark)
         self.look_button.clicked.connect(self._look)

@@ -1,0 +1,78 @@
+"""A viewer's end of a connection: let in with the token, then one answer for each request."""
+
+import json
+import socket
+from typing import Any, Literal
+
+from .. import errors
+from ..errors import AcquisitionError
+from ..host import FrozenModel
+from ._address import EngineAddress
+from ._errors import EngineError, EngineGone
+from ._state import ConnectionRole
+from ._wire import Message, receive, send
+
+PATIENCE_S = 5.0
+"""How long an answer may take; the engine answers from what it holds, in milliseconds [s]."""
+
+
+class Hello(FrozenModel):
+    """The first thing said on every connection."""
+
+    ask: Literal["hello"] = "hello"
+    token: str
+    role: ConnectionRole = ConnectionRole.VISITING
+
+
+def connected(address: EngineAddress, role: ConnectionRole) -> socket.socket:
+    """Connect to a running engine and be let in."""
+    hello = Hello(token=address.token, role=role)
+    try:
+        connection = socket.create_connection((address.host, address.port), PATIENCE_S)
+    except OSError as error:
+        raise EngineGone(
+            f"no engine answers at {address.host}:{address.port} ({error}); start one, or see whether it "
+            "has ended"
+        ) from error
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    try:
+        exchanged(connection, Message(hello.model_dump_json().encode()))
+    except AcquisitionError:
+        connection.close()
+        raise
+    return connection
+
+
+def exchanged(connection: socket.socket, request: Message) -> tuple[dict[str, Any], bytes]:
+    """Send a request and wait for its answer: the parsed text, and the bytes behind it.
+
+    Raises
+    ------
+    EngineGone
+        When no answer comes; the connection is closed then.
+    AcquisitionError
+        What the engine refuses with.
+
+    """
+    try:
+        send(connection, request)
+        answer = receive(connection)
+    except OSError as error:
+        # An answer that comes late must not be taken for that to the next question.
+        connection.close()
+        raise EngineGone(
+            f"the engine does not answer ({error}); its process has ended or hangs. What it drove is "
+            "silent if it could ramp down: look at the bench"
+        ) from error
+    facts = json.loads(answer.text)
+    if "refused" in facts:
+        raise _refusal(facts["kind"], facts["refused"])
+    return facts, answer.payload
+
+
+def _refusal(kind: str, sentence: str) -> AcquisitionError:
+    """Raise here what was raised there, as far as it is one of ours."""
+    known = getattr(errors, kind, None)
+    if isinstance(known, type) and issubclass(known, AcquisitionError):
+        return known(sentence)
+    return EngineError(sentence)

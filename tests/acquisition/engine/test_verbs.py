@@ -1,0 +1,81 @@
+"""Every verb of the engine is complete: request, permission, method, call."""
+
+import inspect
+import json
+
+import pytest
+
+from vibench.acquisition.engine import (
+    Engine,
+    EngineClient,
+    EngineState,
+    JobQueue,
+    RequestHandler,
+    Supervision,
+)
+from vibench.acquisition.engine._server import answered
+from vibench.acquisition.engine._verbs import VERBS
+from vibench.acquisition.engine._wire import Message
+
+WORDS = {
+    *("open", "close", "check", "arm", "disarm", "start", "stop"),
+    *("resume", "mark", "status", "beat", "look", "shutdown"),
+}
+RESTRICTED = {"open", "close", "check", "arm", "start", "mark"}
+
+
+@pytest.fixture
+def handler() -> RequestHandler:
+    engine = Engine(Supervision.UNATTENDED)
+    return RequestHandler(engine, JobQueue(engine))
+
+
+def test_the_words_on_the_wire_stay():
+    assert set(VERBS) == WORDS
+
+
+def test_what_ends_or_shows_a_run_is_permitted_in_every_state():
+    assert {word for word, verb in VERBS.items() if verb.states} == RESTRICTED
+
+
+@pytest.mark.parametrize("verb", VERBS.values(), ids=VERBS.keys())
+def test_handler_and_client_take_what_the_request_holds(verb):
+    asked = [name for name in verb.request.model_fields if name != "ask"]
+    for owner in (EngineClient, RequestHandler):
+        _, *parameters = inspect.signature(getattr(owner, verb.method)).parameters
+        assert parameters[: len(asked)] == asked, owner
+
+
+@pytest.mark.parametrize("word", sorted(RESTRICTED - {"open", "close"}))
+def test_a_state_that_does_not_permit_a_verb_refuses_it(handler, word):
+    verb = VERBS[word]
+    assert EngineState.CLOSED not in verb.states
+    arguments = dict.fromkeys(name for name in verb.request.model_fields if name != "ask")
+    with pytest.raises(Exception, match=f"is closed and cannot {word} now; it can when it is "):
+        handler.carry_out(verb, arguments)
+
+
+@pytest.mark.parametrize(
+    ("request_text", "where"),
+    [
+        ('{"ask": "dance"}', "dance"),
+        ('{"ask": "stop", "level": "gently"}', "stop.level"),
+        ('{"ask": "mark", "text": ""}', "mark.text"),
+        ('{"ask": "look"}', "look.most"),
+        ('{"ask": "beat", "loud": true}', "beat.loud"),
+    ],
+)
+def test_a_request_that_is_not_understood_does_nothing_and_says_where(handler, request_text, where):
+    answer = json.loads(answered(handler, Message(request_text.encode())).text)
+    assert where in answer["refused"]
+    assert "nothing was done" in answer["refused"]
+
+
+def test_a_request_and_its_answer_are_what_they_were_on_the_wire(handler):
+    assert VERBS["look"].message(most=3).text == b'{"ask":"look","since_sample":0,"most":3}'
+    assert VERBS["stop"].message(level="ramp").text == (
+        b'{"ask":"stop","level":"ramp","reason":"stopped by the operator"}'
+    )
+    assert answered(handler, VERBS["beat"].message()).text == b'{"ok": true}'
+    looked = answered(handler, VERBS["look"].message(most=3))
+    assert json.loads(looked.text).keys() == {"run_id", "first_sample", "sample_rate_hz", "shape"}
