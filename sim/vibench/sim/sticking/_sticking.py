@@ -1,10 +1,9 @@
 """Sticking, m1 held by a rigid stop: exact motion of two bodies, up to where the stop would have to pull.
 SI units.
 
-`vibench.sim.model` says what moves. The stop lets go where the acceleration that presses m1 on
-it
-(`vibench.sim.rigid.press_on`) falls to zero: found like a touch, by the same proof, with it in
-the gap's place.
+`vibench.sim.model` says what moves. The stop lets go where the acceleration that presses m1 on it
+(`vibench.sim.rigid.press_on`) falls to zero: found like a touch, by the same proof, with it in the gap's
+place.
 """
 
 import math
