@@ -19,12 +19,12 @@ STARTED = """
 import sys, time
 from pathlib import Path
 from vibench.gui.window._open_window import application
-from vibench.gui.page import Desk
+from vibench.gui.page import AppContext
 from vibench.gui.window._page_catalogue import PAGES
 from vibench.gui.page import Settings
 from vibench.gui.window._window import Window
 app = application(["vibench"])
-window = Window(Desk(Settings(Path(sys.argv[1]))), PAGES)
+window = Window(AppContext(Settings(Path(sys.argv[1]))), PAGES)
 window.show()
 app.processEvents()
 window.grab()

@@ -1,9 +1,4 @@
-"""`vibench measure`: carry out a campaign, one recording a measurement.
-
-What a campaign will take, as a person or a program reads it.
-
-Options that say who is told of faults and of the end of a campaign.
-"""
+"""`vibench measure`: carry out a campaign, one recording a measurement."""
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -134,7 +129,7 @@ def measure(
     if only_estimate:
         return
     messengers = messengers_of(notify, mail)
-    orders = CampaignRequest(
+    request = CampaignRequest(
         campaign=plan,
         folder=out,
         existing=existing,
@@ -143,7 +138,7 @@ def measure(
         check=check,
     )
     with the_bench(rig, plan.name) as engine:
-        point_results = engine.measure(orders, messengers=messengers)
+        point_results = engine.measure(request, messengers=messengers)
     if engine.switch.request is not None:
         raise typer.Exit(STOPPED_EXIT_CODE)
     if any(point_result.outcome is PointOutcome.FAILED for point_result in point_results):
@@ -152,7 +147,7 @@ def measure(
 
 @contextmanager
 def the_bench(rig: Rig, what: str) -> Iterator[Engine]:
-    """Open a bench in this process, with bars on the terminal and a door for whoever watches or stops it."""
+    """Open a bench in this process, with bars on the terminal and a server for `vibench watch` and `stop`."""
     engine = Engine(Supervision.UNATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
     with closing(engine):

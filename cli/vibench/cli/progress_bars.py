@@ -1,9 +1,4 @@
-"""Progress bar of a study, on standard error, so that standard output stays what was asked for.
-
-The progress bar of an analysis: one step a recording.
-
-Progress bar of an export or an import, on standard error like a study's.
-"""
+"""Progress bars on standard error, so that standard output stays what was asked for."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -42,7 +42,7 @@ def serve_rig(
         console.print("The generator, for any other VISA program:")
         console.print(f"  {rig.socket_resource}")
         if rig.token is not None:
-            console.print("\nIt is heard by other computers, and lets in whoever has the token:")
+            console.print("\nOther computers can reach it; it lets in whoever has the token:")
             console.print(
                 f"  export {TOKEN_VARIABLE}={rig.token}  # our own programs; others send it as metadata"
             )

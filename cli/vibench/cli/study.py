@@ -1,7 +1,4 @@
-"""`vibench study`: every combination of what a TOML file lists, predicted into one HDF5 file.
-
-A study that is kept in a folder under a name of its own, and goes on where it was stopped.
-"""
+"""`vibench study`: every combination of what a TOML file lists, predicted into one HDF5 file."""
 
 import hashlib
 from pathlib import Path

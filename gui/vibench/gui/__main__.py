@@ -1,4 +1,4 @@
-"""`vibench-gui` and `python -m gui`: the window, from the command line to its end.
+"""`vibench-gui` and `python -m vibench.gui`: the window, from the command line to its end.
 
 Qt is imported inside `main`: a process that is spawned for background work imports this module too.
 """

@@ -14,7 +14,7 @@ def test_a_state_is_shown_by_symbol_and_word_not_by_colour_alone(qtbot):
     banner = Banner()
     qtbot.addWidget(banner)
     banner.show_indicator(StateIndicator("▶", "RUNNING", Tone.ACTIVE, "0:42 of 2:00"))
-    label = banner.findChild(QLabel, "face")
+    label = banner.findChild(QLabel, "engine_state")
     assert label.text() == "▶  RUNNING"
     assert label.accessibleName() == "State: RUNNING"
     assert label.property("tone") == "active"

@@ -33,7 +33,7 @@ class RunBench(Protocol):
 
     @property
     def digitizer(self) -> CountingDigitizer:
-        """What listens."""
+        """What samples."""
 
     @property
     def channels(self) -> tuple[Channel, ...]:

@@ -1,7 +1,4 @@
-"""A check of a bench as it is kept: what was found, when, and on which configuration.
-
-What a check has found: one line a question, with what was measured and what was expected.
-"""
+"""A check of a bench as it is kept: one finding a question, when it was made, and on which configuration."""
 
 import hashlib
 import json

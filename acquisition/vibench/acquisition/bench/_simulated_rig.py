@@ -1,6 +1,4 @@
-"""The simulated instruments that a rig may ask for: what a bench needs of them, and the one place that
-loads them.
-"""
+"""Simulated instruments: what a bench needs of them, and the one place that loads them."""
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager

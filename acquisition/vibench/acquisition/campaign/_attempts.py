@@ -1,7 +1,4 @@
-"""One point of a campaign until it is done, or its attempts are used up; each attempt in the journal.
-
-Silence between two recordings: specimen and amplifier cool.
-"""
+"""One point of a campaign until it is done or its attempts are used up, with a cooling pause before each."""
 
 from collections.abc import Callable
 from functools import partial

@@ -1,6 +1,6 @@
-"""The file of a journal: how it is opened, that it is one, and its errors as sentences.
+"""The SQLite file of a journal: its tables, how it is opened, and its errors as sentences.
 
-The tables of a campaign's journal, as SQL; docs/campaigns.md describes them for a stranger.
+docs/campaigns.md describes the tables for a stranger.
 """
 
 import sqlite3

@@ -1,7 +1,4 @@
-"""The log of a campaign: one JSON document a line, for programs and for the morning after.
-
-One line that says where a campaign stands, again and again, for ``tail -f`` on another terminal.
-"""
+"""The log of a campaign, one JSON document a line, and its status in one line for ``tail -f``."""
 
 import json
 from collections import Counter

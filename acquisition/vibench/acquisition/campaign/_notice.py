@@ -1,7 +1,4 @@
-"""Telling somebody who is not there: at the end of a campaign, and at every fault.
-
-E-mail about a campaign: settings from a file of the user's own, and one message a notice.
-"""
+"""Telling somebody who is not there of faults and of the end of a campaign: a command, or an e-mail."""
 
 import json
 import shlex
@@ -144,7 +141,7 @@ class CommandMessenger:
 
 
 class Notifier:
-    """Listens to a campaign, and passes faults and its end on. What fails there harms nothing."""
+    """Follows a campaign, and passes faults and its end on. What fails there harms nothing."""
 
     def __init__(
         self, campaign: str, folder: Path, messengers: tuple[Messenger, ...], say: CampaignListener

@@ -84,7 +84,7 @@ def _judged(path: Path, measurement: Measurement) -> tuple[JournalPointState, Re
 
 
 MOST_DIFFERENCES = 5
-"""Shown of a bench that has changed."""
+"""Differences that a refusal lists."""
 
 
 @dataclass(frozen=True)

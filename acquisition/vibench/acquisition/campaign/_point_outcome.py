@@ -1,7 +1,4 @@
-"""What a campaign tells: how each recording came out, and where it stands.
-
-Why a point stands as it does: one word for programs, beside the sentence for people.
-"""
+"""How the points of a campaign came out: a sentence for people, a word for programs, and where it stands."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

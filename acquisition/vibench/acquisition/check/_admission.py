@@ -1,8 +1,7 @@
-"""May this bench be armed? Only on a check that is recent, passed, and of the same configuration.
+"""Whether this bench may be armed: only on a check that is recent, passed, and of the same configuration.
 
-The last check of each rig, kept in the user's state folder: one JSON file a rig.
-
-What has changed since the last check of the same bench: gains in decibels, the clock in ppm.
+The last check of each rig is kept in the user's state folder, one JSON file a rig; what has changed since is
+said in decibels (gains) and ppm (clock).
 """
 
 import hashlib

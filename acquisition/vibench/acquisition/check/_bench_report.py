@@ -20,7 +20,7 @@ CHECK_SHARE = 0.02
 """Level of the sine, of the bench's amplitude limit: far below anything that collides or clips."""
 # An AC coupling of 0.5 Hz has forgotten a step after this time.
 _SETTLE_S = 1.5
-_LISTEN_S = 2.0
+_READ_S = 2.0
 _BYTES_PER_SAMPLE = 4
 _SECONDS_PER_HOUR = 3600.0
 NOISE_SHARE = Bounds(1e-3, 2e-2)
@@ -34,10 +34,10 @@ ROOM_H = Bounds(-10.0, -1.0)
 
 
 def check_bench(bench: Bench, folder: Path, switch: StopSwitch | None = None) -> BenchReport:
-    """Look at everything that can be known before a measurement; the generator is silent afterwards.
+    """Check everything that can be known before a measurement; the generator is silent afterwards.
 
-    Listens in silence, plays two per cent of the amplitude limit at 160 Hz for some seconds by
-    whatever plays sines on this bench, and listens in silence again.
+    Reads all channels in silence, while two per cent of the amplitude limit play at 160 Hz for some seconds,
+    and in silence again.
 
     Parameters
     ----------
@@ -59,69 +59,69 @@ def check_bench(bench: Bench, folder: Path, switch: StopSwitch | None = None) ->
     findings = [*_identified(bench), *_calibrated(bench), _room(bench, folder)]
     amplitude_vpp = CHECK_SHARE * bench.rig.generator.amplitude_limit_vpp
     drive = drive_for(bench, _small_sine(amplitude_vpp))
-    ear = _Ear(bench, StopSwitch() if switch is None else switch)
+    reader = _BlockReader(bench, StopSwitch() if switch is None else switch)
     bench.generator.stop()
-    quiet = ear.in_silence()
-    heard = ear.during_sine(drive)
-    after = ear.in_silence()
+    quiet = reader.in_silence()
+    during = reader.during_sine(drive)
+    after = reader.in_silence()
     if drive.drive_source is DriveSource.GENERATOR:
         findings.append(_latency(bench))
     if bench.output is not None:
         findings.append(_idle(bench.output))
     for channel, row in zip(bench.channels, quiet, strict=True):
         findings += [_noise(channel, row), _offset(channel, row)]
-    findings += LoopCheck(bench, amplitude_vpp, heard, after).findings()
+    findings += LoopCheck(bench, amplitude_vpp, during, after).findings()
     return BenchReport(findings=tuple(findings))
 
 
-class _Ear:
-    """Listens to a bench for the check, in blocks between which the check can be stopped."""
+class _BlockReader:
+    """Reads a bench in blocks, between which the check can be stopped."""
 
     def __init__(self, bench: Bench, switch: StopSwitch) -> None:
         self._bench = bench
         self._switch = switch
 
     def in_silence(self) -> Samples:
-        """Hear what there is when nothing plays, after couplings have settled."""
+        """Read all channels while nothing plays, after couplings have settled."""
         digitizer = self._bench.digitizer
         digitizer.start()
         try:
-            self._heard_for(_SETTLE_S)
-            return np.concatenate(self._heard_for(_LISTEN_S), axis=1)
+            self._read_for(_SETTLE_S)
+            return np.concatenate(self._read_for(_READ_S), axis=1)
         finally:
             digitizer.stop()
 
     def during_sine(self, drive: Drive) -> Samples:
-        """Play the sine without a ramp, as the check of a run does, and hear it when all has settled."""
+        """Play the sine without a ramp, as the check of a run does, and read the settled channels."""
         tone = Tone(CHECK_FREQUENCY_HZ)
         settling = Phase(RunState.CHECKING, tone, _SETTLE_S)
-        listening = Phase(RunState.CHECKING, tone, _LISTEN_S)
+        measuring = Phase(RunState.CHECKING, tone, _READ_S)
         try:
-            drive.arm((settling, listening))
+            drive.arm((settling, measuring))
             self._bench.digitizer.start()
             for wait_s in drive.perform(settling):
-                self._heard_for(wait_s)
-            heard = [block for wait_s in drive.perform(listening) for block in self._heard_for(wait_s)]
-            return np.concatenate(heard, axis=1)
+                self._read_for(wait_s)
+            blocks = [block for wait_s in drive.perform(measuring) for block in self._read_for(wait_s)]
+            return np.concatenate(blocks, axis=1)
         finally:
             try:
                 drive.silence()
             finally:
                 self._bench.digitizer.stop()
 
-    def _heard_for(self, duration_s: float) -> list[Samples]:
+    def _read_for(self, duration_s: float) -> list[Samples]:
         digitizer = self._bench.digitizer
         rate_hz = digitizer.sample_rate_hz
         left, longest = round(duration_s * rate_hz), round(BLOCK_S * rate_hz)
-        heard = []
+        blocks = []
         while left > 0:
             if (request := self._switch.request) is not None:
                 raise CheckStopped(
                     f"the bench check was stopped: {request.reason}. The output is off; check the bench again"
                 )
-            heard.append(digitizer.read(min(longest, left)).volts)
-            left -= heard[-1].shape[1]
-        return heard
+            blocks.append(digitizer.read(min(longest, left)).volts)
+            left -= blocks[-1].shape[1]
+        return blocks
 
 
 def _small_sine(amplitude_vpp: float) -> Measurement:
@@ -129,7 +129,7 @@ def _small_sine(amplitude_vpp: float) -> Measurement:
         amplitude_vpp=amplitude_vpp,
         frequency_hz=CHECK_FREQUENCY_HZ,
         settle_s=_SETTLE_S,
-        duration_s=_LISTEN_S,
+        duration_s=_READ_S,
     )
     return Measurement(name="check", excitation=sine)
 

@@ -1,7 +1,4 @@
-"""One sine round the loop: does every channel hear it, and as loud as generator, knob and model say?
-
-A sine of known frequency in noise: amplitude, phase, their uncertainty, and the true frequency.
-"""
+"""One sine round the loop: whether every channel detects it, as loud as generator, knob and model say."""
 
 from dataclasses import dataclass
 from math import hypot, log10, pi, sqrt
@@ -89,8 +86,8 @@ BASE_DB = Bounds(1.5, 3.0)
 """Of the base's acceleration from the rig's model."""
 CLOCK_PPM = Bounds(100.0, 500.0)
 """Two oscillators of 50 ppm each."""
-HEARD = 10.0
-"""A channel hears the sine when it is this many times its uncertainty."""
+DETECTED = 10.0
+"""The sine counts as detected when it is this many times its uncertainty."""
 WRONG_LOAD = 2.0
 PHASE_DEG = Bounds(45.0, 90.0)
 """Of a channel against the drive from the rig's model: beyond a right angle its sign is wrong."""
@@ -101,11 +98,11 @@ LEFT_OVER = Bounds(0.02, 0.05)
 class LoopCheck:
     """What a small sine shows on its way from the generator round to the inputs."""
 
-    def __init__(self, bench: Bench, amplitude_vpp: float, heard: Samples, after: Samples) -> None:
+    def __init__(self, bench: Bench, amplitude_vpp: float, during: Samples, after: Samples) -> None:
         self._rig = bench.rig
         self._rate_hz = bench.digitizer.sample_rate_hz
         self._channels = {channel.role: channel for channel in bench.channels}
-        self._rows = dict(zip(self._channels, heard, strict=True))
+        self._rows = dict(zip(self._channels, during, strict=True))
         self._after = dict(zip(self._channels, after, strict=True))
         self._terminal_v = 0.5 * amplitude_vpp * bench.rig.generator.terminal_factor()
         self._model = RigModel(bench.rig)
@@ -115,7 +112,7 @@ class LoopCheck:
         found = [self._alive(role) for role in self._channels]
         if Role.DRIVE_VOLTAGE in self._channels:
             found += [self._drive(), self._silence()]
-        # What hears nothing has no frequency and no gain: it has been found fault with already.
+        # What detects nothing has no frequency and no gain: it has been found fault with already.
         if self._hears(Role.DRIVE_VOLTAGE):
             found.append(self._clocks())
         if self._hears(Role.DRIVE_VOLTAGE) and self._hears(Role.AMPLIFIER_VOLTAGE):
@@ -130,7 +127,7 @@ class LoopCheck:
         if role not in self._channels:
             return False
         fit = self._fit(role)
-        return fit.amplitude > HEARD * fit.uncertainty
+        return fit.amplitude > DETECTED * fit.uncertainty
 
     def _fit(self, role: Role) -> SineFit:
         volts = self._rows[role] * self._channels[role].units_per_volt
@@ -146,7 +143,7 @@ class LoopCheck:
         return Finding(
             name=f"{role.value} hears the sine",
             value=f"{fit.amplitude:.3g} +- {fit.uncertainty:.1g} {self._channels[role].unit}",
-            expected=f"more than {HEARD:g} times its uncertainty",
+            expected=f"more than {DETECTED:g} times its uncertainty",
             verdict=Verdict.OK if is_heard else Verdict.FAIL,
             number=fit.amplitude,
             uncertainty=fit.uncertainty,

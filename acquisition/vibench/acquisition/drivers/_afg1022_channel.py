@@ -1,7 +1,4 @@
-"""One channel of an AFG1022 as it was last read back: the settings, the memory and the output relay.
-
-Which load the generator believes to see: set it, ask for it, or leave it to the operator.
-"""
+"""One channel of an AFG1022 as it was last read back: settings, declared load, memory and output relay."""
 
 from dataclasses import dataclass, replace
 

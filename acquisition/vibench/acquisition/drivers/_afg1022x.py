@@ -1,7 +1,4 @@
-"""The Tektronix AFG1022: every setting read back, and an output that goes off whatever happens.
-
-Keeping the first error in front: what fails while cleaning up after it becomes a note on it.
-"""
+"""The Tektronix AFG1022: every setting read back, and an output that goes off whatever happens."""
 
 import statistics
 import time

@@ -1,9 +1,4 @@
-"""A converter behind NI-DAQmx: continuous, hardware-timed, without a gap, and never left reserved.
-
-Who a converter is: product, serial number and the version of the driver it was reached through.
-
-Where in a block an input was past its range.
-"""
+"""A converter behind NI-DAQmx: continuous, hardware-timed, without a gap, and never left reserved."""
 
 from contextlib import ExitStack
 from typing import Self

@@ -17,7 +17,7 @@ from ._visa_link import Link
 Codes = NDArray[np.uint16]
 
 NO_ERROR = 0
-# An error queue holds some tens of entries; more replies than this mean that nobody listens.
+# An error queue holds some tens of entries; more replies than this mean that it is not being emptied.
 _LONGEST_QUEUE = 64
 # Long enough for a stale reply that is already under way, short enough for an emergency stop [ms].
 _STALE_REPLY_MS = 100.0

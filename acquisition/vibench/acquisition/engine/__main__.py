@@ -1,6 +1,4 @@
-"""``python -m vibench.acquisition.engine``: an engine's process. Its first line of output says where to ask
-it.
-"""
+"""``python -m vibench.acquisition.engine``: an engine's process. Its first line says where to ask it."""
 
 import argparse
 import os

@@ -1,7 +1,4 @@
-"""The engine: it owns a bench, and shows everybody what it does with it.
-
-An open bench in the words of the protocol.
-"""
+"""The engine: it owns a bench, and shows everybody what it does with it."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -54,7 +51,7 @@ def bench_facts(bench: Bench) -> BenchFacts:
 class Engine:
     """A bench and what is done with it; one thread calls its methods, and only that one touches instruments.
 
-    Everybody else looks at `shown` and presses `switch`. A method raises what goes wrong, after it has
+    Everybody else reads `published` and uses `switch`. A method raises what goes wrong, after it has
     shown it; leave the engine through a ``with``, and the bench is silent and closed.
     """
 

@@ -1,7 +1,4 @@
-"""What viewers may see of an engine: written by its own thread, read by any other, never waited for.
-
-What has happened, kept for viewers: the newest messages, numbered.
-"""
+"""What viewers may see of an engine: written by its own thread, read by any other, never waited for."""
 
 import shutil
 import threading

@@ -1,7 +1,4 @@
-"""Where the configurations and campaigns lie that come with vibench.
-
-Where this computer keeps what belongs to no recording: locks of benches, last checks.
-"""
+"""Where vibench's own configurations and campaigns lie, and where this computer keeps locks and checks."""
 
 import os
 import sys

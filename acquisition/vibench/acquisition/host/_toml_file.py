@@ -1,7 +1,4 @@
-"""TOML files in: parsed, validated, or refused with the file, the key, what was given, what is allowed.
-
-TOML files out: a plan as text that reads back as exactly the same plan.
-"""
+"""TOML files: read and validated, or refused with file, key and what is allowed; written to be read back."""
 
 import json
 import tomllib

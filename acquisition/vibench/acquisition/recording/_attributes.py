@@ -1,9 +1,4 @@
-"""Scalar HDF5 attributes that old readers understand: numbers, and UTF-8 text of fixed length.
-
-Text in a fixed number of UTF-8 bytes: what every HDF5 reader can show, unlike variable-length strings.
-
-Values as JSON text that any language can read back: no NaN, no infinities.
-"""
+"""HDF5 attributes that every reader can show: numbers, UTF-8 text of fixed length, values as JSON text."""
 
 import json
 from collections.abc import Mapping

@@ -1,10 +1,7 @@
 """A recording becomes ``NAME.h5``: compressed, checked, named, and only then is ``NAME.h5.part`` let go.
 
-Chunks compressed on all cores and handed to HDF5 ready-made.
-
-HDF5's own filter pipeline runs on one core under a global lock. zlib releases the interpreter,
-so the same bytes are made here in threads: shuffle (all first bytes, all second bytes, ...), then
-deflate. HDF5 reads them like its own.
+HDF5's own filter pipeline runs on one core under a global lock. zlib releases the interpreter, so the same
+bytes are made here in threads: shuffle (all first bytes, all second bytes, ...), then deflate.
 """
 
 import hashlib
@@ -190,7 +187,7 @@ def _copy_channel(
 ) -> None:
     dataset = create_counts(copy, role, samples, layout.CHUNK_SAMPLES)
     digest, overview = hashlib.sha256(), OverviewSums()
-    write_chunks(dataset, overview.watched(_hashed(_pieces(source, samples), digest)))
+    write_chunks(dataset, overview.summed(_hashed(_pieces(source, samples), digest)))
     write_attributes(dataset, {**read_attributes(source), "sha256": digest.hexdigest()})
     dataset.attrs["_FillValue"] = np.int32(layout.MISSING_COUNT)
     dataset.dims[0].attach_scale(time_axis)

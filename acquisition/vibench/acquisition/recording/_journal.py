@@ -1,7 +1,4 @@
-"""What a recording says besides its samples: events, segments, overloads and gaps, row by row.
-
-Rows of the pre-allocated tables, turned into writes at known places.
-"""
+"""What a recording says besides its samples: events, segments, overloads and gaps, row by row."""
 
 import time
 from collections.abc import Mapping, Sequence

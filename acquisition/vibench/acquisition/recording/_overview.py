@@ -52,7 +52,7 @@ class OverviewSums:
         self._low: list[Counts] = []
         self._high: list[Counts] = []
 
-    def watched(self, pieces: Iterator[Counts]) -> Iterator[Counts]:
+    def summed(self, pieces: Iterator[Counts]) -> Iterator[Counts]:
         """Hand pieces on unchanged, and take note of them."""
         for piece in pieces:
             self.add(piece)

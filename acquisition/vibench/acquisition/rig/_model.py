@@ -1,7 +1,4 @@
-"""The rig as a linear chain: what a volt at the generator's terminal does to amplifier, coil and table.
-
-The specimen of a rig as the simulation knows it.
-"""
+"""The rig as a linear chain, from a volt at the generator's terminal to table and specimen."""
 
 from dataclasses import dataclass
 from enum import StrEnum

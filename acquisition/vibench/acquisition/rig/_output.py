@@ -35,7 +35,7 @@ class OutputConfig(FrozenModel):
     """Largest voltage that this bench allows, plus and minus [V]."""
     sample_rate_hz: PositiveFloat
     """Rate of the output; it must take this rate exactly."""
-    # Three blocks of a run at least: one is heard, one is ready, and one is being written.
+    # Three blocks of a run at least: one plays, one is ready, and one is being written.
     ahead_s: float = Field(default=0.5, ge=0.3, le=5.0)
     """How much is written ahead [s]: what a pause of this computer may last, and how long what is
     written already plays on before an early ramp down begins."""

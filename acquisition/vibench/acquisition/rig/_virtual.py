@@ -1,7 +1,4 @@
-"""What a hardware configuration says of simulated instruments, where real ones just are as they are.
-
-The word that lets a client in to a virtual rig that is served beyond its own computer.
-"""
+"""What a hardware configuration says of simulated instruments, and the word that lets clients in to them."""
 
 import os
 from math import pi, sqrt

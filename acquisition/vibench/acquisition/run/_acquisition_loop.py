@@ -12,7 +12,7 @@ from ..instruments import Block, Digitizer
 from ..recording import RecordingState
 
 BLOCK_S = 0.1
-"""Longest time between two looks at the limits and at a cancel [s]; ten reads a second suit NI-DAQmx."""
+"""Longest time between two checks of the limits and of the switch [s]; ten reads a second suit NI-DAQmx."""
 
 LIMIT_KIND = "limit"
 """Kind of the event that holds the numbers of a limit that was passed, as a JSON object."""

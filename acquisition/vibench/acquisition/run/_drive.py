@@ -19,7 +19,7 @@ class Drive(Protocol):
 
     @property
     def drive_source(self) -> DriveSource:
-        """The instrument that is heard."""
+        """The instrument that plays."""
 
     @property
     def pause_s(self) -> float:

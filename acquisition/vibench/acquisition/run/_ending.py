@@ -1,7 +1,4 @@
-"""How a run ends: the first cause counts; silence, stop and a finished recording follow whatever fails.
-
-What a run tells whoever watches it: where it stands, and how it ended.
-"""
+"""How a run ends: the first cause counts; silence, stop and a finished recording follow whatever fails."""
 
 from contextlib import ExitStack
 from dataclasses import dataclass

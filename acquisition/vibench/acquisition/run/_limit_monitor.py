@@ -1,7 +1,4 @@
-"""The limit monitor of the running measurement: every block against the limits of the rig.
-
-Where base and specimen are, from what is measured: integrated block by block, and high-passed.
-"""
+"""The limit monitor of a measurement: every block, and positions integrated from it, against the limits."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

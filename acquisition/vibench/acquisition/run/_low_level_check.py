@@ -52,7 +52,7 @@ def judged(
     rig: Rig,
     channels: tuple[Channel, ...],
     quiet: Samples,
-    heard: Samples,
+    during: Samples,
     sample_rate_hz: float,
     amplitude_vpp: float,
 ) -> CheckFigures:
@@ -60,7 +60,7 @@ def judged(
 
     Parameters
     ----------
-    quiet, heard
+    quiet, during
         Volts before, and while, the sine plays: shape (channels, samples) each [V].
 
     Raises
@@ -79,7 +79,7 @@ def judged(
         return sine_amplitude(volts[row], CHECK_FREQUENCY_HZ, sample_rate_hz) * channels[row].units_per_volt
 
     figures = CheckFigures(
-        measured(heard, drive), terminal_v, measured(heard, base), terminal_v * accelerance
+        measured(during, drive), terminal_v, measured(during, base), terminal_v * accelerance
     )
     _require_quiet("the drive voltage", measured(quiet, drive), figures.expected_drive_v, "V")
     _require_quiet("the base acceleration", measured(quiet, base), figures.expected_base_m_per_s2, "m/s2")

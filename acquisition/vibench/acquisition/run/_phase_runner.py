@@ -1,4 +1,4 @@
-"""Playing phases while everything that is heard is read, kept and watched."""
+"""Playing phases while every block is read, kept and held to the limits."""
 
 from collections.abc import Callable, Iterator
 
@@ -27,7 +27,7 @@ class Stopped(Exception):
 class PhaseRunner:
     """The part of a run in which samples pass: phases, holds, and the ramp of an early end.
 
-    After every block it looks at the limits and at the switch: it raises LimitExceeded or `Stopped`,
+    After every block it checks the limits and the switch: it raises LimitExceeded or `Stopped`,
     and it is up to the run to let it ramp down.
     """
 
@@ -50,7 +50,7 @@ class PhaseRunner:
         self._play: Play | None = None
 
     def run_phase(self, phase: Phase, into: list[Block] | None = None) -> Iterator[Progress]:
-        """Play a phase; what is heard goes ``into`` a list as well, if one is given."""
+        """Play a phase; its samples go ``into`` a list as well, if one is given."""
         self._enter(phase.state)
         self.loop.enter(phase.segment)
         self._play = phase.play
@@ -92,7 +92,7 @@ class PhaseRunner:
                 yield from self._held()
 
     def _held(self) -> Iterator[Progress]:
-        """Stay where the run is, watched and recorded, until it is resumed or stopped.
+        """Stay where the run is, monitored and recorded, until it is resumed or stopped.
 
         What must be fed cannot stay, and the recording has room for `HOLD_LONGEST_S` in all: then it is
         ramped down.

@@ -1,9 +1,4 @@
-"""Carrying out a measurement: check, ramp up, settle, record, ramp down, and silence whatever happens.
-
-Whether a measurement is conducted by what is heard, and by whom.
-
-What a recording says before its first sample, taken from the bench and the plan.
-"""
+"""Carrying out a measurement: check, ramp up, settle, record, ramp down, and silence whatever happens."""
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -43,7 +38,7 @@ from ._phase_runner import PhaseRunner, Stopped
 
 
 def controller_for(bench: RunBench, measurement: Measurement) -> Controller[None] | None:
-    """Give who conducts a measurement; None for one whose course is known.
+    """Give the feedback controller of a measurement; None for one whose course is known.
 
     Raises
     ------
@@ -280,8 +275,8 @@ class Run:
     def _checked(self, runner: PhaseRunner) -> Iterator[Progress]:
         before: list[Block] = []
         during: list[Block] = []
-        listening, settling, measuring = check_phases(self._measurement)
-        yield from runner.run_phase(listening, before)
+        silence, settling, measuring = check_phases(self._measurement)
+        yield from runner.run_phase(silence, before)
         yield from runner.run_phase(settling)
         yield from runner.run_phase(measuring, during)
         figures = judged(

@@ -1,7 +1,4 @@
-"""An analogue output as a drive: samples are written ahead of their time, and reading is the clock.
-
-The samples of what is to be played, written down phase by phase, without a step between any two.
-"""
+"""An analogue output as a drive: samples are written ahead of their time, and reading is the clock."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -177,7 +174,7 @@ class StreamDrive:
 
     @property
     def setting_vpp(self) -> float:
-        """What is heard now, as a setting of the generator that would sound alike [V]."""
+        """What plays now, as the setting of the generator that would play the same [V]."""
         return self._heard_vpp
 
     @property
@@ -197,7 +194,7 @@ class StreamDrive:
         self._synthesizer.append(coming)
 
     def perform(self, phase: Phase) -> Iterator[float]:
-        """Write ahead while a phase, written before, is heard; yields how long to read until more fits."""
+        """Write ahead while a phase, written before, plays; yields how long to read until more fits."""
         self._is_playing = True
         yield from self._listened(phase.duration_s, self._full_vpp(phase) * phase.end_level)
 

@@ -1,7 +1,4 @@
-"""Work that takes longer than a frame: done in another process, asked after by a timer.
-
-Background work of which only the newest question counts: one at a time, none out of date.
-"""
+"""Work that takes longer than a frame: done in another process, and asked after by a timer."""
 
 import os
 from collections.abc import Callable

@@ -1,7 +1,4 @@
-"""The bridge between window and engine: what the engine says comes in, what a person wants goes out.
-
-A sign of life for the engine while the window paints: that may take longer than it waits.
-"""
+"""The bridge between window and engine: what the engine says comes in, what a person wants goes out."""
 
 from collections.abc import Callable
 from pathlib import Path

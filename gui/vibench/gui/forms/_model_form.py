@@ -1,7 +1,4 @@
-"""A form for a plan model: a row a field, groups for models inside, a choice for kinds.
-
-A form whose content the model itself judges at every change, field by field and as a whole.
-"""
+"""A form for a plan model: a row a field, groups for models inside, judged by the model at every change."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

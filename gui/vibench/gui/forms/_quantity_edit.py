@@ -1,7 +1,4 @@
-"""A field for one quantity: its unit stands in the field, its limits in the tooltip.
-
-Quantities as people type them: "12,5", "5 ms", "45 µm", "2 kHz".
-"""
+"""A field for one quantity as people type it: "12,5", "5 ms", "45 µm"; its limits stand in the tooltip."""
 
 import re
 

@@ -1,8 +1,8 @@
 """What the pages of the window share.
 
-`Page` is their base class; `Desk` hands each of them the bridge, settings, background work and
+`Page` is their base class; `AppContext` hands each of them the bridge, settings, background work and
 signals to the window. `Selection` holds rig, test and campaign as they are being made, none of them
-sent yet; `Orders` carries out what keys, menus and buttons ask for.
+sent yet; `UserActions` carries out what keys, menus and buttons ask for.
 Pages know each other by name only.
 """
 

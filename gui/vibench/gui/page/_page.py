@@ -1,7 +1,4 @@
-"""What a page of the window is: a widget that follows the engine and the theme.
-
-A page in two parts: what is chosen at the left, scrolled where the window is low, and its picture.
-"""
+"""What a page of the window is: a widget that follows the engine and the theme, whole or in two parts."""
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QScrollArea, QSplitter, QVBoxLayout, QWidget

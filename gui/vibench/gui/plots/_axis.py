@@ -1,7 +1,4 @@
-"""Axes with their unit in the label, no prefixes of their own, and 1-2-5 ticks where they are logarithmic.
-
-The grid of a plot: a line for every tick of its axes, painted with the picture.
-"""
+"""Axes with their unit in the label, 1-2-5 ticks where they are logarithmic, and a grid of all ticks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

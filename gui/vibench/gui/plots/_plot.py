@@ -1,7 +1,4 @@
-"""A plot as all pages draw it: labelled axes, thin pens, a legend that follows the theme.
-
-Axes that follow the data without trembling.
-"""
+"""A plot as all pages draw it: labelled axes that follow the data without trembling, and a legend."""
 
 from collections.abc import Callable
 from math import log10

@@ -135,7 +135,7 @@ QToolTip {{ color: {theme.text}; background: {theme.raised}; border: 1px solid {
 QGroupBox {{ border: 1px solid {theme.line}; border-radius: 4px; margin-top: 0.7em; padding-top: 0.5em; }}
 QGroupBox::title {{ subcontrol-origin: margin; left: 0.7em; padding: 0 0.3em; color: {theme.text}; }}
 QFrame#banner, QFrame#statusLine {{ background: {theme.base}; }}
-QLabel#face {{ border-radius: 4px; padding: 0.35em 0.9em; font-weight: bold; }}
+QLabel#engine_state {{ border-radius: 4px; padding: 0.35em 0.9em; font-weight: bold; }}
 QPushButton#stop {{ background: {theme.tones[Tone.DANGER].ground}; color: {theme.tones[Tone.DANGER].letters};
     border: 2px solid {theme.tones[Tone.DANGER].ground}; border-radius: 4px; font-weight: bold;
     padding: 0.35em 1.4em; }}

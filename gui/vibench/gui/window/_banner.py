@@ -35,7 +35,7 @@ class Banner(QFrame):
         self.setAccessibleName("State of the rig")
         self._indicator = CLOSED
         self._label = QLabel()
-        self._label.setObjectName("face")
+        self._label.setObjectName("engine_state")
         self._detail = QLabel()
         self._detail.setAccessibleName("Details of the state")
         self._detail.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)

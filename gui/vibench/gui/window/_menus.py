@@ -1,9 +1,4 @@
-"""The menus: everything that a key or a click can do, in words.
-
-Esc and Pause abort from anywhere in the window, from modal dialogs and open menus too.
-
-The keys, as F1 lists them.
-"""
+"""The menus, and the keys as F1 lists them; Esc and Pause abort from dialogs and open menus too."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -19,9 +14,9 @@ ABORT_KEYS = frozenset({Qt.Key.Key_Escape, Qt.Key.Key_Pause})
 
 
 class AbortKey(QObject):
-    """Hears every key press of the application before any widget does.
+    """Receives every key press of the application before any widget does.
 
-    A shortcut is not heard while a modal dialog is open; a filter on the application is. The key goes
+    A shortcut does not act while a modal dialog is open; a filter on the application does. The key goes
     on to whoever has the focus, so that Esc still closes a dialog.
     """
 
@@ -33,7 +28,7 @@ class AbortKey(QObject):
         application.installEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Listen, and let everything pass."""
+        """Watch for the keys, and let everything pass."""
         if event.type() is QEvent.Type.KeyRelease:
             self._last_seen = None
         elif event.type() in (QEvent.Type.KeyPress, QEvent.Type.ShortcutOverride):

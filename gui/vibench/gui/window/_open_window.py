@@ -1,7 +1,4 @@
-"""From nothing to a window on the screen, and from its end to the end of the process.
-
-The application around the window: style, font, settings.
-"""
+"""From nothing to a window on the screen, and from its end to the end of the process."""
 
 import gc
 import sys

@@ -1,4 +1,4 @@
-"""The pages there are, in the order of the rail."""
+"""The pages there are, in the order of the navigation bar."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

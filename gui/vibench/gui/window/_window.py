@@ -1,7 +1,4 @@
-"""The frame: banner and STOP, messages, the rail of pages, the status line.
-
-How many pictures a second are drawn, as told by those of the last second.
-"""
+"""The frame: banner and STOP, messages, navigation, the status line."""
 
 from collections import deque
 from collections.abc import Callable

@@ -1,7 +1,4 @@
-"""The 150 Get, Set and Reset calls for attributes, made from the protocol's own description of them.
-
-What a program can ask about a custom scale.
-"""
+"""The 150 Get, Set and Reset calls for attributes, made from the protocol's own description of them."""
 
 import re
 from collections.abc import Callable

@@ -95,7 +95,7 @@ class TaskCalls:
     def _is_done(self, request: Any) -> Fields:
         task = self._task(request)
         if not task.is_done():
-            task.rig.pace.glance(task.rig)
+            task.rig.pace.answer_progress(task.rig)
         return {"is_task_done": task.is_done()}
 
     def _wait(self, request: Any) -> Fields:

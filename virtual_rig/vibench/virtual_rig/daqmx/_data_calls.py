@@ -1,9 +1,4 @@
-"""Calls that move samples between a program and a task of the simulated driver.
-
-Arrays on the wire: one packed field instead of a list of numbers (protobuf "Packed repeated fields").
-
-Writing to a simulated task: into the output buffer, or straight to the terminal.
-"""
+"""Calls that move samples between a program and a task: read, written, and packed as protobuf packs them."""
 
 import math
 import time

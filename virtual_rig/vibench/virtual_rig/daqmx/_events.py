@@ -72,30 +72,30 @@ class EventCalls:
     # --- the streams; each runs on a thread of its own and takes the rig's lock only while it looks
 
     def _repeat(self, task: Task, interval: int, response: Any, context: grpc.ServicerContext) -> Listener:
-        ear = _Ear(self._system, task, context)
-        while stream := ear.await_run():
+        subscription = _Subscription(self._system, task, context)
+        while stream := subscription.await_run():
             count = interval
-            while ear.await_count(stream, count, count - interval):
+            while subscription.await_count(stream, count, count - interval):
                 yield response
                 count += interval
 
     def _await_end(self, task: Task, context: grpc.ServicerContext) -> Listener:
-        ear = _Ear(self._system, task, context)
-        while stream := ear.await_run():
-            if ear.await_end(stream):
+        subscription = _Subscription(self._system, task, context)
+        while stream := subscription.await_run():
+            if subscription.await_end(stream):
                 status = stream.failure.code if stream.failure else 0
                 yield nidaqmx_pb2.RegisterDoneEventResponse(status=status)
 
 
-class _Ear:
-    """One listener's view of one task: which run it has heard, and whether it is still listening."""
+class _Subscription:
+    """One listener's view of one task: which run it has followed, and whether its client is still there."""
 
     def __init__(self, system: DaqmxSystem, task: Task, context: grpc.ServicerContext) -> None:
         self._system = system
         self._rig = system.rig
         self._task = task
         self._context = context
-        self._heard: Stream | None = None
+        self._followed: Stream | None = None
         context.add_callback(self._wake)
 
     def _wake(self) -> None:
@@ -110,11 +110,11 @@ class _Ear:
         self._rig.pace.ask(self._rig, until_s, lambda: is_there() or self._has_gone, _FOR_EVER)
 
     def await_run(self) -> Stream | None:
-        """Wait for a run not heard yet; None when there is nobody to tell any more."""
+        """Wait for a run not followed yet; None when there is nobody to tell any more."""
         with self._rig.changed:
-            self._wait(_BY_OTHERS, lambda: self._task.stream not in (None, self._heard))
-            self._heard = None if self._has_gone else self._task.stream
-            return self._heard
+            self._wait(_BY_OTHERS, lambda: self._task.stream not in (None, self._followed))
+            self._followed = None if self._has_gone else self._task.stream
+            return self._followed
 
     def await_count(self, stream: Stream, count: int, announced: int) -> bool:
         """Wait until ``count`` samples have passed; False when this run will not get there.

@@ -12,7 +12,7 @@ from ._devices import Idle
 from ._errors import DaqmxRefusal
 
 LEAD_S = 0.005
-"""How far samples are handed to the world ahead of their time [s]: no gap, yet new data is soon heard."""
+"""How far samples are handed to the world ahead of their time [s]: no gap, yet new data soon plays."""
 
 _ROUNDING_SAMPLES = 1e-5
 

@@ -70,7 +70,7 @@ class Pace(Protocol):
         ``timeout_s`` is wall time; negative waits for ever. An infinite ``until_s`` depends on somebody else.
         """
 
-    def glance(self, rig: RigClock) -> None:
+    def answer_progress(self, rig: RigClock) -> None:
         """Let a question about progress be answered with something newer than the last time."""
 
     def stumble(self, rig: RigClock) -> None:
@@ -101,7 +101,7 @@ class OnDemandPace:
             return is_there()
         return _wait(rig, is_there, timeout_s)
 
-    def glance(self, rig: RigClock) -> None:
+    def answer_progress(self, rig: RigClock) -> None:
         """Let ``QUESTION_S`` of rig time pass."""
         rig.advance_to(rig.now_s + QUESTION_S)
 
@@ -147,7 +147,7 @@ class WallPace:
         self._step(rig)
         return is_there() or _wait(rig, is_there, timeout_s)
 
-    def glance(self, rig: RigClock) -> None:
+    def answer_progress(self, rig: RigClock) -> None:
         """Bring the rig up to the clock."""
         self._step(rig)
 

@@ -85,7 +85,7 @@ def available(task: Task) -> int:
     if task.acquisition is None:
         return 0
     if task.acquisition.available == 0 and not task.acquisition.is_done:
-        task.rig.pace.glance(task.rig)
+        task.rig.pace.answer_progress(task.rig)
     return min(task.acquisition.available, task.acquisition.buffer_size)
 
 
@@ -131,7 +131,7 @@ def _first_sample(task: Task, acquisition: Acquisition) -> int:
         case ReadRelativeTo.FIRST_SAMPLE:
             origin = 0
         case _:
-            task.rig.pace.glance(task.rig)
+            task.rig.pace.answer_progress(task.rig)
             origin = acquisition.acquired
     return max(0, origin + task.reading.offset)
 

@@ -118,7 +118,7 @@ TRIGGER = AttributeGroup[Task](
 
 def _is_complete(task: Task) -> bool:
     if task.is_running and not task.is_done():
-        task.rig.pace.glance(task.rig)
+        task.rig.pace.answer_progress(task.rig)
     return task.is_done()
 
 
@@ -234,7 +234,7 @@ def _raw_width(task: Task) -> int:
 def _total_generated(task: Task) -> int:
     if task.generation is None:
         return 0
-    task.rig.pace.glance(task.rig)
+    task.rig.pace.answer_progress(task.rig)
     return task.generation.generated
 
 

@@ -1,7 +1,4 @@
-"""A simulated DAQmx task: its channels, and the states it goes through.
-
-Names of the terminals between which a task's clock and start trigger travel.
-"""
+"""A simulated DAQmx task: its channels, its states, and the terminals of its clock and trigger."""
 
 from enum import IntEnum
 from typing import Protocol

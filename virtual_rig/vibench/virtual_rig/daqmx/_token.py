@@ -1,4 +1,4 @@
-"""A server that is heard beyond this computer answers only calls that carry its token."""
+"""A server that can be reached from other computers answers only calls that carry its token."""
 
 import hmac
 import secrets

@@ -313,7 +313,7 @@ class AFG1022:
             self._follow_frequency(channel)
 
     def memory_changed(self) -> None:
-        """Let a changed waveform be heard at once if it is playing."""
+        """Let a changed waveform act at once if it is playing."""
         sounding = self._channels[SOUNDING_CHANNEL]
         if memory_name(sounding.shape) is not None:
             self._play(sounding)

@@ -60,7 +60,7 @@ class Generator(Protocol):
         """Check and take over new settings."""
 
     def memory_changed(self) -> None:
-        """Let a changed waveform be heard at once if it is playing."""
+        """Let a changed waveform act at once if it is playing."""
 
     @property
     def frequencies_are_locked(self) -> bool:

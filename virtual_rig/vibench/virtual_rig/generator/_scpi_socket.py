@@ -1,6 +1,6 @@
 """The generator on a raw TCP socket, for programs outside Python: lines in, lines out.
 
-The real AFG1022 has no network port; this is a door into the simulation, opened with
+The real AFG1022 has no network port; this is a way into the simulation, opened with
 ``TCPIP0::127.0.0.1::<port>::SOCKET`` and newline as the termination character.
 """
 

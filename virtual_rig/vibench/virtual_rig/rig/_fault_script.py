@@ -6,8 +6,6 @@
     at_s = 120
     fault = "pull_usb_cable"
     for_s = 5
-
-The faults of a script by name: what each needs to be told, and how it begins and heals.
 """
 
 from dataclasses import dataclass, field

@@ -1,7 +1,4 @@
-"""From motion to volts: the laser vibrometer that watches m0 and the accelerometer on the base.
-
-Sensor dynamics on the grid of the world: exact poles, zeros fitted to the analogue response.
-"""
+"""From motion to volts: the laser vibrometer that watches m0 and the accelerometer on the base."""
 
 from dataclasses import dataclass
 

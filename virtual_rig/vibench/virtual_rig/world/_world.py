@@ -1,7 +1,4 @@
-"""The analogue world: everything between the generator's terminal and the samples of the converter.
-
-What is to happen at a certain rig time, however the world is advanced there.
-"""
+"""The analogue world: everything between the generator's terminal and the samples of the converter."""
 
 import heapq
 import threading

@@ -1,7 +1,4 @@
-"""The list of curves: which are shown, which are compared, and what each of them is.
-
-Which two curves are compared, and how far they differ in all.
-"""
+"""The list of curves: which are shown, which two are compared, and how far they differ."""
 
 from collections.abc import Callable
 

@@ -1,7 +1,4 @@
-"""The list of recordings: one row a file, with its state in words and a small picture.
-
-Which campaign's recordings are listed, with how far each campaign is.
-"""
+"""The list of recordings: one row a file, with its state in words and a small picture, by campaign."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,4 @@
-"""The spectrogram of what is in sight of a recording, worked out elsewhere.
-
-The two pictures of a recording: its channels over time, and the frequencies that one of them holds.
-"""
+"""The two pictures of a recording: its channels over time, and the spectrogram of what is in sight."""
 
 from math import log10
 from pathlib import Path

@@ -22,9 +22,9 @@ _LEFT_EM, _TIME_AXIS_EM, _LEAST_EM = 5, 3, 3
 MARKER = LineStyle(lambda theme: theme.accent)
 SEGMENT = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
 _MOST_KEPT = 12
-"""Lanes: to make one takes as long as to draw ten."""
+"""Plots: to make one takes as long as to draw ten."""
 _LABEL_AT = 0.1
-"""Names of segments stand at the foot of the first lane: above is the name of the channel."""
+"""Names of segments stand at the foot of the first plot: above is the name of the channel."""
 _NAMED_SHARE = 0.08
 """Part of the recording that a segment must fill for its name to find room."""
 
@@ -38,14 +38,14 @@ class _TimeHistory:
 
 
 class RecordingTimeHistories(QWidget):
-    """Lanes over one time axis. Wheel and + - zoom, arrows move, Home shows all, drag moves."""
+    """Plots over one time axis. Wheel and + - zoom, arrows move, Home shows all, drag moves."""
 
     range_changed = Signal()
     markers_moved = Signal()
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setAccessibleName("Lanes of the recording")
+        self.setAccessibleName("Time histories of the recording")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._theme = theme
         self._overview: RecordingOverview | None = None
@@ -61,7 +61,7 @@ class RecordingTimeHistories(QWidget):
         self._later.timeout.connect(self._draw)
 
     def prepare(self, channel: ChannelHeader) -> None:
-        """Have a lane for a channel ready: to make all lanes at once would hold the window up."""
+        """Have a plot for a channel ready: to make all plots at once would hold the window up."""
         self._history_of(channel)
 
     def show_recording(self, overview: RecordingOverview | None) -> None:
@@ -171,7 +171,7 @@ class RecordingTimeHistories(QWidget):
         event.accept()
 
     def _history_of(self, channel: ChannelHeader) -> _TimeHistory:
-        """Give the lane of a channel, as it was left by another recording, or a new one."""
+        """Give the plot of a channel, as it was left by another recording, or a new one."""
         kind = (channel.role, channel.unit)
         if kind not in self._kept:
             unit = unit_text(channel.unit)
@@ -192,7 +192,7 @@ class RecordingTimeHistories(QWidget):
         return self._kept[kind]
 
     def _begin(self, history: _TimeHistory, number: int, recording: Recording) -> None:
-        """Make a lane ready for a recording: its place, its limits, nothing drawn yet."""
+        """Make a plot ready for a recording: its place, its limits, nothing drawn yet."""
         plot, is_last = history.plot, number == len(recording.channels) - 1
         plot.wipe()
         history.curve = plot.curve(curve_style(number))
@@ -212,7 +212,7 @@ class RecordingTimeHistories(QWidget):
         plot.show()
 
     def _forget_others(self) -> None:
-        """Let lanes go that neither this recording nor, perhaps, the next one needs."""
+        """Let plots go that neither this recording nor, perhaps, the next one needs."""
         for kind, history in list(self._kept.items()):
             if len(self._kept) > _MOST_KEPT and history not in self._histories:
                 del self._kept[kind]
@@ -237,7 +237,7 @@ class RecordingTimeHistories(QWidget):
         self.markers_moved.emit()
 
     def _mark_segments(self, overview: RecordingOverview) -> None:
-        """Draw a line where each segment begins; long ones are named in the first lane."""
+        """Draw a line where each segment begins; long ones are named in the first plot."""
         recording = overview.recording
         begun_s = [each.first_sample / recording.sample_rate_hz for each in recording.segments]
         for history in self._histories:
@@ -257,7 +257,7 @@ class RecordingTimeHistories(QWidget):
             )
 
     def _share_height(self) -> None:
-        """Give all lanes the same height; the last has the time axis on top of it."""
+        """Give all plots the same height; the last has the time axis on top of it."""
         axis = _TIME_AXIS_EM * self.fontMetrics().height()
         history = max(1, (self.height() - axis) // max(1, len(self._histories)))
         for place in range(len(self._histories)):
@@ -290,5 +290,5 @@ class RecordingTimeHistories(QWidget):
             if known[0].size:
                 bottom, top = float(known[0].min()), float(known[1].max())
                 height = (top - bottom) or 1e-9
-                # Room above for the lane's name, which must not lie on the signal.
+                # Room above for the plot's name, which must not lie on the signal.
                 history.plot.setYRange(bottom - 0.06 * height, top + 0.3 * height, padding=0.0)

@@ -1,7 +1,4 @@
-"""Campaigns in rows of words.
-
-What a campaign comes to: rows, time, size; worked out elsewhere, for it may have thousands of points.
-"""
+"""Campaigns in rows of words, and what they come to: rows, time, size."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

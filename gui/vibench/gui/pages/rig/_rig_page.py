@@ -1,7 +1,4 @@
-"""The Rig page: choose a configuration, see the instruments, confirm the knobs, open, check.
-
-What a check found, as people read it: prefixes in place of powers of ten.
-"""
+"""The Rig page: choose a configuration, see the instruments, confirm the knobs, open, check."""
 
 from math import floor, isfinite, log10
 from pathlib import Path

@@ -150,7 +150,7 @@ class RunPage(Page):
         self.look_button.show()
 
     def _show_channels(self) -> None:
-        """Have the lanes before the first sample: to make them in a run would cost it a moment."""
+        """Have the plots before the first sample: to make them in a run would cost it a moment."""
         rig = self.context.selection.rig
         if rig is not None:
             self.time_histories.show_channels(

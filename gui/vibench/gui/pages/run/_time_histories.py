@@ -1,7 +1,4 @@
-"""The newest seconds of every channel, one time history each: smallest and largest sample of every column.
-
-Channels as people call them, and the units that suit them.
-"""
+"""The newest seconds of every channel, one time history each: smallest and largest sample of every column."""
 
 import numpy as np
 import pyqtgraph as pg
@@ -39,15 +36,15 @@ def channel_axis(role: str, unit: str) -> PlotAxis:
 AGO = PlotAxis("Time before now", "s")
 """An axis that stands still: one that scrolls would be painted anew in every frame."""
 LEAST_COLUMNS, MOST_COLUMNS = 500, 3000
-"""Of a lane: as many as there are lines side by side; between fewer, room would stay empty."""
+"""Of a plot: as many as there are lines side by side; between fewer, room would stay empty."""
 AXIS_LETTERS = 9
 TIME_AXIS_EM = 3
 USUAL_SPAN_S = 2.0
-"""What a lane shows at first."""
+"""What a plot shows at first."""
 
 
 class TimeHistoryPlots(QWidget):
-    """Lanes over one time axis; they change with the channels of the run."""
+    """Plots over one time axis; they change with the channels of the run."""
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -61,7 +58,7 @@ class TimeHistoryPlots(QWidget):
         self._layout.setSpacing(1)
 
     def show_channels(self, channels: tuple[tuple[str, str], ...]) -> None:
-        """Have a lane for each channel, given by role and unit."""
+        """Have a plot for each channel, given by role and unit."""
         if channels != self._channels:
             self._build(channels)
             self._channels = channels
@@ -92,7 +89,7 @@ class TimeHistoryPlots(QWidget):
             plot.retheme(theme)
 
     def _build(self, channels: tuple[tuple[str, str], ...]) -> None:
-        """Have as many lanes as channels; those that are there are used again, for a plot is slow to make."""
+        """Have as many plots as channels; those that are there are used again, for a plot is slow to make."""
         for plot in self.plots[len(channels) :]:
             self._layout.removeWidget(plot)
             plot.deleteLater()
@@ -116,15 +113,15 @@ class TimeHistoryPlots(QWidget):
         self._share_height()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Keep all lanes equally high."""
+        """Keep all plots equally high."""
         super().resizeEvent(event)
         self._share_height()
 
     def _share_height(self) -> None:
-        """Give the last lane as much more as its time axis takes."""
+        """Give the last plot as much more as its time axis takes."""
         axis = TIME_AXIS_EM * self.fontMetrics().height()
-        lane = max(1, (self.height() - axis) // max(1, len(self.plots)))
+        height = max(1, (self.height() - axis) // max(1, len(self.plots)))
         for place in range(len(self.plots)):
-            self._layout.setStretch(place, lane + (axis if place == len(self.plots) - 1 else 0))
+            self._layout.setStretch(place, height + (axis if place == len(self.plots) - 1 else 0))
         # At once: a layout that comes after the first picture has everything painted twice.
         self._layout.activate()

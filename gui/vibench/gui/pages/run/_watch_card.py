@@ -1,7 +1,4 @@
-"""Beside the pictures: progress, impacts, levels; freeze the picture, mark an event.
-
-How much of its range each channel uses: a bar with the peak held, red and a word above 95 %.
-"""
+"""Beside the pictures: progress, impacts, levels; freeze the picture, mark an event."""
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
@@ -95,7 +92,7 @@ class LevelMeters(QWidget):
 
 
 SPANS_S = (0.05, 0.2, 1.0, 2.0, 5.0, 10.0)
-"""Seconds in a lane."""
+"""Seconds in a time history."""
 
 
 class WatchCard(QGroupBox):
@@ -119,7 +116,7 @@ class WatchCard(QGroupBox):
         for span_s in SPANS_S:
             self.span.addItem(f"{span_s:g} s")
         self.span.setCurrentIndex(SPANS_S.index(USUAL_SPAN_S))
-        self.span.setToolTip("Seconds in a lane")
+        self.span.setToolTip("Seconds in a time history")
         self.freeze = QCheckBox("Freeze the picture  (Space)")
         self.freeze.setToolTip("Only the picture stands still; the recording goes on")
         self.mark = LineField("event")
@@ -131,7 +128,7 @@ class WatchCard(QGroupBox):
 
     @property
     def span_s(self) -> float:
-        """Seconds in a lane."""
+        """Seconds in a time history."""
         return SPANS_S[self.span.currentIndex()]
 
     def wish_mark(self) -> None:
@@ -158,7 +155,7 @@ class WatchCard(QGroupBox):
 
     def _lay_out(self) -> None:
         form = QFormLayout()
-        for text, widget in (("Impacts", self.impacts), ("Lanes show", self.span)):
+        for text, widget in (("Impacts", self.impacts), ("Histories show", self.span)):
             label = QLabel(text)
             label.setBuddy(widget)
             widget.setAccessibleName(text)

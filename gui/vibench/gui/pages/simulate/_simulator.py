@@ -1,4 +1,4 @@
-"""The window's end of the process that simulates: asks, hears, and drops what nobody wants any more."""
+"""The window's end of the process that simulates: asks, receives, and drops what nobody wants any more."""
 
 from multiprocessing import get_context
 from multiprocessing.connection import Connection

@@ -1,7 +1,4 @@
-"""The signal as it will be played, in time and spectrum.
-
-What the specimen is predicted to do: Response I and II over frequency, and where it collides.
-"""
+"""The signal as it will be played, and what the specimen is predicted to do with it."""
 
 import numpy as np
 from PySide6.QtWidgets import QHBoxLayout, QWidget

@@ -1,7 +1,4 @@
-"""The Test page: a form of what will be played, and beside it exactly what that is and does.
-
-The live arithmetic of a test: what it comes to, in one line.
-"""
+"""The Test page: a form of what will be played, and beside it exactly what that is and does."""
 
 import tomllib
 from pathlib import Path
@@ -88,7 +85,7 @@ class TestPage(Page):
         self._looking = LatestRequest(
             context.background, preview_test, self._looked, self._look_failed, LOOK_MS, self
         )
-        self._foreseeing = LatestRequest(
+        self._predicting = LatestRequest(
             context.background, predict_test, self._predicted, self._prediction_failed, PREDICT_MS, self
         )
         self._lay_out()
@@ -104,7 +101,7 @@ class TestPage(Page):
     @property
     def is_busy(self) -> bool:
         """Whether a preview or a prediction is still to come."""
-        return self._looking.is_busy or self._foreseeing.is_busy
+        return self._looking.is_busy or self._predicting.is_busy
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
@@ -123,7 +120,7 @@ class TestPage(Page):
         self._preview = None
         if measurement is None or rig is None:
             self._looking.drop()
-            self._foreseeing.drop()
+            self._predicting.drop()
             what = self.form.complaint or "Choose a rig first (Ctrl+1)."
             self.summary.setText(f"✖ {what}")
             return
@@ -133,7 +130,7 @@ class TestPage(Page):
         self.summary.setText("…")
         self._looking.ask(TestPreview(measurement, rig))
         self.prediction_note.setText("◌ simulating; the first time compiles the simulation, up to a minute")
-        self._foreseeing.ask(TestPreview(measurement, rig))
+        self._predicting.ask(TestPreview(measurement, rig))
 
     def _looked(self, seen: MeasurementPreview) -> None:
         self._preview = seen
