@@ -89,7 +89,6 @@ class TestReading:
     def test_the_rate_is_the_one_that_the_hardware_takes(self, rig, opened):
         digitizer = opened(with_daq(rig, sample_rate_hz=10_000))
         assert digitizer.sample_rate_hz == pytest.approx(10_240.0)
-        assert digitizer.requested_rate_hz == 10_000
 
     def test_blocks_follow_each_other_without_a_gap(self, digitizer):
         digitizer.start()

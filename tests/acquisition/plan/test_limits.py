@@ -17,7 +17,7 @@ from vibench.acquisition.plan import (
     require_within_limits,
     shortest_ramp_s,
 )
-from vibench.acquisition.plan._limits import limit_checks, limit_table
+from vibench.acquisition.plan._limits import limit_checks
 from vibench.acquisition.rig import BaseQuantity, RigModel
 
 
@@ -139,11 +139,3 @@ def test_the_shortest_ramp_is_three_periods_of_the_loaded_suspension(rig):
     mass = shaker.moving_mass_kg + shaker.fixture_mass_kg
     period_s = 2 * np.pi * np.sqrt(mass / shaker.suspension_stiffness_n_per_m)
     assert shortest_ramp_s(rig) == pytest.approx(3 * period_s)
-
-
-def test_the_table_puts_the_most_used_limit_first(rig):
-    checks = limit_checks(plan(Dwell(amplitude_vpp=5, frequency_hz=20, duration_s=1)), rig)
-    lines = limit_table(checks).splitlines()
-    shares = [float(line.split("%")[0].split()[-1]) for line in lines[1:]]
-    assert shares == sorted(shares, reverse=True)
-    assert len(lines) == len(checks) + 1

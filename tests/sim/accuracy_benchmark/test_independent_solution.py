@@ -7,7 +7,7 @@ from scipy.linalg import expm
 
 from vibench.sim import Accuracy, Harmonic, Hertz, RigidStops, gong2025, integrate
 from vibench.sim.accuracy_benchmark._independent_solution import independent_state, state_error
-from vibench.sim.accuracy_benchmark._plain_equations import plain_rates
+from vibench.sim.accuracy_benchmark._plain_equations import Place, law_of, numbers_of, rates_at
 
 STILL = Harmonic(100.0, 0.0)
 MOVING = np.array([0.0, 0.0, 0.0, 0.0, 0.2, -0.1])
@@ -76,8 +76,9 @@ def test_its_force_is_the_law_as_written():
     specimen = replace(gong2025(), contact=Hertz(4e9))
     at = np.array([0.0, 49e-6, 0.0, 0.0, 0.0, 0.0])
     push = 4e9 * (4e-6) ** 1.5 + specimen.stiffnesses[1] * 49e-6
-    assert plain_rates(specimen, STILL)(0.0, at)[4] == pytest.approx(-push / specimen.masses[1])
-    assert plain_rates(specimen, STILL)(0.0, -at)[4] == pytest.approx(push / specimen.masses[1])
+    rates = rates_at(Place.ANYWHERE, law_of(specimen), numbers_of(specimen, STILL))
+    assert rates(0.0, at)[4] == pytest.approx(-push / specimen.masses[1])
+    assert rates(0.0, -at)[4] == pytest.approx(push / specimen.masses[1])
 
 
 def test_rigid_stops_are_refused_in_a_sentence():

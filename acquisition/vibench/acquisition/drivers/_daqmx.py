@@ -124,11 +124,6 @@ class DaqmxDigitizer:
         return self._sample_rate_hz
 
     @property
-    def requested_rate_hz(self) -> float:
-        """The rate that the configuration asks for."""
-        return self._config.sample_rate_hz
-
-    @property
     def roles(self) -> tuple[str, ...]:
         """Roles of the channels, in the order of the rows of a block."""
         return tuple(channel.role.value for channel in self._channels)

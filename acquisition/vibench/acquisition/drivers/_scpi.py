@@ -86,10 +86,6 @@ class ScpiPort:
         """Ask, and once more when the answer is empty, as the first one after ``*CLS`` may be."""
         return self.query(message) or self.query(message)
 
-    def query_number(self, message: str) -> float:
-        """Ask for a number; a unit behind it is ignored."""
-        return number_in(self.query(message), f"{self._name}: {message}")
-
     def complaints(self) -> tuple[Complaint, ...]:
         """Empty the error queue and return what was in it."""
         with self._lock:

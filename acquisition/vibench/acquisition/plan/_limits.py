@@ -107,24 +107,6 @@ def require_within_limits(measurement: Measurement, rig: Rig) -> tuple[LimitChec
     return checks
 
 
-def limit_table(checks: tuple[LimitCheck, ...]) -> str:
-    """Lay out the checks for a person, the most used limit first."""
-    rows = [("quantity", "predicted", "limit", "used", "source of the limit")]
-    rows += [
-        (
-            check.what,
-            f"{check.value:.4g} {check.unit}",
-            f"{check.side.value} {check.limit:.4g} {check.unit}",
-            f"{100 * check.use:.1f} %",
-            check.source,
-        )
-        for check in sorted(checks, key=lambda each: each.use, reverse=True)
-    ]
-    widths = [max(len(row[column]) for row in rows) for column in range(4)]
-    lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)) for row in rows)
-    return "\n".join(f"{line}  {row[4]}" for line, row in zip(lines, rows, strict=True))
-
-
 def shortest_ramp_s(rig: Rig) -> float:
     """Three periods of the loaded shaker on its suspension [s]."""
     shaker = rig.shaker

@@ -1,7 +1,5 @@
 """What a person means to do: rig, test and campaign as they are being made. Nothing of it has been sent."""
 
-from pathlib import Path
-
 from PySide6.QtCore import QObject, Signal
 
 from vibench.acquisition.plan import Campaign, Measurement
@@ -19,7 +17,6 @@ class Selection(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._rig: Rig | None = None
-        self._rig_path: Path | None = None
         self._measurement: Measurement | None = None
         self._campaign: Campaign | None = None
         self._prediction: MeasurementPrediction | None = None
@@ -28,11 +25,6 @@ class Selection(QObject):
     def rig(self) -> Rig | None:
         """The rig that was chosen, open or not."""
         return self._rig
-
-    @property
-    def rig_path(self) -> Path | None:
-        """Its configuration file."""
-        return self._rig_path
 
     @property
     def measurement(self) -> Measurement | None:
@@ -49,9 +41,9 @@ class Selection(QObject):
         """The campaign on the Queue page."""
         return self._campaign
 
-    def choose_rig(self, rig: Rig | None, path: Path | None) -> None:
+    def choose_rig(self, rig: Rig | None) -> None:
         """Mean another rig."""
-        self._rig, self._rig_path = rig, path
+        self._rig = rig
         self.rig_changed.emit()
 
     def choose_measurement(self, measurement: Measurement | None) -> None:

@@ -53,7 +53,7 @@ class ReadTable(QTableWidget):
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(range(len(columns))[wide], QHeaderView.ResizeMode.Stretch)
         header.setMaximumSectionSize(_WIDEST_LETTERS * self.fontMetrics().averageCharWidth())
-        self._wide, self._hint = range(len(columns))[wide], hint
+        self._hint = hint
         self._shown: tuple[tuple[str, ...], ...] = ()
         # A change of width comes with many steps: rows are measured once, after them.
         self._later = QTimer(self, interval=0, singleShot=True)

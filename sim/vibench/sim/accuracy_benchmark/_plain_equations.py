@@ -46,14 +46,6 @@ class Law(NamedTuple):
     """Of each power at the reference [N]."""
 
 
-def plain_rates(specimen: Specimen, drive: Harmonic) -> Rates:
-    """Give d/dt of x, y, z, vx, vy, vz as Gong et al. 2025, eq. 1, has it: what any general solver takes.
-
-    Raises ValueError for rigid stops, whose force is no function of the state.
-    """
-    return rates_at(Place.ANYWHERE, law_of(specimen), numbers_of(specimen, drive))
-
-
 def rates_at(place: Place, law: Law, numbers: Floats) -> Rates:
     """Give d/dt of the state for as long as m1 stays at a place."""
     where = int(place)

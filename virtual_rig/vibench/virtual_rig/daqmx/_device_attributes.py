@@ -38,7 +38,6 @@ class System:
     """The whole simulated system, as the system attributes describe it."""
 
     catalogue: Catalogue
-    task_names: Callable[[], tuple[str, ...]]
     scale_names: Callable[[], tuple[str, ...]]
 
 

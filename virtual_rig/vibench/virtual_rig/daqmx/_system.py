@@ -28,7 +28,7 @@ class DaqmxSystem:
     @property
     def description(self) -> System:
         """The system as its attributes show it."""
-        return System(self.catalogue, lambda: tuple(self.tasks), lambda: tuple(self.scales))
+        return System(self.catalogue, lambda: tuple(self.scales))
 
     # --- tasks ---------------------------------------------------------------------------
 

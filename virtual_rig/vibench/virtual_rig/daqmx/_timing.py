@@ -38,7 +38,6 @@ class Timing:
     trigger_source: str = ""
     """Empty: the task begins when it is started."""
     trigger_edge: Edge = Edge.RISING
-    trigger_delay_s: float = 0.0
 
     @property
     def total(self) -> float:

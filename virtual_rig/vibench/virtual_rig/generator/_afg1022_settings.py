@@ -5,7 +5,6 @@ queries speak of, is that voltage divided by the load the user has declared (``O
 another load changes the reading, not the output.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum, StrEnum
@@ -187,8 +186,3 @@ def highest_frequency_hz(shape: str) -> float:
     if shape in FORMULAS:
         return _HIGHEST_BUILT_IN_FREQUENCY_HZ
     return _HIGHEST_FREQUENCY_HZ.get(shape, _HIGHEST_MEMORY_FREQUENCY_HZ)
-
-
-def displayed_load(declared_load_ohm: float) -> float:
-    """Return the declared load as SCPI sends it, infinity as 9.9E+37."""
-    return 9.9e37 if math.isinf(declared_load_ohm) else declared_load_ohm

@@ -169,7 +169,7 @@ class RigPage(Page):
             kind = "Every instrument is simulated." if rig.virtual is not None else "Real instruments."
             self.about.setText(f"{rig.name}. {kind} {' → '.join(chain)} → {rig.daq.product}")
             self.context.settings.keep_text(Remembered.BENCH, str(self.choice.path))
-        self.context.selection.choose_rig(rig, self.choice.path)
+        self.context.selection.choose_rig(rig)
 
     def _choose_first(self) -> None:
         otherwise = str(shipped("hardware_configs/virtual_rig.toml"))
