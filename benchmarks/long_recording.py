@@ -25,7 +25,7 @@ from vibench.acquisition.recording import (
     RecordingState,
     create_recording,
 )
-from vibench.analysis import analyse_recording
+from vibench.analysis import analyse
 from vibench.analysis.live import RESPONSE
 from vibench.analysis.recordings import BASE, DRIVE
 
@@ -96,7 +96,7 @@ def write_recording(path, duration_s):
 def ours(path):
     """Analyse the recording as the command does: levels, checks, three estimates with bounds, resonances."""
     with open_recording(path) as recording:
-        found = analyse_recording(recording).response.h1
+        found = analyse(recording).response.h1
     return found.frequency_hz, found.magnitude
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import RecordingState
-from vibench.analysis import analyse_recording
+from vibench.analysis import analyse
 from vibench.sim import base_transmissibility, gong2025
 
 LINEAR_HZ = (95.0, 266.0, 500.0)
@@ -64,7 +64,7 @@ def test_strong_noise_shows_the_two_terminal_resonances_within_two_percent_and_n
 
 def test_the_linear_transmission_is_the_exact_one_within_tight_bounds_of_its_own(demo):
     with open_recording(demo / "recordings" / "noise_weak.h5") as recording:
-        measured = analyse_recording(recording).response.frequency_response
+        measured = analyse(recording).response.frequency_response
     exact = np.abs(base_transmissibility(gong2025(), measured.frequency_hz)[:, 0])
     inside = (measured.magnitude_lower <= exact) & (exact <= measured.magnitude_upper)
     # 95 % of the lines, within twice the standard error of a share of 551 independent lines.

@@ -164,9 +164,9 @@ def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path):
 def start_dwell(bench, qtbot, name):
     bench.pages[TEST].form.show_measurement(dwell(name, 600.0))
     reach(qtbot, bench, EngineState.READY)
-    bench.actions.arm_test()
+    bench.user_actions.arm_test()
     reach(qtbot, bench, EngineState.ARMED)
-    bench.actions.start()
+    bench.user_actions.start()
     qtbot.waitUntil(lambda: check_drive_is_on(bench), timeout=PATIENCE_MS)
 
 
@@ -230,11 +230,11 @@ def test_esc_brings_the_drive_to_zero_wherever_the_focus_is(bench, qtbot, place)
 
 def test_a_hold_keeps_the_drive_and_stop_ramps_down(bench, qtbot):
     start_dwell(bench, qtbot, "held")
-    bench.actions.hold_or_resume()
+    bench.user_actions.hold_or_resume()
     reach(qtbot, bench, EngineState.HELD)
     qtbot.waitUntil(lambda: bench.banner.indicator.word == "HELD", timeout=PATIENCE_MS)
     assert drive_is_on(bench)
-    bench.actions.hold_or_resume()
+    bench.user_actions.hold_or_resume()
     reach(qtbot, bench, EngineState.RUNNING)
     bench.banner.stop_wanted.emit()
     reach(qtbot, bench, EngineState.READY)
@@ -261,7 +261,7 @@ def test_the_live_pictures_show_the_run(bench, qtbot):
     page.watch_card.mark.setText("tapped the table")
     page.watch_card.wish_mark()
     qtbot.waitUntil(lambda: bench.context.bridge.status.samples > samples + 60_000, timeout=PATIENCE_MS)
-    bench.actions.abort()
+    bench.user_actions.abort()
     reach(qtbot, bench, EngineState.READY)
     with open_recording(recorded(bench).file) as recording:
         assert any("tapped the table" in event.text for event in recording.events)
@@ -270,7 +270,7 @@ def test_the_live_pictures_show_the_run(bench, qtbot):
 def test_the_cancel_button_has_the_focus_when_armed_and_disarms(bench, qtbot):
     bench.show_page(RUN)
     reach(qtbot, bench, EngineState.READY)
-    bench.actions.arm_test()
+    bench.user_actions.arm_test()
     reach(qtbot, bench, EngineState.ARMED)
     bench.tick()
     card = bench.pages[RUN].arm_card

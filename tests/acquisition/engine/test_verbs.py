@@ -5,6 +5,7 @@ import json
 
 import pytest
 
+from vibench.acquisition import ConfigurationError
 from vibench.acquisition.engine import (
     Engine,
     EngineClient,
@@ -69,6 +70,11 @@ def test_a_request_that_is_not_understood_does_nothing_and_says_where(handler, r
     answer = json.loads(answered(handler, Message(request_text.encode())).text)
     assert where in answer["refused"]
     assert "nothing was done" in answer["refused"]
+
+
+def test_a_word_that_is_none_is_refused_before_it_is_sent():
+    with pytest.raises(ConfigurationError, match=r"a request to stop: level .*'ramp'"):
+        VERBS["stop"].message(level="gently")
 
 
 def test_a_request_and_its_answer_are_what_they_were_on_the_wire(handler):

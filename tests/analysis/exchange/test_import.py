@@ -14,7 +14,7 @@ from scipy.io import savemat, wavfile
 
 from vibench.acquisition import ConfigurationError, RecordingError, load_toml, open_recording
 from vibench.acquisition.recording import RecordingState
-from vibench.analysis import AnalysisError, InvalidRequest, analyse_recording
+from vibench.analysis import AnalysisError, InvalidRequest, analyse
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.exchange import (
     Format,
@@ -245,7 +245,7 @@ def test_samples_that_look_like_a_delimiter_are_samples(known, tmp_path):
 
 def test_an_imported_dwell_is_analysed_like_the_recording_it_came_from(dwell_file, tmp_path):
     with open_recording(dwell_file()) as recording:
-        original = analyse_recording(recording)
+        original = analyse(recording)
         path, _ = export_samples(excerpt(recording), Format.UFF, tmp_path / "dwell.uff")
         delay_s = recording.channel("m0_velocity").delay_s
         start_s = recording.segments[0].start / recording.sample_rate_hz
@@ -263,7 +263,7 @@ def test_an_imported_dwell_is_analysed_like_the_recording_it_came_from(dwell_fil
     ]
     made = import_recording(path, mapping(tmp_path, *channels, head=head), tmp_path / "made.h5")
     with open_recording(made) as recording:
-        found = analyse_recording(recording)
+        found = analyse(recording)
     assert found.response.response_i == pytest.approx(original.response.response_i, rel=1e-6)
     assert found.response.response_ii == pytest.approx(original.response.response_ii, rel=1e-6)
     assert found.facts.whole_stretches == found.facts.planned_stretches == 1
@@ -271,7 +271,7 @@ def test_an_imported_dwell_is_analysed_like_the_recording_it_came_from(dwell_fil
 
 def test_imported_noise_gives_the_transmission_of_the_recording_it_came_from(noise_file, tmp_path):
     with open_recording(noise_file()) as recording:
-        original = analyse_recording(recording)
+        original = analyse(recording)
         path, *_ = export_samples(excerpt(recording), Format.MAT, tmp_path / "noise.mat")
         rate = recording.sample_rate_hz
         parts = [(each.start / rate, each.stop / rate) for each in recording.segments]
@@ -287,7 +287,7 @@ def test_imported_noise_gives_the_transmission_of_the_recording_it_came_from(noi
     channels = [(f"{role}.values", role, "") for role in roles]
     made = import_recording(path, mapping(tmp_path, *channels, head=head), tmp_path / "made.h5")
     with open_recording(made) as recording:
-        found = analyse_recording(recording)
+        found = analyse(recording)
     wanted = original.response.frequency_response
     np.testing.assert_array_equal(found.response.frequency_response.frequency_hz, wanted.frequency_hz)
     np.testing.assert_allclose(found.response.frequency_response.value, wanted.value, rtol=1e-4)

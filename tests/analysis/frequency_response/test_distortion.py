@@ -10,7 +10,6 @@ import pytest
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.plan import OddMultisine
-from vibench.analysis import analyse_recording
 from vibench.analysis.figures import distortion_figure
 from vibench.analysis.figures._distortion import distortion_caption
 from vibench.analysis.frequency_response import distortion
@@ -61,7 +60,7 @@ def analysed(synthetic, tmp_path_factory):
         folder = tmp_path_factory.mktemp("odd")
         path = synthetic.write_recording(folder, plan, base, np.concatenate(velocities), parts, name="odd")
         with open_recording(path) as recording:
-            return analyse_recording(recording)
+            return analyse(recording)
 
     return analyse
 

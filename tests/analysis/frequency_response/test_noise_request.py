@@ -12,7 +12,7 @@ from vibench.analysis import (
     MagnitudeScale,
     NotEnoughData,
     Window,
-    analyse_recording,
+    analyse,
     quantities_named,
 )
 from vibench.analysis.frequency_response._request import longest_segment
@@ -23,7 +23,7 @@ RATE = 6400.0
 
 def response(path, **asked):
     with open_recording(path) as recording:
-        return analyse_recording(recording, FrequencyResponseRequest(**asked)).response
+        return analyse(recording, FrequencyResponseRequest(**asked)).response
 
 
 def test_streamed_noise_gives_the_exact_ratio_by_every_estimator(streamed_file):

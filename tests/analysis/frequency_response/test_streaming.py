@@ -7,7 +7,7 @@ import pytest
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.plan import StreamedNoise
-from vibench.analysis import FrequencyResponseRequest, analyse_recording
+from vibench.analysis import FrequencyResponseRequest, analyse
 from vibench.analysis.frequency_response import noise_response
 from vibench.analysis.recordings import Stretch
 
@@ -73,7 +73,7 @@ class Notes:
 def test_a_watcher_hears_every_stage_and_how_far_it_is_read(streamed_file):
     notes = Notes()
     with open_recording(streamed_file()) as recording:
-        analyse_recording(recording, observer=notes)
+        analyse(recording, observer=notes)
     assert notes.stages == [("streamed.h5", "looking at every channel"), ("streamed.h5", "analysing")]
     for shares in notes.reads:
         assert shares == sorted(shares)

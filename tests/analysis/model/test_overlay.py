@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_recording
-from vibench.analysis import analyse_recording
+from vibench.analysis import analyse
 from vibench.analysis.model import (
     DwellOverlay,
     NoiseOverlay,
@@ -20,7 +20,7 @@ from vibench.sim import base_transmissibility, gong2025
 
 def laid_over(path, **how):
     with open_recording(path) as recording:
-        analysis = analyse_recording(recording)
+        analysis = analyse(recording)
         return analysis, overlay(recording, analysis, **how)
 
 

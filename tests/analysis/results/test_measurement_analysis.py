@@ -5,7 +5,7 @@ import pytest
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import RecordingState
-from vibench.analysis import NotEnoughData, analyse_recording
+from vibench.analysis import NotEnoughData, analyse
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.frequency_response import NoiseAnalysis
 from vibench.analysis.recordings import Verdict
@@ -17,7 +17,7 @@ RATE = 6400.0
 
 def analysed(path):
     with open_recording(path) as recording:
-        return analyse_recording(recording)
+        return analyse(recording)
 
 
 def truth(frequency_hz):

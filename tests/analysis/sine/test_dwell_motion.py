@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_recording
-from vibench.analysis import analyse_recording
+from vibench.analysis import analyse
 from vibench.analysis.chaos import MotionKind
 from vibench.analysis.figures import portraits_figure
 
 
 @pytest.fixture(scope="module")
 def analyses(dwell_file):
-    return {level: analyse_recording(open_recording(dwell_file(level))) for level in ("weak", "strong")}
+    return {level: analyse(open_recording(dwell_file(level))) for level in ("weak", "strong")}
 
 
 def test_a_weak_dwell_is_periodic_with_the_drive_and_a_colliding_one_is_not(analyses):

@@ -8,7 +8,7 @@ import pytest
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, ResonanceTracking, SettledSine
 from vibench.acquisition.rig import load_rig
-from vibench.analysis import CampaignResults, analyse_recording, result_summary
+from vibench.analysis import CampaignResults, result_summary
 from vibench.analysis.figures import stepped_sine_figure
 from vibench.analysis.recordings import FeedbackNote
 from vibench.analysis.report import result_figures
@@ -63,7 +63,7 @@ def analysed(tmp_path):
             plan = Measurement(name="run", excitation=excitation, ramp_s=0.4, ramp_step_s=0.02)
             outcome = run_measurement(bench, plan, tmp_path / "run.h5")
         with open_recording(outcome.path) as recording:
-            return analyse_recording(recording)
+            return analyse(recording)
 
     return analyse
 

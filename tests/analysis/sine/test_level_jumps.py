@@ -8,7 +8,7 @@ import pytest
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, SteppedLevel
 from vibench.acquisition.rig import load_rig
-from vibench.analysis import CampaignResults, analyse_recording, result_summary
+from vibench.analysis import CampaignResults, analyse, result_summary
 from vibench.analysis.figures import stepped_sine_figure
 from vibench.analysis.report._findings import findings
 from vibench.analysis.results import SteppedSineResult
@@ -33,7 +33,7 @@ def analysis(tmp_path_factory):
     with open_bench(rig) as bench:
         run_measurement(bench, Measurement(name="level", excitation=plan, ramp_s=0.3), path)
     with open_recording(path) as recording:
-        return analyse_recording(recording)
+        return analyse(recording)
 
 
 def test_the_specimen_jumps_up_at_a_higher_level_than_it_falls_back_at(analysis):

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_recording
-from vibench.analysis import analyse_recording
+from vibench.analysis import analyse
 from vibench.analysis.sine import terminal_levels
 
 
 def test_a_line_in_the_band_reads_its_own_level_re_the_drives_line(dwell_file):
     with open_recording(dwell_file("weak")) as recording:
-        response = analyse_recording(recording).response
+        response = analyse(recording).response
     motion = response.displacement
     line_m = abs(response.order_displacement[response.orders.index(1.0)])
     time_s = np.arange(motion.samples.size) / motion.sample_rate_hz

@@ -132,7 +132,7 @@ def of_files(window, recording, long_recording):
         lambda: files.pictures.setCurrentWidget(spectrogram),
         lambda: not spectrogram.is_busy,
     )
-    yield Action("show the lanes again", lambda: files.pictures.setCurrentWidget(time_histories))
+    yield Action("show the time histories again", lambda: files.pictures.setCurrentWidget(time_histories))
 
 
 def of_compare(window, recording, folder):

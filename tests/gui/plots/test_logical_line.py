@@ -9,15 +9,15 @@ import pytest
 WIDTHS = """
 from vibench.gui.window._open_window import application
 application([])
-from vibench.gui.plots import TIME, Axis
-from vibench.gui.plots import Ink
+from vibench.gui.plots import TIME, PlotAxis
+from vibench.gui.plots import LineStyle
 from vibench.gui.plots import Plot
 from vibench.gui.widgets import LIGHT
-plot = Plot("a plot", TIME, Axis("Height", "m"), LIGHT)
+plot = Plot("a plot", TIME, PlotAxis("Height", "m"), LIGHT)
 plot.resize(400, 300)
 plot.setXRange(0, 10, padding=0)
 plot.setYRange(0, 10, padding=0)
-line = plot.curve(Ink(lambda theme: "#ff0000"))
+line = plot.curve(LineStyle(lambda theme: "#ff0000"))
 for x, y in (([0.0, 10.0], [4.3, 4.3]), ([4.3, 4.3], [0.0, 10.0])):
     line.setData(x, y)
     picture = plot.grab().toImage()

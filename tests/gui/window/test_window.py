@@ -45,7 +45,7 @@ def test_the_banner_and_stop_are_in_sight_on_every_page(window, qapp):
 
 @pytest.mark.parametrize("order", ["arm_test", "start", "check"])
 def test_an_order_without_a_bench_is_answered_with_what_to_do(window, order):
-    getattr(window.actions, order)()
+    getattr(window.user_actions, order)()
     newest = window.strip.notices[-1]
     assert newest.next_step
     assert window.page is window.pages[RIG]

@@ -10,6 +10,7 @@ from typing import Self
 
 from ..drivers import AFG1022X, DaqmxDigitizer, DaqmxOutput
 from ..errors import AcquisitionError
+from ..host import chosen
 from ..instruments import Identity
 from ..rig import (
     CalibrationRule,
@@ -97,7 +98,7 @@ class Bench:
 def open_bench(
     config: Rig | Path,
     confirm: Confirm | None = None,
-    calibration: CalibrationRule = CalibrationRule.ENFORCED,
+    calibration: CalibrationRule | str = CalibrationRule.ENFORCED,
     power: RigPower | None = None,
 ) -> Bench:
     """Open every instrument of a rig, with generator and analogue output silent.
@@ -126,7 +127,7 @@ def open_bench(
 
     """
     rig = config if isinstance(config, Rig) else load_rig(config)
-    if rig.virtual is None and calibration is CalibrationRule.ENFORCED:
+    if rig.virtual is None and chosen(CalibrationRule, calibration) is CalibrationRule.ENFORCED:
         check_calibrations(rig, datetime.now(UTC).astimezone().date())
     closing = ExitStack()
     try:

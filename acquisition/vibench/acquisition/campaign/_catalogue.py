@@ -12,6 +12,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from ..errors import RecordingError
+from ..host import chosen
 from ..recording import PART_SUFFIX, SUFFIX
 from ._catalogue_entry import CatalogueEntry, read_entry
 
@@ -35,7 +36,7 @@ class Refresh(StrEnum):
     ALL = "all"
 
 
-def list_recordings(folder: Path, refresh: Refresh = Refresh.CHANGED) -> tuple[CatalogueEntry, ...]:
+def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> tuple[CatalogueEntry, ...]:
     """List the recordings of a folder, the oldest first, and bring its catalogue up to date.
 
     In a folder that may not be written the list is made anew each time.
@@ -49,7 +50,7 @@ def list_recordings(folder: Path, refresh: Refresh = Refresh.CHANGED) -> tuple[C
     if not folder.is_dir():
         raise RecordingError(f"{folder} is no folder; give the folder that the recordings are in.")
     try:
-        with closing(_opened(folder, refresh)) as connection:
+        with closing(_opened(folder, chosen(Refresh, refresh))) as connection:
             _update(folder, connection)
             return _entries(connection)
     except (sqlite3.OperationalError, PermissionError):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ..bench import RunBench
 from ..errors import RecordingError
+from ..host import chosen
 from ..plan import Campaign
 from ..recording import sole_use
 from ..stopping import StopSwitch, stop_on_signal
@@ -31,14 +32,14 @@ def run_campaign(
     bench: RunBench,
     campaign: Campaign,
     folder: Path,
-    existing: ExistingRecordings = ExistingRecordings.REFUSE,
-    after_failure: AfterFailure = AfterFailure.STOP,
+    existing: ExistingRecordings | str = ExistingRecordings.REFUSE,
+    after_failure: AfterFailure | str = AfterFailure.STOP,
     on_progress: Callable[[CampaignProgress], None] = ignore_campaign_progress,
     on_result: Callable[[PointResult], None] = ignore_result,
     switch: StopSwitch | None = None,
     after: After | None = None,
     reopen: Reopen | None = None,
-    changed_bench: ChangedBench = ChangedBench.REFUSE,
+    changed_bench: ChangedBench | str = ChangedBench.REFUSE,
     on_event: CampaignListener = ignore_event,
     messengers: tuple[Messenger, ...] = (),
 ) -> tuple[PointResult, ...]:
@@ -46,7 +47,7 @@ def run_campaign(
 
     All points are held against the limits of the rig before the first one begins. What was done, what
     failed and why stands in the campaign's journal, so that a campaign that was killed goes on with
-    ``Existing.RESUME`` at its first unfinished point. Ctrl-C ends the running measurement softly, and
+    ``existing="resume"`` at its first unfinished point. Ctrl-C ends the running measurement softly, and
     the campaign with it.
 
     Parameters
@@ -55,8 +56,8 @@ def run_campaign(
         On what, what, and where to.
     existing, after_failure, changed_bench
         What to do about recordings that are there, about a point whose attempts are used up, and about
-        another bench than the campaign was begun on.
-    on_progress, on_item, on_happening
+        another bench than the campaign was begun on; members of the enums or their words.
+    on_progress, on_result, on_event
         Called after every block, after every recording, and whenever something happens.
     switch
         Lets others hold the running measurement, or end the campaign.
@@ -71,7 +72,7 @@ def run_campaign(
 
     Returns
     -------
-    tuple of CampaignItem
+    tuple of PointResult
         What was made, kept or failed; it ends early when the campaign was stopped.
 
     Raises
@@ -87,6 +88,9 @@ def run_campaign(
         Whatever a failing run raises, when ``after_failure`` says stop, or an instrument is lost.
 
     """
+    existing = chosen(ExistingRecordings, existing)
+    after_failure = chosen(AfterFailure, after_failure)
+    changed_bench = chosen(ChangedBench, changed_bench)
     points = campaign.points()
     require_all_within_limits(points, bench)
     if existing is ExistingRecordings.REFUSE:

@@ -8,6 +8,7 @@ from types import TracebackType
 from typing import Self, TypeVar
 
 from ..campaign import ExistingRecordings
+from ..host import chosen
 from ..plan import Campaign
 from ._address import EngineAddress
 from ._campaign_request import CampaignRequest
@@ -33,9 +34,11 @@ class EngineClient(EngineVerbs):
         self._rows: tuple[int, tuple[RowStatus, ...]] = (-1, ())
 
     @classmethod
-    def attach(cls, address: EngineAddress, role: ConnectionRole = ConnectionRole.VISITING) -> "EngineClient":
+    def attach(
+        cls, address: EngineAddress, role: ConnectionRole | str = ConnectionRole.VISITING
+    ) -> "EngineClient":
         """Connect to a running engine, for a look or to attend to its run."""
-        return cls(connected(address, role))
+        return cls(connected(address, chosen(ConnectionRole, role)))
 
     def status(self) -> EngineStatus:
         """Where the engine stands."""
@@ -47,10 +50,12 @@ class EngineClient(EngineVerbs):
         return status
 
     def arm(
-        self, campaign: Campaign, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE
+        self, campaign: Campaign, folder: Path, existing: ExistingRecordings | str = ExistingRecordings.REFUSE
     ) -> ArmedPlan:
         """Get ready to carry out a campaign; `arm_request` takes all that can be said."""
-        return self.arm_request(CampaignRequest(campaign=campaign, folder=folder, existing=existing))
+        return self.arm_request(
+            CampaignRequest(campaign=campaign, folder=folder, existing=chosen(ExistingRecordings, existing))
+        )
 
     def close(self) -> None:
         """End the connection; the engine stays. Legal at any time."""

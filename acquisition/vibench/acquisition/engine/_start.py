@@ -5,6 +5,7 @@ import sys
 from types import TracebackType
 from typing import Self
 
+from ..host import chosen
 from ._address import EngineAddress
 from ._client import EngineClient
 from ._errors import EngineGone
@@ -60,7 +61,7 @@ class EngineProcess:
         self.close()
 
 
-def start_engine(supervision: Supervision = Supervision.ATTENDED) -> EngineProcess:
+def start_engine(supervision: Supervision | str = Supervision.ATTENDED) -> EngineProcess:
     """Start an engine of this installation, with no bench open.
 
     Raises
@@ -69,6 +70,7 @@ def start_engine(supervision: Supervision = Supervision.ATTENDED) -> EngineProce
         When it does not start.
 
     """
+    supervision = chosen(Supervision, supervision)
     process = subprocess.Popen(  # noqa: S603 - this interpreter, and nothing of a user's
         [sys.executable, "-m", "vibench.acquisition.engine", "--attendance", supervision.value],
         stdin=subprocess.PIPE if supervision is Supervision.ATTENDED else subprocess.DEVNULL,

@@ -19,7 +19,7 @@ from typing import Annotated, Any, Concatenate, Generic, Literal, ParamSpec, Typ
 import numpy as np
 from pydantic import AfterValidator, BaseModel, Field, NonNegativeInt, PositiveInt, TypeAdapter, create_model
 
-from ..host import FrozenModel
+from ..host import FrozenModel, validated
 from ..rig import KnobSheet, Rig
 from ..stopping import StopLevel
 from ._campaign_request import CampaignRequest
@@ -57,7 +57,8 @@ class Verb(Generic[A]):
 
     def message(self, **arguments: object) -> Message:
         """Put a request on the wire."""
-        return Message(self.request.model_validate(arguments).model_dump_json().encode())
+        request = validated(arguments, self.request, f"a request to {self.word}")
+        return Message(request.model_dump_json().encode())
 
 
 VERBS: dict[str, Verb[Any]] = {}

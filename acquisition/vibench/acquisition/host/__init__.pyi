@@ -1,3 +1,6 @@
+from ._chosen import (
+    chosen as chosen,
+)
 from ._follow_parent import (
     follow_parent as follow_parent,
 )

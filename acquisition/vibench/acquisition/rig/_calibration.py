@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 from datetime import date
-from enum import Enum, auto
+from enum import StrEnum, auto
 
 from ..errors import CheckFailed
 from ._channel import channels_of
 from ._configuration import Rig
 
 
-class CalibrationRule(Enum):
+class CalibrationRule(StrEnum):
     """What a calibration that has run out does."""
 
     ENFORCED = auto()

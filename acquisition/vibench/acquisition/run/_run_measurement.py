@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..bench import RunBench
+from ..host import chosen
 from ..plan import Measurement
 from ..recording import create_recording
 from ..stopping import StopSwitch, stop_on_signal
@@ -20,7 +21,7 @@ def run_measurement(
     bench: RunBench,
     measurement: Measurement,
     path: Path,
-    bench_check: LowLevelCheck = LowLevelCheck.AT_LOW_LEVEL,
+    bench_check: LowLevelCheck | str = LowLevelCheck.AT_LOW_LEVEL,
     on_progress: Callable[[Progress], None] = ignore_progress,
     create: CreateRecording = create_recording,
     switch: StopSwitch | None = None,
@@ -37,7 +38,7 @@ def run_measurement(
         finished as failed.
 
     """
-    run = Run(bench, measurement, path, bench_check, create, switch)
+    run = Run(bench, measurement, path, chosen(LowLevelCheck, bench_check), create, switch)
     # The signals stay caught until the run has been left: impatience must not interrupt the silencing.
     with stop_on_signal(run.switch), run:
         for progress in run:

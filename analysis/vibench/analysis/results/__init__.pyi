@@ -21,7 +21,7 @@ from ._compared_recording import (
 from ._measurement_analysis import (
     UNOBSERVED as UNOBSERVED,
     RecordingAnalysis as RecordingAnalysis,
-    analyse_recording as analyse_recording,
+    analyse as analyse,
 )
 from ._summary import (
     campaign_summary as campaign_summary,

@@ -30,7 +30,7 @@ from ..sine import (
     SteppedSineAnalysis,
     SweepAnalysis,
 )
-from ._measurement_analysis import UNOBSERVED, RecordingAnalysis, analyse_recording
+from ._measurement_analysis import UNOBSERVED, RecordingAnalysis, analyse
 
 Overlay = NoiseOverlay | SweepOverlay | DwellOverlay | SteppedSineOverlay
 Stage = Callable[[str], None]
@@ -54,7 +54,7 @@ def overlay(
     Parameters
     ----------
     recording, analysis
-        The recording and what `analyse_recording` made of it.
+        The recording and what `analyse` made of it.
     specimen
         The model; by default what the recording's bench configuration says is on the shaker.
     accuracy
@@ -183,7 +183,7 @@ def analyse_files(
     observer: ProgressObserver = UNOBSERVED,
     specimen: Specimen | None = None,
 ) -> CampaignResults:
-    """Analyse recordings one after the other, each with the model laid over it, as `analyse_recording` does.
+    """Analyse recordings one after the other, each with the model laid over it, as `analyse` does.
 
     The model is the ``specimen`` given; by default what each recording's bench configuration says.
 
@@ -234,7 +234,7 @@ def result_of(
 
     """
     name = recording.path.name
-    analysis = analyse_recording(recording, request, observer)
+    analysis = analyse(recording, request, observer)
     if simulation is Simulation.LEFT_OUT:
         return _paired(analysis, None), ()
     try:

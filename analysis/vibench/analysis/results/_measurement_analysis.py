@@ -1,5 +1,7 @@
 """From one recording to its result, by what was played."""
 
+from pathlib import Path
+
 from vibench.acquisition.plan import (
     Dwell,
     HeldDwell,
@@ -13,7 +15,7 @@ from vibench.acquisition.plan import (
     SteppedSine,
     StreamedNoise,
 )
-from vibench.acquisition.recording import Recording
+from vibench.acquisition.recording import Recording, open_recording
 
 from ..errors import AnalysisError
 from ..frequency_response import DEFAULT_REQUEST, FrequencyResponseRequest, NoiseAnalysis, noise_response
@@ -47,8 +49,8 @@ UNOBSERVED = Unobserved()
 RecordingAnalysis = NoiseAnalysis | SweepAnalysis | DwellAnalysis | SteppedSineAnalysis
 
 
-def analyse_recording(
-    recording: Recording,
+def analyse(
+    recording: Recording | Path,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
     observer: ProgressObserver = UNOBSERVED,
 ) -> RecordingAnalysis:
@@ -57,10 +59,11 @@ def analyse_recording(
     Parameters
     ----------
     recording
-        Finished, interrupted or still growing: what it held when it was opened is analysed.
+        Open, or the path of its file. Finished, interrupted or still growing: what it held when it was opened
+        is analysed.
     request
         How the transmission of noise is estimated; other excitations take no notice.
-    watcher
+    observer
         Told how far it is.
 
     Raises
@@ -69,6 +72,9 @@ def analyse_recording(
         With one sentence that names the file, when nothing in it is usable.
 
     """
+    if isinstance(recording, Path):
+        with open_recording(recording) as opened:
+            return analyse(opened, request, observer)
     name = recording.path.name
     observer.begin(name, "looking at every channel")
     facts = recording_facts(recording, observer.read)

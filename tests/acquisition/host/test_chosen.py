@@ -1,0 +1,39 @@
+"""Where a member of an enum is asked for, its word does as well; a wrong word is answered by others."""
+
+import pytest
+
+from vibench.acquisition import ConfigurationError, open_bench, run_campaign
+from vibench.acquisition.campaign import ExistingRecordings, list_recordings
+from vibench.acquisition.host import chosen
+
+
+def test_a_member_and_its_word_are_the_same_choice():
+    assert chosen(ExistingRecordings, "resume") is ExistingRecordings.RESUME
+    assert chosen(ExistingRecordings, ExistingRecordings.RESUME) is ExistingRecordings.RESUME
+
+
+@pytest.mark.parametrize(
+    ("asked", "sentence"),
+    [
+        (
+            lambda folder: run_campaign(None, None, folder, existing="keep"),
+            "'keep' is no ExistingRecordings; ",
+        ),
+        (
+            lambda folder: run_campaign(None, None, folder, after_failure="sulk"),
+            "'sulk' is no AfterFailure; ",
+        ),
+        (
+            lambda folder: list_recordings(folder, "some"),
+            "'some' is no Refresh; give one of 'changed', 'all'",
+        ),
+    ],
+)
+def test_a_wrong_word_is_answered_by_those_that_are_allowed(tmp_path, asked, sentence):
+    with pytest.raises(ConfigurationError, match=sentence):
+        asked(tmp_path)
+
+
+def test_a_bench_opens_by_a_word_for_its_calibrations(rig):
+    with open_bench(rig, calibration="waived") as bench:
+        assert bench.rig == rig
