@@ -10,10 +10,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from ..errors import RecordingError
+from ..host import ClosedOnLeaving
 from ..plan import Campaign, Point
 from ._bench_identity import BenchIdentity
 from ._journal_database import SCHEMA, VERSION, connected, require_version, sentences
@@ -28,7 +28,7 @@ def journal_path(folder: Path, campaign: str) -> Path:
     return folder / f"{campaign}{JOURNAL_SUFFIX}"
 
 
-class Journal:
+class Journal(ClosedOnLeaving):
     """The journal of one campaign, open for writing; belongs to one thread. Use it in a ``with``."""
 
     def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
@@ -135,14 +135,6 @@ class Journal:
     def close(self) -> None:
         """Let go of the file. Legal at any time."""
         self._connection.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _fact(self, key: str) -> str:
         (value,) = self._connection.execute("SELECT value FROM campaign WHERE key = ?", (key,)).fetchone()

@@ -7,10 +7,9 @@ from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from time import monotonic
-from types import TracebackType
-from typing import Self
 
 from ..errors import RecordingError
+from ..host import ClosedOnLeaving
 from ..plan import measured_s
 from ._event import CampaignEvent, CampaignEventKind
 from ._journal_point import JournalPoint, JournalPointState
@@ -19,7 +18,7 @@ from ._point_outcome import CampaignProgress
 LOG_SUFFIX = ".log.jsonl"
 
 
-class CampaignLog:
+class CampaignLog(ClosedOnLeaving):
     """Appends what happens; a line is on its way to the disk before the next thing is done.
 
     A log that cannot be written (the disk is full) is no reason to stop: the journal is what counts.
@@ -46,12 +45,8 @@ class CampaignLog:
             self._file.write(json.dumps(line) + "\n")
             self._file.flush()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """End the log. Legal at any time."""
         with suppress(OSError):
             self._file.close()
 

@@ -113,17 +113,17 @@ class LoopCheck:
         if Role.DRIVE_VOLTAGE in self._channels:
             found += [self._drive(), self._silence()]
         # What detects nothing has no frequency and no gain: it has been found fault with already.
-        if self._hears(Role.DRIVE_VOLTAGE):
+        if self._detects(Role.DRIVE_VOLTAGE):
             found.append(self._clocks())
-        if self._hears(Role.DRIVE_VOLTAGE) and self._hears(Role.AMPLIFIER_VOLTAGE):
+        if self._detects(Role.DRIVE_VOLTAGE) and self._detects(Role.AMPLIFIER_VOLTAGE):
             found += [self._gain(), self._sign(Role.AMPLIFIER_VOLTAGE, BaseQuantity.AMPLIFIER_VOLTAGE)]
-        if self._hears(Role.BASE_ACCELERATION):
+        if self._detects(Role.BASE_ACCELERATION):
             found.append(self._base())
-        if self._hears(Role.DRIVE_VOLTAGE) and self._hears(Role.BASE_ACCELERATION):
+        if self._detects(Role.DRIVE_VOLTAGE) and self._detects(Role.BASE_ACCELERATION):
             found.append(self._sign(Role.BASE_ACCELERATION, BaseQuantity.ACCELERATION))
         return found
 
-    def _hears(self, role: Role) -> bool:
+    def _detects(self, role: Role) -> bool:
         if role not in self._channels:
             return False
         fit = self._fit(role)
@@ -135,7 +135,7 @@ class LoopCheck:
 
     def _alive(self, role: Role) -> Finding:
         fit = self._fit(role)
-        is_heard = self._hears(role)
+        is_detected = self._detects(role)
         advice = {
             Role.M0_VELOCITY: "see whether the laser is on, focused, and its beam free",
             Role.BASE_ACCELERATION: "see whether the accelerometer is plugged in and its current on",
@@ -144,11 +144,11 @@ class LoopCheck:
             name=f"{role.value} hears the sine",
             value=f"{fit.amplitude:.3g} +- {fit.uncertainty:.1g} {self._channels[role].unit}",
             expected=f"more than {DETECTED:g} times its uncertainty",
-            verdict=Verdict.OK if is_heard else Verdict.FAIL,
+            verdict=Verdict.OK if is_detected else Verdict.FAIL,
             number=fit.amplitude,
             uncertainty=fit.uncertainty,
             unit=self._channels[role].unit,
-            advice="" if is_heard else advice,
+            advice="" if is_detected else advice,
         )
 
     def _drive(self) -> Finding:

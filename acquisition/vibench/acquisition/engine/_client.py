@@ -4,11 +4,10 @@ import socket
 from collections.abc import Mapping
 from pathlib import Path
 from threading import Lock
-from types import TracebackType
-from typing import Self, TypeVar
+from typing import TypeVar
 
 from ..campaign import ExistingRecordings
-from ..host import chosen
+from ..host import ClosedOnLeaving, chosen
 from ..plan import Campaign
 from ._address import EngineAddress
 from ._campaign_request import CampaignRequest
@@ -20,7 +19,7 @@ from ._verbs import EngineVerbs, Verb
 Answer = TypeVar("Answer")
 
 
-class EngineClient(EngineVerbs):
+class EngineClient(EngineVerbs, ClosedOnLeaving):
     """A connection to an engine.
 
     Asking anything over an attending connection tells the engine that somebody is there: an attended
@@ -60,14 +59,6 @@ class EngineClient(EngineVerbs):
     def close(self) -> None:
         """End the connection; the engine stays. Legal at any time."""
         self._connection.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def ask(self, verb: Verb[Answer], arguments: Mapping[str, object]) -> Answer:
         """Send a request and wait for its answer."""

@@ -2,10 +2,8 @@
 
 import subprocess
 import sys
-from types import TracebackType
-from typing import Self
 
-from ..host import chosen
+from ..host import ClosedOnLeaving, chosen
 from ._address import EngineAddress
 from ._client import EngineClient
 from ._errors import EngineGone
@@ -15,7 +13,7 @@ LEAVING_S = 10.0
 """How long an engine may take to ramp down, finish its recording and end [s]."""
 
 
-class EngineProcess:
+class EngineProcess(ClosedOnLeaving):
     """An engine's process and a connection to it. An attended engine ends with whoever started it."""
 
     def __init__(self, process: "subprocess.Popen[str]", address: EngineAddress) -> None:
@@ -51,14 +49,6 @@ class EngineProcess:
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:
                 pipe.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def start_engine(supervision: Supervision | str = Supervision.ATTENDED) -> EngineProcess:

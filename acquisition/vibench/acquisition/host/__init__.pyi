@@ -1,6 +1,9 @@
 from ._chosen import (
     chosen as chosen,
 )
+from ._closed_on_leaving import (
+    ClosedOnLeaving as ClosedOnLeaving,
+)
 from ._follow_parent import (
     follow_parent as follow_parent,
 )

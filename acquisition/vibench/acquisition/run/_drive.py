@@ -30,7 +30,7 @@ class Drive(Protocol):
         """What is played now, as an amplitude setting, peak to peak [V]; 0 in silence."""
 
     @property
-    def is_heard(self) -> bool:
+    def is_playing(self) -> bool:
         """Whether there is anything to ramp down."""
 
     def arm(self, coming: Iterable[Phase]) -> None:

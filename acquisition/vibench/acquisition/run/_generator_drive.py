@@ -38,7 +38,7 @@ class GeneratorDrive:
         return self._setting_vpp if self._is_on else 0.0
 
     @property
-    def is_heard(self) -> bool:
+    def is_playing(self) -> bool:
         """Whether the output is on, and above the quiet level."""
         return self._is_on and self._level > 0.0
 
@@ -152,7 +152,7 @@ class GeneratorDrive:
         self._generator.set_amplitude(self._setting_vpp)
 
     def _ramp_down_blindly(self) -> None:
-        if not self.is_heard:
+        if not self.is_playing:
             return
         top = self._level
         for stair in range(1, self._stairs + 1):

@@ -68,9 +68,9 @@ class PhaseRunner:
         self.loop.log("end", reason)
         self.loop.cut()
         since_s = self.loop.elapsed_s
-        if self._drive.is_heard:
+        if self._drive.is_playing:
             self._enter(RunState.RAMPING_DOWN)
-        while level is not StopLevel.OFF and self._drive.is_heard:
+        while level is not StopLevel.OFF and self._drive.is_playing:
             for wait_s in self._drive.ramp_down(ramp_s(level)):
                 yield from self._read(wait_s)
                 if (harder := self._switch.harder_than(level)) is not None:

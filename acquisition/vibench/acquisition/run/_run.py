@@ -3,13 +3,12 @@
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from ..bench import RunBench
 from ..control import Controller, feedback_controller, phase_samples
 from ..errors import AcquisitionError, ConfigurationError, LimitExceeded
 from ..excitation import AbstractFeedback
+from ..host import ClosedOnLeaving
 from ..instruments import Block
 from ..plan import (
     CHECK_S,
@@ -104,7 +103,7 @@ def _confirmations(sheet: KnobSheet) -> dict[str, str]:
 CreateRecording = Callable[[Path, RecordingHeader], SampleSink]
 
 
-class Run:
+class Run(ClosedOnLeaving):
     """One measurement being carried out: iterate it, and it plays, watches and records, block by block.
 
     `RunState` has the diagram of its states. However the run ends (plan done, cancelled, limit,
@@ -176,14 +175,6 @@ class Run:
 
     def __iter__(self) -> Iterator[Progress]:
         return self._blocks
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _carry_out(self) -> Generator[Progress, None, None]:
         sink = self._admitted()

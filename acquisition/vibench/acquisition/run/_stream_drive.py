@@ -178,7 +178,7 @@ class StreamDrive:
         return self._heard_vpp
 
     @property
-    def is_heard(self) -> bool:
+    def is_playing(self) -> bool:
         """Whether anything but silence is still to be played."""
         return self._is_playing and self._sounds_until > self._played
 
@@ -260,7 +260,7 @@ class StreamDrive:
         self._written += count
 
     def _fade_blindly(self) -> None:
-        if not self.is_heard:
+        if not self.is_playing:
             return
         self._synthesizer.fade(BLIND_FADE_S)
         ahead = self._output.ahead_samples
