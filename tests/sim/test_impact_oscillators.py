@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numba import njit
 
+from tests.sim.exponents.dynamical_exponents import map_exponents
 from vibench.sim import (
     Harmonic,
     LinearGap,
@@ -21,7 +22,6 @@ from vibench.sim import (
     lyapunov_exponent,
     lyapunov_spectrum,
 )
-from vibench.sim.exponents._dynamical_exponents import map_exponents
 from vibench.sim.exponents._lyapunov import ExponentVerdict, Source
 from vibench.sim.exponents._settling import FinalMotion
 

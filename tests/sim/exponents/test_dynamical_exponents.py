@@ -5,7 +5,7 @@ import math
 import pytest
 from numba import njit
 
-from vibench.sim.exponents._dynamical_exponents import flow_exponents, map_exponents
+from tests.sim.exponents.dynamical_exponents import flow_exponents, map_exponents
 
 
 @njit

@@ -20,10 +20,10 @@ from numba import njit
 from numpy.typing import ArrayLike
 from scipy.integrate._ivp import dop853_coefficients as _dop
 
-from ..contact import BLEND, ERROR_3, ERROR_5, STAGES, step_factor
-from ..kernels import Floats, Table, Vector, kernel_without_refcount, orthonormal_rows, orthonormalise
-from ._blocking import blocked_mean
-from ._lyapunov_spectrum import kaplan_yorke
+from vibench.sim.contact import BLEND, ERROR_3, ERROR_5, STAGES, step_factor
+from vibench.sim.exponents import blocked_mean
+from vibench.sim.exponents._lyapunov_spectrum import kaplan_yorke
+from vibench.sim.kernels import Floats, Table, Vector, orthonormal_rows, orthonormalise
 
 Flow = Callable[[float, Vector, Vector, Vector], None]
 FlowJacobian = Callable[[float, Vector, Vector, Table], None]
@@ -187,9 +187,7 @@ def _averaged(growth: Floats, times: Floats, state: Floats) -> Exponents:
 
 
 def _specialised(kernel: Kernel) -> Kernel:
-    """Compile as `vibench.sim.kernels.compiled` does, but keep nothing on the disk: it takes functions of
-    others.
-    """
+    """Compile as `vibench.sim.kernels` does, but keep nothing on the disk: it takes functions of others."""
     return cast("Kernel", njit(nogil=True, error_model="numpy")(kernel))
 
 
@@ -222,7 +220,7 @@ def _fill_slopes(
                 slopes[stage, first + i] = slope
 
 
-@kernel_without_refcount
+@_specialised
 def _step_error(slopes: Table, state: Vector, step: float, tolerance: float) -> float:
     """Error of a step of the state, over what is allowed; NaN when a stage ran away."""
     largest, fifth, third = 1e-300, 0.0, 0.0

@@ -10,13 +10,17 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike
 
-from ..kernels import Floats, Table, Vector, clock_at, dot, kernel
-from ..model import Accuracy, Harmonic, Outcome, Specimen
-from ..motion import MAX_IMPACT_RATE_HZ, new_record, start_motion
-from ..slots import REACHED_END, Record
-from ..stepping import (
+from vibench.sim import Accuracy, Harmonic, Outcome, Specimen
+from vibench.sim.exponents import BlockedMean, blocked_mean
+from vibench.sim.exponents._lyapunov import intervals_to_skip
+from vibench.sim.exponents._tangent_run import energy_metric, interval_for
+from vibench.sim.kernels import Floats, Table, Vector, clock_at, dot
+from vibench.sim.motion import MAX_IMPACT_RATE_HZ, new_record, start_motion
+from vibench.sim.slots import REACHED_END, Record
+from vibench.sim.stepping import (
     HarmonicTables,
     Workspace,
     advance_by_law,
@@ -25,9 +29,6 @@ from ..stepping import (
     place_on_its_side,
     workspace_for,
 )
-from ._blocking import BlockedMean, blocked_mean
-from ._lyapunov import intervals_to_skip
-from ._tangent_run import energy_metric, interval_for
 
 DISTANCE = 1e-7
 """Of the two motions after each return, over the state's scale: far above the error of a run at reference
@@ -61,7 +62,7 @@ def two_trajectory_exponent(
 ) -> TwoTrajectoryExponent:
     """Follow two motions a ten-millionth of the gap apart, and average how fast they part.
 
-    Arguments as in `vibench.sim.exponents.largest_exponent`. Intervals are short, a quarter of the slowest
+    Arguments as in `vibench.sim.lyapunov_exponent`. Intervals are short, a quarter of the slowest
     mode's cycle when None: in a longer one chaos may part the motions for good.
     """
     about = 0.25 / float(specimen.natural_frequencies_hz[0]) if interval_s is None else interval_s
@@ -88,7 +89,7 @@ def two_trajectory_exponent(
     return TwoTrajectoryExponent(mean.mean, mean.standard_error, mean, rates, Outcome(code))
 
 
-@kernel
+@njit(nogil=True, error_model="numpy")
 def _part(
     first: Vector,
     second: Vector,
