@@ -22,13 +22,13 @@ ROOT_SCALE, RATE_SCALE = 10, 11
 """In contact: how large w and r will become, the measure of their errors."""
 PACE = 12
 """In contact: w over r, as large as they will become: the time scale of the collision, in s [s/m^0.5]."""
-CLOSED = 11
+CLOSED = 13
 """Under rigid stops: how far from one m1 counts as touching it [m], from the rounding of the last flight."""
-SCALES = 12
+SCALES = 14
 """Under a power law, the first of seven: how large p, dp/dt, x, z, vx, vz have lately been, and time as 1."""
-LEVEL = 19
+LEVEL = 21
 """Under a power law: one more than the level of the next long step; 0 where none was made yet."""
-STATE_SIZE = 20
+STATE_SIZE = 22
 
 
 class Parameters(NamedTuple):
