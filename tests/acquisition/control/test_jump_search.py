@@ -6,11 +6,11 @@ from hypothesis import given, strategies as st
 from vibench.acquisition.control._jump_search import (
     LocatedJump,
     SettledPoint,
-    Side,
     is_on_branch,
     located,
     side,
 )
+from vibench.acquisition.recording import JumpSide
 
 
 def found(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=0.4):
@@ -57,7 +57,8 @@ def test_half_the_factor_in_decibels_tells_two_branches_apart(response, expected
 
 
 @pytest.mark.parametrize(
-    ("response", "expected"), [(3.6, Side.BEFORE), (4.1, Side.BEFORE), (5.0, Side.AFTER), (1.6, Side.AFTER)]
+    ("response", "expected"),
+    [(3.6, JumpSide.BEFORE), (4.1, JumpSide.BEFORE), (5.0, JumpSide.AFTER), (1.6, JumpSide.AFTER)],
 )
 def test_a_third_branch_lies_after_the_jump(response, expected):
     assert side(SettledPoint(177, response), SettledPoint(175, 3.6), SettledPoint(180, 5.4)) is expected

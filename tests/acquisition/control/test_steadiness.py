@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.acquisition.control._steadiness import Steadiness, judged
+from vibench.acquisition.control._steadiness import judged
 from vibench.acquisition.excitation import Settling
+from vibench.acquisition.recording import Steadiness
 
 RULE = Settling()
 

@@ -7,41 +7,51 @@ import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, ResonanceTracking, SettledSine
+from vibench.acquisition.recording import Held, JumpNote, JumpSearchEnd, JumpSide, SegmentNote, Steadiness
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import CampaignResults, result_summary
 from vibench.analysis.figures import stepped_sine_figure
-from vibench.analysis.recordings import FeedbackNote
 from vibench.analysis.report import result_figures
 from vibench.analysis.report._findings import findings
 from vibench.analysis.results import SteppedSineResult
 from vibench.analysis.sine import feedback_sentences, noted_jumps
 
 ROOT = Path(__file__).parents[3]
-JUMP = {"direction": "down", "before_hz": 101.25, "after_hz": 100.9375, "how": "localised"}
-STEP = {"segment": "step", "motion": "periodic", "period": 1, "level": "within tolerance"}
-
-
-def notes(*numbers, kind):
-    return [FeedbackNote(kind, 0.1 * place, each) for place, each in enumerate(numbers)]
+JUMP = JumpNote(
+    direction="down",
+    pass_number=1,
+    frequency_hz=101.09375,
+    before_hz=101.25,
+    after_hz=100.9375,
+    response_before=3.0,
+    response_after=1.0,
+    how=JumpSearchEnd.LOCALISED,
+    arrived=JumpSide.AFTER,
+)
+STEP = SegmentNote(
+    segment="step",
+    frequency_hz=100.0,
+    drive_hz=100.0,
+    base_m_per_s2=1.0,
+    base_u=0.01,
+    level=Held.WITHIN,
+    response_ii=2.0,
+    motion=Steadiness.PERIODIC,
+    period=1,
+)
 
 
 def test_only_bracketed_jumps_count():
-    steep = {**JUMP, "how": "steep, but no jump"}
-    (jump,) = noted_jumps(notes(JUMP, steep, kind="jump"))
+    steep = JUMP.model_copy(update={"how": JumpSearchEnd.STEEP})
+    (jump,) = noted_jumps([JUMP, steep])
     assert (jump.low_hz, jump.high_hz, jump.direction) == (100.9375, 101.25, "down")
-    assert list(feedback_sentences(notes(JUMP, kind="jump"))) == [
-        "Jumps between 100.94 and 101.25 Hz (down)."
-    ]
+    assert list(feedback_sentences([JUMP])) == ["Jumps between 100.94 and 101.25 Hz (down)."]
 
 
 def test_steps_are_counted_by_what_they_do():
-    found = [
-        STEP,
-        {**STEP, "period": 3},
-        {**STEP, "period": 3},
-        {**STEP, "motion": "aperiodic", "period": 0, "level": "outside tolerance"},
-    ]
-    said = list(feedback_sentences(notes(*found, kind="achieved")))
+    tripled = STEP.model_copy(update={"period": 3})
+    chaotic = STEP.model_copy(update={"motion": Steadiness.APERIODIC, "period": 0, "level": Held.OUTSIDE})
+    said = list(feedback_sentences([STEP, tripled, tripled, chaotic]))
     assert said == [
         "Of 4 recorded motions, by kind: period 3: 2, no period: 1.",
         "The base was off its level in 1 of them.",

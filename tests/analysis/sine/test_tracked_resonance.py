@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from vibench.analysis.recordings import FeedbackNote
+from vibench.acquisition.recording import DwellNote, ResonanceNote
 from vibench.analysis.sine import backbone_sentence, lost_levels, tracked_resonances
 
 
@@ -15,11 +15,16 @@ def note(number, base, frequency_hz, **more):
         "frequency_hz": frequency_hz,
         "frequency_u_hz": 0.03,
         "at_hz": 100.0,
+        "phase_deg": -90.0,
         "response_ii": 20.0,
         "base_m_per_s2": base,
+        "base_u": 0.0,
+        "held": "within tolerance",
+        "motion": "periodic",
+        "tries": 3,
         "lock": "locked",
     }
-    return FeedbackNote("resonance", float(number), numbers | more)
+    return ResonanceNote(**numbers | more)
 
 
 def lost(number, base):
@@ -35,7 +40,12 @@ def test_levels_are_in_the_order_of_the_base_and_m0_moves_by_the_response_times_
 
 
 def test_a_level_at_which_the_resonance_was_lost_is_no_point_of_the_backbone():
-    notes = [note(0, 1.0, 100.0), lost(1, 3.0), lost(2, 2.0), FeedbackNote("achieved", 0.0, {})]
+    notes = [
+        note(0, 1.0, 100.0),
+        lost(1, 3.0),
+        lost(2, 2.0),
+        DwellNote(segment="dwell", looks=1, looks_outside=0),
+    ]
     assert [each.number for each in tracked_resonances(notes)] == [0]
     assert lost_levels(notes) == (2.0, 3.0)
     assert tracked_resonances([lost(0, 1.0)]) == ()

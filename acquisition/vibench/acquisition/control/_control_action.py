@@ -8,15 +8,7 @@ import numpy as np
 
 from ..instruments import Block, Samples
 from ..plan import Phase
-
-
-@dataclass(frozen=True)
-class Note:
-    """Something decided or found, for the recording's events."""
-
-    kind: str
-    """``"settled"``, ``"step"``, ``"jump"``, ``"level"``, ``"resonance"``."""
-    text: str
+from ..recording import FeedbackNote
 
 
 @dataclass(frozen=True)
@@ -25,7 +17,7 @@ class ControlAction:
 
     phase: Phase | None
     """None for the notes alone: nothing is heard then."""
-    notes: tuple[Note, ...] = ()
+    notes: tuple[FeedbackNote, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

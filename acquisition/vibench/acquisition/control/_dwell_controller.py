@@ -1,14 +1,14 @@
 """A dwell at a level: settled first, then watched and corrected while it is recorded."""
 
-import json
 from math import ceil
 
 from ..excitation import HeldDwell
 from ..plan import RunState
+from ..recording import DwellNote, Held, LevelNote, SegmentLabel
 from ._closed_loop_check import require_answer
 from ._control_action import Controller
-from ._level_control import Held, LevelControl, measured_level
-from ._settling_controller import SettlingController, shortened
+from ._level_control import LevelControl, measured_level
+from ._settling_controller import SettlingController
 from ._sine_loop import SineLoop
 from ._start import started
 
@@ -31,18 +31,19 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
         require_answer(loop.rig, plan.frequency_hz, loop.setting.setting_vpp, measured.amplitude)
         held = settling_controller.held(measured)
         outside += held is Held.OUTSIDE
-        said = {
-            "at_s": shortened(begun_s + piece_s),
-            "base_m_per_s2": shortened(measured.amplitude),
-            "base_u": shortened(measured.uncertainty),
-            "setting_vpp": shortened(loop.setting.setting_vpp),
-            "level": held.value,
-        }
-        loop.note("level", json.dumps(said))
+        loop.note(
+            LevelNote(
+                at_s=begun_s + piece_s,
+                base_m_per_s2=measured.amplitude,
+                base_u=measured.uncertainty,
+                setting_vpp=loop.setting.setting_vpp,
+                level=held,
+            )
+        )
         # The figures of all pieces since the last change are one mean: chaos needs it long.
         next_vpp = control.next_vpp(loop.setting.setting_vpp, measured, target)
         if next_vpp != loop.setting.setting_vpp and number + 1 < pieces:
             loop.change(plan.frequency_hz, next_vpp)
-    loop.note("achieved", json.dumps({"segment": "dwell", "looks": pieces, "looks_outside": outside}))
+    loop.note(DwellNote(segment=SegmentLabel.DWELL, looks=pieces, looks_outside=outside))
     yield from loop.ramp_down()
     yield from loop.say()

@@ -3,17 +3,17 @@
 Letting a motion die by lowering its drive and bringing it back: the way out of a stubborn branch.
 """
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from ..excitation import SEARCH_LABEL, Segment, SettledSine
+from ..excitation import Segment, SettledSine
 from ..plan import RunState
+from ..recording import JumpNote, JumpSearchEnd, JumpSide, SegmentLabel
 from ._control_action import Controller
-from ._jump_search import LocatedJump, SettledPoint, Side, is_on_branch, located, side
+from ._jump_search import LocatedJump, SettledPoint, is_on_branch, located, side
 from ._record import recorded
-from ._settling_controller import SettledState, SettlingController, shortened
+from ._settling_controller import SettledState, SettlingController
 from ._sine_loop import SineLoop
 from ._start import glided
 
@@ -63,7 +63,7 @@ class _JumpSearch:
     branch: list[SettledPoint]
     """Visits on the branch before the jump, in the order of the pass."""
     after: SettledPoint
-    here: Side
+    here: JumpSide
 
     @property
     def bracket(self) -> LocatedJump:
@@ -74,9 +74,9 @@ class _JumpSearch:
         """Take in a visit between the two ends."""
         self.here = side(point, self.branch[-1], self.after)
         match self.here:
-            case Side.BEFORE:
+            case JumpSide.BEFORE:
                 self.branch.append(point)
-            case Side.AFTER:
+            case JumpSide.AFTER:
                 self.after = point
 
     def left(self, place: int, point: SettledPoint) -> None:
@@ -90,7 +90,7 @@ class Arrival:
     """Where a search has ended, at the frequency it was begun for."""
 
     point: SettledPoint
-    branch: Side
+    branch: JumpSide
     is_jump: bool
 
 
@@ -114,44 +114,44 @@ class JumpLocator:
         A response that only changes steeply is no jump: it closes as the bracket does. Where both
         branches are there at ``after``, the way to it may end on either, which is said.
         """
-        search = _JumpSearch(list(points), after, Side.AFTER)
+        search = _JumpSearch(list(points), after, JumpSide.AFTER)
         found, why = yield from self._bisected(search)
         is_jump = found.is_jump(self._rule.factor)
         end = yield from self._moved_to(after.frequency_hz)
         point = end.point
         has_arrived = is_on_branch(point, after, self._rule.factor)
-        branch = Side.AFTER if has_arrived or not is_jump else Side.BEFORE
+        branch = JumpSide.AFTER if has_arrived or not is_jump else JumpSide.BEFORE
         self._say(found, why, branch)
         return Arrival(point, branch, is_jump)
 
-    def _bisected(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, str]]:
+    def _bisected(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, JumpSearchEnd]]:
         for _ in range(_MOST_BRACKETS):
             found = yield from self._halved(search)
             if found is not None:
                 return found
-        return search.bracket, "the motion jumped somewhere else each time"
+        return search.bracket, JumpSearchEnd.ELSEWHERE
 
-    def _halved(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, str] | None]:
+    def _halved(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, JumpSearchEnd] | None]:
         """Halve the bracket to its end; None when the motion left its branch earlier: a new bracket."""
         seek = located(search.branch[-1], search.after, self._rule.resolution_hz)
         try:
             frequency_hz = next(seek)
             while True:
-                if search.here is Side.AFTER:
+                if search.here is JumpSide.AFTER:
                     match (yield from self._returned_to_branch(search)):
                         case _Return.NOT_FOUND if not self._is_late():
-                            return search.bracket, "its branch was not found again"
+                            return search.bracket, JumpSearchEnd.BRANCH_LOST
                         case _Return.LEFT:
                             return None
                 if self._is_late():
-                    return search.bracket, "the time for the search was over"
+                    return search.bracket, JumpSearchEnd.OUT_OF_TIME
                 point = yield from self._searched(frequency_hz)
                 search.narrow(point)
                 if not search.bracket.is_jump(self._rule.factor):
-                    return search.bracket, "steep, but no jump"
+                    return search.bracket, JumpSearchEnd.STEEP
                 frequency_hz = seek.send(point)
         except StopIteration:
-            return search.bracket, "localised"
+            return search.bracket, JumpSearchEnd.LOCALISED
 
     def _returned_to_branch(self, search: _JumpSearch) -> Controller[_Return]:
         """Go back along the pass until its branch is found again, then forward to the branch's end.
@@ -211,12 +211,12 @@ class JumpLocator:
     def _searched(self, frequency_hz: float) -> Controller[SettledPoint]:
         found = yield from self._moved_to(frequency_hz)
         segment = Segment(
-            SEARCH_LABEL,
+            SegmentLabel.SEARCH,
             {
                 "frequency_hz": frequency_hz,
                 "direction": self._direction,
                 "pass": self._number,
-                **found.numbers(),
+                **found.note.numbers,
             },
         )
         yield from recorded(self._settling_controller, found, segment, self._plan.record_s)
@@ -227,16 +227,17 @@ class JumpLocator:
         step_s = self._plan.settling.longest_wait_s
         return self._settling_controller.loop.elapsed_s + 2 * step_s + self._plan.record_s > self._until_s
 
-    def _say(self, found: LocatedJump, how: str, arrived: Side) -> None:
-        said = {
-            "direction": self._direction,
-            "pass": self._number,
-            "frequency_hz": shortened(found.frequency_hz),
-            "before_hz": found.before.frequency_hz,
-            "after_hz": found.after.frequency_hz,
-            "response_before": shortened(found.before.response),
-            "response_after": shortened(found.after.response),
-            "how": how,
-            "arrived": arrived.value,
-        }
-        self._settling_controller.loop.note("jump", json.dumps(said))
+    def _say(self, found: LocatedJump, how: JumpSearchEnd, arrived: JumpSide) -> None:
+        self._settling_controller.loop.note(
+            JumpNote(
+                direction=self._direction,
+                pass_number=self._number,
+                frequency_hz=found.frequency_hz,
+                before_hz=found.before.frequency_hz,
+                after_hz=found.after.frequency_hz,
+                response_before=found.before.response,
+                response_after=found.after.response,
+                how=how,
+                arrived=arrived,
+            )
+        )

@@ -2,15 +2,9 @@
 
 from collections.abc import Generator
 from dataclasses import dataclass
-from enum import StrEnum
 from math import inf, log
 
-
-class Side(StrEnum):
-    """On which branch of a jump a response lies."""
-
-    BEFORE = "before"
-    AFTER = "after"
+from ..recording import JumpSide
 
 
 @dataclass(frozen=True)
@@ -57,21 +51,21 @@ def located(before: SettledPoint, after: SettledPoint, resolution_hz: float) -> 
     while abs(after.frequency_hz - before.frequency_hz) > resolution_hz * (1 + 1e-9):
         middle = yield 0.5 * (before.frequency_hz + after.frequency_hz)
         match side(middle, before, after):
-            case Side.BEFORE:
+            case JumpSide.BEFORE:
                 before = middle
-            case Side.AFTER:
+            case JumpSide.AFTER:
                 after = middle
     return LocatedJump(before, after)
 
 
-def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> Side:
+def side(point: SettledPoint, before: SettledPoint, after: SettledPoint) -> JumpSide:
     """Say on which side of a jump a response lies that was found between them.
 
     Before it is what is nearer to the response before, and no further from that than the one after: a
     third branch has been jumped to, just as the second.
     """
     away = ratio(point, before)
-    return Side.BEFORE if away <= min(ratio(point, after), ratio(before, after)) else Side.AFTER
+    return JumpSide.BEFORE if away <= min(ratio(point, after), ratio(before, after)) else JumpSide.AFTER
 
 
 def ratio(one: SettledPoint, other: SettledPoint) -> float:

@@ -1,12 +1,12 @@
 """Holding the base at a level: the next setting from what was measured, in small steps, within limits."""
 
 from dataclasses import dataclass
-from enum import StrEnum
 from math import sqrt
 
 import numpy as np
 
 from ..excitation import LOWEST_AMPLITUDE_VPP, BaseLevel
+from ..recording import Held
 from ._stroboscope import Phasors
 
 _DEAD_SHARE = 0.3
@@ -17,14 +17,6 @@ _GAIN = 0.8
 """Share of the error, in decibels, that is taken out at once: the specimen answers a change slowly."""
 _BATCHES = 8
 """Stretches whose scatter gives the uncertainty of a mean: single periods of chaos are not independent."""
-
-
-class Held(StrEnum):
-    """Whether a level was held."""
-
-    WITHIN = "within tolerance"
-    OUTSIDE = "outside tolerance"
-    OPEN = "not controlled"
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,13 @@
 """Recording what has settled, and saying which level the base really had meanwhile."""
 
-import json
 from dataclasses import dataclass
 
 from ..excitation import Segment
 from ..plan import RunState
+from ..recording import Held, SegmentNote
 from ._control_action import Controller
-from ._level_control import Held, MeasuredLevel, measured_level
-from ._settling_controller import SettledState, SettlingController, shortened
+from ._level_control import MeasuredLevel, measured_level
+from ._settling_controller import SettledState, SettlingController
 
 
 @dataclass(frozen=True)
@@ -28,16 +28,17 @@ def recorded(
     yield from loop.listen(RunState.RECORDING, duration_s, segment)
     measured = measured_level(loop.periods.base)
     result = Recorded(measured, settling_controller.held(measured))
-    said = {
-        "segment": segment.label,
-        "frequency_hz": found.frequency_hz,
-        "drive_hz": loop.drive_hz,
-        "base_m_per_s2": shortened(measured.amplitude),
-        "base_u": shortened(measured.uncertainty),
-        "level": result.held.value,
-        "response_ii": shortened(found.response),
-        "motion": found.judgement.steadiness.value,
-        "period": found.judgement.period,
-    }
-    loop.note("achieved", json.dumps(said))
+    loop.note(
+        SegmentNote(
+            segment=segment.label,
+            frequency_hz=found.frequency_hz,
+            drive_hz=loop.drive_hz,
+            base_m_per_s2=measured.amplitude,
+            base_u=measured.uncertainty,
+            level=result.held,
+            response_ii=found.response,
+            motion=found.judgement.steadiness,
+            period=found.judgement.period,
+        )
+    )
     return result

@@ -5,22 +5,20 @@ A mode from a few points of its transmissibility: one resonance beside whatever 
 Finding the frequency at which a phase has a wanted value: secants inside a bracket that only narrows.
 """
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 from math import degrees, hypot, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..excitation import ResonanceTracking
+from ..recording import LockResult, ResonanceNote, Steadiness
 from ._control_action import Controller
 from ._record import recorded
-from ._settling_controller import SettledState, SettlingController, shortened
+from ._settling_controller import SettledState, SettlingController
 from ._sine_loop import SineLoop
 from ._start import moved, started
-from ._steadiness import Steadiness
 from ._stroboscope import Periods
 
 _UNKNOWNS = 8
@@ -197,14 +195,6 @@ _FURTHEST = 1.5
 """Half-widths of the resonance between it and the furthest point of a flank."""
 
 
-class LockResult(StrEnum):
-    """How a search for a resonance ended."""
-
-    LOCKED = "locked"
-    LOST = "not met within the tries"
-    AT_THE_EDGE = "outside the range"
-
-
 def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]:
     """Lock on to the resonance at every level, record there, go on to the next level from there."""
     yield from started(loop, plan.start_hz, plan.base_level(0))
@@ -296,23 +286,24 @@ def _phase_error(periods: Periods, found: SettledState, wanted_deg: float) -> Ph
 
 def _say(loop: SineLoop, plan: ResonanceTracking, number: int, found: SettledState, tracked: Tracked) -> None:
     is_told = tracked.lock is LockResult.LOCKED and found.judgement.steadiness is not Steadiness.UNSETTLED
-    said: dict[str, int | float | str | None] = {
-        "level": number,
-        "asked_m_per_s2": plan.accelerations_m_per_s2[number],
-        "frequency_hz": shortened(tracked.resonance.frequency_hz) if is_told else None,
-        "frequency_u_hz": shortened(tracked.resonance.uncertainty_hz) if is_told else None,
-        "at_hz": shortened(found.drive_hz),
-        "phase_deg": shortened(degrees(float(np.angle(found.transmissibility)))),
-        "response_ii": shortened(found.response),
-        "base_m_per_s2": shortened(found.base.amplitude),
-        "base_u": shortened(found.base.uncertainty),
-        "held": found.held.value,
-        "motion": found.judgement.steadiness.value,
-        "tries": tracked.tries,
-        "lock": tracked.lock.value,
-    }
-    if is_told and tracked.mode is not None:
-        said["mode_hz"] = shortened(tracked.mode.frequency_hz)
-        said["mode_u_hz"] = shortened(tracked.mode.frequency_u_hz)
-        said["damping_ratio"] = shortened(tracked.mode.damping_ratio)
-    loop.note("resonance", json.dumps(said))
+    resonance, mode = (tracked.resonance, tracked.mode) if is_told else (None, None)
+    loop.note(
+        ResonanceNote(
+            level=number,
+            asked_m_per_s2=plan.accelerations_m_per_s2[number],
+            frequency_hz=None if resonance is None else resonance.frequency_hz,
+            frequency_u_hz=None if resonance is None else resonance.uncertainty_hz,
+            at_hz=found.drive_hz,
+            phase_deg=degrees(float(np.angle(found.transmissibility))),
+            response_ii=found.response,
+            base_m_per_s2=found.base.amplitude,
+            base_u=found.base.uncertainty,
+            held=found.held,
+            motion=found.judgement.steadiness,
+            tries=tracked.tries,
+            lock=tracked.lock,
+            mode_hz=None if mode is None else mode.frequency_hz,
+            mode_u_hz=None if mode is None else mode.frequency_u_hz,
+            damping_ratio=None if mode is None else mode.damping_ratio,
+        )
+    )

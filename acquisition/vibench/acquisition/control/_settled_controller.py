@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 
-from ..excitation import STEP_LABEL, Segment, SettledSine
+from ..excitation import Segment, SettledSine
+from ..recording import JumpSide, SegmentLabel
 from ._control_action import Controller
 from ._jump_controller import JumpLocator
-from ._jump_search import SettledPoint, Side, ratio
+from ._jump_search import SettledPoint, ratio
 from ._record import recorded
 from ._settling_controller import SettlingController
 from ._sine_loop import SineLoop
@@ -51,7 +52,7 @@ class Pass:
                 searched += 1
                 locator = JumpLocator(self._settling_controller, self._plan, self._direction, self._number)
                 arrival = yield from locator.localised(points, point)
-                if arrival.is_jump and arrival.branch is Side.AFTER:
+                if arrival.is_jump and arrival.branch is JumpSide.AFTER:
                     self._branch += 1
                     points = []
                 point = arrival.point
@@ -65,14 +66,14 @@ class Pass:
         )
         found = yield from settling_controller.settled()
         segment = Segment(
-            STEP_LABEL,
+            SegmentLabel.STEP,
             {
                 "frequency_hz": frequency_hz,
                 "direction": self._direction,
                 "pass": self._number,
                 "branch": self._branch,
                 "came_from": came_from,
-                **found.numbers(),
+                **found.note.numbers,
             },
         )
         yield from recorded(settling_controller, found, segment, self._plan.record_s)

@@ -1,17 +1,17 @@
 """Waiting until a motion has settled, while the base is brought to its level and kept there."""
 
-import json
 from dataclasses import dataclass
 from math import isfinite
 
 from ..excitation import BaseLevel, Settling
 from ..plan import RunState
+from ..recording import Held, SettledNote, Steadiness
 from ._closed_loop_check import require_answer
 from ._control_action import Controller
 from ._jump_search import SettledPoint
-from ._level_control import Held, LevelControl, MeasuredLevel, measured_level
+from ._level_control import LevelControl, MeasuredLevel, measured_level
 from ._sine_loop import SineLoop
-from ._steadiness import Judgement, Steadiness, judged
+from ._steadiness import Judgement, judged
 
 LOOK_S = 0.2
 """Time between two looks at the motion [s]; ten periods at least."""
@@ -46,21 +46,23 @@ class SettledState:
         """What a search for a jump needs of it."""
         return SettledPoint(self.frequency_hz, self.response, self.judgement.period)
 
-    def numbers(self) -> dict[str, int | float | str]:
-        """Give what belongs beside the samples."""
+    @property
+    def note(self) -> SettledNote:
+        """What is noted of it; the same numbers stand beside the samples."""
         found = self.judgement
-        return {
-            "motion": found.steadiness.value,
-            "period": found.period,
-            "waited_s": round(self.waited_s, 3),
+        return SettledNote(
+            frequency_hz=self.frequency_hz,
+            motion=found.steadiness,
+            period=found.period,
+            waited_s=round(self.waited_s, 3),
             # Too few periods for a figure: as wide as the motion itself.
-            "scatter": shortened(found.scatter) if isfinite(found.scatter) else 1.0,
-            "noise": shortened(found.noise) if isfinite(found.noise) else 0.0,
-            "setting_vpp": shortened(self.setting_vpp),
-            "base_m_per_s2": shortened(self.base.amplitude),
-            "base_u": shortened(self.base.uncertainty),
-            "level": self.held.value,
-        }
+            scatter=found.scatter if isfinite(found.scatter) else 1.0,
+            noise=found.noise if isfinite(found.noise) else 0.0,
+            setting_vpp=self.setting_vpp,
+            base_m_per_s2=self.base.amplitude,
+            base_u=self.base.uncertainty,
+            level=self.held,
+        )
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ class SettlingController:
                 continue
             found = self._found(waited_s)
             if is_late or (self._is_steady(found) and found.judgement.steadiness is not Steadiness.UNSETTLED):
-                self._say(found)
+                self.loop.note(found.note)
                 return found
 
     def measured(self) -> MeasuredLevel:
@@ -143,11 +145,3 @@ class SettlingController:
         is_known = _SURE * found.base.uncertainty <= self.level.tolerance * self._target
         is_at_the_end = found.setting_vpp >= self.loop.most_vpp
         return is_known and (found.held is Held.WITHIN or is_at_the_end)
-
-    def _say(self, found: SettledState) -> None:
-        self.loop.note("settled", json.dumps({"frequency_hz": found.frequency_hz, **found.numbers()}))
-
-
-def shortened(value: float) -> float:
-    """Round to six figures: the recording's table is narrow."""
-    return float(f"{value:.6g}")

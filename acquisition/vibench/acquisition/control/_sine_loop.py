@@ -7,8 +7,9 @@ import numpy as np
 
 from ..excitation import LOWEST_AMPLITUDE_VPP, Segment, Tone
 from ..plan import HUSH_S, Measurement, Phase, RunState, ramp
+from ..recording import FeedbackNote
 from ..rig import Rig
-from ._control_action import ControlAction, Controller, Note, PhaseSamples
+from ._control_action import ControlAction, Controller, PhaseSamples
 from ._feedback_channels import FeedbackChannels
 from ._stroboscope import Periods, Stroboscope
 
@@ -26,7 +27,7 @@ class SineLoop:
 
     def __init__(self, channels: FeedbackChannels, rig: Rig, measurement: Measurement) -> None:
         self._measurement = measurement
-        self._notes: list[Note] = []
+        self._notes: list[FeedbackNote] = []
         self._scope: Stroboscope
         self._silence = np.zeros(0)
         self.channels = channels
@@ -74,9 +75,9 @@ class SineLoop:
         """Look anew from the next move on."""
         self._scope.forget()
 
-    def note(self, kind: str, text: str) -> None:
+    def note(self, note: FeedbackNote) -> None:
         """Have something noted with the next move."""
-        self._notes.append(Note(kind, text))
+        self._notes.append(note)
 
     def ramp_up(self) -> Controller[None]:
         """Begin to play."""
@@ -100,7 +101,7 @@ class SineLoop:
     def _run_phase(self, phase: Phase) -> Generator[ControlAction, PhaseSamples, PhaseSamples]:
         return (yield ControlAction(phase, self._taken_notes()))
 
-    def _taken_notes(self) -> tuple[Note, ...]:
+    def _taken_notes(self) -> tuple[FeedbackNote, ...]:
         notes = tuple(self._notes)
         self._notes.clear()
         return notes

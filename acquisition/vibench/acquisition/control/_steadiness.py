@@ -1,7 +1,6 @@
 """Whether a motion seen once a period has settled: it repeats after k periods, or keeps its statistics."""
 
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from math import hypot, sqrt
 
 import numpy as np
@@ -9,6 +8,7 @@ from scipy.stats import kendalltau
 
 from ..excitation import Settling
 from ..instruments import Samples
+from ..recording import Steadiness
 from ._stroboscope import Phasors
 
 _THIRDS = 3
@@ -24,15 +24,6 @@ _NOISE_MARGIN = 1.5
 """The noise of a channel is taken that much larger than it was in silence."""
 _SLOWEST = 0.9
 """Largest ratio of two changes that is extrapolated; slower ones count ninefold."""
-
-
-class Steadiness(StrEnum):
-    """What kind of settled motion it is."""
-
-    PERIODIC = "periodic"
-    APERIODIC = "aperiodic"
-    """Stationary, but without a period that was looked for: quasi-periodic or chaotic."""
-    UNSETTLED = "unsettled"
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,13 @@
 """A sweep at a level: every step's setting follows from what the base did in the steps before."""
 
-import json
 from dataclasses import dataclass
 
 from ..excitation import HeldSweep
 from ..plan import RunState
+from ..recording import ExcursionNote, Held, SegmentLabel, SweepNote
 from ._control_action import Controller
 from ._gain_estimator import GainEstimator
-from ._level_control import Held
-from ._settling_controller import SettlingController, shortened
+from ._settling_controller import SettlingController
 from ._sine_loop import SineLoop
 from ._start import followed, started, tracked
 
@@ -40,8 +39,9 @@ def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
         outside += excursion is not None
     if excursion is not None:
         _say(loop, excursion)
-    said = {"segment": "sweep", "steps": steps, "steps_outside": outside, "average_s": plan.average_s}
-    loop.note("achieved", json.dumps(said))
+    loop.note(
+        SweepNote(segment=SegmentLabel.SWEEP, steps=steps, steps_outside=outside, average_s=plan.average_s)
+    )
     yield from loop.ramp_down()
     yield from loop.say()
 
@@ -60,10 +60,8 @@ def _judged(
 
 
 def _say(loop: SineLoop, excursion: _Excursion) -> None:
-    said = {
-        "from_hz": shortened(excursion.begin_hz),
-        "to_hz": shortened(excursion.end_hz),
-        "worst": shortened(excursion.worst),
-        "level": Held.OUTSIDE.value,
-    }
-    loop.note("level", json.dumps(said))
+    loop.note(
+        ExcursionNote(
+            from_hz=excursion.begin_hz, to_hz=excursion.end_hz, worst=excursion.worst, level=Held.OUTSIDE
+        )
+    )

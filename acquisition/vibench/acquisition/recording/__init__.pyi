@@ -5,6 +5,23 @@ from ._disk_trouble import (
     DiskTrouble as DiskTrouble,
     troubled_disks as troubled_disks,
 )
+from ._feedback_note import (
+    DwellNote as DwellNote,
+    ExcursionNote as ExcursionNote,
+    FeedbackNote as FeedbackNote,
+    Held as Held,
+    JumpNote as JumpNote,
+    JumpSearchEnd as JumpSearchEnd,
+    JumpSide as JumpSide,
+    LevelNote as LevelNote,
+    LockResult as LockResult,
+    ResonanceNote as ResonanceNote,
+    SegmentNote as SegmentNote,
+    SettledNote as SettledNote,
+    Steadiness as Steadiness,
+    SweepNote as SweepNote,
+    feedback_note as feedback_note,
+)
 from ._header import (
     ROLE_PATTERN as ROLE_PATTERN,
     ChannelHeader as ChannelHeader,
@@ -45,6 +62,10 @@ from ._recover import (
 from ._results import (
     ResultArray as ResultArray,
     SavedResult as SavedResult,
+)
+from ._segment_label import (
+    NO_RESULT as NO_RESULT,
+    SegmentLabel as SegmentLabel,
 )
 from ._writer import (
     RecordingWriter as RecordingWriter,

@@ -21,7 +21,6 @@ from ._checks import (
     measurement_checks as measurement_checks,
 )
 from ._facts import (
-    FeedbackNote as FeedbackNote,
     RecordingFacts as RecordingFacts,
     recording_facts as recording_facts,
     specimen_of as specimen_of,

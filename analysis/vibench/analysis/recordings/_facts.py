@@ -1,10 +1,6 @@
-"""What a recording says about itself: what was measured, with what, and how it ended.
+"""What a recording says about itself: what was measured, with what, and how it ended."""
 
-What a measurement with feedback found and decided while it ran, as it noted it in its recording.
-"""
-
-import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,41 +9,11 @@ from pydantic import ValidationError
 
 from vibench.acquisition import Identity
 from vibench.acquisition.plan import Measurement
-from vibench.acquisition.recording import Origin, Recording, RecordingState
+from vibench.acquisition.recording import FeedbackNote, Origin, Recording, RecordingState, feedback_note
 from vibench.sim import Specimen, gong2025
 
 from ..errors import UnusableData
 from ._channel_levels import ChannelLevel, OnRead, channel_levels, ignore_reading
-
-FEEDBACK_KINDS = ("settled", "achieved", "level", "jump", "resonance")
-"""Events whose text is JSON: one object of numbers and words."""
-
-
-@dataclass(frozen=True)
-class FeedbackNote:
-    """One thing that was found or decided."""
-
-    kind: str
-    time_s: float
-    """From the beginning of the recording [s]."""
-    numbers: Mapping[str, int | float | str | None]
-
-
-def feedback_notes(recording: Recording) -> tuple[FeedbackNote, ...]:
-    """Read all notes, in the order of time; one that was cut short in the file is left out."""
-    return tuple(_notes(recording))
-
-
-def _notes(recording: Recording) -> Iterator[FeedbackNote]:
-    for event in recording.events:
-        if event.kind not in FEEDBACK_KINDS:
-            continue
-        try:
-            numbers = json.loads(event.text)
-        except json.JSONDecodeError:
-            continue
-        if isinstance(numbers, dict):
-            yield FeedbackNote(event.kind, event.sample / recording.sample_rate_hz, numbers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +48,8 @@ class RecordingFacts:
     """The last check of the whole bench before it, as the recording has it; may be empty."""
     feedback: tuple[FeedbackNote, ...] = ()
     """What a measurement with feedback found while it ran; empty for any other."""
+    feedback_s: tuple[float, ...] = ()
+    """When each of it was noted, from the beginning of the recording [s]."""
 
     @property
     def is_simulated(self) -> bool:
@@ -113,6 +81,7 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
     steps = {id(step.segment): step.segment for step in measurement.excitation.steps()}
     labels = {segment.label for segment in steps.values()}
     played = [each for each in recording.segments if each.label in labels]
+    noted = [(each.sample / rate, note) for each in recording.events if (note := feedback_note(each))]
     return RecordingFacts(
         name=recording.path.name.removesuffix(".part").removesuffix(".h5"),
         path=recording.path,
@@ -137,7 +106,8 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
         whole_stretches=sum(each.is_complete for each in played),
         check=" ".join(each.text for each in recording.events if each.kind == "check"),
         bench_check=recording.bench_check,
-        feedback=feedback_notes(recording),
+        feedback=tuple(note for _, note in noted),
+        feedback_s=tuple(time_s for time_s, _ in noted),
     )
 
 

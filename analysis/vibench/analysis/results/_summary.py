@@ -71,7 +71,10 @@ def _facts(facts: RecordingFacts) -> Json:
         "excitation": facts.measurement.excitation.model_dump(mode="json"),
         "overload_s": dict(facts.overload_s),
         "lost_samples": facts.lost_samples,
-        "feedback": [{"kind": each.kind, "time_s": each.time_s, **each.numbers} for each in facts.feedback],
+        "feedback": [
+            {"kind": each.kind, "time_s": time_s, **each.numbers}
+            for time_s, each in zip(facts.feedback_s, facts.feedback, strict=True)
+        ],
     }
 
 

@@ -4,12 +4,19 @@ What feedback found, in sentences: jumps, motions that do not repeat, resonances
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from ..recordings import FeedbackNote
-
-LOCALISED = "localised"
+from vibench.acquisition.recording import (
+    FeedbackNote,
+    Held,
+    JumpNote,
+    JumpSearchEnd,
+    ResonanceNote,
+    SegmentNote,
+    Steadiness,
+)
 
 
 @dataclass(frozen=True)
@@ -23,8 +30,11 @@ class NotedJump:
 
 def noted_jumps(notes: Sequence[FeedbackNote]) -> tuple[NotedJump, ...]:
     """Give the jumps that were bracketed as closely as the plan asks."""
-    found = [each.numbers for each in notes if each.kind == "jump" and each.numbers.get("how") == LOCALISED]
-    return tuple(_jump(numbers) for numbers in found)
+    return tuple(
+        NotedJump(each.direction, *sorted((each.before_hz, each.after_hz)))
+        for each in notes
+        if isinstance(each, JumpNote) and each.how is JumpSearchEnd.LOCALISED
+    )
 
 
 def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
@@ -33,53 +43,39 @@ def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
     if jumps:
         said = ", ".join(f"{each.low_hz:.5g} and {each.high_hz:.5g} Hz ({each.direction})" for each in jumps)
         yield f"Jumps between {said}."
-    steps = [each.numbers for each in notes if each.kind == "achieved" and "motion" in each.numbers]
-    periods = sorted({_whole(each, "period") for each in steps if each["motion"] == "periodic"})
-    kinds = [f"period {period}: {_count(steps, period)}" for period in periods if period > 1]
-    aperiodic = sum(each["motion"] == "aperiodic" for each in steps)
-    unsettled = sum(each["motion"] == "unsettled" for each in steps)
-    kinds += [f"no period: {aperiodic}"] * bool(aperiodic) + [f"not settled: {unsettled}"] * bool(unsettled)
+    yield from _motions([each for each in notes if isinstance(each, SegmentNote)])
+    yield from (_resonance(each) for each in notes if isinstance(each, ResonanceNote))
+
+
+def _motions(steps: Sequence[SegmentNote]) -> Iterator[str]:
+    """Count recorded motions by what they do; a plain period of one is not worth a word."""
+    count = Counter((each.motion, each.period) for each in steps)
+    kinds = [
+        f"period {period}: {count[Steadiness.PERIODIC, period]}"
+        for period in sorted(period for motion, period in count if motion is Steadiness.PERIODIC)
+        if period > 1
+    ]
+    motions = Counter(each.motion for each in steps)
+    for motion, word in ((Steadiness.APERIODIC, "no period"), (Steadiness.UNSETTLED, "not settled")):
+        kinds += [f"{word}: {motions[motion]}"] * bool(motions[motion])
     if kinds:
         yield f"Of {len(steps)} recorded motions, by kind: {', '.join(kinds)}."
-    outside = sum(each.get("level") == "outside tolerance" for each in steps)
+    outside = sum(each.level is Held.OUTSIDE for each in steps)
     if outside:
         yield f"The base was off its level in {outside} of them."
-    yield from (_resonance(each.numbers) for each in notes if each.kind == "resonance")
 
 
-def _jump(numbers: Mapping[str, int | float | str | None]) -> NotedJump:
-    low_hz, high_hz = sorted((_given_number(numbers, "before_hz"), _given_number(numbers, "after_hz")))
-    return NotedJump(str(numbers["direction"]), low_hz, high_hz)
-
-
-def _count(steps: Sequence[Mapping[str, int | float | str | None]], period: int) -> int:
-    return sum(each["motion"] == "periodic" and each["period"] == period for each in steps)
-
-
-def _resonance(numbers: Mapping[str, int | float | str | None]) -> str:
-    level = f"{_given_number(numbers, 'asked_m_per_s2'):g} m/s²"
-    if numbers.get("frequency_hz") is None:
-        return f"No phase resonance at {level}: {numbers['lock']}."
-    frequency_hz, u_hz = _given_number(numbers, "frequency_hz"), _given_number(numbers, "frequency_u_hz")
-    text = f"Phase resonance at {frequency_hz:.3f} ± {2 * u_hz:.2g} Hz ({level})"
-    if numbers.get("mode_hz") is None:
+def _resonance(note: ResonanceNote) -> str:
+    level = f"{note.asked_m_per_s2:g} m/s²"
+    if note.frequency_hz is None or note.frequency_u_hz is None:
+        return f"No phase resonance at {level}: {note.lock.value}."
+    text = f"Phase resonance at {note.frequency_hz:.3f} ± {2 * note.frequency_u_hz:.2g} Hz ({level})"
+    if note.mode_hz is None or note.mode_u_hz is None:
         return f"{text}."
-    mode_hz, mode_u_hz = _given_number(numbers, "mode_hz"), _given_number(numbers, "mode_u_hz")
-    damping = _given_number(numbers, "damping_ratio")
-    return f"{text}; natural frequency {mode_hz:.3f} ± {2 * mode_u_hz:.2g} Hz, damping ratio {damping:.3g}."
-
-
-def _given_number(numbers: Mapping[str, int | float | str | None], key: str) -> float:
-    value = numbers[key]
-    assert isinstance(value, int | float), f"{key} of a note is a number"
-    return float(value)
-
-
-def _whole(numbers: Mapping[str, int | float | str | None], key: str) -> int:
-    return int(_given_number(numbers, key))
-
-
-Numbers = Mapping[str, int | float | str | None]
+    return (
+        f"{text}; natural frequency {note.mode_hz:.3f} ± {2 * note.mode_u_hz:.2g} Hz, "
+        f"damping ratio {note.damping_ratio:.3g}."
+    )
 
 
 @dataclass(frozen=True)
@@ -109,41 +105,24 @@ def tracked_resonances(notes: Sequence[FeedbackNote]) -> tuple[TrackedResonance,
 
 def lost_levels(notes: Sequence[FeedbackNote]) -> tuple[float, ...]:
     """Give the levels [m/s²] that were asked for and at which no resonance was found."""
-    lost = [
-        _required(each.numbers, "asked_m_per_s2")
-        for each in notes
-        if each.kind == "resonance" and each.numbers.get("frequency_hz") is None
-    ]
-    return tuple(sorted(lost))
+    lost = (each for each in notes if isinstance(each, ResonanceNote) and each.frequency_hz is None)
+    return tuple(sorted(each.asked_m_per_s2 for each in lost))
 
 
 def _found(notes: Sequence[FeedbackNote]) -> Iterator[TrackedResonance]:
-    for numbers in (each.numbers for each in notes if each.kind == "resonance"):
-        frequency_hz, u_hz = _number(numbers, "frequency_hz"), _number(numbers, "frequency_u_hz")
-        if frequency_hz is None or u_hz is None:
+    for each in notes:
+        if not isinstance(each, ResonanceNote) or each.frequency_hz is None or each.frequency_u_hz is None:
             continue
-        base, response, at_hz = (_required(numbers, key) for key in ("base_m_per_s2", "response_ii", "at_hz"))
         yield TrackedResonance(
-            number=int(_required(numbers, "level")),
-            base_m_per_s2=base,
-            frequency_hz=frequency_hz,
-            u_frequency_hz=u_hz,
-            amplitude_m=response * base / (2 * math.pi * at_hz) ** 2,
-            mode_hz=_number(numbers, "mode_hz"),
-            u_mode_hz=_number(numbers, "mode_u_hz"),
-            damping_ratio=_number(numbers, "damping_ratio"),
+            number=each.level,
+            base_m_per_s2=each.base_m_per_s2,
+            frequency_hz=each.frequency_hz,
+            u_frequency_hz=each.frequency_u_hz,
+            amplitude_m=each.response_ii * each.base_m_per_s2 / (2 * math.pi * each.at_hz) ** 2,
+            mode_hz=each.mode_hz,
+            u_mode_hz=each.mode_u_hz,
+            damping_ratio=each.damping_ratio,
         )
-
-
-def _required(numbers: Numbers, key: str) -> float:
-    value = _number(numbers, key)
-    assert value is not None, f"{key} of a note is a number"
-    return value
-
-
-def _number(numbers: Numbers, key: str) -> float | None:
-    value = numbers.get(key)
-    return float(value) if isinstance(value, int | float) else None
 
 
 def backbone_sentence(levels: Sequence[TrackedResonance]) -> str:

@@ -1,0 +1,231 @@
+"""What a feedback controller notes in a recording, and analysis reads back: one model for each note.
+
+A note is an event: its kind is the event's, its text one JSON object of everything else. An event's text
+is short, so that notes of the first version name no version.
+"""
+
+import json
+from enum import StrEnum
+from typing import Annotated, Any, Final, Literal, TypeAlias
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from ..errors import RecordingError
+from ._segment_label import SegmentLabel
+from ._tables import Event
+
+VERSION: Final = 1
+
+
+class Steadiness(StrEnum):
+    """What kind of settled motion it is."""
+
+    PERIODIC = "periodic"
+    APERIODIC = "aperiodic"
+    """Stationary, but without a period that was looked for: quasi-periodic or chaotic."""
+    UNSETTLED = "unsettled"
+
+
+class Held(StrEnum):
+    """Whether a level was held."""
+
+    WITHIN = "within tolerance"
+    OUTSIDE = "outside tolerance"
+    OPEN = "not controlled"
+
+
+class JumpSide(StrEnum):
+    """On which branch of a jump a response lies."""
+
+    BEFORE = "before"
+    AFTER = "after"
+
+
+class JumpSearchEnd(StrEnum):
+    """How a search for a jump ended."""
+
+    LOCALISED = "localised"
+    STEEP = "steep, but no jump"
+    BRANCH_LOST = "its branch was not found again"
+    OUT_OF_TIME = "the time for the search was over"
+    ELSEWHERE = "the motion jumped somewhere else each time"
+
+
+class LockResult(StrEnum):
+    """How a search for a resonance ended."""
+
+    LOCKED = "locked"
+    LOST = "not met within the tries"
+    AT_THE_EDGE = "outside the range"
+
+
+SixFigures = Annotated[float, AfterValidator(lambda value: float(f"{value:.6g}"))]
+"""A number that is kept to six figures: the recording's table is narrow."""
+Way = Literal["up", "down"]
+
+
+class AbstractNote(BaseModel):
+    """Numbers and words of one finding, in the order in which they are written."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+    version: Literal[1] = VERSION
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What was said, as JSON can hold it."""
+        return self.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+
+    @property
+    def text(self) -> str:
+        """The event's text."""
+        return json.dumps(self.numbers)
+
+
+class SettledNote(AbstractNote):
+    """What was found at a frequency after waiting."""
+
+    kind: Literal["settled"] = "settled"
+    frequency_hz: float
+    """As commanded [Hz]."""
+    motion: Steadiness
+    period: int
+    """In drive periods; 0 when it has none."""
+    waited_s: float
+    scatter: SixFigures
+    noise: SixFigures
+    setting_vpp: SixFigures
+    base_m_per_s2: SixFigures
+    base_u: SixFigures
+    level: Held
+
+
+class SegmentNote(AbstractNote):
+    """The base and the motion over a segment that was recorded once settled."""
+
+    kind: Literal["achieved"] = "achieved"
+    segment: Literal[SegmentLabel.STEP, SegmentLabel.SEARCH, SegmentLabel.RESONANCE]
+    frequency_hz: float
+    drive_hz: float
+    """As seen by the converter [Hz]."""
+    base_m_per_s2: SixFigures
+    base_u: SixFigures
+    level: Held
+    response_ii: SixFigures
+    motion: Steadiness
+    period: int
+
+
+class DwellNote(AbstractNote):
+    """How often the level was off over a dwell."""
+
+    kind: Literal["achieved"] = "achieved"
+    segment: Literal[SegmentLabel.DWELL]
+    looks: int
+    looks_outside: int
+
+
+class SweepNote(AbstractNote):
+    """How often the level was off over a sweep."""
+
+    kind: Literal["achieved"] = "achieved"
+    segment: Literal[SegmentLabel.SWEEP]
+    steps: int
+    steps_outside: int
+    average_s: float
+
+
+class LevelNote(AbstractNote):
+    """The level over one look of a dwell."""
+
+    kind: Literal["level"] = "level"
+    at_s: SixFigures
+    base_m_per_s2: SixFigures
+    base_u: SixFigures
+    setting_vpp: SixFigures
+    level: Held
+
+
+class ExcursionNote(AbstractNote):
+    """A stretch of a sweep in which the level was not held."""
+
+    kind: Literal["level"] = "level"
+    from_hz: SixFigures
+    to_hz: SixFigures
+    worst: SixFigures
+    """Largest deviation, as a share, with its sign."""
+    level: Held
+
+
+class JumpNote(AbstractNote):
+    """What a search between two settled frequencies of a pass came to."""
+
+    kind: Literal["jump"] = "jump"
+    direction: Way
+    pass_number: int = Field(alias="pass")
+    frequency_hz: SixFigures
+    before_hz: float
+    after_hz: float
+    response_before: SixFigures
+    response_after: SixFigures
+    how: JumpSearchEnd
+    arrived: JumpSide
+    """The branch on which the pass went on."""
+
+
+class ResonanceNote(AbstractNote):
+    """What was found of a mode at one level of the base."""
+
+    kind: Literal["resonance"] = "resonance"
+    level: int
+    """Its number, in the order played, from 0."""
+    asked_m_per_s2: float
+    frequency_hz: SixFigures | None
+    """Of the phase resonance; None where it was not found."""
+    frequency_u_hz: SixFigures | None
+    at_hz: SixFigures
+    """Frequency of the recorded segment."""
+    phase_deg: SixFigures
+    response_ii: SixFigures
+    base_m_per_s2: SixFigures
+    base_u: SixFigures
+    held: Held
+    motion: Steadiness
+    tries: int
+    lock: LockResult
+    mode_hz: SixFigures | None = None
+    """Natural frequency; left out where the flanks do not tell it."""
+    mode_u_hz: SixFigures | None = None
+    damping_ratio: SixFigures | None = None
+
+
+FeedbackNote: TypeAlias = (
+    SettledNote | SegmentNote | DwellNote | SweepNote | LevelNote | ExcursionNote | JumpNote | ResonanceNote
+)
+_NOTES: TypeAdapter[FeedbackNote] = TypeAdapter(FeedbackNote)
+_KINDS = frozenset({"settled", "achieved", "level", "jump", "resonance"})
+
+
+def feedback_note(event: Event) -> FeedbackNote | None:
+    """Read an event as a note; None when it is another event, or was cut short in the file.
+
+    Raises
+    ------
+    RecordingError
+        When it is a note of a version that this program does not know.
+
+    """
+    if event.kind not in _KINDS:
+        return None
+    try:
+        numbers = json.loads(event.text)
+    except json.JSONDecodeError:
+        return None
+    try:
+        return _NOTES.validate_python({**numbers, "kind": event.kind})
+    except ValidationError as error:
+        version = numbers.get("version", VERSION)
+        raise RecordingError(
+            f"the note {event.kind!r} at sample {event.sample}, of version {version}, is not one that this "
+            f"vibench can read (it knows version {VERSION}); read the samples with h5py, or update vibench"
+        ) from error

@@ -1,0 +1,29 @@
+"""Names of the stretches of a recording: given by plans and runs, looked up by analysis."""
+
+from enum import StrEnum
+
+
+class SegmentLabel(StrEnum):
+    """What is played while a segment is recorded."""
+
+    REALISATION = "realisation"
+    NOISE = "noise"
+    SWEEP = "sweep"
+    DWELL = "dwell"
+    STEP = "step"
+    """A frequency of the plan's list, or a level."""
+    SEARCH = "search"
+    """A frequency that was added to localise a jump."""
+    RESONANCE = "resonance"
+    CHECK = "check"
+    """The small sine before the first ramp."""
+    LEAD_IN = "lead_in"
+    """Tones on the way to a dwell."""
+    RAMP_UP = "ramp_up"
+    RAMP_DOWN = "ramp_down"
+
+
+NO_RESULT = frozenset(
+    {SegmentLabel.CHECK, SegmentLabel.LEAD_IN, SegmentLabel.RAMP_UP, SegmentLabel.RAMP_DOWN}
+)
+"""Segments that no result is taken from."""
