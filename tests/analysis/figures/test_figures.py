@@ -11,6 +11,7 @@ from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSwe
 from vibench.analysis import Simulation
 from vibench.analysis.figures import (
     SIMULATED,
+    STEPPED_FREQUENCIES,
     bench_levels_figure,
     dwells_figure,
     excitation_figure,
@@ -131,7 +132,7 @@ def test_the_largest_column_of_a_spectrum_is_response_ii(dwell_file):
 
 def test_a_stepped_sine_figure_has_one_marker_a_step(stepped_file):
     found = result(stepped_file)
-    drawn = stepped_sine_figure(found.analysis, found.laid)
+    drawn = stepped_sine_figure(found.analysis, found.laid, STEPPED_FREQUENCIES)
     measured = line(drawn.figure.axes[1], "measured, up")
     np.testing.assert_array_equal(measured.get_ydata(), found.analysis.response.response_ii)
     assert "2 steps" in drawn.caption

@@ -9,7 +9,7 @@ from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, StreamedNoise
 from vibench.acquisition.run._low_level_check import LowLevelCheck
 from vibench.analysis import NotEnoughData
-from vibench.analysis.frequency_response import noise_response
+from vibench.analysis.frequency_response import streamed_response
 from vibench.analysis.recordings import RecordedChannels
 from vibench.analysis.signals import phase_half_width
 from vibench.sim import base_transmissibility, gong2025
@@ -44,7 +44,7 @@ def responses(tmp_path_factory):
             )
             run_measurement(bench, plan, path, LowLevelCheck.RECENTLY_PASSED)
             with open_recording(path) as recording:
-                found[level] = noise_response(RecordedChannels(recording), plan.excitation)
+                found[level] = streamed_response(RecordedChannels(recording), plan.excitation)
     return found
 
 
@@ -65,7 +65,7 @@ def poles():
     return sorted((abs(each) / (2 * np.pi), -each.real / abs(each)) for each in values if each.imag > 0)
 
 
-@pytest.mark.parametrize("estimator", ["transmission", "h1", "h2"])
+@pytest.mark.parametrize("estimator", ["frequency_response", "h1", "h2"])
 def test_the_bounds_of_weak_noise_hold_the_closed_form_at_95_of_100_lines(responses, estimator):
     found = getattr(responses[WEAK_VPP], estimator)
     truth = exact(found.frequency_hz)
@@ -126,4 +126,4 @@ class Short:
 
 def test_a_record_too_short_for_its_lowest_frequency_is_refused():
     with pytest.raises(NotEnoughData, match=r"0\.08 s of noise leave segments of 0\.017 s, .* 50 Hz"):
-        noise_response(Short(), noise(1.0, 0.08))
+        streamed_response(Short(), noise(1.0, 0.08))

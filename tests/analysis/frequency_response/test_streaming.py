@@ -8,7 +8,7 @@ import pytest
 from vibench.acquisition import open_recording
 from vibench.acquisition.plan import StreamedNoise
 from vibench.analysis import FrequencyResponseRequest, analyse
-from vibench.analysis.frequency_response import noise_response
+from vibench.analysis.frequency_response import streamed_response
 from vibench.analysis.recordings import Stretch
 
 RATE = 51_200.0
@@ -42,7 +42,7 @@ def peak_bytes(duration_s):
     )
     channels = Endless(duration_s)
     tracemalloc.start()
-    noise_response(channels, plan, FrequencyResponseRequest(segment_s=1.0))
+    streamed_response(channels, plan, FrequencyResponseRequest(segment_s=1.0))
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return peak, channels

@@ -12,7 +12,7 @@ from vibench.analysis import CampaignResults, NotEnoughData, Simulation, analyse
 from vibench.analysis.model_updating._gap_fit import fit_gap, onsets, swept_relative
 from vibench.analysis.model_updating._specimen_fit import LINEAR, Parameter, parameter_value, with_values
 from vibench.analysis.model_updating._updated_specimen import bracketed_gap, brackets
-from vibench.analysis.report._findings import findings
+from vibench.analysis.report._drawings import findings
 from vibench.sim import Sampled, base_transmissibility, gong2025, integrate
 
 TRUE = with_values(

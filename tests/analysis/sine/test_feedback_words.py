@@ -10,10 +10,10 @@ from vibench.acquisition.plan import Measurement, ResonanceTracking, SettledSine
 from vibench.acquisition.recording import Held, JumpNote, JumpSearchEnd, JumpSide, SegmentNote, Steadiness
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import CampaignResults, result_summary
-from vibench.analysis.figures import stepped_sine_figure
+from vibench.analysis.figures import STEPPED_FREQUENCIES, TRACKED_RESONANCE, stepped_sine_figure
+from vibench.analysis.kinds import Result
 from vibench.analysis.report import result_figures
-from vibench.analysis.report._findings import findings
-from vibench.analysis.results import SteppedSineResult
+from vibench.analysis.report._drawings import findings
 from vibench.analysis.sine import feedback_sentences, noted_jumps
 
 ROOT = Path(__file__).parents[3]
@@ -93,19 +93,19 @@ def test_a_tracked_resonance_is_analysed_and_said(analysed):
     (sentence,) = feedback_sentences(analysis.facts.feedback)
     assert sentence.startswith("Phase resonance at 266.")
     assert "natural frequency 266.1" in sentence
-    said = findings(CampaignResults("run", (SteppedSineResult(analysis, None),), ()))
+    said = findings(CampaignResults("run", (Result(analysis, None),), ()))
     assert list(said) == [sentence], "it is no stepped sine"
-    drawn = stepped_sine_figure(analysis)
+    drawn = stepped_sine_figure(analysis, None, TRACKED_RESONANCE)
     assert drawn.title == "Tracked resonance, around 266.4 Hz"
     assert drawn.caption == f"Resonance tracked, levels of the base: 1. {sentence}"
-    (figure,) = result_figures(CampaignResults("run", (SteppedSineResult(analysis, None),), ()))
+    (figure,) = result_figures(CampaignResults("run", (Result(analysis, None),), ()))
     assert figure.name == "backbone_run", "what is stepped is the level"
     numbers = dict(figure.tables[0].columns)
     found = analysis.response
     assert numbers["amplitude_m"] == pytest.approx(found.response_ii * found.drive_amplitude_m, rel=0.01)
     assert numbers["base_m_per_s2"] == pytest.approx([0.5], rel=0.05)
     assert numbers["frequency_hz"] == pytest.approx(found.frequency_hz, abs=0.1)
-    document = json.loads(json.dumps(result_summary(SteppedSineResult(analysis, None))))
+    document = json.loads(json.dumps(result_summary(Result(analysis, None))))
     kinds = [each["kind"] for each in document["recording"]["feedback"]]
     assert kinds.count("resonance") == 1
 
@@ -115,4 +115,4 @@ def test_settled_steps_are_analysed_like_any_stepped_sine(analysed):
     assert analysis.response.left_out == 0
     assert analysis.response.response_ii == pytest.approx([3.21, 4.24], rel=0.02)
     assert analysis.response.direction == ("up", "up")
-    assert "2 steps" in stepped_sine_figure(analysis).caption
+    assert "2 steps" in stepped_sine_figure(analysis, None, STEPPED_FREQUENCIES).caption

@@ -9,9 +9,9 @@ from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, SteppedLevel
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import CampaignResults, analyse, result_summary
-from vibench.analysis.figures import stepped_sine_figure
-from vibench.analysis.report._findings import findings
-from vibench.analysis.results import SteppedSineResult
+from vibench.analysis.kinds import Result
+from vibench.analysis.report import result_figures
+from vibench.analysis.report._drawings import findings
 from vibench.analysis.sine import SteppedResponse, hysteresis_vpp, level_jumps
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
@@ -63,17 +63,17 @@ def test_between_the_jumps_the_way_decides_which_motion_there_is(analysis):
 
 
 def test_figure_and_summary_tell_both_jumps(analysis):
-    figure = stepped_sine_figure(analysis)
+    (figure,) = result_figures(CampaignResults("levels", (Result(analysis, None),), ()))
     assert "between 0.6 and 0.7 Vpp" in figure.caption
     assert "between 0.3 and 0.2 Vpp" in figure.caption
     assert "0.3 to 0.5 V above the fall back" in figure.caption
     assert figure.figure.axes[-1].get_xlabel() == "level at the generator [Vpp]"
-    measured = result_summary(SteppedSineResult(analysis, None))["measured"]
+    measured = result_summary(Result(analysis, None))["measured"]
     assert [each["direction"] for each in measured["jumps"]] == ["up", "down"]
 
 
 def test_the_report_speaks_of_levels_and_jumps_in_short(analysis):
-    (said,) = findings(CampaignResults("levels", (SteppedSineResult(analysis, None),), ()))
+    (said,) = findings(CampaignResults("levels", (Result(analysis, None),), ()))
     assert said.startswith("Level stepped at 195 Hz, 14 steps from 0.2 to 0.8 Vpp.")
     assert "between 0.6 and 0.7 Vpp" in said
     assert "0.3 to 0.5 V above the fall back" in said

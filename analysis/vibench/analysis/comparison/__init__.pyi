@@ -14,8 +14,8 @@ from ._options import (
 )
 from ._recording_curves import (
     dwell_traces as dwell_traces,
+    noise_traces as noise_traces,
     predicted_curves as predicted_curves,
     stepped_traces as stepped_traces,
     sweep_traces as sweep_traces,
-    transmission_trace as transmission_trace,
 )

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..frequency_response import FrequencyResponse
+from ..frequency_response import NoiseResponse
 from ..model import ResponsePrediction
 from ..signals import Reals
 from ..sine import DwellResponse, SteppedResponse, SweepResponse
@@ -34,11 +34,12 @@ def predicted_curves(name: str, found: ResponsePrediction) -> Iterator[Curve]:
     )
 
 
-def transmission_trace(name: str, origin: CurveOrigin, found: FrequencyResponse) -> Curve:
+def noise_traces(name: str, origin: CurveOrigin, response: NoiseResponse) -> Iterator[Curve]:
     """Make a curve of an estimated transmission, with its bounds."""
+    found = response.frequency_response
     how = found.settings
     note = f"{how.estimator.value}, {found.n_eff:.3g} averages, lines {found.resolution_hz:.3g} Hz wide"
-    return Curve(
+    yield Curve(
         name,
         origin,
         CurveKind.TRANSMISSIBILITY,
@@ -58,8 +59,7 @@ def sweep_traces(name: str, origin: CurveOrigin, found: SweepResponse) -> Iterat
 
 
 def stepped_traces(name: str, origin: CurveOrigin, found: SteppedResponse) -> Iterator[Curve]:
-    """Make a curve of each response that a stepped sine measured."""
-    """Give steps up and steps down as curves of their own: between jumps they differ."""
+    """Make a curve of each response of the steps up, and of those down: between jumps they differ."""
     if found.frequency_hz.size > 1 and np.ptp(found.frequency_hz) < SAME_HZ:
         return  # levels at one frequency are no curve over it
     directions = np.array(found.direction)

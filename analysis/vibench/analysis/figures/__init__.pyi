@@ -28,6 +28,10 @@ from ._portraits import (
     verdict_text as verdict_text,
 )
 from ._stepped_sine import (
+    STEPPED_FREQUENCIES as STEPPED_FREQUENCIES,
+    STEPPED_LEVELS as STEPPED_LEVELS,
+    TRACKED_RESONANCE as TRACKED_RESONANCE,
+    SteppedLook as SteppedLook,
     stepped_level_caption as stepped_level_caption,
     stepped_sine_figure as stepped_sine_figure,
 )

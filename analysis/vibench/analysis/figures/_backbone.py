@@ -18,6 +18,7 @@ from ..sine import (
 )
 from ..tables import table
 from ._drawn import DrawnFigure
+from ._stepped_sine import tracked_caption
 from ._style import BOUNDS, MEASURED, PREDICTED, SIMULATED, legend_above, new_figure, prefixed, styled
 
 _HEIGHT_IN = 4.2
@@ -144,7 +145,7 @@ def _or_nan(values: Sequence[float | None]) -> Reals:
 
 
 def _caption(analysis: SteppedSineAnalysis, levels: Sequence[TrackedResonance]) -> str:
-    text = f"Resonance tracked, levels of the base: {analysis.response.frequency_hz.size}."
+    text = tracked_caption(analysis.response)
     return " ".join(
         each
         for each in (text, backbone_sentence(levels), *feedback_sentences(analysis.facts.feedback))

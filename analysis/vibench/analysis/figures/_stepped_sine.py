@@ -1,13 +1,24 @@
 """Responses I and II at every frequency, or every level, of a stepped sine, up and down apart."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
 import numpy as np
 from matplotlib.axes import Axes
 
-from vibench.acquisition.plan import ResonanceTracking, SteppedLevel
+from vibench.acquisition.plan import ResonanceTracking, SettledSine, SteppedLevel, SteppedSine
 
 from ..model import SteppedSineOverlay
 from ..signals import Reals
-from ..sine import SteppedSineAnalysis, feedback_sentences, hysteresis_vpp, level_jumps, noted_jumps
+from ..sine import (
+    SteppedResponse,
+    SteppedSineAnalysis,
+    feedback_sentences,
+    hysteresis_vpp,
+    level_jumps,
+    noted_jumps,
+)
 from ..tables import table
 from ._drawn import DrawnFigure
 from ._style import LINEAR, MEASURED, PREDICTED, SIMULATED, legend_above, magnitude_axis, new_figure, styled
@@ -16,16 +27,33 @@ _HEIGHT_IN = 4.6
 _MARKERS = {"up": "^", "down": "v"}
 
 
-def stepped_sine_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None = None) -> DrawnFigure:
-    """Draw Response I and II against frequency or level, one marker a direction."""
+P = TypeVar("P")
+
+
+@dataclass(frozen=True)
+class SteppedLook(Generic[P]):
+    """How a stepped sine is drawn and titled, by what was stepped."""
+
+    along: Callable[[SteppedResponse], Reals]
+    axis: str
+    title: Callable[[P, SteppedResponse], str]
+    caption: Callable[[P, SteppedResponse], str]
+    """Its first sentences, without feedback and simulation."""
+
+
+def stepped_sine_figure(
+    analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, look: SteppedLook[Any]
+) -> DrawnFigure:
+    """Draw Response I and II against what was stepped, one marker a direction."""
+    along = look.along(analysis.response)
     with styled():
         figure = new_figure(_HEIGHT_IN)
         first, second = figure.subplots(2, 1, sharex=True)
-        _responses(first, analysis, laid, "response_i")
-        _responses(second, analysis, laid, "response_ii")
+        _responses(first, along, analysis, laid, "response_i")
+        _responses(second, along, analysis, laid, "response_ii")
         first.set_ylabel("Response I\nmax |x| / A0")
         second.set_ylabel("Response II\n|x at f| / A0")
-        second.set_xlabel(_along(analysis)[1])
+        second.set_xlabel(look.axis)
         legend_above(figure, [first], columns=2)
     found = analysis.response
     columns = {
@@ -44,35 +72,17 @@ def stepped_sine_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay 
     name = f"stepped_sine_{analysis.facts.name}"
     return DrawnFigure(
         name=name,
-        title=_title(analysis),
-        caption=stepped_sine_caption(analysis, laid),
+        title=look.title(analysis.excitation, found),
+        caption=_caption(analysis, laid, look),
         figure=figure,
         tables=(table(name, **columns),),
     )
 
 
-def _along(analysis: SteppedSineAnalysis) -> tuple[Reals, str]:
-    """Give what was stepped, and what its axis is called."""
-    match analysis.excitation:
-        case SteppedLevel():
-            return analysis.response.amplitude_vpp, "level at the generator [Vpp]"
-        case _:
-            return analysis.response.frequency_hz, "drive frequency [Hz]"
-
-
-def _title(analysis: SteppedSineAnalysis) -> str:
-    match analysis.excitation:
-        case SteppedLevel(frequency_hz=frequency_hz):
-            return f"Stepped level, {frequency_hz:g} Hz"
-        case ResonanceTracking():
-            return f"Tracked resonance, around {np.median(analysis.response.frequency_hz):.4g} Hz"
-        case plan:
-            return f"Stepped sine, {plan.amplitude_vpp:g} Vpp"
-
-
-def _responses(axes: Axes, analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, what: str) -> None:
+def _responses(
+    axes: Axes, along: Reals, analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, what: str
+) -> None:
     found = analysis.response
-    along, _ = _along(analysis)
     rising = np.argsort(along)
     if laid is not None:
         sines = laid.prediction
@@ -120,23 +130,9 @@ def _responses(axes: Axes, analysis: SteppedSineAnalysis, laid: SteppedSineOverl
     magnitude_axis(axes)
 
 
-def stepped_sine_caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None) -> str:
-    """Say where the largest response was, and how far the simulation lies from it."""
-    found = analysis.response
-    top = int(np.argmax(found.response_ii))
-    text = (
-        f"Stepped sine at {analysis.excitation.amplitude_vpp:g} Vpp, {found.frequency_hz.size} steps from "
-        f"{np.min(found.frequency_hz):.4g} to {np.max(found.frequency_hz):.4g} Hz. Response II is largest "
-        f"at {found.frequency_hz[top]:.4g} Hz: {found.response_ii[top]:.3g} ± "
-        f"{2 * found.sd_response_ii[top]:.2g}."
-    )
-    match analysis.excitation:
-        case SteppedLevel():
-            text = stepped_level_caption(analysis)
-        case ResonanceTracking():
-            text = f"Resonance tracked, levels of the base: {found.frequency_hz.size}."
-        case _:
-            pass
+def _caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, look: SteppedLook[Any]) -> str:
+    """Say what was found, and how far the simulation lies from it."""
+    text = look.caption(analysis.excitation, analysis.response)
     text = " ".join([text, *feedback_sentences(analysis.facts.feedback)])
     if laid is None:
         return text
@@ -147,9 +143,19 @@ def stepped_sine_caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay
     )
 
 
-def stepped_level_caption(analysis: SteppedSineAnalysis) -> str:
+def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse) -> str:
+    """Say where the largest response was."""
+    top = int(np.argmax(found.response_ii))
+    return (
+        f"Stepped sine at {plan.amplitude_vpp:g} Vpp, {found.frequency_hz.size} steps from "
+        f"{np.min(found.frequency_hz):.4g} to {np.max(found.frequency_hz):.4g} Hz. Response II is largest "
+        f"at {found.frequency_hz[top]:.4g} Hz: {found.response_ii[top]:.3g} ± "
+        f"{2 * found.sd_response_ii[top]:.2g}."
+    )
+
+
+def stepped_level_caption(found: SteppedResponse) -> str:
     """Say between which levels the motion jumps, and how far apart the two ways lie."""
-    found = analysis.response
     text = (
         f"Level stepped at {np.median(found.frequency_hz):.4g} Hz, {found.frequency_hz.size} steps from "
         f"{np.min(found.amplitude_vpp):.4g} to {np.max(found.amplitude_vpp):.4g} Vpp."
@@ -164,3 +170,28 @@ def stepped_level_caption(analysis: SteppedSineAnalysis) -> str:
     if apart is not None:
         told.append(f"The jump up lies {max(apart[0], 0.0):.3g} to {apart[1]:.3g} V above the fall back.")
     return " ".join([text, *(told or ["No jump by more than a factor of two."])])
+
+
+def tracked_caption(found: SteppedResponse) -> str:
+    """Say how many levels there are."""
+    return f"Resonance tracked, levels of the base: {found.frequency_hz.size}."
+
+
+STEPPED_FREQUENCIES: SteppedLook[SteppedSine | SettledSine] = SteppedLook(
+    along=lambda found: found.frequency_hz,
+    axis="drive frequency [Hz]",
+    title=lambda plan, _: f"Stepped sine, {plan.amplitude_vpp:g} Vpp",
+    caption=_frequencies_caption,
+)
+STEPPED_LEVELS: SteppedLook[SteppedLevel] = SteppedLook(
+    along=lambda found: found.amplitude_vpp,
+    axis="level at the generator [Vpp]",
+    title=lambda plan, _: f"Stepped level, {plan.frequency_hz:g} Hz",
+    caption=lambda _, found: stepped_level_caption(found),
+)
+TRACKED_RESONANCE: SteppedLook[ResonanceTracking] = SteppedLook(
+    along=lambda found: found.frequency_hz,
+    axis="drive frequency [Hz]",
+    title=lambda _, found: f"Tracked resonance, around {np.median(found.frequency_hz):.4g} Hz",
+    caption=lambda _, found: tracked_caption(found),
+)

@@ -8,7 +8,8 @@ from ._noise_response import (
     Noise as Noise,
     NoiseAnalysis as NoiseAnalysis,
     NoiseResponse as NoiseResponse,
-    noise_response as noise_response,
+    repeated_response as repeated_response,
+    streamed_response as streamed_response,
 )
 from ._periodic import (
     PeriodicFrequencyResponse as PeriodicFrequencyResponse,

@@ -4,11 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vibench.acquisition.plan import (
-    MultisineNoise,
-    OddMultisine,
-    StreamedNoise,
-)
+from vibench.acquisition.plan import MultisineNoise, OddMultisine, StreamedNoise
+from vibench.acquisition.recording import SegmentLabel
 
 from ..errors import InvalidRequest, NotEnoughData
 from ..recordings import Channels, Check, RecordingFacts, Stretch, only_stretch
@@ -53,29 +50,21 @@ class NoiseResponse:
     """Samples inside the noise at which a channel was near its full scale."""
 
 
-def noise_response(
-    channels: Channels, noise: Noise, request: FrequencyResponseRequest = DEFAULT_REQUEST
+def repeated_response(
+    channels: Channels,
+    noise: MultisineNoise | OddMultisine,
+    request: FrequencyResponseRequest = DEFAULT_REQUEST,
 ) -> NoiseResponse:
-    """Estimate the transmission of a noise measurement from everything usable in it.
+    """Estimate the transmission of noise that repeats from everything usable in it.
 
     Raises
     ------
     NotEnoughData
-        When no realisation, or less than two segments, is left.
+        When no realisation is left.
     InvalidRequest
-        When segments are chosen for noise that repeats: its periods are the segments.
+        When segments are chosen: the periods are the segments.
 
     """
-    match noise:
-        case StreamedNoise():
-            return _streamed(channels, noise, request)
-        case MultisineNoise() | OddMultisine():
-            return _repeated(channels, noise, request)
-
-
-def _repeated(
-    channels: Channels, noise: MultisineNoise | OddMultisine, request: FrequencyResponseRequest
-) -> NoiseResponse:
     if request.cuts_segments:
         raise InvalidRequest(
             f"this noise repeats every {1 / noise.repetition_hz:g} s: its periods are its segments, without "
@@ -88,7 +77,7 @@ def _repeated(
         rate, segment_samples=round(rate * min(_LEVEL_SEGMENT_S, _LEAST_PERIODS / noise.repetition_hz))
     )
     means: list[Complexes] = []
-    stretches = channels.stretches("realisation")
+    stretches = channels.stretches(SegmentLabel.REALISATION)
     used = 0
     bad = _Unusable()
     for stretch in stretches:
@@ -200,9 +189,19 @@ def _least_squares(
     return as_displacements(result.without_delay(delay_s))
 
 
-def _streamed(channels: Channels, noise: StreamedNoise, request: FrequencyResponseRequest) -> NoiseResponse:
+def streamed_response(
+    channels: Channels, noise: StreamedNoise, request: FrequencyResponseRequest = DEFAULT_REQUEST
+) -> NoiseResponse:
+    """Estimate the transmission of noise that does not repeat from everything usable in it.
+
+    Raises
+    ------
+    NotEnoughData
+        When less than two segments are left.
+
+    """
     rate = channels.sample_rate_hz
-    stretch = only_stretch(channels, "noise")
+    stretch = only_stretch(channels, SegmentLabel.NOISE)
     segment = request.segment_samples(stretch.samples, rate)
     if segment < round(rate / noise.band_start_hz):
         raise NotEnoughData(

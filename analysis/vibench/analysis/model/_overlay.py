@@ -5,9 +5,10 @@ from enum import Enum, auto
 
 import numpy as np
 
+from vibench.acquisition.recording import SegmentLabel
 from vibench.sim import Accuracy, Specimen
 
-from ..frequency_response import NoiseAnalysis, NoiseResponse, noise_response
+from ..frequency_response import NoiseAnalysis, NoiseResponse
 from ..signals import Envelope, Reals
 from ..sine import (
     Collisions,
@@ -23,8 +24,6 @@ from ..sine import (
     measured_dwell,
     measured_sweep,
     settled_envelope,
-    step_label,
-    stepped_response,
     terminal_levels,
 )
 from ._difference import CurveDifference, logarithmic_difference
@@ -110,7 +109,7 @@ class SteppedSineOverlay:
     prediction: ResponsePrediction
 
 
-def _run(channels: SimulatedChannels, label: str) -> SimulatedRun:
+def _run(channels: SimulatedChannels, label: SegmentLabel) -> SimulatedRun:
     simulated: SimulatedSpecimen = channels.simulated
     impacts, played_s = played_impacts(channels, simulated, label)
     return SimulatedRun(
@@ -123,16 +122,17 @@ def _run(channels: SimulatedChannels, label: str) -> SimulatedRun:
     )
 
 
-def noise_overlay(analysis: NoiseAnalysis, channels: SimulatedChannels) -> NoiseOverlay:
-    """Estimate from simulated channels what was estimated from the recorded ones."""
+def noise_overlay(
+    analysis: NoiseAnalysis, channels: SimulatedChannels, response: NoiseResponse
+) -> NoiseOverlay:
+    """Compare with ``response``, which was estimated from simulated channels as from the recorded ones."""
     noise = analysis.excitation
-    response = noise_response(channels, noise, analysis.request)
     measured, simulated = analysis.response.frequency_response, response.frequency_response
     amplitude_m, basis = equivalent_amplitude(analysis)
     stop_hz = min(noise.band_stop_hz, _HIGHEST_PREDICTED_HZ)
     grid = prediction_grid(channels.simulated.specimen, noise.band_start_hz, stop_hz)
     return NoiseOverlay(
-        run=_run(channels, "noise" if analysis.response.periodic is None else "realisation"),
+        run=_run(channels, SegmentLabel.NOISE if response.periodic is None else SegmentLabel.REALISATION),
         response=response,
         difference=logarithmic_difference(
             measured.frequency_hz,
@@ -172,7 +172,7 @@ def sweep_overlay(analysis: SweepAnalysis, channels: SimulatedChannels) -> Sweep
     grid = prediction_grid(channels.simulated.specimen, low, high)
     amplitude_m = np.interp(grid, measured.frequency_hz[rising], measured.drive_amplitude_m[rising])
     return SweepOverlay(
-        run=_run(channels, "sweep"),
+        run=_run(channels, SegmentLabel.SWEEP),
         response=response,
         collisions=collisions(response),
         difference=logarithmic_difference(
@@ -190,7 +190,7 @@ def dwell_overlay(analysis: DwellAnalysis, channels: SimulatedChannels) -> Dwell
     response = measured_dwell(channels, analysis.excitation, towards_hz)
     measured = analysis.response
     return DwellOverlay(
-        run=_run(channels, "dwell"),
+        run=_run(channels, SegmentLabel.DWELL),
         response=response,
         displacement=settled_envelope(response),
         terminal=terminal_levels(response, towards_hz),
@@ -209,12 +209,13 @@ def dwell_overlay(analysis: DwellAnalysis, channels: SimulatedChannels) -> Dwell
     )
 
 
-def stepped_overlay(analysis: SteppedSineAnalysis, channels: SimulatedChannels) -> SteppedSineOverlay:
-    """Measure every step in simulated channels as in the recorded ones."""
-    response = stepped_response(channels, analysis.excitation)
+def stepped_overlay(
+    analysis: SteppedSineAnalysis, channels: SimulatedChannels, response: SteppedResponse, label: SegmentLabel
+) -> SteppedSineOverlay:
+    """Compare with ``response``, measured at every step in simulated channels as in the recorded ones."""
     measured = analysis.response
     return SteppedSineOverlay(
-        run=_run(channels, step_label(analysis.excitation)),
+        run=_run(channels, label),
         response=response,
         difference=logarithmic_difference(
             measured.frequency_hz,

@@ -30,16 +30,22 @@ from ._accuracy_document import (
 from ._comparison_export import (
     write_comparison,
 )
+from ._drawings import (
+    DRAWINGS,
+    Drawing,
+    result_figures,
+)
 from ._figure_choice import (
     recording_figures,
-    result_figures,
 )
 from ._report import (
     write_report,
 )
 
 __all__ = [
+    "DRAWINGS",
     "PAPER_FIGURES",
+    "Drawing",
     "DrawnFigure",
     "FigureOptions",
     "FrequencyGrid",

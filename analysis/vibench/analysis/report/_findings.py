@@ -5,79 +5,70 @@ What a report cannot say: stated in it, so that nobody reads more out of it than
 
 from collections.abc import Iterator
 
-from vibench.acquisition.plan import ResonanceTracking, SteppedLevel
-
 from ..figures import regions_text, stepped_level_caption, verdict_text
+from ..kinds import DwellResult, NoiseResult, SteppedSineResult, SweepResult
 from ..model import PREDICTION_S, WINDOW_S
-from ..results import CampaignResults, DwellResult, NoiseResult, SweepResult
-from ..sine import SteppedSineAnalysis, feedback_sentences
+from ..results import CampaignResults
+from ..sine import feedback_sentences
 
 
-def findings(results: CampaignResults) -> Iterator[str]:
-    """Say what each measurement found, weak to strong, and how far the simulation lies from it."""
-    yield from results.model_said
-    for noise in results.noise:
-        yield _noise(noise)
-    for sweep in results.sweeps:
-        yield _sweep(sweep)
-    for dwell in results.dwells:
-        yield _dwell(dwell)
-    for stepped in results.stepped:
-        yield from _stepped(stepped.analysis)
-
-
-def _noise(result: NoiseResult) -> str:
+def noise_findings(result: NoiseResult) -> Iterator[str]:
+    """Say where the resonances are, and how far the simulation lies from the transmission."""
     peaks = ", ".join(f"{each.frequency_hz:.1f}" for each in result.analysis.response.resonances)
     where = f"resonances at {peaks} Hz" if peaks else "no resonance above its uncertainty"
     text = f"Noise at {result.analysis.excitation.amplitude_vpp:g} Vpp: {where}"
-    if result.laid is None:
-        return f"{text}."
-    return (
-        f"{text}; the simulation under the same base motion lies "
-        f"{result.laid.difference.median_abs_db:.2g} dB away (median) and strikes "
-        f"{result.laid.run.impact_rate_hz:.0f} times per second."
-    )
+    if result.laid is not None:
+        text += (
+            f"; the simulation under the same base motion lies "
+            f"{result.laid.difference.median_abs_db:.2g} dB away (median) and strikes "
+            f"{result.laid.run.impact_rate_hz:.0f} times per second"
+        )
+    yield f"{text}."
 
 
-def _sweep(result: SweepResult) -> str:
+def sweep_findings(result: SweepResult) -> Iterator[str]:
+    """Say where the masses collide, measured and simulated."""
     plan = result.analysis.excitation
     text = (
         f"Sweep at {plan.amplitude_vpp:g} Vpp from {plan.start_hz:g} to {plan.stop_hz:g} Hz: "
         f"{regions_text(result.analysis.collisions)}"
     )
-    return (
-        f"{text}." if result.laid is None else f"{text}; simulated: {regions_text(result.laid.collisions)}."
+    simulated = "" if result.laid is None else f"; simulated: {regions_text(result.laid.collisions)}"
+    yield f"{text}{simulated}."
+
+
+def stepped_findings(result: SteppedSineResult) -> Iterator[str]:
+    """Say how far Response II went in a stepped sine, and what feedback found."""
+    found, plan = result.analysis.response.response_ii, result.analysis.excitation
+    text = (
+        f"Stepped sine at {plan.amplitude_vpp:g} Vpp: Response II up to {found.max():.3g} in "
+        f"{found.size} steps."
     )
+    yield " ".join([text, *feedback_sentences(result.analysis.facts.feedback)])
 
 
-def _stepped(analysis: SteppedSineAnalysis) -> Iterator[str]:
-    heard = tuple(feedback_sentences(analysis.facts.feedback))
-    match analysis.excitation:
-        case SteppedLevel():
-            yield stepped_level_caption(analysis)
-        case ResonanceTracking():
-            yield from heard
-        case plan:
-            found = analysis.response.response_ii
-            text = (
-                f"Stepped sine at {plan.amplitude_vpp:g} Vpp: Response II up to {found.max():.3g} in "
-                f"{found.size} steps."
-            )
-            yield " ".join([text, *heard])
+def level_findings(result: SteppedSineResult) -> Iterator[str]:
+    """Say between which levels the motion jumps."""
+    yield stepped_level_caption(result.analysis.response)
 
 
-def _dwell(result: DwellResult) -> str:
+def tracked_findings(result: SteppedSineResult) -> Iterator[str]:
+    """Say where the resonance was at each level."""
+    yield from feedback_sentences(result.analysis.facts.feedback)
+
+
+def dwell_findings(result: DwellResult) -> Iterator[str]:
+    """Say both responses, measured and simulated, and how the motion repeats."""
     found, plan = result.analysis.response, result.analysis.excitation
     text = (
         f"Dwell at {plan.frequency_hz:g} Hz and {plan.amplitude_vpp:g} Vpp (A0 = "
         f"{1e6 * found.drive.amplitude_m:.3g} µm): Response I {found.response_i:.3g}, Response II "
         f"{found.response_ii:.3g}, {verdict_text(result.analysis.motion.verdict)}"
     )
-    if result.laid is None:
-        return f"{text}."
-    return (
-        f"{text}; simulated {result.laid.response.response_i:.3g} and {result.laid.response.response_ii:.3g}."
-    )
+    if result.laid is not None:
+        simulated = result.laid.response
+        text += f"; simulated {simulated.response_i:.3g} and {simulated.response_ii:.3g}"
+    yield f"{text}."
 
 
 def limits(results: CampaignResults) -> Iterator[str]:

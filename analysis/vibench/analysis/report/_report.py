@@ -11,10 +11,12 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ..errors import NotEnoughData
 from ..figures import DrawnFigure
+from ..kinds import AnyResult
 from ..recordings import RecordingFacts, Verdict
-from ..results import AnalysisFailure, CampaignResults, Result
-from ._figure_choice import recording_figures, result_figures
-from ._findings import findings, limits
+from ..results import AnalysisFailure, CampaignResults
+from ._drawings import findings, result_figures, result_tables
+from ._figure_choice import recording_figures
+from ._findings import limits
 from ._recording_section import (
     CHANNEL_HEADINGS,
     Rows,
@@ -24,7 +26,7 @@ from ._recording_section import (
     measured_rows,
     version_rows,
 )
-from ._result_tables import ReportTable, result_tables
+from ._result_tables import ReportTable
 
 _LARGEST_SVG_BYTES = 300_000
 """Above this a PNG is smaller and quicker to show, and as legible."""
@@ -126,7 +128,7 @@ def _embedded(number: int, drawn: DrawnFigure, folder: Path | None) -> EmbeddedF
     return EmbeddedFigure(number, drawn.title, drawn.caption, source)
 
 
-def _section(result: Result, numbers: Iterator[int], folder: Path | None) -> RecordingSection:
+def _section(result: AnyResult, numbers: Iterator[int], folder: Path | None) -> RecordingSection:
     facts = result.analysis.facts
     return RecordingSection(
         name=facts.name,

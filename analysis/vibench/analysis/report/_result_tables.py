@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from ..figures import verdict_text
 from ..frequency_response import Resonance
+from ..kinds import DwellResult, NoiseResult, SweepResult
 from ..model import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
 from ..recordings import specimen_of
-from ..results import CampaignResults, DwellResult, NoiseResult, SweepResult
 from ..sine import Edge
 
 _NEAR = 0.08
@@ -27,19 +27,6 @@ class ReportTable:
     headings: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str
-
-
-def result_tables(results: CampaignResults) -> tuple[ReportTable, ...]:
-    """Build every table for which there are results."""
-    tables = []
-    if results.noise:
-        tables.append(resonance_table(results.noise))
-    if results.sweeps:
-        tables.append(collision_table(results.sweeps))
-    if results.dwells:
-        tables.append(dwell_table(results.dwells))
-        tables.append(line_table(results.dwells))
-    return tuple(tables)
 
 
 def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:

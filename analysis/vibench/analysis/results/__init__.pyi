@@ -1,12 +1,6 @@
 from ._campaign_results import (
     AnalysisFailure as AnalysisFailure,
     CampaignResults as CampaignResults,
-    DwellResult as DwellResult,
-    NoiseResult as NoiseResult,
-    Overlay as Overlay,
-    Result as Result,
-    SteppedSineResult as SteppedSineResult,
-    SweepResult as SweepResult,
     analyse_files as analyse_files,
     merged_results as merged_results,
     overlay as overlay,
@@ -20,7 +14,6 @@ from ._compared_recording import (
 )
 from ._measurement_analysis import (
     UNOBSERVED as UNOBSERVED,
-    RecordingAnalysis as RecordingAnalysis,
     analyse as analyse,
 )
 from ._summary import (

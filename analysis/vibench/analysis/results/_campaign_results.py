@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import assert_never
 
 from vibench.acquisition import RecordingError, open_recording
 from vibench.acquisition.recording import Recording
@@ -11,28 +10,21 @@ from vibench.sim import Accuracy, Specimen
 
 from ..errors import AnalysisError, NotEnoughData
 from ..frequency_response import DEFAULT_REQUEST, FrequencyResponseRequest, NoiseAnalysis
-from ..model import (
-    DwellOverlay,
-    NoiseOverlay,
-    SimulatedChannels,
-    Simulation,
-    SteppedSineOverlay,
-    SweepOverlay,
-    dwell_overlay,
-    noise_overlay,
-    simulated_specimen,
-    stepped_overlay,
-    sweep_overlay,
+from ..kinds import (
+    ANALYSES,
+    AnyResult,
+    DwellResult,
+    NoiseResult,
+    Overlay,
+    RecordingAnalysis,
+    Result,
+    SweepResult,
 )
+from ..model import SimulatedChannels, Simulation, simulated_specimen
 from ..recordings import ProgressObserver, RecordedChannels, RecordingFacts, specimen_of
-from ..sine import (
-    DwellAnalysis,
-    SteppedSineAnalysis,
-    SweepAnalysis,
-)
-from ._measurement_analysis import UNOBSERVED, RecordingAnalysis, analyse
+from ..sine import DwellAnalysis, SweepAnalysis
+from ._measurement_analysis import UNOBSERVED, analyse
 
-Overlay = NoiseOverlay | SweepOverlay | DwellOverlay | SteppedSineOverlay
 Stage = Callable[[str], None]
 """Told, in a few words, what is being computed."""
 
@@ -74,52 +66,8 @@ def overlay(
     simulated = simulated_specimen(recording, facts.measurement, model, accuracy)
     channels = SimulatedChannels(RecordedChannels(recording), simulated)
     stage("predicting the response to sines")
-    match analysis:
-        case NoiseAnalysis():
-            return noise_overlay(analysis, channels)
-        case SweepAnalysis():
-            return sweep_overlay(analysis, channels)
-        case DwellAnalysis():
-            return dwell_overlay(analysis, channels)
-        case SteppedSineAnalysis():
-            return stepped_overlay(analysis, channels)
-        case _:
-            assert_never(analysis)
-
-
-@dataclass(frozen=True, eq=False)
-class NoiseResult:
-    """A noise measurement and its simulation."""
-
-    analysis: NoiseAnalysis
-    laid: NoiseOverlay | None
-
-
-@dataclass(frozen=True, eq=False)
-class SweepResult:
-    """A sweep and its simulation."""
-
-    analysis: SweepAnalysis
-    laid: SweepOverlay | None
-
-
-@dataclass(frozen=True, eq=False)
-class DwellResult:
-    """A dwell and its simulation."""
-
-    analysis: DwellAnalysis
-    laid: DwellOverlay | None
-
-
-@dataclass(frozen=True, eq=False)
-class SteppedSineResult:
-    """A stepped sine and its simulation."""
-
-    analysis: SteppedSineAnalysis
-    laid: SteppedSineOverlay | None
-
-
-Result = NoiseResult | SweepResult | DwellResult | SteppedSineResult
+    laid: Overlay = ANALYSES[analysis.excitation.kind].simulate(analysis, channels)
+    return laid
 
 
 @dataclass(frozen=True)
@@ -137,7 +85,7 @@ class CampaignResults:
     """What a report is made of."""
 
     name: str
-    results: tuple[Result, ...]
+    results: tuple[AnyResult, ...]
     failures: tuple[AnalysisFailure, ...]
     model_said: tuple[str, ...] = ()
     """What is to be known of the model that was laid over: a sentence for each fitted value."""
@@ -148,31 +96,33 @@ class CampaignResults:
         return tuple(each.analysis.facts for each in self.results)
 
     @property
+    def in_order(self) -> tuple[AnyResult, ...]:
+        """Family by family, each weak to strong or in the order given."""
+        families = tuple(dict.fromkeys(row.family for row in ANALYSES.values()))
+
+        def place(each: AnyResult) -> tuple[float, ...]:
+            row = ANALYSES[each.kind]
+            return families.index(row.family), *row.place(each.analysis.excitation)
+
+        return tuple(sorted(self.results, key=place))
+
+    @property
     def noise(self) -> tuple[NoiseResult, ...]:
         """Noise measurements, weak to strong."""
-        found = [each for each in self.results if isinstance(each, NoiseResult)]
-        return tuple(sorted(found, key=lambda each: each.analysis.excitation.amplitude_vpp))
+        return self._with(NoiseAnalysis)
 
     @property
     def sweeps(self) -> tuple[SweepResult, ...]:
         """Sweeps, in the order given."""
-        return tuple(each for each in self.results if isinstance(each, SweepResult))
+        return self._with(SweepAnalysis)
 
     @property
     def dwells(self) -> tuple[DwellResult, ...]:
         """Dwells by frequency, weak to strong."""
-        found = [each for each in self.results if isinstance(each, DwellResult)]
+        return self._with(DwellAnalysis)
 
-        def place(each: DwellResult) -> tuple[float, float]:
-            plan = each.analysis.excitation
-            return plan.frequency_hz, plan.amplitude_vpp
-
-        return tuple(sorted(found, key=place))
-
-    @property
-    def stepped(self) -> tuple[SteppedSineResult, ...]:
-        """Stepped sines, in the order given."""
-        return tuple(each for each in self.results if isinstance(each, SteppedSineResult))
+    def _with(self, analysis: type[RecordingAnalysis]) -> tuple[AnyResult, ...]:
+        return tuple(each for each in self.in_order if isinstance(each.analysis, analysis))
 
 
 def analyse_files(
@@ -195,7 +145,7 @@ def analyse_files(
     """
     if not paths:
         raise NotEnoughData(f"no recording was given for {name!r}; give the paths of one or more .h5 files")
-    results: list[Result] = []
+    results: list[AnyResult] = []
     failures: list[AnalysisFailure] = []
     for path in paths:
         try:
@@ -224,7 +174,7 @@ def result_of(
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
     observer: ProgressObserver = UNOBSERVED,
     specimen: Specimen | None = None,
-) -> tuple[Result, tuple[AnalysisFailure, ...]]:
+) -> tuple[AnyResult, tuple[AnalysisFailure, ...]]:
     """Analyse one recording; a simulation that fails leaves the measured result standing.
 
     Raises
@@ -236,28 +186,14 @@ def result_of(
     name = recording.path.name
     analysis = analyse(recording, request, observer)
     if simulation is Simulation.LEFT_OUT:
-        return _paired(analysis, None), ()
+        return Result(analysis, None), ()
     try:
         laid = overlay(
             recording, analysis, specimen=specimen, stage=lambda stage: observer.begin(name, stage)
         )
     except AnalysisError as error:
-        return _paired(analysis, None), (AnalysisFailure(name, "simulation", str(error)),)
-    return _paired(analysis, laid), ()
-
-
-def _paired(analysis: RecordingAnalysis, laid: Overlay | None) -> Result:
-    match analysis, laid:
-        case NoiseAnalysis(), (NoiseOverlay() | None):
-            return NoiseResult(analysis, laid)
-        case SweepAnalysis(), (SweepOverlay() | None):
-            return SweepResult(analysis, laid)
-        case DwellAnalysis(), (DwellOverlay() | None):
-            return DwellResult(analysis, laid)
-        case SteppedSineAnalysis(), (SteppedSineOverlay() | None):
-            return SteppedSineResult(analysis, laid)
-        case _:
-            raise AssertionError(f"{type(laid).__name__} belongs to no {type(analysis).__name__}")
+        return Result(analysis, None), (AnalysisFailure(name, "simulation", str(error)),)
+    return Result(analysis, laid), ()
 
 
 def recordings_in(folder: Path) -> tuple[Path, ...]:

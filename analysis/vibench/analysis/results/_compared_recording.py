@@ -7,27 +7,12 @@ from pathlib import Path
 
 from vibench.acquisition import open_recording
 
-from ..comparison import (
-    Curve,
-    CurveOrigin,
-    dwell_traces,
-    predicted_curves,
-    sorted_curve,
-    stepped_traces,
-    sweep_traces,
-    transmission_trace,
-)
+from ..comparison import Curve, CurveOrigin, predicted_curves, sorted_curve
 from ..frequency_response import FrequencyResponseRequest
+from ..kinds import ANALYSES, AnyResult
 from ..model import Simulation
-from ._campaign_results import (
-    AnalysisFailure,
-    DwellResult,
-    NoiseResult,
-    Result,
-    SteppedSineResult,
-    SweepResult,
-    result_of,
-)
+from ..recordings import Verdict
+from ._campaign_results import AnalysisFailure, result_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,34 +49,22 @@ def compare_recording(
         name=name,
         curves=tuple(sorted_curve(each) for each in _curves(result, name)),
         failures=tuple(each.sentence for each in failures),
-        warnings=tuple(each.text for each in result.analysis.checks if each.verdict.value == "warning"),
+        warnings=tuple(each.text for each in result.analysis.checks if each.verdict is Verdict.WARNING),
         kept=pickle.dumps((result, failures)),
     )
 
 
-def kept_result(compared: ComparedRecording) -> tuple[Result, tuple[AnalysisFailure, ...]]:
+def kept_result(compared: ComparedRecording) -> tuple[AnyResult, tuple[AnalysisFailure, ...]]:
     """Open the whole result again; the bytes were made by this program a moment ago, never by a file."""
     result, failures = pickle.loads(compared.kept)  # noqa: S301
     return result, failures
 
 
-def _curves(result: Result, name: str) -> Iterator[Curve]:
-    match result:
-        case NoiseResult(analysis=noise, laid=laid):
-            yield transmission_trace(name, CurveOrigin.MEASURED, noise.response.frequency_response)
-            if laid is not None:
-                yield transmission_trace(name, CurveOrigin.SIMULATED, laid.response.frequency_response)
-        case SweepResult(analysis=sweep, laid=laid):
-            yield from sweep_traces(name, CurveOrigin.MEASURED, sweep.response)
-            if laid is not None:
-                yield from sweep_traces(name, CurveOrigin.SIMULATED, laid.response)
-        case DwellResult(analysis=dwell, laid=laid):
-            yield from dwell_traces(name, CurveOrigin.MEASURED, dwell.response)
-            if laid is not None:
-                yield from dwell_traces(name, CurveOrigin.SIMULATED, laid.response)
-        case SteppedSineResult(analysis=stepped, laid=laid):
-            yield from stepped_traces(name, CurveOrigin.MEASURED, stepped.response)
-            if laid is not None:
-                yield from stepped_traces(name, CurveOrigin.SIMULATED, laid.response)
-    if result.laid is not None and result.laid.prediction.frequency_hz.size > 1:
+def _curves(result: AnyResult, name: str) -> Iterator[Curve]:
+    curves = ANALYSES[result.kind].curves
+    yield from curves(name, CurveOrigin.MEASURED, result.analysis.response)
+    if result.laid is None:
+        return
+    yield from curves(name, CurveOrigin.SIMULATED, result.laid.response)
+    if result.laid.prediction.frequency_hz.size > 1:
         yield from predicted_curves(name, result.laid.prediction)

@@ -10,6 +10,7 @@ from ._dwell import (
 )
 from ._dwell_analysis import (
     DwellAnalysis as DwellAnalysis,
+    DwellPlan as DwellPlan,
     bound_frequencies_hz as bound_frequencies_hz,
     measured_dwell as measured_dwell,
     settled_envelope as settled_envelope,
@@ -35,7 +36,6 @@ from ._stepped_response import (
     SteppedResponse as SteppedResponse,
     SteppedSineAnalysis as SteppedSineAnalysis,
     Steps as Steps,
-    step_label as step_label,
     stepped_response as stepped_response,
 )
 from ._sweep import (
@@ -43,6 +43,7 @@ from ._sweep import (
     SweepSums as SweepSums,
 )
 from ._sweep_analysis import (
+    Sweep as Sweep,
     SweepAnalysis as SweepAnalysis,
     measured_sweep as measured_sweep,
     smooth_jumps as smooth_jumps,

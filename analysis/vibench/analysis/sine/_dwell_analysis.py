@@ -1,11 +1,9 @@
-"""From one recording to its result, by what was played."""
+"""From a recorded dwell to its responses over the last seconds."""
 
 from dataclasses import dataclass
 
-from vibench.acquisition.plan import (
-    Dwell,
-    HeldDwell,
-)
+from vibench.acquisition.plan import Dwell, HeldDwell
+from vibench.acquisition.recording import SegmentLabel
 
 from ..errors import NotEnoughData
 from ..recordings import (
@@ -21,6 +19,7 @@ from ._dwell import DwellResponse, dwell_response
 from ._dwell_motion import DwellMotion
 from ._terminal_level import TerminalLevel
 
+DwellPlan = Dwell | HeldDwell
 WINDOW_S = 5.0
 """The paper's window: the last 5 s of a dwell."""
 _DWELL_EDGE_PERIODS = 121
@@ -35,7 +34,7 @@ class DwellAnalysis:
 
     facts: RecordingFacts
     checks: tuple[Check, ...]
-    excitation: Dwell | HeldDwell
+    excitation: DwellPlan
     response: DwellResponse
     displacement: Envelope
     """x over the dwell [m], without the ends that integration disturbs."""
@@ -50,11 +49,9 @@ def bound_frequencies_hz(facts: RecordingFacts) -> tuple[float, ...]:
     return tuple(float(each) for each in specimen_of(facts.bench).bound_frequencies_hz)
 
 
-def measured_dwell(
-    channels: Channels, dwell: Dwell | HeldDwell, towards_hz: tuple[float, ...]
-) -> DwellResponse:
+def measured_dwell(channels: Channels, dwell: DwellPlan, towards_hz: tuple[float, ...]) -> DwellResponse:
     """Analyse the last 5 s of a dwell, or what there is of them."""
-    stretch = only_stretch(channels, "dwell")
+    stretch = only_stretch(channels, SegmentLabel.DWELL)
     drive, base, response = read_whole(channels, stretch)
     rate = channels.sample_rate_hz
     clear_s = stretch.samples / rate - _DWELL_EDGE_PERIODS / dwell.frequency_hz

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vibench.acquisition.recording import SegmentLabel
+
 from ..chaos import MotionVerdict, Points, motion_verdict
 from ..errors import InvalidRequest, NotEnoughData
 from ..recordings import Channels, only_stretch, read_whole
@@ -119,7 +121,7 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
         When samples were lost inside the dwell.
 
     """
-    stretch = only_stretch(channels, "dwell")
+    stretch = only_stretch(channels, SegmentLabel.DWELL)
     drive, _, velocity = read_whole(channels, stretch)
     section = stroboscope(
         drive,

@@ -3,9 +3,7 @@
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 
-from vibench.acquisition.plan import SteppedLevel
-
-from ._stepped_response import SteppedResponse, Steps
+from ._stepped_response import SteppedResponse
 
 JUMP_FACTOR = 2.0
 """Response II that changes by more than this between two levels has jumped: a linear one does not change."""
@@ -55,10 +53,8 @@ def hysteresis_vpp(jumps: tuple[LevelJump, ...]) -> tuple[float, float] | None:
     return rise.before_vpp - fall.before_vpp, rise.after_vpp - fall.after_vpp
 
 
-def level_summary(plan: Steps, response: SteppedResponse) -> dict[str, object]:
-    """Give levels and jumps as JSON can hold them, where it was the level that was stepped."""
-    if not isinstance(plan, SteppedLevel):
-        return {}
+def level_summary(response: SteppedResponse) -> dict[str, object]:
+    """Give levels and jumps as JSON can hold them."""
     jumps = level_jumps(response)
     return {
         "amplitude_vpp": response.amplitude_vpp,

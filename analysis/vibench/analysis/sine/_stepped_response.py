@@ -1,17 +1,12 @@
 """Responses I and II at every frequency of a stepped sine."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from vibench.acquisition.plan import (
-    RESONANCE_LABEL,
-    STEP_LABEL,
-    ResonanceTracking,
-    SettledSine,
-    SteppedLevel,
-    SteppedSine,
-)
+from vibench.acquisition.plan import ResonanceTracking, SettledSine, SteppedLevel, SteppedSine
+from vibench.acquisition.recording import SegmentLabel
 
 from ..errors import NotEnoughData
 from ..recordings import (
@@ -49,8 +44,17 @@ class SteppedResponse:
     """Steps that were cut short or lost samples."""
 
 
-def stepped_response(channels: Channels, plan: Steps) -> SteppedResponse:
+def stepped_response(
+    channels: Channels, plan: Steps, label: SegmentLabel, setting_vpp: Callable[[Steps, Stretch], float]
+) -> SteppedResponse:
     """Analyse every whole step as a dwell of its own.
+
+    Parameters
+    ----------
+    label
+        Of the segments that the steps were recorded as.
+    setting_vpp
+        Tells the generator's setting during a step [V].
 
     Raises
     ------
@@ -58,7 +62,7 @@ def stepped_response(channels: Channels, plan: Steps) -> SteppedResponse:
         When no step was recorded whole.
 
     """
-    stretches = channels.stretches(step_label(plan))
+    stretches = channels.stretches(label)
     whole = [each for each in stretches if each.is_complete]
     pairs = [(each, found) for each in whole if (found := _step(channels, each, plan)) is not None]
     if not pairs:
@@ -70,7 +74,7 @@ def stepped_response(channels: Channels, plan: Steps) -> SteppedResponse:
     return SteppedResponse(
         frequency_hz=np.array([each.drive.frequency_hz for each in steps]),
         direction=tuple(str(stretch.numbers.get("direction", "up")) for stretch, _ in pairs),
-        amplitude_vpp=np.array([_setting_vpp(stretch, plan) for stretch, _ in pairs]),
+        amplitude_vpp=np.array([setting_vpp(plan, stretch) for stretch, _ in pairs]),
         drive_amplitude_m=np.array([each.drive.amplitude_m for each in steps]),
         response_i=np.array([each.response_i for each in steps]),
         noise_bias_i=np.array([each.noise_bias_i for each in steps]),
@@ -79,21 +83,6 @@ def stepped_response(channels: Channels, plan: Steps) -> SteppedResponse:
         phase_rad=np.array([each.phase_rad for each in steps]),
         left_out=len(stretches) - len(steps),
     )
-
-
-def step_label(plan: Steps) -> str:
-    """Say what the segments of a plan's steps are called."""
-    return RESONANCE_LABEL if isinstance(plan, ResonanceTracking) else STEP_LABEL
-
-
-def _setting_vpp(stretch: Stretch, plan: Steps) -> float:
-    match plan:
-        case SteppedLevel():
-            return float(stretch.numbers["amplitude_vpp"])
-        case SteppedSine():
-            return plan.amplitude_vpp
-        case SettledSine() | ResonanceTracking():
-            return float("nan")
 
 
 def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | None:

@@ -1,13 +1,11 @@
-"""From one recording to its result, by what was played."""
+"""From a recorded sweep to its responses and a picture of its velocity."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from vibench.acquisition.plan import (
-    HeldSweep,
-    SineSweep,
-)
+from vibench.acquisition.plan import HeldSweep, SineSweep
+from vibench.acquisition.recording import SegmentLabel
 
 from ..errors import NotEnoughData
 from ..recordings import (
@@ -21,6 +19,7 @@ from ._collision_region import Collisions
 from ._jumps import Jump, jumps
 from ._sweep import SweepResponse, SweepSums
 
+Sweep = SineSweep | HeldSweep
 _BLOCK = 1 << 20
 _RESPONSE = 2
 _SPECTROGRAM_ORDER = 3.2
@@ -33,7 +32,7 @@ class SweepAnalysis:
 
     facts: RecordingFacts
     checks: tuple[Check, ...]
-    excitation: SineSweep | HeldSweep
+    excitation: Sweep
     response: SweepResponse
     collisions: Collisions
     jumps: tuple[Jump, ...]
@@ -47,9 +46,9 @@ def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, 
     return jumps(response.time_s, response.frequency_hz, response.response_ii, ~colliding.is_colliding)
 
 
-def measured_sweep(channels: Channels, sweep: SineSweep | HeldSweep) -> tuple[SweepResponse, Spectrogram]:
+def measured_sweep(channels: Channels, sweep: Sweep) -> tuple[SweepResponse, Spectrogram]:
     """Analyse what there is of a sweep, whichever way it ran, and picture its velocity."""
-    stretch = only_stretch(channels, "sweep")
+    stretch = only_stretch(channels, SegmentLabel.SWEEP)
     ends = sorted((sweep.start_hz, sweep.stop_hz))
     rate = channels.sample_rate_hz
     sums = SweepSums(rate, low_hz=ends[0], high_hz=ends[1])

@@ -1,0 +1,10 @@
+"""What analysis does with each kind of excitation: one row a kind, looked up by ``excitation.kind``.
+
+A row says how a recording of the kind is analysed, how its simulation is laid over it, which curves a
+comparison shows of it and what its JSON document says. Kinds of one family share most of their row. How
+results are drawn and worded is kept apart, in `report`, because that loads matplotlib.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,15 @@
+from ._analyses import (
+    ANALYSES as ANALYSES,
+)
+from ._analysis_kind import (
+    AnalysisKind as AnalysisKind,
+    AnyResult as AnyResult,
+    DwellResult as DwellResult,
+    Json as Json,
+    NoiseResult as NoiseResult,
+    Overlay as Overlay,
+    RecordingAnalysis as RecordingAnalysis,
+    Result as Result,
+    SteppedSineResult as SteppedSineResult,
+    SweepResult as SweepResult,
+)

@@ -1,0 +1,56 @@
+"""What a result is, and what must be known of a kind of excitation to get one."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, Generic, TypeAlias, TypeVar
+
+from ..comparison import Curve, CurveOrigin
+from ..frequency_response import FrequencyResponseRequest, NoiseAnalysis
+from ..model import DwellOverlay, NoiseOverlay, SimulatedChannels, SteppedSineOverlay, SweepOverlay
+from ..recordings import Channels, RecordingFacts
+from ..sine import DwellAnalysis, SteppedSineAnalysis, SweepAnalysis
+
+Json = dict[str, Any]
+RecordingAnalysis = NoiseAnalysis | SweepAnalysis | DwellAnalysis | SteppedSineAnalysis
+Overlay = NoiseOverlay | SweepOverlay | DwellOverlay | SteppedSineOverlay
+P = TypeVar("P")
+A = TypeVar("A", bound=RecordingAnalysis)
+L = TypeVar("L", bound=Overlay)
+
+
+@dataclass(frozen=True, eq=False)
+class Result(Generic[A, L]):
+    """A measurement and its simulation."""
+
+    analysis: A
+    laid: L | None
+
+    @property
+    def kind(self) -> str:
+        """Of the excitation."""
+        return self.analysis.excitation.kind
+
+
+AnyResult: TypeAlias = Result[Any, Any]
+NoiseResult: TypeAlias = Result[NoiseAnalysis, NoiseOverlay]
+SweepResult: TypeAlias = Result[SweepAnalysis, SweepOverlay]
+DwellResult: TypeAlias = Result[DwellAnalysis, DwellOverlay]
+SteppedSineResult: TypeAlias = Result[SteppedSineAnalysis, SteppedSineOverlay]
+
+
+@dataclass(frozen=True)
+class AnalysisKind(Generic[P, A, L]):
+    """How recordings of one kind of excitation are analysed: plan, analysis and overlay belong together."""
+
+    family: str
+    """What JSON calls the results; kinds with equal results share it."""
+    analyse: Callable[[RecordingFacts, Channels, P, FrequencyResponseRequest], A]
+    simulate: Callable[[A, SimulatedChannels], L]
+    """Estimate from simulated channels what was estimated from the recorded ones."""
+    curves: Callable[[str, CurveOrigin, Any], Iterator[Curve]]
+    """Of the response, measured or simulated, of the recording with that name."""
+    measured: Callable[[A], Json]
+    """The numbers of a result."""
+    simulated: Callable[[L], Json]
+    place: Callable[[P], tuple[float, ...]] = lambda _: ()
+    """Sorts the results of a family, weak to strong; without it they stay in the order given."""

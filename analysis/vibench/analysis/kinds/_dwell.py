@@ -1,0 +1,116 @@
+"""Dwells: both responses, the lines of the spectrum, how the motion repeats, and what JSON says of them."""
+
+from ..chaos import MotionVerdict
+from ..comparison import dwell_traces
+from ..frequency_response import FrequencyResponseRequest
+from ..model import DwellOverlay, dwell_overlay
+from ..recordings import Channels, RecordingFacts, measurement_checks
+from ..sine import (
+    DwellAnalysis,
+    DwellPlan,
+    TerminalLevel,
+    bound_frequencies_hz,
+    dwell_motion,
+    measured_dwell,
+    settled_envelope,
+    terminal_levels,
+)
+from ._analysis_kind import AnalysisKind, Json
+
+
+def _analyse(
+    facts: RecordingFacts, channels: Channels, plan: DwellPlan, _: FrequencyResponseRequest
+) -> DwellAnalysis:
+    towards_hz = bound_frequencies_hz(facts)
+    found = measured_dwell(channels, plan, towards_hz)
+    return DwellAnalysis(
+        facts=facts,
+        checks=measurement_checks(facts),
+        excitation=plan,
+        response=found,
+        displacement=settled_envelope(found),
+        terminal=terminal_levels(found, towards_hz),
+        motion=dwell_motion(channels, found),
+    )
+
+
+def _measured(analysis: DwellAnalysis) -> Json:
+    found = analysis.response
+    return {
+        "frequency_hz": found.drive.frequency_hz,
+        "sd_frequency_hz": found.drive.sd_frequency_hz,
+        "drive_amplitude_m": found.drive.amplitude_m,
+        "sd_drive_amplitude_m": found.drive.sd_amplitude_m,
+        "drive_distortion": found.drive.distortion,
+        "window_s": found.window_s,
+        "response_i": found.response_i,
+        "noise_bias_i": found.noise_bias_i,
+        "response_ii": found.response_ii,
+        "sd_response_ii": found.sd_response_ii,
+        "phase_rad": found.phase_rad,
+        "sd_phase_rad": found.sd_phase_rad,
+        "lines": [
+            {
+                "label": each.label,
+                "frequency_hz": each.frequency_hz,
+                "amplitude_m": each.amplitude_m,
+                "sd_amplitude_m": each.sd_amplitude_m,
+                "decibel_re_drive_line": each.decibel,
+            }
+            for each in found.lines
+        ],
+        "terminal_bands": [_band(each) for each in analysis.terminal],
+        "motion": _motion(analysis.motion.verdict),
+    }
+
+
+def _motion(verdict: MotionVerdict) -> Json:
+    evidence = verdict.evidence
+    exponent, sd_exponent = evidence.exponent_per_s or (None, None)
+    return {
+        "kind": verdict.kind.value,
+        "why": verdict.why,
+        "period": verdict.period,
+        "periods_judged": evidence.periods,
+        "is_settled": evidence.is_settled,
+        "scatter_over_orbit": evidence.spread,
+        "noise_over_orbit": evidence.noise,
+        "zero_one_k": None if evidence.zero_one is None else evidence.zero_one.k,
+        "surrogates_p": None if evidence.surrogates is None else evidence.surrogates.p,
+        "turns_per_period": None if evidence.rotation is None else evidence.rotation.turns_per_period,
+        "lyapunov_per_s": exponent,
+        "sd_lyapunov_per_s": sd_exponent,
+    }
+
+
+def _band(found: TerminalLevel) -> Json:
+    return {
+        "towards_hz": found.towards_hz,
+        "low_hz": found.low_hz,
+        "high_hz": found.high_hz,
+        "peak_hz": found.peak_hz,
+        "rms_m": found.rms_m,
+        "relative_sd": found.relative_sd,
+        "decibel_re_drive_line": found.decibel,
+    }
+
+
+def _simulated(laid: DwellOverlay) -> Json:
+    return {
+        "response_i": laid.response.response_i,
+        "response_ii": laid.response.response_ii,
+        "sd_response_ii": laid.response.sd_response_ii,
+        "response_i_measured_over_simulated_db": laid.response_i_db,
+        "terminal_bands": [_band(each) for each in laid.terminal],
+    }
+
+
+DWELL = AnalysisKind(
+    family="dwell",
+    analyse=_analyse,
+    simulate=dwell_overlay,
+    curves=dwell_traces,
+    measured=_measured,
+    simulated=_simulated,
+    place=lambda plan: (plan.frequency_hz, plan.amplitude_vpp),
+)

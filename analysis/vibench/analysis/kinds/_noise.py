@@ -1,0 +1,126 @@
+"""Noise: the transmission from base to m0, its resonances, and what JSON says of them."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..comparison import noise_traces
+from ..frequency_response import (
+    FrequencyResponseRequest,
+    Noise,
+    NoiseAnalysis,
+    NoiseResponse,
+    PeriodicFrequencyResponse,
+    Resonance,
+    distortion,
+    repeated_response,
+    streamed_response,
+)
+from ..model import NoiseOverlay, SimulatedChannels, noise_overlay
+from ..recordings import Channels, RecordingFacts, measurement_checks
+from ._analysis_kind import AnalysisKind, Json
+
+Estimate = Callable[[Channels, Any, FrequencyResponseRequest], NoiseResponse]
+
+
+def _measured(analysis: NoiseAnalysis) -> Json:
+    found = analysis.response
+    return {
+        "resonances": [_resonance(each) for each in found.resonances],
+        "transmission": _frequency_response(analysis),
+        "distortion": None if found.periodic is None else _distortion(found.periodic),
+        "independent_averages": found.frequency_response.n_eff,
+        "used_s": found.used_s,
+        "left_out": found.left_out,
+        "lost_samples": found.lost_samples,
+        "overloaded_samples": found.overloaded_samples,
+        "median_coherence": float(np.median(found.frequency_response.coherence)),
+        "base_rms_acceleration_m_per_s2": found.base_level.rms_acceleration,
+        "base_rms_displacement_m": found.base_level.rms_displacement_m,
+        "relative_sd_base_rms": found.base_level.relative_sd,
+    }
+
+
+def _frequency_response(analysis: NoiseAnalysis) -> Json:
+    view = analysis.request.view
+    found = view.shown(analysis.response.frequency_response)
+    how = found.settings
+    return {
+        "quantity": view.name,
+        "unit": view.unit,
+        "estimator": how.estimator.value,
+        "noise_ratio": how.noise_ratio,
+        "window": how.window,
+        "segment_s": how.segment_samples / how.sample_rate_hz,
+        "overlap": how.overlap,
+        "resolution_hz": found.resolution_hz,
+        "segments_used": found.segments_used,
+        "segments_excluded": found.segments_excluded,
+        "delay_removed_s": how.delay_s,
+        "confidence": how.confidence,
+        "coherence_significance": found.coherence_significance,
+        "frequency_hz": found.frequency_hz,
+        "magnitude": found.magnitude,
+        "magnitude_lower": found.magnitude_lower,
+        "magnitude_upper": found.magnitude_upper,
+        "phase_rad": found.phase_rad,
+        "phase_lower_rad": found.phase_lower,
+        "phase_upper_rad": found.phase_upper,
+        "coherence": found.coherence,
+    }
+
+
+def _distortion(periodic: PeriodicFrequencyResponse) -> Json:
+    found = distortion(periodic)
+    return {
+        "realisations": periodic.realisations,
+        "median_noise_over_magnitude": found.noise_share,
+        "median_distortion_over_magnitude": found.distortion_share,
+        "odd_detection_lines_m_per_s": found.odd_m_per_s,
+        "even_detection_lines_m_per_s": found.even_m_per_s,
+        "noise_on_detection_lines_m_per_s": found.detection_noise_m_per_s,
+    }
+
+
+def _resonance(found: Resonance) -> Json:
+    return {
+        "frequency_hz": found.frequency_hz,
+        "sd_frequency_hz": found.sd_frequency_hz,
+        "damping_ratio": found.damping_ratio,
+        "sd_damping_ratio": found.sd_damping_ratio,
+        "peak_frequency_hz": found.peak_frequency_hz,
+        "peak_magnitude": found.peak_magnitude,
+        "sd_peak_magnitude": found.sd_peak_magnitude,
+        "is_resolved": bool(found.is_resolved),
+    }
+
+
+def _simulated(laid: NoiseOverlay) -> Json:
+    return {"resonances": [_resonance(each) for each in laid.response.resonances]}
+
+
+def _noise(estimate: Estimate) -> AnalysisKind[Noise, NoiseAnalysis, NoiseOverlay]:
+    def analyse(
+        facts: RecordingFacts, channels: Channels, plan: Noise, request: FrequencyResponseRequest
+    ) -> NoiseAnalysis:
+        response = estimate(channels, plan, request)
+        return NoiseAnalysis(facts, measurement_checks(facts), plan, response, request)
+
+    def simulate(analysis: NoiseAnalysis, channels: SimulatedChannels) -> NoiseOverlay:
+        response = estimate(channels, analysis.excitation, analysis.request)
+        return noise_overlay(analysis, channels, response)
+
+    return AnalysisKind(
+        family="noise",
+        analyse=analyse,
+        simulate=simulate,
+        curves=noise_traces,
+        measured=_measured,
+        simulated=_simulated,
+        place=lambda plan: (plan.amplitude_vpp,),
+    )
+
+
+REPEATED_NOISE = _noise(repeated_response)
+STREAMED_NOISE = _noise(streamed_response)

@@ -1,0 +1,64 @@
+"""Stepped sines: responses frequency by frequency or level by level, and what JSON says of them."""
+
+from collections.abc import Callable
+from math import nan
+
+from vibench.acquisition.recording import SegmentLabel
+
+from ..comparison import stepped_traces
+from ..frequency_response import FrequencyResponseRequest
+from ..model import SimulatedChannels, SteppedSineOverlay, stepped_overlay
+from ..recordings import Channels, RecordingFacts, Stretch, measurement_checks
+from ..sine import SteppedSineAnalysis, Steps, level_summary, stepped_response
+from ._analysis_kind import AnalysisKind, Json
+
+Setting = Callable[[Steps, Stretch], float]
+
+
+def _measured(analysis: SteppedSineAnalysis) -> Json:
+    found = analysis.response
+    return {
+        "frequency_hz": found.frequency_hz,
+        "direction": found.direction,
+        "drive_amplitude_m": found.drive_amplitude_m,
+        "response_i": found.response_i,
+        "noise_bias_i": found.noise_bias_i,
+        "response_ii": found.response_ii,
+        "sd_response_ii": found.sd_response_ii,
+        "left_out": found.left_out,
+    }
+
+
+def _measured_levels(analysis: SteppedSineAnalysis) -> Json:
+    return {**_measured(analysis), **level_summary(analysis.response)}
+
+
+def _simulated(laid: SteppedSineOverlay) -> Json:
+    return {"response_i": laid.response.response_i, "response_ii": laid.response.response_ii}
+
+
+def _stepped(
+    setting_vpp: Setting,
+    label: SegmentLabel = SegmentLabel.STEP,
+    measured: Callable[[SteppedSineAnalysis], Json] = _measured,
+) -> AnalysisKind[Steps, SteppedSineAnalysis, SteppedSineOverlay]:
+    def analyse(
+        facts: RecordingFacts, channels: Channels, plan: Steps, _: FrequencyResponseRequest
+    ) -> SteppedSineAnalysis:
+        response = stepped_response(channels, plan, label, setting_vpp)
+        return SteppedSineAnalysis(facts, measurement_checks(facts), plan, response)
+
+    def simulate(analysis: SteppedSineAnalysis, channels: SimulatedChannels) -> SteppedSineOverlay:
+        response = stepped_response(channels, analysis.excitation, label, setting_vpp)
+        return stepped_overlay(analysis, channels, response, label)
+
+    return AnalysisKind("stepped_sine", analyse, simulate, stepped_traces, measured, _simulated)
+
+
+STEPPED_SINE = _stepped(lambda plan, _: plan.amplitude_vpp)
+STEPPED_LEVEL = _stepped(
+    lambda _, stretch: float(stretch.numbers["amplitude_vpp"]), measured=_measured_levels
+)
+# With feedback the setting is not the plan's, and is known of no step.
+SETTLED_SINE = _stepped(lambda *_: nan)
+RESONANCE_TRACKING = _stepped(lambda *_: nan, SegmentLabel.RESONANCE)

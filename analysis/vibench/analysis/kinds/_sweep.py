@@ -1,0 +1,92 @@
+"""Sweeps: responses over frequency, where the masses collide, and what JSON says of them."""
+
+import numpy as np
+
+from ..comparison import sweep_traces
+from ..frequency_response import FrequencyResponseRequest
+from ..model import SweepOverlay, sweep_overlay
+from ..recordings import Channels, RecordingFacts, measurement_checks
+from ..sine import (
+    CollisionRegion,
+    Collisions,
+    Edge,
+    Sweep,
+    SweepAnalysis,
+    collisions,
+    measured_sweep,
+    smooth_jumps,
+)
+from ._analysis_kind import AnalysisKind, Json
+
+
+def _analyse(
+    facts: RecordingFacts, channels: Channels, plan: Sweep, _: FrequencyResponseRequest
+) -> SweepAnalysis:
+    response, picture = measured_sweep(channels, plan)
+    colliding = collisions(response)
+    jumps = smooth_jumps(response, colliding)
+    return SweepAnalysis(facts, measurement_checks(facts), plan, response, colliding, jumps, picture)
+
+
+def _measured(analysis: SweepAnalysis) -> Json:
+    found = analysis.response
+    top = int(np.argmax(found.response_ii))
+    return {
+        "start_hz": float(found.frequency_hz[0]),
+        "stop_hz": float(found.frequency_hz[-1]),
+        "sweep_rate_hz_per_s": found.sweep_rate_hz_per_s,
+        "drive_amplitude_start_m": float(found.drive_amplitude_m[0]),
+        "drive_amplitude_stop_m": float(found.drive_amplitude_m[-1]),
+        "largest_response_i": float(np.max(found.response_i)),
+        "largest_response_ii": float(found.response_ii[top]),
+        "largest_response_ii_at_hz": float(found.frequency_hz[top]),
+        "collision_regions": _regions(analysis.collisions),
+        "jumps": [
+            {
+                "frequency_hz": each.frequency_hz,
+                "lower_hz": each.lower_hz,
+                "upper_hz": each.upper_hz,
+                "time_s": each.time_s,
+                "before": each.before,
+                "after": each.after,
+                "decibel": each.decibel,
+            }
+            for each in analysis.jumps
+        ],
+    }
+
+
+def _regions(found: Collisions) -> list[Json]:
+    return [_region(each) for each in found.regions]
+
+
+def _region(region: CollisionRegion) -> Json:
+    return {
+        "start": _edge(region.start),
+        "stop": _edge(region.stop),
+        "reaches_start_of_sweep": region.reaches_start,
+        "reaches_stop_of_sweep": region.reaches_stop,
+    }
+
+
+def _edge(edge: Edge) -> Json:
+    return {
+        "frequency_hz": edge.frequency_hz,
+        "time_s": edge.time_s,
+        "lower_hz": edge.lower_hz,
+        "upper_hz": edge.upper_hz,
+    }
+
+
+def _simulated(laid: SweepOverlay) -> Json:
+    return {"collision_regions": _regions(laid.collisions)}
+
+
+SWEEP = AnalysisKind(
+    family="sweep",
+    analyse=_analyse,
+    simulate=sweep_overlay,
+    curves=sweep_traces,
+    measured=_measured,
+    simulated=_simulated,
+)
