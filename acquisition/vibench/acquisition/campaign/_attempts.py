@@ -8,7 +8,7 @@ from time import monotonic
 from ..bench import RunBench
 from ..errors import AcquisitionError, InstrumentError
 from ..plan import Point, Retryable, RetryPolicy, RunState
-from ..recording import open_recording
+from ..recording import NO_RESULT, open_recording
 from ..run import BLOCK_S, Outcome, Progress, run_measurement
 from ..stopping import StopSwitch
 from ._attempt_files import next_attempt
@@ -56,8 +56,6 @@ Reopen = Callable[[], RunBench]
 
 LOOK_EVERY_S = 1.0
 """How often a lost instrument is looked for, and how long another attempt waits [s]."""
-BESIDE = frozenset({"check", "lead_in", "ramp_up", "ramp_down"})
-"""Segments that no result is taken from."""
 
 
 class Attempts:
@@ -205,7 +203,7 @@ class Attempts:
 def _over_range(path: Path) -> str:
     """Say which inputs were near full scale while it counted; empty when none was."""
     with open_recording(path) as recording:
-        counting = [each for each in recording.segments if each.label not in BESIDE]
+        counting = [each for each in recording.segments if each.label not in NO_RESULT]
         roles = {
             overload.channel: None
             for overload in recording.overloads

@@ -1,5 +1,4 @@
 from ._dwell import (
-    LEAD_IN_LABEL as LEAD_IN_LABEL,
     MOST_LEAD_INS as MOST_LEAD_INS,
     Dwell as Dwell,
     LeadIn as LeadIn,
@@ -36,13 +35,10 @@ from ._preview import (
     SignalPreview as SignalPreview,
 )
 from ._resonance_tracking import (
-    RESONANCE_LABEL as RESONANCE_LABEL,
     ResonanceTracking as ResonanceTracking,
 )
 from ._settled_sine import (
     GLIDE_TONE_S as GLIDE_TONE_S,
-    SEARCH_LABEL as SEARCH_LABEL,
-    STEP_LABEL as STEP_LABEL,
     SettledSine as SettledSine,
 )
 from ._sine_sweep import (

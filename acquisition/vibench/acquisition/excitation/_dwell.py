@@ -6,14 +6,13 @@ from typing import Literal, Self
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from ..host import FrozenModel
+from ..recording import SegmentLabel
 from ._plan import AbstractExcitation, AmplitudeVpp, FrequencyHz
 from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
 MOST_LEAD_INS = 1000
 """Tones that may be passed on the way to one dwell."""
-LEAD_IN_LABEL = "lead_in"
-"""Segment recorded on that way; no result is taken from it."""
 
 
 class LeadIn(FrozenModel):
@@ -69,11 +68,11 @@ class Dwell(AbstractExcitation):
 
     def steps(self) -> Iterator[Step]:
         """List the tones of the lead-in, as one segment, then the dwell."""
-        way = Segment(LEAD_IN_LABEL, {"tones": len(self.lead_in)})
+        way = Segment(SegmentLabel.LEAD_IN, {"tones": len(self.lead_in)})
         for tone in self.lead_in:
             level = tone.amplitude_vpp / self.amplitude_vpp
             yield Step(Tone(tone.frequency_hz, level), 0.0, self.lead_s, way)
-        segment = Segment("dwell", {"frequency_hz": self.frequency_hz})
+        segment = Segment(SegmentLabel.DWELL, {"frequency_hz": self.frequency_hz})
         yield Step(Tone(self.frequency_hz), self.settle_s, self.duration_s, segment)
 
     def preview(self, sample_rate_hz: float) -> SignalPreview:

@@ -5,6 +5,7 @@ from typing import Literal
 
 from pydantic import PositiveFloat
 
+from ..recording import SegmentLabel
 from ._feedback import BaseLevel, Settling
 from ._plan import AbstractFeedback, FrequencyHz
 from ._preview import SignalPreview, signal_preview
@@ -39,7 +40,7 @@ class HeldDwell(AbstractFeedback):
     @property
     def segment(self) -> Segment:
         """What the recorded part is called."""
-        return Segment("dwell", {"frequency_hz": self.frequency_hz})
+        return Segment(SegmentLabel.DWELL, {"frequency_hz": self.frequency_hz})
 
     def steps(self) -> Iterator[Step]:
         """One step, without its wait, at the largest setting."""

@@ -5,6 +5,7 @@ from typing import Literal
 
 from pydantic import PositiveFloat
 
+from ..recording import SegmentLabel
 from ._feedback import BaseLevel, Settling
 from ._plan import AbstractFeedback
 from ._preview import SignalPreview, signal_preview
@@ -36,7 +37,7 @@ class HeldSweep(MovingSine, AbstractFeedback):
     def segment(self) -> Segment:
         """What the sweep is called."""
         return Segment(
-            "sweep",
+            SegmentLabel.SWEEP,
             {
                 "start_hz": self.start_hz,
                 "stop_hz": self.stop_hz,

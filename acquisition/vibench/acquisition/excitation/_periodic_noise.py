@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
+from ..recording import SegmentLabel
 from ._multisine import Lines, band_lines, flat_periods, require_playable
 from ._plan import AbstractExcitation, FrequencyHz
 from ._preview import SignalPreview, signal_preview
@@ -70,7 +71,7 @@ class PeriodicNoise(AbstractExcitation):
                 settle_s=self.settle_s,
                 record_s=self.periods / self.repetition_hz,
                 segment=Segment(
-                    "realisation",
+                    SegmentLabel.REALISATION,
                     {
                         "realisation": realisation,
                         "repetition_hz": self.repetition_hz,

@@ -5,13 +5,11 @@ from typing import Literal, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
+from ..recording import SegmentLabel
 from ._feedback import BaseLevel, Settling
 from ._plan import AbstractFeedback, FrequencyHz
 from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
-
-RESONANCE_LABEL = "resonance"
-"""Segment recorded on a resonance."""
 
 
 class ResonanceTracking(AbstractFeedback):
@@ -80,7 +78,7 @@ class ResonanceTracking(AbstractFeedback):
     def segment(self, number: int, frequency_hz: float) -> Segment:
         """Name the recording on the resonance of a level."""
         return Segment(
-            RESONANCE_LABEL,
+            SegmentLabel.RESONANCE,
             {
                 "level": number,
                 "frequency_hz": frequency_hz,
@@ -98,7 +96,7 @@ class ResonanceTracking(AbstractFeedback):
         count = int(self.high_hz - self.low_hz) + 2
         for number in range(count):
             frequency_hz = self.low_hz + (self.high_hz - self.low_hz) * number / (count - 1)
-            yield Step(Tone(frequency_hz), 0.0, self.record_s, Segment(RESONANCE_LABEL))
+            yield Step(Tone(frequency_hz), 0.0, self.record_s, Segment(SegmentLabel.RESONANCE))
 
     def held_accelerations(self) -> Iterator[tuple[float, float]]:
         """Give the largest level where the search begins."""

@@ -5,6 +5,7 @@ from typing import Literal, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
+from ..recording import SegmentLabel
 from ._feedback import BaseLevel, JumpSearch, Settling
 from ._plan import AbstractFeedback
 from ._preview import SignalPreview, signal_preview
@@ -13,12 +14,8 @@ from ._steps import Segment, Step, Tone
 
 MOST_SETTLED_STEPS = 600
 """Four events a step, and as many again for searches, fit into a recording's table."""
-STEP_LABEL = "step"
-"""Segment of a frequency of the list."""
 GLIDE_TONE_S = 0.1
 """Time at each tone that is only passed on the way to the next frequency [s]."""
-SEARCH_LABEL = "search"
-"""Segment of a frequency that was added to localise a jump."""
 
 
 class SettledSine(FrequencySteps, AbstractFeedback):
@@ -62,7 +59,7 @@ class SettledSine(FrequencySteps, AbstractFeedback):
         """One step for every frequency of the list, without its wait, at the largest setting."""
         for direction, frequencies_hz in self.passes():
             for frequency_hz in frequencies_hz:
-                segment = Segment(STEP_LABEL, {"frequency_hz": frequency_hz, "direction": direction})
+                segment = Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
                 yield Step(Tone(frequency_hz), 0.0, self.record_s, segment)
 
     def held_accelerations(self) -> Iterator[tuple[float, float]]:

@@ -7,6 +7,7 @@ from typing import Literal, Self
 
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
+from ..recording import SegmentLabel
 from ._plan import LOWEST_AMPLITUDE_VPP, AbstractExcitation, FrequencyHz
 from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
@@ -132,7 +133,7 @@ class SineSweep(MovingSine):
     def steps(self) -> Iterator[Step]:
         """One step for every ``step_s``, all of one segment."""
         segment = Segment(
-            "sweep",
+            SegmentLabel.SWEEP,
             {
                 "start_hz": self.start_hz,
                 "stop_hz": self.stop_hz,

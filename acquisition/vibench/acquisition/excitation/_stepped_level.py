@@ -6,6 +6,7 @@ from typing import Literal, Self
 
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
+from ..recording import SegmentLabel
 from ._plan import AbstractExcitation, AmplitudeVpp, FrequencyHz
 from ._preview import SignalPreview, signal_preview
 from ._stepped_sine import MOST_STEPS, Direction
@@ -78,7 +79,7 @@ class SteppedLevel(AbstractExcitation):
                     "direction": direction,
                 }
                 tone = Tone(self.frequency_hz, level_vpp / self.amplitude_vpp)
-                yield Step(tone, self.settle_s, self.record_s, Segment("step", numbers))
+                yield Step(tone, self.settle_s, self.record_s, Segment(SegmentLabel.STEP, numbers))
 
     def preview(self, sample_rate_hz: float) -> SignalPreview:
         """All levels, waits included."""

@@ -9,6 +9,7 @@ from typing import Literal, Self
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from ..host import FrozenModel
+from ..recording import SegmentLabel
 from ._plan import AbstractExcitation, FrequencyHz
 from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
@@ -132,7 +133,7 @@ class SteppedSine(FrequencySteps):
             for frequency_hz in frequencies_hz:
                 # The direction keeps the turning point of a way there and back
                 # from being one segment.
-                segment = Segment("step", {"frequency_hz": frequency_hz, "direction": direction})
+                segment = Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
                 yield Step(Tone(frequency_hz), self.settle_s, self.record_s, segment)
 
     def preview(self, sample_rate_hz: float) -> SignalPreview:

@@ -7,6 +7,8 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..recording import SegmentLabel
+
 Samples = NDArray[np.float64]
 
 
@@ -62,8 +64,7 @@ Play: TypeAlias = Tone | Waveform | Stream
 class Segment:
     """A named stretch of the recording that belongs together in the analysis."""
 
-    label: str
-    """``"realisation"``, ``"sweep"``, ``"dwell"``, ``"step"``, ``"noise"``."""
+    label: SegmentLabel
     numbers: Mapping[str, int | float | str] = field(default_factory=dict)
     """What the analysis must know: ``realisation``, ``repetition_hz``, ``frequency_hz``, ``start_hz`` ..."""
 

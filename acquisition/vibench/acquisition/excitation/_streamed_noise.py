@@ -8,6 +8,7 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
+from ..recording import SegmentLabel
 from ._plan import AbstractExcitation, FrequencyHz
 from ._preview import SignalPreview, signal_preview
 from ._steps import Samples, Segment, Step, Stream
@@ -117,7 +118,7 @@ class StreamedNoise(AbstractExcitation):
     def steps(self) -> Iterator[Step]:
         """One step."""
         band = {"band_start_hz": self.band_start_hz, "band_stop_hz": self.band_stop_hz}
-        yield Step(Stream(self.source), self.settle_s, self.duration_s, Segment("noise", band))
+        yield Step(Stream(self.source), self.settle_s, self.duration_s, Segment(SegmentLabel.NOISE, band))
 
     def preview(self, sample_rate_hz: float) -> SignalPreview:
         """Show the first seconds of it."""

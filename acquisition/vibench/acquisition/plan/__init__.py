@@ -15,8 +15,6 @@ docs/decisions/0014-chains-of-points.md. Feedback: docs/feedback.md.
 
 from ..excitation import (
     KINDS,
-    RESONANCE_LABEL,
-    STEP_LABEL,
     AbstractExcitation,
     Direction,
     Dwell,
@@ -90,8 +88,6 @@ __all__ = [
     "CHECK_S",
     "HUSH_S",
     "KINDS",
-    "RESONANCE_LABEL",
-    "STEP_LABEL",
     "AbstractExcitation",
     "Campaign",
     "Direction",

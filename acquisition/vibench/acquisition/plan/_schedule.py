@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from itertools import takewhile
 from math import ceil, cos, pi
 
-from ..excitation import LEAD_IN_LABEL, AbstractFeedback, Play, Segment, Step, Tone
+from ..excitation import AbstractFeedback, Play, Segment, Step, Tone
+from ..recording import NO_RESULT, SegmentLabel
 from ._measurement import Measurement
 from ._run_state import RunState
 
@@ -47,7 +48,9 @@ def check_phases(measurement: Measurement) -> tuple[Phase, Phase, Phase]:
     planned_vpp = measurement.excitation.amplitude_vpp
     amplitude_vpp = check_amplitude_vpp(planned_vpp)
     tone = Tone(CHECK_FREQUENCY_HZ, amplitude_vpp / planned_vpp)
-    segment = Segment("check", {"frequency_hz": CHECK_FREQUENCY_HZ, "amplitude_vpp": amplitude_vpp})
+    segment = Segment(
+        SegmentLabel.CHECK, {"frequency_hz": CHECK_FREQUENCY_HZ, "amplitude_vpp": amplitude_vpp}
+    )
     return (
         Phase(RunState.CHECKING, None, CHECK_QUIET_S, segment),
         Phase(RunState.CHECKING, tone, CHECK_SETTLE_S, segment),
@@ -93,7 +96,7 @@ def ramp(state: RunState, play: Play, measurement: Measurement) -> Phase:
     return Phase(state, play, measurement.ramp_s, Segment(_RAMP_LABELS[state]))
 
 
-_RAMP_LABELS = {RunState.RAMPING_UP: "ramp_up", RunState.RAMPING_DOWN: "ramp_down"}
+_RAMP_LABELS = {RunState.RAMPING_UP: SegmentLabel.RAMP_UP, RunState.RAMPING_DOWN: SegmentLabel.RAMP_DOWN}
 
 
 def duration_s(measurement: Measurement) -> float:
@@ -118,7 +121,7 @@ def lead_in_s(measurement: Measurement) -> float:
 
 
 def _leads_in(phase: Phase) -> bool:
-    return phase.segment is None or phase.segment.label in (LEAD_IN_LABEL, *_RAMP_LABELS.values())
+    return phase.segment is None or phase.segment.label in NO_RESULT
 
 
 def measured_s(measurement: Measurement) -> float:
