@@ -111,7 +111,8 @@ class Account:
         """Print the reckoning."""
         wall_s, used = self.wall_s, os.times()
         print(
-            f"points: {dict(Counter(each.reason_code.value for each in self._last.values()))} of {len(self._names)}"
+            f"points: {dict(Counter(each.reason_code.value for each in self._last.values()))} "
+            f"of {len(self._names)}"
         )
         print(f"unaccounted for: {sorted(set(self._names) - set(self._last))}")
         for point_result in self._last.values():

@@ -75,7 +75,7 @@ def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
         frequency_high_hz=high_hz,
         duration_s=recording.duration_s,
         size_bytes=size_bytes,
-        bench_check=" ".join(event.text for event in recording.events if event.kind == "check"),
+        bench_check=recording.check_text,
         results=", ".join(recording.result_names),
         operator=str(recording.confirmations.get("operator", "")),
         notes=str(recording.plan.get("notes", "")),

@@ -33,6 +33,7 @@ from ..host import state_folder
 from ..rig import Rig
 from ..stopping import StopSwitch
 from ._bench_report import check_bench
+from ._loop import LASTING, Lasting
 from ._rule import CheckRule
 
 FOLDER = "bench_checks"
@@ -82,7 +83,6 @@ DRIFT_DB = Bounds(0.5, 3.0)
 """Of a gain, from one check to the next on an unchanged configuration."""
 CLOCK_PPM = Bounds(20.0, inf)
 """Of the ratio of two clocks: oscillators age by some ppm a year."""
-SUFFIX = " since last time"
 _DECIBELS, _PPM = "dB", "ppm"
 _ADVICE = (
     "nothing in the configuration has changed: look for a knob, a cable, a loose sensor or a dying amplifier"
@@ -103,29 +103,23 @@ def drift(now: BenchReport, last: CheckResult, at: datetime) -> tuple[Finding, .
 
 
 def _changed(now: Finding, before: Finding, since: str) -> Finding | None:
-    if now.number is None or before.number is None or SUFFIX in now.name:
+    if now.number is None or before.number is None:
         return None
-    match _quantity(now):
-        case "gain in dB":
+    match LASTING.get(now.name):
+        case Lasting.GAIN:
             return _judged(now.name, now.number - before.number, _DECIBELS, DRIFT_DB, since)
-        case "level" if now.number > 0 and before.number > 0:
+        case Lasting.LEVEL if now.number > 0 and before.number > 0:
             change_db = 20 * log10(now.number / before.number)
             return _judged(now.name, change_db, _DECIBELS, DRIFT_DB, since)
-        case "clock":
+        case Lasting.CLOCK:
             return _judged(now.name, now.number - before.number, _PPM, CLOCK_PPM, since)
         case _:
             return None
 
 
-def _quantity(finding: Finding) -> str:
-    if finding.name in ("drive over setting", "base acceleration") or finding.name.endswith("hears the sine"):
-        return "level"
-    return {"amplifier gain": "gain in dB", "drive's clock": "clock"}.get(finding.name, "")
-
-
 def _judged(name: str, change: float, unit: str, bounds: Bounds, since: str) -> Finding:
     finding = judged(
-        f"{name}{SUFFIX}",
+        f"{name} since last time",
         change,
         unit,
         f"0 {unit} within {bounds.well:g} {unit}",

@@ -1,6 +1,8 @@
 """One sine round the loop: whether every channel detects it, as loud as generator, knob and model say."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum, auto
 from math import hypot, log10, pi, sqrt
 
 import numpy as np
@@ -94,6 +96,35 @@ PHASE_DEG = Bounds(45.0, 90.0)
 LEFT_OVER = Bounds(0.02, 0.05)
 """Share of the drive that may be left when the output is off."""
 
+AMPLIFIER_GAIN = "amplifier gain"
+DRIVE_CLOCK = "drive's clock"
+DRIVE_OVER_SETTING = "drive over setting"
+BASE_ACCELERATION = "base acceleration"
+
+
+def hears_name(role: Role) -> str:
+    """Name the finding on whether a channel hears the sine."""
+    return f"{role.value} hears the sine"
+
+
+class Lasting(Enum):
+    """What stays the same from one check to the next."""
+
+    GAIN = auto()
+    """In decibels."""
+    LEVEL = auto()
+    CLOCK = auto()
+
+
+LASTING: Mapping[str, Lasting] = {
+    AMPLIFIER_GAIN: Lasting.GAIN,
+    DRIVE_CLOCK: Lasting.CLOCK,
+    DRIVE_OVER_SETTING: Lasting.LEVEL,
+    BASE_ACCELERATION: Lasting.LEVEL,
+    **{hears_name(role): Lasting.LEVEL for role in Role},
+}
+"""By the name of the finding."""
+
 
 class LoopCheck:
     """What a small sine shows on its way from the generator round to the inputs."""
@@ -141,7 +172,7 @@ class LoopCheck:
             Role.BASE_ACCELERATION: "see whether the accelerometer is plugged in and its current on",
         }.get(role, "see whether the cable is open or shorted, its source plugged in, and the amplifier on")
         return Finding(
-            name=f"{role.value} hears the sine",
+            name=hears_name(role),
             value=f"{fit.amplitude:.3g} +- {fit.uncertainty:.1g} {self._channels[role].unit}",
             expected=f"more than {DETECTED:g} times its uncertainty",
             verdict=Verdict.OK if is_detected else Verdict.FAIL,
@@ -163,7 +194,7 @@ class LoopCheck:
                     "generator.load_ohm (or the divider with daq.channels.attenuation)"
                 )
         return judged(
-            "drive over setting", ratio, "", f"1 within {DRIVE_DEVIATION.well:.0%}", verdict, advice,
+            DRIVE_OVER_SETTING, ratio, "", f"1 within {DRIVE_DEVIATION.well:.0%}", verdict, advice,
             fit.uncertainty / self._terminal_v,
         )  # fmt: skip
 
@@ -185,7 +216,7 @@ class LoopCheck:
         verdict = CLOCK_PPM.verdict(abs(ratio.ppm))
         advice = "compare daq.sample_rate_hz and the reference of what plays; phases over a minute need it"
         expected = f"0 ppm within {CLOCK_PPM.well:g} ppm"
-        return judged("drive's clock", ratio.ppm, "ppm", expected, verdict, advice, ratio.uncertainty_ppm)
+        return judged(DRIVE_CLOCK, ratio.ppm, "ppm", expected, verdict, advice, ratio.uncertainty_ppm)
 
     def _gain(self) -> Finding:
         drive, output = self._fit(Role.DRIVE_VOLTAGE), self._fit(Role.AMPLIFIER_VOLTAGE)
@@ -199,7 +230,7 @@ class LoopCheck:
         verdict = GAIN_DB.verdict(abs(gain_db - expected_db))
         advice = f"set the gain of the {self._rig.amplifier.model} to {self._rig.amplifier.gain_db:g} dB"
         expected = f"{expected_db:.2f} dB within {GAIN_DB.well:g} dB"
-        return judged("amplifier gain", gain_db, "dB", expected, verdict, advice, _db(1 + relative))
+        return judged(AMPLIFIER_GAIN, gain_db, "dB", expected, verdict, advice, _db(1 + relative))
 
     def _base(self) -> Finding:
         fit = self._fit(Role.BASE_ACCELERATION)
@@ -208,7 +239,7 @@ class LoopCheck:
         verdict = BASE_DB.verdict(abs(_db(fit.amplitude / modelled)))
         expected = f"{modelled:.3g} m/s2 within {BASE_DB.well:g} dB"
         advice = "check the accelerometer's sensitivity, the fixture's mass, the amplifier's power and gain"
-        return judged("base acceleration", fit.amplitude, "m/s2", expected, verdict, advice, fit.uncertainty)
+        return judged(BASE_ACCELERATION, fit.amplitude, "m/s2", expected, verdict, advice, fit.uncertainty)
 
     def _sign(self, role: Role, quantity: BaseQuantity) -> Finding:
         """Compare a channel's phase against the drive with the model's: half a turn is a wrong sign."""

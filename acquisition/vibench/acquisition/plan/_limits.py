@@ -58,6 +58,8 @@ class LimitCheck:
     """What to change when it is exceeded."""
     side: LimitSide = LimitSide.AT_MOST
     consequence: Consequence = Consequence.REFUSED
+    load: BaseQuantity | None = None
+    """Of which the value is the peak; None for any other value."""
 
     @property
     def use(self) -> float:
@@ -209,7 +211,7 @@ def _loads(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
     ):
         load = loads[quantity]
         name = f"{what} ({load.cause}, peak)"
-        yield LimitCheck(name, load.peak, limit.value, unit, limit.source, remedy)
+        yield LimitCheck(name, load.peak, limit.value, unit, limit.source, remedy, load=quantity)
     current, volts = loads[BaseQuantity.CURRENT], loads[BaseQuantity.AMPLIFIER_VOLTAGE]
     limiter = rig.amplifier.current_limit_a
     yield LimitCheck(
@@ -217,7 +219,10 @@ def _loads(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
     )
     clip = f"clipping of the {rig.amplifier.model}"
     name = f"the amplifier's voltage ({volts.cause}, peak)"
-    yield LimitCheck(name, volts.peak, rig.amplifier.clip_v, "V", clip, "lower amplitude_vpp or the gain")
+    yield LimitCheck(
+        name, volts.peak, rig.amplifier.clip_v, "V", clip, "lower amplitude_vpp or the gain",
+        load=BaseQuantity.AMPLIFIER_VOLTAGE,
+    )  # fmt: skip
     yield from _inputs(
         rig, measurement.excitation.highest_amplitude_vpp, volts.peak, loads[BaseQuantity.ACCELERATION].peak
     )

@@ -67,6 +67,9 @@ from ._segment_label import (
     NO_RESULT as NO_RESULT,
     SegmentLabel as SegmentLabel,
 )
+from ._tables import (
+    EventKind as EventKind,
+)
 from ._writer import (
     RecordingWriter as RecordingWriter,
     create_recording as create_recording,

@@ -23,7 +23,7 @@ from ._opening import name_now, open_hdf5
 from ._overview import CountOverview, read_overview
 from ._replacing import replace_with_change
 from ._results import ResultArray, SavedResult, Setting, read_results, write_result
-from ._tables import Event, Gap, Segment
+from ._tables import Event, EventKind, Gap, Segment
 
 RESULT_HEAD_BYTES = 100_000
 """More than HDF5 needs to describe one array of a result."""
@@ -93,6 +93,11 @@ class Recording:
     def duration_s(self) -> float:
         """Length of what was recorded [s]."""
         return self.samples / self.sample_rate_hz
+
+    @property
+    def check_text(self) -> str:
+        """What the check of the bench found before the run; empty where nothing was noted."""
+        return " ".join(each.text for each in self.events if each.kind == EventKind.CHECK)
 
     @property
     def roles(self) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 import h5py
@@ -16,6 +17,20 @@ from ._journal import Number
 from ._layout import Table
 
 Columns = dict[str, NDArray[Any]]
+
+
+class EventKind(StrEnum):
+    """What a run notes by itself; feedback and other programs add kinds of their own."""
+
+    PLAYER = "player"
+    CHECK = "check"
+    """What the check of the bench found before the run."""
+    STATE = "state"
+    MARK = "mark"
+    LIMIT = "limit"
+    """Numbers of a limit that was passed, as a JSON object."""
+    END = "end"
+    SILENCE = "silence"
 
 
 @dataclass(frozen=True)

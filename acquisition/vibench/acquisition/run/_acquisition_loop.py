@@ -9,13 +9,10 @@ from typing import Protocol
 from ..errors import LimitExceeded
 from ..excitation import Segment
 from ..instruments import Block, Digitizer
-from ..recording import RecordingState
+from ..recording import EventKind, RecordingState
 
 BLOCK_S = 0.1
 """Longest time between two checks of the limits and of the switch [s]; ten reads a second suit NI-DAQmx."""
-
-LIMIT_KIND = "limit"
-"""Kind of the event that holds the numbers of a limit that was passed, as a JSON object."""
 
 
 class SampleSink(Protocol):
@@ -102,4 +99,4 @@ class AcquisitionLoop:
     def log_limit_trip(self, error: LimitExceeded) -> None:
         """Note the numbers of a limit that was passed, at the sample where it was."""
         if error.trip is not None:
-            self._sink.log(LIMIT_KIND, json.dumps(asdict(error.trip)), error.trip.sample)
+            self._sink.log(EventKind.LIMIT, json.dumps(asdict(error.trip)), error.trip.sample)

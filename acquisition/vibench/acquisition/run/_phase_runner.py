@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from ..excitation import Play, Tone
 from ..instruments import Block
 from ..plan import Phase, RunState
-from ..recording import HOLD_ROOM_S
+from ..recording import HOLD_ROOM_S, EventKind
 from ..stopping import Cause, StopLevel, StopRequest, StopSwitch
 from ._acquisition_loop import BLOCK_S, AcquisitionLoop
 from ._drive import Drive
@@ -65,7 +65,7 @@ class PhaseRunner:
         A harder stop that is asked for on the way takes over. ``ramp_s`` tells how long each takes [s].
         """
         self._look = _look_away
-        self.loop.log("end", reason)
+        self.loop.log(EventKind.END, reason)
         self.loop.cut()
         since_s = self.loop.elapsed_s
         if self._drive.is_playing:
@@ -75,12 +75,12 @@ class PhaseRunner:
                 yield from self._read(wait_s)
                 if (harder := self._switch.harder_than(level)) is not None:
                     level = harder.level
-                    self.loop.log("end", harder.reason)
+                    self.loop.log(EventKind.END, harder.reason)
                     break
         if level is StopLevel.OFF:
             self._drive.cut()
         took_s = self.loop.elapsed_s - since_s
-        self.loop.log("silence", f"{level.value}: {took_s:.3f} s after the stop was seen")
+        self.loop.log(EventKind.SILENCE, f"{level.value}: {took_s:.3f} s after the stop was seen")
 
     def _read(self, duration_s: float, into: list[Block] | None = None) -> Iterator[Progress]:
         for block in self.loop.read_for(duration_s):
@@ -122,7 +122,7 @@ class PhaseRunner:
         """Note what others want to be noted, and tell where the run stands."""
         loop = self.loop
         for text in self._switch.take_marks():
-            loop.log("mark", text)
+            loop.log(EventKind.MARK, text)
         level_vpp = self._drive.setting_vpp
         frequency_hz = self._play.frequency_hz if isinstance(self._play, Tone) else None
         return Progress(
@@ -132,7 +132,7 @@ class PhaseRunner:
     def _enter(self, state: RunState) -> None:
         if state is not self.state:
             self.state = state
-            self.loop.log("state", state.value)
+            self.loop.log(EventKind.STATE, state.value)
 
 
 def _look_away(block: Block) -> None:

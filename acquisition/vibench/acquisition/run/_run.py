@@ -25,7 +25,7 @@ from ..plan import (
     require_within_limits,
     shortest_ramp_s,
 )
-from ..recording import ChannelHeader, Origin, RecordingHeader, create_recording
+from ..recording import ChannelHeader, EventKind, Origin, RecordingHeader, create_recording
 from ..rig import Channel, KnobSheet
 from ..stopping import LEVELS, Cause, StopLevel, StopRequest, StopSwitch
 from ._acquisition_loop import AcquisitionLoop, SampleSink
@@ -231,7 +231,7 @@ class Run(ClosedOnLeaving):
 
     def _played(self, runner: PhaseRunner) -> Iterator[Progress]:
         loop = runner.loop
-        loop.log("player", self._drive.drive_source.value)
+        loop.log(EventKind.PLAYER, self._drive.drive_source.value)
         match self._bench_check:
             case LowLevelCheck.AT_LOW_LEVEL:
                 self._begin(check_phases(self._measurement))
@@ -240,7 +240,7 @@ class Run(ClosedOnLeaving):
                 pause_s = self._drive.pause_s
             case LowLevelCheck.RECENTLY_PASSED:
                 self._begin(known_phases(self._measurement))
-                loop.log("check", "left out: the bench was checked shortly before")
+                loop.log(EventKind.CHECK, "left out: the bench was checked shortly before")
                 pause_s = 0.0
         yield from runner.run_phase(Phase(RunState.ARMED, None, pause_s))
         if self._controller is None:
@@ -278,7 +278,7 @@ class Run(ClosedOnLeaving):
             self._bench.digitizer.sample_rate_hz,
             check_amplitude_vpp(self._measurement.excitation.amplitude_vpp),
         )
-        runner.loop.log("check", figures.text())
+        runner.loop.log(EventKind.CHECK, figures.text())
 
     def _ramped_down_early(self, runner: PhaseRunner, level: StopLevel) -> Iterator[Progress]:
         return runner.ramp_down_early(self._ending.reason, level, self._ramp_s)

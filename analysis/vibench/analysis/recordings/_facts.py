@@ -104,7 +104,7 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
         lost_samples=sum(each.last_sample - each.first_sample + 1 for each in recording.gaps),
         planned_stretches=len(steps),
         whole_stretches=sum(each.is_complete for each in played),
-        check=" ".join(each.text for each in recording.events if each.kind == "check"),
+        check=recording.check_text,
         bench_check=recording.bench_check,
         feedback=tuple(note for _, note in noted),
         feedback_s=tuple(time_s for time_s, _ in noted),

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from vibench.sim import Accuracy
+from vibench.sim import Accuracy, PowerLaw, gong2025
 
 from ._request import Exponent, SimulationRequest
 
@@ -41,8 +41,10 @@ def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
     """Say what a request's accuracy costs and errs, and how long it takes on so many idle cores."""
     level = MEASURED[request.accuracy]
     each_s = request.simulated_s / len(request.models)
-    shortest_s = sum(each_s / (level.power if _is_power(model) else level.free) for model in request.models)
-    longest_s = sum(each_s / (level.power if _is_power(model) else level.chaos) for model in request.models)
+    laws = [gong2025(gap_m=request.gap_m, contact=model).contact for model in request.models]
+    powers = [isinstance(law, PowerLaw) for law in laws]
+    shortest_s = sum(each_s / (level.power if is_power else level.free) for is_power in powers)
+    longest_s = sum(each_s / (level.power if is_power else level.chaos) for is_power in powers)
     on_top = "; the exponent comes on top" if request.exponent is Exponent.COMPUTED else ""
     error = f"{level.response_i_error:.0e}" if level.response_i_error else "none"
     shortest, longest = _time(shortest_s / cores), _time(longest_s / cores)
@@ -61,10 +63,6 @@ def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
         ),
         f"Measured on {MACHINE}.",
     )
-
-
-def _is_power(model: str) -> bool:
-    return model.startswith("power:")
 
 
 def _time(seconds: float) -> str:

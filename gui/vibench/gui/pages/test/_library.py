@@ -6,6 +6,8 @@ from pathlib import Path
 from vibench.acquisition import ConfigurationError, all_shipped, load_campaign, load_toml
 from vibench.acquisition.plan import Measurement
 
+FIRST = "quick"
+"""The campaign whose tests are listed before all others."""
 MOST_OF_ONE = 12
 """Tests listed of one campaign; sweeps make hundreds."""
 
@@ -20,13 +22,12 @@ class NamedTest:
 
 def shipped_tests() -> tuple[NamedTest, ...]:
     """Every measurement of the campaigns that come with vibench."""
-    found: list[NamedTest] = []
-    for path in all_shipped("campaigns"):
-        campaign = load_campaign(path)
-        found += [
-            NamedTest(f"{campaign.name} / {each.name}", each) for each in campaign.measurements[:MOST_OF_ONE]
-        ]
-    return tuple(sorted(found, key=lambda test: (not test.label.startswith("quick"), test.label)))
+    campaigns = [load_campaign(path) for path in all_shipped("campaigns")]
+    return tuple(
+        NamedTest(f"{campaign.name} / {each.name}", each)
+        for campaign in sorted(campaigns, key=lambda each: (each.name != FIRST, each.name))
+        for each in sorted(campaign.measurements[:MOST_OF_ONE], key=lambda each: each.name)
+    )
 
 
 def own_tests(folder: Path) -> tuple[NamedTest, ...]:

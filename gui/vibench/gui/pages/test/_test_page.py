@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 
 from vibench.acquisition import ConfigurationError, save_toml, toml_text, validated
 from vibench.acquisition.plan import LimitCheck, Measurement, MeasurementPreview
-from vibench.acquisition.rig import Rig
+from vibench.acquisition.rig import BaseQuantity, Rig
 from vibench.analysis import MeasurementPrediction
 
 from ...background import LatestRequest
@@ -31,13 +31,20 @@ from ._preview_plots import PredictionPlot, PreviewPlots
 from ._test_form import TestForm
 from ._test_preview import TestPreview, predict_test, preview_test
 
-_SHOWN = ("the stroke", "the table's acceleration", "the force", "the amplifier's voltage")
+_SHOWN = {
+    BaseQuantity.STROKE: "stroke",
+    BaseQuantity.ACCELERATION: "acceleration",
+    BaseQuantity.FORCE: "force",
+    BaseQuantity.AMPLIFIER_VOLTAGE: "amplifier's voltage",
+}
 _UNITS = {"m": ("mm", 1e3), "m/s2": ("m/s²", 1.0), "N": ("N", 1.0), "V": ("V", 1.0)}
 
 
 def summary_text(seen: MeasurementPreview) -> str:
     """Peak stroke, acceleration, force and volts beside their limits; then time and size."""
-    parts = [_load(check) for name in _SHOWN for check in seen.checks if check.what.startswith(name)]
+    parts = [
+        _load(check, name) for load, name in _SHOWN.items() for check in seen.checks if check.load is load
+    ]
     parts.append(f"generator {seen.peak_v:.3g} V peak, crest {seen.crest_factor:.2f}")
     parts.append(f"takes {clock(seen.duration_s)}")
     parts.append(f"file {seen.size_bytes / 1e6:.0f} MB")
@@ -50,9 +57,8 @@ def summary_text(seen: MeasurementPreview) -> str:
     return f"{sign} {broken[0].complaint()}   ·   {said}"
 
 
-def _load(check: LimitCheck) -> str:
+def _load(check: LimitCheck, name: str) -> str:
     unit, factor = _UNITS.get(check.unit, (check.unit, 1.0))
-    name = check.what.partition(" (")[0].removeprefix("the ").removeprefix("table's ")
     return f"{name} {check.value * factor:.3g} of {check.limit * factor:.3g} {unit}"
 
 
