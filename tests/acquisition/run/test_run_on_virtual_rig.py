@@ -105,7 +105,7 @@ def test_a_sweep_arrives_with_the_cycles_of_the_ideal_one(virtual_bench, tmp_pat
 
 def test_the_quick_campaign_is_recorded_without_an_overload(virtual_bench, tmp_path):
     items = run_campaign(virtual_bench, load_campaign(ROOT / "campaigns" / "quick.toml"), tmp_path)
-    assert [point_result.outcome for point_result in items] == [PointOutcome.RECORDED] * 15
+    assert [item.outcome for item in items] == [PointOutcome.RECORDED] * 15
     for item in items:
         with open_recording(item.path) as recording:
             assert recording.state is RecordingState.COMPLETE
