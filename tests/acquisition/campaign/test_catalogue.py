@@ -8,7 +8,8 @@ import pytest
 from vibench.acquisition import Overload, RecordingError, run_campaign
 from vibench.acquisition.campaign import Refresh, _catalogue as catalogue_module, list_recordings
 from vibench.acquisition.campaign._catalogue import CATALOGUE_NAME
-from vibench.acquisition.plan import Campaign, Dwell, Measurement, RunState, SineSweep
+from vibench.acquisition.campaign._catalogue_entry import _band
+from vibench.acquisition.plan import Campaign, Dwell, Measurement, ResonanceTracking, RunState, SineSweep
 from vibench.acquisition.run._run import Run
 
 DWELL = Measurement(
@@ -55,6 +56,13 @@ def test_it_says_what_when_and_how_large_also_of_folders_in_the_folder(folder):
     assert dwell.duration_s == pytest.approx(0.6 + 0.2 + 0.1 + 0.2 + 0.2)
     assert "expected" in dwell.bench_check
     assert dwell.started_utc < sweep.started_utc
+
+
+def test_a_tracked_resonance_is_listed_with_the_range_of_its_search():
+    plan = ResonanceTracking(
+        amplitude_vpp=1, start_hz=262, low_hz=240, high_hz=290, accelerations_m_per_s2=(0.3,)
+    )
+    assert _band(plan.model_dump()) == (240, 290)
 
 
 def test_only_what_is_new_or_changed_is_read_again(folder, reads):

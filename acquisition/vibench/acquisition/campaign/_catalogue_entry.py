@@ -10,6 +10,7 @@ from ..recording import PART_SUFFIX, Recording, RecordingState, open_recording
 UNREADABLE = "unreadable"
 """State of a file that is no recording, or damaged; its reason says what is wrong."""
 GOOD = "good"
+_FREQUENCIES = ("frequency_hz", "start_hz", "stop_hz", "low_hz", "high_hz", "band_start_hz", "band_stop_hz")
 
 
 @dataclass(frozen=True)
@@ -109,11 +110,7 @@ def _unreadable(where: str, reason: str, size_bytes: int) -> CatalogueEntry:
 def _band(excitation: dict[str, Any]) -> tuple[float | None, float | None]:
     """Lowest and highest frequency of an excitation, as its plan names them."""
     grid = excitation.get("grid") or {}
-    named = [
-        table.get(key)
-        for table in (excitation, grid)
-        for key in ("frequency_hz", "start_hz", "stop_hz", "band_start_hz", "band_stop_hz")
-    ]
+    named = [table.get(key) for table in (excitation, grid) for key in _FREQUENCIES]
     found = [
         each for each in (*named, *excitation.get("frequencies_hz", ())) if isinstance(each, int | float)
     ]
