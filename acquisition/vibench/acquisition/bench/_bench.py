@@ -8,10 +8,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from ..drivers import AFG1022X, DaqmxDigitizer, DaqmxOutput
 from ..errors import AcquisitionError
 from ..host import chosen
-from ..instruments import Identity
+from ..instruments import AnalogOutput, Identity
 from ..rig import (
     CalibrationRule,
     Channel,
@@ -24,6 +23,8 @@ from ..rig import (
     confirm_simulated,
     load_rig,
 )
+from ._instrument_drivers import DAQ_DRIVERS, GENERATOR_DRIVERS
+from ._protocol import CountingDigitizer, VerifiedGenerator
 from ._result import CheckResult
 from ._rig_power import RigPower
 
@@ -45,9 +46,9 @@ class Bench:
     def __init__(
         self,
         rig: Rig,
-        generator: AFG1022X,
-        digitizer: DaqmxDigitizer,
-        output: DaqmxOutput | None,
+        generator: VerifiedGenerator,
+        digitizer: CountingDigitizer,
+        output: AnalogOutput | None,
         confirmations: KnobSheet,
         power: RigPower,
         closing: ExitStack,
@@ -140,10 +141,10 @@ def open_bench(
 def _opened(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: ExitStack) -> Bench:
     power = closing.enter_context(RigPower(rig)) if power is None else power
     connected = power.connected
-    digitizer = DaqmxDigitizer.open(connected)
+    digitizer = DAQ_DRIVERS[connected.daq.driver].digitizer(connected)
     closing.callback(digitizer.close)
     output = _output(connected, digitizer, closing)
-    generator = AFG1022X.open(connected.generator)
+    generator = GENERATOR_DRIVERS[connected.generator.driver](connected.generator)
     closing.callback(generator.close)
     closing.callback(generator.stop)  # the last to enter is the first to happen
     if output is not None:
@@ -153,11 +154,11 @@ def _opened(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: 
     return Bench(rig, generator, digitizer, output, sheet, power, closing)
 
 
-def _output(rig: Rig, digitizer: DaqmxDigitizer, closing: ExitStack) -> DaqmxOutput | None:
+def _output(rig: Rig, digitizer: CountingDigitizer, closing: ExitStack) -> AnalogOutput | None:
     config, physical = rig.daq.output, rig.daq.output_channel
     if config is None or physical is None:
         return None
-    output = DaqmxOutput.open(physical, config, digitizer)
+    output = DAQ_DRIVERS[rig.daq.driver].output(physical, config, digitizer)
     closing.callback(output.close)
     return output
 

@@ -4,8 +4,19 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from ..instruments import AnalogOutput, Digitizer, FunctionGenerator, Identity
-from ..rig import Channel, KnobSheet, Rig
+from ..rig import Channel, Knob, KnobSheet, Rig
 from ._result import CheckResult
+
+
+class VerifiedGenerator(FunctionGenerator, Protocol):
+    """A generator whose settings are read back."""
+
+    @property
+    def unconfirmed(self) -> tuple[Knob, ...]:
+        """Settings that could be neither made nor read remotely: the operator must confirm them."""
+
+    def measured_latency_s(self) -> float:
+        """How long one verified change of amplitude takes: the floor of any emergency stop [s]."""
 
 
 class CountingDigitizer(Digitizer, Protocol):
