@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import load_campaign
-from vibench.acquisition.plan import excited_band_hz, preview_measurement
+from vibench.acquisition.plan import preview_measurement
 from vibench.acquisition.plan._measurement_preview import MOST_SAMPLES, SPECTRUM_POINTS
 from vibench.acquisition.rig import load_rig
 
@@ -56,4 +56,4 @@ def test_a_long_sweep_is_shown_from_a_bounded_number_of_samples(rig):
     ("name", "band_hz"), [("noise", (20, 800)), ("sweep", (220, 310)), ("dwell", (130, 520))]
 )
 def test_the_band_is_what_is_excited(name, band_hz):
-    assert excited_band_hz(QUICK[name].excitation) == band_hz
+    assert QUICK[name].excitation.band_hz == band_hz

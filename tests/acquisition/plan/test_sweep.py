@@ -7,6 +7,7 @@ from vibench.acquisition.plan import Campaign, RunState, phases, predicted_loads
 from vibench.acquisition.rig import BaseQuantity
 
 DWELL = {"kind": "dwell", "settle_s": 1.0, "duration_s": 2.0}
+SWEEP = {"kind": "sine_sweep", "start_hz": 300, "stop_hz": 200, "duration_s": 5}
 
 
 def campaign(**sweep):
@@ -47,7 +48,7 @@ class TestOrder:
         plan = campaign(
             measurement={"excitation": {"amplitude_vpp": 1.0, "settle_s": 0.5}},
             excitations=[
-                {"kind": "sine_sweep", "start_hz": 300, "stop_hz": 200, "duration_s": 5},
+                SWEEP,
                 {"kind": "stepped_sine", "frequencies_hz": [200, 210]},
             ],
             direction=["up", "down"],
@@ -203,7 +204,7 @@ class TestChains:
         ),
         (
             {
-                "measurement": {"excitation": {"kind": "sine_sweep"}},
+                "measurement": {"excitation": SWEEP},
                 "amplitude_vpp": [1, 2],
                 "continue_from_previous": "amplitude_vpp",
             },

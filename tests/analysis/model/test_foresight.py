@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import load_campaign
-from vibench.acquisition.plan import Measurement, SineSweep, predicted_loads
+from vibench.acquisition.plan import Measurement, SineSweep, base_motion, predicted_loads
 from vibench.acquisition.rig import BaseQuantity, load_rig
 from vibench.analysis import predict_measurement
-from vibench.analysis.model._measurement_prediction import bands_of, base_amplitude_m
+from vibench.analysis.model._measurement_prediction import bands_of
 
 ROOT = Path(__file__).resolve().parents[3]
 QUICK = {each.name: each for each in load_campaign(ROOT / "campaigns" / "quick.toml").measurements}
@@ -28,17 +28,17 @@ def test_no_point_inside_is_no_band():
 
 def test_the_amplitude_of_a_dwell_is_the_stroke_of_its_plan():
     measurement = QUICK["dwell"]
-    amplitude_m, _ = base_amplitude_m(measurement, RIG, np.array([260.0]))
-    assert amplitude_m[0] == pytest.approx(
+    base = base_motion(measurement.excitation, RIG, np.array([260.0]))
+    assert base.amplitude_m[0] == pytest.approx(
         predicted_loads(measurement.excitation, RIG)[BaseQuantity.STROKE].peak
     )
 
 
 def test_noise_is_stood_for_by_a_sine_of_the_same_rms():
-    amplitude_m, basis = base_amplitude_m(QUICK["noise"], RIG, np.array([100.0, 200.0]))
+    base = base_motion(QUICK["noise"].excitation, RIG, np.array([100.0, 200.0]))
     rms_m = predicted_loads(QUICK["noise"].excitation, RIG)[BaseQuantity.STROKE].rms
-    assert amplitude_m == pytest.approx(np.sqrt(2) * rms_m)
-    assert "rms" in basis
+    assert base.amplitude_m == pytest.approx(np.sqrt(2) * rms_m)
+    assert "rms" in base.basis
 
 
 def lowest_hz(start_hz, stop_hz, amplitude_vpp):

@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel
 
 from vibench.acquisition import load_campaign
-from vibench.acquisition.plan import KINDS, Measurement
+from vibench.acquisition.plan import EXCITATION_KINDS, Measurement
 from vibench.gui.forms import ModelForm
 
 CAMPAIGNS = Path(__file__).resolve().parents[3] / "campaigns"
@@ -42,7 +42,7 @@ def leaves(form):
             yield from leaves(inner)
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS))
+@pytest.mark.parametrize("kind", sorted(EXCITATION_KINDS))
 def test_every_field_of_every_kind_is_there_named_and_labelled(form, kind):
     example = next((m for m in MEASUREMENTS.values() if m.excitation.kind == kind), None)
     excitation = form.editors["excitation"]

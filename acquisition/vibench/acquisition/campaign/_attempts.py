@@ -1,6 +1,6 @@
 """One point of a campaign until it is done or its attempts are used up, with a cooling pause before each."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import partial
 from pathlib import Path
 from time import monotonic
@@ -8,7 +8,7 @@ from time import monotonic
 from ..bench import RunBench
 from ..errors import AcquisitionError, InstrumentError
 from ..plan import Point, Retryable, RetryPolicy, RunState
-from ..recording import NO_RESULT, open_recording
+from ..recording import open_recording
 from ..run import BLOCK_S, Outcome, Progress, run_measurement
 from ..stopping import StopSwitch
 from ._attempt_files import next_attempt
@@ -139,7 +139,7 @@ class Attempts:
             return PointResult(
                 point.name, PointOutcome.STOPPED, outcome.path, outcome.reason, ReasonCode.STOPPED
             )
-        over = _over_range(outcome.path)
+        over = _over_range(outcome.path, point.measurement.excitation.result_labels)
         reason_code = ReasonCode.OVER_RANGE if over else ReasonCode.CARRIED_OUT
         reason = f"{outcome.reason}; {over}" if over else outcome.reason
         self._journal.end(point.name, JournalPointState.DONE, reason_code, reason)
@@ -200,10 +200,10 @@ class Attempts:
         self._say(CampaignEvent(kind, text, {"point": point.name, "file": path.name}))
 
 
-def _over_range(path: Path) -> str:
+def _over_range(path: Path, labels: Collection[str]) -> str:
     """Say which inputs were near full scale while it counted; empty when none was."""
     with open_recording(path) as recording:
-        counting = [each for each in recording.segments if each.label not in NO_RESULT]
+        counting = [each for each in recording.segments if each.label in labels]
         roles = {
             overload.channel: None
             for overload in recording.overloads

@@ -66,11 +66,7 @@ def estimate_campaign(
         kept=len(planned) - len(missing),
         duration_s=sum(durations_s) + rest_s,
         rest_s=rest_s,
-        lead_in_s=sum(
-            each.excitation.lead_s * len(each.excitation.lead_in)
-            for each in missing
-            if each.excitation.kind == "dwell"
-        ),
+        lead_in_s=sum(each.excitation.lead_in_s for each in missing),
         largest_bytes=round(max(durations_s, default=0.0) * bytes_per_s),
         total_bytes=round(sum(durations_s) * bytes_per_s * WRITTEN_SHARE),
         free_bytes=shutil.disk_usage(_existing_part(folder)).free,

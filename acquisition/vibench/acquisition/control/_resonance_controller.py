@@ -197,7 +197,7 @@ _FURTHEST = 1.5
 
 def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]:
     """Lock on to the resonance at every level, record there, go on to the next level from there."""
-    yield from started(loop, plan.start_hz, plan.base_level(0))
+    yield from started(loop, plan.start_hz, plan.held_levels[0])
     frequency_hz = plan.start_hz
     for number in range(len(plan.accelerations_m_per_s2)):
         frequency_hz = yield from _tracked(loop, plan, number, frequency_hz)
@@ -206,7 +206,7 @@ def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]
 
 
 def _tracked(loop: SineLoop, plan: ResonanceTracking, number: int, start_hz: float) -> Controller[float]:
-    level = plan.base_level(number)
+    level = plan.held_levels[number]
     settling_controller = SettlingController(loop, plan.settling, level)
     search = PhaseSearch(plan.low_hz, plan.high_hz, plan.widest_step_hz)
     states: list[SettledState] = []

@@ -1,7 +1,15 @@
+from ._base_level import (
+    HeldAcceleration as HeldAcceleration,
+    RelativeSetting as RelativeSetting,
+    RmsSetting as RmsSetting,
+)
+from ._direction import (
+    Approach as Approach,
+    Direction as Direction,
+)
 from ._dwell import (
     MOST_LEAD_INS as MOST_LEAD_INS,
     Dwell as Dwell,
-    LeadIn as LeadIn,
 )
 from ._feedback import (
     BaseLevel as BaseLevel,
@@ -14,8 +22,10 @@ from ._held_sweep import (
     HeldSweep as HeldSweep,
 )
 from ._kinds import (
-    KINDS as KINDS,
+    EXCITATION_KINDS as EXCITATION_KINDS,
     Excitation as Excitation,
+    ExcitationKind as ExcitationKind,
+    excitation_text as excitation_text,
 )
 from ._multisine import (
     held_lines as held_lines,
@@ -30,6 +40,8 @@ from ._plan import (
     LOWEST_AMPLITUDE_VPP as LOWEST_AMPLITUDE_VPP,
     AbstractExcitation as AbstractExcitation,
     AbstractFeedback as AbstractFeedback,
+    Family as Family,
+    LeadIn as LeadIn,
 )
 from ._preview import (
     SignalPreview as SignalPreview,
@@ -42,13 +54,13 @@ from ._settled_sine import (
     SettledSine as SettledSine,
 )
 from ._sine_sweep import (
+    Hold as Hold,
     SineSweep as SineSweep,
 )
 from ._stepped_level import (
     SteppedLevel as SteppedLevel,
 )
 from ._stepped_sine import (
-    Direction as Direction,
     FrequencySteps as FrequencySteps,
     SteppedSine as SteppedSine,
 )

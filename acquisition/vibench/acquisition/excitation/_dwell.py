@@ -1,13 +1,13 @@
 """One sine, held: for the long look at one frequency."""
 
 from collections.abc import Iterator
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from ..host import FrozenModel
 from ..recording import SegmentLabel
-from ._plan import AbstractExcitation, AmplitudeVpp, FrequencyHz
+from ._base_level import RelativeSetting
+from ._plan import Family, FixedSine, LeadIn
 from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
@@ -15,14 +15,7 @@ MOST_LEAD_INS = 1000
 """Tones that may be passed on the way to one dwell."""
 
 
-class LeadIn(FrozenModel):
-    """A tone that is passed on the way to a dwell."""
-
-    frequency_hz: FrequencyHz
-    amplitude_vpp: AmplitudeVpp
-
-
-class Dwell(AbstractExcitation):
+class Dwell(FixedSine):
     """A sine at one frequency, recorded after it has settled.
 
     An impacting specimen may have several motions at one frequency, and which of them it takes depends
@@ -30,8 +23,9 @@ class Dwell(AbstractExcitation):
     in phase, recorded as a segment of its own that no result is taken from.
     """
 
+    family: ClassVar[Family] = Family.DWELL
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.DWELL,)
     kind: Literal["dwell"] = "dwell"
-    frequency_hz: FrequencyHz
     settle_s: NonNegativeFloat = 3.0
     """Wait until the transient has died out [s]."""
     duration_s: PositiveFloat
@@ -43,13 +37,30 @@ class Dwell(AbstractExcitation):
 
     def next_to(self, frequency_hz: float, amplitude_vpp: float | None = None) -> Self:
         """Plan the dwell to which this one leads: the specimen comes through this one, along its branch."""
-        passed = LeadIn(frequency_hz=self.frequency_hz, amplitude_vpp=self.amplitude_vpp)
         changed = {
-            "lead_in": (*self.lead_in, passed),
+            "lead_in": (*self.lead_in, self._tone),
             "frequency_hz": frequency_hz,
             "amplitude_vpp": self.amplitude_vpp if amplitude_vpp is None else amplitude_vpp,
         }
         return type(self).model_validate(self.model_dump() | changed)
+
+    def led(self, way: tuple[LeadIn, ...], lead_s: float) -> tuple[Self, LeadIn]:
+        """Lead the specimen through a way to this dwell, in place of the way of its own."""
+        return self.model_copy(update={"lead_in": way, "lead_s": lead_s}), self._tone
+
+    @property
+    def _tone(self) -> LeadIn:
+        return LeadIn(frequency_hz=self.frequency_hz, amplitude_vpp=self.amplitude_vpp)
+
+    def level_at(self, frequency_hz: float) -> RelativeSetting:
+        """Give the setting, the same at every frequency."""
+        del frequency_hz
+        return RelativeSetting(1.0)
+
+    @property
+    def lead_in_s(self) -> float:
+        """Time of all tones of the lead-in [s]."""
+        return len(self.lead_in) * self.lead_s
 
     @property
     def highest_frequency_hz(self) -> float:
@@ -64,7 +75,7 @@ class Dwell(AbstractExcitation):
     @property
     def playing_s(self) -> float:
         """Lead-in, settling and recording [s]."""
-        return len(self.lead_in) * self.lead_s + self.settle_s + self.duration_s
+        return self.lead_in_s + self.settle_s + self.duration_s
 
     def steps(self) -> Iterator[Step]:
         """List the tones of the lead-in, as one segment, then the dwell."""

@@ -69,6 +69,13 @@ class BaseLevel(FrozenModel):
         """The motion that is held: ``"acceleration"`` or ``"displacement"``."""
         return "acceleration" if self.displacement_m is None else "displacement"
 
+    @property
+    def text(self) -> str:
+        """The level with its unit."""
+        if self.displacement_m is not None:
+            return f"{1e6 * self.displacement_m:g} µm"
+        return f"{self.acceleration_m_per_s2:g} m/s²"
+
     def acceleration_at(self, frequency_hz: float) -> float:
         """Acceleration amplitude to be held [m/s2]."""
         if self.displacement_m is not None:

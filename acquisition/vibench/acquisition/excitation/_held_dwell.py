@@ -1,23 +1,23 @@
 """One sine, held, with the base kept at a level while the specimen does what it likes."""
 
 from collections.abc import Iterator
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import PositiveFloat
 
 from ..recording import SegmentLabel
 from ._feedback import BaseLevel, Settling
-from ._plan import AbstractFeedback, FrequencyHz
+from ._plan import AbstractFeedback, Family, FixedSine
 from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
 
-class HeldDwell(AbstractFeedback):
+class HeldDwell(FixedSine, AbstractFeedback):
     """A dwell whose base motion is measured and held, before the recording and while it lasts."""
 
+    family: ClassVar[Family] = Family.DWELL
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.DWELL,)
     kind: Literal["held_dwell"] = "held_dwell"
-    frequency_hz: FrequencyHz
-    """Frequency of the sine [Hz]."""
     base_level: BaseLevel
     """Level of the base to be held."""
     settling: Settling = Settling()
@@ -28,9 +28,9 @@ class HeldDwell(AbstractFeedback):
     """How often the level is looked at, and corrected if need be, while recording [s]."""
 
     @property
-    def highest_frequency_hz(self) -> float:
-        """The frequency itself [Hz]."""
-        return self.frequency_hz
+    def held_levels(self) -> tuple[BaseLevel, ...]:
+        """The one level."""
+        return (self.base_level,)
 
     @property
     def playing_s(self) -> float:
@@ -45,10 +45,6 @@ class HeldDwell(AbstractFeedback):
     def steps(self) -> Iterator[Step]:
         """One step, without its wait, at the largest setting."""
         yield Step(Tone(self.frequency_hz), 0.0, self.duration_s, self.segment)
-
-    def held_accelerations(self) -> Iterator[tuple[float, float]]:
-        """Give the level at the dwell's frequency."""
-        yield self.frequency_hz, self.base_level.acceleration_at(self.frequency_hz)
 
     def preview(self, sample_rate_hz: float) -> SignalPreview:
         """Show the recorded part at the largest setting."""

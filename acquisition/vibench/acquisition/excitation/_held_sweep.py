@@ -29,6 +29,11 @@ class HeldSweep(MovingSine, AbstractFeedback):
     """When the sweep begins to move."""
 
     @property
+    def held_levels(self) -> tuple[BaseLevel, ...]:
+        """The one level."""
+        return (self.base_level,)
+
+    @property
     def playing_s(self) -> float:
         """The longest wait at the start, and the sweep [s]."""
         return self.settling.longest_wait_s + self.duration_s
@@ -53,11 +58,6 @@ class HeldSweep(MovingSine, AbstractFeedback):
         segment = self.segment
         for mean_hz, duration_s in self.mean_steps():
             yield Step(Tone(mean_hz), 0.0, duration_s, segment)
-
-    def held_accelerations(self) -> Iterator[tuple[float, float]]:
-        """Give the level at every step."""
-        for mean_hz, _ in self.mean_steps():
-            yield mean_hz, self.base_level.acceleration_at(mean_hz)
 
     def preview(self, sample_rate_hz: float) -> SignalPreview:
         """Show the whole sweep at the largest setting."""

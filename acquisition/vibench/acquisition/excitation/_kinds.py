@@ -1,6 +1,9 @@
 """All kinds of excitation, told apart by the word ``kind`` in a file."""
 
-from typing import Annotated, TypeAlias
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Annotated, TypeAlias, get_args
 
 from pydantic import Field
 
@@ -9,7 +12,7 @@ from ._held_dwell import HeldDwell
 from ._held_sweep import HeldSweep
 from ._multisine_noise import MultisineNoise
 from ._odd_multisine import OddMultisine
-from ._plan import AbstractExcitation
+from ._plan import AbstractExcitation, AbstractFeedback
 from ._resonance_tracking import ResonanceTracking
 from ._settled_sine import SettledSine
 from ._sine_sweep import SineSweep
@@ -32,18 +35,35 @@ Excitation: TypeAlias = Annotated[
     Field(discriminator="kind"),
 ]
 
-_PLANS: tuple[type[AbstractExcitation], ...] = (
-    MultisineNoise,
-    StreamedNoise,
-    SineSweep,
-    Dwell,
-    SteppedSine,
-    SteppedLevel,
-    OddMultisine,
-    SettledSine,
-    HeldSweep,
-    HeldDwell,
-    ResonanceTracking,
+
+@dataclass(frozen=True)
+class ExcitationKind:
+    """What a kind of excitation is to whoever meets its word in a file."""
+
+    plan: type[AbstractExcitation]
+
+    @property
+    def word(self) -> str:
+        """What a file gives as ``kind``."""
+        return str(self.plan.model_fields["kind"].default)
+
+    @property
+    def label(self) -> str:
+        """What a person reads."""
+        return self.word.replace("_", " ")
+
+    @property
+    def is_feedback(self) -> bool:
+        """Whether its next step depends on what was measured."""
+        return issubclass(self.plan, AbstractFeedback)
+
+
+EXCITATION_KINDS: Mapping[str, ExcitationKind] = MappingProxyType(
+    {kind.word: kind for kind in map(ExcitationKind, get_args(get_args(Excitation)[0]))}
 )
-KINDS = frozenset(str(plan.model_fields["kind"].default) for plan in _PLANS)
-"""The words that a file may give as ``kind``."""
+"""A row for each plan of the union, which is written out for whoever checks types."""
+
+
+def excitation_text(excitation: Excitation) -> str:
+    """Say in words what is played, and how strongly."""
+    return f"{EXCITATION_KINDS[excitation.kind].label}, {excitation.level_text}"

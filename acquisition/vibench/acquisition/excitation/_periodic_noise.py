@@ -2,25 +2,22 @@
 
 from abc import abstractmethod
 from collections.abc import Iterator
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from ..recording import SegmentLabel
+from ._band_noise import BandNoise
 from ._multisine import Lines, band_lines, flat_periods, require_playable
-from ._plan import AbstractExcitation, FrequencyHz
 from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Waveform
 
 
-class PeriodicNoise(AbstractExcitation):
+class PeriodicNoise(BandNoise):
     """Whole periods of flat lines with random phases, one waveform for every realisation."""
 
-    band_start_hz: FrequencyHz
-    """Lowest frequency of the band [Hz]."""
-    band_stop_hz: FrequencyHz
-    """Highest frequency of the band [Hz]."""
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.REALISATION,)
     repetition_hz: PositiveFloat = 1.0
     """Periods per second, and the distance of the harmonics [Hz]."""
     realisations: PositiveInt = 10
@@ -44,18 +41,8 @@ class PeriodicNoise(AbstractExcitation):
 
     @model_validator(mode="after")
     def _band_fits_the_memory(self) -> Self:
-        if self.band_stop_hz <= self.band_start_hz:
-            raise ValueError(
-                f"band_stop_hz = {self.band_stop_hz:g} is not above band_start_hz = {self.band_start_hz:g}; "
-                "give the band from low to high"
-            )
         require_playable(self.candidates, self.band_stop_hz, self.repetition_hz)
         return self
-
-    @property
-    def highest_frequency_hz(self) -> float:
-        """The upper edge of the band [Hz]."""
-        return self.band_stop_hz
 
     @property
     def playing_s(self) -> float:

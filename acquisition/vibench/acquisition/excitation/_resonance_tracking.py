@@ -1,13 +1,13 @@
 """A sine that seeks the phase resonance of a mode and stays on it, level after level."""
 
 from collections.abc import Iterator
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
 from ..recording import SegmentLabel
 from ._feedback import BaseLevel, Settling
-from ._plan import AbstractFeedback, FrequencyHz
+from ._plan import AbstractFeedback, Family, FrequencyHz
 from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
@@ -21,6 +21,8 @@ class ResonanceTracking(AbstractFeedback):
     is linear.
     """
 
+    family: ClassVar[Family] = Family.STEPPED
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.RESONANCE,)
     kind: Literal["resonance_tracking"] = "resonance_tracking"
     start_hz: FrequencyHz
     """Where the search begins; closer to this mode than to any other [Hz]."""
@@ -59,6 +61,11 @@ class ResonanceTracking(AbstractFeedback):
         return self
 
     @property
+    def band_hz(self) -> tuple[float, float]:
+        """The range of the search [Hz]."""
+        return self.low_hz, self.high_hz
+
+    @property
     def highest_frequency_hz(self) -> float:
         """The upper end of the range [Hz]."""
         return self.high_hz
@@ -69,10 +76,12 @@ class ResonanceTracking(AbstractFeedback):
         tries_s = (self.most_tries + 2 * self.flank_pairs) * self.settling.longest_wait_s
         return len(self.accelerations_m_per_s2) * (tries_s + self.record_s)
 
-    def base_level(self, number: int) -> BaseLevel:
-        """Give one of the levels as what is held."""
-        return BaseLevel(
-            acceleration_m_per_s2=self.accelerations_m_per_s2[number], tolerance=self.level_tolerance
+    @property
+    def held_levels(self) -> tuple[BaseLevel, ...]:
+        """All levels, in the order played."""
+        return tuple(
+            BaseLevel(acceleration_m_per_s2=each, tolerance=self.level_tolerance)
+            for each in self.accelerations_m_per_s2
         )
 
     def segment(self, number: int, frequency_hz: float) -> Segment:
@@ -97,10 +106,6 @@ class ResonanceTracking(AbstractFeedback):
         for number in range(count):
             frequency_hz = self.low_hz + (self.high_hz - self.low_hz) * number / (count - 1)
             yield Step(Tone(frequency_hz), 0.0, self.record_s, Segment(SegmentLabel.RESONANCE))
-
-    def held_accelerations(self) -> Iterator[tuple[float, float]]:
-        """Give the largest level where the search begins."""
-        yield self.start_hz, max(self.accelerations_m_per_s2)
 
     def preview(self, sample_rate_hz: float) -> SignalPreview:
         """Show the recorded parts where the search begins, at the largest setting."""

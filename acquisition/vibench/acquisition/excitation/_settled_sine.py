@@ -1,7 +1,7 @@
 """Sines one after the other, each recorded when its motion has settled, whatever kind of motion that is."""
 
 from collections.abc import Iterator
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
@@ -25,6 +25,7 @@ class SettledSine(FrequencySteps, AbstractFeedback):
     waiting time, level of the base, where the branch came from) stands in the recording beside it.
     """
 
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP, SegmentLabel.SEARCH)
     kind: Literal["settled_sine"] = "settled_sine"
     settling: Settling = Settling()
     base_level: BaseLevel | None = None
@@ -47,6 +48,11 @@ class SettledSine(FrequencySteps, AbstractFeedback):
         return self
 
     @property
+    def held_levels(self) -> tuple[BaseLevel, ...]:
+        """The one level, or none."""
+        return () if self.base_level is None else (self.base_level,)
+
+    @property
     def playing_s(self) -> float:
         """All steps with the longest waits, and all searches [s]."""
         passes = sum(1 for _ in self.passes())
@@ -61,12 +67,6 @@ class SettledSine(FrequencySteps, AbstractFeedback):
             for frequency_hz in frequencies_hz:
                 segment = Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
                 yield Step(Tone(frequency_hz), 0.0, self.record_s, segment)
-
-    def held_accelerations(self) -> Iterator[tuple[float, float]]:
-        """Give the level at every frequency of the list; none without a level."""
-        if self.base_level is not None:
-            for frequency_hz in self.rising_hz:
-                yield frequency_hz, self.base_level.acceleration_at(frequency_hz)
 
     def preview(self, sample_rate_hz: float) -> SignalPreview:
         """All steps of the list, waits left out, at the largest setting."""

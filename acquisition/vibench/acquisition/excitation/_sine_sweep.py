@@ -3,12 +3,14 @@
 from collections.abc import Iterator
 from enum import StrEnum
 from math import ceil, expm1, log
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from ..recording import SegmentLabel
-from ._plan import LOWEST_AMPLITUDE_VPP, AbstractExcitation, FrequencyHz
+from ._base_level import RelativeSetting
+from ._direction import Approach, Direction
+from ._plan import LOWEST_AMPLITUDE_VPP, AbstractExcitation, Family, FrequencyHz
 from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
@@ -50,6 +52,8 @@ class MovingSine(AbstractExcitation):
     recorded drive.
     """
 
+    family: ClassVar[Family] = Family.SWEEP
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.SWEEP,)
     start_hz: FrequencyHz
     """Frequency at the beginning [Hz]; above ``stop_hz`` for a sweep downwards."""
     stop_hz: FrequencyHz
@@ -74,6 +78,27 @@ class MovingSine(AbstractExcitation):
                 "give a shorter step"
             )
         return self
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """The two ends, the lower one first [Hz]."""
+        return min(self.start_hz, self.stop_hz), max(self.start_hz, self.stop_hz)
+
+    @property
+    def approach(self) -> Approach:
+        """From the side on which the sweep starts."""
+        return Approach.UP if self.start_hz < self.stop_hz else Approach.DOWN
+
+    def turned(self, direction: Direction) -> Self | None:
+        """Go from the lower end to the upper one, or back; a sweep does not turn on its way."""
+        low_hz, high_hz = self.band_hz
+        match direction:
+            case Direction.UP:
+                return self.model_copy(update={"start_hz": low_hz, "stop_hz": high_hz})
+            case Direction.DOWN:
+                return self.model_copy(update={"start_hz": high_hz, "stop_hz": low_hz})
+            case _:
+                return None
 
     @property
     def highest_frequency_hz(self) -> float:
@@ -124,6 +149,10 @@ class SineSweep(MovingSine):
     def level(self, frequency_hz: float) -> float:
         """Amplitude at a frequency as a fraction of ``amplitude_vpp``."""
         return float((frequency_hz / self.highest_frequency_hz) ** self.hold.power)
+
+    def level_at(self, frequency_hz: float) -> RelativeSetting:
+        """Give the setting, as it follows the frequency."""
+        return RelativeSetting(self.level(frequency_hz))
 
     @property
     def playing_s(self) -> float:

@@ -2,18 +2,20 @@
 
 from collections.abc import Iterator
 from math import floor
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from ..recording import SegmentLabel
-from ._plan import AbstractExcitation, AmplitudeVpp, FrequencyHz
+from ._base_level import RelativeSetting
+from ._direction import Direction
+from ._plan import AmplitudeVpp, Family, FixedSine
 from ._preview import SignalPreview, signal_preview
-from ._stepped_sine import MOST_STEPS, Direction
+from ._stepped_sine import MOST_STEPS
 from ._steps import Segment, Step, Tone
 
 
-class SteppedLevel(AbstractExcitation):
+class SteppedLevel(FixedSine):
     """A sine whose level goes up and down in steps; each is played until it has settled, then recorded.
 
     The phase goes on from one level to the next, so that the specimen keeps to its branch: the level at
@@ -21,8 +23,9 @@ class SteppedLevel(AbstractExcitation):
     ``amplitude_vpp`` is the highest level.
     """
 
+    family: ClassVar[Family] = Family.STEPPED
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP,)
     kind: Literal["stepped_level"] = "stepped_level"
-    frequency_hz: FrequencyHz
     lowest_vpp: AmplitudeVpp
     """The lowest level, if the steps down from ``amplitude_vpp`` land on it [V]."""
     step_vpp: PositiveFloat
@@ -55,10 +58,14 @@ class SteppedLevel(AbstractExcitation):
             round(self.amplitude_vpp - number * self.step_vpp, 9) for number in reversed(range(self._count()))
         )
 
-    @property
-    def highest_frequency_hz(self) -> float:
-        """The one that is played [Hz]."""
-        return self.frequency_hz
+    def level_at(self, frequency_hz: float) -> RelativeSetting:
+        """Give the highest level."""
+        del frequency_hz
+        return RelativeSetting(1.0)
+
+    def turned(self, direction: Direction) -> Self:
+        """Go through the levels in a direction."""
+        return type(self).model_validate({**self.model_dump(exclude_unset=True), "direction": direction})
 
     @property
     def playing_s(self) -> float:

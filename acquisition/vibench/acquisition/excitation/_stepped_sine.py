@@ -1,44 +1,22 @@
 """Sines one after the other, each settled before it is recorded: the slow, exact way through a band."""
 
 from collections.abc import Iterator
-from enum import StrEnum
 from itertools import pairwise
 from math import floor
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from ..host import FrozenModel
 from ..recording import SegmentLabel
-from ._plan import AbstractExcitation, FrequencyHz
+from ._base_level import RelativeSetting
+from ._direction import Approach, Direction
+from ._plan import AbstractExcitation, Family, FrequencyHz, around
 from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
 MOST_STEPS = 4000
 """What the table of segments of one recording holds, with room for the ramps and the check."""
-
-
-class Direction(StrEnum):
-    """Which way through the steps: an impacting specimen may answer differently on the way back."""
-
-    UP = "up"
-    DOWN = "down"
-    UP_THEN_DOWN = "up_then_down"
-    DOWN_THEN_UP = "down_then_up"
-
-    def ways(self, rising: tuple[float, ...]) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Give each way through what rises: ``"up"`` or ``"down"``, and its values in the order played."""
-        up = (Direction.UP.value, rising)
-        down = (Direction.DOWN.value, rising[::-1])
-        match self:
-            case Direction.UP:
-                yield up
-            case Direction.DOWN:
-                yield down
-            case Direction.UP_THEN_DOWN:
-                yield from (up, down)
-            case Direction.DOWN_THEN_UP:
-                yield from (down, up)
 
 
 class FrequencyGrid(FrozenModel):
@@ -69,6 +47,8 @@ class FrequencyGrid(FrozenModel):
 class FrequencySteps(AbstractExcitation):
     """A list of frequencies and the way through it; each is recorded as its own segment."""
 
+    family: ClassVar[Family] = Family.STEPPED
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP,)
     frequencies_hz: tuple[FrequencyHz, ...] = ()
     """Rising [Hz]; or give ``grid``."""
     grid: FrequencyGrid | None = None
@@ -101,6 +81,22 @@ class FrequencySteps(AbstractExcitation):
         return self.frequencies_hz if self.grid is None else self.grid.values_hz
 
     @property
+    def band_hz(self) -> tuple[float, float]:
+        """The first and the last of the list, or an octave to either side of its only one [Hz]."""
+        low_hz, *_, high_hz = (*self.rising_hz, self.rising_hz[-1])
+        return (low_hz, high_hz) if low_hz < high_hz else around(high_hz)
+
+    @property
+    def approach(self) -> Approach:
+        """From the side on which the first way through the list begins."""
+        first, _ = next(self.passes())
+        return Approach.UP if first == Direction.UP.value else Approach.DOWN
+
+    def turned(self, direction: Direction) -> Self:
+        """Go through the list in a direction."""
+        return type(self).model_validate({**self.model_dump(exclude_unset=True), "direction": direction})
+
+    @property
     def highest_frequency_hz(self) -> float:
         """The highest frequency of the list [Hz]."""
         return self.rising_hz[-1]
@@ -120,6 +116,11 @@ class SteppedSine(FrequencySteps):
     kind: Literal["stepped_sine"] = "stepped_sine"
     settle_s: NonNegativeFloat = 3.0
     """Wait at every frequency until the transient has died out [s]."""
+
+    def level_at(self, frequency_hz: float) -> RelativeSetting:
+        """Give the setting, the same at every frequency."""
+        del frequency_hz
+        return RelativeSetting(1.0)
 
     @property
     def playing_s(self) -> float:

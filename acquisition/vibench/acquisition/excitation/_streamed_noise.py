@@ -3,13 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, Self
+from typing import ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from ..recording import SegmentLabel
-from ._plan import AbstractExcitation, FrequencyHz
+from ._band_noise import BandNoise
 from ._preview import SignalPreview, signal_preview
 from ._steps import Samples, Segment, Step, Stream
 
@@ -73,17 +73,14 @@ def _taps(band_start_hz: float, band_stop_hz: float, sample_rate_hz: float) -> S
     return np.asarray(taps / np.sqrt(np.sum(taps**2)))
 
 
-class StreamedNoise(AbstractExcitation):
+class StreamedNoise(BandNoise):
     """Band-limited Gaussian noise of any length, by an analogue output beside the generator.
 
-    The rms value is the amplitude setting over twice the crest factor of 4.5.
+    The rms value is the amplitude setting over twice the crest factor of 4.5. Edges are -6 dB points.
     """
 
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.NOISE,)
     kind: Literal["streamed_noise"] = "streamed_noise"
-    band_start_hz: FrequencyHz
-    """Lower edge, -6 dB [Hz]."""
-    band_stop_hz: FrequencyHz
-    """Upper edge, -6 dB [Hz]."""
     settle_s: NonNegativeFloat = 3.0
     """Wait until the transient has died out [s]."""
     duration_s: PositiveFloat
@@ -91,24 +88,10 @@ class StreamedNoise(AbstractExcitation):
     seed: int = Field(default=1, ge=0)
     """The same seed gives the same noise, on any machine with the same numpy."""
 
-    @model_validator(mode="after")
-    def _band_rises(self) -> Self:
-        if self.band_stop_hz <= self.band_start_hz:
-            raise ValueError(
-                f"band_stop_hz = {self.band_stop_hz:g} is not above band_start_hz = {self.band_start_hz:g}; "
-                "give the band from low to high"
-            )
-        return self
-
     @property
     def source(self) -> GaussianBand:
         """The signal itself."""
         return GaussianBand(self.band_start_hz, self.band_stop_hz, self.seed)
-
-    @property
-    def highest_frequency_hz(self) -> float:
-        """The upper edge of the band [Hz]."""
-        return self.band_stop_hz
 
     @property
     def playing_s(self) -> float:

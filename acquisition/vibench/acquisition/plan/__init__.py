@@ -14,14 +14,18 @@ docs/decisions/0014-chains-of-points.md. Feedback: docs/feedback.md.
 """
 
 from ..excitation import (
-    KINDS,
+    EXCITATION_KINDS,
     AbstractExcitation,
+    Approach,
     Direction,
     Dwell,
     Excitation,
+    ExcitationKind,
+    Family,
     FrequencySteps,
     HeldDwell,
     HeldSweep,
+    Hold,
     LeadIn,
     MultisineNoise,
     OddMultisine,
@@ -34,14 +38,13 @@ from ..excitation import (
     SteppedLevel,
     SteppedSine,
     StreamedNoise,
+    excitation_text,
 )
 from ._axis import (
     Range,
     RangeSpacing,
 )
-from ._band import (
-    excited_band_hz,
-)
+from ._base_motion import BaseMotion, base_motion
 from ._campaign import BYTES_PER_SAMPLE, Campaign, Retryable, RetryPolicy, load_campaign
 from ._drive_source import (
     DriveSource,
@@ -86,17 +89,22 @@ __all__ = [
     "BYTES_PER_SAMPLE",
     "CHECK_FREQUENCY_HZ",
     "CHECK_S",
+    "EXCITATION_KINDS",
     "HUSH_S",
-    "KINDS",
     "AbstractExcitation",
+    "Approach",
+    "BaseMotion",
     "Campaign",
     "Direction",
     "DriveSource",
     "Dwell",
     "Excitation",
+    "ExcitationKind",
+    "Family",
     "FrequencySteps",
     "HeldDwell",
     "HeldSweep",
+    "Hold",
     "InRunLimits",
     "LeadIn",
     "LimitCheck",
@@ -123,11 +131,12 @@ __all__ = [
     "SteppedSine",
     "StreamedNoise",
     "SweepAxis",
+    "base_motion",
     "check_amplitude_vpp",
     "check_phases",
     "drive_source_of",
     "duration_s",
-    "excited_band_hz",
+    "excitation_text",
     "half_cosine",
     "known_phases",
     "lead_in_s",

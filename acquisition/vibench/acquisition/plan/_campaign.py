@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveInt, model_validator
 
-from ..excitation import KINDS
+from ..excitation import EXCITATION_KINDS
 from ..host import FrozenModel, load_toml
 from ._measurement import Measurement, Name, Point
 from ._schedule import measured_s
@@ -152,7 +152,7 @@ def _filled(measurement: object, defaults: Mapping[str, Any]) -> object:
     """Put the defaults underneath a measurement's own values."""
     match measurement:
         case dict():
-            shared = {key: value for key, value in defaults.items() if key not in KINDS}
+            shared = {key: value for key, value in defaults.items() if key not in EXCITATION_KINDS}
             own = {**shared, **measurement}
             match own.get("excitation"):
                 case {"kind": str(kind), **values}:

@@ -6,7 +6,7 @@ from itertools import takewhile
 from math import ceil, cos, pi
 
 from ..excitation import AbstractFeedback, Play, Segment, Step, Tone
-from ..recording import NO_RESULT, SegmentLabel
+from ..recording import SegmentLabel
 from ._measurement import Measurement
 from ._run_state import RunState
 
@@ -96,7 +96,10 @@ def ramp(state: RunState, play: Play, measurement: Measurement) -> Phase:
     return Phase(state, play, measurement.ramp_s, Segment(_RAMP_LABELS[state]))
 
 
-_RAMP_LABELS = {RunState.RAMPING_UP: SegmentLabel.RAMP_UP, RunState.RAMPING_DOWN: SegmentLabel.RAMP_DOWN}
+_RAMP_LABELS = {
+    RunState.RAMPING_UP: SegmentLabel.RAMP_UP,
+    RunState.RAMPING_DOWN: SegmentLabel.RAMP_DOWN,
+}
 
 
 def duration_s(measurement: Measurement) -> float:
@@ -116,12 +119,12 @@ def lead_in_s(measurement: Measurement) -> float:
     """
     if isinstance(measurement.excitation, AbstractFeedback):
         return CHECK_S + HUSH_S + measurement.ramp_s
-    before = takewhile(_leads_in, phases(measurement))
-    return CHECK_S + sum(phase.duration_s for phase in before)
+    counting = measurement.excitation.result_labels
 
+    def leads_in(phase: Phase) -> bool:
+        return phase.segment is None or phase.segment.label not in counting
 
-def _leads_in(phase: Phase) -> bool:
-    return phase.segment is None or phase.segment.label in NO_RESULT
+    return CHECK_S + sum(phase.duration_s for phase in takewhile(leads_in, phases(measurement)))
 
 
 def measured_s(measurement: Measurement) -> float:

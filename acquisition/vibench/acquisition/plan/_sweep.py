@@ -9,7 +9,7 @@ from typing import Any, Self
 
 from pydantic import Field, PositiveFloat, PositiveInt, ValidationError, model_validator
 
-from ..excitation import MOST_LEAD_INS, Direction, Dwell, LeadIn
+from ..excitation import MOST_LEAD_INS, Direction, Excitation, LeadIn
 from ..host import FrozenModel, complaints
 from ._axis import Values, values_of
 from ._measurement import Measurement, Name, Point
@@ -173,10 +173,11 @@ class Sweep(FrozenModel):
     def _alone(self) -> Iterator[Point]:
         for place in self._places(self._axes()):
             name = place.name(self.name)
-            content = self._content(name, place.values)
+            measurement = _measurement(self._content(name, place.values), name)
             if SweepAxis.DIRECTION in place.values:
-                _turn(content["excitation"], place.values[SweepAxis.DIRECTION], name)
-            yield Point(name, _measurement(content, name))
+                turned = _turned(measurement.excitation, place.values[SweepAxis.DIRECTION], name)
+                measurement = measurement.model_copy(update={"excitation": turned})
+            yield Point(name, measurement)
 
     def _led(self) -> Iterator[Point]:
         """Go along each chain, the points passed before being the way to the next."""
@@ -188,12 +189,12 @@ class Sweep(FrozenModel):
             for word, value in _passed(chain.values.get(SweepAxis.DIRECTION), rising):
                 there = chain.with_words(DIRECTION=word) if word else chain
                 name = f"{there.name(self.name)}-{self._word(along, value)}"
-                content = self._content(name, {**chain.values, along: value})
-                dwell = _dwell(content, name)
+                measurement = _measurement(self._content(name, {**chain.values, along: value}), name)
                 passed = way if self.lead_points is None else way[-self.lead_points :]
-                led = dwell.model_copy(update={"lead_in": tuple(passed), "lead_s": self.lead_s})
-                yield Point(name, _measurement({**content, "excitation": led}, name), chain.name(self.name))
-                way.append(LeadIn(frequency_hz=led.frequency_hz, amplitude_vpp=led.amplitude_vpp))
+                led, tone = _led(measurement.excitation, tuple(passed), self.lead_s, name)
+                led_there = measurement.model_copy(update={"excitation": led})
+                yield Point(name, led_there, chain.name(self.name))
+                way.append(tone)
 
     def _content(self, name: str, values: Mapping[SweepAxis, Any]) -> dict[str, Any]:
         """Put the values of a place into the template."""
@@ -238,33 +239,31 @@ def _passed(way: Direction | None, rising: list[float]) -> Iterator[tuple[str, f
             yield from (*down, *up)
 
 
-def _turn(excitation: dict[str, Any], way: Direction, name: str) -> None:
+def _turned(excitation: Excitation, way: Direction, name: str) -> Excitation:
     """Let an excitation that moves by itself go the given way."""
-    match excitation.get("kind"):
-        case "stepped_sine":
-            excitation["direction"] = way.value
-        case "sine_sweep" if way not in _TURNING:
-            ends = sorted((excitation.get("start_hz", 0.0), excitation.get("stop_hz", 0.0)))
-            excitation["start_hz"], excitation["stop_hz"] = ends if way is Direction.UP else ends[::-1]
-        case kind:
-            raise ValueError(
-                f"{name}: direction = {way.value!r} says nothing to the excitation {kind!r} by itself; give "
-                "continue_from_previous to go along an axis, or leave direction out"
-            )
-
-
-def _dwell(content: Mapping[str, Any], name: str) -> Dwell:
-    """Read the excitation of a chain's point; only a dwell can be led to."""
-    kind = content["excitation"].get("kind")
-    if kind != "dwell":
-        raise ValueError(
-            f"{name}: continue_from_previous leads from dwell to dwell, and the excitation is {kind!r}; "
-            "give kind = 'dwell', or leave continue_from_previous out"
-        )
     try:
-        return Dwell.model_validate(content["excitation"])
+        turned = excitation.turned(way)
     except ValidationError as error:
         raise ValueError(f"{name}: {complaints(error)}") from error
+    if turned is None:
+        raise ValueError(
+            f"{name}: direction = {way.value!r} says nothing to the excitation {excitation.kind!r} by "
+            "itself; give continue_from_previous to go along an axis, or leave direction out"
+        )
+    return turned
+
+
+def _led(
+    excitation: Excitation, way: tuple[LeadIn, ...], lead_s: float, name: str
+) -> tuple[Excitation, LeadIn]:
+    """Lead to a point of a chain through those before it."""
+    led = excitation.led(way, lead_s)
+    if led is None:
+        raise ValueError(
+            f"{name}: continue_from_previous leads from dwell to dwell, and the excitation is "
+            f"{excitation.kind!r}; give kind = 'dwell', or leave continue_from_previous out"
+        )
+    return led
 
 
 def _measurement(content: Mapping[str, Any], name: str) -> Measurement:

@@ -64,7 +64,6 @@ from ._results import (
     SavedResult as SavedResult,
 )
 from ._segment_label import (
-    NO_RESULT as NO_RESULT,
     SegmentLabel as SegmentLabel,
 )
 from ._tables import (

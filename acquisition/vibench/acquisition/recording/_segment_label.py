@@ -21,9 +21,3 @@ class SegmentLabel(StrEnum):
     """Tones on the way to a dwell."""
     RAMP_UP = "ramp_up"
     RAMP_DOWN = "ramp_down"
-
-
-NO_RESULT = frozenset(
-    {SegmentLabel.CHECK, SegmentLabel.LEAD_IN, SegmentLabel.RAMP_UP, SegmentLabel.RAMP_DOWN}
-)
-"""Segments that no result is taken from."""

@@ -4,10 +4,10 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 
+from vibench.acquisition.plan import Approach
 from vibench.sim import (
     Accuracy,
     Harmonic,
@@ -30,16 +30,6 @@ PREDICTION_S = 8.0
 WINDOW_S = 5.0
 """The last 5 s are observed, as in the paper; 3 s before them leave 3e-5 of the slowest transient, so that
 the paper's 30 s would say nothing else. In chaos each value is one draw, whatever the duration."""
-
-
-class Approach(StrEnum):
-    """Where the simulation of each point begins; with several motions at one frequency it decides which."""
-
-    REST = "from rest"
-    UP = "led upwards"
-    """From the state and the phase in which the next lower frequency ended."""
-    DOWN = "led downwards"
-
 
 Progress = Callable[[int, int], None]
 """Told (points done, points in all), in the calling thread."""

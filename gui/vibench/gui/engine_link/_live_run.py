@@ -3,7 +3,7 @@
 import numpy as np
 
 from vibench.acquisition.engine import BenchFacts
-from vibench.acquisition.plan import Campaign, Measurement, excited_band_hz, lead_in_s
+from vibench.acquisition.plan import Campaign, Measurement, lead_in_s
 from vibench.acquisition.rig import Rig
 from vibench.analysis.live import LiveChannel, LiveView
 
@@ -15,7 +15,7 @@ WARM_RATE_HZ, WARM_S, WARM_HZ = 51200.0, 3.0, 200.0
 def live_view(bench: BenchFacts, rig: Rig | None, campaign: Campaign | None, name: str) -> LiveView:
     """Begin to watch the run of the recording ``name``."""
     measurement = measurement_called(campaign, name)
-    band_hz = WHOLE_BAND_HZ if measurement is None else excited_band_hz(measurement.excitation)
+    band_hz = WHOLE_BAND_HZ if measurement is None else measurement.excitation.band_hz
     channels = [
         LiveChannel(each.role, each.unit, each.units_per_volt, each.full_scale_v) for each in bench.channels
     ]

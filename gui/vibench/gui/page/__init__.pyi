@@ -1,6 +1,12 @@
 from ._app_context import (
     AppContext as AppContext,
 )
+from ._kind_views import (
+    KIND_VIEWS as KIND_VIEWS,
+    OF_A_BAND as OF_A_BAND,
+    KindView as KindView,
+    LivePicture as LivePicture,
+)
 from ._page import (
     Page as Page,
     SideAndPicture as SideAndPicture,

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from vibench.acquisition.engine import DRIVING, EngineState, RowStatus
-from vibench.acquisition.plan import Campaign, duration_s
+from vibench.acquisition.plan import EXCITATION_KINDS, Campaign, duration_s, excitation_text
 from vibench.acquisition.rig import Rig
 
 from ...widgets import clock
@@ -24,7 +24,7 @@ def entry_rows(campaign: Campaign) -> list[tuple[str, str, str, str]]:
     rows = [
         (
             each.name,
-            f"{each.excitation.kind.replace('_', ' ')}, {each.excitation.amplitude_vpp:g} Vpp",
+            excitation_text(each.excitation),
             str(each.repeats),
             clock(each.repeats * duration_s(each)),
         )
@@ -32,7 +32,8 @@ def entry_rows(campaign: Campaign) -> list[tuple[str, str, str, str]]:
     ]
     for sweep in campaign.sweeps:
         points = sweep.points()
-        kind = str(sweep.measurement.get("excitation", {}).get("kind", "")).replace("_", " ")
+        kinds = dict.fromkeys(point.measurement.excitation.kind for point in points)
+        kind = ", ".join(EXCITATION_KINDS[each].label for each in kinds)
         takes = sum(duration_s(point.measurement) for point in points)
         rows.append((sweep.name, f"sweep of {kind}", str(len(points)), clock(takes)))
     return rows

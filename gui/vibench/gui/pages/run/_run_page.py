@@ -1,19 +1,21 @@
 """The Run page: arm, start, watch; every picture is of the newest samples."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TypeAlias
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
 
 from vibench.acquisition.engine import EngineClient, EngineState
-from vibench.acquisition.plan import excited_band_hz
+from vibench.acquisition.plan import EXCITATION_KINDS
 from vibench.acquisition.rig import channels_of
 from vibench.analysis import MeasurementPrediction
 from vibench.analysis.live import LiveView
 
 from ...engine_link import measurement_called
-from ...page import AppContext, Page, UserActions
+from ...page import KIND_VIEWS, OF_A_BAND, AppContext, LivePicture, Page, UserActions
 from ...widgets import FILES, Theme
 from ._arm_card import ArmCard
 from ._portrait_plot import PortraitPlot
@@ -25,7 +27,9 @@ from ._watch_card import WatchCard
 
 LEFT_LETTERS = 44
 """Width of the column on the left: it must not move when its words change."""
-_TONES = frozenset({"dwell", "sine_sweep", "stepped_sine"})
+LivePlot: TypeAlias = (
+    TransmissibilityPlot | SpectrumPlot | SweepHistoryPlot | SweepEnvelopePlot | PortraitPlot
+)
 
 
 class RunPage(Page):
@@ -68,7 +72,7 @@ class RunPage(Page):
         test = (
             ""
             if measurement is None
-            else f"{measurement.name} ({measurement.excitation.kind.replace('_', ' ')})"
+            else f"{measurement.name} ({EXCITATION_KINDS[measurement.excitation.kind].label})"
         )
         reason = "" if measurement is not None else "The test is not complete; see the Test page (Ctrl+2)."
         self.arm_card.show_status(status, test, reason)
@@ -87,15 +91,12 @@ class RunPage(Page):
         self.time_histories.show_view(view, self.watch_card.span_s)
         for tabs in (self.left_tabs, self.right_tabs):
             shown = tabs.currentWidget()
-            assert isinstance(
-                shown,
-                TransmissibilityPlot | SpectrumPlot | SweepHistoryPlot | SweepEnvelopePlot | PortraitPlot,
-            )
+            assert isinstance(shown, LivePlot)
             shown.show_view(view)
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
-        for part in (self.time_histories, self.watch_card, *self._pictures):
+        for part in (self.time_histories, self.watch_card, *self._pictures.values()):
             part.retheme(theme)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -109,10 +110,14 @@ class RunPage(Page):
                 super().keyPressEvent(event)
 
     @property
-    def _pictures(
-        self,
-    ) -> tuple[TransmissibilityPlot, SpectrumPlot, SweepHistoryPlot, SweepEnvelopePlot, PortraitPlot]:
-        return (self.frequency_response, self.spectrum, self.history, self.envelope, self.portrait)
+    def _pictures(self) -> Mapping[LivePicture, LivePlot]:
+        return {
+            LivePicture.FREQUENCY_RESPONSE: self.frequency_response,
+            LivePicture.SPECTRUM: self.spectrum,
+            LivePicture.HISTORY: self.history,
+            LivePicture.ENVELOPE: self.envelope,
+            LivePicture.PORTRAIT: self.portrait,
+        }
 
     def _begin(self, view: LiveView) -> None:
         """Another run: clear the pictures, lay its prediction beneath, show what suits its excitation."""
@@ -125,16 +130,17 @@ class RunPage(Page):
             measurement is None or prediction.measurement.excitation != measurement.excitation
         ):
             prediction = None
-        for picture in self._pictures:
+        pictures = self._pictures
+        for picture in pictures.values():
             picture.clear()
         self._show_prediction(prediction)
         if measurement is not None:
             for plot in (self.history.plot, self.envelope.plot, self.frequency_response.magnitude):
                 # What the check plays before the run lies outside, and would make the band small.
-                plot.setXRange(*excited_band_hz(measurement.excitation), padding=0.03)
-        is_tone = measurement is not None and measurement.excitation.kind in _TONES
-        self.left_tabs.setCurrentWidget(self.history if is_tone else self.frequency_response)
-        self.right_tabs.setCurrentWidget(self.portrait if is_tone else self.spectrum)
+                plot.setXRange(*measurement.excitation.band_hz, padding=0.03)
+        shown = OF_A_BAND if measurement is None else KIND_VIEWS[measurement.excitation.kind]
+        self.left_tabs.setCurrentWidget(pictures[shown.left])
+        self.right_tabs.setCurrentWidget(pictures[shown.right])
 
     def _show_prediction(self, seen: MeasurementPrediction | None) -> None:
         self.frequency_response.show_prediction(seen)

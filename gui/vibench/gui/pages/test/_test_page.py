@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from vibench.acquisition import ConfigurationError, save_toml, toml_text, validated
-from vibench.acquisition.plan import LimitCheck, Measurement, MeasurementPreview
+from vibench.acquisition.plan import LimitCheck, Measurement, MeasurementPreview, excitation_text
 from vibench.acquisition.rig import BaseQuantity, Rig
 from vibench.analysis import MeasurementPrediction
 
@@ -41,8 +41,9 @@ _UNITS = {"m": ("mm", 1e3), "m/s2": ("m/s²", 1.0), "N": ("N", 1.0), "V": ("V", 
 
 
 def summary_text(seen: MeasurementPreview) -> str:
-    """Peak stroke, acceleration, force and volts beside their limits; then time and size."""
-    parts = [
+    """Say what is played; then peak stroke, acceleration, force and volts beside their limits, time, size."""
+    parts = [excitation_text(seen.measurement.excitation)]
+    parts += [
         _load(check, name) for load, name in _SHOWN.items() for check in seen.checks if check.load is load
     ]
     parts.append(f"generator {seen.peak_v:.3g} V peak, crest {seen.crest_factor:.2f}")
@@ -153,7 +154,8 @@ class TestPage(Page):
         bands = ", ".join(f"{low:.0f}–{high:.0f} Hz" for low, high in seen.collision_bands_hz)
         collides = f"Collides at {bands}." if bands else "No collision is predicted."
         self.prediction_note.setText(
-            f"Simulated ({seen.model}), {seen.approach.value}, base amplitude from {seen.basis}. {collides}"
+            f"Simulated ({seen.model}), {seen.approach.value}, base amplitude {seen.base_text} from "
+            f"{seen.basis}. {collides}"
         )
 
     def _prediction_failed(self, error: BaseException) -> None:

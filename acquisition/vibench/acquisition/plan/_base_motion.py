@@ -1,0 +1,43 @@
+"""How far the base will move at each frequency of a plan, as the plan holds it or the rig's model has it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..excitation import Excitation, HeldAcceleration, RelativeSetting, RmsSetting
+from ..rig import BaseQuantity, Rig, RigModel
+from ._loads import predicted_loads, terminal_volts
+
+
+@dataclass(frozen=True, eq=False)
+class BaseMotion:
+    """Amplitude of the base's sine at each frequency."""
+
+    amplitude_m: NDArray[np.float64]
+    basis: str
+    """Where it comes from."""
+
+
+def base_motion(excitation: Excitation, rig: Rig, frequency_hz: NDArray[np.float64]) -> BaseMotion:
+    """Predict the base's motion, shape of ``frequency_hz``: a level that feedback holds is met exactly.
+
+    A setting is followed through the rig's linear model; noise is stood for by a sine of its rms.
+    """
+    levels = [excitation.level_at(float(each)) for each in frequency_hz]
+    per_setting_m = terminal_volts(excitation, rig) * np.abs(
+        RigModel(rig).transfer(BaseQuantity.STROKE, frequency_hz)
+    )
+    amplitudes_m = []
+    noise_m: float | None = None
+    for level, at_hz, stroke_m in zip(levels, frequency_hz, per_setting_m, strict=True):
+        match level:
+            case HeldAcceleration(acceleration):
+                amplitudes_m.append(acceleration / (2 * np.pi * at_hz) ** 2)
+            case RelativeSetting(share):
+                amplitudes_m.append(share * stroke_m)
+            case RmsSetting():
+                if noise_m is None:
+                    noise_m = np.sqrt(2) * predicted_loads(excitation, rig)[BaseQuantity.STROKE].rms
+                amplitudes_m.append(noise_m)
+    return BaseMotion(np.array(amplitudes_m, dtype=np.float64), levels[0].basis)

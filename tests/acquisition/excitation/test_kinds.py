@@ -1,0 +1,141 @@
+"""A kind of excitation is one row, and says of itself what others would have to ask of its name."""
+
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from vibench.acquisition.excitation import (
+    EXCITATION_KINDS,
+    Approach,
+    BaseLevel,
+    Direction,
+    Dwell,
+    Excitation,
+    Family,
+    HeldAcceleration,
+    HeldDwell,
+    HeldSweep,
+    LeadIn,
+    MultisineNoise,
+    OddMultisine,
+    RelativeSetting,
+    ResonanceTracking,
+    RmsSetting,
+    SettledSine,
+    SineSweep,
+    SteppedLevel,
+    SteppedSine,
+    StreamedNoise,
+    excitation_text,
+)
+
+BAND = {"band_start_hz": 20, "band_stop_hz": 800}
+MOVE = {"start_hz": 220, "stop_hz": 310, "duration_s": 6}
+HELD = BaseLevel(displacement_m=5e-6)
+EXAMPLES = (
+    MultisineNoise(amplitude_vpp=1, realisations=2, **BAND),
+    StreamedNoise(amplitude_vpp=1, duration_s=2, **BAND),
+    SineSweep(amplitude_vpp=1, hold="displacement", **MOVE),
+    Dwell(amplitude_vpp=1, frequency_hz=260, duration_s=2),
+    SteppedSine(amplitude_vpp=1, frequencies_hz=(200, 210, 220)),
+    SteppedLevel(amplitude_vpp=1, frequency_hz=260, lowest_vpp=0.5, step_vpp=0.25),
+    OddMultisine(amplitude_vpp=1, realisations=2, **BAND),
+    SettledSine(amplitude_vpp=1, frequencies_hz=(200, 210), direction="down", base_level=HELD),
+    HeldSweep(amplitude_vpp=1, base_level=HELD, **MOVE),
+    HeldDwell(amplitude_vpp=1, frequency_hz=260, duration_s=2, base_level=HELD),
+    ResonanceTracking(
+        amplitude_vpp=1, start_hz=262, low_hz=240, high_hz=290, accelerations_m_per_s2=(0.6, 0.3)
+    ),
+)
+by_kind = {each.kind: each for each in EXAMPLES}
+every_kind = pytest.mark.parametrize("excitation", EXAMPLES, ids=list(by_kind))
+
+
+def test_the_union_and_the_rows_name_the_same_plans_in_the_same_order():
+    union, _ = get_args(Excitation)
+    assert get_args(union) == tuple(kind.plan for kind in EXCITATION_KINDS.values())
+    assert list(EXCITATION_KINDS) == list(by_kind)
+
+
+@every_kind
+def test_every_segment_that_is_recorded_is_one_that_results_are_taken_from(excitation):
+    assert {step.segment.label for step in excitation.steps()} <= set(excitation.result_labels)
+    assert excitation.family in Family
+
+
+@every_kind
+def test_the_band_holds_what_is_played(excitation):
+    low_hz, high_hz = excitation.band_hz
+    tones = [step.play.frequency_hz for step in excitation.steps() if hasattr(step.play, "frequency_hz")]
+    assert low_hz < high_hz
+    assert all(low_hz <= each <= high_hz for each in (*tones, excitation.highest_frequency_hz))
+
+
+def test_a_resonance_is_sought_in_the_whole_range_of_its_plan():
+    assert by_kind["resonance_tracking"].band_hz == (240, 290)
+
+
+@pytest.mark.parametrize(
+    ("kind", "level"),
+    [
+        ("multisine_noise", RmsSetting()),
+        ("odd_multisine", RmsSetting()),
+        ("streamed_noise", RmsSetting()),
+        ("dwell", RelativeSetting(1.0)),
+        ("stepped_sine", RelativeSetting(1.0)),
+        ("stepped_level", RelativeSetting(1.0)),
+        ("sine_sweep", RelativeSetting(pytest.approx((250 / 310) ** 2))),
+        ("settled_sine", HeldAcceleration(pytest.approx(5e-6 * (2 * np.pi * 250) ** 2))),
+        ("held_sweep", HeldAcceleration(pytest.approx(5e-6 * (2 * np.pi * 250) ** 2))),
+        ("held_dwell", HeldAcceleration(pytest.approx(5e-6 * (2 * np.pi * 250) ** 2))),
+        ("resonance_tracking", HeldAcceleration(0.6)),
+    ],
+)
+def test_a_kind_says_what_decides_the_motion_of_the_base(kind, level):
+    assert by_kind[kind].level_at(250.0) == level
+
+
+def test_a_settled_sine_without_a_level_plays_its_setting():
+    plain = SettledSine(amplitude_vpp=1, frequencies_hz=(200, 210))
+    assert plain.level_at(200.0) == RelativeSetting(1.0)
+    assert not list(plain.held_accelerations())
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        ("sine_sweep", "sine sweep, 1 Vpp"),
+        ("held_dwell", "held dwell, base held at 5 µm, at most 1 Vpp"),
+        ("resonance_tracking", "resonance tracking, base held at 0.6 m/s², 0.3 m/s², at most 1 Vpp"),
+    ],
+)
+def test_words_of_a_plan_name_the_level_that_it_holds(kind, said):
+    assert excitation_text(by_kind[kind]) == said
+
+
+@pytest.mark.parametrize("kind", ["sine_sweep", "held_sweep", "stepped_sine", "settled_sine"])
+def test_what_goes_through_frequencies_comes_to_each_from_the_side_it_is_turned_to(kind):
+    for direction, approach in ((Direction.UP, Approach.UP), (Direction.DOWN, Approach.DOWN)):
+        turned = by_kind[kind].turned(direction)
+        assert turned.approach is approach
+        assert turned.turned(Direction.UP) == by_kind[kind].turned(Direction.UP)
+
+
+@pytest.mark.parametrize("kind", ["dwell", "held_dwell", "multisine_noise", "resonance_tracking"])
+def test_what_has_no_direction_cannot_be_turned(kind):
+    assert by_kind[kind].turned(Direction.UP) is None
+    assert by_kind[kind].approach is Approach.REST
+
+
+def test_levels_go_the_way_that_they_are_turned_to():
+    falling = by_kind["stepped_level"].turned(Direction.DOWN)
+    assert [step.play.level for step in falling.steps()] == [1.0, 0.75, 0.5]
+
+
+def test_only_a_dwell_is_led_and_it_adds_its_tone_to_the_way():
+    way = (LeadIn(frequency_hz=250, amplitude_vpp=1),)
+    assert [kind for kind, each in by_kind.items() if each.led(way, 0.5) is not None] == ["dwell"]
+    led, tone = by_kind["dwell"].led(way, 0.25)
+    assert (led.lead_in, led.lead_in_s) == (way, 0.25)
+    assert tone == LeadIn(frequency_hz=260, amplitude_vpp=1)

@@ -1,0 +1,12 @@
+"""Every kind of excitation has its live pictures."""
+
+from vibench.acquisition.plan import EXCITATION_KINDS, Family
+from vibench.gui.page import KIND_VIEWS, LivePicture
+
+
+def test_every_kind_has_its_pictures_and_only_noise_shows_a_whole_band():
+    assert set(KIND_VIEWS) == set(EXCITATION_KINDS)
+    for word, kind in EXCITATION_KINDS.items():
+        is_noise = kind.plan.family is Family.NOISE
+        assert (KIND_VIEWS[word].left is LivePicture.FREQUENCY_RESPONSE) == is_noise, word
+        assert (KIND_VIEWS[word].right is LivePicture.SPECTRUM) == is_noise, word
