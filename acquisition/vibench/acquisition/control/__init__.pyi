@@ -3,5 +3,6 @@ from ._control_action import (
     phase_samples as phase_samples,
 )
 from ._controllers import (
+    CONTROLLERS as CONTROLLERS,
     feedback_controller as feedback_controller,
 )

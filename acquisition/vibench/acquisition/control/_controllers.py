@@ -1,8 +1,9 @@
 """Controllers of measurements whose next step depends on what was measured."""
 
-from typing import assert_never
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
 
-from ..excitation import AbstractFeedback, HeldDwell, HeldSweep, ResonanceTracking, SettledSine
 from ..plan import Measurement
 from ..rig import Channel, Rig
 from ._control_action import Controller
@@ -12,6 +13,16 @@ from ._resonance_controller import track_resonance
 from ._settled_controller import step_settled
 from ._sine_loop import SineLoop
 from ._sweep_controller import hold_sweep
+
+CONTROLLERS: Mapping[str, Callable[[SineLoop, Any], Controller[None]]] = MappingProxyType(
+    {
+        "settled_sine": step_settled,
+        "held_dwell": hold_dwell,
+        "held_sweep": hold_sweep,
+        "resonance_tracking": track_resonance,
+    }
+)
+"""Controller of each kind with feedback: of the loop, and of a plan of its kind."""
 
 
 def feedback_controller(
@@ -25,17 +36,5 @@ def feedback_controller(
         When the rig lacks a channel that feedback listens to; before anything is yielded.
 
     """
-    excitation = measurement.excitation
-    assert isinstance(excitation, AbstractFeedback), "only feedback needs a controller"
     loop = SineLoop(feedback_channels_of(channels, sample_rate_hz), rig, measurement)
-    match excitation:
-        case SettledSine():
-            return step_settled(loop, excitation)
-        case HeldDwell():
-            return hold_dwell(loop, excitation)
-        case HeldSweep():
-            return hold_sweep(loop, excitation)
-        case ResonanceTracking():
-            return track_resonance(loop, excitation)
-        case _:
-            assert_never(excitation)
+    return CONTROLLERS[measurement.excitation.kind](loop, measurement.excitation)

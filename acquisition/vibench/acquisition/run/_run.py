@@ -5,9 +5,8 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from pathlib import Path
 
 from ..bench import RunBench
-from ..control import Controller, feedback_controller, phase_samples
+from ..control import CONTROLLERS, Controller, feedback_controller, phase_samples
 from ..errors import AcquisitionError, ConfigurationError, LimitExceeded
-from ..excitation import AbstractFeedback
 from ..host import ClosedOnLeaving
 from ..instruments import Block
 from ..plan import (
@@ -45,7 +44,7 @@ def controller_for(bench: RunBench, measurement: Measurement) -> Controller[None
         When the bench cannot do it: before anything plays.
 
     """
-    if not isinstance(measurement.excitation, AbstractFeedback):
+    if measurement.excitation.kind not in CONTROLLERS:
         return None
     if drive_source_of(measurement, bench.rig) is DriveSource.OUTPUT:
         raise ConfigurationError(
