@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication
 
 from vibench.acquisition import shipped
 from vibench.acquisition.engine import EngineState, Supervision, start_engine
-from vibench.acquisition.plan import Measurement
+from vibench.acquisition.plan import Dwell, Hold, Measurement, SineSweep
 from vibench.analysis.live import RowSpacing
 
 from ..page import AppContext, Remembered, Settings
@@ -35,31 +35,21 @@ PATIENCE_S = 180.0
 STILL_MS = 1200
 """Until the status line shows what a page in sight costs, and no more what it cost to get there."""
 _SMALLEST_FILE = 0
-SHOWN = Measurement.model_validate(
-    {
-        "name": "sweep",
-        "ramp_s": 0.3,
-        "ramp_step_s": 0.03,
-        "excitation": {
-            "kind": "sine_sweep",
-            "amplitude_vpp": 1.5,
-            "start_hz": 150,
-            "stop_hz": 350,
-            "duration_s": 20,
-            "settle_s": 0.5,
-            "hold": "displacement",
-        },
-    }
+SHOWN = Measurement(
+    name="sweep",
+    ramp_s=0.3,
+    ramp_step_s=0.03,
+    excitation=SineSweep(
+        amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=20, settle_s=0.5, hold=Hold.DISPLACEMENT
+    ),
 )
 """The paper's sweep through the impacting region, ten times as fast."""
 SHOWN_AT_S = 17.0
-SHOWN_TOO = Measurement.model_validate(
-    {
-        "name": "dwell",
-        "ramp_s": 0.3,
-        "ramp_step_s": 0.03,
-        "excitation": {"kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "duration_s": 3},
-    }
+SHOWN_TOO = Measurement(
+    name="dwell",
+    ramp_s=0.3,
+    ramp_step_s=0.03,
+    excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, duration_s=3),
 )
 CAMPAIGN = "campaigns/paper.toml"
 
