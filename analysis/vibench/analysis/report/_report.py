@@ -9,10 +9,12 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from vibench.acquisition.plan import excitation_text
+
 from ..errors import NotEnoughData
 from ..figures import DrawnFigure
 from ..kinds import AnyResult
-from ..recordings import RecordingFacts, Verdict
+from ..recordings import Verdict
 from ..results import AnalysisFailure, CampaignResults
 from ._drawings import findings, result_figures, result_tables
 from ._figure_choice import recording_figures
@@ -142,7 +144,7 @@ def _overview(results: CampaignResults) -> ReportTable:
     rows = tuple(
         (
             facts.name,
-            _played(facts),
+            excitation_text(facts.measurement.excitation),
             facts.started_utc[:19].replace("T", " "),
             f"{facts.duration_s:.1f} s",
             facts.state.value,
@@ -152,11 +154,6 @@ def _overview(results: CampaignResults) -> ReportTable:
     )
     headings = ("recording", "excitation", "started (UTC)", "length", "ended", "origin")
     return ReportTable("Recordings", headings, rows, "")
-
-
-def _played(facts: RecordingFacts) -> str:
-    excitation = facts.measurement.excitation
-    return f"{excitation.kind.replace('_', ' ')}, {excitation.amplitude_vpp:g} Vpp"
 
 
 def _warnings(results: CampaignResults) -> Iterator[str]:
