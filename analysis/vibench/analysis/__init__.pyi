@@ -45,6 +45,7 @@ from .results import (
     AnalysisFailure as AnalysisFailure,
     CampaignResults as CampaignResults,
     ComparedRecording as ComparedRecording,
+    FailedStep as FailedStep,
     analyse as analyse,
     analyse_files as analyse_files,
     campaign_summary as campaign_summary,

@@ -11,6 +11,7 @@ from vibench.analysis import (
     AnalysisFailure,
     CampaignResults,
     Estimator,
+    FailedStep,
     FrequencyResponseRequest,
     MagnitudeScale,
     ProgressObserver,
@@ -53,6 +54,7 @@ def analyse(
     ] = False,
     estimator: Annotated[
         Estimator,
+        FailedStep,
         typer.Option(
             help="drive: referenced to the drive voltage, free of any channel's noise.", rich_help_panel=NOISE
         ),
@@ -156,7 +158,7 @@ def complain_about(results: CampaignResults) -> None:
     """End with a sentence for each recording without a result."""
     for failure in results.failures:
         typer.echo(f"error: {_named(failure)}", err=True)
-    if any(failure.what == "analysis" for failure in results.failures):
+    if any(failure.what is FailedStep.ANALYSIS for failure in results.failures):
         raise typer.Exit(1)
 
 

@@ -1,7 +1,5 @@
 """A sweep at a level: every step's setting follows from what the base did in the steps before."""
 
-from dataclasses import dataclass
-
 from ..excitation import HeldSweep
 from ..plan import RunState
 from ..recording import ExcursionNote, Held, SegmentLabel, SweepNote
@@ -12,23 +10,13 @@ from ._sine_loop import SineLoop
 from ._start import followed, started, tracked
 
 
-@dataclass(frozen=True)
-class _Excursion:
-    """A stretch of the sweep in which the level was not held."""
-
-    begin_hz: float
-    end_hz: float
-    worst: float
-    """Largest deviation, as a share, with its sign."""
-
-
 def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
     """Ramp up to the level, settle, sweep, ramp down."""
     level = plan.base_level
     yield from started(loop, plan.start_hz, level)
     yield from SettlingController(loop, plan.settling, level).settled()
     estimator = GainEstimator(plan.average_s)
-    excursion: _Excursion | None = None
+    excursion: ExcursionNote | None = None
     steps = outside = 0
     for mean_hz, duration_s in plan.mean_steps():
         tracked(loop, mean_hz, level, estimator, duration_s)
@@ -38,7 +26,7 @@ def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
         steps += 1
         outside += excursion is not None
     if excursion is not None:
-        _say(loop, excursion)
+        loop.note(excursion)
     loop.note(
         SweepNote(segment=SegmentLabel.SWEEP, steps=steps, steps_outside=outside, average_s=plan.average_s)
     )
@@ -47,21 +35,14 @@ def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:
 
 
 def _judged(
-    loop: SineLoop, before: _Excursion | None, frequency_hz: float, deviation: float, tolerance: float
-) -> _Excursion | None:
+    loop: SineLoop, before: ExcursionNote | None, frequency_hz: float, deviation: float, tolerance: float
+) -> ExcursionNote | None:
     """Begin, continue or end a stretch outside the tolerance."""
     if abs(deviation) <= tolerance:
         if before is not None:
-            _say(loop, before)
+            loop.note(before)
         return None
-    if before is None:
-        return _Excursion(frequency_hz, frequency_hz, deviation)
-    return _Excursion(before.begin_hz, frequency_hz, max(before.worst, deviation, key=abs))
-
-
-def _say(loop: SineLoop, excursion: _Excursion) -> None:
-    loop.note(
-        ExcursionNote(
-            from_hz=excursion.begin_hz, to_hz=excursion.end_hz, worst=excursion.worst, level=Held.OUTSIDE
-        )
+    begin_hz, worst = (frequency_hz, deviation) if before is None else (before.from_hz, before.worst)
+    return ExcursionNote(
+        from_hz=begin_hz, to_hz=frequency_hz, worst=max(worst, deviation, key=abs), level=Held.OUTSIDE
     )

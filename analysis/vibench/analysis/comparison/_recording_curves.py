@@ -20,18 +20,8 @@ def predicted_curves(name: str, found: ResponsePrediction) -> Iterator[Curve]:
     level = f"{low:.3g} µm" if low == high else f"{low:.3g} to {high:.3g} µm"
     note = f"sines of A0 = {level}, {found.accuracy.value}"
     unknown = np.full(found.frequency_hz.shape, np.nan)
-    yield Curve(
-        name, CurveOrigin.PREDICTED, CurveKind.RESPONSE_I, found.frequency_hz, found.response_i, unknown, note
-    )
-    yield Curve(
-        name,
-        CurveOrigin.PREDICTED,
-        CurveKind.RESPONSE_II,
-        found.frequency_hz,
-        found.response_ii,
-        unknown,
-        note,
-    )
+    values = (found.response_i, found.response_ii, unknown)
+    yield from _responses(name, CurveOrigin.PREDICTED, found.frequency_hz, values, note)
 
 
 def noise_traces(name: str, origin: CurveOrigin, response: NoiseResponse) -> Iterator[Curve]:

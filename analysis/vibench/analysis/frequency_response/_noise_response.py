@@ -8,7 +8,7 @@ from vibench.acquisition.plan import MultisineNoise, OddMultisine, StreamedNoise
 from vibench.acquisition.recording import SegmentLabel
 
 from ..errors import InvalidRequest, NotEnoughData
-from ..recordings import Channels, Check, RecordingFacts, Stretch, only_stretch
+from ..recordings import AbstractAnalysis, Channels, Stretch, only_stretch
 from ..signals import Complexes, Flags, Quantity, Reals, relative_sd, student_half_width
 from ..spectra import DensitySums
 from ..tones import NoiseDriveLevel, noise_drive_level
@@ -264,12 +264,8 @@ def _resonances(frequency_response: FrequencyResponse) -> tuple[Resonance, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class NoiseAnalysis:
+class NoiseAnalysis(AbstractAnalysis[Noise, NoiseResponse]):
     """A noise measurement: transmission base to m0."""
 
-    facts: RecordingFacts
-    checks: tuple[Check, ...]
-    excitation: Noise
-    response: NoiseResponse
     request: FrequencyResponseRequest
     """What was asked for."""

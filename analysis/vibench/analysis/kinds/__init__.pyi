@@ -7,8 +7,6 @@ from ._analysis_kind import (
     DwellResult as DwellResult,
     Json as Json,
     NoiseResult as NoiseResult,
-    Overlay as Overlay,
-    RecordingAnalysis as RecordingAnalysis,
     Result as Result,
     SteppedSineResult as SteppedSineResult,
     SweepResult as SweepResult,

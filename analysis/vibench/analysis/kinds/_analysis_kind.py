@@ -6,16 +6,21 @@ from typing import Any, Generic, TypeAlias, TypeVar
 
 from ..comparison import Curve, CurveOrigin
 from ..frequency_response import FrequencyResponseRequest, NoiseAnalysis
-from ..model import DwellOverlay, NoiseOverlay, SimulatedChannels, SteppedSineOverlay, SweepOverlay
-from ..recordings import Channels, RecordingFacts
+from ..model import (
+    AbstractOverlay,
+    DwellOverlay,
+    NoiseOverlay,
+    SimulatedChannels,
+    SteppedSineOverlay,
+    SweepOverlay,
+)
+from ..recordings import AbstractAnalysis, Channels, RecordingFacts
 from ..sine import DwellAnalysis, SteppedSineAnalysis, SweepAnalysis
 
 Json = dict[str, Any]
-RecordingAnalysis = NoiseAnalysis | SweepAnalysis | DwellAnalysis | SteppedSineAnalysis
-Overlay = NoiseOverlay | SweepOverlay | DwellOverlay | SteppedSineOverlay
 P = TypeVar("P")
-A = TypeVar("A", bound=RecordingAnalysis)
-L = TypeVar("L", bound=Overlay)
+A = TypeVar("A", bound=AbstractAnalysis[Any, Any])
+L = TypeVar("L", bound=AbstractOverlay[Any])
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +33,7 @@ class Result(Generic[A, L]):
     @property
     def kind(self) -> str:
         """Of the excitation."""
-        return self.analysis.excitation.kind
+        return self.analysis.facts.measurement.excitation.kind
 
 
 AnyResult: TypeAlias = Result[Any, Any]

@@ -1,5 +1,7 @@
 """Sweeps: responses over frequency, where the masses collide, and what JSON says of them."""
 
+from dataclasses import asdict
+
 import numpy as np
 
 from ..comparison import sweep_traces
@@ -9,7 +11,6 @@ from ..recordings import Channels, RecordingFacts, measurement_checks
 from ..sine import (
     CollisionRegion,
     Collisions,
-    Edge,
     Sweep,
     SweepAnalysis,
     collisions,
@@ -62,19 +63,10 @@ def _regions(found: Collisions) -> list[Json]:
 
 def _region(region: CollisionRegion) -> Json:
     return {
-        "start": _edge(region.start),
-        "stop": _edge(region.stop),
+        "start": asdict(region.start),
+        "stop": asdict(region.stop),
         "reaches_start_of_sweep": region.reaches_start,
         "reaches_stop_of_sweep": region.reaches_stop,
-    }
-
-
-def _edge(edge: Edge) -> Json:
-    return {
-        "frequency_hz": edge.frequency_hz,
-        "time_s": edge.time_s,
-        "lower_hz": edge.lower_hz,
-        "upper_hz": edge.upper_hz,
     }
 
 

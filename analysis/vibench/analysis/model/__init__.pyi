@@ -7,6 +7,7 @@ from ._measurement_prediction import (
     predict_measurement as predict_measurement,
 )
 from ._overlay import (
+    AbstractOverlay as AbstractOverlay,
     DwellOverlay as DwellOverlay,
     NoiseOverlay as NoiseOverlay,
     SimulatedRun as SimulatedRun,

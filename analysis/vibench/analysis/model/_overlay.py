@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum, auto
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -55,58 +56,50 @@ class SimulatedRun:
         return self.impacts / self.played_s
 
 
+R = TypeVar("R")
+
+
 @dataclass(frozen=True, eq=False)
-class NoiseOverlay:
-    """A transmission, and what the model says of it."""
+class AbstractOverlay(Generic[R]):
+    """A measurement, and what the model says of it."""
 
     run: SimulatedRun
-    response: NoiseResponse
+    response: R
     """Of the simulated specimen under the recorded base motion."""
     difference: CurveDifference
-    """Measured over simulated transmission."""
+    """Measured over simulated transmission, or Response II."""
     prediction: ResponsePrediction
-    """Under sines."""
+    """Under sines of the measured A0."""
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseOverlay(AbstractOverlay[NoiseResponse]):
+    """A transmission, and what the model says of it."""
+
     amplitude_basis: str
     """Where the sines' A0 comes from."""
 
 
 @dataclass(frozen=True, eq=False)
-class SweepOverlay:
+class SweepOverlay(AbstractOverlay[SweepResponse]):
     """A sweep, and what the model says of it."""
 
-    run: SimulatedRun
-    response: SweepResponse
     collisions: Collisions
-    difference: CurveDifference
-    """Measured over simulated Response II."""
-    prediction: ResponsePrediction
-    """Under sines of the measured A0 at each frequency."""
 
 
 @dataclass(frozen=True, eq=False)
-class DwellOverlay:
+class DwellOverlay(AbstractOverlay[DwellResponse]):
     """A dwell, and what the model says of it."""
 
-    run: SimulatedRun
-    response: DwellResponse
     displacement: Envelope
     terminal: tuple[TerminalLevel, ...]
     response_i_db: float
     """Measured over simulated Response I [dB]."""
-    difference: CurveDifference
-    """Measured over simulated Response II."""
-    prediction: ResponsePrediction
-    """Under a sine of the measured A0."""
 
 
 @dataclass(frozen=True, eq=False)
-class SteppedSineOverlay:
+class SteppedSineOverlay(AbstractOverlay[SteppedResponse]):
     """A stepped sine, and what the model says of it."""
-
-    run: SimulatedRun
-    response: SteppedResponse
-    difference: CurveDifference
-    prediction: ResponsePrediction
 
 
 def _run(channels: SimulatedChannels, label: SegmentLabel) -> SimulatedRun:
@@ -163,6 +156,19 @@ def equivalent_amplitude(analysis: NoiseAnalysis) -> tuple[float, str]:
     return float(np.sqrt(2) * rms), "a sine of the same rms base displacement"
 
 
+def _difference(
+    frequency_hz: Reals,
+    measured: SweepResponse | DwellResponse | SteppedResponse,
+    simulated: SweepResponse | DwellResponse | SteppedResponse,
+) -> CurveDifference:
+    """Compare Responses II, with their relative standard deviations."""
+    first, second = (
+        (np.atleast_1d(each.response_ii), np.atleast_1d(each.sd_response_ii / each.response_ii))
+        for each in (measured, simulated)
+    )
+    return logarithmic_difference(frequency_hz, first, second)
+
+
 def sweep_overlay(analysis: SweepAnalysis, channels: SimulatedChannels) -> SweepOverlay:
     """Follow the sweep through simulated channels as through the recorded ones."""
     response, _ = measured_sweep(channels, analysis.excitation)
@@ -175,11 +181,7 @@ def sweep_overlay(analysis: SweepAnalysis, channels: SimulatedChannels) -> Sweep
         run=_run(channels, SegmentLabel.SWEEP),
         response=response,
         collisions=collisions(response),
-        difference=logarithmic_difference(
-            measured.frequency_hz,
-            (measured.response_ii, measured.sd_response_ii / measured.response_ii),
-            (response.response_ii, response.sd_response_ii / response.response_ii),
-        ),
+        difference=_difference(measured.frequency_hz, measured, response),
         prediction=predicted(channels.simulated.specimen, grid, amplitude_m),
     )
 
@@ -195,11 +197,7 @@ def dwell_overlay(analysis: DwellAnalysis, channels: SimulatedChannels) -> Dwell
         displacement=settled_envelope(response),
         terminal=terminal_levels(response, towards_hz),
         response_i_db=float(20 * np.log10(measured.response_i / response.response_i)),
-        difference=logarithmic_difference(
-            np.array([measured.drive.frequency_hz]),
-            (np.array([measured.response_ii]), np.array([measured.sd_response_ii / measured.response_ii])),
-            (np.array([response.response_ii]), np.array([response.sd_response_ii / response.response_ii])),
-        ),
+        difference=_difference(np.array([measured.drive.frequency_hz]), measured, response),
         prediction=predicted(
             channels.simulated.specimen,
             np.array([measured.drive.frequency_hz]),
@@ -217,11 +215,7 @@ def stepped_overlay(
     return SteppedSineOverlay(
         run=_run(channels, label),
         response=response,
-        difference=logarithmic_difference(
-            measured.frequency_hz,
-            (measured.response_ii, measured.sd_response_ii / measured.response_ii),
-            (response.response_ii, response.sd_response_ii / response.response_ii),
-        ),
+        difference=_difference(measured.frequency_hz, measured, response),
         prediction=predicted(channels.simulated.specimen, measured.frequency_hz, measured.drive_amplitude_m),
     )
 

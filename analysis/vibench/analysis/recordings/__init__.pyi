@@ -16,6 +16,7 @@ from ._channels import (
     read_whole as read_whole,
 )
 from ._checks import (
+    AbstractAnalysis as AbstractAnalysis,
     Check as Check,
     Verdict as Verdict,
     measurement_checks as measurement_checks,

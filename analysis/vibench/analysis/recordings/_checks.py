@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import date
 from enum import StrEnum
+from typing import Generic, TypeVar
 
 from vibench.acquisition.recording import RecordingState
 
@@ -35,6 +36,20 @@ _LEAST_SHARE_OF_RANGE = 1e-3
 _SAME_RATE = 1e-9
 _LEVEL_TOLERANCE = 0.05
 """Overshoot of the recorded drive over its setting that noise and the converter's filter explain."""
+
+
+P = TypeVar("P")
+R = TypeVar("R")
+
+
+@dataclass(frozen=True, eq=False)
+class AbstractAnalysis(Generic[P, R]):
+    """What was found in a recording: of a plan, a response."""
+
+    facts: RecordingFacts
+    checks: tuple[Check, ...]
+    excitation: P
+    response: R
 
 
 def measurement_checks(facts: RecordingFacts) -> tuple[Check, ...]:

@@ -7,7 +7,9 @@ from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from ..figures import STEPPED_FREQUENCIES, STEPPED_LEVELS, DrawnFigure
-from ..kinds import Overlay, RecordingAnalysis, Result
+from ..kinds import Result
+from ..model import AbstractOverlay
+from ..recordings import AbstractAnalysis
 from ..results import CampaignResults
 from ._figure_choice import dwell_figures, noise_figures, stepped_figures, sweep_figures, tracked_figures
 from ._findings import (
@@ -20,8 +22,8 @@ from ._findings import (
 )
 from ._result_tables import ReportTable, collision_table, dwell_table, line_table, resonance_table
 
-A = TypeVar("A", bound=RecordingAnalysis)
-L = TypeVar("L", bound=Overlay)
+A = TypeVar("A", bound=AbstractAnalysis[Any, Any])
+L = TypeVar("L", bound=AbstractOverlay[Any])
 
 
 @dataclass(frozen=True)

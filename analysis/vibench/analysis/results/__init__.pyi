@@ -1,6 +1,7 @@
 from ._campaign_results import (
     AnalysisFailure as AnalysisFailure,
     CampaignResults as CampaignResults,
+    FailedStep as FailedStep,
     analyse_files as analyse_files,
     merged_results as merged_results,
     overlay as overlay,

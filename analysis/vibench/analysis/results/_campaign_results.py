@@ -2,7 +2,9 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
+from typing import Any
 
 from vibench.acquisition import RecordingError, open_recording
 from vibench.acquisition.recording import Recording
@@ -15,13 +17,11 @@ from ..kinds import (
     AnyResult,
     DwellResult,
     NoiseResult,
-    Overlay,
-    RecordingAnalysis,
     Result,
     SweepResult,
 )
-from ..model import SimulatedChannels, Simulation, simulated_specimen
-from ..recordings import ProgressObserver, RecordedChannels, RecordingFacts, specimen_of
+from ..model import AbstractOverlay, SimulatedChannels, Simulation, simulated_specimen
+from ..recordings import AbstractAnalysis, ProgressObserver, RecordedChannels, RecordingFacts, specimen_of
 from ..sine import DwellAnalysis, SweepAnalysis
 from ._measurement_analysis import UNOBSERVED, analyse
 
@@ -35,12 +35,12 @@ def ignore_stage(stage: str) -> None:
 
 def overlay(
     recording: Recording,
-    analysis: RecordingAnalysis,
+    analysis: AbstractAnalysis[Any, Any],
     *,
     specimen: Specimen | None = None,
     accuracy: Accuracy = Accuracy.STANDARD,
     stage: Stage = ignore_stage,
-) -> Overlay:
+) -> AbstractOverlay[Any]:
     """Simulate what was measured and compare.
 
     Parameters
@@ -66,8 +66,15 @@ def overlay(
     simulated = simulated_specimen(recording, facts.measurement, model, accuracy)
     channels = SimulatedChannels(RecordedChannels(recording), simulated)
     stage("predicting the response to sines")
-    laid: Overlay = ANALYSES[analysis.excitation.kind].simulate(analysis, channels)
+    laid: AbstractOverlay[Any] = ANALYSES[analysis.excitation.kind].simulate(analysis, channels)
     return laid
+
+
+class FailedStep(StrEnum):
+    """What a recording has no result of."""
+
+    ANALYSIS = "analysis"
+    SIMULATION = "simulation"
 
 
 @dataclass(frozen=True)
@@ -75,8 +82,7 @@ class AnalysisFailure:
     """A recording without a result, or a result without its simulation, and why."""
 
     name: str
-    what: str
-    """``"analysis"`` or ``"simulation"``."""
+    what: FailedStep
     sentence: str
 
 
@@ -121,7 +127,7 @@ class CampaignResults:
         """Dwells by frequency, weak to strong."""
         return self._with(DwellAnalysis)
 
-    def _with(self, analysis: type[RecordingAnalysis]) -> tuple[AnyResult, ...]:
+    def _with(self, analysis: type[AbstractAnalysis[Any, Any]]) -> tuple[AnyResult, ...]:
         return tuple(each for each in self.in_order if isinstance(each.analysis, analysis))
 
 
@@ -152,7 +158,7 @@ def analyse_files(
             with open_recording(path) as recording:
                 result, failed = result_of(recording, simulation, request, observer, specimen)
         except (AnalysisError, RecordingError) as error:
-            failures.append(AnalysisFailure(path.name, "analysis", str(error)))
+            failures.append(AnalysisFailure(path.name, FailedStep.ANALYSIS, str(error)))
             continue
         results.append(result)
         failures.extend(failed)
@@ -192,7 +198,7 @@ def result_of(
             recording, analysis, specimen=specimen, stage=lambda stage: observer.begin(name, stage)
         )
     except AnalysisError as error:
-        return Result(analysis, None), (AnalysisFailure(name, "simulation", str(error)),)
+        return Result(analysis, None), (AnalysisFailure(name, FailedStep.SIMULATION, str(error)),)
     return Result(analysis, laid), ()
 
 

@@ -1,13 +1,15 @@
 """From one recording to its result, by what was played."""
 
 from pathlib import Path
+from typing import Any
 
 from vibench.acquisition.recording import Recording, open_recording
 
 from ..errors import AnalysisError
 from ..frequency_response import DEFAULT_REQUEST, FrequencyResponseRequest
-from ..kinds import ANALYSES, RecordingAnalysis
+from ..kinds import ANALYSES
 from ..recordings import (
+    AbstractAnalysis,
     ObservedChannels,
     ProgressObserver,
     RecordedChannels,
@@ -23,7 +25,7 @@ def analyse(
     recording: Recording | Path,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
     observer: ProgressObserver = UNOBSERVED,
-) -> RecordingAnalysis:
+) -> AbstractAnalysis[Any, Any]:
     """Analyse a recording, complete or not, by the excitation that its plan names.
 
     Parameters
@@ -53,7 +55,7 @@ def analyse(
         channels = ObservedChannels(RecordedChannels(recording), observer)
         require_moving_channels(facts.channels)
         plan = facts.measurement.excitation
-        found: RecordingAnalysis = ANALYSES[plan.kind].analyse(facts, channels, plan, request)
+        found: AbstractAnalysis[Any, Any] = ANALYSES[plan.kind].analyse(facts, channels, plan, request)
     except AnalysisError as error:
         ended = f"{facts.state.value}" + (f": {facts.reason}" if facts.reason else "")
         raise type(error)(f"{recording.path.name} ({ended}): {error}") from error

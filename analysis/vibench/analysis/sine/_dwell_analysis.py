@@ -7,8 +7,8 @@ from vibench.acquisition.recording import SegmentLabel
 
 from ..errors import NotEnoughData
 from ..recordings import (
+    AbstractAnalysis,
     Channels,
-    Check,
     RecordingFacts,
     only_stretch,
     read_whole,
@@ -29,13 +29,9 @@ _TIME_BINS = 1200
 
 
 @dataclass(frozen=True, eq=False)
-class DwellAnalysis:
+class DwellAnalysis(AbstractAnalysis[DwellPlan, DwellResponse]):
     """A dwell: time signal, spectrum, responses and lines."""
 
-    facts: RecordingFacts
-    checks: tuple[Check, ...]
-    excitation: DwellPlan
-    response: DwellResponse
     displacement: Envelope
     """x over the dwell [m], without the ends that integration disturbs."""
     terminal: tuple[TerminalLevel, ...]

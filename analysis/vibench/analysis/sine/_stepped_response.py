@@ -10,9 +10,8 @@ from vibench.acquisition.recording import SegmentLabel
 
 from ..errors import NotEnoughData
 from ..recordings import (
+    AbstractAnalysis,
     Channels,
-    Check,
-    RecordingFacts,
     Stretch,
 )
 from ..signals import Reals
@@ -107,10 +106,5 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
 
 
 @dataclass(frozen=True, eq=False)
-class SteppedSineAnalysis:
+class SteppedSineAnalysis(AbstractAnalysis[Steps, SteppedResponse]):
     """A stepped sine: responses at every frequency, or at every level."""
-
-    facts: RecordingFacts
-    checks: tuple[Check, ...]
-    excitation: Steps
-    response: SteppedResponse

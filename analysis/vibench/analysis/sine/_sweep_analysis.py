@@ -9,9 +9,8 @@ from vibench.acquisition.recording import SegmentLabel
 
 from ..errors import NotEnoughData
 from ..recordings import (
+    AbstractAnalysis,
     Channels,
-    Check,
-    RecordingFacts,
     only_stretch,
 )
 from ..spectra import Spectrogram, SpectrogramSums
@@ -27,13 +26,9 @@ _SPECTROGRAM_ORDER = 3.2
 
 
 @dataclass(frozen=True, eq=False)
-class SweepAnalysis:
+class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
     """A sweep: envelope, responses and where the masses collide."""
 
-    facts: RecordingFacts
-    checks: tuple[Check, ...]
-    excitation: Sweep
-    response: SweepResponse
     collisions: Collisions
     jumps: tuple[Jump, ...]
     """Of Response II, between a smooth motion and another."""
