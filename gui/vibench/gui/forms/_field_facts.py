@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, get_args
 
-import annotated_types
+from annotated_types import Ge, Gt, Le, Lt
 from pydantic.fields import FieldInfo
 
 UNITS = (
@@ -62,21 +62,22 @@ def field_facts(name: str, field: FieldInfo) -> FieldFacts:
 
 
 def _limits(field: FieldInfo, unit: str) -> str:
-    # "above" and "at least" before "at most" and "below".
-    said = ", ".join(sorted(_limit_texts(field), key=lambda text: text.startswith(("at most", "below"))))
+    said = ", ".join(_limit_texts(field))
     return f"{said} {unit}".strip() if said else ""
 
 
 def _limit_texts(field: FieldInfo) -> Iterator[str]:
-    for constraint in (*field.metadata, *_inner(field.annotation)):
+    constraints = (*field.metadata, *_inner(field.annotation))
+    # Lower bounds before upper ones.
+    for constraint in sorted(constraints, key=lambda each: isinstance(each, (Le, Lt))):
         match constraint:
-            case annotated_types.Ge(ge):
+            case Ge(ge):
                 yield f"at least {ge:g}"
-            case annotated_types.Gt(gt):
+            case Gt(gt):
                 yield f"above {gt:g}"
-            case annotated_types.Le(le):
+            case Le(le):
                 yield f"at most {le:g}"
-            case annotated_types.Lt(lt):
+            case Lt(lt):
                 yield f"below {lt:g}"
 
 
