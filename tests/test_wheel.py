@@ -1,0 +1,170 @@
+"""The wheel as users install it: beside files of theirs that bear the names of our folders."""
+
+import json
+import os
+import subprocess
+import sys
+import sysconfig
+import tomllib
+import venv
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+from packaging.requirements import Requirement
+
+ROOT = Path(__file__).resolve().parent.parent
+PORTIONS = ("acquisition", "analysis", "cli", "gui", "sim", "virtual_rig")
+
+FACES = """
+from vibench.acquisition import open_bench, open_recording, run_campaign
+from vibench.analysis import transmissibility
+from vibench.sim import Harmonic, gong2025, lyapunov_exponent, periodic_branch, steady_response
+"""
+EVERY_NAME = """
+import importlib, pkgutil
+for portion in {portions}:
+    package = importlib.import_module(f"vibench.{{portion}}")
+    rooms = [room.name for room in pkgutil.iter_modules(package.__path__) if room.ispkg]
+    for face in (package, *(importlib.import_module(f"vibench.{{portion}}.{{room}}") for room in rooms)):
+        for name in getattr(face, "__all__", ()):
+            getattr(face, name)
+print("every name resolves")
+"""
+
+
+def run(*command, cwd, **environment):
+    """Run a program that knows nothing of this checkout, and give what it printed."""
+    kept = {name: value for name, value in os.environ.items() if name not in {"PYTHONPATH", "VIRTUAL_ENV"}}
+    result = subprocess.run(
+        [str(part) for part in command],
+        cwd=cwd,
+        env=kept | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 0, f"{command}\n{result.stdout}{result.stderr}"
+    return result.stdout
+
+
+def pip(*arguments):
+    return run(sys.executable, "-m", "pip", "--quiet", *arguments, cwd=ROOT)
+
+
+def empty_environment(folder):
+    """Make an environment without packages, and give its interpreter."""
+    venv.create(folder, symlinks=os.name != "nt")
+    programs = Path(sysconfig.get_path("scripts", "venv", {"base": str(folder), "platbase": str(folder)}))
+    return programs / Path(sys.executable).name
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wheel")
+    pip("wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", folder, ROOT)
+    (built,) = folder.glob("vibench-*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def python(wheel, tmp_path_factory):
+    """Interpreter of an environment with the wheel; its libraries are those of these tests."""
+    folder = tmp_path_factory.mktemp("installed")
+    python = empty_environment(folder)
+    pip("--python", python, "install", "--no-deps", "--no-compile", wheel)
+    site = Path(sysconfig.get_path("purelib", "venv", {"base": str(folder), "platbase": str(folder)}))
+    # A folder named in a .pth file is searched, but its own .pth files, our checkout's, are not read.
+    (site / "libraries.pth").write_text(sysconfig.get_path("purelib"))
+    return python
+
+
+@pytest.fixture
+def users_folder(tmp_path):
+    for portion in PORTIONS:
+        (tmp_path / f"{portion}.py").write_text("raise RuntimeError('a file of the user was imported')\n")
+    return tmp_path
+
+
+def test_the_wheel_holds_types_templates_and_the_files_that_are_shipped(wheel):
+    names = set(ZipFile(wheel).namelist())
+    for portion in PORTIONS:
+        assert f"vibench/{portion}/py.typed" in names
+        assert f"vibench/{portion}/__init__.pyi" in names
+    assert "vibench/__init__.py" not in names
+    assert any(name.endswith("/report.html.j2") for name in names)
+    for folder in ("hardware_configs", "campaigns", "studies"):
+        for path in (ROOT / folder).rglob("*.toml"):
+            inside = path.relative_to(ROOT).as_posix()
+            assert any(name.endswith(f".data/data/share/vibench/{inside}") for name in names), inside
+
+
+def test_every_source_file_is_in_the_wheel_under_the_name_by_which_it_is_imported(wheel):
+    names = {name for name in ZipFile(wheel).namelist() if name.startswith("vibench/")}
+    tracked = {
+        path.relative_to(ROOT / portion).as_posix()
+        for portion in PORTIONS
+        for path in (ROOT / portion / "vibench").rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    assert names == tracked
+
+
+def test_a_script_beside_files_of_our_folders_names_imports_ours(python, users_folder):
+    script = users_folder / "script.py"
+    script.write_text(f"{FACES}\nimport vibench.sim\nprint(vibench.sim.__file__)\n")
+    imported = Path(run(python, script, cwd=users_folder).strip())
+    assert imported.is_relative_to(python.parent.parent)
+
+
+def test_every_name_of_every_face_resolves_from_the_wheel(python, users_folder):
+    printed = run(
+        python, "-c", EVERY_NAME.format(portions=PORTIONS), cwd=users_folder, QT_QPA_PLATFORM="offscreen"
+    )
+    assert printed == "every name resolves\n"
+
+
+def test_the_command_works_as_a_module_and_as_a_program(python, users_folder):
+    assert "predict" in run(python, "-m", "vibench.cli", "--help", cwd=users_folder)
+    command = python.parent / f"vibench{python.suffix}"
+    arguments = ("predict", "--model", "linear", "--amplitude", "1e-6", "--frequency", "95", "--json")
+    (point,) = json.loads(run(command, *arguments, cwd=users_folder))["points"]
+    assert point["relative_i"] > 0
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)  # all kernels are compiled: an installation has its own
+def test_a_shipped_campaign_is_measured_and_analysed_from_the_wheel(python, users_folder):
+    campaign = python.parent.parent / "share" / "vibench" / "campaigns" / "quick.toml"
+    run(python, "-m", "vibench.cli", "measure", campaign, "--out", "recordings", cwd=users_folder)
+    run(python, "-m", "vibench.cli", "analyse", "recordings/noise.h5", "--out", "analysed", cwd=users_folder)
+    assert list((users_folder / "analysed").rglob("*.html"))
+
+
+def lowest_allowed():
+    """Give our requirements, each at the lowest version that pyproject.toml allows."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    for text in project["dependencies"]:
+        requirement = Requirement(text)
+        (lowest,) = (part.version for part in requirement.specifier if part.operator in {">=", "=="})
+        extras = f"[{','.join(sorted(requirement.extras))}]" if requirement.extras else ""
+        yield f"{requirement.name}{extras}=={lowest}"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_it_works_with_the_lowest_version_of_every_library_and_the_newest_of_theirs(
+    wheel, tmp_path, users_folder
+):
+    """docs/decisions/0005-dependencies.md says what each lower bound is for."""
+    python = empty_environment(tmp_path / "lowest")
+    pip("--python", python, "install", "--prefer-binary", wheel, *lowest_allowed())
+    run(python, "-c", EVERY_NAME.format(portions=PORTIONS), cwd=users_folder, QT_QPA_PLATFORM="offscreen")
+    assert "predict" in run(python, "-m", "vibench.cli", "--help", cwd=users_folder)
+    arguments = ("predict", "--model", "hertz", "--amplitude", "5e-6", "--frequency", "260", "--json")
+    (point,) = json.loads(run(python, "-m", "vibench.cli", *arguments, cwd=users_folder))["points"]
+    assert point["impacts"] > 0
+    # The virtual rig speaks to every library of the bench: VISA, USB, DAQmx, gRPC.
+    campaign = python.parent.parent / "share" / "vibench" / "campaigns" / "quick.toml"
+    run(python, "-m", "vibench.cli", "measure", campaign, "--out", "recordings", cwd=users_folder)
+    run(python, "-m", "vibench.cli", "analyse", "recordings/noise.h5", "--out", "analysed", cwd=users_folder)
