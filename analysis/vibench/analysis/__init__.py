@@ -1,4 +1,4 @@
-"""Recordings and predictions become transmissibilities, spectra, responses, figures and reports.
+"""Recordings and predictions become frequency responses, spectra, responses, figures and reports.
 
 Pure functions with frozen results; what can have an uncertainty carries one. SI units; a name says the
 unit where it is not plain. An error says what was given, what is allowed, and what to do next.

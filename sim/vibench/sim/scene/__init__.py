@@ -3,7 +3,7 @@
 `Scene` holds specimen, drive, start, duration, observables and accuracy. `plan_scene` decides beforehand
 whether a closed form suffices and what has to be carried along; `solve_scene` runs it and measures the
 integration error against stricter steps and the scatter of chaotic windows (docs/accuracy.md). The answer,
-`Prediction`, is one flat frozen value. Many scenes at once are the business of `study`.
+`ScenePrediction`, is one flat frozen value. Many scenes at once are the business of `study`.
 """
 
 import lazy_loader
