@@ -1,0 +1,61 @@
+"""The scripts in examples/ run as they stand, and say what their first lines promise."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import Block
+from vibench.acquisition.recording import (
+    ChannelHeader,
+    Origin,
+    RecordingHeader,
+    RecordingState,
+    create_recording,
+)
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+
+
+def lines_of(script, *arguments):
+    command = [sys.executable, "-W", "error", str(EXAMPLES / script), *map(str, arguments)]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
+    return result.stdout.splitlines()
+
+
+def test_at_260_hz_the_specimen_strikes_its_stops_at_5_micrometres_but_not_at_1():
+    weak, strong = lines_of("response_and_exponent.py")
+    assert re.search(r"^1 µm: Response I [\d.]+, II [\d.]+, 0 impacts .* exponent -[\d.]+ ±", weak)
+    assert int(re.search(r"(\d+) impacts", strong)[1]) > 0
+
+
+def test_a_recording_is_read_without_vibench(tmp_path):
+    channel = ChannelHeader(
+        "m0_velocity", "Dev1/ai0", "velocity", "m s-1", physical_per_volt=0.125, range_v=5.0
+    )
+    plan = {"excitation": {"kind": "dwell", "amplitude_vpp": 0.5}}
+    header = RecordingHeader(
+        (channel,), 1000.0, expected_samples=500, origin=Origin.SIMULATED, plan_json=json.dumps(plan)
+    )
+    with create_recording(tmp_path / "sine.h5", header) as writer:
+        writer.append(Block(0, np.sin(0.1 * np.arange(500))[np.newaxis]))
+        path = writer.finish(RecordingState.COMPLETE, "the plan was carried out")
+    assert lines_of("read_a_recording_with_h5py.py", path) == [
+        "complete: the plan was carried out",
+        "played: dwell, 0.5 Vpp",
+        "m0: 0.50 s, at most 125.0 mm/s",
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_a_campaign_on_the_virtual_rig_finds_the_resonances_of_the_specimen(tmp_path):
+    lines = lines_of("campaign_on_the_virtual_rig.py", tmp_path / "recordings")
+    assert sum(line.endswith(".h5: recorded") for line in lines) == 15
+    found = [float(re.search(r"at ([\d.]+)", line)[1]) for line in lines if line.startswith("resonance")]
+    assert found == pytest.approx([94.4, 266.0, 500.5], abs=2.0)
