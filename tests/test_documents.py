@@ -1,0 +1,148 @@
+"""What documents and faces say of the code is true of it: names, paths, links and examples."""
+
+import ast
+import doctest
+import importlib
+import importlib.util
+import re
+import shutil
+import tomllib
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+FOLDERS = (
+    "sim|acquisition|virtual_rig|analysis|gui|cli|"
+    "tests|docs|examples|benchmarks|campaigns|studies|hardware_configs"
+)
+
+NAME = re.compile(r"(?<![\w./-])vibench(?:\.[A-Za-z_]\w*)+")
+PATH = re.compile(rf"(?<![\w./-])(?:{FOLDERS})/[\w.*/-]*\w")
+LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
+CODE = re.compile(r"^```python\n(.*?)^```", flags=re.DOTALL | re.MULTILINE)
+
+FACES_WITH_AN_EXAMPLE = [
+    "vibench.sim",
+    "vibench.sim.study",
+    "vibench.sim.chain",
+    "vibench.sim.stepping",
+    "vibench.sim.accuracy_benchmark",
+    "vibench.virtual_rig",
+    "vibench.acquisition",
+    "vibench.acquisition.plan",
+    "vibench.acquisition.rig",
+    "vibench.acquisition.recording",
+    "vibench.acquisition.campaign",
+    "vibench.acquisition.engine",
+    "vibench.analysis",
+    "vibench.analysis.live",
+    "vibench.analysis.report",
+    "vibench.analysis.exchange",
+    "vibench.analysis.simulation",
+    "vibench.analysis.reproduction",
+]
+
+every_document = pytest.mark.parametrize(
+    "document", [pytest.param(path, id=path.relative_to(ROOT).as_posix()) for path in DOCUMENTS]
+)
+
+
+@cache
+def text_of(document):
+    return document.read_text(encoding="utf-8")
+
+
+def resolves(dotted):
+    """Say whether a dotted name is a module, or something that stands on one."""
+    module, *rest = None, *dotted.split(".")[1:]
+    name = "vibench"
+    while rest:
+        try:
+            module = importlib.import_module(f"{name}.{rest[0]}")
+        except ModuleNotFoundError:
+            break
+        name = f"{name}.{rest.pop(0)}"
+    for attribute in rest:
+        if not hasattr(module, attribute):
+            return False
+        module = getattr(module, attribute)
+    return module is not None
+
+
+@every_document
+def test_every_dotted_name_in_a_document_resolves(document):
+    assert [name for name in sorted(set(NAME.findall(text_of(document)))) if not resolves(name)] == []
+
+
+@every_document
+def test_every_path_in_a_document_leads_to_something(document):
+    named = sorted(set(PATH.findall(text_of(document))))
+    assert [path for path in named if not list(ROOT.glob(path))] == []
+
+
+@every_document
+def test_every_link_in_a_document_leads_to_a_file(document):
+    links = sorted(set(LINK.findall(text_of(document))))
+    assert [link for link in links if not (document.parent / link).exists()] == []
+
+
+@every_document
+def test_every_import_of_ours_in_the_code_of_a_document_works(document):
+    missing = []
+    for code in CODE.findall(text_of(document)):
+        for node in ast.walk(ast.parse(code)):
+            if isinstance(node, ast.ImportFrom) and str(node.module).startswith("vibench"):
+                missing += [
+                    f"{node.module}.{each.name}"
+                    for each in node.names
+                    if not resolves(f"{node.module}.{each.name}")
+                ]
+    assert missing == []
+
+
+def code_of_the_readme(saying):
+    """Give the one example that says something, compiled."""
+    (code,) = (code for code in CODE.findall(text_of(ROOT / "README.md")) if saying in code)
+    return compile(code, "README.md", "exec")
+
+
+def test_the_simulation_in_the_readme_runs(capsys):
+    exec(code_of_the_readme("steady_response"), {})
+    assert capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_the_measurement_in_the_readme_runs(tmp_path, monkeypatch, capsys):
+    for folder in ("campaigns", "hardware_configs"):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
+    monkeypatch.chdir(tmp_path)
+    exec(code_of_the_readme("run_campaign"), {})
+    assert "Resonance" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("face", FACES_WITH_AN_EXAMPLE)
+def test_the_example_of_a_face_says_what_happens(face):
+    result = doctest.testmod(importlib.import_module(face))
+    assert result.attempted > 0
+    assert result.failed == 0
+
+
+def ordered_rooms():
+    """Give the rooms of every package, highest first, as the contracts of pyproject.toml order them."""
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
+    for contract in contracts["contracts"]:
+        for package in contract.get("containers", ()):
+            layers = " | ".join(contract["layers"])
+            yield pytest.param(package, layers.split(" | "), id=package)
+
+
+@pytest.mark.parametrize(("package", "rooms"), list(ordered_rooms()))
+def test_the_page_on_architecture_lists_the_rooms_in_their_order_and_in_their_own_words(package, rooms):
+    _, section = text_of(ROOT / "docs" / "architecture.md").split(f"### `{package}`\n")
+    listed = re.findall(r"^\| `(\w+)` \| (.+) \|$", section.split("\n### ")[0].split("\n## ")[0], flags=re.M)
+    said = [importlib.util.find_spec(f"{package}.{room}") for room in rooms]
+    first_lines = [ast.get_docstring(ast.parse(Path(spec.origin).read_text("utf-8"))) for spec in said]
+    assert listed == [(room, text.split("\n")[0]) for room, text in zip(rooms, first_lines, strict=True)]
