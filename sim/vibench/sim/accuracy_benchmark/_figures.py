@@ -66,9 +66,7 @@ class LevelFigures:
     cost: float
     """Processor time over simulated time."""
     state_error: float | None
-    """Of the state at the end of the span, as `vibench.sim.accuracy_benchmark.state_error`; None in
-    chaos.
-    """
+    """Of the state at the end of the span, as `state_error` measures it; None in chaos."""
     response_i_error: float | None
     """Relative, against the reference level; None in chaos."""
     response_ii_error: float | None

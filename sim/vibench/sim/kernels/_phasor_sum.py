@@ -1,5 +1,4 @@
-"""A sum of phasors, propagated: sixteen numbers of it at once: at the next grid steps, or of its series. SI
-units.
+"""A sum of phasors, sixteen numbers of it at once: at the next grid steps, or of its series. SI units.
 
 Each term turns and shrinks at its own rate, so that every such number is a sum of rows with the terms as
 weights: nothing waits for the step or the coefficient before.

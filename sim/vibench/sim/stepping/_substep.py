@@ -140,9 +140,7 @@ def _stay_on_stop(
     series: Table,
     path: Vector,
 ) -> tuple[int, float]:
-    """Advance from ``tau`` while a stop pushes; the codes of `vibench.sim.contact`, and the time
-    reached.
-    """
+    """Advance from ``tau`` while a stop pushes; codes of `vibench.sim.contact`, and the time reached."""
     if restitution is not None:
         lets_go = hold_on_series(series, path, state, shifted(force, tau), length - tau, tables.par)
         if lets_go == NEVER:
@@ -167,9 +165,7 @@ def _fly_substep(
     series: Table,
     path: Vector,
 ) -> tuple[int, float]:
-    """Advance a flight from ``tau`` to its first touch or to ``length``; codes of
-    `vibench.sim.flight`.
-    """
+    """Advance a flight from ``tau`` to its first touch or to ``length``; codes of `vibench.sim.flight`."""
     par, rest, left = tables.par, shifted(force, tau), length - tau
     bound = acceleration_bound(state, rest, tables)
     if not bound < LARGEST_BOUND:

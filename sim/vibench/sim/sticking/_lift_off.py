@@ -1,5 +1,4 @@
-"""Lift-off: the first moment after m1 leaves a rigid stop on which it stood: too slow to search for
-touches. SI units.
+"""Lift-off: the first moment after m1 leaves a rigid stop it stood on: too slow to search for touches. SI.
 
 A search that starts on the stop with no speed cannot tell leaving from touching: the gap grows with t^2 or
 t^3 from nothing, and its first digits are rounding. But it surely grows while

@@ -1,5 +1,4 @@
-"""Sticking, m1 held by a rigid stop: exact motion of two bodies, up to where the stop would have to pull.
-SI units.
+"""Sticking, m1 held by a rigid stop: exact motion of two bodies, until the stop would have to pull. SI.
 
 `vibench.sim.model` says what moves. The stop lets go where the acceleration that presses m1 on it
 (`vibench.sim.rigid.press_on`) falls to zero: found like a touch, by the same proof, with it in the gap's
@@ -87,9 +86,7 @@ def hold(
     held: FlightTables,
     pulls: Complex,
 ) -> tuple[int, float]:
-    """Find how long a stop holds m1: until it lets go, or ``longest`` [s]; see
-    `vibench.sim.flight.fly`.
-    """
+    """Find how long a stop holds m1: until it lets go, or ``longest`` [s]; see `flight.fly`."""
     par, elapsed = held.par, 0.0
     weight, spring = -side / par.mass2, par.k1 * gap_of(side, par) / par.reduced_mass
     while elapsed < longest:
@@ -126,9 +123,7 @@ def place_held(state: Vector, side: float, phasors: Complex, held: FlightTables)
 
 @kernel_without_refcount
 def observe_held(observations: Vector, side: float, clock: Vector, length: float, held: FlightTables) -> None:
-    """Add what the constant p does to its peak and line; `vibench.sim.flight.tally_flight` does the
-    rest.
-    """
+    """Add what the constant p does to its peak and line; `flight.tally_flight` does the rest."""
     if observations[MODE] == NOTHING:
         return
     gap = gap_of(side, held.par)
