@@ -6,9 +6,17 @@ from hypothesis import given, settings, strategies as st
 
 from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.frequency_response._periodic import PeriodicSums, Scatter, periodic_frequency_response
+from vibench.analysis.frequency_response._periodic import EVERYTHING, PeriodicSums, Scatter
 
 RATE = 5120.0
+
+
+def periodic_frequency_response(realisations, rate_hz, *, repetition_hz, delay_s=0.0, band_hz=EVERYTHING):
+    """Add every (drive, base, response) of a multisine, and estimate."""
+    sums = PeriodicSums(rate_hz, repetition_hz)
+    for rows in realisations:
+        sums.add(*rows)
+    return sums.frequency_response(delay_s=delay_s, band_hz=band_hz)
 
 
 def multisine(orders, phases, period_samples, samples):

@@ -7,7 +7,6 @@ robust method of Pintelon & Schoukens, System Identification, 2nd ed., section 4
 The best linear approximation over realisations of a periodic drive, its noise and its distortion.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -214,7 +213,10 @@ class PeriodicSums:
     def frequency_response(
         self, *, delay_s: float = 0.0, band_hz: tuple[float, float] = EVERYTHING
     ) -> PeriodicFrequencyResponse:
-        """Give the transmission of the realisations added so far.
+        """Give the transmission of the realisations added so far, at the driven lines.
+
+        The bounds are Student's with 2 (realisations - 1) degrees of freedom, so that they also hold for two
+        or three realisations.
 
         Parameters
         ----------
@@ -276,40 +278,6 @@ class PeriodicSums:
                 confidence=self._confidence,
             ),
         )
-
-
-def periodic_frequency_response(
-    realisations: Iterable[tuple[Reals, Reals, Reals]],
-    sample_rate_hz: float,
-    *,
-    repetition_hz: float,
-    delay_s: float = 0.0,
-    band_hz: tuple[float, float] = EVERYTHING,
-    confidence: float = DEFAULT_CONFIDENCE,
-) -> PeriodicFrequencyResponse:
-    """Estimate response over base motion from realisations of a multisine, with honest bounds.
-
-    Parameters
-    ----------
-    realisations
-        (drive, base, response) samples of each; may be read from a file one by one.
-    sample_rate_hz, repetition_hz
-        Nominal; the true repetition is measured on the drive of every realisation.
-    delay_s
-        By how much the response channel lags the base channel.
-    band_hz
-        Lowest and highest line to keep: a held waveform also drives images far above its band.
-
-    Returns
-    -------
-    Lines at the driven multiples of the repetition frequency. The bounds are Student's with
-    2 (realisations - 1) degrees of freedom, so that they also hold for two or three realisations.
-
-    """
-    sums = PeriodicSums(sample_rate_hz, repetition_hz, confidence=confidence)
-    for drive, base, response in realisations:
-        sums.add(drive, base, response)
-    return sums.frequency_response(delay_s=delay_s, band_hz=band_hz)
 
 
 def _within(frequency_hz: Reals, band_hz: tuple[float, float], spacing_hz: float) -> Flags:

@@ -33,10 +33,8 @@ from ._comparison_export import (
 from ._drawings import (
     DRAWINGS,
     Drawing,
-    result_figures,
-)
-from ._figure_choice import (
     recording_figures,
+    result_figures,
 )
 from ._report import (
     write_report,

@@ -6,12 +6,30 @@ from itertools import groupby
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
-from ..figures import STEPPED_FREQUENCIES, STEPPED_LEVELS, DrawnFigure
-from ..kinds import Result
+from ..figures import (
+    STEPPED_FREQUENCIES,
+    STEPPED_LEVELS,
+    TRACKED_RESONANCE,
+    DrawnFigure,
+    SteppedLook,
+    backbone_figure,
+    bench_levels_figure,
+    distortion_figure,
+    dwells_figure,
+    excitation_figure,
+    hysteresis_figure,
+    portraits_figure,
+    stepped_sine_figure,
+    sweep_figure,
+    sweep_orders_figure,
+    transmission_figure,
+    transmission_levels_figure,
+)
+from ..kinds import AnyResult, DwellResult, NoiseResult, Result, SteppedSineResult, SweepResult
 from ..model import AbstractOverlay
 from ..recordings import AbstractAnalysis
 from ..results import CampaignResults
-from ._figure_choice import dwell_figures, noise_figures, stepped_figures, sweep_figures, tracked_figures
+from ..sine import tracked_resonances
 from ._findings import (
     dwell_findings,
     level_findings,
@@ -35,10 +53,66 @@ class Drawing(Generic[A, L]):
     tables: tuple[Callable[[Sequence[Result[A, L]]], ReportTable], ...] = ()
 
 
-_NOISE = Drawing(noise_figures, noise_findings, (resonance_table,))
-_SWEEP = Drawing(sweep_figures, sweep_findings, (collision_table,))
-_DWELL = Drawing(dwell_figures, dwell_findings, (dwell_table, line_table))
-_STEPPED = Drawing(stepped_figures(STEPPED_FREQUENCIES), stepped_findings)
+def _noise_figures(noise: Sequence[NoiseResult]) -> Iterator[DrawnFigure]:
+    """Draw all levels in one, then each with its distortion."""
+    if len(noise) > 1:
+        yield transmission_levels_figure([each.analysis for each in noise])
+    for each in noise:
+        yield transmission_figure(each.analysis, each.laid)
+        if each.analysis.response.periodic is not None:
+            yield distortion_figure(each.analysis, each.analysis.response.periodic)
+
+
+def _sweep_figures(sweeps: Sequence[SweepResult]) -> Iterator[DrawnFigure]:
+    """Draw each sweep, then those that went there and back over each other."""
+    for sweep in sweeps:
+        yield sweep_figure(sweep.analysis, sweep.laid)
+        yield sweep_orders_figure(sweep.analysis)
+    for up, down in _there_and_back(sweeps):
+        yield hysteresis_figure(up.analysis, down.analysis)
+
+
+def _dwell_figures(dwells: Sequence[DwellResult]) -> Iterator[DrawnFigure]:
+    """Draw the dwells at one frequency together."""
+    for _, group in groupby(dwells, key=lambda each: each.analysis.excitation.frequency_hz):
+        same = tuple(group)
+        yield dwells_figure([(each.analysis, each.laid) for each in same])
+        yield portraits_figure([each.analysis for each in same])
+
+
+def _stepped_figures(
+    look: SteppedLook[Any],
+) -> Callable[[Sequence[SteppedSineResult]], Iterator[DrawnFigure]]:
+    """Draw a figure of each over what was stepped."""
+    return lambda stepped: (stepped_sine_figure(each.analysis, each.laid, look) for each in stepped)
+
+
+def _tracked_figures(tracked: Sequence[SteppedSineResult]) -> Iterator[DrawnFigure]:
+    """Draw each resonance over level, where one was found."""
+    for each in tracked:
+        if tracked_resonances(each.analysis.facts.feedback):
+            yield backbone_figure(each.analysis, each.laid)
+        else:
+            yield stepped_sine_figure(each.analysis, each.laid, TRACKED_RESONANCE)
+
+
+def _there_and_back(sweeps: Sequence[SweepResult]) -> Iterator[tuple[SweepResult, SweepResult]]:
+    """Pair each sweep upwards with the first one downwards of the same level over some of its band."""
+    for up in sweeps:
+        plan = up.analysis.excitation
+        for down in sweeps:
+            other = down.analysis.excitation
+            is_back = plan.start_hz < plan.stop_hz and other.start_hz > other.stop_hz
+            overlaps = other.stop_hz < plan.stop_hz and other.start_hz > plan.start_hz
+            if is_back and overlaps and plan.amplitude_vpp == other.amplitude_vpp:
+                yield up, down
+                break
+
+
+_NOISE = Drawing(_noise_figures, noise_findings, (resonance_table,))
+_SWEEP = Drawing(_sweep_figures, sweep_findings, (collision_table,))
+_DWELL = Drawing(_dwell_figures, dwell_findings, (dwell_table, line_table))
+_STEPPED = Drawing(_stepped_figures(STEPPED_FREQUENCIES), stepped_findings)
 DRAWINGS: Mapping[str, Drawing[Any, Any]] = MappingProxyType(
     {
         "multisine_noise": _NOISE,
@@ -50,14 +124,14 @@ DRAWINGS: Mapping[str, Drawing[Any, Any]] = MappingProxyType(
         "held_dwell": _DWELL,
         "stepped_sine": _STEPPED,
         "settled_sine": _STEPPED,
-        "stepped_level": Drawing(stepped_figures(STEPPED_LEVELS), level_findings),
-        "resonance_tracking": Drawing(tracked_figures, tracked_findings),
+        "stepped_level": Drawing(_stepped_figures(STEPPED_LEVELS), level_findings),
+        "resonance_tracking": Drawing(_tracked_figures, tracked_findings),
     }
 )
 """By the word in a plan."""
 
 
-def _groups(results: CampaignResults) -> Iterator[tuple[Drawing[Any, Any], tuple[Result[Any, Any], ...]]]:
+def _groups(results: CampaignResults) -> Iterator[tuple[Drawing[Any, Any], tuple[AnyResult, ...]]]:
     for drawing, group in groupby(results.in_order, key=lambda each: DRAWINGS[each.kind]):
         yield drawing, tuple(group)
 
@@ -78,3 +152,9 @@ def findings(results: CampaignResults) -> Iterator[str]:
     yield from results.model_said
     for each in results.in_order:
         yield from DRAWINGS[each.kind].findings(each)
+
+
+def recording_figures(result: AnyResult) -> tuple[DrawnFigure, ...]:
+    """Draw what was planned and what every channel recorded."""
+    facts = result.analysis.facts
+    return excitation_figure(facts.measurement), bench_levels_figure(facts)

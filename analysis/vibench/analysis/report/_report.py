@@ -16,8 +16,7 @@ from ..figures import DrawnFigure
 from ..kinds import AnyResult
 from ..recordings import Verdict
 from ..results import AnalysisFailure, CampaignResults
-from ._drawings import findings, result_figures, result_tables
-from ._figure_choice import recording_figures
+from ._drawings import findings, recording_figures, result_figures, result_tables
 from ._findings import limits
 from ._recording_section import (
     CHANNEL_HEADINGS,
