@@ -7,15 +7,30 @@ package of vibench: instruments, files of recordings and figures are unknown her
 solves many scenes at once, `vibench.sim.chain` joins many specimens; what each level of `Accuracy` costs is
 in docs/accuracy.md.
 
->>> from vibench.sim import Accuracy, Harmonic, base_transmissibility, gong2025, steady_response
+>>> from vibench.sim import Harmonic, base_transmissibility, gong2025, steady_response
 >>> specimen = gong2025(damping_time_s=2e-5, gap_m=45e-6, contact="hertz")
 >>> free = base_transmissibility(specimen, 266.2)[0]  # x, y, z and p over the base, without stops
 >>> [round(float(value), 1) for value in abs(free)]
 [22.6, 6.0, 36.7, 42.7]
 >>> drive = Harmonic(frequency_hz=130.0, amplitude_m=20e-6)
->>> response = steady_response(specimen, drive, Accuracy.STANDARD, duration_s=4.0, window_s=1.0)
+>>> response = steady_response(specimen, drive, accuracy="standard", duration_s=4.0, window_s=1.0)
 >>> round(response.relative_i, 2), round(response.relative_ii, 2), response.impacts
 (2.31, 1.21, 260)
+
+Motions are followed from any state; whether neighbours part is an exponent with its error; periodic motions
+are found by shooting or harmonic balance and followed along frequency or amplitude:
+
+>>> from vibench.sim import Precision, integrate, lyapunov_exponent, periodic_branch, periodic_orbit
+>>> run = integrate(specimen, drive, duration_s=0.1, initial_state=response.final_state, sample_rate_hz=1e4)
+>>> run.states.shape, run.impacts.count
+((1001, 6), 26)
+>>> chaos = lyapunov_exponent(specimen, Harmonic(260.0, 5e-6), precision=Precision(absolute_per_s=10.0))
+>>> chaos.exponent_per_s > 5.0 * chaos.standard_error_per_s
+True
+>>> orbit = periodic_orbit(gong2025(damping_time_s=3e-5), drive)  # with more damping it repeats
+>>> branch = periodic_branch(orbit, "frequency", stop=131.0)
+>>> orbit.impacts, orbit.is_stable, float(branch.frequencies_hz[-1]), branch.events
+(2, True, 131.0, ())
 """
 
 import lazy_loader

@@ -15,7 +15,7 @@ from vibench.sim import (
 from vibench.sim.periodic._balance_branch import raised_balance
 from vibench.sim.periodic._balance_solver import BalanceOptions, balance
 from vibench.sim.periodic._branch import BifurcationKind, Parameter
-from vibench.sim.periodic._condensation import Structure
+from vibench.sim.periodic._condensation import LinearStructure
 from vibench.sim.periodic._continuation import ArcEnd, ArcSteps
 from vibench.sim.periodic._harmonic_balance import BalanceEnd, HarmonicSet
 from vibench.sim.periodic._restoring_force import GapSpring, NoForce
@@ -25,7 +25,7 @@ ONE = np.array([[1.0]])
 
 def oscillator(damping, stiffness=1.0):
     """x'' + damping x' + stiffness x + F = U."""
-    return Structure(ONE, damping * ONE, stiffness * ONE, np.ones(1), np.ones(1), np.zeros(1))
+    return LinearStructure(ONE, damping * ONE, stiffness * ONE, np.ones(1), np.ones(1), np.zeros(1))
 
 
 def kinds(branch):
@@ -123,7 +123,7 @@ def test_the_two_mass_unilateral_stop_of_nlvib_doubles_its_period_and_loses_it_o
     # Krack and Gross, NLvib, example 03: 21 harmonics, from 0.8 to 0.5 rad/s. Its authors report turning
     # points, period doubling near the peak, a stable motion at 0.635, and a Neimark-Sacker point above 0.60.
     stiffness = np.array([[1.0, -1.0], [-1.0, 2.0]])
-    structure = Structure(
+    structure = LinearStructure(
         np.eye(2), 0.03 * stiffness, stiffness, np.array([1.0, 0.0]), np.array([0.0, 1.0]), np.zeros(2)
     )
     spring = GapSpring(100.0, 1.0, 1.0, math.inf)

@@ -12,7 +12,7 @@ from vibench.sim import (
     jump_frequencies,
     structure_of,
 )
-from vibench.sim.periodic._condensation import Structure, condense
+from vibench.sim.periodic._condensation import LinearStructure, condense
 from vibench.sim.periodic._first_order_balance import fold_amplitudes, fundamental_share
 
 FIT_LENGTH, FIT_FORCE = 46e-6, 4.891e9 * 1e-6**1.5
@@ -21,7 +21,7 @@ FIT_LENGTH, FIT_FORCE = 46e-6, 4.891e9 * 1e-6**1.5
 def duffing(damping_ratio):
     """x'' + 2 zeta x' + x = U - F, one mass."""
     one = np.array([[1.0]])
-    return Structure(one, 2.0 * damping_ratio * one, one, np.ones(1), np.ones(1), np.zeros(1))
+    return LinearStructure(one, 2.0 * damping_ratio * one, one, np.ones(1), np.ones(1), np.zeros(1))
 
 
 @pytest.mark.parametrize("exponent", [1, 3, 5, 7, 29, 47, 201])

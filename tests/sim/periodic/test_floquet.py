@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from vibench.sim import Accuracy, Harmonic, PowerSpring, gong2025, integrate, spring_of, structure_of
 from vibench.sim.periodic import multipliers
 from vibench.sim.periodic._balance_solver import BalanceOptions, Guess, balance
-from vibench.sim.periodic._condensation import Structure
+from vibench.sim.periodic._condensation import LinearStructure
 from vibench.sim.periodic._floquet import Motion, crossings, transition
 from vibench.sim.periodic._frequency_time import phasors_of
 from vibench.sim.periodic._restoring_force import GapSpring, NoForce
@@ -17,7 +17,7 @@ ONE = np.array([[1.0]])
 
 
 def oscillator(damping=0.05, stiffness=1.0):
-    return Structure(ONE, damping * ONE, stiffness * ONE, np.ones(1), np.ones(1), np.zeros(1))
+    return LinearStructure(ONE, damping * ONE, stiffness * ONE, np.ones(1), np.ones(1), np.zeros(1))
 
 
 def test_without_a_spring_the_multipliers_are_those_of_the_modes():

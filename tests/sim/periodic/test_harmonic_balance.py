@@ -15,7 +15,7 @@ from vibench.sim import (
     structure_of,
 )
 from vibench.sim.periodic._balance_solver import BalanceOptions, Guess, balance
-from vibench.sim.periodic._condensation import Structure
+from vibench.sim.periodic._condensation import LinearStructure
 from vibench.sim.periodic._frequency_time import phasors_of, waveform
 from vibench.sim.periodic._harmonic_balance import BalanceEnd, BalanceProblem, HarmonicSet, harmonics_up_to
 from vibench.sim.periodic._restoring_force import GapSpring, NoForce
@@ -170,4 +170,4 @@ def two_masses(damping_time):
     """Two unit masses and springs, the first free: a spring force on the second, which is also driven."""
     stiffness = np.array([[1.0, -1.0], [-1.0, 2.0]])
     push = np.array([0.0, 1.0])
-    return Structure(np.eye(2), damping_time * stiffness, stiffness, push, push, np.zeros(2))
+    return LinearStructure(np.eye(2), damping_time * stiffness, stiffness, push, push, np.zeros(2))

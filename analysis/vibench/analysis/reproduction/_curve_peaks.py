@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.signal import find_peaks
 
-from vibench.sim import JOIN, Specimen
+from vibench.sim import Specimen, bound_matrices
 
 from ..model import linear_transmissibility
 from ..signals import Reals
@@ -30,10 +30,7 @@ def linear_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
 
 def bound_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
     """Frequencies of the same peaks with m1 held on m2, to 0.01 Hz, shape (peaks,)."""
-    mass, damping, stiffness = (
-        JOIN.T @ each @ JOIN
-        for each in (specimen.mass_matrix, specimen.damping_matrix, specimen.stiffness_matrix)
-    )
+    mass, damping, stiffness = bound_matrices(specimen)
     fine = np.linspace(low_hz, high_hz, _FINE_POINTS)
     omega = 2.0 * np.pi * fine[:, None, None]
     force = np.zeros((fine.size, 2, 1), dtype=np.complex128)

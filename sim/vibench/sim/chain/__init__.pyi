@@ -3,18 +3,23 @@ from ._chain import (
     chain_of as chain_of,
 )
 from ._dispersion import (
+    BandGap as BandGap,
     band_gaps as band_gaps,
     bloch_factor as bloch_factor,
 )
 from ._integrate import (
+    ChainImpacts as ChainImpacts,
+    ChainTrajectory as ChainTrajectory,
     integrate_chain as integrate_chain,
 )
 from ._lyapunov import (
+    ChainExponent as ChainExponent,
     chain_lyapunov_exponent as chain_lyapunov_exponent,
 )
 from ._modes import (
     chain_transmissibility as chain_transmissibility,
 )
 from ._response import (
+    ChainResponse as ChainResponse,
     chain_response as chain_response,
 )

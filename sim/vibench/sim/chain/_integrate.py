@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..flight import SERIES_TERMS
 from ..kernels import Complex, Floats, Table, clock_at
-from ..model import Accuracy, Harmonic, Outcome
+from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, chosen
 from ..motion import MAX_IMPACT_RATE_HZ, ROUNDING, SPARE_IMPACTS
 from ._cell_contact import begin_pressing
 from ._cell_flow import CURVATURE_TERMS, POWER, SIDE, fill_curvature
@@ -60,7 +60,7 @@ def integrate_chain(
     chain: Chain,
     drive: Harmonic,
     duration_s: float,
-    accuracy: Accuracy = Accuracy.STANDARD,
+    accuracy: Accuracy | AccuracyWord = Accuracy.STANDARD,
     initial_state: ArrayLike | None = None,
     sample_rate_hz: float | None = None,
     *,
@@ -97,6 +97,7 @@ def integrate_chain(
         When an argument is not allowed.
 
     """
+    accuracy = chosen(Accuracy, accuracy)
     _check_times(duration_s, start_time_s, sample_rate_hz, max_impact_rate_hz)
     tables = chain_tables(chain, drive, accuracy)
     cells, phasors = start_chain(chain, initial_state, start_time_s, tables, accuracy)

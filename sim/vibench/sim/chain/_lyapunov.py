@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..exponents import BlockedMean, blocked_mean
 from ..kernels import Floats, Table, clock_at
-from ..model import Accuracy, Harmonic, Outcome
+from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, chosen
 from ..motion import MAX_IMPACT_RATE_HZ
 from ._chain import MASSES_PER_CELL, Chain
 from ._integrate import integrate_chain, new_chain_record, new_observations, start_chain, state_of_phasors
@@ -55,7 +55,7 @@ class ChainExponent:
 def chain_lyapunov_exponent(
     chain: Chain,
     drive: Harmonic,
-    accuracy: Accuracy = Accuracy.REFERENCE,
+    accuracy: Accuracy | AccuracyWord = Accuracy.REFERENCE,
     duration_s: float = 5.0,
     settle_s: float = 2.0,
     initial_state: ArrayLike | None = None,
@@ -80,6 +80,7 @@ def chain_lyapunov_exponent(
         When an argument is not allowed, or the duration holds too few intervals for an error.
 
     """
+    accuracy = chosen(Accuracy, accuracy)
     interval_s = math.ceil(SHORTEST_INTERVAL_S * drive.frequency_hz) / drive.frequency_hz
     intervals = math.floor(duration_s / interval_s * (1.0 + 1e-9)) if math.isfinite(duration_s) else 0
     if intervals < FEWEST_INTERVALS:

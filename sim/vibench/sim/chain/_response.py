@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..kernels import Complex, Floats, clock_at
-from ..model import Accuracy, Harmonic, Outcome
+from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, chosen
 from ..motion import MAX_IMPACT_RATE_HZ, whole_periods
 from ._chain import MASSES_PER_CELL, Chain
 from ._integrate import impacts_of, new_chain_record, new_observations, start_chain, state_of_phasors
@@ -57,7 +57,7 @@ class ChainResponse:
 def chain_response(
     chain: Chain,
     drive: Harmonic,
-    accuracy: Accuracy = Accuracy.STANDARD,
+    accuracy: Accuracy | AccuracyWord = Accuracy.STANDARD,
     duration_s: float = 30.0,
     window_s: float = 5.0,
     initial_state: ArrayLike | None = None,
@@ -83,6 +83,7 @@ def chain_response(
         When the drive has no amplitude, or the window is longer than the run or shorter than one period.
 
     """
+    accuracy = chosen(Accuracy, accuracy)
     periods = whole_periods(drive, duration_s, window_s)
     tables = chain_tables(chain, drive, accuracy)
     cells, phasors = start_chain(chain, initial_state, 0.0, tables, accuracy)

@@ -3,10 +3,12 @@ from ._blocking import (
     blocked_mean as blocked_mean,
 )
 from ._lyapunov import (
+    ExponentVerdict as ExponentVerdict,
     LyapunovEstimate as LyapunovEstimate,
     Precision as Precision,
     lyapunov_exponent as lyapunov_exponent,
 )
 from ._lyapunov_spectrum import (
+    LyapunovSpectrum as LyapunovSpectrum,
     lyapunov_spectrum as lyapunov_spectrum,
 )

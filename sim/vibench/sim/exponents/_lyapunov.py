@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..kernels import Floats
-from ..model import Accuracy, Harmonic, Outcome, Specimen, modal_form
+from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, Specimen, chosen, modal_form
 from ..motion import MAX_IMPACT_RATE_HZ, flow_derivative, state_scales
 from ..periodic import multipliers
 from ._blocking import BlockedMean, blocked_mean
@@ -118,7 +118,7 @@ class LyapunovEstimate:
 def lyapunov_exponent(
     specimen: Specimen,
     drive: Harmonic,
-    accuracy: Accuracy = Accuracy.STANDARD,
+    accuracy: Accuracy | AccuracyWord = Accuracy.STANDARD,
     duration_s: float = 25.0,
     settle_s: float = 5.0,
     initial_state: ArrayLike | None = None,
@@ -156,6 +156,7 @@ def lyapunov_exponent(
         When an argument is not allowed, or the duration holds fewer than 32 intervals.
 
     """
+    accuracy = chosen(Accuracy, accuracy)
     interval = interval_for(specimen, drive, interval_s)
     skipped = intervals_to_skip(interval, duration_s, settle_s)
 

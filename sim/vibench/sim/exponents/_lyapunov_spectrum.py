@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..kernels import Floats
-from ..model import Accuracy, Harmonic, Outcome, Specimen, state_matrix
+from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, Specimen, chosen, state_matrix
 from ..motion import MAX_IMPACT_RATE_HZ, state_scales
 from ..slots import UNITS
 from ._blocking import blocked_mean
@@ -59,7 +59,7 @@ class LyapunovSpectrum:
 def lyapunov_spectrum(
     specimen: Specimen,
     drive: Harmonic,
-    accuracy: Accuracy = Accuracy.STANDARD,
+    accuracy: Accuracy | AccuracyWord = Accuracy.STANDARD,
     duration_s: float = 25.0,
     settle_s: float = 5.0,
     initial_state: ArrayLike | None = None,
@@ -72,6 +72,7 @@ def lyapunov_spectrum(
     Arguments as in `vibench.sim.exponents.largest_exponent`; the errors need blocks as long as the motion's
     memory too.
     """
+    accuracy = chosen(Accuracy, accuracy)
     interval = interval_for(specimen, drive, interval_s)
     skipped = intervals_to_skip(interval, duration_s, settle_s)
     run = run_with_tangent(

@@ -1,12 +1,12 @@
 from ._accuracy import (
     Accuracy as Accuracy,
+    AccuracyWord as AccuracyWord,
 )
 from ._against_stops import (
     BaseResponse as BaseResponse,
     base_response as base_response,
 )
 from ._bound_modes import (
-    JOIN as JOIN,
     PULL as PULL,
     RATE as RATE,
     ROW as ROW,
@@ -15,6 +15,8 @@ from ._bound_modes import (
 )
 from ._contact_law import (
     MOST_TERMS as MOST_TERMS,
+    ContactLaw as ContactLaw,
+    Elasticity as Elasticity,
     Hertz as Hertz,
     HuntCrossley as HuntCrossley,
     LinearGap as LinearGap,
@@ -54,6 +56,7 @@ from ._specimen import (
     Matrix as Matrix,
     Specimen as Specimen,
     Triple as Triple,
+    bound_matrices as bound_matrices,
     gong2025 as gong2025,
 )
 from ._state import (
@@ -63,4 +66,7 @@ from ._state import (
     X as X,
     Y as Y,
     Z as Z,
+)
+from ._word import (
+    chosen as chosen,
 )

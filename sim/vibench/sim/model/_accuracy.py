@@ -1,6 +1,7 @@
 """How exactly a simulation is asked to run: three named levels, each with one tolerance."""
 
 from enum import StrEnum
+from typing import Literal
 
 
 class Accuracy(StrEnum):
@@ -27,5 +28,6 @@ class Accuracy(StrEnum):
         return _PROMISES[self]
 
 
+AccuracyWord = Literal["quick", "standard", "reference"]
 _TOLERANCES = {Accuracy.QUICK: 3e-6, Accuracy.STANDARD: 3e-7, Accuracy.REFERENCE: 1e-10}
 _PROMISES = {Accuracy.QUICK: 1e-5, Accuracy.STANDARD: 1e-6, Accuracy.REFERENCE: 1e-9}

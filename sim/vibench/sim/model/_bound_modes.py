@@ -11,7 +11,7 @@ import numpy as np
 
 from ..kernels import Complex
 from ._modes import diagonal_form
-from ._specimen import Specimen
+from ._specimen import JOIN, Specimen, bound_matrices
 from ._state import VX, VZ, X, Z
 
 RATE = 0
@@ -24,8 +24,6 @@ PULL = 13
 """Column of what a unit phasor adds to the force k2 (z - x) + c2 (vz - vx) by which m2 pulls at m0 [N]."""
 COLUMNS = 14
 
-JOIN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
-"""(x, y, z) of a unit of x and of z."""
 PLACES = [X, Z, VX, VZ]
 """Where the four unknowns of the bound motion stand in a state."""
 
@@ -35,9 +33,7 @@ def bound_motion(specimen: Specimen, omega: float, amplitude_m: float) -> Comple
 
     Raises ValueError when two bound modes coincide.
     """
-    mass = JOIN.T @ specimen.mass_matrix @ JOIN
-    damping = JOIN.T @ specimen.damping_matrix @ JOIN
-    stiffness = JOIN.T @ specimen.stiffness_matrix @ JOIN
+    mass, damping, stiffness = bound_matrices(specimen)
     modes = diagonal_form(mass, stiffness, damping)
     dynamic = stiffness - omega**2 * mass + 1j * omega * damping
     base = -1j * amplitude_m * (specimen.stiffnesses[0] + 1j * omega * specimen.dampings[0])

@@ -84,8 +84,8 @@ class Specimen:
     @property
     def bound_frequencies_hz(self) -> NDArray[np.float64]:
         """Undamped natural frequencies with m1 stuck to m2, ascending, shape (2,) [Hz]."""
-        join = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
-        return _natural_frequencies(join.T @ self.mass_matrix @ join, join.T @ self.stiffness_matrix @ join)
+        mass, _, stiffness = bound_matrices(self)
+        return _natural_frequencies(mass, stiffness)
 
     @property
     def damping_ratios(self) -> NDArray[np.float64]:
@@ -98,6 +98,17 @@ class Specimen:
         values, vectors = np.linalg.eigh(self.stiffness_matrix / np.outer(root, root))
         damping = vectors.T @ (self.damping_matrix / np.outer(root, root)) @ vectors
         return np.asarray(np.diag(damping) / (2.0 * np.sqrt(values)), dtype=np.float64)
+
+
+JOIN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
+"""(x, y, z) of a unit of x and of z while m1 sticks to m2."""
+
+
+def bound_matrices(specimen: Specimen) -> tuple[Matrix, Matrix, Matrix]:
+    """Give M, C and K of the two bodies, x and z, that are left while m1 sticks to m2; shapes (2, 2)."""
+    whole = specimen.mass_matrix, specimen.damping_matrix, specimen.stiffness_matrix
+    mass, damping, stiffness = (JOIN.T @ matrix @ JOIN for matrix in whole)
+    return mass, damping, stiffness
 
 
 PAPER_MASSES: Triple = (5.8e-3, 2.1e-3, 2.0e-3)

@@ -21,11 +21,14 @@ from ._response import (
     whole_periods as whole_periods,
 )
 from ._response_curve import (
+    ResponseCurve as ResponseCurve,
     response_curve as response_curve,
 )
 from ._sample_by_sample import (
+    FollowedMotion as FollowedMotion,
     follow_samples as follow_samples,
 )
 from ._trajectory import (
+    Impacts as Impacts,
     Trajectory as Trajectory,
 )

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from ..kernels import Vector, clock_at
 from ..model import (
     Accuracy,
+    AccuracyWord,
     Drive,
     Harmonic,
     LinearSweep,
@@ -16,6 +17,7 @@ from ..model import (
     Sampled,
     Specimen,
     Sweep,
+    chosen,
 )
 from ..slots import IMPACTS, NEXT_SAMPLE, OBSERVATIONS_SIZE, Record
 from ..stepping import advance_harmonic, advance_intervals, harmonic_tables, interval_tables, new_state
@@ -43,7 +45,7 @@ def integrate(
     specimen: Specimen,
     drive: Drive,
     duration_s: float,
-    accuracy: Accuracy = Accuracy.STANDARD,
+    accuracy: Accuracy | AccuracyWord = Accuracy.STANDARD,
     initial_state: ArrayLike | None = None,
     sample_rate_hz: float | None = None,
     *,
@@ -79,6 +81,7 @@ def integrate(
         When an argument is not allowed, or the drive is over before the run is.
 
     """
+    accuracy = chosen(Accuracy, accuracy)
     _check_times(duration_s, start_time_s, sample_rate_hz, max_impact_rate_hz)
     state = new_state(specimen, start_motion(initial_state), accuracy)
     clock = clock_at(float(start_time_s))

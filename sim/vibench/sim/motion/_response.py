@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..kernels import Floats, clock_at
-from ..model import Accuracy, Harmonic, Outcome, Specimen
+from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, Specimen, chosen
 from ..slots import (
     IMPACTS,
     LINE_P_IM,
@@ -78,7 +78,7 @@ class Response:
 def steady_response(
     specimen: Specimen,
     drive: Harmonic,
-    accuracy: Accuracy = Accuracy.STANDARD,
+    accuracy: Accuracy | AccuracyWord = Accuracy.STANDARD,
     duration_s: float = 30.0,
     window_s: float = 5.0,
     initial_state: ArrayLike | None = None,
@@ -94,6 +94,7 @@ def steady_response(
     Raises ValueError when the drive has no amplitude, or the window is longer than the run or shorter
     than one drive period.
     """
+    accuracy = chosen(Accuracy, accuracy)
     periods = whole_periods(drive, duration_s, window_s)
     state = new_state(specimen, start_motion(initial_state), accuracy)
     clock = clock_at(0.0)

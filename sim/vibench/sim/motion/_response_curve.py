@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..kernels import Floats
-from ..model import Accuracy, Harmonic, Specimen
+from ..model import Accuracy, AccuracyWord, Harmonic, Specimen, chosen
 from ._response import Response, steady_response
 
 Quantity = Literal["response_i", "response_ii", "relative_i", "relative_ii"]
@@ -48,7 +48,7 @@ def response_curve(
     specimen: Specimen,
     amplitude_m: float,
     frequencies_hz: ArrayLike,
-    accuracy: Accuracy = Accuracy.STANDARD,
+    accuracy: Accuracy | AccuracyWord = Accuracy.STANDARD,
     workers: int | None = None,
     duration_s: float = 30.0,
     window_s: float = 5.0,
@@ -74,6 +74,7 @@ def response_curve(
         When an argument is not allowed; before any point is computed.
 
     """
+    accuracy = chosen(Accuracy, accuracy)
     frequencies = np.atleast_1d(np.asarray(frequencies_hz, dtype=np.float64))
     if frequencies.ndim != 1 or len(frequencies) == 0:
         msg = f"Frequencies of shape {frequencies.shape} are not allowed: give one row of one or more."

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..kernels import Table, Vector, kernel
-from ..model import Accuracy, Sampled, Specimen
+from ..model import Accuracy, AccuracyWord, Sampled, Specimen, chosen
 from ..stepping import FAILED, IntervalTables, advance_interval, interval_tables, new_state
 from ._base_motion import sampled_motion
 from ._integrate import start_motion
@@ -39,7 +39,7 @@ class FollowedMotion:
 def follow_samples(
     specimen: Specimen,
     drive: Sampled,
-    accuracy: Accuracy = Accuracy.STANDARD,
+    accuracy: Accuracy | AccuracyWord = Accuracy.STANDARD,
     initial_state: ArrayLike | None = None,
     *,
     first: int = 0,
@@ -56,6 +56,7 @@ def follow_samples(
         still shape the spline.
 
     """
+    accuracy = chosen(Accuracy, accuracy)
     base = sampled_motion(drive)
     pieces = base.pieces[first:last]
     state = new_state(specimen, start_motion(initial_state), accuracy)

@@ -1,23 +1,51 @@
+from ._balance_agreement import (
+    BalanceCheck as BalanceCheck,
+    check_balance as check_balance,
+)
 from ._balance_branch import (
+    balance_specimen as balance_specimen,
     harmonic_balance_branch as harmonic_balance_branch,
 )
+from ._balance_solver import (
+    BalanceOptions as BalanceOptions,
+)
+from ._branch import (
+    BifurcationKind as BifurcationKind,
+    Branch as Branch,
+    BranchEvent as BranchEvent,
+    Parameter as Parameter,
+)
 from ._condensation import (
+    LinearStructure as LinearStructure,
     structure_of as structure_of,
 )
+from ._continuation import (
+    ArcSteps as ArcSteps,
+)
 from ._first_order_balance import (
+    FirstOrderState as FirstOrderState,
     first_order_states as first_order_states,
     jump_frequencies as jump_frequencies,
 )
 from ._floquet import (
     multipliers as multipliers,
 )
+from ._harmonic_balance import (
+    Balance as Balance,
+    HarmonicSet as HarmonicSet,
+)
 from ._orbit_branch import (
     periodic_branch as periodic_branch,
 )
+from ._period_map import (
+    OrbitShape as OrbitShape,
+)
 from ._restoring_force import (
     PowerSpring as PowerSpring,
+    RestoringForce as RestoringForce,
     spring_of as spring_of,
 )
 from ._shooting import (
+    PeriodicOrbit as PeriodicOrbit,
     periodic_orbit as periodic_orbit,
 )

@@ -9,7 +9,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from ..model import Accuracy, Harmonic, Outcome, Specimen
+from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, Specimen, chosen
 from ..motion import integrate, state_scales, steady_response
 from ._harmonic_balance import Balance, BalanceEnd
 
@@ -39,7 +39,7 @@ def check_balance(
     specimen: Specimen,
     found: Balance,
     tolerance: float = 0.01,
-    accuracy: Accuracy = Accuracy.STANDARD,
+    accuracy: Accuracy | AccuracyWord = Accuracy.STANDARD,
     duration_s: float = 10.0,
 ) -> BalanceCheck:
     """Compare a harmonic balance of a specimen with integration.
@@ -56,6 +56,7 @@ def check_balance(
         Of the run from rest; its last half is compared.
 
     """
+    accuracy = chosen(Accuracy, accuracy)
     drive = Harmonic(found.frequency_hz, found.amplitude_m)
     period = integrate(specimen, drive, 1.0 / drive.frequency_hz, accuracy, found.state)
     defect = float(np.abs((period.final_state - found.state) / state_scales(specimen, drive)).max())

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Harmonic, Specimen, Y, Z
+from ..model import Harmonic, Specimen, Y, Z, chosen
 from ._balance_solver import BalanceOptions, Guess, balance, described, linear_guess
-from ._branch import Branch, Parameter
+from ._branch import Branch, Parameter, ParameterWord
 from ._branch_following import Followed, OrbitReport, follow
-from ._condensation import Structure, condense, structure_of
+from ._condensation import LinearStructure, condense, structure_of
 from ._continuation import ArcEnd, ArcSteps
 from ._floquet import Motion, crossings, multipliers, transition
 from ._frequency_time import phasors_of
@@ -104,7 +104,7 @@ class BalanceFamily:
 
 
 def orbit_signs(
-    structure: Structure, spring: RestoringForce, found: Balance, kept: HarmonicSet
+    structure: LinearStructure, spring: RestoringForce, found: Balance, kept: HarmonicSet
 ) -> OrbitSigns:
     """Stability and contacts of a solution, by the exact variational equation along it."""
     motion = Motion(found.frequency_hz, found.harmonics, found.relative)
@@ -116,10 +116,10 @@ def orbit_signs(
 
 
 def harmonic_balance_branch(
-    structure: Structure,
+    structure: LinearStructure,
     spring: RestoringForce,
     start: Balance,
-    parameter: Parameter,
+    parameter: Parameter | ParameterWord,
     stop: float,
     options: BalanceOptions = BalanceOptions(),  # noqa: B008 - frozen
     steps: ArcSteps = ArcSteps(),  # noqa: B008 - frozen
@@ -135,11 +135,11 @@ def harmonic_balance_branch(
         When the start did not converge, or is where the branch shall stop.
 
     """
-    return _followed(structure, spring, start, parameter, stop, options, steps).branch
+    return _followed(structure, spring, start, chosen(Parameter, parameter), stop, options, steps).branch
 
 
 def _followed(
-    structure: Structure,
+    structure: LinearStructure,
     spring: RestoringForce,
     start: Balance,
     parameter: Parameter,
@@ -156,7 +156,7 @@ def _followed(
 
 
 def _family_at(
-    structure: Structure,
+    structure: LinearStructure,
     spring: RestoringForce,
     start: Balance,
     parameter: Parameter,
@@ -178,7 +178,7 @@ def _family_at(
 
 
 def raised_balance(
-    structure: Structure,
+    structure: LinearStructure,
     spring: RestoringForce,
     frequency_hz: float,
     amplitude_m: float,

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kernels import Complex
-from ._condensation import Structure, condense
+from ..model import chosen
+from ._condensation import LinearStructure, condense
 from ._first_order_balance import first_order_states
 from ._frequency_time import force_harmonics, force_tail
 from ._harmonic_balance import (
@@ -38,6 +39,7 @@ class BalanceOptions:
     """Part of the fundamental of p that the harmonics left out may move it by."""
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "kept", chosen(HarmonicSet, self.kept))
         if not (1 <= self.fewest <= self.most and 0.0 < self.tolerance < math.inf):
             msg = (
                 f"From {self.fewest} to {self.most} harmonics at tolerance {self.tolerance} is not allowed: "
@@ -55,7 +57,7 @@ class Guess:
     """P_k under U = A0 sin(w t), shape (m,) [m]."""
 
 
-def linear_guess(structure: Structure, frequency_hz: float, amplitude_m: float) -> Guess:
+def linear_guess(structure: LinearStructure, frequency_hz: float, amplitude_m: float) -> Guess:
     """Start from the motion without the spring."""
     fundamental = np.array([1])
     seen = condense(structure, 2.0 * math.pi * frequency_hz, fundamental)
@@ -63,7 +65,7 @@ def linear_guess(structure: Structure, frequency_hz: float, amplitude_m: float) 
 
 
 def first_guess(
-    structure: Structure, spring: RestoringForce, frequency_hz: float, amplitude_m: float
+    structure: LinearStructure, spring: RestoringForce, frequency_hz: float, amplitude_m: float
 ) -> Guess:
     """Start from the weakest first-order motion of a power law, else from the motion without the spring."""
     match spring:
@@ -75,7 +77,7 @@ def first_guess(
 
 
 def balance(
-    structure: Structure,
+    structure: LinearStructure,
     spring: RestoringForce,
     frequency_hz: float,
     amplitude_m: float,

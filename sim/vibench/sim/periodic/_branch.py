@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ class Parameter(StrEnum):
     """Drive frequency [Hz]."""
     AMPLITUDE = "amplitude"
     """Drive amplitude [m]."""
+
+
+ParameterWord = Literal["frequency", "amplitude"]
 
 
 class BifurcationKind(StrEnum):

@@ -22,7 +22,7 @@ Harmonics = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Structure:
+class LinearStructure:
     """Masses, springs and dampers without the nonlinear spring, and where that and the drive act."""
 
     mass: Matrix
@@ -51,9 +51,9 @@ class Structure:
         return len(self.direction)
 
 
-def structure_of(specimen: Specimen) -> Structure:
+def structure_of(specimen: Specimen) -> LinearStructure:
     """Take the stops away: displacements (x, y, z), p = y - z, driven at m0 through k0 and c0."""
-    return Structure(
+    return LinearStructure(
         mass=specimen.mass_matrix,
         damping=specimen.damping_matrix,
         stiffness=specimen.stiffness_matrix,
@@ -78,7 +78,7 @@ class Condensed(NamedTuple):
     """Z_1^-1 e, shape (n,): every displacement over U without the spring."""
 
 
-def condense(structure: Structure, omega: float, harmonics: Harmonics) -> Condensed:
+def condense(structure: LinearStructure, omega: float, harmonics: Harmonics) -> Condensed:
     """Solve the linear part of the structure at the given multiples of ``omega``.
 
     Parameters
@@ -113,5 +113,5 @@ def condense(structure: Structure, omega: float, harmonics: Harmonics) -> Conden
     )
 
 
-def _dynamic(structure: Structure, omega: NDArray[np.float64]) -> Complex:
+def _dynamic(structure: LinearStructure, omega: NDArray[np.float64]) -> Complex:
     return structure.stiffness - omega**2 * structure.mass + 1j * omega * structure.damping

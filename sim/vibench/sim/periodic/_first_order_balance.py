@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from ..kernels import Complex
-from ._condensation import Structure, condense
+from ._condensation import LinearStructure, condense
 from ._restoring_force import PowerSpring
 
 Floats = NDArray[np.float64]
@@ -125,7 +125,7 @@ class FirstOrderState:
 
 
 def first_order_states(
-    structure: Structure, spring: PowerSpring, frequency_hz: float, amplitude_m: float
+    structure: LinearStructure, spring: PowerSpring, frequency_hz: float, amplitude_m: float
 ) -> list[FirstOrderState]:
     """Find every first-order solution at one frequency and drive amplitude, by ascending abs(P).
 
@@ -159,7 +159,7 @@ def first_order_states(
     return states
 
 
-def fold_amplitudes(structure: Structure, spring: PowerSpring, frequency_hz: float) -> Floats:
+def fold_amplitudes(structure: LinearStructure, spring: PowerSpring, frequency_hz: float) -> Floats:
     """Drive amplitudes at which two first-order solutions meet, by ascending abs(P), shape (0,) or (2,) [m].
 
     (More than two are possible for sums with terms of both signs.) Closed form for one power law; the
@@ -174,7 +174,7 @@ def fold_amplitudes(structure: Structure, spring: PowerSpring, frequency_hz: flo
 
 
 def jump_frequencies(
-    structure: Structure,
+    structure: LinearStructure,
     spring: PowerSpring,
     amplitude_m: float,
     start_hz: float,

@@ -18,7 +18,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from ..kernels import Complex
-from ._condensation import Structure
+from ._condensation import LinearStructure
 from ._frequency_time import grid_size, motion_on_grid, waveform
 from ._restoring_force import RestoringForce
 
@@ -64,7 +64,7 @@ def multipliers(monodromy: NDArray[np.float64]) -> Complex:
 
 
 def transition(
-    structure: Structure, spring: RestoringForce, motion: Motion, span_rad: float = 2.0 * math.pi
+    structure: LinearStructure, spring: RestoringForce, motion: Motion, span_rad: float = 2.0 * math.pi
 ) -> NDArray[np.float64]:
     """Find what the first ``span_rad`` of a period make of small departures (d, d'), shape (2 n, 2 n)."""
     system, spring_in = _state_form(structure)
@@ -83,7 +83,7 @@ def transition(
     return np.asarray(result)
 
 
-def _state_form(structure: Structure) -> tuple[Floats, Floats]:
+def _state_form(structure: LinearStructure) -> tuple[Floats, Floats]:
     """Rates of (q, q') without the spring, shape (2n, 2n), and what a force in the spring adds, (2n,)."""
     n = structure.size
     system = np.zeros((2 * n, 2 * n))
@@ -93,7 +93,7 @@ def _state_form(structure: Structure) -> tuple[Floats, Floats]:
     return system, np.concatenate([np.zeros(n), -np.linalg.solve(structure.mass, structure.direction)])
 
 
-def _fastest(structure: Structure, spring: RestoringForce, motion: Motion, system: Floats) -> float:
+def _fastest(structure: LinearStructure, spring: RestoringForce, motion: Motion, system: Floats) -> float:
     """Fastest rate of the structure plus that of the spring at its stiffest [rad/s]."""
     omega = 2.0 * math.pi * motion.frequency_hz
     samples = grid_size(int(motion.harmonics[-1]))
@@ -141,7 +141,7 @@ def _marks(start: float, stop: float, turn: float, spring: RestoringForce, highe
 def _crossed(
     system: Floats,
     spring_in: Floats,
-    structure: Structure,
+    structure: LinearStructure,
     spring: RestoringForce,
     motion: Motion,
     marks: Floats,
@@ -174,7 +174,7 @@ def _rates(
     turn: Floats,
     system: Floats,
     spring_in: Floats,
-    structure: Structure,
+    structure: LinearStructure,
     spring: RestoringForce,
     motion: Motion,
 ) -> Floats:

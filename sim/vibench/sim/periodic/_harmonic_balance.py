@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels import Complex
-from ._condensation import Condensed, Structure, condense
+from ._condensation import Condensed, LinearStructure, condense
 from ._frequency_time import ForceHarmonics, force_harmonics, grid_size, waveform
 from ._restoring_force import RestoringForce
 
@@ -58,7 +58,7 @@ def harmonics_up_to(highest: int, kept: HarmonicSet) -> Harmonics:
 class BalanceProblem:
     """The equations at one frequency: real unknowns (Re P, Im P) over the spring's length scale."""
 
-    structure: Structure
+    structure: LinearStructure
     spring: RestoringForce
     harmonics: Harmonics
 

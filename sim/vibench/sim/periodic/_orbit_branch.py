@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Harmonic
+from ..model import Harmonic, chosen
 from ..motion import state_scales
-from ._branch import Branch, Parameter
+from ._branch import Branch, Parameter, ParameterWord
 from ._branch_following import Family, OrbitReport, follow
 from ._continuation import ArcSteps
 from ._period_map import PeriodMap
@@ -86,7 +86,7 @@ class OrbitFamily:
 
 
 def periodic_branch(
-    orbit: PeriodicOrbit, parameter: Parameter, stop: float, steps: ArcSteps = ORBIT_STEPS
+    orbit: PeriodicOrbit, parameter: Parameter | ParameterWord, stop: float, steps: ArcSteps = ORBIT_STEPS
 ) -> Branch:
     """Follow a periodic motion along frequency [Hz] or drive amplitude [m], from where it is to ``stop``.
 
@@ -98,6 +98,7 @@ def periodic_branch(
         When the orbit did not converge, or ``stop`` is not allowed.
 
     """
+    parameter = chosen(Parameter, parameter)
     if orbit.outcome is not ShootingEnd.CONVERGED:
         msg = f"A branch cannot start at {orbit.drive}: {orbit.outcome}."
         raise ValueError(msg)

@@ -11,6 +11,7 @@ only Newton's iteration uses them.
 import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,9 @@ class OrbitShape(StrEnum):
     """Its mirror image after half a drive period; needs equal stops."""
     REPEATED = "repeated"
     """Itself after a whole number of drive periods."""
+
+
+OrbitShapeWord = Literal["mirrored", "repeated"]
 
 
 @dataclass(frozen=True, eq=False)

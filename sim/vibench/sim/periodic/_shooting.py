@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..kernels import Complex
-from ..model import Harmonic, Specimen, X, Y, Z
+from ..model import Harmonic, Specimen, X, Y, Z, chosen
 from ..motion import integrate, start_motion, state_scales
 from ._floquet import multipliers
 from ._frequency_time import phasors_of
 from ._orbit_events import OrbitSigns, Symmetry
-from ._period_map import OrbitShape, PeriodMap
+from ._period_map import OrbitShape, OrbitShapeWord, PeriodMap
 
 Vector = NDArray[np.float64]
 
@@ -74,7 +74,7 @@ class PeriodicOrbit:
 def periodic_orbit(
     specimen: Specimen,
     drive: Harmonic,
-    shape: OrbitShape = OrbitShape.REPEATED,
+    shape: OrbitShape | OrbitShapeWord = OrbitShape.REPEATED,
     periods: int = 1,
     start: ArrayLike | None = None,
 ) -> PeriodicOrbit:
@@ -97,7 +97,7 @@ def periodic_orbit(
     if drive.amplitude_m == 0.0 or drive.phase_rad != 0.0:
         msg = f"Drive {drive} is not allowed for shooting: give a positive amplitude and phase zero."
         raise ValueError(msg)
-    mapping = PeriodMap(specimen, shape, periods)
+    mapping = PeriodMap(specimen, chosen(OrbitShape, shape), periods)
     settling = SETTLING_PERIODS / drive.frequency_hz
     first = integrate(specimen, drive, settling).final_state if start is None else start_motion(start)
     scales = state_scales(specimen, drive)

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 from pydantic import ConfigDict
 
-from ..model import Accuracy, Harmonic, Specimen
+from ..model import Accuracy, Harmonic, Specimen, chosen
 from ..motion import WHOLE
 from ._prediction import State
 
@@ -122,6 +122,8 @@ class Scene:
     start: Rest | Given = Rest()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "accuracy", chosen(Accuracy, self.accuracy))
+        object.__setattr__(self, "observe", tuple(chosen(Observable, each) for each in self.observe))
         if not self.observe:
             msg = f"A scene in which nothing is observed is not allowed: give one of {', '.join(Observable)}."
             raise ValueError(msg)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..model import Accuracy, Outcome
+from ..model import Accuracy, AccuracyWord, Outcome, chosen
 from ..scene import Method, MotionKind, ScenePrediction
 from ._arrays import Arrays
 from ._columns import ENDED, FINAL_STATE, METHOD, MOTION, NUMBERS, OUTCOME, TEXT_BYTES, Cell
@@ -22,7 +22,12 @@ def cells_of(prediction: ScenePrediction) -> dict[str, Cell]:
 
 
 def prediction_at(
-    arrays: Arrays, number: int, frequency_hz: float, amplitude_m: float, accuracy: Accuracy, start: str
+    arrays: Arrays,
+    number: int,
+    frequency_hz: float,
+    amplitude_m: float,
+    accuracy: Accuracy | AccuracyWord,
+    start: str,
 ) -> ScenePrediction:
     """Make the prediction of a point from its cells and from what the study says of it."""
     numbers = {field: _number(arrays[column.name][number]) for field, column in NUMBERS.items()}
@@ -37,7 +42,7 @@ def prediction_at(
         ended=bytes(arrays[ENDED][number]).decode(),
         final_state=(x, y, z, vx, vy, vz),
         start=start,
-        accuracy=accuracy.value,
+        accuracy=chosen(Accuracy, accuracy).value,
     )
 
 

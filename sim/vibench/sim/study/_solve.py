@@ -4,7 +4,9 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from enum import StrEnum
 from pathlib import Path
+from typing import Literal
 
+from ..model import chosen
 from ._errors import ClusterLost
 from ._executor import Executor
 from ._progress import Cancelled, StudyObserver
@@ -22,10 +24,13 @@ class ExistingStudy(StrEnum):
     RESUME = "resume"
 
 
+ExistingWord = Literal["refuse", "resume"]
+
+
 def solve_study(
     study: Study,
     out: Path | None = None,
-    existing: ExistingStudy = ExistingStudy.REFUSE,
+    existing: ExistingStudy | ExistingWord = ExistingStudy.REFUSE,
     workers: int | None = None,
     cluster: str | None = None,
     observer: StudyObserver | None = None,
@@ -46,7 +51,7 @@ def solve_study(
         Threads of this process; one for each processor when None.
     cluster
         Address of a Dask scheduler, whose workers compute instead.
-    watcher, cancelled
+    observer, cancelled
         Told, and asked, in the calling thread.
 
     Returns
@@ -60,6 +65,7 @@ def solve_study(
         In one sentence: a file of another study, a cluster that does not answer, a full disk, ...
 
     """
+    existing = chosen(ExistingStudy, existing)
     with _executor(workers, cluster) as executor:
         if out is None:
             store = MemoryStore(study)

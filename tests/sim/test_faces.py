@@ -1,0 +1,154 @@
+"""The public faces of the simulation: their examples run, and words stand for enums."""
+
+import doctest
+import importlib
+import inspect
+import typing
+from enum import StrEnum
+
+import numpy as np
+import pytest
+
+import vibench.sim as sim
+import vibench.sim.chain as chain
+import vibench.sim.study as study
+
+FACES = (
+    "vibench.sim",
+    "vibench.sim.accuracy_benchmark",
+    "vibench.sim.chain",
+    "vibench.sim.stepping",
+    "vibench.sim.study",
+)
+SPECIMEN, DRIVE = sim.gong2025(), sim.Harmonic(130.0, 20e-6)
+SMOOTH = sim.gong2025(contact="linear")
+SHORT = {"duration_s": 0.05, "window_s": 0.02}
+SAMPLES = sim.Sampled(np.zeros(8), 1e4)
+
+ONE_POINT = study.Study(models=["linear"], frequencies_hz=[90.0], amplitudes_m=[1e-6])
+
+
+def orbit():
+    return sim.periodic_orbit(SMOOTH, DRIVE, start=np.zeros(6))
+
+
+def balance():
+    return sim.balance_specimen(SMOOTH, DRIVE)
+
+
+def balanced_branch(**words):
+    parts = sim.structure_of(SMOOTH), sim.PowerSpring(45e-6, ((3, 1e-9),))
+    return sim.harmonic_balance_branch(*parts, balance(), stop=130.01, **words)
+
+
+CALLS = {
+    sim.integrate: lambda **words: sim.integrate(SPECIMEN, DRIVE, 0.01, **words),
+    sim.follow_samples: lambda **words: sim.follow_samples(SPECIMEN, SAMPLES, **words),
+    sim.steady_response: lambda **words: sim.steady_response(SPECIMEN, DRIVE, **SHORT, **words),
+    sim.response_curve: lambda **words: sim.response_curve(SPECIMEN, 1e-6, [130.0], **SHORT, **words),
+    sim.lyapunov_exponent: lambda **words: sim.lyapunov_exponent(
+        SPECIMEN, DRIVE, duration_s=1.0, settle_s=0.1, **words
+    ),
+    sim.lyapunov_spectrum: lambda **words: sim.lyapunov_spectrum(
+        SPECIMEN, DRIVE, duration_s=1.0, settle_s=0.1, **words
+    ),
+    sim.periodic_orbit: lambda **words: sim.periodic_orbit(SMOOTH, DRIVE, start=np.zeros(6), **words),
+    sim.periodic_branch: lambda **words: sim.periodic_branch(orbit(), stop=130.01, **words),
+    sim.harmonic_balance_branch: balanced_branch,
+    sim.check_balance: lambda **words: sim.check_balance(SMOOTH, balance(), duration_s=0.1, **words),
+    chain.integrate_chain: lambda **words: chain.integrate_chain(
+        chain.chain_of(SPECIMEN, 2), DRIVE, 0.01, **words
+    ),
+    chain.chain_response: lambda **words: chain.chain_response(
+        chain.chain_of(SPECIMEN, 2), DRIVE, **SHORT, **words
+    ),
+    chain.chain_lyapunov_exponent: lambda **words: chain.chain_lyapunov_exponent(
+        chain.chain_of(SPECIMEN, 2), DRIVE, duration_s=0.5, settle_s=0.01, **words
+    ),
+    study.solve_study: lambda **words: study.solve_study(ONE_POINT, **words),
+    study.prediction_at: lambda **words: study.prediction_at(
+        study.solve_study(ONE_POINT).arrays, 0, 90.0, 1e-6, start="rest", **words
+    ),
+    sim.Scene: lambda **words: sim.Scene(SPECIMEN, DRIVE, **words),
+    sim.BalanceOptions: sim.BalanceOptions,
+}
+"""How each thing that asks for an enum is called."""
+
+
+def enum_in(annotation):
+    """Find the enum that an annotation names, if any."""
+    parts = typing.get_args(annotation) or (annotation,)
+    return next((part for part in parts if isinstance(part, type) and issubclass(part, StrEnum)), None)
+
+
+def asked_enums():
+    for face in (sim, study, chain):
+        for name in face.__all__:
+            function = getattr(face, name)
+            if inspect.isfunction(function):
+                for parameter, annotation in typing.get_type_hints(function).items():
+                    kind = enum_in(annotation)
+                    if kind is not None and parameter != "return":
+                        yield pytest.param(function, parameter, kind, id=f"{name}-{parameter}")
+    yield pytest.param(sim.Scene, "accuracy", sim.Accuracy, id="Scene-accuracy")
+    yield pytest.param(sim.BalanceOptions, "kept", sim.HarmonicSet, id="BalanceOptions-kept")
+
+
+@pytest.mark.parametrize(("function", "parameter", "kind"), list(asked_enums()))
+def test_where_an_enum_is_asked_for_its_word_is_accepted_and_another_refused_with_those_allowed(
+    function, parameter, kind
+):
+    call = CALLS[function]
+    call(**{parameter: next(iter(kind)).value})
+    with pytest.raises(ValueError, match=f"'nonsense' is not allowed: give one of {', '.join(kind)}"):
+        call(**{parameter: "nonsense"})
+
+
+def test_what_is_observed_may_be_named_by_words():
+    named = sim.Scene(SPECIMEN, DRIVE, observe=("response", "lyapunov"), accuracy="quick")
+    assert named.observe == (sim.Observable.RESPONSE, sim.Observable.LYAPUNOV)
+    assert named.accuracy is sim.Accuracy.QUICK
+    assert study.Study(
+        frequencies_hz=[90.0], amplitudes_m=[1e-6], accuracy="quick", starts=["up"]
+    ).starts == (study.Start.UP,)
+
+
+def test_a_checker_of_types_knows_every_word_of_an_enum():
+    for case in asked_enums():
+        function, parameter, kind = case.values
+        if inspect.isfunction(function):
+            literals = [
+                word
+                for part in typing.get_args(typing.get_type_hints(function)[parameter])
+                if typing.get_origin(part) is typing.Literal
+                for word in typing.get_args(part)
+            ]
+            assert literals == list(kind), case.id
+
+
+@pytest.mark.parametrize("face", FACES)
+def test_the_example_of_a_face_runs(face):
+    failed, tried = doctest.testmod(importlib.import_module(face))
+    assert (failed, tried > 0) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("contact", "law"),
+    [
+        ("hertz", sim.Hertz),
+        ("linear", sim.NoContact),
+        ("linear_gap", sim.LinearGap),
+        ("hunt_crossley:0.5", sim.HuntCrossley),
+        ("rigid:0.8", sim.RigidStops),
+        ("power:3+5+7", sim.PowerLaw),
+    ],
+)
+def test_a_contact_law_is_named_by_its_word(contact, law):
+    assert isinstance(sim.gong2025(damping_time_s=2e-5, gap_m=45e-6, contact=contact).contact, law)
+
+
+def test_a_trajectory_holds_what_the_design_promises():
+    run = sim.integrate(SPECIMEN, DRIVE, 0.1, accuracy="standard", sample_rate_hz=1e3)
+    assert run.states.shape == (len(run.time_s), 6) == (101, 6)
+    assert run.final_state == pytest.approx(run.states[-1])
+    assert run.impacts.count == len(run.impacts.times_s) > 0
