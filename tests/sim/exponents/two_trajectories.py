@@ -10,14 +10,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from vibench.sim import Accuracy, Harmonic, Outcome, Specimen
 from vibench.sim.exponents import BlockedMean, blocked_mean
 from vibench.sim.exponents._lyapunov import intervals_to_skip
 from vibench.sim.exponents._tangent_run import energy_metric, interval_for
-from vibench.sim.kernels import Floats, Table, Vector, clock_at, dot
+from vibench.sim.kernels import Floats, Table, Vector, clock_at, dot, kernel
 from vibench.sim.motion import MAX_IMPACT_RATE_HZ, new_record, start_motion
 from vibench.sim.slots import REACHED_END, Record
 from vibench.sim.stepping import (
@@ -89,7 +88,7 @@ def two_trajectory_exponent(
     return TwoTrajectoryExponent(mean.mean, mean.standard_error, mean, rates, Outcome(code))
 
 
-@njit(nogil=True, error_model="numpy")
+@kernel
 def _part(
     first: Vector,
     second: Vector,

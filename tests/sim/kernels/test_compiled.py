@@ -4,10 +4,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import vibench.sim
 
 KERNELS = Path(vibench.sim.__file__).parent / "kernels"
 IMPORT = "from .kernels._compile import kernel\n"
+TWICE = (
+    "from vibench.sim.kernels import kernel\n\n"
+    "@kernel\ndef twice(x):\n    return 2.0 * x\n\nprint(twice(1.5))\n"
+)
 INNER = IMPORT + "\n@kernel\ndef inner(x):\n    return {factor} * x\n"
 
 
@@ -43,6 +49,15 @@ def test_importing_vibench_leaves_the_cache_of_other_peoples_kernels_alone():
         "assert config.CACHE_DIR == before, config.CACHE_DIR"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+@pytest.mark.parametrize("start", [["own.py"], ["-c", "import loose.own"]], ids=["script", "no __init__"])
+def test_a_kernel_may_stand_in_a_script_or_in_a_folder_without_an_init(tmp_path, start):
+    (tmp_path / "loose").mkdir()
+    for place in (tmp_path, tmp_path / "loose"):
+        (place / "own.py").write_text(TWICE)
+    run = subprocess.run([sys.executable, *start], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert run.stdout == "3.0\n"
 
 
 ARRAYS = {"Vector", "Table", "Complex", "PowerStepState", "PowerObserver", "Workspace", "FlightTables"}

@@ -31,7 +31,10 @@ SOURCES = _digest_of_sources(SIM)
 @cache
 def _sources_behind(package: str) -> str:
     """Digest of the sources that a kernel of a package may call: the package's own, and these."""
-    folder = Path(str(sys.modules[package].__file__)).parent
+    module = sys.modules[package]
+    # A package has a path, also one without an __init__; a script has only its file.
+    places = getattr(module, "__path__", None) or [Path(str(module.__file__)).parent]
+    folder = Path(next(iter(places)))
     return SOURCES if folder == SIM else f"{SOURCES}-{_digest_of_sources(folder)}"
 
 
