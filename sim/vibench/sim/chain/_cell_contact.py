@@ -1,7 +1,7 @@
 """A cell while its force acts: from touching a stop to leaving it, with controlled error. SI units.
 
-The same step control, landings and ends as `vibench.sim.contact`, for the unknowns of
-`vibench.sim.chain`.
+Steps, landings and errors are those of `vibench.sim.contact`, for the unknowns of a cell. A power law acts at
+every p: there w and r are p and dp/dt, and s is time itself.
 """
 
 import math
@@ -15,43 +15,52 @@ from ..contact import (
     LANDING,
     LEFT,
     LOGGED,
-    MOST_CORRECTIONS,
     MOST_STEPS,
+    NEAR,
     NOT_FINITE,
+    POINT,
     RATE_FLOOR,
     ROOT_FLOOR,
     SLOWEST_TOUCH,
+    SPARE,
     STALLED,
+    TRIAL,
     R,
     W,
+    foreseen_collision,
+    gap_of,
     step_error,
     step_factor,
+    step_to_exit,
+    step_to_time,
+    trial_step,
 )
 from ..flight import polynomial_at
-from ..kernels import Table, Vector, inlined, kernel, kernel_without_refcount
+from ..kernels import Table, Vector, copy_row, kernel, kernel_without_refcount
+from ..power_law import power_force, short_of_the_wall
 from ._cell_flow import (
+    CURVATURE,
     MEMORY,
     MOMENT,
     MOMENTS,
-    POINT,
     POWER,
     RATE,
     RATE_SCALE,
     ROOT,
     ROOT_SCALE,
     SIDE,
-    SPARE,
     STEP,
-    TRIAL,
     WIDTH,
-    WORK_ROWS,
     CellLaw,
+    CellSystem,
     T,
-    stop_rates,
-    stop_step,
+    cell_rates,
 )
-from ._cell_power import power_cell_rates, power_cell_step, short_of_the_wall
 
+FIRST_PART = 0.05
+"""First step under a power law, as a part of the window."""
+FADING = 0.999
+"""How much of a past size is left after a window."""
 FIRST_STEP_TOLERANCE = 1e-6
 """The tolerance for which a contact's first step is tuned; it scales with the eighth root."""
 
@@ -59,23 +68,17 @@ FIRST_STEP_TOLERANCE = 1e-6
 @kernel
 def cell_workspace() -> Table:
     """Memory that one run (one thread) hands to every contact."""
-    return np.zeros((WORK_ROWS, WIDTH))
+    return np.zeros((CURVATURE + 1, WIDTH))
 
 
 @kernel_without_refcount
-def gap_on(side: float, law: CellLaw) -> float:
-    """Clearance of the stop on one side [m]."""
-    return law.upper if side > 0.0 else law.lower
-
-
-@kernel_without_refcount
-def motion_in_series(cell: Vector, series: Vector, markov: Vector, tau: float) -> tuple[float, float]:
+def motion_in_series(moments: Vector, series: Vector, markov: Vector, tau: float) -> tuple[float, float]:
     """Displacement and velocity ``tau`` after the window began: the series less what the force has done."""
     value, slope = polynomial_at(series, tau)
     for k in range(1, MOMENTS):
-        value -= markov[k] * cell[MEMORY + k]
-        slope -= markov[k] * cell[MEMORY + k - 1]
-    slope -= markov[MOMENTS] * cell[MEMORY + MOMENTS - 1]
+        value -= markov[k] * moments[k]
+        slope -= markov[k] * moments[k - 1]
+    slope -= markov[MOMENTS] * moments[MOMENTS - 1]
     return value, slope
 
 
@@ -95,79 +98,30 @@ def begin_pressing(
     The first step resolves the elastic collision or a slow pressing, whichever is faster: see
     `vibench.sim.contact.begin_contact`.
     """
-    root = math.sqrt(max(side * p - gap_on(side, law), 0.0))
+    root = math.sqrt(max(side * p - gap_of(side, law.lower, law.upper), 0.0))
     rate *= side
     if root == 0.0:
         rate = max(rate, SLOWEST_TOUCH)
-    hertz = 0.8 * law.contact_stiffness * markov[1]
-    linear = law.linear_stiffness * markov[1]
-    speed = math.sqrt(rate * rate + hertz * root**5 + linear * root**4)
-    deepest = min((speed * speed / hertz) ** 0.2, math.sqrt(speed / math.sqrt(linear)))
+    speed, deepest = foreseen_collision(
+        root, rate, law.linear_stiffness * markov[1], law.contact_stiffness * markov[1]
+    )
     tuned = min(1.0, (tolerance / FIRST_STEP_TOLERANCE) ** 0.125)
     cell[SIDE], cell[ROOT], cell[RATE] = side, root, rate
     cell[ROOT_SCALE], cell[RATE_SCALE] = deepest + ROOT_FLOOR, speed + RATE_FLOOR
     cell[STEP] = tuned * min(4.8 * deepest / speed / 5.0, 0.7 / math.sqrt(0.5 * abs(acceleration) + 1e-300))
 
 
-@inlined
-def _begin_step(work: Table, side: float, curvature: Vector, markov: Vector, law: CellLaw) -> None:
-    """Write the rates at the accepted point."""
-    if law.kind == POWER:
-        power_cell_rates(work[POINT], work[0], curvature, markov, law.power)
-    else:
-        stop_rates(work[POINT], work[0], side, curvature, markov, law)
-
-
-@inlined
-def _try_step(work: Table, step: float, side: float, curvature: Vector, markov: Vector, law: CellLaw) -> None:
-    if law.kind == POWER:
-        power_cell_step(work, step, curvature, markov, law.power)
-    else:
-        stop_step(work, step, side, curvature, markov, law)
-
-
 @kernel_without_refcount
-def _land(
-    work: Table,
-    longest: float,
-    column: int,
-    goal: float,
-    close: float,
-    side: float,
-    curvature: Vector,
-    markov: Vector,
-    law: CellLaw,
-) -> float:
-    """Shorten the trial step, which is past it, until W falls or T rises to ``goal``; gives the step."""
-    low, high, step = 0.0, longest, longest
-    for _ in range(MOST_CORRECTIONS):
-        off = work[TRIAL, column] - goal
-        if column == W:
-            slope = 0.5 * work[TRIAL, R]
-            is_early, is_regular = off > 0.0, slope < 0.0
-        else:
-            slope = 1.0 if law.kind == POWER else work[TRIAL, W]
-            is_early, is_regular = off < 0.0, slope > 0.0
-        if abs(off) <= close:
-            break
-        if is_early:
-            low = step
-        else:
-            high = step
-        step = step - off / slope if is_regular else low
-        if not low < step < high:
-            step = 0.5 * (low + high)
-            if not low < step < high:
-                break
-        _try_step(work, step, side, curvature, markov, law)
-    return step
-
-
-@inlined
-def copy_row(to: Vector, source: Vector) -> None:
-    """Copy a point of the motion."""
-    for k in range(WIDTH):
-        to[k] = source[k]
+def begin_power(cell: Vector, series: Vector, markov: Vector, law: CellLaw, length: float) -> None:
+    """Take p and dp/dt of a cell under a power law from the chain, and the sizes that errors are held to."""
+    p, rate = series[0], series[1]
+    secant = power_force(p, law.power) / p if p != 0.0 else 0.0
+    turn = math.sqrt(max(secant * markov[1], 1.0 / (length * length)))
+    cell[SIDE], cell[ROOT], cell[RATE] = 1.0, p, rate
+    cell[ROOT_SCALE] = max(abs(p) + abs(rate) / turn, FADING * cell[ROOT_SCALE])
+    cell[RATE_SCALE] = max(abs(rate) + abs(p) * turn, FADING * cell[RATE_SCALE])
+    if cell[STEP] == 0.0:
+        cell[STEP] = FIRST_PART * length
 
 
 @kernel_without_refcount
@@ -182,15 +136,15 @@ def log_moment(log: Table, at: Vector) -> None:
 @kernel_without_refcount
 def _far(w: float, side: float, law: CellLaw) -> float:
     """abs(p) of a pressed cell [m]."""
-    return abs(w) if law.kind == POWER else gap_on(side, law) + w * w
+    return abs(w) if law.kind == POWER else gap_of(side, law.lower, law.upper) + w * w
 
 
 @kernel_without_refcount
 def _log_apex(
-    log: Table, work: Table, step: float, side: float, curvature: Vector, markov: Vector, law: CellLaw
+    log: Table, work: Table, step: float, side: float, curvature: Vector, system: CellSystem
 ) -> None:
     """Note the largest abs(p) of the step just taken; where r turns, step to r = 0 exactly."""
-    log[0, DEEPEST] = max(log[0, DEEPEST], _far(work[TRIAL, W], side, law))
+    log[0, DEEPEST] = max(log[0, DEEPEST], _far(work[TRIAL, W], side, system.law))
     before, after = work[POINT, R], work[TRIAL, R]
     if before * after >= 0.0:
         return
@@ -198,8 +152,8 @@ def _log_apex(
     low, high = 0.0, step
     for _ in range(APEX_SECANTS):
         part = low + (high - low) * before / (before - after)
-        _try_step(work, part, side, curvature, markov, law)
-        log[0, DEEPEST] = max(log[0, DEEPEST], _far(work[TRIAL, W], side, law))
+        trial_step(work, part, side, curvature, 0.0, system)
+        log[0, DEEPEST] = max(log[0, DEEPEST], _far(work[TRIAL, W], side, system.law))
         if work[TRIAL, R] * before > 0.0:
             low, before = part, work[TRIAL, R]
         else:
@@ -227,9 +181,9 @@ def _scatter(work: Table, cell: Vector, series: Vector, markov: Vector, law: Cel
         cell[MEMORY + k] = at[MOMENT + k]
     if law.kind == POWER:
         return
-    p, rate = motion_in_series(cell, series, markov, at[T])
-    cell[MEMORY + 1] += (p - side * (gap_on(side, law) + at[W] * at[W])) / markov[1]
-    p, rate = motion_in_series(cell, series, markov, at[T])
+    p, rate = motion_in_series(cell[MEMORY:], series, markov, at[T])
+    cell[MEMORY + 1] += (p - side * (gap_of(side, law.lower, law.upper) + at[W] * at[W])) / markov[1]
+    p, rate = motion_in_series(cell[MEMORY:], series, markov, at[T])
     cell[MEMORY] += (rate - side * at[R]) / markov[1]
 
 
@@ -275,14 +229,14 @@ def press_cell(  # noqa: C901, PLR0912 - a step control and its three ends are o
     if tau >= limit:
         return HELD, tau
     _gather(work, cell, tau)
-    point, trial = work[POINT], work[TRIAL]
-    close = 4.0 * np.finfo(np.float64).eps * limit
-    _begin_step(work, side, curvature, markov, law)
+    point, trial, system = work[POINT], work[TRIAL], CellSystem(markov, law)
+    near = NEAR * math.sqrt(tolerance)
+    cell_rates(point, work[0], side, curvature, 0.0, system)
     for _ in range(MOST_STEPS):
-        wish = step
+        wish, left = step, limit - point[T]
         if law.kind == POWER:
-            step = min(short_of_the_wall(step, point, markov, law), limit - point[T])
-        _try_step(work, step, side, curvature, markov, law)
+            step = min(short_of_the_wall(step, point, 0.0, markov[1], law.power), left)
+        trial_step(work, step, side, curvature, 0.0, system)
         error = step_error(work, step, root_scale, rate_scale, tolerance)
         factor = step_factor(error)
         if not error <= 1.0:
@@ -292,18 +246,20 @@ def press_cell(  # noqa: C901, PLR0912 - a step control and its three ends are o
             continue
         taken, code = step, -1
         if law.kind != POWER and trial[W] <= 0.0:
-            taken = _land(work, step, W, 0.0, LANDING * root_scale, side, curvature, markov, law)
+            close = LANDING * root_scale
+            taken = step_to_exit(work, step, side, curvature, 0.0, system, close, near * point[W])
             code = LEFT
-        if trial[T] >= limit - close:
-            taken = _land(work, taken, T, limit, close, side, curvature, markov, law)
-            trial[T] = limit
+        if law.kind == POWER and taken == left:
+            trial[T], code = limit, HELD
+        elif trial[T] >= limit:
+            taken = step_to_time(work, taken, T, limit, side, curvature, 0.0, system)
             code = HELD
         if trial[T] < point[T]:
             # Time runs backwards where w < 0: the step leapt over the exit and came back.
             step *= 0.5
             continue
         if len(log) > 0:
-            _log_apex(log, work, taken, side, curvature, markov, law)
+            _log_apex(log, work, taken, side, curvature, system)
         copy_row(point, trial)
         if code == LEFT:
             point[W] = 0.0
@@ -315,7 +271,7 @@ def press_cell(  # noqa: C901, PLR0912 - a step control and its three ends are o
             if code == LEFT:
                 cell[SIDE] = 0.0
             return code, point[T]
-        _begin_step(work, side, curvature, markov, law)
+        cell_rates(point, work[0], side, curvature, 0.0, system)
         # A step that was cut by the limit says little about the next one's length.
         step = wish * factor if step == wish else max(wish, step * factor)
     _scatter(work, cell, series, markov, law)

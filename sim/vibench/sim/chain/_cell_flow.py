@@ -12,71 +12,10 @@ every rate is a polynomial, and one step is Dormand and Prince's 8(5,3), both as
 
 from typing import NamedTuple
 
-from ..contact import (
-    A21,
-    A31,
-    A32,
-    A41,
-    A43,
-    A51,
-    A53,
-    A54,
-    A61,
-    A64,
-    A65,
-    A71,
-    A74,
-    A75,
-    A76,
-    A81,
-    A84,
-    A85,
-    A86,
-    A87,
-    A91,
-    A94,
-    A95,
-    A96,
-    A97,
-    A98,
-    A101,
-    A104,
-    A105,
-    A106,
-    A107,
-    A108,
-    A109,
-    A111,
-    A114,
-    A115,
-    A116,
-    A117,
-    A118,
-    A119,
-    A121,
-    A124,
-    A125,
-    A126,
-    A127,
-    A128,
-    A129,
-    A1110,
-    A1210,
-    A1211,
-    B1,
-    B6,
-    B7,
-    B8,
-    B9,
-    B10,
-    B11,
-    B12,
-    STAGES,
-    R,
-    W,
-)
+from ..contact import WORK_ROWS, R, W, rates_of
 from ..flight import SERIES_TERMS
-from ..kernels import Table, Vector, inlined, kernel_without_refcount
+from ..kernels import Vector, inlined, kernel_without_refcount
+from ..power_law import power_force
 from ..slots import PowerTerms
 
 T = 2
@@ -95,11 +34,8 @@ CELL_SIZE = MEMORY + MOMENTS
 MARKOV_TERMS = MOMENTS + 2
 """g_0 ... g_10."""
 
-WORK_ROWS = STAGES + 5
-ARGUMENT, POINT, TRIAL, SPARE, CURVATURE = range(STAGES, WORK_ROWS)
-"""Rows of a workspace after the stages, as in `vibench.sim.contact`; the last is a curvature
-long.
-"""
+CURVATURE = WORK_ROWS
+"""Row of a cell's workspace after those of `vibench.sim.contact`: the free motion's second derivative."""
 YIELDING, POWER = range(2)
 """How a cell's force acts: by stops that give way, or everywhere."""
 
@@ -149,68 +85,33 @@ def memory_force(markov: Vector, moments: Vector) -> float:
     return value
 
 
+class CellSystem(NamedTuple):
+    """What moves p of one cell besides the free motion: its force, and the chain's answer to it."""
+
+    markov: Vector
+    """g_k of p, shape (MARKOV_TERMS,)."""
+    law: CellLaw
+
+
+@rates_of(CellSystem, WIDTH)
 @inlined
-def stop_rates(
-    at: Vector, rates: Vector, side: float, curvature: Vector, markov: Vector, law: CellLaw
+def cell_rates(
+    at: Vector, rates: Vector, side: float, curvature: Vector, middle: float, system: CellSystem
 ) -> None:
-    """Write d/ds of the unknowns at ``at`` into ``rates``; ``curvature`` is d2p/dt2 without the force."""
-    w, r = at[W], at[R]
-    force = side * w * w * (law.linear_stiffness + law.contact_stiffness * w) * (1.0 + law.loss * r)
-    taken = markov[1] * force + memory_force(markov, at[MOMENT:])
-    rates[W] = 0.5 * r
-    rates[R] = w * side * (acceleration_at(curvature, at[T]) - taken)
-    rates[T] = w
-    rates[MOMENT] = w * force
+    """Write d/ds of the unknowns at ``at`` into ``rates``, for a power law d/dt.
+
+    ``curvature`` is d2p/dt2 without the force, in powers of (t - middle).
+    """
+    law, w, r = system.law, at[W], at[R]
+    free = acceleration_at(curvature, at[T] - middle) - memory_force(system.markov, at[MOMENT:])
+    if law.kind == POWER:
+        pace, force = 1.0, power_force(w, law.power)
+        rates[W], rates[R] = r, free - system.markov[1] * force
+    else:
+        pace = w
+        force = side * w * w * (law.linear_stiffness + law.contact_stiffness * w) * (1.0 + law.loss * r)
+        rates[W], rates[R] = 0.5 * r, w * side * (free - system.markov[1] * force)
+    rates[T] = pace
+    rates[MOMENT] = pace * force
     for k in range(MOMENT + 1, WIDTH):
-        rates[k] = w * at[k - 1]
-
-
-@kernel_without_refcount
-def stop_step(  # noqa: C901 - the twelve stages of one formula, in order
-    work: Table, step: float, side: float, curvature: Vector, markov: Vector, law: CellLaw
-) -> None:
-    """Step from ``work[POINT]``, whose rates are in ``work[0]``, and write the end to ``work[TRIAL]``."""
-    h = step
-    k1, k2, k3, k4, k5, k6 = work[0], work[1], work[2], work[3], work[4], work[5]
-    k7, k8, k9, k10, k11, k12 = work[6], work[7], work[8], work[9], work[10], work[11]
-    u, y, end = work[ARGUMENT], work[POINT], work[TRIAL]
-    for i in range(WIDTH):
-        u[i] = y[i] + h * (A21 * k1[i])
-    stop_rates(u, k2, side, curvature, markov, law)
-    for i in range(WIDTH):
-        u[i] = y[i] + h * (A31 * k1[i] + A32 * k2[i])
-    stop_rates(u, k3, side, curvature, markov, law)
-    for i in range(WIDTH):
-        u[i] = y[i] + h * (A41 * k1[i] + A43 * k3[i])
-    stop_rates(u, k4, side, curvature, markov, law)
-    for i in range(WIDTH):
-        u[i] = y[i] + h * (A51 * k1[i] + A53 * k3[i] + A54 * k4[i])
-    stop_rates(u, k5, side, curvature, markov, law)
-    for i in range(WIDTH):
-        u[i] = y[i] + h * (A61 * k1[i] + A64 * k4[i] + A65 * k5[i])
-    stop_rates(u, k6, side, curvature, markov, law)
-    for i in range(WIDTH):
-        u[i] = y[i] + h * (A71 * k1[i] + A74 * k4[i] + A75 * k5[i] + A76 * k6[i])
-    stop_rates(u, k7, side, curvature, markov, law)
-    for i in range(WIDTH):
-        u[i] = y[i] + h * (A81 * k1[i] + A84 * k4[i] + A85 * k5[i] + A86 * k6[i] + A87 * k7[i])
-    stop_rates(u, k8, side, curvature, markov, law)
-    for i in range(WIDTH):
-        early = A91 * k1[i] + A94 * k4[i] + A95 * k5[i]
-        u[i] = y[i] + h * (early + A96 * k6[i] + A97 * k7[i] + A98 * k8[i])
-    stop_rates(u, k9, side, curvature, markov, law)
-    for i in range(WIDTH):
-        early = A101 * k1[i] + A104 * k4[i] + A105 * k5[i] + A106 * k6[i]
-        u[i] = y[i] + h * (early + A107 * k7[i] + A108 * k8[i] + A109 * k9[i])
-    stop_rates(u, k10, side, curvature, markov, law)
-    for i in range(WIDTH):
-        early = A111 * k1[i] + A114 * k4[i] + A115 * k5[i] + A116 * k6[i]
-        u[i] = y[i] + h * (early + A117 * k7[i] + A118 * k8[i] + A119 * k9[i] + A1110 * k10[i])
-    stop_rates(u, k11, side, curvature, markov, law)
-    for i in range(WIDTH):
-        early = A121 * k1[i] + A124 * k4[i] + A125 * k5[i] + A126 * k6[i] + A127 * k7[i]
-        u[i] = y[i] + h * (early + A128 * k8[i] + A129 * k9[i] + A1210 * k10[i] + A1211 * k11[i])
-    stop_rates(u, k12, side, curvature, markov, law)
-    for i in range(WIDTH):
-        early = B1 * k1[i] + B6 * k6[i] + B7 * k7[i] + B8 * k8[i]
-        end[i] = y[i] + h * (early + B9 * k9[i] + B10 * k10[i] + B11 * k11[i] + B12 * k12[i])
+        rates[k] = pace * at[k - 1]

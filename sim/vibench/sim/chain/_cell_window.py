@@ -1,12 +1,11 @@
 """One cell through one window: flight, contact, flight, ... and nothing else of the chain. SI units."""
 
-from ..contact import DEEPEST, HELD, LEFT, LOGGED, NOT_FINITE, R, W
+from ..contact import ARGUMENT, DEEPEST, HELD, LEFT, LOGGED, NOT_FINITE, R, W
 from ..flight import NEVER, SERIES_TERMS, first_contact, touched_side
 from ..kernels import Table, Vector, kernel_without_refcount
 from ..model import Outcome
 from ._cell_contact import begin_pressing, log_moment, motion_in_series, press_cell
 from ._cell_flow import (
-    ARGUMENT,
     CURVATURE,
     MEMORY,
     MOMENT,
@@ -142,7 +141,7 @@ def cross_window(
             return CHATTERS
         touches[COUNT] += 1.0
         touches[int(touches[COUNT])] = tau
-        p, rate = motion_in_series(cell, series, markov, tau)
+        p, rate = motion_in_series(cell[MEMORY:], series, markov, tau)
         side = touched_side(p, rate, law.lower, law.upper)
         acceleration = acceleration_at(curvature, tau) - memory_force(markov, cell[MEMORY:])
         begin_pressing(cell, side, p, rate, acceleration, markov, law, tolerance)

@@ -7,17 +7,16 @@ only the latter are summed.
 
 from typing import NamedTuple
 
-from ..contact import DEEPEST, LOGGED
-from ..flight import polynomial_at, series_peak
+from ..contact import DEEPEST, LOGGED, hermite_peak
+from ..flight import series_peak
 from ..kernels import Complex, Table, Vector, kernel_without_refcount
+from ._cell_contact import motion_in_series
 from ._cell_flow import MEMORY, MOMENT, MOMENTS, T
 from ._tables import OBSERVED, PATH, ChainTables
 from ._windows import Workspace, fill_observed
 
 NOTHING, PEAKS, PEAKS_AND_LINES = range(3)
 """What a tally's mode asks for."""
-SECANTS = 3
-"""Secant steps to the extreme of a cubic: there its slope is zero, so that their error counts squared."""
 
 
 class ChainObservations(NamedTuple):
@@ -72,16 +71,6 @@ def observe_idle(
 
 
 @kernel_without_refcount
-def _node(series: Vector, markov: Vector, at: Vector) -> tuple[float, float]:
-    """Value and slope of an observed motion at a logged instant."""
-    value, slope = polynomial_at(series, at[T])
-    for k in range(1, MOMENTS):
-        value -= markov[k] * at[MOMENT + k]
-        slope -= markov[k] * at[MOMENT + k - 1]
-    return value, slope - markov[MOMENTS] * at[MOMENT + MOMENTS - 1]
-
-
-@kernel_without_refcount
 def observe_busy(
     observations: ChainObservations, place: int, series: Table, log: Table, tables: ChainTables
 ) -> None:
@@ -89,30 +78,10 @@ def observe_busy(
     observations.peaks[PATH, place] = max(observations.peaks[PATH, place], log[0, DEEPEST])
     for what in range(OBSERVED):
         markov, best = tables.markov[place, what], observations.peaks[what, place]
-        value, slope = _node(series[what], markov, log[1])
+        value, slope = motion_in_series(log[1, MOMENT:], series[what], markov, log[1, T])
         for row in range(2, int(log[0, LOGGED]) + 1):
             step = log[row, T] - log[row - 1, T]
-            value_end, slope_end = _node(series[what], markov, log[row])
-            best = _cubic_peak(best, value, step * slope, value_end, step * slope_end)
+            value_end, slope_end = motion_in_series(log[row, MOMENT:], series[what], markov, log[row, T])
+            best = hermite_peak(best, value, slope, value_end, slope_end, step)
             value, slope = value_end, slope_end
         observations.peaks[what, place] = best
-
-
-@kernel_without_refcount
-def _cubic_peak(best: float, x0: float, v0: float, x1: float, v1: float) -> float:
-    """Largest magnitude on [0, 1] of the cubic with these end values and slopes, or ``best``."""
-    best = max(best, abs(x0), abs(x1))
-    if v0 * v1 >= 0.0:
-        return best
-    rise = x1 - x0
-    quadratic, cubic = 3.0 * rise - 2.0 * v0 - v1, v0 + v1 - 2.0 * rise
-    low, high, slope_low, slope_high = 0.0, 1.0, v0, v1
-    for _ in range(SECANTS):
-        part = low - slope_low * (high - low) / (slope_high - slope_low)
-        slope = v0 + part * (2.0 * quadratic + part * 3.0 * cubic)
-        best = max(best, abs(x0 + part * (v0 + part * (quadratic + part * cubic))))
-        if slope * slope_low > 0.0:
-            low, slope_low = part, slope
-        else:
-            high, slope_high = part, slope
-    return best

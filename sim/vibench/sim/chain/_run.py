@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ..kernels import Complex, Table, Vector, advance_clock, kernel, kernel_without_refcount, time_until
 from ..model import Outcome
+from ._cell_contact import begin_power
 from ._cell_flow import CELL_SIZE, MEMORY, POWER, SIDE
-from ._cell_power import begin_power
 from ._cell_window import COUNT, cross_window
 from ._observer import NOTHING, PEAKS_AND_LINES, ChainObservations, observe_busy, observe_forces, observe_idle
 from ._tables import KIND, LOWER, OBSERVED, PATH, UPPER, ChainTables

@@ -119,7 +119,13 @@ def collide(
     _see_from_its_side(collision.motion, state, clock, tables)
     store(collision.course, 0, eight_of_eight(collisions.onto_p, 0, collision.motion))
     duration = _duration(
-        collision, speed, deepest, tolerance * CLOSE, par, gap_of(state[SIDE], par), collisions
+        collision,
+        speed,
+        deepest,
+        tolerance * CLOSE,
+        par,
+        gap_of(state[SIDE], par.lower, par.upper),
+        collisions,
     )
     if not 0.0 < duration < min(longest, LONGEST_TURN / collisions.fastest):
         return 0.0
@@ -149,7 +155,7 @@ def _leave(state: Vector, after: Vector, par: Parameters) -> None:
         side * after[X_RATE],
         side * after[Z_RATE],
     )
-    state[Y] = state[Z] + side * gap_of(side, par)
+    state[Y] = state[Z] + side * gap_of(side, par.lower, par.upper)
     state[VY] = state[VZ] + side * after[P_RATE]
     state[ROOT], state[RATE], state[SIDE] = 0.0, after[P_RATE], 0.0
 

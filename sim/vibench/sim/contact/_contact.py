@@ -24,6 +24,7 @@ from ._flow import (
     W,
     contact_error,
     contact_rates,
+    gap_of,
     trial_step,
 )
 
@@ -57,14 +58,12 @@ LOG_ROWS = 256
 LOGGED, DEEPEST, STAGES_ONLY = range(3)
 """Places of a log's first row: how many steps' ends are in the rows below; the largest w so far; 1 when no
 deepest point is wanted, only the stages."""
-LOG_TIME, LOG_X, LOG_VX, LOG_P, LOG_RATE, LOG_AX, LOG_AP = range(7)
-"""Columns of the rows below: time, x, vx, p and dp/dt at the ends of the accepted steps; under a power law,
-whose steps are long, the accelerations of x and p too."""
-LOG_COLUMNS = 7
-LOG_STEP = 7
+LOG_COLUMNS = 5
+LOG_TIME, LOG_X, LOG_VX, LOG_P, LOG_RATE, LOG_STEP = range(LOG_COLUMNS + 1)
+"""Columns of the rows below: time, x, vx, p and dp/dt at the ends of the accepted steps."""
 LOG_STAGE_T, LOG_STAGE_W = LOG_STEP + 1, LOG_STEP + 1 + STAGES
-"""Further columns of a wide log, about the step that begins at a row: its length in s, and the rates of t and
-w at its stages, from which a small change of the motion is carried along exactly as the motion was."""
+"""Further columns of a wide log, from LOG_STEP on, about the step that begins at a row: its length in s, and
+the rates of t and w at its stages, from which a small change of the motion is carried along exactly."""
 WIDE_LOG_COLUMNS = LOG_STEP + 1 + 2 * STAGES
 
 
@@ -84,12 +83,6 @@ def log_for(observations: Vector, tangent: Table | None) -> Table:
 
 
 @kernel_without_refcount
-def gap_of(side: float, par: Parameters) -> float:
-    """Clearance of the stop on one side [m]."""
-    return par.upper if side > 0.0 else par.lower
-
-
-@kernel_without_refcount
 def begin_contact(state: Vector, side: float, par: Parameters, tolerance: float) -> None:
     """Enter contact from the flight state, at any penetration (zero when the stop is just touched).
 
@@ -97,16 +90,14 @@ def begin_contact(state: Vector, side: float, par: Parameters, tolerance: float)
     5.1 w_max/v), or the other springs pressing a slow contact (w'' = -(a/2) w).
     """
     p = state[Y] - state[Z]
-    gap = gap_of(side, par)
+    gap = gap_of(side, par.lower, par.upper)
     root = math.sqrt(max(side * p - gap, 0.0))
     rate = side * (state[VY] - state[VZ])
     if root == 0.0:
         rate = max(rate, SLOWEST_TOUCH)
-    # In a collision with the speed v: m v^2 / 2 = k1 d^2 / 2 + 2 k d^(5/2) / 5, each spring taken alone.
-    hertz = 0.8 * par.contact_stiffness / par.reduced_mass
-    linear = par.linear_stiffness / par.reduced_mass
-    speed = math.sqrt(rate * rate + hertz * root**5 + linear * root**4)
-    deepest = min((speed * speed / hertz) ** 0.2, math.sqrt(speed / math.sqrt(linear)))
+    speed, deepest = foreseen_collision(
+        root, rate, par.linear_stiffness / par.reduced_mass, par.contact_stiffness / par.reduced_mass
+    )
     pull = par.k2 * (state[Z] - state[X]) + par.c2 * (state[VZ] - state[VX])
     pressing = par.k1 * gap + par.c1 * rate
     press = abs(side * pull / par.mass2 - pressing / par.reduced_mass)
@@ -118,6 +109,17 @@ def begin_contact(state: Vector, side: float, par: Parameters, tolerance: float)
     state[RATE_SCALE] = speed + RATE_FLOOR
     whole = min(deepest / speed, PRESSED / math.sqrt(0.5 * press + 1e-300))
     state[STEP] = step_scale(tolerance) * _foreseen(root / state[ROOT_SCALE], rate) * whole
+
+
+@inlined
+def foreseen_collision(root: float, rate: float, linear: float, hertz: float) -> tuple[float, float]:
+    """Foresee a collision's largest speed [m/s] and w [m^0.5] from a point of it; stiffnesses over the mass.
+
+    With the speed v: m v^2 / 2 = k1 d^2 / 2 + 2 k d^(5/2) / 5, each spring taken alone.
+    """
+    fifth = 0.8 * hertz
+    speed = math.sqrt(rate * rate + fifth * root**5 + linear * root**4)
+    return speed, min((speed * speed / fifth) ** 0.2, math.sqrt(speed / math.sqrt(linear)))
 
 
 @kernel_without_refcount
@@ -142,7 +144,8 @@ def _foreseen(depth: float, rate: float) -> float:
 
 
 @kernel_without_refcount
-def _gather(work: Table, state: Vector, tau: float) -> None:
+def gather(work: Table, state: Vector, tau: float) -> None:
+    """Write the unknowns from the state vector to ``work[POINT]``."""
     at = work[POINT]
     at[W], at[R], at[CX], at[CZ] = state[ROOT], state[RATE], state[X], state[Z]
     at[CVX], at[CVZ], at[T], at[WIDTH - 1] = state[VX], state[VZ], tau, 0.0
@@ -153,7 +156,7 @@ def _scatter(work: Table, state: Vector, par: Parameters) -> None:
     at, side = work[POINT], state[SIDE]
     state[ROOT], state[RATE] = at[W], at[R]
     state[X], state[Z], state[VX], state[VZ] = at[CX], at[CZ], at[CVX], at[CVZ]
-    state[Y] = at[CZ] + side * (gap_of(side, par) + at[W] * at[W])
+    state[Y] = at[CZ] + side * (gap_of(side, par.lower, par.upper) + at[W] * at[W])
     state[VY] = at[CVZ] + side * at[R]
 
 
@@ -172,7 +175,10 @@ def _log_point(log: Table, work: Table, side: float, par: Parameters) -> None:
     log[0, LOGGED] += 1.0
     row = int(log[0, LOGGED])
     log[row, LOG_TIME], log[row, LOG_X], log[row, LOG_VX] = at[T], at[CX], at[CVX]
-    log[row, LOG_P], log[row, LOG_RATE] = side * (gap_of(side, par) + at[W] * at[W]), side * at[R]
+    log[row, LOG_P], log[row, LOG_RATE] = (
+        side * (gap_of(side, par.lower, par.upper) + at[W] * at[W]),
+        side * at[R],
+    )
 
 
 @kernel_without_refcount
@@ -256,7 +262,7 @@ def advance_contact(  # noqa: C901, PLR0912 - a step control and its three ends 
     root_scale, rate_scale = state[ROOT_SCALE], state[RATE_SCALE]
     longest = state[PACE] * step_scale(tolerance)
     near = NEAR * math.sqrt(tolerance)
-    _gather(work, state, tau)
+    gather(work, state, tau)
     _start_log(log, work, side, par)
     if tau >= limit:
         return HELD, tau
@@ -277,7 +283,7 @@ def advance_contact(  # noqa: C901, PLR0912 - a step control and its three ends 
             )
             code = LEFT
         if work[TRIAL, T] >= limit:
-            taken = step_to_time(work, taken, limit, side, force, middle, par)
+            taken = step_to_time(work, taken, T, limit, side, force, middle, par)
             code = HELD
         if work[TRIAL, T] < work[POINT, T]:
             # Time runs backwards where w < 0: the step leapt over the exit and came back.

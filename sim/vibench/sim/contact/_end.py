@@ -3,8 +3,7 @@
 import numpy as np
 
 from ..kernels import Table, Vector, kernel_without_refcount
-from ..slots import Parameters
-from ._flow import POINT, SPARE, TRIAL, WIDTH, R, T, W, contact_rates, trial_step
+from ._flow import POINT, SPARE, TRIAL, R, System, W, motion_rates, places_of, trial_step
 
 MOST_CORRECTIONS = 100
 """Bracketed Newton always ends by bisection before this."""
@@ -19,22 +18,22 @@ def step_to_exit(
     side: float,
     force: Vector,
     middle: float,
-    par: Parameters,
+    system: System,
     close: float,
     near: float,
 ) -> float:
     """Shorten the trial step until it ends at w = 0; ``work[TRIAL]`` is past it. Gives the step taken."""
     low, high, step = 0.0, longest, longest
-    guess = _where_root_ends(work, longest, side, force, middle, par)
+    guess = _where_root_ends(work, longest, side, force, middle, system)
     if 0.0 < guess < longest:
         step = guess
-        trial_step(work, step, side, force, middle, par)
+        trial_step(work, step, side, force, middle, system)
     for _ in range(MOST_CORRECTIONS):
         w, slope = work[TRIAL, W], 0.5 * work[TRIAL, R]
         if abs(w) <= close:
             break
         if abs(w) <= near and slope < 0.0:
-            _slip_to_exit(work, side, force, middle, par)
+            _slip_to_exit(work, side, force, middle, system)
             break
         if w > 0.0:
             low = step
@@ -45,16 +44,16 @@ def step_to_exit(
             step = 0.5 * (low + high)
             if not low < step < high:
                 break
-        trial_step(work, step, side, force, middle, par)
+        trial_step(work, step, side, force, middle, system)
     return step
 
 
 @kernel_without_refcount
 def _where_root_ends(
-    work: Table, longest: float, side: float, force: Vector, middle: float, par: Parameters
+    work: Table, longest: float, side: float, force: Vector, middle: float, system: System
 ) -> float:
     """Guess the step to w = 0 within the trial step, by the quintic through both its ends."""
-    contact_rates(work[TRIAL], work[SPARE], side, force, middle, par)
+    motion_rates(work[TRIAL], work[SPARE], side, force, middle, system)
     h = longest
     w0, slope0, bend0 = work[POINT, W], h * work[0, W], 0.5 * h * h * work[0, R]
     w1, slope1, bend1 = work[TRIAL, W], h * work[SPARE, W], 0.5 * h * h * work[SPARE, R]
@@ -73,28 +72,38 @@ def _where_root_ends(
 
 
 @kernel_without_refcount
-def _slip_to_exit(work: Table, side: float, force: Vector, middle: float, par: Parameters) -> None:
+def _slip_to_exit(work: Table, side: float, force: Vector, middle: float, system: System) -> None:
     """Go the last hair to w = 0 without a step: all rates but that of w are in proportion to w itself.
 
     Their mean over the hair is half of what they are at its start; what is left out is of its third order.
     """
-    contact_rates(work[TRIAL], work[SPARE], side, force, middle, par)
+    motion_rates(work[TRIAL], work[SPARE], side, force, middle, system)
     hair = -work[TRIAL, W] / work[SPARE, W]
-    for i in range(WIDTH):
+    for i in range(places_of(system)):
         work[TRIAL, i] += 0.5 * hair * work[SPARE, i]
     work[TRIAL, W] = 0.0
 
 
 @kernel_without_refcount
 def step_to_time(
-    work: Table, longest: float, limit: float, side: float, force: Vector, middle: float, par: Parameters
+    work: Table,
+    longest: float,
+    time: int,
+    limit: float,
+    side: float,
+    force: Vector,
+    middle: float,
+    system: System,
 ) -> float:
-    """Shorten the trial step until it ends at the time limit; ``work[TRIAL]`` is past it. Gives the step."""
+    """Shorten the trial step until its place ``time``, with the rate w, is at the limit, past which it goes.
+
+    Gives the step taken.
+    """
     low, high, step = 0.0, longest, longest
     # A few units in the last place of the stretch: closer than that, time itself has no digits.
-    close = 4.0 * np.finfo(np.float64).eps * (abs(limit) + abs(work[POINT, T]))
+    close = 4.0 * np.finfo(np.float64).eps * (abs(limit) + abs(work[POINT, time]))
     for _ in range(MOST_CORRECTIONS):
-        late, slope = work[TRIAL, T] - limit, work[TRIAL, W]
+        late, slope = work[TRIAL, time] - limit, work[TRIAL, W]
         if abs(late) <= close:
             break
         if late < 0.0:
@@ -106,6 +115,6 @@ def step_to_time(
             step = 0.5 * (low + high)
             if not low < step < high:
                 break
-        trial_step(work, step, side, force, middle, par)
-    work[TRIAL, T] = limit
+        trial_step(work, step, side, force, middle, system)
+    work[TRIAL, time] = limit
     return step

@@ -60,6 +60,67 @@ def base_force_at(force: Vector, since_middle: float) -> float:
 
 
 @inlined
+def gap_of(side: float, lower: float, upper: float) -> float:
+    """Clearance of the stop on one side [m]."""
+    return upper if side > 0.0 else lower
+
+
+System = TypeVar("System", bound=tuple[object, ...])
+Rates = TypeVar("Rates", bound=Callable[..., None])
+
+
+def motion_rates(
+    at: Vector, rates: Vector, side: float, force: Vector, middle: float, system: System
+) -> None:
+    """Write the rates of a system, chosen by its type when a kernel is compiled.
+
+    One source of the twelve stages serves every law, and none pays for another's.
+    """
+    raise NotImplementedError
+
+
+def places_of(system: System) -> int:
+    """Give how many places a point of a system's motion has, as a constant of the compiled kernel."""
+    raise NotImplementedError
+
+
+def rates_of(kind: type[System], places: int = WIDTH) -> Callable[[Rates], Rates]:
+    """Declare a kernel to be the `motion_rates` of a kind of system, and how many places its points have."""
+
+    # numba calls what is overloaded with types, not values, and wants the names of what it returns.
+    def declared(kernel: Rates) -> Rates:
+        @overload(motion_rates, jit_options={"forceinline": True})
+        def _choose_rates(
+            at: Vector, rates: Vector, side: float, force: Vector, middle: float, system: System
+        ) -> Callable[..., None] | None:
+            del at, rates, side, force, middle
+            if getattr(system, "instance_class", None) is not kind:
+                return None
+
+            def chosen(
+                at: Vector, rates: Vector, side: float, force: Vector, middle: float, system: System
+            ) -> None:
+                kernel(at, rates, side, force, middle, system)
+
+            return chosen
+
+        @overload(places_of, jit_options={"forceinline": True})
+        def _choose_places(system: System) -> Callable[..., int] | None:
+            if getattr(system, "instance_class", None) is not kind:
+                return None
+
+            def chosen(system: System) -> int:  # noqa: ARG001 - only its type counts
+                return places
+
+            return chosen
+
+        return kernel
+
+    return declared
+
+
+@rates_of(Parameters)
+@inlined
 def contact_rates(
     at: Vector, rates: Vector, side: float, force: Vector, middle: float, par: Parameters
 ) -> None:
@@ -69,7 +130,7 @@ def contact_rates(
     motion is mirrored to the last bit.
     """
     w, r, vx, vz = at[0], at[1], at[4], at[5]
-    gap = par.upper if side > 0.0 else par.lower
+    gap = gap_of(side, par.lower, par.upper)
     penetration = w * w
     reaction = penetration * (par.linear_stiffness + par.contact_stiffness * w) * (1.0 + par.loss * r)
     pressing = par.k1 * (gap + penetration) + par.c1 * r + reaction
@@ -85,89 +146,59 @@ def contact_rates(
     rates[7] = 0.0
 
 
-System = TypeVar("System", bound=tuple[object, ...])
-
-
-def motion_rates(
-    at: Vector, rates: Vector, side: float, force: Vector, middle: float, system: System
-) -> None:
-    """Write the rates of a system, chosen by its type when a kernel is compiled.
-
-    One source of the twelve stages serves every law, and none pays for another's.
-    """
-    raise NotImplementedError
-
-
-@overload(motion_rates, jit_options={"forceinline": True})
-def _choose_contact_rates(
-    at: Vector, rates: Vector, side: float, force: Vector, middle: float, system: Parameters
-) -> Callable[..., None] | None:
-    # numba calls this with types, not values, and wants the names of what it returns.
-    del at, rates, side, force, middle
-    if getattr(system, "instance_class", None) is not Parameters:
-        return None
-
-    def chosen(
-        at: Vector, rates: Vector, side: float, force: Vector, middle: float, system: Parameters
-    ) -> None:
-        contact_rates(at, rates, side, force, middle, system)
-
-    return chosen
-
-
 @kernel_without_refcount
 def trial_step(  # noqa: C901 - the twelve stages of one formula, in order
     work: Table, step: float, side: float, force: Vector, middle: float, system: System
 ) -> None:
     """Step from ``work[POINT]``, whose rates are in ``work[0]``, and write the end to ``work[TRIAL]``."""
-    h = step
+    h, places = step, places_of(system)
     k1, k2, k3, k4, k5, k6 = work[0], work[1], work[2], work[3], work[4], work[5]
     k7, k8, k9, k10, k11, k12 = work[6], work[7], work[8], work[9], work[10], work[11]
     u, y, end = work[ARGUMENT], work[POINT], work[TRIAL]
-    for i in range(WIDTH):
+    for i in range(places):
         u[i] = y[i] + h * (A21 * k1[i])
     motion_rates(u, k2, side, force, middle, system)
-    for i in range(WIDTH):
+    for i in range(places):
         u[i] = y[i] + h * (A31 * k1[i] + A32 * k2[i])
     motion_rates(u, k3, side, force, middle, system)
-    for i in range(WIDTH):
+    for i in range(places):
         u[i] = y[i] + h * (A41 * k1[i] + A43 * k3[i])
     motion_rates(u, k4, side, force, middle, system)
-    for i in range(WIDTH):
+    for i in range(places):
         u[i] = y[i] + h * (A51 * k1[i] + A53 * k3[i] + A54 * k4[i])
     motion_rates(u, k5, side, force, middle, system)
-    for i in range(WIDTH):
+    for i in range(places):
         u[i] = y[i] + h * (A61 * k1[i] + A64 * k4[i] + A65 * k5[i])
     motion_rates(u, k6, side, force, middle, system)
-    for i in range(WIDTH):
+    for i in range(places):
         u[i] = y[i] + h * (A71 * k1[i] + A74 * k4[i] + A75 * k5[i] + A76 * k6[i])
     motion_rates(u, k7, side, force, middle, system)
-    for i in range(WIDTH):
+    for i in range(places):
         u[i] = y[i] + h * (A81 * k1[i] + A84 * k4[i] + A85 * k5[i] + A86 * k6[i] + A87 * k7[i])
     motion_rates(u, k8, side, force, middle, system)
-    for i in range(WIDTH):
+    for i in range(places):
         early = A91 * k1[i] + A94 * k4[i] + A95 * k5[i]
         u[i] = y[i] + h * (early + A96 * k6[i] + A97 * k7[i] + A98 * k8[i])
     motion_rates(u, k9, side, force, middle, system)
-    for i in range(WIDTH):
+    for i in range(places):
         early = A101 * k1[i] + A104 * k4[i] + A105 * k5[i] + A106 * k6[i]
         u[i] = y[i] + h * (early + A107 * k7[i] + A108 * k8[i] + A109 * k9[i])
     motion_rates(u, k10, side, force, middle, system)
-    for i in range(WIDTH):
+    for i in range(places):
         early = A111 * k1[i] + A114 * k4[i] + A115 * k5[i] + A116 * k6[i]
         u[i] = y[i] + h * (early + A117 * k7[i] + A118 * k8[i] + A119 * k9[i] + A1110 * k10[i])
     motion_rates(u, k11, side, force, middle, system)
-    for i in range(WIDTH):
+    for i in range(places):
         early = A121 * k1[i] + A124 * k4[i] + A125 * k5[i] + A126 * k6[i] + A127 * k7[i]
         u[i] = y[i] + h * (early + A128 * k8[i] + A129 * k9[i] + A1210 * k10[i] + A1211 * k11[i])
     motion_rates(u, k12, side, force, middle, system)
-    for i in range(WIDTH):
+    for i in range(places):
         early = B1 * k1[i] + B6 * k6[i] + B7 * k7[i] + B8 * k8[i]
         end[i] = y[i] + h * (early + B9 * k9[i] + B10 * k10[i] + B11 * k11[i] + B12 * k12[i])
 
 
 @inlined
-def _errors(work: Table, column: int, allowed: float) -> tuple[float, float]:
+def squared_errors(work: Table, column: int, allowed: float) -> tuple[float, float]:
     """Squares of the fifth- and third-order errors of one unknown's step, over step and what is allowed."""
     fifth, third = 0.0, 0.0
     for stage in range(STAGES):
@@ -177,23 +208,23 @@ def _errors(work: Table, column: int, allowed: float) -> tuple[float, float]:
 
 
 @inlined
-def _blended(fifth: float, third: float, step: float) -> float:
-    """DOP853's error from the sums of squares; infinite when a stage ran away or overflowed."""
+def blended_error(fifth: float, third: float, count: float, step: float) -> float:
+    """DOP853's error from sums of squares over ``count``; infinite when a stage ran away or overflowed."""
     blended = fifth + BLEND * third
     if blended == 0.0:
         return 0.0
     if not blended < LARGEST_SQUARE:
         # A stage ran away: fifth over infinity would pass for no error at all.
         return math.inf
-    return step * fifth / math.sqrt(2.0 * blended)
+    return step * fifth / math.sqrt(count * blended)
 
 
 @kernel_without_refcount
 def step_error(work: Table, step: float, root_scale: float, rate_scale: float, tolerance: float) -> float:
     """Error of the step just tried, over what is allowed: on w and r, the two fast unknowns."""
-    fifth_w, third_w = _errors(work, W, tolerance * (root_scale + abs(work[POINT, W])))
-    fifth_r, third_r = _errors(work, R, tolerance * (rate_scale + abs(work[POINT, R])))
-    return _blended(fifth_w + fifth_r, third_w + third_r, step)
+    fifth_w, third_w = squared_errors(work, W, tolerance * (root_scale + abs(work[POINT, W])))
+    fifth_r, third_r = squared_errors(work, R, tolerance * (rate_scale + abs(work[POINT, R])))
+    return blended_error(fifth_w + fifth_r, third_w + third_r, 2.0, step)
 
 
 @kernel_without_refcount
@@ -203,7 +234,7 @@ def contact_error(work: Table, step: float, root_scale: float, rate_scale: float
     m0 feels no contact, but a light one is faster than the contact itself, and a step that it cannot bear
     must be seen.
     """
-    fifth_w, third_w = _errors(work, W, tolerance * (root_scale + abs(work[POINT, W])))
-    fifth_r, third_r = _errors(work, R, tolerance * (rate_scale + abs(work[POINT, R])))
-    fifth_x, third_x = _errors(work, CVX, tolerance * (rate_scale + abs(work[POINT, CVX])))
-    return _blended(fifth_w + fifth_r + fifth_x, third_w + third_r + third_x, step)
+    fifth_w, third_w = squared_errors(work, W, tolerance * (root_scale + abs(work[POINT, W])))
+    fifth_r, third_r = squared_errors(work, R, tolerance * (rate_scale + abs(work[POINT, R])))
+    fifth_x, third_x = squared_errors(work, CVX, tolerance * (rate_scale + abs(work[POINT, CVX])))
+    return blended_error(fifth_w + fifth_r + fifth_x, third_w + third_r + third_x, 2.0, step)

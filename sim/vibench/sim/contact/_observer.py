@@ -8,7 +8,8 @@ closed form over flights, and by the corrected trapezoidal rule (error ~ step^4)
 from ..flight import FlightTables, drive_phasor
 from ..kernels import Table, Vector, kernel_without_refcount
 from ..slots import LINE_P_RE, LINE_X_RE, MODE, PEAK_P, PEAK_X, PEAKS_AND_LINES, SECANTS
-from ._contact import DEEPEST, LOG_P, LOG_RATE, LOG_TIME, LOG_VX, LOG_X, LOGGED, gap_of
+from ._contact import DEEPEST, LOG_P, LOG_RATE, LOG_TIME, LOG_VX, LOG_X, LOGGED
+from ._flow import gap_of
 
 
 @kernel_without_refcount
@@ -17,7 +18,7 @@ def observe_contact(tally: Vector, log: Table, clock: Vector, tables: FlightTabl
     rows = int(log[0, LOGGED])
     deepest = log[0, DEEPEST]
     side = 1.0 if log[1, LOG_P] > 0.0 else -1.0
-    tally[PEAK_P] = max(tally[PEAK_P], gap_of(side, tables.par) + deepest * deepest)
+    tally[PEAK_P] = max(tally[PEAK_P], gap_of(side, tables.par.lower, tables.par.upper) + deepest * deepest)
     at = drive_phasor(clock, log[1, LOG_TIME], tables).conjugate()
     for row in range(1, rows):
         start, end = log[row, LOG_TIME], log[row + 1, LOG_TIME]

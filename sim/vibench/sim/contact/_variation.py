@@ -9,11 +9,9 @@ force of a stop that yields starts from zero, so that the rates are continuous (
 and Bifurcations of Non-smooth Mechanical Systems, Springer 2004, section 7.3).
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 
 from ..flight import FORCE_TERMS
@@ -21,7 +19,7 @@ from ..kernels import Table, Vector, inlined, kernel, kernel_without_refcount
 from ..model import VX, VY, VZ, X, Y, Z
 from ..slots import Parameters, keep_in_range
 from ._contact import LOG_STAGE_T, LOG_STAGE_W, LOG_STEP, LOGGED
-from ._flow import POINT, STAGES, TRIAL, WIDTH, WORK_ROWS, motion_rates, trial_step
+from ._flow import POINT, STAGES, TRIAL, WIDTH, WORK_ROWS, rates_of, trial_step
 
 STEP_TIME, PRESS_P, PRESS_RATE = range(3)
 """Columns of a step's slopes, one row a stage: dt/ds, and the derivatives of what presses m1 and m2 together,
@@ -52,8 +50,16 @@ class TangentSystem(NamedTuple):
     """Shape (1,): the stage that comes next, counted by who writes the rates."""
 
 
+@rates_of(TangentSystem)
 @inlined
-def tangent_rates(at: Vector, rates: Vector, system: TangentSystem) -> None:
+def tangent_rates(
+    at: Vector,
+    rates: Vector,
+    side: float,  # noqa: ARG001 - of the motion, not of a change
+    force: Vector,  # noqa: ARG001
+    middle: float,  # noqa: ARG001
+    system: TangentSystem,
+) -> None:
     """Write d/ds of a change (p, dp/dt, x, z, vx, vz) at the coming stage."""
     links, stage = system.links, system.stage[0]
     system.stage[0] = stage + 1
@@ -69,25 +75,6 @@ def tangent_rates(at: Vector, rates: Vector, system: TangentSystem) -> None:
     rates[5] = links.light2 * (pressing - pull)
     rates[6] = 0.0
     rates[7] = 0.0
-
-
-@overload(motion_rates, jit_options={"forceinline": True})
-def _choose_tangent_rates(
-    at: Vector, rates: Vector, side: float, force: Vector, middle: float, system: TangentSystem
-) -> Callable[..., None] | None:
-    # numba calls this with types, not values, and wants the names of what it returns.
-    del at, rates, side, force, middle
-    if getattr(system, "instance_class", None) is not TangentSystem:
-        return None
-
-    # fmt: off
-    def chosen(
-        at: Vector, rates: Vector, side: float, force: Vector, middle: float, system: TangentSystem  # noqa: ARG001 - as above
-    ) -> None:
-        # fmt: on
-        tangent_rates(at, rates, system)
-
-    return chosen
 
 
 @kernel_without_refcount
@@ -125,7 +112,7 @@ def propagate_tangent_steps(tangent: Table, log: Table, par: Parameters, memory:
             at[0], at[1], at[2], at[3] = change[Y], change[VY], change[X], change[Z]
             at[4], at[5] = change[VX], change[VZ]
             stage[0] = 0
-            tangent_rates(at, work[0], system)
+            tangent_rates(at, work[0], 1.0, unforced, 0.0, system)
             trial_step(work, log[logged, LOG_STEP], 1.0, unforced, 0.0, system)
             change[Y], change[VY], change[X], change[Z] = end[0], end[1], end[2], end[3]
             change[VX], change[VZ] = end[4], end[5]

@@ -5,15 +5,17 @@ time itself, so that the same step advances both.
 """
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
-from numba.extending import overload
-
-from ..contact import base_force_at, motion_rates
-from ..kernels import SimdVector, Vector, inlined
+from ..contact import base_force_at, rates_of
+from ..kernels import SimdVector, Vector, inlined, kernel_without_refcount
 from ..model import MOST_TERMS
 from ..slots import Parameters, PowerTerms
+
+WALL_TURN = 1.5
+"""See `short_of_the_wall`: for p^47 the errors are ten times smaller than without, at no cost, for steps
+that would fail are not tried [rad]."""
+SHORTENING, MOST_SHORTENINGS = 0.75, 40
 
 
 class PowerSystem(NamedTuple):
@@ -69,21 +71,28 @@ def power_forces(p: SimdVector, power: PowerTerms) -> SimdVector:
 
 
 @inlined
-def stiffest_rate(p: float, par: Parameters, power: PowerTerms) -> float:
-    """Angular frequency that the law's steepest term would give the pair at ``p``, at least [rad/s]."""
+def stiffest_rate(p: float, linear: float, inverse_mass: float, power: PowerTerms) -> float:
+    """Angular frequency at ``p`` of a mass on a linear spring and the law's steepest term [rad/s]."""
     exponent = 1
     for place in range(MOST_TERMS):
         exponent += 2 * power.halves[place]
     secant = power_force(p, power) / p if p > 0.0 else 0.0
-    rate: float = math.sqrt((par.k1 + exponent * secant) / par.reduced_mass)
+    rate: float = math.sqrt((linear + exponent * secant) * inverse_mass)
     return rate
 
 
+@rates_of(PowerSystem)
 @inlined
 def power_rates(
-    at: Vector, rates: Vector, force: Vector, middle: float, par: Parameters, power: PowerTerms
+    at: Vector,
+    rates: Vector,
+    side: float,  # noqa: ARG001 - the law acts on both
+    force: Vector,
+    middle: float,
+    system: PowerSystem,
 ) -> None:
     """Write d/dt of the seven unknowns at ``at`` into ``rates``."""
+    par, power = system.par, system.power
     p, rate, vx, vz = at[0], at[1], at[4], at[5]
     pressing = par.k1 * p + par.c1 * rate + power_force(p, power)
     pull = par.k2 * (at[3] - at[2]) + par.c2 * (vz - vx)
@@ -99,20 +108,19 @@ def power_rates(
     rates[7] = p
 
 
-@overload(motion_rates, jit_options={"forceinline": True})
-def _choose_power_rates(
-    at: Vector, rates: Vector, side: float, force: Vector, middle: float, system: PowerSystem
-) -> Callable[..., None] | None:
-    # numba calls this with types, not values, and wants the names of what it returns.
-    del at, rates, side, force, middle
-    if getattr(system, "instance_class", None) is not PowerSystem:
-        return None
+@kernel_without_refcount
+def short_of_the_wall(
+    step: float, at: Vector, linear: float, inverse_mass: float, power: PowerTerms
+) -> float:
+    """Shorten a step until it would turn the stiffest spring on its way by `WALL_TURN` at most.
 
-    # fmt: off
-    def chosen(
-        at: Vector, rates: Vector, side: float, force: Vector, middle: float, system: PowerSystem  # noqa: ARG001 - as above
-    ) -> None:
-        # fmt: on
-        power_rates(at, rates, force, middle, system.par, system.power)
-
-    return chosen
+    In free motion the error sees nothing of a steep wall ahead, and a stage that meets it late in the step is
+    too little for the estimate. ``at`` begins with p and dp/dt.
+    """
+    outward = at[1] if at[0] >= 0.0 else -at[1]
+    for _ in range(MOST_SHORTENINGS):
+        reach = abs(at[0]) + max(outward, 0.0) * step
+        if step * stiffest_rate(reach, linear, inverse_mass, power) <= WALL_TURN:
+            break
+        step *= SHORTENING
+    return step

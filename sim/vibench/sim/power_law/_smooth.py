@@ -11,31 +11,28 @@ step shrinks.
 import math
 
 from ..contact import (
-    BLEND,
     CVX,
     CVZ,
     CX,
     CZ,
-    ERROR_3,
-    ERROR_5,
     HELD,
-    LARGEST_SQUARE,
     NOT_FINITE,
     POINT,
-    STAGES,
     STALLED,
     TRIAL,
-    WIDTH,
     R,
     T,
     W,
+    blended_error,
+    gather,
+    squared_errors,
     step_factor,
     trial_step,
 )
 from ..kernels import Table, Vector, copy_row, kernel_without_refcount
 from ..model import VX, VY, VZ, X, Y, Z
-from ..slots import RATE, ROOT, SCALES, SIDE, STEP, Parameters, PowerTerms
-from ._flow import PowerSystem, power_rates, stiffest_rate
+from ..slots import RATE, ROOT, SCALES, SIDE, STEP, Parameters
+from ._flow import PowerSystem, power_rates, short_of_the_wall, stiffest_rate
 
 MOTIONS = 6
 """The unknowns whose errors count; time has none."""
@@ -49,10 +46,6 @@ FIRST_TURN = 0.01
 """First step, in radians of the fastest link without the power law."""
 MOST_STEPS = 1_000_000
 """Steps in one call, which is a fraction of a period."""
-WALL_TURN = 1.5
-"""See `_short_of_the_wall`: for p^47 the errors are ten times smaller than without, at no cost, for steps
-that would fail are not tried [rad]."""
-SHORTENING, MOST_SHORTENINGS = 0.75, 40
 
 
 @kernel_without_refcount
@@ -64,13 +57,6 @@ def begin_smooth(state: Vector) -> None:
     sizes = state[SCALES : SCALES + MOTIONS]
     sizes[W], sizes[R], sizes[CX] = abs(state[ROOT]), abs(state[RATE]), abs(state[X])
     sizes[CZ], sizes[CVX], sizes[CVZ] = abs(state[Z]), abs(state[VX]), abs(state[VZ])
-
-
-@kernel_without_refcount
-def _gather(work: Table, state: Vector, tau: float) -> None:
-    at = work[POINT]
-    at[W], at[R], at[CX], at[CZ] = state[ROOT], state[RATE], state[X], state[Z]
-    at[CVX], at[CVZ], at[T], at[WIDTH - 1] = state[VX], state[VZ], tau, 0.0
 
 
 @kernel_without_refcount
@@ -102,37 +88,10 @@ def smooth_error(work: Table, step: float, sizes: Vector, tolerance: float) -> f
     """
     fifth, third = 0.0, 0.0
     for i in range(MOTIONS):
-        sum_5, sum_3 = 0.0, 0.0
-        for stage in range(STAGES):
-            sum_5 += ERROR_5[stage] * work[stage, i]
-            sum_3 += ERROR_3[stage] * work[stage, i]
-        allowed = tolerance * sizes[i]
-        fifth += (sum_5 / allowed) ** 2
-        third += (sum_3 / allowed) ** 2
-    blended = fifth + BLEND * third
-    if blended == 0.0:
-        return 0.0
-    if not blended < LARGEST_SQUARE:
-        # A stage ran away: fifth over infinity would pass for no error at all.
-        return math.inf
-    error: float = abs(step) * fifth / math.sqrt(MOTIONS * blended)
-    return error
-
-
-@kernel_without_refcount
-def _short_of_the_wall(step: float, at: Vector, par: Parameters, power: PowerTerms) -> float:
-    """Shorten a step until it would turn the stiffest spring on its way by `WALL_TURN` at most.
-
-    In free motion the error sees nothing of a steep wall ahead, and a stage that meets it late in the step is
-    too little for the estimate.
-    """
-    outward = at[R] if at[W] >= 0.0 else -at[R]
-    for _ in range(MOST_SHORTENINGS):
-        reach = abs(at[W]) + max(outward, 0.0) * step
-        if step * stiffest_rate(reach, par, power) <= WALL_TURN:
-            break
-        step *= SHORTENING
-    return step
+        fifth_i, third_i = squared_errors(work, i, tolerance * sizes[i])
+        fifth += fifth_i
+        third += third_i
+    return blended_error(fifth, third, float(MOTIONS), step)
 
 
 @kernel_without_refcount
@@ -164,7 +123,7 @@ def advance_smooth(
     """
     par, power = system.par, system.power
     sizes, step = state[SCALES : SCALES + MOTIONS], state[STEP]
-    _gather(work, state, tau)
+    gather(work, state, tau)
     if tau >= limit:
         return HELD, tau
     at = work[POINT]
@@ -174,13 +133,13 @@ def advance_smooth(
         fastest = math.sqrt((par.k0 + par.k2) / par.mass0 + (par.k1 + par.k2) / par.reduced_mass)
         step = FIRST_TURN / fastest
         # What is let go has no speed yet by which to tell an error of it.
-        sizes[R] = max(sizes[R], stiffest_rate(sizes[W], par, power) * sizes[W])
+        sizes[R] = max(sizes[R], stiffest_rate(sizes[W], par.k1, par.inverse_pair, power) * sizes[W])
         sizes[CVX], sizes[CVZ] = max(sizes[CVX], fastest * sizes[CX]), max(sizes[CVZ], fastest * sizes[CZ])
     _widen_sizes(sizes, at, 1.0, push, par)
-    power_rates(at, work[0], force, middle, par, power)
+    power_rates(at, work[0], 1.0, force, middle, system)
     code = STALLED
     for _ in range(MOST_STEPS):
-        step = _short_of_the_wall(step, at, par, power)
+        step = short_of_the_wall(step, at, par.k1, par.inverse_pair, power)
         left = limit - at[T]
         steps = math.ceil(left / step)
         taken = left / steps if steps <= 2 else step
@@ -198,7 +157,7 @@ def advance_smooth(
         # A step that was cut by the limit says little about the next one's length.
         step = max(step, taken * factor) if taken < step and factor > 1.0 else taken * factor
         _widen_sizes(sizes, at, 1.0 / (1.0 + lowest * taken), push, par)
-        power_rates(at, work[0], force, middle, par, power)
+        power_rates(at, work[0], 1.0, force, middle, system)
         if at[T] >= limit:
             code = HELD
             break

@@ -133,7 +133,7 @@ def level_that_sees(
     outward = max(rate if p >= 0.0 else -rate, 0.0)
     while level < LEVELS:
         length = steps.lengths[level]
-        if length * stiffest_rate(abs(p) + outward * length, par, power) <= WALL_TURN:
+        if length * stiffest_rate(abs(p) + outward * length, par.k1, par.inverse_pair, power) <= WALL_TURN:
             break
         level += 1
     return level

@@ -42,7 +42,7 @@ def press_on(side: float, state: Vector, par: Parameters) -> float:
     Times the reduced mass it is the force between m1 and the stop that holds it.
     """
     pull = par.k2 * (state[Z] - state[X]) + par.c2 * (state[VZ] - state[VX])
-    inner = par.k1 * gap_of(side, par) + par.c1 * (side * (state[VY] - state[VZ]))
+    inner = par.k1 * gap_of(side, par.lower, par.upper) + par.c1 * (side * (state[VY] - state[VZ]))
     press: float = side * pull / par.mass2 - inner / par.reduced_mass
     return press
 
@@ -50,7 +50,7 @@ def press_on(side: float, state: Vector, par: Parameters) -> float:
 @kernel_without_refcount
 def place_on_stop(state: Vector, side: float, rate: float, par: Parameters) -> None:
     """Put m1 exactly on a stop, with ``rate`` = d|p|/dt [m/s]; the pair keeps its centre and its momentum."""
-    gap = side * gap_of(side, par)
+    gap = side * gap_of(side, par.lower, par.upper)
     before, relative = state[Y] - state[Z], state[VY] - state[VZ]
     share = par.reduced_mass / par.mass2
     state[Z] -= share * (gap - before)
@@ -66,7 +66,7 @@ def rebound(state: Vector, side: float, par: Parameters, restitution: float, tol
     The touch was called a hair before the gap had closed; the speed is what it will be when it has, so that
     a million impacts do not lose a million hairs.
     """
-    short = gap_of(side, par) - side * (state[Y] - state[Z])
+    short = gap_of(side, par.lower, par.upper) - side * (state[Y] - state[Z])
     approach = side * (state[VY] - state[VZ])
     speed = math.sqrt(max(approach * approach + 2.0 * press_on(side, state, par) * short, 0.0))
     place_on_stop(state, side, -restitution * speed, par)
@@ -84,7 +84,7 @@ def hold_if_pressed(
     """
     rate = state[VY] - state[VZ]
     press = press_on(side, state, par)
-    gap = gap_of(side, par)
+    gap = gap_of(side, par.lower, par.upper)
     part = tolerance * (1.0 - restitution)
     too_low = RESOLVED * state[CLOSED] + part * part * gap
     if press >= 0.0 and rate * rate <= 2.0 * press * too_low:
@@ -97,7 +97,7 @@ def place_between_rigid_stops(state: Vector, par: Parameters, restitution: float
     """Decide whether a motion that is given starts held by a stop; one beyond a stop is put on it."""
     p = state[Y] - state[Z]
     side = math.copysign(1.0, p)
-    short = gap_of(side, par) - side * p
+    short = gap_of(side, par.lower, par.upper) - side * p
     state[CLOSED] = closed_gap(abs(state[X]) + abs(state[Y]) + abs(state[Z]), par)
     if short <= state[CLOSED]:
         place_on_stop(state, side, side * (state[VY] - state[VZ]), par)

@@ -250,7 +250,7 @@ def _observe_collision_in_full(
     """Observe a collision that began in the state ``shadow`` at clock time."""
     par, collision = tables.par, workspace.collision
     if record.observations[MODE] != NOTHING:
-        gap = gap_of(shadow[SIDE], par)
+        gap = gap_of(shadow[SIDE], par.lower, par.upper)
         observe_collision(record.observations, collision, length, gap, tables.omega, collisions)
     if tangent is not None and len(tangent) > 0:
         propagate_tangent_collision(tangent, collision, length, par, collisions, workspace.equations)
@@ -295,6 +295,6 @@ def _stay_held(
         propagate_tangent_flight(tangent, length, flight)
     sample_flight(phasors, now, clock, length, flight, record)
     for row in range(first, record.counts[NEXT_SAMPLE]):
-        record.samples[row, Y] += side * gap_of(side, flight.par)
+        record.samples[row, Y] += side * gap_of(side, flight.par.lower, flight.par.upper)
     place_held(state, side, landed, flight)
     return ends, length

@@ -88,7 +88,7 @@ def hold(
 ) -> tuple[int, float]:
     """Find how long a stop holds m1: until it lets go, or ``longest`` [s]; see `flight.fly`."""
     par, elapsed = held.par, 0.0
-    weight, spring = -side / par.mass2, par.k1 * gap_of(side, par) / par.reduced_mass
+    weight, spring = -side / par.mass2, par.k1 * gap_of(side, par.lower, par.upper) / par.reduced_mass
     while elapsed < longest:
         propagate_phasors(now, phasors, elapsed, clock, held)
         reach, bound = spring, 0.0
@@ -118,7 +118,7 @@ def hold(
 def place_held(state: Vector, side: float, phasors: Complex, held: FlightTables) -> None:
     """Write the motion of the phasors to ``state``, m1 on its stop."""
     place_on_phasors(state, phasors, held)
-    state[Y] = state[Z] + side * gap_of(side, held.par)
+    state[Y] = state[Z] + side * gap_of(side, held.par.lower, held.par.upper)
 
 
 @kernel_without_refcount
@@ -126,7 +126,7 @@ def observe_held(observations: Vector, side: float, clock: Vector, length: float
     """Add what the constant p does to its peak and line; `flight.tally_flight` does the rest."""
     if observations[MODE] == NOTHING:
         return
-    gap = gap_of(side, held.par)
+    gap = gap_of(side, held.par.lower, held.par.upper)
     observations[PEAK_P] = max(observations[PEAK_P], gap)
     if observations[MODE] == PEAKS_AND_LINES:
         # The integral of exp(-i (omega t + phase)): its middle value times sin(q)/q, q half the turn.
@@ -147,7 +147,7 @@ def hold_on_series(
     Returns the time at which it lets go, or NEVER. Workspaces as in `vibench.sim.flight`.
     """
     side = state[SIDE]
-    spring = par.k1 * gap_of(side, par) / par.reduced_mass
+    spring = par.k1 * gap_of(side, par.lower, par.upper) / par.reduced_mass
     _fill_held_series(series, path, state, force, par)
     reach = spring
     for k in range(2):
@@ -156,7 +156,7 @@ def hold_on_series(
     bound = derivative_bound(path, length, 2)
     free = first_contact(path, length, math.inf, 0.0, bound, reach)
     place_on_series(state, series, length if free == NEVER else free)
-    state[Y] = state[Z] + side * gap_of(side, par)
+    state[Y] = state[Z] + side * gap_of(side, par.lower, par.upper)
     return free
 
 
