@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
+from ..kernels import Floats
 from ..model import Harmonic, Specimen
 from ._plain_equations import (
     VY,
     VZ,
-    Floats,
     Law,
     Place,
     Rates,

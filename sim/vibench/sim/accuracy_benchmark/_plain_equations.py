@@ -9,12 +9,10 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..kernels import kernel
+from ..kernels import Floats, kernel
 from ..model import Harmonic, Hertz, HuntCrossley, LinearGap, NoContact, PowerLaw, RigidStops, Specimen
 
-Floats = NDArray[np.float64]
 Rates = Callable[[float, Floats], Floats]
 """(time, state) -> d state / dt, as general solvers ask for it."""
 Y, Z, VY, VZ = 1, 2, 4, 5

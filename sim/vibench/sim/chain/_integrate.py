@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..flight import SERIES_TERMS
 from ..kernels import Complex, Floats, Table, clock_at
 from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, chosen
-from ..motion import MAX_IMPACT_RATE_HZ, ROUNDING, SPARE_IMPACTS
+from ..motion import MAX_IMPACT_RATE_HZ, ROUNDING, SPARE_IMPACTS, check_times
 from ._cell_contact import begin_pressing
 from ._cell_flow import CURVATURE_TERMS, POWER, SIDE, fill_curvature
 from ._chain import MASSES_PER_CELL, Chain
@@ -98,7 +98,7 @@ def integrate_chain(
 
     """
     accuracy = chosen(Accuracy, accuracy)
-    _check_times(duration_s, start_time_s, sample_rate_hz, max_impact_rate_hz)
+    check_times(duration_s, start_time_s, sample_rate_hz, max_impact_rate_hz)
     tables = chain_tables(chain, drive, accuracy)
     cells, phasors = start_chain(chain, initial_state, start_time_s, tables, accuracy)
     clock, end = clock_at(start_time_s), start_time_s + duration_s
@@ -212,20 +212,3 @@ def _trajectory(
         outcome=outcome,
         accuracy=accuracy,
     )
-
-
-def _check_times(
-    duration_s: float, start_time_s: float, sample_rate_hz: float | None, max_impact_rate_hz: float
-) -> None:
-    if not 0.0 <= duration_s < math.inf:
-        msg = f"Duration {duration_s} s is not allowed: it must be zero or positive, and finite."
-        raise ValueError(msg)
-    if not 0.0 <= start_time_s < math.inf:
-        msg = f"Start time {start_time_s} s is not allowed: it must be zero or positive, and finite."
-        raise ValueError(msg)
-    if sample_rate_hz is not None and not 0.0 < sample_rate_hz < math.inf:
-        msg = f"Sample rate {sample_rate_hz} Hz is not allowed: it must be positive and finite, or None."
-        raise ValueError(msg)
-    if not 0.0 <= max_impact_rate_hz < math.inf:
-        msg = f"Impact rate {max_impact_rate_hz} Hz is not allowed: it must be zero or more, and finite."
-        raise ValueError(msg)

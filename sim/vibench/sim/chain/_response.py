@@ -16,9 +16,6 @@ from ._observer import NOTHING, PEAKS, PEAKS_AND_LINES
 from ._run import IMPACTS, advance_chain
 from ._tables import chain_tables
 
-OF_P = 3
-"""Column of p in `ChainResponse`, after x, y, z."""
-
 
 @dataclass(frozen=True, eq=False)
 class ChainResponse:

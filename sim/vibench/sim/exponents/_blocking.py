@@ -1,4 +1,5 @@
 """How well the mean of a correlated series is known: its standard error, by blocks as long as they must be.
+from ..kernels import Floats
 
 Neighbouring values are averaged in pairs, again and again; the error of the mean that the blocks suggest
 grows until they are longer than the memory of the series, and stays (Flyvbjerg and Petersen, J. Chem. Phys.
@@ -10,10 +11,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import chi2
 
-Floats = NDArray[np.float64]
+from ..kernels import Floats
 
 FEWEST_BLOCKS = 16
 """With fewer independent blocks an error is itself known to less than 20 per cent."""

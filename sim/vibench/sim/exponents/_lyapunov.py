@@ -109,11 +109,6 @@ class LyapunovEstimate:
     end_time_s: float
     outcome: Outcome
 
-    @property
-    def correlation_time_s(self) -> float:
-        """Time that carries as much as one independent value of the mean; NaN unless it was a mean."""
-        return math.nan if self.blocks is None else self.blocks.correlation_length * self.interval_s
-
 
 def lyapunov_exponent(
     specimen: Specimen,

@@ -24,7 +24,6 @@ from ._flight import (
     RUN_OF_STEPS as RUN_OF_STEPS,
     TOUCHES as TOUCHES,
     FlightTables as FlightTables,
-    begin_terms as begin_terms,
     drive_phasor as drive_phasor,
     fill_base_force as fill_base_force,
     flight_tables as flight_tables,

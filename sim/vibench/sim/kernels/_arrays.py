@@ -1,7 +1,4 @@
-"""What the kernels need to know of a specimen: plain numbers, ready to multiply. SI units.
-
-Also the layout of the one state vector that every kernel advances in place.
-"""
+"""What a kernel is handed, for the checker of types: arrays of numbers."""
 
 import numpy as np
 from numpy.typing import NDArray

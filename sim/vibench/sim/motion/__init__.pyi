@@ -5,6 +5,9 @@ from ._integrate import (
     MAX_IMPACT_RATE_HZ as MAX_IMPACT_RATE_HZ,
     ROUNDING as ROUNDING,
     SPARE_IMPACTS as SPARE_IMPACTS,
+    Impacts as Impacts,
+    Trajectory as Trajectory,
+    check_times as check_times,
     integrate as integrate,
     new_record as new_record,
     start_motion as start_motion,
@@ -27,8 +30,4 @@ from ._response_curve import (
 from ._sample_by_sample import (
     FollowedMotion as FollowedMotion,
     follow_samples as follow_samples,
-)
-from ._trajectory import (
-    Impacts as Impacts,
-    Trajectory as Trajectory,
 )

@@ -3,7 +3,7 @@
 Sampled drives: the C2 spline through the samples, which is the definition of the drive. Sweeps: the cubic
 that matches displacement and velocity at both ends of each interval (C1). Its error in displacement is at
 most amplitude (omega h)^4 / 384 for the highest frequency; h is chosen so that this is a thousandth of the
-tolerance, and `sweep_error` says what it came to.
+tolerance.
 """
 
 import math
@@ -46,12 +46,6 @@ def sweep_interval_s(drive: Sweep, accuracy: Accuracy) -> float:
     intervals = math.ceil(drive.duration_s * 2.0 * math.pi * drive.highest_hz / turn)
     interval: float = drive.duration_s / intervals
     return interval
-
-
-def sweep_error_m(drive: Sweep, accuracy: Accuracy) -> float:
-    """Bound of the error of the base displacement [m], at the highest frequency."""
-    turn = 2.0 * math.pi * drive.highest_hz * sweep_interval_s(drive, accuracy)
-    return drive.amplitude_m * turn**4 / HERMITE
 
 
 def sweep_motion(drive: Sweep, interval_s: float, first: int, count: int) -> BaseMotion:

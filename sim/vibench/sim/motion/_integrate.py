@@ -1,11 +1,12 @@
 """The motion of a specimen under a drive, from a state to a later time. SI units."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels import Vector, clock_at
+from ..kernels import Floats, Vector, clock_at
 from ..model import (
     Accuracy,
     AccuracyWord,
@@ -22,7 +23,6 @@ from ..model import (
 from ..slots import IMPACTS, NEXT_SAMPLE, OBSERVATIONS_SIZE, Record
 from ..stepping import advance_harmonic, advance_intervals, harmonic_tables, interval_tables, new_state
 from ._base_motion import BaseMotion, sampled_motion, sweep_interval_s, sweep_motion
-from ._trajectory import Impacts, Trajectory
 
 MAX_IMPACT_RATE_HZ = 200_000.0
 """Several times the busiest motions known of the paper's specimen: at 50 um 4300 impacts a second on Hertz's
@@ -39,6 +39,36 @@ BATCH = 1 << 16
 """Intervals of a sweep that are cut at a time: bounds the memory of a long sweep."""
 ROUNDING = 1e-9
 """A duration this close to a whole number of samples or intervals is taken for it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Impacts:
+    """When m1 touched a stop."""
+
+    times_s: Floats
+    """Ascending, shape (count,) [s]."""
+
+    @property
+    def count(self) -> int:
+        """How many contacts began."""
+        return len(self.times_s)
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Where the specimen went, when it struck, and how the run ended."""
+
+    time_s: Floats
+    """Shape (n,); empty when no sample rate was asked for."""
+    states: Floats
+    """Shape (n, 6): x, y, z, vx, vy, vz [m, m/s], absolute."""
+    final_state: Floats
+    """Shape (6,), at ``end_time_s``."""
+    end_time_s: float
+    impacts: Impacts
+    outcome: Outcome
+    """Look here first: only REACHED_END reached the time that was asked for."""
+    accuracy: Accuracy
 
 
 def integrate(
@@ -82,7 +112,7 @@ def integrate(
 
     """
     accuracy = chosen(Accuracy, accuracy)
-    _check_times(duration_s, start_time_s, sample_rate_hz, max_impact_rate_hz)
+    check_times(duration_s, start_time_s, sample_rate_hz, max_impact_rate_hz)
     state = new_state(specimen, start_motion(initial_state), accuracy)
     clock = clock_at(float(start_time_s))
     end = float(start_time_s + duration_s)
@@ -216,9 +246,10 @@ def _trajectory(
     )
 
 
-def _check_times(
+def check_times(
     duration_s: float, start_time_s: float, sample_rate_hz: float | None, max_impact_rate_hz: float
 ) -> None:
+    """Refuse times and rates that no run can have."""
     if not 0.0 <= duration_s < math.inf:
         msg = f"Duration {duration_s} s is not allowed: it must be zero or positive, and finite."
         raise ValueError(msg)

@@ -1,12 +1,11 @@
 """The motion once a drive period: the stroboscopic map, and what it tells of a motion's period. SI units."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..kernels import Floats
 from ..model import Accuracy, Harmonic, Outcome, Specimen
 from ._integrate import integrate
-
-Floats = NDArray[np.float64]
 
 
 def state_scales(specimen: Specimen, drive: Harmonic) -> Floats:

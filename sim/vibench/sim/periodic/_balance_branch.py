@@ -7,12 +7,12 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..kernels import Table, Vector
 from ..model import Harmonic, Specimen, Y, Z, chosen
 from ._balance_solver import BalanceOptions, Guess, balance, described, linear_guess
 from ._branch import Branch, Parameter, ParameterWord
-from ._branch_following import Followed, OrbitReport, follow
+from ._branch_following import Followed, OrbitReport, branch_range, follow
 from ._condensation import LinearStructure, condense, structure_of
 from ._continuation import ArcEnd, ArcSteps
 from ._floquet import Motion, crossings, multipliers, transition
@@ -29,11 +29,6 @@ from ._orbit_events import OrbitSigns, Symmetry
 from ._restoring_force import RestoringForce, spring_of
 from ._shooting import SAMPLES, PeriodicOrbit, ShootingEnd, periodic_orbit
 
-Vector = NDArray[np.float64]
-Table = NDArray[np.float64]
-
-RANGE_LENGTH = 10.0
-"""The parameter's range counts as this many units of length, the spring's length scale as one."""
 SAFE_SHARE = 0.1
 """A power law hardly bends the response while p stays below this part of its length scale."""
 
@@ -163,16 +158,9 @@ def _family_at(
     stop: float,
     options: BalanceOptions,
 ) -> tuple[BalanceFamily, Vector]:
-    along = {
-        Parameter.FREQUENCY: (start.frequency_hz, start.amplitude_m),
-        Parameter.AMPLITUDE: (start.amplitude_m, start.frequency_hz),
-    }
-    value, fixed = along[parameter]
-    if not 0.0 < stop < math.inf or stop == value:
-        msg = f"A branch from {value} to {stop} is not allowed: positive, and two different ends."
-        raise ValueError(msg)
+    value, scale = branch_range(parameter, start.frequency_hz, start.amplitude_m, stop)
+    fixed = start.amplitude_m if parameter is Parameter.FREQUENCY else start.frequency_hz
     problem = BalanceProblem(structure, spring, start.harmonics)
-    scale = abs(stop - value) / RANGE_LENGTH
     family = BalanceFamily(problem, parameter, fixed, scale, options)
     return family, np.append(problem.packed(start.relative), value / scale)
 

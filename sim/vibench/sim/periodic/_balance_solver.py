@@ -1,20 +1,19 @@
 """One periodic motion by harmonic balance: enough harmonics, and a verdict on the result. SI units."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..kernels import Complex
 from ..model import chosen
-from ._condensation import LinearStructure, condense
+from ._condensation import Harmonics, LinearStructure, condense
 from ._first_order_balance import first_order_states
 from ._frequency_time import force_harmonics, force_tail
 from ._harmonic_balance import (
     Balance,
     BalanceEnd,
     BalanceProblem,
-    Harmonics,
     HarmonicSet,
     harmonics_up_to,
     newton,
@@ -122,7 +121,7 @@ def balance(
         found = described(problem, unknowns, frequency_hz, amplitude_m, options.tolerance)
         enough = is_solved and found.outcome is BalanceEnd.CONVERGED
         if enough or highest == options.most:
-            return found if is_solved else _unsolved(found)
+            return found if is_solved else replace(found, outcome=BalanceEnd.NO_SOLUTION)
         if is_solved:
             guess = Guess(harmonics, found.relative)
         highest = min(2 * highest + 1, options.most)
@@ -156,15 +155,3 @@ def _left_out(problem: BalanceProblem, phasors: Complex, omega: float) -> float:
     moved = condense(problem.structure, omega, beyond).compliance * lines[beyond]
     fundamental = abs(phasors[int(np.searchsorted(problem.harmonics, 1))])
     return float(np.sum(np.abs(moved)) / fundamental) if fundamental > 0.0 else math.inf
-
-
-def _unsolved(attempt: Balance) -> Balance:
-    return Balance(
-        attempt.frequency_hz,
-        attempt.amplitude_m,
-        attempt.harmonics,
-        attempt.relative,
-        attempt.displacements,
-        attempt.left_out,
-        BalanceEnd.NO_SOLUTION,
-    )

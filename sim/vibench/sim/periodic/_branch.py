@@ -7,10 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels import Complex
+from ..kernels import Complex, Floats
 from ._continuation import ArcEnd
-
-Floats = NDArray[np.float64]
 
 
 class Parameter(StrEnum):

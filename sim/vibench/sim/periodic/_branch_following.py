@@ -1,16 +1,15 @@
 """Follow any family of periodic motions along a parameter, and gather what is on the way into a branch."""
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..kernels import Vector
 from ._branch import BifurcationKind, Branch, BranchEvent, Parameter
 from ._continuation import ArcEnd, ArcPoint, ArcSteps, Curve, correct, locate, trace
 from ._orbit_events import OrbitSigns, bifurcations_between, sign_of
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +65,21 @@ class _Gathered:
     def add_event(self, kind: BifurcationKind, report: OrbitReport) -> None:
         last = len(self.reports) - 1
         self.events.append(BranchEvent(kind, report.frequency_hz, report.amplitude_m, report.state, last))
+
+
+RANGE_LENGTH = 10.0
+"""The parameter's range counts as this many units of length, the gap or the spring's length scale as one."""
+
+
+def branch_range(
+    parameter: Parameter, frequency_hz: float, amplitude_m: float, stop: float
+) -> tuple[float, float]:
+    """Give the value at which a branch to ``stop`` starts, and how much of it is a unit of length [Hz, m]."""
+    value = {Parameter.FREQUENCY: frequency_hz, Parameter.AMPLITUDE: amplitude_m}[parameter]
+    if not 0.0 < stop < math.inf or stop == value:
+        msg = f"A branch from {value} to {stop} is not allowed: positive, and two different ends."
+        raise ValueError(msg)
+    return value, abs(stop - value) / RANGE_LENGTH
 
 
 def follow(

@@ -13,11 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels import Complex
+from ..kernels import Complex, Vector
 from ..model import Specimen
 
 Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 Harmonics = NDArray[np.int64]
 
 

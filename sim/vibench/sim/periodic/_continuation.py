@@ -13,10 +13,8 @@ from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
-Table = NDArray[np.float64]
+from ..kernels import Table, Vector
 
 
 class Curve(Protocol):

@@ -16,14 +16,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from ..kernels import Complex
+from ..kernels import Complex, Floats
 from ._condensation import LinearStructure, condense
 from ._restoring_force import PowerSpring
-
-Floats = NDArray[np.float64]
 
 TOUCHING = 1e-14
 """A turning point whose value is this part of its largest term is a double zero."""

@@ -17,13 +17,10 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from ..kernels import Complex
-from ._condensation import LinearStructure
+from ..kernels import Complex, Floats
+from ._condensation import Harmonics, LinearStructure
 from ._frequency_time import grid_size, motion_on_grid, waveform
 from ._restoring_force import RestoringForce
-
-Floats = NDArray[np.float64]
-Harmonics = NDArray[np.int64]
 
 CONTACT_STEPS = 96
 """Magnus steps across one contact."""

@@ -10,13 +10,10 @@ dF_k = sum_l (S_{k-l} + i l w E_{k-l}) dP_l + (S_{k+l} - i l w E_{k+l}) dP_l*
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..kernels import Complex
+from ..kernels import Complex, Floats
+from ._condensation import Harmonics
 from ._restoring_force import RestoringForce
-
-Floats = NDArray[np.float64]
-Harmonics = NDArray[np.int64]
 
 SAMPLES_PER_HARMONIC = 16
 """Grid points over the highest harmonic: what aliases back lies 15 times above it."""

@@ -12,16 +12,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..kernels import Complex
-from ._condensation import Condensed, LinearStructure, condense
+from ..kernels import Complex, Table, Vector
+from ._condensation import Condensed, Harmonics, LinearStructure, condense
 from ._frequency_time import ForceHarmonics, force_harmonics, grid_size, waveform
 from ._restoring_force import RestoringForce
-
-Vector = NDArray[np.float64]
-Table = NDArray[np.float64]
-Harmonics = NDArray[np.int64]
 
 NEWTON_ITERATIONS = 80
 MOST_HALVINGS = 12

@@ -4,21 +4,16 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..kernels import Table, Vector
 from ..model import Harmonic, chosen
 from ..motion import state_scales
 from ._branch import Branch, Parameter, ParameterWord
-from ._branch_following import Family, OrbitReport, follow
+from ._branch_following import Family, OrbitReport, branch_range, follow
 from ._continuation import ArcSteps
 from ._period_map import PeriodMap
 from ._shooting import PeriodicOrbit, ShootingEnd, described_orbit
 
-Vector = NDArray[np.float64]
-Table = NDArray[np.float64]
-
-RANGE_LENGTH = 10.0
-"""The parameter's range counts as this many units of length, the gap as one."""
 ORBIT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=500)
 """A residual below 1e-9 of the gap: what the flow at reference accuracy allows."""
 
@@ -102,15 +97,7 @@ def periodic_branch(
     if orbit.outcome is not ShootingEnd.CONVERGED:
         msg = f"A branch cannot start at {orbit.drive}: {orbit.outcome}."
         raise ValueError(msg)
-    values = {
-        Parameter.FREQUENCY: orbit.drive.frequency_hz,
-        Parameter.AMPLITUDE: orbit.drive.amplitude_m,
-    }
-    value = values[parameter]
-    if not 0.0 < stop < math.inf or stop == value:
-        msg = f"A branch from {value} to {stop} is not allowed: positive, and two different ends."
-        raise ValueError(msg)
-    scale = abs(stop - value) / RANGE_LENGTH
+    value, scale = branch_range(parameter, orbit.drive.frequency_hz, orbit.drive.amplitude_m, stop)
     family = OrbitFamily(orbit.period_map, parameter, orbit.drive, scale)
     scales = state_scales(orbit.period_map.specimen, orbit.drive)
     start = np.append(orbit.state / scales, value / scale)

@@ -14,13 +14,10 @@ from enum import StrEnum
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..kernels import Table, Vector
 from ..model import Accuracy, Harmonic, Outcome, Specimen
 from ..motion import Trajectory, flow_derivative, integrate, state_scales
-
-Vector = NDArray[np.float64]
-Table = NDArray[np.float64]
 
 DIFFERENCE = 1e-5
 """Step of a difference, over the parameter."""

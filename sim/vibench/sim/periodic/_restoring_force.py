@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..kernels import Floats
 from ..model import Hertz, HuntCrossley, LinearGap, NoContact, PowerLaw, RigidStops, Specimen
-
-Floats = NDArray[np.float64]
 
 
 class RestoringForce(Protocol):

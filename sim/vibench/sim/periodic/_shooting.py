@@ -9,17 +9,15 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..kernels import Complex
+from ..kernels import Complex, Vector
 from ..model import Harmonic, Specimen, X, Y, Z, chosen
 from ..motion import integrate, start_motion, state_scales
 from ._floquet import multipliers
 from ._frequency_time import phasors_of
 from ._orbit_events import OrbitSigns, Symmetry
 from ._period_map import OrbitShape, OrbitShapeWord, PeriodMap
-
-Vector = NDArray[np.float64]
 
 NEWTON_ITERATIONS = 30
 MOST_HALVINGS = 8

@@ -83,11 +83,6 @@ class Ensemble:
         """Relative standard deviation of Response I; None when a run was lost."""
         return _relative_deviation(self.response_i)
 
-    @property
-    def scatter_ii(self) -> float | None:
-        """The same of Response II."""
-        return _relative_deviation(self.response_ii)
-
 
 def response_ensemble(
     specimen: Specimen,

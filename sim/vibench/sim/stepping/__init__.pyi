@@ -1,9 +1,7 @@
 from ._harmonic_run import (
+    HarmonicTables as HarmonicTables,
     advance_by_law as advance_by_law,
     advance_harmonic as advance_harmonic,
-)
-from ._harmonic_tables import (
-    HarmonicTables as HarmonicTables,
     harmonic_tables as harmonic_tables,
 )
 from ._interval import (

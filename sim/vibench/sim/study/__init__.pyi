@@ -41,11 +41,9 @@ from ._solve import (
 from ._store import (
     MemoryStore as MemoryStore,
 )
-from ._structure import (
-    Structure as Structure,
-)
 from ._study import (
     Start as Start,
+    Structure as Structure,
     Study as Study,
     StudyObservable as StudyObservable,
 )
