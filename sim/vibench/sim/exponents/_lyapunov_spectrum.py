@@ -69,7 +69,7 @@ def lyapunov_spectrum(
 ) -> LyapunovSpectrum:
     """Tell how fast neighbouring motions part or come together, in every direction.
 
-    Arguments as in `vibench.sim.exponents.largest_exponent`; the errors need blocks as long as the motion's
+    Arguments as in `vibench.sim.lyapunov_exponent`; the errors need blocks as long as the motion's
     memory too.
     """
     accuracy = chosen(Accuracy, accuracy)

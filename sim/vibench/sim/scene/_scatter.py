@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from ..kernels import Floats
-from ..model import Accuracy, Harmonic, Outcome, Specimen
+from ..model import Accuracy, Harmonic, Specimen
 from ..motion import steady_response
 
 COVERED = 0.975
@@ -70,21 +70,7 @@ def bootstrap_of_largest(ascending: Floats, drawn: int) -> tuple[float, float]:
     return mean, math.sqrt(float(weights @ (ascending - mean) ** 2))
 
 
-@dataclass(frozen=True, eq=False)
-class Ensemble:
-    """Responses of m0 over the drive amplitude, from starts that hardly differ."""
-
-    response_i: Floats
-    """Shape (members,); NaN where a run did not reach its end."""
-    response_ii: Floats
-
-    @property
-    def scatter_i(self) -> float | None:
-        """Relative standard deviation of Response I; None when a run was lost."""
-        return _relative_deviation(self.response_i)
-
-
-def response_ensemble(
+def scatter_of_starts(
     specimen: Specimen,
     drive: Harmonic,
     accuracy: Accuracy = Accuracy.STANDARD,
@@ -94,10 +80,10 @@ def response_ensemble(
     *,
     members: int = MEMBERS,
     seed: int = SEED,
-) -> Ensemble:
-    """Run a motion again and again from starts that differ by a millionth of the gap.
+) -> float | None:
+    """Find the relative standard deviation of Response I over starts that differ by a millionth of the gap.
 
-    Raises ValueError when fewer than two members are asked for, or as
+    None when a run was lost. Raises ValueError when fewer than two members are asked for, or as
     `vibench.sim.motion.steady_response` does.
     """
     if members < 2:
@@ -105,17 +91,13 @@ def response_ensemble(
         raise ValueError(msg)
     scale = PUSH * min(specimen.gaps_m) * np.repeat([1.0, 2.0 * math.pi * drive.frequency_hz], 3)
     pushes = np.random.default_rng(seed).uniform(-1.0, 1.0, (members, 6)) * scale
-    found = [
-        steady_response(specimen, drive, accuracy, duration_s, window_s, np.asarray(start) + push)
-        for push in pushes
-    ]
-    whole = [one if one.outcome is Outcome.REACHED_END else None for one in found]
-    return Ensemble(
-        np.array([math.nan if one is None else one.response_i for one in whole]),
-        np.array([math.nan if one is None else one.response_ii for one in whole]),
+    found = np.array(
+        [
+            steady_response(
+                specimen, drive, accuracy, duration_s, window_s, np.asarray(start) + push
+            ).response_i
+            for push in pushes
+        ]
     )
-
-
-def _relative_deviation(values: Floats) -> float | None:
-    deviation = float(values.std(ddof=1) / values.mean())
+    deviation = float(found.std(ddof=1) / found.mean())
     return deviation if math.isfinite(deviation) else None

@@ -23,7 +23,7 @@ from ._linear_motion import LinearMotion, linear_motion
 from ._observed_window import ObservedWindow, samples_between, states_of, whole_periods
 from ._plan import plan_of, transient_decay_s
 from ._prediction import Method, MotionKind, ScenePrediction, State
-from ._scatter import WindowScatter, response_ensemble, window_scatter
+from ._scatter import WindowScatter, scatter_of_starts, window_scatter
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
 
 STRICTER = 1e-2
@@ -262,14 +262,14 @@ def _between_windows(seen: SceneRun) -> WindowScatter | None:
 def _scatter(scene: Scene, seen: SceneRun, duration_s: float, drawn: WindowScatter | None) -> float | None:
     """Find the scatter of Response I from many starts if it was asked for."""
     if Observable.SCATTER in scene.observe:
-        return response_ensemble(
+        return scatter_of_starts(
             scene.specimen,
             scene.drive,
             scene.accuracy,
             duration_s,
             seen.window.length_s,
             scene.start.state,
-        ).scatter_i
+        )
     return None if drawn is None else drawn.relative
 
 
