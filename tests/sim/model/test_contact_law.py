@@ -1,6 +1,7 @@
 """Contact laws: their numbers, their fits, and the names by which a user asks for them."""
 
 import math
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -8,8 +9,9 @@ from hypothesis import given, settings, strategies as st
 from pydantic import TypeAdapter
 
 from vibench.sim import Hertz, HuntCrossley, LinearGap, NoContact, PowerLaw, RigidStops, gong2025, spring_of
-from vibench.sim.model import model_named
-from vibench.sim.model._contact_law import ContactLaw, fitted_linear_gap, fitted_power_law
+from vibench.sim.model import CONTACT_LAWS, ContactLaw, model_named
+from vibench.sim.model._linear_gap import fitted_linear_gap
+from vibench.sim.model._power_law import fitted_power_law
 from vibench.sim.power_law import power_force
 from vibench.sim.slots import power_terms
 
@@ -58,16 +60,16 @@ def test_a_high_power_neither_overflows_below_its_reference_nor_lies_beyond_all_
         ("hertz", HERTZ),
         ("linear", NoContact()),
         ("linear_gap:2e6", LinearGap(2e6)),
-        ("linear_gap", fitted_linear_gap(HERTZ)),
+        ("linear_gap", fitted_linear_gap(HERTZ.stiffness)),
         ("hunt_crossley:0.3", HuntCrossley(HERTZ.stiffness, 0.3)),
         ("rigid:0.8", RigidStops(0.8)),
-        ("power:5", fitted_power_law([5], HERTZ, GAP)),
-        ("power:7+3", fitted_power_law([3, 7], HERTZ, GAP)),
-        ("power:3@0.25+7@0.75", fitted_power_law([3, 7], HERTZ, GAP, shares=[0.25, 0.75])),
+        ("power:5", fitted_power_law([5], HERTZ.stiffness, GAP)),
+        ("power:7+3", fitted_power_law([3, 7], HERTZ.stiffness, GAP)),
+        ("power:3@0.25+7@0.75", fitted_power_law([3, 7], HERTZ.stiffness, GAP, shares=[0.25, 0.75])),
     ],
 )
 def test_a_name_gives_its_law(text, law):
-    assert model_named(text, HERTZ, GAP) == law
+    assert model_named(text, HERTZ.stiffness, GAP) == law
 
 
 @pytest.mark.parametrize(
@@ -89,7 +91,7 @@ def test_a_name_gives_its_law(text, law):
 )
 def test_a_wrong_name_is_refused_in_one_sentence(text, sentence):
     with pytest.raises(ValueError, match=sentence):
-        model_named(text, HERTZ, GAP)
+        model_named(text, HERTZ.stiffness, GAP)
 
 
 @pytest.mark.parametrize(
@@ -110,3 +112,7 @@ def test_a_gap_that_is_none_is_refused(gap):
 def test_a_power_law_without_terms_is_refused():
     with pytest.raises(ValueError, match="without terms is not allowed"):
         PowerLaw(46e-6, ())
+
+
+def test_every_law_of_the_union_has_a_row_under_its_kind_and_the_other_way_round():
+    assert {law.__dataclass_fields__["kind"].default for law in get_args(ContactLaw)} == set(CONTACT_LAWS)

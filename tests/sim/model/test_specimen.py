@@ -5,8 +5,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from vibench.sim import Hertz, Specimen, gong2025
-from vibench.sim.model import hertz_stiffness
-from vibench.sim.model._contact_law import Elasticity
+from vibench.sim.model import Elasticity, hertz_stiffness
 
 
 def test_the_papers_materials_give_the_stiffness_of_its_contact():

@@ -11,12 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..kernels import Floats, kernel
-from ..model import Harmonic, Hertz, HuntCrossley, LinearGap, NoContact, PowerLaw, RigidStops, Specimen
+from ..model import Harmonic, NoContact, PowerLaw, RigidStops, Specimen
 
 Rates = Callable[[float, Floats], Floats]
 """(time, state) -> d state / dt, as general solvers ask for it."""
 Y, Z, VY, VZ = 1, 2, 4, 5
-HERTZ_EXPONENT = 1.5
 
 
 class Place(IntEnum):
@@ -56,18 +55,14 @@ def law_of(specimen: Specimen) -> Law:
     match specimen.contact:
         case NoContact():
             return Law(np.inf, np.inf)
-        case Hertz(stiffness=stiffness):
-            return Law(lower, upper, stiffness, HERTZ_EXPONENT)
-        case HuntCrossley(stiffness=stiffness, loss=loss):
-            return Law(lower, upper, stiffness, HERTZ_EXPONENT, loss)
-        case LinearGap(stiffness=stiffness):
-            return Law(lower, upper, stiffness)
         case PowerLaw(reference=reference, terms=terms):
             powers, forces = np.array(terms, dtype=np.float64).T.copy()
             return Law(np.inf, np.inf, reference=reference, powers=powers, forces=forces)
         case RigidStops():
             msg = "Rigid stops push with no finite force: give a law that yields, such as hertz."
             raise ValueError(msg)
+        case law:
+            return Law(lower, upper, *law.stops.term, law.stops.loss)
 
 
 def numbers_of(specimen: Specimen, drive: Harmonic) -> Floats:

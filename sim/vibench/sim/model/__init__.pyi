@@ -14,16 +14,9 @@ from ._bound_modes import (
     bound_motion as bound_motion,
 )
 from ._contact_law import (
-    MOST_TERMS as MOST_TERMS,
+    CONTACT_LAWS as CONTACT_LAWS,
     ContactLaw as ContactLaw,
-    Elasticity as Elasticity,
-    Hertz as Hertz,
-    HuntCrossley as HuntCrossley,
-    LinearGap as LinearGap,
-    NoContact as NoContact,
-    PowerLaw as PowerLaw,
-    RigidStops as RigidStops,
-    hertz_stiffness as hertz_stiffness,
+    model_named as model_named,
 )
 from ._drive import (
     Drive as Drive,
@@ -33,8 +26,18 @@ from ._drive import (
     Sampled as Sampled,
     Sweep as Sweep,
 )
-from ._model_name import (
-    model_named as model_named,
+from ._elasticity import (
+    Elasticity as Elasticity,
+    hertz_stiffness as hertz_stiffness,
+)
+from ._hertz import (
+    Hertz as Hertz,
+)
+from ._hunt_crossley import (
+    HuntCrossley as HuntCrossley,
+)
+from ._linear_gap import (
+    LinearGap as LinearGap,
 )
 from ._modes import (
     COINCIDENT as COINCIDENT,
@@ -44,8 +47,18 @@ from ._modes import (
     modal_form as modal_form,
     state_matrix as state_matrix,
 )
+from ._no_contact import (
+    NoContact as NoContact,
+)
 from ._outcome import (
     Outcome as Outcome,
+)
+from ._power_law import (
+    MOST_TERMS as MOST_TERMS,
+    PowerLaw as PowerLaw,
+)
+from ._rigid_stops import (
+    RigidStops as RigidStops,
 )
 from ._specimen import (
     ALUMINIUM as ALUMINIUM,

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict
 
-from ._contact_law import ContactLaw, Elasticity, Hertz, hertz_stiffness
-from ._model_name import model_named
+from ._contact_law import ContactLaw, model_named
+from ._elasticity import Elasticity, hertz_stiffness
 
 Triple = tuple[float, float, float]
 Gaps = tuple[float, float]
@@ -145,9 +145,9 @@ def gong2025(
     if not 0.0 <= damping_time_s < math.inf:
         msg = f"Damping time {damping_time_s} s is not allowed: it must be zero or positive."
         raise ValueError(msg)
-    hertz = Hertz(hertz_stiffness(STEEL, ALUMINIUM, PAPER_RADIUS_M))
+    stiffness = hertz_stiffness(STEEL, ALUMINIUM, PAPER_RADIUS_M)
     lower, upper = gap_m if isinstance(gap_m, tuple) else (None, gap_m)
-    law = model_named(contact, hertz, upper if lower is None else min(lower, upper))
+    law = model_named(contact, stiffness, upper if lower is None else min(lower, upper))
     m0, m1, m2 = PAPER_MASSES
     f0, f1, f2 = PAPER_FREQUENCIES_HZ
     k0, k1, k2 = (m * (2.0 * math.pi * f) ** 2 for m, f in ((m0, f0), (m1, f1), (m2, f2)))

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from ..kernels import Floats
-from ..model import Hertz, HuntCrossley, LinearGap, NoContact, PowerLaw, RigidStops, Specimen
+from ..model import NoContact, PowerLaw, RigidStops, Specimen
 
 
 class RestoringForce(Protocol):
@@ -180,19 +180,10 @@ class NoForce:
         return np.zeros_like(p)
 
 
-HERTZ_EXPONENT = 1.5
-
-
 def spring_of(specimen: Specimen) -> RestoringForce:
     """Turn a specimen's stops into the function that harmonic balance needs."""
     lower, upper = specimen.gaps_m
     match specimen.contact:
-        case Hertz(stiffness=stiffness):
-            return GapSpring(stiffness, HERTZ_EXPONENT, upper, lower)
-        case HuntCrossley(stiffness=stiffness, loss=loss):
-            return GapSpring(stiffness, HERTZ_EXPONENT, upper, lower, loss)
-        case LinearGap(stiffness=stiffness):
-            return GapSpring(stiffness, 1.0, upper, lower)
         case PowerLaw(reference=reference, terms=terms):
             return PowerSpring(reference, terms)
         case NoContact():
@@ -200,3 +191,5 @@ def spring_of(specimen: Specimen) -> RestoringForce:
         case RigidStops():
             msg = "Rigid stops push with no finite force: follow the motion in time instead, or use Hertz."
             raise ValueError(msg)
+        case law:
+            return GapSpring(*law.stops.term, upper, lower, law.stops.loss)

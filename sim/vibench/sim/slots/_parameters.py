@@ -7,7 +7,7 @@ import math
 from itertools import pairwise
 from typing import NamedTuple
 
-from ..model import MOST_TERMS, Hertz, HuntCrossley, LinearGap, NoContact, PowerLaw, RigidStops, Specimen
+from ..model import MOST_TERMS, NoContact, PowerLaw, Specimen
 
 SIDE = 6
 """0 in flight; +1 or -1 while m1 presses on the stop at positive or negative p, or is held by a rigid one; +1
@@ -65,18 +65,9 @@ class Parameters(NamedTuple):
     """Of stops that do not yield; None tells a kernel, by its type, that they do."""
 
 
-class Stops(NamedTuple):
-    """A contact law as numbers: the part of `Parameters` that depends on it."""
-
-    linear_stiffness: float = 0.0
-    contact_stiffness: float = 0.0
-    loss: float = 0.0
-    restitution: float | None = None
-
-
 def parameters(specimen: Specimen) -> Parameters:
     """Turn a specimen into the numbers of the kernels."""
-    stops = _stops(specimen)
+    stops = specimen.contact.stops
     lower, upper = specimen.gaps_m
     if isinstance(specimen.contact, NoContact):
         lower, upper = math.inf, math.inf
@@ -89,20 +80,6 @@ def parameters(specimen: Specimen) -> Parameters:
     return Parameters(
         m0, m1, m2, k0, k1, k2, c0, c1, c2, float(lower), float(upper), pair, in0, in2, in_pair, *stops
     )
-
-
-def _stops(specimen: Specimen) -> Stops:
-    match specimen.contact:
-        case NoContact() | PowerLaw():
-            return Stops()
-        case Hertz(stiffness=stiffness):
-            return Stops(contact_stiffness=float(stiffness))
-        case LinearGap(stiffness=stiffness):
-            return Stops(linear_stiffness=float(stiffness))
-        case HuntCrossley(stiffness=stiffness, loss=loss):
-            return Stops(contact_stiffness=float(stiffness), loss=float(loss))
-        case RigidStops(restitution=restitution):
-            return Stops(restitution=float(restitution))
 
 
 class PowerTerms(NamedTuple):

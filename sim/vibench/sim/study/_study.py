@@ -24,7 +24,6 @@ from ..model import (
     STEEL,
     Accuracy,
     Harmonic,
-    Hertz,
     Specimen,
     Triple,
     hertz_stiffness,
@@ -64,7 +63,7 @@ class Structure(BaseModel):
             stiffnesses=(k0, k1, k2),
             dampings=(damping_time_s * k0, damping_time_s * k1, damping_time_s * k2),
             gap_m=gap_m,
-            contact=model_named(model, Hertz(self.hertz_stiffness), gap_m),
+            contact=model_named(model, self.hertz_stiffness, gap_m),
         )
 
 

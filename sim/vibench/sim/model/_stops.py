@@ -1,0 +1,92 @@
+"""What contact laws have in common: numbers for the kernels, and a word that stands for each. SI units."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, NamedTuple, TypeVar
+
+from pydantic import ConfigDict
+
+Law_co = TypeVar("Law_co", covariant=True)
+STRICT = ConfigDict(extra="forbid")
+HERTZ_EXPONENT = 1.5
+"""Of the indentation, for a sphere on a plane."""
+PAPER_INDENTATION_M = 1e-6
+"""The paper fits its continuous models where the contact is pressed in by 1 um (its section 2)."""
+
+
+class Stops(NamedTuple):
+    """A law as the kernels take it: F = linear d + contact d^(3/2) (1 + loss dd/dt) at the indentation d."""
+
+    linear_stiffness: float = 0.0
+    """[N/m]."""
+    contact_stiffness: float = 0.0
+    """[N/m^1.5]."""
+    loss: float = 0.0
+    """[s/m]."""
+    restitution: float | None = None
+    """Of stops that do not yield; None where they do, or where there are none."""
+
+    @property
+    def term(self) -> tuple[float, float]:
+        """Stiffness and exponent of the one term of a law that yields.
+
+        Raises
+        ------
+        ValueError
+            When the law has two terms.
+
+        """
+        if self.linear_stiffness and self.contact_stiffness:
+            msg = "A law of two terms, d and d^(3/2), is not followed here: give a law of one."
+            raise ValueError(msg)
+        if self.linear_stiffness:
+            return self.linear_stiffness, 1.0
+        return self.contact_stiffness, HERTZ_EXPONENT
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a fitted law is fitted to: the paper's contact, and the clearance before it."""
+
+    stiffness: float
+    """k_contact [N/m^1.5]."""
+    gap_m: float
+
+    def __post_init__(self) -> None:
+        require_positive("Contact stiffness", self.stiffness, "N/m^1.5")
+
+
+@dataclass(frozen=True)
+class LawWord(Generic[Law_co]):
+    """A row of `CONTACT_LAWS`: how a law is written as one word, and how it is made of it."""
+
+    form: str
+    """What may be written, for a message."""
+    made: Callable[[str, Reference], Law_co]
+    """Takes what stands behind the colon; raises `UnreadableLawError` for what is no number."""
+
+
+class UnreadableLawError(ValueError):
+    """What stands behind a law's name is not of its form."""
+
+
+def number_in(detail: str) -> float:
+    """Read the one number of a law."""
+    try:
+        return float(detail)
+    except ValueError:
+        raise UnreadableLawError(detail) from None
+
+
+def require_nothing(detail: str) -> None:
+    """Refuse a number where a law takes none."""
+    if detail:
+        raise UnreadableLawError(detail)
+
+
+def require_positive(name: str, value: float, unit: str) -> None:
+    """Refuse what is no positive finite number."""
+    if not 0.0 < value < math.inf:
+        msg = f"{name} {value} {unit} is not allowed: it must be positive and finite."
+        raise ValueError(msg)
