@@ -14,7 +14,7 @@ from .campaign import (
 )
 from .check import (
     CheckRule as CheckRule,
-    check_and_keep as check_and_keep,
+    check_bench as check_bench,
     last_check as last_check,
 )
 from .errors import (

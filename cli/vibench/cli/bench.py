@@ -11,7 +11,7 @@ from vibench.acquisition import (
     CheckResult,
     StopSwitch,
     Verdict,
-    check_and_keep,
+    check_bench,
     last_check,
     list_instruments,
     list_rig_instruments,
@@ -79,7 +79,7 @@ def check(
 def _now(path: Path, out: Path) -> CheckResult:
     rig, switch = load_rig(path), StopSwitch()
     with closing(BenchLock.of(rig)), open_bench(rig) as opened, stop_on_signal(switch):
-        return check_and_keep(opened, out, switch=switch)
+        return check_bench(opened, out, switch=switch)
 
 
 def _last(rig: Rig) -> CheckResult:

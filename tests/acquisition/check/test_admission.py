@@ -13,7 +13,7 @@ from vibench.acquisition import (
     Finding,
     RecordingError,
     Verdict,
-    check_and_keep,
+    check_bench,
     last_check,
     open_bench,
     open_recording,
@@ -132,9 +132,9 @@ def test_a_virtual_bench_is_checked_unasked_once_and_then_trusted(rig, state_fol
 
 def test_what_has_changed_since_the_last_check_is_said_in_decibels_and_days(real, tmp_path):
     bench, virtual = real
-    check_and_keep(bench, tmp_path, lambda: NOW - timedelta(days=2))
+    check_bench(bench, tmp_path, lambda: NOW - timedelta(days=2))
     virtual.faults.turn_amplifier_gain(bench.rig.amplifier.gain_db - 0.8)
-    result = check_and_keep(bench, tmp_path, lambda: NOW)
+    result = check_bench(bench, tmp_path, lambda: NOW)
     drifted = result.report["amplifier gain since last time"]
     assert drifted.value == "-0.80 dB since 2 days"
     assert drifted.verdict is Verdict.WARN
@@ -147,7 +147,7 @@ def test_what_has_changed_since_the_last_check_is_said_in_decibels_and_days(real
 def test_another_configuration_is_not_compared_with(real, tmp_path):
     bench, _ = real
     kept_result(bench.rig.model_copy(update={"calibration_valid_days": 1}))
-    assert not [each for each in check_and_keep(bench, tmp_path).findings if "since" in each.name]
+    assert not [each for each in check_bench(bench, tmp_path).findings if "since" in each.name]
 
 
 class TestKeeping:

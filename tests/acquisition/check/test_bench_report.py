@@ -8,7 +8,7 @@ import pytest
 
 from vibench.acquisition import BenchReport, InstrumentLost, StopSwitch, Verdict, open_bench
 from vibench.acquisition.bench import Bounds
-from vibench.acquisition.check._bench_report import check_bench
+from vibench.acquisition.check._bench_report import bench_report
 from vibench.acquisition.check._loop import clock_ratio, fit_sine
 from vibench.acquisition.errors import CheckStopped
 from vibench.acquisition.rig import load_rig
@@ -23,7 +23,7 @@ def checked(bench_of):
     def check(rig, tmp_path, fault=lambda virtual: None, **habits):
         with bench_of(rig, **habits) as (bench, virtual):
             fault(virtual)
-            report = check_bench(bench, tmp_path)
+            report = bench_report(bench, tmp_path)
             assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
         return report
 
@@ -84,7 +84,7 @@ def test_a_check_can_be_stopped_while_it_sounds_and_leaves_silence(bench_of, rig
     with bench_of(rig) as (bench, virtual):
         switch = PressedOnceItSounds(virtual.generator)
         with pytest.raises(CheckStopped, match=r"was stopped: SIGTERM\. The output is off"):
-            check_bench(bench, tmp_path, switch)
+            bench_report(bench, tmp_path, switch)
         assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
 
 
@@ -105,7 +105,7 @@ def test_a_lost_generator_is_an_error_and_no_finding(bench_of, rig, tmp_path):
     with bench_of(rig) as (bench, virtual):
         virtual.faults.pull_usb_cable()
         with pytest.raises(InstrumentLost):
-            check_bench(bench, tmp_path)
+            bench_report(bench, tmp_path)
         virtual.faults.plug_usb_cable()
 
 
@@ -123,7 +123,7 @@ def test_the_report_reads_as_a_table_and_survives_json(checked, rig, tmp_path):
 def test_a_bench_whose_output_plays_sines_is_checked_by_its_output(tmp_path):
     rig = load_rig(ROOT / "hardware_configs" / "virtual_rig_streaming.toml")
     with open_bench(rig) as bench:
-        report = check_bench(bench, tmp_path)
+        report = bench_report(bench, tmp_path)
     assert failed(report) == set()
     assert report["drive over setting"].number == pytest.approx(1.0, abs=2e-3)
     # One oscillator for both: the generator's would be 17 ppm off.

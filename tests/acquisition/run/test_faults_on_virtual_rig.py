@@ -175,7 +175,7 @@ def test_a_laser_dropout_and_an_over_range_are_flagged_and_the_run_goes_on(labor
 
 def test_an_output_relay_that_sticks_is_seen_by_the_bench_check(laboratory, tmp_path):
     from vibench.acquisition import Verdict
-    from vibench.acquisition.check._bench_report import check_bench
+    from vibench.acquisition.check._bench_report import bench_report
 
     virtual, connected = laboratory()
     with bench_on(connected) as bench:
@@ -183,7 +183,7 @@ def test_an_output_relay_that_sticks_is_seen_by_the_bench_check(laboratory, tmp_
         bench.generator.start()
         virtual.faults.stick_output()
         bench.generator.stop()
-        report = check_bench(bench, tmp_path)
+        report = bench_report(bench, tmp_path)
         assert report.verdict is Verdict.FAIL
         assert report["drive left after stop"].verdict is Verdict.FAIL
         virtual.faults.free_output()

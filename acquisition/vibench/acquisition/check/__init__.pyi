@@ -1,5 +1,5 @@
 from ._admission import (
-    check_and_keep as check_and_keep,
+    check_bench as check_bench,
     last_check as last_check,
     require_fresh as require_fresh,
     require_on_record as require_on_record,

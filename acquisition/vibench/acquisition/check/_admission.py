@@ -32,7 +32,7 @@ from ..errors import CheckFailed, RecordingError
 from ..host import state_folder
 from ..rig import Rig
 from ..stopping import StopSwitch
-from ._bench_report import check_bench
+from ._bench_report import bench_report
 from ._loop import LASTING, Lasting
 from ._rule import CheckRule
 
@@ -137,11 +137,11 @@ def utc_now() -> datetime:
     return datetime.now(UTC)
 
 
-def check_and_keep(
+def check_bench(
     bench: Bench, folder: Path, clock: Clock = utc_now, switch: StopSwitch | None = None
 ) -> CheckResult:
-    """Check a bench, compare with the last time, and keep the result for later; see `check_bench`."""
-    report, at = check_bench(bench, folder, switch), clock()
+    """Check a bench, compare with the last time, and keep the result for later; see `bench_report`."""
+    report, at = bench_report(bench, folder, switch), clock()
     last = last_check(bench.rig.name)
     if last is not None and last.rig_digest == rig_digest(bench.rig):
         report = BenchReport(findings=(*report.findings, *drift(report, last, at)))
@@ -185,7 +185,7 @@ def require_fresh(
             bench.last_check = last_check(bench.rig.name)
             return bench.last_check
         case CheckRule.NOW:
-            return _passed(check_and_keep(bench, folder, clock, switch))
+            return _passed(check_bench(bench, folder, clock, switch))
         case CheckRule.FRESH:
             return _fresh(bench, folder, clock, switch)
         case _:
@@ -200,7 +200,7 @@ def _fresh(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | None) 
         return last
     match bench.kind:
         case BenchKind.SIMULATED:
-            return _passed(check_and_keep(bench, folder, clock, switch))
+            return _passed(check_bench(bench, folder, clock, switch))
         case BenchKind.REAL:
             raise CheckFailed(
                 f"{complaint}. Nothing was played; check it with 'vibench bench check' or --check now, or go "

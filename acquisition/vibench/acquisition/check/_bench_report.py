@@ -33,7 +33,7 @@ ROOM_H = Bounds(-10.0, -1.0)
 """Recording time that the disk should hold, negative since more is better [h]."""
 
 
-def check_bench(bench: Bench, folder: Path, switch: StopSwitch | None = None) -> BenchReport:
+def bench_report(bench: Bench, folder: Path, switch: StopSwitch | None = None) -> BenchReport:
     """Check everything that can be known before a measurement; the generator is silent afterwards.
 
     Reads all channels in silence, while two per cent of the amplitude limit play at 160 Hz for some seconds,

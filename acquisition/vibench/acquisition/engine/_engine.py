@@ -18,7 +18,7 @@ from ..campaign import (
     make_folder,
     run_campaign,
 )
-from ..check import check_and_keep, require_fresh
+from ..check import check_bench, require_fresh
 from ..errors import AcquisitionError, CheckStopped, InstrumentLost
 from ..rig import Confirm, Rig
 from ..stopping import StopSwitch, stop_on_signal
@@ -96,7 +96,7 @@ class Engine:
     def check(self, folder: Path) -> None:
         """Check the bench with a small sine, and keep what was found."""
         try:
-            result = check_and_keep(self.bench, folder, switch=self.switch)
+            result = check_bench(self.bench, folder, switch=self.switch)
         except CheckStopped as stopped:
             self._check_ended(stopped)
             return
