@@ -10,6 +10,7 @@ import pytest
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.plan import OddMultisine
+from vibench.analysis import analyse
 from vibench.analysis.figures import distortion_figure
 from vibench.analysis.figures._distortion import distortion_caption
 from vibench.analysis.frequency_response import distortion
@@ -33,7 +34,7 @@ def synthetic():
 def analysed(synthetic, tmp_path_factory):
     """Analyse a mass that moves twice as far as its base, plus a distortion of its velocity."""
 
-    def analyse(distorted, realisations=REALISATIONS):
+    def played(distorted, realisations=REALISATIONS):
         plan = OddMultisine(
             amplitude_vpp=0.2,
             band_start_hz=60.0,
@@ -62,7 +63,7 @@ def analysed(synthetic, tmp_path_factory):
         with open_recording(path) as recording:
             return analyse(recording)
 
-    return analyse
+    return played
 
 
 def test_a_square_shows_on_even_lines_and_a_cube_on_odd_ones(analysed):

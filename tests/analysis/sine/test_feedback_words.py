@@ -9,7 +9,7 @@ from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, ResonanceTracking, SettledSine
 from vibench.acquisition.recording import Held, JumpNote, JumpSearchEnd, JumpSide, SegmentNote, Steadiness
 from vibench.acquisition.rig import load_rig
-from vibench.analysis import CampaignResults, result_summary
+from vibench.analysis import CampaignResults, analyse, result_summary
 from vibench.analysis.figures import STEPPED_FREQUENCIES, TRACKED_RESONANCE, stepped_sine_figure
 from vibench.analysis.kinds import Result
 from vibench.analysis.report import result_figures
@@ -66,7 +66,7 @@ def test_nothing_is_said_without_feedback():
 def analysed(tmp_path):
     """Carry out an excitation on the virtual rig, and analyse its recording."""
 
-    def analyse(excitation):
+    def played(excitation):
         shipped = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
         daq = shipped.daq.model_copy(update={"sample_rate_hz": 10240.0})
         with open_bench(shipped.model_copy(update={"daq": daq})) as bench:
@@ -75,7 +75,7 @@ def analysed(tmp_path):
         with open_recording(outcome.path) as recording:
             return analyse(recording)
 
-    return analyse
+    return played
 
 
 def test_a_tracked_resonance_is_analysed_and_said(analysed):
