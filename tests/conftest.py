@@ -37,15 +37,72 @@ def pytest_report_header() -> str:
     return "the window is tested offscreen"
 
 
-LONGEST = (
+LONG = (
     "tests/cli/test_demo.py",
     "tests/sim/chain/test_integrate.py",
     "tests/sim/exponents/test_lyapunov_spectrum.py",
     "tests/sim/exponents/test_tangent.py",
     "tests/cli/test_killed_campaign.py",
     "tests/gui/pages/compare/test_compare_page.py",
+    "tests/acquisition/engine/test_engine_process.py",
+    "tests/acquisition/run/test_stop_matrix.py",
+    "tests/gui/test_window_dies.py",
+    "tests/acquisition/run/test_run_on_virtual_rig.py",
+    "tests/gui/pages/test_loop_is_free.py",
+    "tests/cli/test_command_line.py",
+    "tests/gui/test_accessibility.py",
+    "tests/gui/test_job.py",
+    "tests/acquisition/control/test_on_virtual_rig.py",
+    "tests/analysis/frequency_response/test_noise_request.py",
+    "tests/analysis/paper_figures/test_paper_figures.py",
+    "tests/cli/test_watch.py",
+    "tests/analysis/sine/test_jumps.py",
+    "tests/cli/test_study.py",
+    "tests/analysis/report/test_report.py",
+    "tests/sim/exponents/test_two_trajectories.py",
+    "tests/acquisition/run/test_stream_faults.py",
+    "tests/acquisition/bench/test_bench.py",
+    "tests/acquisition/drivers/test_daqmx_output.py",
+    "tests/acquisition/check/test_bench_report.py",
+    "tests/sim/study/test_cluster.py",
+    "tests/virtual_rig/rig/test_virtual_rig.py",
+    "tests/acquisition/run/test_stream_on_virtual_rig.py",
+    "tests/analysis/sine/test_collision_region.py",
+    "tests/virtual_rig/rig/test_fault_script.py",
+    "tests/sim/exponents/test_dynamical_exponents.py",
+    "tests/acquisition/check/test_admission.py",
+    "tests/analysis/chaos/test_witnesses.py",
+    "tests/analysis/frequency_response/test_transmission_of_the_specimen.py",
+    "tests/acquisition/recording/test_kill.py",
+    "tests/gui/window/test_window.py",
+    "tests/gui/plots/test_logical_line.py",
+    "tests/analysis/reproduction/test_reproduction.py",
+    "tests/acquisition/engine/test_pulse.py",
+    "tests/analysis/frequency_response/test_noise_response.py",
+    "tests/cli/test_campaign_commands.py",
+    "tests/sim/test_extremes.py",
+    "tests/sim/study/test_kill.py",
+    "tests/cli/test_analyse.py",
+    "tests/cli/test_blas_threads.py",
+    "tests/analysis/figures/test_figures.py",
+    "tests/sim/rigid/test_rigid_stops.py",
+    "tests/gui/pages/simulate/test_simulate_page.py",
+    "tests/analysis/model_updating/test_shaken_specimen.py",
+    "tests/acquisition/campaign/test_documented_script.py",
+    "tests/acquisition/bench/test_bench_list.py",
+    "tests/sim/periodic/test_balance_branch.py",
+    "tests/virtual_rig/usb/test_usb_bus.py",
+    "tests/analysis/model/test_foresight.py",
+    "tests/analysis/simulation/test_simulation.py",
+    "tests/acquisition/recording/test_commit_order.py",
+    "tests/sim/test_faces.py",
+    "tests/test_wheel.py",
+    "tests/test_examples.py",
 )
-"""Files of few and long tests: begun last, one would run while the other process has nothing to do."""
+"""Files of over three seconds, in the order in which they begin: one begun last would run alone.
+
+All others are quick.
+"""
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -54,8 +111,12 @@ def pytest_configure(config: pytest.Config) -> None:
         config.option.loadscopereorder = False
 
 
-@pytest.hookimpl(trylast=True)
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the longest."""
-    place = {name: number for number, name in enumerate(LONGEST)}
+    """Begin with the longest, and mark what is quick."""
+    place = {name: number for number, name in enumerate(LONG)}
     items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(place)))
+    for item in items:
+        is_long = item.nodeid.partition("::")[0] in place
+        if not is_long and not any(item.get_closest_marker(name) for name in ("slow", "hardware")):
+            item.add_marker("quick")
