@@ -1,7 +1,7 @@
 """Every contact law followed in time: against the equations as written, closed forms, and mechanics."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -23,6 +23,8 @@ from vibench.sim import (
     spring_of,
     steady_response,
 )
+from vibench.sim.accuracy_benchmark._independent_solution import independent_state
+from vibench.sim.model._stops import Stops
 
 DRIVE = Harmonic(130.0, 20e-6)
 STILL = Harmonic(100.0, 0.0)
@@ -69,6 +71,21 @@ def test_an_independent_integrator_of_the_equations_as_written_agrees(contact):
     ours = integrate(specimen, DRIVE, 0.02, Accuracy.REFERENCE)
     assert ours.outcome is Outcome.REACHED_END
     assert distance(ours.final_state, as_written(specimen, DRIVE, 0.02)) < 2e-6
+
+
+@dataclass(frozen=True)
+class EveryTerm:
+    """A law that no table names: it says its numbers, and that is all."""
+
+    stops = Stops(linear_stiffness=2e6, contact_stiffness=4.9e9, loss=0.3)
+
+
+def test_a_law_that_yields_is_followed_by_every_solver_from_its_numbers_alone():
+    specimen = replace(paper("hertz"), contact=EveryTerm())
+    ours = integrate(specimen, DRIVE, 0.02, Accuracy.REFERENCE)
+    assert ours.impacts.count > 2
+    assert distance(ours.final_state, as_written(specimen, DRIVE, 0.02)) < 2e-6
+    assert distance(ours.final_state, independent_state(specimen, DRIVE, 0.02, np.zeros(6))) < 2e-6
 
 
 @pytest.mark.parametrize("gap_m", [(30e-6, 45e-6), (20e-6, math.inf), (math.inf, 20e-6)])

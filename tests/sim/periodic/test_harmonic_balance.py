@@ -128,6 +128,7 @@ def test_one_harmonic_is_the_papers_analytical_solution(exponent):
         PowerSpring(1.0, ((3, 0.5), (7, 2.0))),
         GapSpring(100.0, 1.5, 0.5, 0.8, loss=0.3),
         GapSpring(50.0, 2.5, 0.3, math.inf),
+        GapSpring(100.0, 1.5, 0.5, 0.8, loss=0.3, beside=40.0),
     ],
 )
 def test_the_jacobian_and_both_slopes_are_the_derivatives_of_the_residual(spring):

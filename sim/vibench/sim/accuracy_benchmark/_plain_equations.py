@@ -29,7 +29,7 @@ class Place(IntEnum):
 
 
 class Law(NamedTuple):
-    """A contact law as numbers: k d^exponent (1 + loss dd/dt) at the depth d, and powers of p at every p."""
+    """A law as numbers: (k d^exponent + beside d) (1 + loss dd/dt) at the depth d; powers of p at every p."""
 
     lower: float
     upper: float
@@ -41,6 +41,8 @@ class Law(NamedTuple):
     powers: Floats = np.zeros(0)
     forces: Floats = np.zeros(0)
     """Of each power at the reference [N]."""
+    beside: float = 0.0
+    """Of a linear spring that is pressed together with the stop [N/m]."""
 
 
 def rates_at(place: Place, law: Law, numbers: Floats) -> Rates:
@@ -62,7 +64,7 @@ def law_of(specimen: Specimen) -> Law:
             msg = "Rigid stops push with no finite force: give a law that yields, such as hertz."
             raise ValueError(msg)
         case law:
-            return Law(lower, upper, *law.stops.term, law.stops.loss)
+            return Law(lower, upper, *law.stops.term, law.stops.loss, beside=law.stops.spring_beside)
 
 
 def numbers_of(specimen: Specimen, drive: Harmonic) -> Floats:
@@ -101,6 +103,12 @@ def _depths(state: Floats, law: Law) -> tuple[float, float]:
 
 
 @kernel
+def _stop_force(depth: float, rate: float, law: Law) -> float:
+    still: float = law.stiffness * depth**law.exponent + law.beside * depth
+    return still * (1.0 + law.loss * rate)
+
+
+@kernel
 def _rates(time_s: float, state: Floats, place: int, law: Law, numbers: Floats) -> Floats:
     """d/dt of x, y, z, vx, vy, vz. On a stop the force ends at depth zero; in flight there is none."""
     m0, m1, m2, k0, k1, k2, c0, c1, c2, amplitude, omega, phase = numbers
@@ -109,9 +117,9 @@ def _rates(time_s: float, state: Floats, place: int, law: Law, numbers: Floats) 
     base_rate = amplitude * omega * np.cos(omega * time_s + phase)
     p, rate, push = y - z, vy - vz, 0.0
     if p > law.upper and place != Place.FLIGHT:
-        push = law.stiffness * (p - law.upper) ** law.exponent * (1.0 + law.loss * rate)
+        push = _stop_force(p - law.upper, rate, law)
     if -p > law.lower and place != Place.FLIGHT:
-        push = -law.stiffness * (-p - law.lower) ** law.exponent * (1.0 - law.loss * rate)
+        push = -_stop_force(-p - law.lower, -rate, law)
     for power, force in zip(law.powers, law.forces):  # noqa: B905 - numba's zip has no strict
         push += force * (p / law.reference) ** power
     inner = k1 * p + c1 * rate + push

@@ -16,7 +16,7 @@ PAPER_INDENTATION_M = 1e-6
 
 
 class Stops(NamedTuple):
-    """A law as the kernels take it: F = linear d + contact d^(3/2) (1 + loss dd/dt) at the indentation d."""
+    """A law as kernels take it: F = (linear d + contact d^(3/2)) (1 + loss dd/dt) at the indentation d."""
 
     linear_stiffness: float = 0.0
     """[N/m]."""
@@ -29,20 +29,15 @@ class Stops(NamedTuple):
 
     @property
     def term(self) -> tuple[float, float]:
-        """Stiffness and exponent of the one term of a law that yields.
+        """Stiffness and exponent of the steepest term of a law that yields."""
+        if self.contact_stiffness:
+            return self.contact_stiffness, HERTZ_EXPONENT
+        return self.linear_stiffness, 1.0
 
-        Raises
-        ------
-        ValueError
-            When the law has two terms.
-
-        """
-        if self.linear_stiffness and self.contact_stiffness:
-            msg = "A law of two terms, d and d^(3/2), is not followed here: give a law of one."
-            raise ValueError(msg)
-        if self.linear_stiffness:
-            return self.linear_stiffness, 1.0
-        return self.contact_stiffness, HERTZ_EXPONENT
+    @property
+    def spring_beside(self) -> float:
+        """Stiffness of the linear term where it is not the only one [N/m]."""
+        return self.linear_stiffness if self.contact_stiffness else 0.0
 
 
 @dataclass(frozen=True)

@@ -90,7 +90,7 @@ class PowerSpring:
 
 @dataclass(frozen=True)
 class GapSpring:
-    """Stops on one or both sides: k d^exponent (1 + loss dd/dt) at the penetration d, free between them."""
+    """Stops on one or both sides: (k d^exponent + beside d) (1 + loss dd/dt) at the penetration d."""
 
     stiffness_coefficient: float
     """k [N/m^exponent]."""
@@ -102,6 +102,8 @@ class GapSpring:
     """The stop at negative p, as a positive distance [m]; infinite for none."""
     loss: float = 0.0
     """Hunt and Crossley's lambda over k [s/m]."""
+    beside: float = 0.0
+    """Stiffness of a linear spring that is pressed together with the stop [N/m]."""
 
     def __post_init__(self) -> None:
         if not (self.stiffness_coefficient > 0.0 and self.exponent >= 1.0 and self.loss >= 0.0):
@@ -132,18 +134,21 @@ class GapSpring:
     def force(self, p: Floats, rate: Floats) -> Floats:
         """F [N]."""
         side, depth = self._pressed(p)
-        return side * self.stiffness_coefficient * depth**self.exponent * (1.0 + self.loss * side * rate)
+        return side * self._push(depth) * (1.0 + self.loss * side * rate)
 
     def stiffness(self, p: Floats, rate: Floats) -> Floats:
         """dF/dp [N/m]."""
         side, depth = self._pressed(p)
-        slope = self.exponent * self.stiffness_coefficient * depth ** (self.exponent - 1.0)
+        slope = self.exponent * self.stiffness_coefficient * depth ** (self.exponent - 1.0) + self.beside
         return np.where(depth > 0.0, slope * (1.0 + self.loss * side * rate), 0.0)
 
     def damping(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - linear in the rate
         """dF/d(dp/dt) [N s/m]."""
         _, depth = self._pressed(p)
-        return self.loss * self.stiffness_coefficient * depth**self.exponent
+        return self.loss * self._push(depth)
+
+    def _push(self, depth: Floats) -> Floats:
+        return self.stiffness_coefficient * depth**self.exponent + self.beside * depth
 
     def _pressed(self, p: Floats) -> tuple[Floats, Floats]:
         depth = np.where(p > 0.0, p - self.upper, -p - self.lower)
@@ -192,4 +197,4 @@ def spring_of(specimen: Specimen) -> RestoringForce:
             msg = "Rigid stops push with no finite force: follow the motion in time instead, or use Hertz."
             raise ValueError(msg)
         case law:
-            return GapSpring(*law.stops.term, upper, lower, law.stops.loss)
+            return GapSpring(*law.stops.term, upper, lower, law.stops.loss, law.stops.spring_beside)
