@@ -121,7 +121,7 @@ COMMANDS = {
     "export": Place(
         "export",
         "export",
-        "Write a recording's samples, with units and times, as CSV, UFF 58, MATLAB or WAV.",
+        "Write a recording's samples, with units and times, as a file that other programs read.",
     ),
     "import": Place(
         "import_recording", "import_file", "Make a recording of another program's file, or say what is in it."

@@ -33,7 +33,7 @@ def export(
         bool, typer.Option("--results", help="Results that were saved in the recording, too.")
     ] = False,
 ) -> None:
-    """Write a recording's samples, with units and times, as CSV, UFF 58, MATLAB or WAV."""
+    """Write a recording's samples, with units and times, as a file that other programs read."""
     with open_recording(recording) as opened:
         chosen = excerpt(opened, tuple(channels.split(",")) if channels else (), from_s, to_s)
         path = recording.with_name(f"{chosen.name}.{to.value}") if out is None else out
