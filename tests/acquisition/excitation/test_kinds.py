@@ -29,15 +29,17 @@ from vibench.acquisition.excitation import (
     StreamedNoise,
     excitation_text,
 )
+from vibench.acquisition.recording import SegmentLabel
 
 BAND = {"band_start_hz": 20, "band_stop_hz": 800}
 MOVE = {"start_hz": 220, "stop_hz": 310, "duration_s": 6}
 HELD = BaseLevel(displacement_m=5e-6)
+WAY = (LeadIn(frequency_hz=250, amplitude_vpp=1),)
 EXAMPLES = (
     MultisineNoise(amplitude_vpp=1, realisations=2, **BAND),
     StreamedNoise(amplitude_vpp=1, duration_s=2, **BAND),
     SineSweep(amplitude_vpp=1, hold="displacement", **MOVE),
-    Dwell(amplitude_vpp=1, frequency_hz=260, duration_s=2),
+    Dwell(amplitude_vpp=1, frequency_hz=260, duration_s=2, lead_in=WAY),
     SteppedSine(amplitude_vpp=1, frequencies_hz=(200, 210, 220)),
     SteppedLevel(amplitude_vpp=1, frequency_hz=260, lowest_vpp=0.5, step_vpp=0.25),
     OddMultisine(amplitude_vpp=1, realisations=2, **BAND),
@@ -59,8 +61,9 @@ def test_the_union_and_the_rows_name_the_same_plans_in_the_same_order():
 
 
 @every_kind
-def test_every_segment_that_is_recorded_is_one_that_results_are_taken_from(excitation):
-    assert {step.segment.label for step in excitation.steps()} <= set(excitation.result_labels)
+def test_every_segment_that_is_recorded_is_one_that_results_are_taken_from_or_the_way_there(excitation):
+    labels = {step.segment.label for step in excitation.steps()}
+    assert labels - {SegmentLabel.LEAD_IN} <= set(excitation.result_labels)
     assert excitation.family in Family
 
 
@@ -134,8 +137,7 @@ def test_levels_go_the_way_that_they_are_turned_to():
 
 
 def test_only_a_dwell_is_led_and_it_adds_its_tone_to_the_way():
-    way = (LeadIn(frequency_hz=250, amplitude_vpp=1),)
-    assert [kind for kind, each in by_kind.items() if each.led(way, 0.5) is not None] == ["dwell"]
-    led, tone = by_kind["dwell"].led(way, 0.25)
-    assert (led.lead_in, led.lead_in_s) == (way, 0.25)
+    assert [kind for kind, each in by_kind.items() if each.led(WAY, 0.5) is not None] == ["dwell"]
+    led, tone = by_kind["dwell"].led(WAY, 0.25)
+    assert (led.lead_in, led.lead_in_s) == (WAY, 0.25)
     assert tone == LeadIn(frequency_hz=260, amplitude_vpp=1)
