@@ -59,7 +59,7 @@ class Bench:
         self.output = output
         self.confirmations = confirmations
         self.last_check: CheckResult | None = None
-        """The check that this bench was admitted on; see `check.admission`."""
+        """The check that this bench was admitted on; see `vibench.acquisition.check`."""
         self._power = power
         self._closing = closing
 

@@ -100,7 +100,7 @@ class DaqmxDigitizer:
         Raises
         ------
         InstrumentBusy, InstrumentLost, InstrumentError, ConfigurationError, SettingRefused
-            As `daqmx_errors` tells them apart. Nothing stays reserved then.
+            As `_daqmx_errors` tells them apart. Nothing stays reserved then.
 
         """
         digitizer = cls(daqmx_session(rig.daq.server), rig.daq, channels_of(rig))

@@ -57,7 +57,7 @@ class DaqmxOutput:
         SettingRefused
             When the device takes another sample rate than the one asked for.
         InstrumentError
-            As `daqmx_errors` tells them apart; nothing stays reserved then.
+            As `_daqmx_errors` tells them apart; nothing stays reserved then.
 
         """
         output = cls(physical, config, digitizer)

@@ -48,7 +48,7 @@ def straight_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
 
 
 def curve_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
-    """Give the pen of a curve, one pixel of the screen wide; `logical_line` draws it wider.
+    """Give the pen of a curve, one pixel of the screen wide; `LogicalLine` draws it wider.
 
     Its dashes are as long on a fine screen as on a coarse one.
     """

@@ -123,7 +123,7 @@ def place_held(state: Vector, side: float, phasors: Complex, held: FlightTables)
 
 @kernel_without_refcount
 def observe_held(observations: Vector, side: float, clock: Vector, length: float, held: FlightTables) -> None:
-    """Add what the constant p does to its peak and line; `flight.tally_flight` does the rest."""
+    """Add what the constant p does to its peak and line; `observe_flight` does the rest."""
     if observations[MODE] == NOTHING:
         return
     gap = gap_of(side, held.par.lower, held.par.upper)

@@ -82,7 +82,7 @@ NUMBERS = {
     "lyapunov_per_s": Column("lyapunov", REAL, "s-1", "largest Lyapunov exponent"),
     "lyapunov_error_per_s": Column("lyapunov_error", REAL, "s-1", "standard error of the largest exponent"),
 }
-"""By the field of `Prediction` that they keep."""
+"""By the field of `ScenePrediction` that they keep."""
 OTHERS = (
     Column(MOTION, WHOLE, "", "what the motion has come to", _meanings(MotionKind)),
     Column(METHOD, WHOLE, "", "how the scene was answered", _meanings(Method)),

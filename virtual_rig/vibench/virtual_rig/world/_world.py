@@ -71,7 +71,7 @@ class TerminalVoltage(Protocol):
 class World:
     """The simulated rig in rig time, advancing only when asked to.
 
-    Rig time is counted by the converter's clock (see `time_grid`). Two worlds of one configuration
+    Rig time is counted by the converter's clock (see `_time_grid`). Two worlds of one configuration
     agree bit for bit, whatever sizes of blocks they are read in. Safe to use from several threads;
     `time_s` never waits, so an instrument may ask for it while it is being rendered.
     """

@@ -2,7 +2,7 @@
 
 A form of one measurement, the signal in time and spectrum, predicted loads beside the limits of
 the rig, and the predicted response of the specimen. Preview and prediction are worked out in
-another process; `_ahead` is loaded there, without widgets.
+another process; `_test_preview` is loaded there, without widgets.
 """
 
 import lazy_loader
