@@ -102,9 +102,22 @@ def test_metres_for_micrometres_are_computed_with_a_warning_beside_the_answer(vi
     assert warning.endswith("give 5e-06")
 
 
+@pytest.mark.timeout(COMPILING_S)
+def test_a_point_without_an_answer_is_an_error_beside_the_answers_of_the_others(vibench_here, tmp_path):
+    chatter = ("--model", "rigid:1", "--gap", 1e-9, "--amplitude", 1e-3, "--duration", 0.3, "--window", 0.01)
+    ran = vibench_here("predict", *chatter, "--frequency", "100:60100:60000", "--json", cwd=tmp_path)
+    assert ran.returncode == 1
+    (line,) = [each for each in ran.stderr.splitlines() if each.startswith("error:")]
+    assert line.startswith("error: frequency 100.0 Hz: more impacts than allowed")
+    said = json.loads(ran.stdout)
+    assert [point["response_i"] is None for point in said["points"]] == [True, False]
+    assert [failure["frequency"] for failure in said["failures"]] == [100.0]
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
+        (("--amplitude", 1e-300, "--frequency", 100), "Drive amplitude 1e-300 m is not allowed"),
         (("--amplitude", -1, "--frequency", 100), "--amplitude was given as -1.0: it must be above 0"),
         (("--amplitude", 1e-6, "--frequency", "x"), "START:STOP:STEP"),
         (("--amplitude", 1e-6, "--frequency", "1:2"), "START:STOP:STEP"),

@@ -11,7 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 
+from vibench.cli.study import KeptStudies
 from vibench.sim.study import PointState, Study, open_study
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -110,6 +112,22 @@ def test_a_wrong_study_is_one_sentence_and_makes_no_file(vibench_here, tmp_path,
     assert "Traceback" not in result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
     assert not (tmp_path / "a.h5").exists()
+
+
+def test_a_study_with_a_point_without_an_answer_is_kept_and_ends_in_an_error(vibench_here, tmp_path):
+    chatter = 'models = ["hertz", "rigid:1"]\ngaps_m = [1e-9]\nduration_s = 0.3\nwindow_s = 0.01\n'
+    asked = plan(tmp_path, chatter + "amplitudes_m = [1e-3]\nfrequencies_hz = [100]\n")
+    ran = vibench_here("study", asked, "--out", "a.h5", cwd=tmp_path)
+    assert ran.returncode == 1
+    assert "2 of 2 points, 1 failed (complete)" in ran.stdout
+    assert "error: model rigid:1: more impacts than allowed" in ran.stderr
+    assert np.isfinite(open_study(tmp_path / "a.h5").values("response_i", model="hertz")).all()
+    # A figure or a reproduction that rests on such a study is made, and ends in the same error.
+    studies = KeptStudies(tmp_path / "studies", 1)
+    assert studies(Study.model_validate(tomllib.loads(asked.read_text(encoding="utf-8")))).is_complete
+    with pytest.raises(typer.Exit) as ended:
+        studies.complain()
+    assert ended.value.exit_code == 1
 
 
 def test_a_cluster_that_does_not_answer_is_one_sentence_and_makes_no_file(vibench_here, tmp_path):

@@ -12,6 +12,7 @@ from vibench.acquisition.rig import load_rig
 from vibench.analysis import campaign_summary
 from vibench.analysis.report import write_report
 
+from .analyse import complain_about
 from .analyst import second_process
 from .measure import STOPPED_EXIT_CODE, the_bench
 from .output import bold, console, write_json
@@ -56,3 +57,4 @@ def demo(
     report = write_report(results, folder / "report.html", folder / "figures")
     write_json(campaign_summary(results), folder / "results.json")
     console.print("\nThe report:", bold(report.resolve()))
+    complain_about(results)

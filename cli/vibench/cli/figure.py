@@ -21,7 +21,7 @@ from vibench.sim import Accuracy
 from .analyse import complain_about
 from .output import bold, console
 from .paths import room_for_folder
-from .study import kept_study
+from .study import KeptStudies
 
 ALL = "all"
 EXPERIMENT = (12, 13, 14)
@@ -61,11 +61,13 @@ def figure(
     numbers = _numbers(number)
     room_for_folder(out)
     experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])
+    studies = KeptStudies(out / "studies", workers)
     for each in numbers:
-        drawn = experiment(each) if each in EXPERIMENT else _simulated(each, options, out, workers)
+        drawn = experiment(each) if each in EXPERIMENT else _simulated(each, options, studies)
         for one in drawn:
             paths = one.save(out, kinds)
             console.print(f"figure {each}:", bold(paths[0]), f"({one.title})")
+    studies.complain()
 
 
 def _numbers(asked: str) -> tuple[int, ...]:
@@ -77,10 +79,9 @@ def _numbers(asked: str) -> tuple[int, ...]:
     raise InvalidRequest(f"figure {asked!r} was asked for; the paper has 1 to {known[-1]}, or say all")
 
 
-def _simulated(number: int, options: FigureOptions, out: Path, workers: int | None) -> Iterator[DrawnFigure]:
+def _simulated(number: int, options: FigureOptions, studies: KeptStudies) -> Iterator[DrawnFigure]:
     chosen = PAPER_FIGURES[number]
-    answers = tuple(kept_study(each, out / "studies", workers) for each in chosen.studies(options))
-    yield chosen.draw(options, answers)
+    yield chosen.draw(options, tuple(studies(each) for each in chosen.studies(options)))
 
 
 def _experiment(folder: Path | None, wanted: list[int]) -> Callable[[int], Iterator[DrawnFigure]]:

@@ -27,7 +27,7 @@ from .interruption import told_to_stop
 from .output import console, print_json, print_warnings
 from .paths import AsJson
 from .progress_bars import study_bar
-from .study import STOPPED_EXIT_CODE, Cluster, Workers
+from .study import Cluster, Workers, complain_about_points
 
 AUTO: Literal["auto"] = "auto"
 _SHOWN = 24
@@ -109,10 +109,7 @@ def predict(
         _tell(results)
     if explain:
         typer.echo(explanation(results), err=as_json)
-    for where, why in results.failures():
-        typer.echo(f"error: {where['frequency']} Hz: {why}", err=True)
-    if not results.is_complete:
-        raise typer.Exit(STOPPED_EXIT_CODE)
+    complain_about_points(results)
 
 
 def _study(options: dict[str, object]) -> Study:

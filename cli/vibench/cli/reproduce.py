@@ -26,7 +26,7 @@ from vibench.sim import Accuracy
 
 from .output import bold, console
 from .paths import room_for_folder
-from .study import Workers, kept_study
+from .study import KeptStudies, Workers
 
 PAGE = "reproduction.md"
 IMAGES = "images"
@@ -53,7 +53,8 @@ def reproduce(
     options = FigureOptions(damping_time_s=damping_time, accuracy=accuracy, grid=grid)
     for folder in (out, *([] if markdown is None else [markdown.parent])):
         room_for_folder(folder)
-    evidence = Evidence(lambda study: kept_study(study, out / "studies", workers))
+    studies = KeptStudies(out / "studies", workers)
+    evidence = Evidence(studies)
     found = reproduction(SECTIONS, evidence, options, lambda step: console.print(f"measuring {step}"))
     page = out / PAGE if markdown is None else markdown
     page.parent.mkdir(parents=True, exist_ok=True)
@@ -61,6 +62,7 @@ def reproduce(
     page.write_text(reproduction_document(found, pictures), encoding="utf-8")
     _tell(found)
     console.print("The page:", bold(page.resolve()))
+    studies.complain()
 
 
 def _pictures(

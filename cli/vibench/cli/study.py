@@ -16,6 +16,8 @@ from .progress_bars import study_bar
 
 STOPPED_EXIT_CODE = 3
 """Not everything was computed, and nothing failed: somebody stopped it."""
+FAILED_EXIT_CODE = 1
+"""A point has no answer; all others are kept."""
 SHOWN_FAILURES = 5
 
 Workers = Annotated[
@@ -47,8 +49,7 @@ def study(
         print_json(document(results, out))
     else:
         tell(results, out)
-    if not results.is_complete:
-        raise typer.Exit(STOPPED_EXIT_CODE)
+    complain_about_points(results)
 
 
 def document(results: StudyResults, out: Path) -> dict[str, object]:
@@ -65,38 +66,71 @@ def document(results: StudyResults, out: Path) -> dict[str, object]:
 
 
 def tell(results: StudyResults, out: Path) -> None:
-    """Say how far a study is, and where scenes could not be computed."""
-    failures = list(results.failures())
+    """Say how far a study is."""
+    failed = sum(1 for _ in results.failures())
     state = "complete" if results.is_complete else "stopped: go on with --resume"
-    console.print(
-        f"{out}: {results.kept} of {results.study.grid.size} points, {len(failures)} failed ({state})"
-    )
+    console.print(f"{out}: {results.kept} of {results.study.grid.size} points, {failed} failed ({state})")
+
+
+def complain_about_points(results: StudyResults) -> None:
+    """End with a sentence for each of the first points without an answer, or as a study that was stopped.
+
+    Returns where every point is answered.
+    """
+    if say_failures(results) > 0:
+        raise typer.Exit(FAILED_EXIT_CODE)
+    if not results.is_complete:
+        raise typer.Exit(STOPPED_EXIT_CODE)
+
+
+def say_failures(results: StudyResults) -> int:
+    """Say on standard error which points have no answer, and why; gives how many."""
+    failures = list(results.failures())
     for where, why in failures[:SHOWN_FAILURES]:
-        place = ", ".join(f"{name} {value}" for name, value in where.items())
-        console.print(f"  {place}: {why}", markup=False)
+        # An axis of one value tells no point from another.
+        told = [axis for axis in results.axes if len(axis.values) > 1] or [results.axes[-1]]
+        place = ", ".join(f"{axis.name} {where[axis.name]} {axis.units}".strip() for axis in told)
+        typer.echo(f"error: {place}: {why}", err=True)
     if len(failures) > SHOWN_FAILURES:
-        console.print(f"  and {len(failures) - SHOWN_FAILURES} more; see `message` in the file")
+        more = len(failures) - SHOWN_FAILURES
+        typer.echo(f"error: {more} more points have no answer: see `failures` with --json", err=True)
+    return len(failures)
 
 
 _DIGEST = 16
 
 
-def kept_study(study: Study, folder: Path, workers: int | None) -> StudyResults:
-    """Solve a study, or what is missing of it: its file is named by everything that it asks."""
-    folder.mkdir(parents=True, exist_ok=True)
-    digest = hashlib.sha256(study.model_dump_json().encode()).hexdigest()[:_DIGEST]
-    with told_to_stop() as is_stopped, study_bar(study.grid.size) as observer:
-        results = solve_study(
-            study,
-            folder / f"{digest}.h5",
-            ExistingStudy.RESUME,
-            workers,
-            observer=observer,
-            cancelled=is_stopped,
-        )
-    if not results.is_complete:
-        typer.echo(
-            f"stopped after {results.kept} of {study.grid.size} points; the same command goes on", err=True
-        )
-        raise typer.Exit(STOPPED_EXIT_CODE)
-    return results
+class KeptStudies:
+    """The studies that a command rests on, in a folder: each file is named by all that it asks."""
+
+    def __init__(self, folder: Path, workers: int | None) -> None:
+        self._folder = folder
+        self._workers = workers
+        self._failed = 0
+
+    def __call__(self, study: Study) -> StudyResults:
+        """Solve a study, or what is missing of it."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        digest = hashlib.sha256(study.model_dump_json().encode()).hexdigest()[:_DIGEST]
+        with told_to_stop() as is_stopped, study_bar(study.grid.size) as observer:
+            results = solve_study(
+                study,
+                self._folder / f"{digest}.h5",
+                ExistingStudy.RESUME,
+                self._workers,
+                observer=observer,
+                cancelled=is_stopped,
+            )
+        self._failed += say_failures(results)
+        if not results.is_complete:
+            typer.echo(
+                f"stopped after {results.kept} of {study.grid.size} points; the same command goes on",
+                err=True,
+            )
+            raise typer.Exit(STOPPED_EXIT_CODE)
+        return results
+
+    def complain(self) -> None:
+        """End a command whose studies lack an answer; what it made of the others is there."""
+        if self._failed > 0:
+            raise typer.Exit(FAILED_EXIT_CODE)

@@ -11,6 +11,8 @@ from pydantic import ConfigDict
 _STRICT = ConfigDict(extra="forbid")
 FEWEST_SAMPLES = 4
 """A cubic spline without end conditions of its own needs four points."""
+SMALLEST_AMPLITUDE_M = 1e-100
+"""Below, squares of displacements are no numbers any more: errors of steps and scatters would be zero."""
 
 
 @dataclass(frozen=True)
@@ -129,8 +131,11 @@ def _require_positive(name: str, value: float, unit: str) -> None:
 
 
 def _require_amplitude(amplitude_m: float) -> None:
-    if not 0.0 <= amplitude_m < math.inf:
-        msg = f"Drive amplitude {amplitude_m} m is not allowed: it must be zero or positive, and finite."
+    if amplitude_m != 0.0 and not SMALLEST_AMPLITUDE_M <= amplitude_m < math.inf:
+        msg = (
+            f"Drive amplitude {amplitude_m} m is not allowed: "
+            f"it must be zero, or {SMALLEST_AMPLITUDE_M:g} m or more, and finite."
+        )
         raise ValueError(msg)
 
 

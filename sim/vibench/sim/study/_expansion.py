@@ -111,8 +111,13 @@ class Expansion:
         return PointAnswer(number, state, cells, solved.taken_s)
 
     def failure(self, number: int, error: BaseException) -> PointAnswer:
-        """Say what is kept of a scene that could not be computed."""
-        return PointAnswer(number, PointState.FAILED, {MESSAGE: cut_text(f"{type(error).__name__}: {error}")})
+        """Say what is kept of a scene that could not be computed: a refusal is a sentence by itself."""
+        match error:
+            case ValueError():
+                said = str(error)
+            case _:
+                said = f"{type(error).__name__}: {error}"
+        return PointAnswer(number, PointState.FAILED, {MESSAGE: cut_text(said)})
 
     def _origin(self, number: int, scene: Scene, arrays: Arrays) -> dict[str, Cell]:
         """Say where a point began, and which scene it is."""

@@ -12,7 +12,7 @@ from ..scene import ScenePrediction
 from ._answers import prediction_at
 from ._arrays import Arrays, states
 from ._axes import StudyAxis
-from ._columns import COLUMNS, CONTINUES, MESSAGE
+from ._columns import COLUMNS, CONTINUES, ENDED, MESSAGE
 from ._errors import InvalidStudy
 from ._expansion import continued_from
 from ._file_reading import Session, read_arrays, read_sessions, read_study
@@ -111,9 +111,11 @@ class StudyResults:
         )
 
     def failures(self) -> Iterator[tuple[dict[str, Value], str]]:
-        """Where, and why, a scene could not be computed."""
-        for number in np.flatnonzero(states(self.arrays) == PointState.FAILED):
-            yield self.coordinates(int(number)), bytes(self.arrays[MESSAGE][number]).decode()
+        """Where, and why, there is no answer: the scene could not be computed, or its run was lost."""
+        state = states(self.arrays)
+        for number in np.flatnonzero(state > PointState.DONE):
+            why = MESSAGE if state[number] == PointState.FAILED else ENDED
+            yield self.coordinates(int(number)), bytes(self.arrays[why][number]).decode()
 
     def coordinates(self, number: int) -> dict[str, Value]:
         """Values of the axes at a point."""
