@@ -42,6 +42,22 @@ def plan(folder, text=SMALL):
     return path
 
 
+def test_an_estimate_counts_points_and_work_and_makes_no_file(vibench_here, tmp_path):
+    told = {}
+    for duration_s in (0.5, 5.0):
+        asked = plan(tmp_path, SMALL.replace("duration_s = 0.5", f"duration_s = {duration_s}"))
+        found = vibench_here("study", asked, "--out", "a.h5", "--estimate", "--json", cwd=tmp_path)
+        assert found.returncode == 0, found.stderr
+        told[duration_s] = json.loads(found.stdout)
+    assert [each["points"] for each in told.values()] == [12, 12]
+    assert 3.0 < told[5.0]["work_s"] / told[0.5]["work_s"] <= 10.5
+    assert (
+        "12 points, planned as"
+        in vibench_here("study", asked, "--out", "a.h5", "--estimate", cwd=tmp_path).stdout
+    )
+    assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
+
+
 @pytest.mark.timeout(COMPILING_S)
 def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(vibench, tmp_path):
     asked = plan(tmp_path)

@@ -7,7 +7,14 @@ from typing import Annotated
 import typer
 
 from vibench.acquisition import load_toml
-from vibench.sim.study import ExistingStudy, Study, StudyResults, plausibility_warnings, solve_study
+from vibench.sim.study import (
+    ExistingStudy,
+    Study,
+    StudyResults,
+    planned_work_s,
+    plausibility_warnings,
+    solve_study,
+)
 
 from .interruption import told_to_stop
 from .output import console, print_json, print_warnings
@@ -37,11 +44,17 @@ def study(
     ] = False,
     workers: Workers = None,
     cluster: Cluster = None,
+    only_estimate: Annotated[
+        bool, typer.Option("--estimate", help="Say how many points and how much work; compute nothing.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Predict responses over every combination of what a file lists, longest first."""
     asked = load_toml(plan, Study)
     print_warnings(plausibility_warnings(asked))
+    if only_estimate:
+        tell_work(asked, as_json)
+        return
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
     with told_to_stop() as is_stopped, study_bar(asked.grid.size) as observer:
         results = solve_study(asked, out, existing, workers, cluster, observer, is_stopped)
@@ -50,6 +63,15 @@ def study(
     else:
         tell(results, out)
     complain_about_points(results)
+
+
+def tell_work(study: Study, as_json: bool) -> None:
+    """Say how many points a study has, and what all of them are planned to take."""
+    points, work_s = study.grid.size, planned_work_s(study)
+    if as_json:
+        print_json({"points": points, "work_s": work_s})
+    else:
+        console.print(f"{points} points, planned as {work_s:.2g} s of one core")
 
 
 def document(results: StudyResults, out: Path) -> dict[str, object]:

@@ -10,6 +10,9 @@ from ._columns import (
 from ._errors import (
     StudyError as StudyError,
 )
+from ._expansion import (
+    planned_work_s as planned_work_s,
+)
 from ._frequency_range import (
     frequency_range as frequency_range,
 )

@@ -159,6 +159,17 @@ class Expansion:
             return 0.0
 
 
+def planned_work_s(study: Study) -> float:
+    """Time that all points of a study together are planned to take on one core [s]; none is run.
+
+    >>> from vibench.sim.study import Study
+    >>> study = Study(frequencies_hz=(200.0, 260.0), amplitudes_m=(1e-6,))
+    >>> 0.0 < planned_work_s(study) < 60.0
+    True
+    """
+    return float(Expansion(study).planned_s.sum())
+
+
 def continued_from(frequency_hz: float) -> str:
     """Name of a start that is the end of another point."""
     return f"end at {frequency_hz:g} Hz"
