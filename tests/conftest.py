@@ -118,5 +118,5 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(place)))
     for item in items:
         is_long = item.nodeid.partition("::")[0] in place
-        if not is_long and not any(item.get_closest_marker(name) for name in ("slow", "hardware")):
+        if not is_long and not any(item.get_closest_marker(name) for name in ("slow", "hardware", "attack")):
             item.add_marker("quick")

@@ -1,0 +1,65 @@
+"""``python -m tests.attack TARGET``: hours on purpose, in shards, and the sum of what they have seen.
+
+::
+
+    python -m tests.attack toml --seed 7 --count 5000 --shard 1/4 --save toml_1.json
+    python -m tests.attack --sum toml_*.json
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+from . import imported_files, toml_files
+from .tally import Attack, Shard, Tally, saved_tally
+
+TARGETS: dict[str, Attack] = {
+    "toml": toml_files.attack,
+    "imports": imported_files.attack,
+}
+"""What can be attacked, each by its own file."""
+
+
+def main() -> int:
+    """Attack, or add up; the exit code is 1 when something was found."""
+    options = _options()
+    if options.sum:
+        tallies = _added_up([saved_tally(path) for path in options.sum])
+    else:
+        part, of = (int(each) for each in options.shard.split("/"))
+        shard = Shard(options.seed, options.count, part - 1, of)
+        tallies = [TARGETS[name](shard) for name in options.target or TARGETS]
+    for tally in tallies:
+        print(tally.line())
+        for finding in tally.findings:
+            print(f"  seed {finding.seed}, number {finding.number}: {'; '.join(finding.faults)}")
+            print("    " + finding.told.strip().replace("\n", "\n    "))
+        if options.save is not None:
+            tally.save(options.save)
+    return int(any(tally.findings for tally in tallies))
+
+
+def _added_up(tallies: list[Tally]) -> list[Tally]:
+    sums: dict[str, Tally] = {}
+    for tally in tallies:
+        sums.setdefault(tally.target, Tally(tally.target)).add(tally)
+    return list(sums.values())
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m tests.attack", description=__doc__.split("\n")[0])
+    parser.add_argument("target", nargs="*", choices=[[], *TARGETS], help="all of them if absent")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int, default=500, help="mutants of all shards together")
+    parser.add_argument(
+        "--shard", default="1/1", metavar="I/N", help="only every Nth mutant, from the Ith on"
+    )
+    parser.add_argument("--save", type=Path, metavar="FILE.json", help="what this shard has seen")
+    parser.add_argument(
+        "--sum", type=Path, nargs="+", metavar="FILE.json", help="add up what shards have saved"
+    )
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,30 @@
+"""An attack on commands: cases made by number, each run in a process of its own and judged by its end."""
+
+import random
+from collections.abc import Callable
+
+from .command_runner import CommandRunner
+from .limits import Case, Ending
+from .tally import Finding, Shard, Tally
+
+TOLD = 600
+"""Letters of what a command said that are kept with a finding."""
+
+
+def attack_commands(
+    name: str,
+    mutant: Callable[[random.Random], Case],
+    shard: Shard,
+    judge: Callable[[Case, Ending], tuple[str, ...]] = lambda _, ending: ending.faults,
+) -> Tally:
+    """Run the mutants of a shard, and tell what was found."""
+    tally = Tally(name)
+    with CommandRunner() as runner:
+        for number, chance in shard.chances():
+            case = mutant(chance)
+            ending = runner.run(case)
+            tally.count(ending.code, ending.took_s, ending.peak_bytes)
+            if faults := judge(case, ending):
+                told = (ending.err or ending.out)[-TOLD:]
+                tally.findings.append(Finding(name, shard.seed, number, faults, told))
+    return tally

@@ -1,0 +1,160 @@
+"""Commands one after the other, each in a process of its own that is bounded in time and memory.
+
+Starting an interpreter and importing takes seconds, so one process imports everything and forks itself for
+each command. What is forked ends for good: nothing of a command reaches the next one.
+"""
+
+import json
+import os
+import resource
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from pathlib import Path
+from typing import Self
+
+from .limits import LONGEST_S, MOST_BYTES, Case, Ending
+
+ROOT = Path(__file__).resolve().parents[2]
+GRACE_S = 2.0
+"""A command that hangs is killed this much after its time was up [s]."""
+ADDRESS_ROOM_BYTES = 4 * MOST_BYTES
+"""Addresses that a command may take beyond those of its imports: this protects the computer only."""
+
+
+class CommandRunner:
+    """Runs cases; use it in a ``with``."""
+
+    def __init__(self) -> None:
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200", "PYTHONUNBUFFERED": "1"}
+        self._server = subprocess.Popen(
+            [sys.executable, "-m", f"{__package__}.{Path(__file__).stem}"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=ROOT,
+            env=environment,
+        )
+
+    def run(self, case: Case) -> Ending:
+        """Run a case in a new folder, which is removed afterwards."""
+        with tempfile.TemporaryDirectory(prefix="vibench_attack_") as name:
+            case.lay(Path(name))
+            return self.run_in(Path(name), case.arguments)
+
+    def run_in(self, folder: Path, arguments: tuple[str, ...]) -> Ending:
+        """Run ``vibench`` with arguments in a folder that is there."""
+        before = _files(folder)
+        asked = json.dumps({"folder": str(folder), "arguments": arguments})
+        self._server.stdin.write(asked + "\n")
+        self._server.stdin.flush()
+        answer = self._server.stdout.readline()
+        if not answer:
+            raise RuntimeError("the process that forks for each command has ended")
+        return Ending(**json.loads(answer), made=tuple(sorted(_files(folder) - before)))
+
+    def close(self) -> None:
+        """End the process that imported everything."""
+        self._server.stdin.close()
+        self._server.wait()
+        self._server.stdout.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _files(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def serve() -> None:
+    """Fork for each line of standard input, and say on standard output how the command ended."""
+    import vibench.cli.blas_threads  # noqa: I001 - numpy reads its setting, so it comes first
+    import vibench.analysis
+    import vibench.cli.__main__
+    import vibench.cli.analyse
+    import vibench.cli.import_recording
+    import vibench.cli.measure
+    import vibench.cli.study  # noqa: F401
+
+    for line in sys.stdin:
+        asked = json.loads(line)
+        print(json.dumps(ended(Path(asked["folder"]), asked["arguments"])), flush=True)
+
+
+def ended(folder: Path, arguments: list[str]) -> dict[str, object]:
+    """Run one command to its end, or to the end of its time."""
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        began = time.monotonic()
+        number = os.fork()
+        if number == 0:
+            _become_command(folder, arguments, out.fileno(), err.fileno())
+        status, usage = _waited(number)
+        return {
+            "code": os.waitstatus_to_exitcode(status),
+            "took_s": time.monotonic() - began,
+            "peak_bytes": usage.ru_maxrss * 1024,
+            "out": _text(out),
+            "err": _text(err),
+        }
+
+
+def _waited(number: int) -> tuple[int, resource.struct_rusage]:
+    """Wait for a process to end, or end it with everything that it started."""
+    descriptor = os.pidfd_open(number)
+    try:
+        ready, _, _ = select.select([descriptor], [], [], LONGEST_S + GRACE_S)
+    finally:
+        os.close(descriptor)
+    if not ready:
+        os.killpg(number, signal.SIGKILL)
+    _, status, usage = os.wait4(number, 0)
+    return status, usage
+
+
+def _text(file: object) -> str:
+    file.seek(0)
+    return file.read().decode(errors="replace")
+
+
+def _become_command(folder: Path, arguments: list[str], out: int, err: int) -> None:
+    """Never returns."""
+    os.setpgid(0, 0)
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(out, 1)
+    os.dup2(err, 2)
+    os.chdir(folder)
+    room = _addresses_bytes() + ADDRESS_ROOM_BYTES
+    resource.setrlimit(resource.RLIMIT_AS, (room, room))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    sys.argv = ["vibench", *arguments]
+    code = 1
+    try:
+        from vibench.cli.__main__ import main
+
+        main()
+        code = 0
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else int(end.code is not None)
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+
+
+def _addresses_bytes() -> int:
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    return pages * resource.getpagesize()
+
+
+if __name__ == "__main__":
+    serve()

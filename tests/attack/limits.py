@@ -1,0 +1,61 @@
+"""What may happen when a command reads a damaged file: bounds, how it ended, and what was wrong with that."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+LONGEST_S = 10.0
+"""A command that reads one damaged file must have ended by then [s]."""
+MOST_BYTES = 1_000_000_000
+"""Resident memory that such a command may have had at its peak."""
+LONGEST_COMPLAINT = 2_000
+"""Letters of standard error: a sentence, and what it lists."""
+STOPPED = 3
+"""Exit code of what was stopped before its end."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A command, and the files of the folder in which it is run."""
+
+    arguments: tuple[str, ...]
+    files: Mapping[str, bytes] = field(default_factory=dict)
+
+    def lay(self, folder: Path) -> None:
+        """Write the files."""
+        for name, content in self.files.items():
+            path = folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a command's process ended."""
+
+    code: int
+    """Exit code; the negative number of the signal that ended it."""
+    out: str
+    err: str
+    took_s: float
+    peak_bytes: int
+    """Largest resident memory, that of the interpreter and its libraries included."""
+    made: tuple[str, ...] = ()
+    """Files that lie in its folder afterwards and did not before."""
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """What must not be, whatever was given: empty when the command behaved."""
+        return tuple(said for said, is_so in self._possible_faults() if is_so)
+
+    def _possible_faults(self) -> tuple[tuple[str, bool], ...]:
+        complaint = [line for line in self.err.splitlines() if line.startswith("error: ")]
+        return (
+            (f"took {self.took_s:.1f} s", self.took_s > LONGEST_S),
+            (f"took {self.peak_bytes / 1e6:.0f} MB", self.peak_bytes > MOST_BYTES),
+            ("a traceback", "Traceback (most recent call last)" in self.err),
+            (f"exit code {self.code}", self.code not in {0, 1, 2, STOPPED} and self.took_s <= LONGEST_S),
+            ("an error, and exit code 0", self.code == 0 and bool(complaint)),
+            (f"{len(complaint)} sentences, and exit code 1", self.code == 1 and len(complaint) != 1),
+            (f"{len(self.err)} letters of complaint", len(self.err) > LONGEST_COMPLAINT),
+        )

@@ -1,0 +1,84 @@
+"""What the attacks stand on: mutants by number, shards that add up, commands judged by how they end."""
+
+import random
+from dataclasses import replace
+
+import pytest
+
+from .byte_mutants import mutated_bytes
+from .command_runner import CommandRunner
+from .limits import LONGEST_COMPLAINT, LONGEST_S, MOST_BYTES, Case, Ending
+from .tally import Finding, Shard, Tally, saved_tally
+from .text_mutants import mutated_toml
+from .toml_files import CAMPAIGNS, reading
+
+GOOD = Ending(code=0, out="{}", err="", took_s=1.0, peak_bytes=200_000_000)
+REFUSED = replace(GOOD, code=1, err="error: what was given is not allowed; give another\n")
+
+
+@pytest.mark.parametrize("ending", [GOOD, REFUSED, replace(GOOD, code=2, err="Usage: vibench ...")])
+def test_an_answer_and_a_sentence_are_no_faults(ending):
+    assert ending.faults == ()
+
+
+@pytest.mark.parametrize(
+    "ending",
+    [
+        replace(GOOD, took_s=LONGEST_S + 1),
+        replace(GOOD, peak_bytes=MOST_BYTES + 1),
+        replace(GOOD, code=-11),
+        replace(GOOD, code=137),
+        replace(GOOD, err="error: all is lost\n"),
+        replace(GOOD, code=1),
+        replace(REFUSED, err="Traceback (most recent call last):\n" + REFUSED.err),
+        replace(REFUSED, err=2 * REFUSED.err),
+        replace(REFUSED, err=REFUSED.err + "x" * LONGEST_COMPLAINT),
+    ],
+)
+def test_each_thing_that_may_not_be_is_a_fault(ending):
+    assert len(ending.faults) == 1
+
+
+def test_a_mutant_depends_on_its_seed_and_number_only():
+    def mutants(shard):
+        return {number: mutated_toml(CAMPAIGNS[0], chance) for number, chance in shard.chances()}
+
+    whole = mutants(Shard(7, 40))
+    parts = [mutants(Shard(7, 40, part, 3)) for part in range(3)]
+    assert whole == {number: text for part in parts for number, text in part.items()}
+    assert sum(len(part) for part in parts) == 40
+    assert len(set(whole.values())) > 30
+    assert whole != mutants(Shard(8, 40))
+
+
+def test_shards_are_added_up(tmp_path):
+    first, second = Tally("toml"), Tally("toml")
+    first.count(0, took_s=2.0, peak_bytes=5)
+    second.count(0, took_s=1.0, peak_bytes=7)
+    second.count(1)
+    second.findings.append(Finding("toml", 1, 2, ("a traceback",), "TypeError"))
+    second.save(tmp_path / "second.json")
+    first.add(saved_tally(tmp_path / "second.json"))
+    assert first == Tally("toml", 3, {"0": 2, "1": 1}, 2.0, 7, second.findings)
+    with pytest.raises(ValueError, match="different targets"):
+        first.add(Tally("imports"))
+
+
+def test_mutants_of_nothing_are_mutants_too():
+    for number in range(200):
+        chance = random.Random(number)
+        assert isinstance(mutated_bytes(b"", chance, (b"abc",)), bytes)
+        assert isinstance(mutated_toml("", chance, ("a = 1",)), bytes)
+
+
+def test_a_command_runs_in_a_process_of_its_own():
+    with CommandRunner() as runner:
+        good = runner.run(reading("campaign", CAMPAIGNS[0].encode()))
+        bad = runner.run(reading("campaign", b"name = 3"))
+        none = runner.run(Case(("measure", "no.toml", "--out", "x")))
+    assert (good.code, good.faults, good.made) == (0, (), ())
+    assert '"recordings": 7' in good.out
+    assert (bad.code, none.code) == (1, 1)
+    assert bad.err.startswith("error: broken.toml: name = 3")
+    assert bad.faults == none.faults == ()
+    assert all(50e6 < each.peak_bytes < 500e6 for each in (good, bad, none))
