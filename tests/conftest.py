@@ -77,6 +77,7 @@ LONG = (
     "tests/gui/window/test_window.py",
     "tests/gui/plots/test_logical_line.py",
     "tests/analysis/reproduction/test_reproduction.py",
+    "tests/acquisition/engine/test_stopping_for_sure.py",
     "tests/acquisition/engine/test_heartbeat.py",
     "tests/analysis/frequency_response/test_noise_response.py",
     "tests/cli/test_campaign_commands.py",

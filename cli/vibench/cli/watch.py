@@ -11,7 +11,10 @@ from vibench.acquisition.engine import (
     Announcement,
     EngineClient,
     EngineGone,
+    EngineSilent,
+    StopDelivery,
     announced_engines,
+    stop_engine,
     the_engine,
 )
 
@@ -58,12 +61,20 @@ def stop(
 ) -> None:
     """Stop what an engine drives, and the campaign with it; the recording is kept and says why."""
     engine = the_engine(pid)
-    with EngineClient.attach(engine.address) as client:
-        client.stop(level, reason)
-    told = (
-        "to hold; 'vibench release' lets it go on" if level is StopLevel.HOLD else f"to stop ({level.value})"
-    )
-    console.print(f"{engine.what}, process {engine.pid}: told {told}.")
+    name = f"{engine.what}, process {engine.pid}"
+    match stop_engine(engine, level, reason):
+        case StopDelivery.KEPT:
+            raise EngineSilent(
+                f"{name} lives and does not answer: it hangs, or was stopped. The stop ({level.value}) is "
+                "kept, and obeyed when it comes back; what it drives goes on until then: in an emergency "
+                "switch the amplifier off by hand"
+            )
+        case StopDelivery.TAKEN:
+            console.print(f"{name}: does not answer, and has taken the stop ({level.value}).")
+        case StopDelivery.TOLD if level is StopLevel.HOLD:
+            console.print(f"{name}: told to hold; 'vibench release' lets it go on.")
+        case StopDelivery.TOLD:
+            console.print(f"{name}: told to stop ({level.value}).")
 
 
 def release(pid: Pid = None) -> None:
@@ -76,6 +87,16 @@ def release(pid: Pid = None) -> None:
 
 
 def _facts(engine: Announcement) -> dict[str, object]:
-    with EngineClient.attach(engine.address) as client:
-        status = client.status().model_dump(mode="json")
-    return {"pid": engine.pid, "what": engine.what, "started_utc": engine.started_utc, "status": status}
+    status, silence = None, ""
+    try:
+        with EngineClient.attach(engine.address) as client:
+            status = client.status().model_dump(mode="json")
+    except EngineGone as error:
+        silence = str(error)
+    return {
+        "pid": engine.pid,
+        "what": engine.what,
+        "started_utc": engine.started_utc,
+        "status": status,
+        "silence": silence,
+    }

@@ -14,6 +14,7 @@ from ._engine import (
 )
 from ._errors import (
     EngineGone as EngineGone,
+    EngineSilent as EngineSilent,
 )
 from ._heartbeat import (
     Heartbeat as Heartbeat,
@@ -50,4 +51,8 @@ from ._status import (
     MessageKind as MessageKind,
     RowStatus as RowStatus,
     RunStatus as RunStatus,
+)
+from ._stop_engine import (
+    StopDelivery as StopDelivery,
+    stop_engine as stop_engine,
 )

@@ -11,7 +11,7 @@ from ..host import ClosedOnLeaving, chosen
 from ..plan import Campaign
 from ._address import EngineAddress
 from ._campaign_request import CampaignRequest
-from ._connection import connected, exchanged
+from ._connection import PATIENCE_S, connected, exchanged
 from ._state import ConnectionRole
 from ._status import ArmedPlan, EngineStatus, RowStatus
 from ._verbs import EngineVerbs, Verb
@@ -34,10 +34,22 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
 
     @classmethod
     def attach(
-        cls, address: EngineAddress, role: ConnectionRole | str = ConnectionRole.VISITING
+        cls,
+        address: EngineAddress,
+        role: ConnectionRole | str = ConnectionRole.VISITING,
+        patience_s: float = PATIENCE_S,
     ) -> "EngineClient":
-        """Connect to a running engine, for a look or to attend to its run."""
-        return cls(connected(address, chosen(ConnectionRole, role)))
+        """Connect to a running engine, for a look or to attend to its run.
+
+        Raises
+        ------
+        EngineSilent
+            When no answer comes within ``patience_s`` [s], now or later.
+        EngineGone
+            When nobody listens there.
+
+        """
+        return cls(connected(address, chosen(ConnectionRole, role), patience_s))
 
     def status(self) -> EngineStatus:
         """Where the engine stands."""

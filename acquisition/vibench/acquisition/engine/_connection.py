@@ -8,9 +8,9 @@ from .. import errors
 from ..errors import AcquisitionError
 from ..host import FrozenModel
 from ._address import EngineAddress
-from ._errors import EngineError, EngineGone
+from ._errors import EngineError, EngineGone, EngineSilent
 from ._state import ConnectionRole
-from ._wire import Message, receive, send
+from ._wire import ANSWERS, Message, receive, send
 
 PATIENCE_S = 5.0
 """How long an answer may take; the engine answers from what it holds, in milliseconds [s]."""
@@ -24,11 +24,13 @@ class Hello(FrozenModel):
     role: ConnectionRole = ConnectionRole.VISITING
 
 
-def connected(address: EngineAddress, role: ConnectionRole) -> socket.socket:
-    """Connect to a running engine and be let in."""
+def connected(address: EngineAddress, role: ConnectionRole, patience_s: float = PATIENCE_S) -> socket.socket:
+    """Connect to a running engine and be let in; no answer on the connection may take ``patience_s``."""
     hello = Hello(token=address.token, role=role)
     try:
-        connection = socket.create_connection((address.host, address.port), PATIENCE_S)
+        connection = socket.create_connection((address.host, address.port), patience_s)
+    except TimeoutError as error:
+        raise _silent(patience_s) from error
     except OSError as error:
         raise EngineGone(
             f"no engine answers at {address.host}:{address.port} ({error}); start one, or see whether it "
@@ -48,17 +50,23 @@ def exchanged(connection: socket.socket, request: Message) -> tuple[dict[str, An
 
     Raises
     ------
+    EngineSilent
+        When no answer comes in time; the connection is closed then.
     EngineGone
-        When no answer comes; the connection is closed then.
+        When the connection has ended; it is closed then.
     AcquisitionError
         What the engine refuses with.
 
     """
+    patience_s = connection.gettimeout() or PATIENCE_S
     try:
         send(connection, request)
-        answer = receive(connection)
-    except OSError as error:
+        answer = receive(connection, ANSWERS)
+    except TimeoutError as error:
         # An answer that comes late must not be taken for that to the next question.
+        connection.close()
+        raise _silent(patience_s) from error
+    except OSError as error:
         connection.close()
         raise EngineGone(
             f"the engine does not answer ({error}); its process has ended or hangs. What it drove is "
@@ -68,6 +76,14 @@ def exchanged(connection: socket.socket, request: Message) -> tuple[dict[str, An
     if "refused" in facts:
         raise _refusal(facts["kind"], facts["refused"])
     return facts, answer.payload
+
+
+def _silent(patience_s: float) -> EngineSilent:
+    return EngineSilent(
+        f"the engine does not answer within {patience_s:g} s; its process hangs, or was stopped. What it "
+        "drives may go on: 'vibench stop' leaves a stop that it obeys when it comes back; in an emergency "
+        "switch the amplifier off by hand"
+    )
 
 
 def _refusal(kind: str, sentence: str) -> AcquisitionError:

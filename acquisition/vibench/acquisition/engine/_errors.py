@@ -9,3 +9,7 @@ class EngineError(AcquisitionError):
 
 class EngineGone(EngineError, ConnectionError):
     """The engine's process has ended, or cannot be reached."""
+
+
+class EngineSilent(EngineGone):
+    """The engine has not answered in time; its process may live."""

@@ -4,25 +4,26 @@
 engine's own thread is at work.
 """
 
-import hmac
 import json
 import secrets
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
-from threading import Event, Thread
+from dataclasses import dataclass
+from threading import Event, Lock, Thread
+from time import monotonic
 
 from pydantic import ValidationError
 
 from ..errors import AcquisitionError
 from ._address import EngineAddress
+from ._admission import Admission
 from ._announcement import announced
-from ._connection import Hello
-from ._errors import EngineError
+from ._kept_stops import KeptStops
 from ._request_handler import RequestHandler
 from ._state import ConnectionRole
 from ._verbs import DONE, REQUEST, VERBS
-from ._wire import Message, WireError, receive, send
+from ._wire import REQUESTS, Message, receive, refused, send
 
 
 def answered(handler: RequestHandler, message: Message) -> Message:
@@ -41,14 +42,18 @@ def answered(handler: RequestHandler, message: Message) -> Message:
         return refused(str(error), error)
 
 
-def refused(sentence: str, error: Exception) -> Message:
-    """Say no."""
-    return Message(json.dumps({"refused": sentence, "kind": type(error).__name__}).encode())
-
-
 LOOPBACK = "127.0.0.1"
-GREETING_S = 5.0
-"""How long a connection may take to say who it is [s]."""
+VIEWERS_MOST = 16
+"""With one more, the one that has asked nothing for longest is let go: a frozen one holds 20 MB."""
+REQUEST_S = 10.0
+"""How long a request may take, from its first byte to its last [s]."""
+
+
+@dataclass
+class _Viewer:
+    connection: socket.socket
+    role: ConnectionRole
+    asked_s: float
 
 
 class Server:
@@ -57,8 +62,10 @@ class Server:
     def __init__(self, handler: RequestHandler, host: str = LOOPBACK, port: int = 0) -> None:
         self._handler = handler
         self._token = secrets.token_urlsafe(32)
+        self._viewers: dict[int, _Viewer] = {}
+        self._coming_and_going = Lock()
         self._listening = socket.create_server((host, port))
-        Thread(target=self._accept, name="engine server", daemon=True).start()
+        self._admission = Admission(self._listening, self._token, self._welcome, self._make_room)
 
     @property
     def address(self) -> EngineAddress:
@@ -68,44 +75,57 @@ class Server:
 
     def close(self) -> None:
         """Let nobody in any more."""
+        self._admission.close()
         self._listening.close()
 
-    def _accept(self) -> None:
-        while True:
-            try:
-                connection, _ = self._listening.accept()
-            except OSError:  # closed
-                return
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            Thread(target=self._serve, args=(connection,), name="engine viewer", daemon=True).start()
-
-    def _serve(self, connection: socket.socket) -> None:
-        """Answer one viewer until it goes. A viewer that does not read blocks this thread, and no other."""
-        with connection, suppress(WireError, OSError):
-            connection.settimeout(GREETING_S)
-            role = self._let_in(connection)
-            if role is None:
-                return
-            connection.settimeout(None)
-            while True:
-                message = receive(connection)
-                if role is ConnectionRole.ATTENDING:
-                    self._handler.note_presence()
-                send(connection, answered(self._handler, message))
-
-    def _let_in(self, connection: socket.socket) -> ConnectionRole | None:
-        """Say what the connection is for, or turn it away."""
+    def _welcome(self, connection: socket.socket, role: ConnectionRole) -> None:
+        """Serve a viewer that has shown the token, in a thread of its own."""
+        viewer = _Viewer(connection, role, monotonic())
+        with self._coming_and_going:
+            self._viewers[id(viewer)] = viewer
+            surplus = len(self._viewers) - VIEWERS_MOST
+        if surplus > 0:
+            self._make_room()
         try:
-            hello = Hello.model_validate_json(receive(connection).text)
-        except ValidationError:
-            hello = Hello(token="")
-        if hmac.compare_digest(hello.token.encode(), self._token.encode()):
-            if hello.role is ConnectionRole.ATTENDING:
-                self._handler.note_presence()
-            send(connection, DONE.written(None))
-            return hello.role
-        send(connection, refused("the token is not this engine's; nobody was let in", EngineError()))
-        return None
+            Thread(target=self._serve, args=(viewer,), name="engine viewer", daemon=True).start()
+        except RuntimeError:  # the system gives no more threads
+            self._leave(viewer)
+
+    def _make_room(self) -> None:
+        """Let go of who has asked nothing for longest; of one that attends only if there is no other."""
+        with self._coming_and_going:
+            viewers = sorted(
+                self._viewers.values(),
+                key=lambda each: (each.role is ConnectionRole.ATTENDING, each.asked_s),
+            )
+        if viewers:
+            # Wakes its thread, wherever that waits; closing alone would not.
+            with suppress(OSError):
+                viewers[0].connection.shutdown(socket.SHUT_RDWR)
+
+    def _leave(self, viewer: _Viewer) -> None:
+        with self._coming_and_going:
+            self._viewers.pop(id(viewer), None)
+        viewer.connection.close()
+
+    def _serve(self, viewer: _Viewer) -> None:
+        """Answer one viewer until it goes. A viewer that does not read blocks this thread, and no other."""
+        try:
+            self._note(viewer)
+            send(viewer.connection, DONE.written(None))
+            while True:
+                message = receive(viewer.connection, REQUESTS, REQUEST_S)
+                self._note(viewer)
+                send(viewer.connection, answered(self._handler, message))
+        except OSError:  # it has gone, or does not speak this protocol
+            pass
+        finally:
+            self._leave(viewer)
+
+    def _note(self, viewer: _Viewer) -> None:
+        viewer.asked_s = monotonic()
+        if viewer.role is ConnectionRole.ATTENDING:
+            self._handler.note_presence()
 
 
 def spoken(address: EngineAddress) -> str:
@@ -114,33 +134,45 @@ def spoken(address: EngineAddress) -> str:
 
 
 INTERVAL_S = 0.05
-"""How often deadlines are looked at [s]."""
+"""How often deadlines, and stops that were put down, are looked at [s]."""
 
 
 class Watchdog:
-    """Lets the request handler enforce its deadlines at every `INTERVAL_S`, until closed."""
+    """Lets something be done at every `INTERVAL_S`, in a thread of its own, until closed."""
 
-    def __init__(self, handler: RequestHandler) -> None:
-        self._handler = handler
+    def __init__(self, look: Callable[[], None], name: str) -> None:
+        self._look = look
         self._closing = Event()
-        self._thread = Thread(target=self._run, name="engine watchdog", daemon=True)
+        self._thread = Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
     def close(self) -> None:
-        """Stop watching."""
+        """Stop watching; a look that hangs, in a folder that has gone away, is left alone."""
         self._closing.set()
-        self._thread.join()
+        self._thread.join(LEFT_ALONE_S)
 
     def _run(self) -> None:
         while not self._closing.wait(INTERVAL_S):
-            self._handler.enforce_deadlines()
+            self._look()
+
+
+LEFT_ALONE_S = 1.0
 
 
 @contextmanager
 def serving(handler: RequestHandler, what: str, host: str = LOOPBACK) -> Iterator[Server]:
-    """Serve a request handler; ``what`` is shown to those who look for an engine."""
+    """Serve a request handler; ``what`` is shown to those who look for an engine.
+
+    Raises
+    ------
+    EngineError
+        When the state folder cannot be written: nobody could stop what cannot be found.
+
+    """
     with ExitStack() as inside:
         server = inside.enter_context(closing(Server(handler, host)))
-        inside.enter_context(closing(Watchdog(handler)))
+        inside.enter_context(closing(Watchdog(handler.enforce_deadlines, "engine watchdog")))
+        kept = KeptStops.of_this_process(handler.stop)
+        inside.enter_context(closing(Watchdog(kept.obey, "engine kept stops")))
         inside.enter_context(announced(server.address, what))
         yield server

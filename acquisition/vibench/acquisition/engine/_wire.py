@@ -1,18 +1,35 @@
 """Messages on a stream: a short binary head, a JSON text, and samples behind it where there are any.
 
 Nothing that is executable is ever sent: what comes from another process is parsed as JSON or taken as
-numbers, never unpickled.
+numbers, never unpickled. What is declared costs no memory: only what has come is held, and each side says
+how long a message may be.
 """
 
+import json
 import socket
 import struct
 from dataclasses import dataclass
+from time import monotonic
 
 HEAD = struct.Struct("!4sII")
 MAGIC = b"VBE1"
-LONGEST_TEXT = 32_000_000
-"""A campaign of thousands of measurements; anything longer is not ours."""
-LONGEST_PAYLOAD = 64_000_000
+PIECE_BYTES = 1 << 18
+"""Most that is read at once."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """The longest message that is taken."""
+
+    text_bytes: int
+    payload_bytes: int = 0
+
+
+HELLO = Bounds(1_000)
+"""Before the token was shown."""
+REQUESTS = Bounds(32_000_000)
+"""A campaign of thousands of measurements; no request carries samples."""
+ANSWERS = Bounds(32_000_000, 64_000_000)
 
 
 class WireError(ConnectionError):
@@ -27,33 +44,76 @@ class Message:
     payload: bytes = b""
 
 
+class IncomingMessage:
+    """A message that comes in pieces."""
+
+    def __init__(self, bounds: Bounds) -> None:
+        self._bounds = bounds
+        self._came = bytearray()
+        self._text_end = self._end = HEAD.size
+        self._has_head = False
+
+    @property
+    def missing(self) -> int:
+        """Bytes to read before anything more can be said; 0 when the message is complete."""
+        return self._end - len(self._came)
+
+    def take(self, piece: bytes) -> None:
+        """Take what has come, at most `missing` bytes; raises WireError for what is no message."""
+        if not piece:
+            raise WireError("the other side closed the connection")
+        self._came += piece
+        if not self._has_head and self.missing == 0:
+            self._read_head()
+
+    def message(self) -> Message:
+        """Give the complete message."""
+        came = memoryview(self._came)
+        return Message(bytes(came[HEAD.size : self._text_end]), bytes(came[self._text_end :]))
+
+    def _read_head(self) -> None:
+        magic, text_bytes, payload_bytes = HEAD.unpack(self._came)
+        is_ours = magic == MAGIC
+        if not is_ours or text_bytes > self._bounds.text_bytes or payload_bytes > self._bounds.payload_bytes:
+            raise WireError("what came over the connection is no message of this protocol; it was closed")
+        self._has_head = True
+        self._text_end += text_bytes
+        self._end = self._text_end + payload_bytes
+
+
+def refused(sentence: str, error: Exception) -> Message:
+    """Say no, in one sentence."""
+    return Message(json.dumps({"refused": sentence, "kind": type(error).__name__}).encode())
+
+
 def send(connection: socket.socket, message: Message) -> None:
     """Send one message; raises OSError when the other side is gone."""
     head = HEAD.pack(MAGIC, len(message.text), len(message.payload))
-    connection.sendall(head + message.text + message.payload)
+    connection.sendall(head + message.text)
+    if message.payload:
+        connection.sendall(message.payload)
 
 
-def receive(connection: socket.socket) -> Message:
-    """Wait for one message.
+def receive(connection: socket.socket, bounds: Bounds, within_s: float | None = None) -> Message:
+    """Wait for one message, as long as the connection's timeout allows; from its first byte on ``within_s``.
 
     Raises
     ------
     WireError
         When the connection ends, or what comes is not a message.
+    TimeoutError
+        When it does not come in time.
 
     """
-    magic, text_bytes, payload_bytes = HEAD.unpack(_exactly(connection, HEAD.size))
-    if magic != MAGIC or text_bytes > LONGEST_TEXT or payload_bytes > LONGEST_PAYLOAD:
-        raise WireError("what came over the connection is no message of this protocol; it was closed")
-    return Message(_exactly(connection, text_bytes), _exactly(connection, payload_bytes))
-
-
-def _exactly(connection: socket.socket, count: int) -> bytes:
-    parts = bytearray(count)
-    view = memoryview(parts)
-    while view:
-        got = connection.recv_into(view)
-        if got == 0:
-            raise WireError("the other side closed the connection")
-        view = view[got:]
-    return bytes(parts)
+    incoming = IncomingMessage(bounds)
+    patience_s, until_s = connection.gettimeout(), None
+    try:
+        while incoming.missing:
+            incoming.take(connection.recv(min(incoming.missing, PIECE_BYTES)))
+            if within_s is not None:
+                until_s = monotonic() + within_s if until_s is None else until_s
+                # Not 0: that would mean not to wait at all.
+                connection.settimeout(max(until_s - monotonic(), 1e-3))
+    finally:
+        connection.settimeout(patience_s)
+    return incoming.message()

@@ -1,4 +1,4 @@
-"""What the computer provides: TOML files in and out, shipped files, the state folder, the parent process.
+"""What the computer provides: TOML files in and out, shipped files, the state folder, processes.
 
 `FrozenModel` is the base of every validated value; what a file says wrongly is refused with file, key,
 what was given and what is allowed. ``VIBENCH_STATE_DIR`` names another state folder. Knows nothing of

@@ -1,0 +1,81 @@
+"""Stops that need no connection: a file in the state folder, which the engine looks for all the time.
+
+Its name says everything: which process, when that began, how hard. So it is found with a look at a name,
+by an engine that may open no more files, and it can be put down on a disk that takes no more bytes; what
+it holds is the reason, where there is room for one.
+"""
+
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from threading import get_ident
+
+from ..host import process_start, state_folder
+from ..stopping import StopLevel
+
+LONGEST_REASON = 500
+SILENT_REASON = "a stop that was left in the state folder"
+
+
+def engines_folder() -> Path:
+    """Give the folder in which engines are announced and stops are put down; nobody else's business."""
+    folder = state_folder() / "engines"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    if folder.stat().st_mode & 0o077:
+        folder.chmod(0o700)
+    return folder
+
+
+class KeptStops:
+    """The stops that are put down for one process."""
+
+    def __init__(
+        self, pid: int, process_start: str, press: Callable[[StopLevel, str], None], folder: Path
+    ) -> None:
+        self._paths = {
+            level: folder / f"{pid}.{process_start}.stop-{level.value}" for level in reversed(StopLevel)
+        }
+        self._press = press
+        self._obeyed: dict[Path, tuple[int, int]] = {}
+
+    @classmethod
+    def of_this_process(cls, press: Callable[[StopLevel, str], None]) -> "KeptStops":
+        """Look for stops of this process; ``press`` carries them out."""
+        return cls(os.getpid(), process_start(os.getpid()) or "", press, engines_folder())
+
+    def obey(self) -> None:
+        """Carry out what was put down since the last look, the hardest first, and take it away."""
+        for level, path in self._paths.items():
+            try:
+                found = path.stat()
+            except OSError:  # not there, or the folder is not
+                continue
+            mark = (found.st_ino, found.st_mtime_ns)
+            if self._obeyed.get(path) == mark:
+                continue
+            self._obeyed[path] = mark  # where it cannot be taken away, it is still obeyed only once
+            self._press(level, _reason(path))
+            with suppress(OSError):
+                path.unlink()
+
+
+def _reason(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace") or SILENT_REASON
+    except OSError:  # not even one descriptor is left
+        return SILENT_REASON
+
+
+def put_down(pid: int, process_start: str, level: StopLevel, reason: str) -> Path:
+    """Leave a stop for a process; raises OSError when there is no room for a name."""
+    path = engines_folder() / f"{pid}.{process_start}.stop-{level.value}"
+    coming = path.with_name(f"{path.name}-{os.getpid()}-{get_ident()}")
+    descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    try:
+        with suppress(OSError):  # a full disk: the name says what matters
+            os.write(descriptor, reason.encode()[:LONGEST_REASON])
+    finally:
+        os.close(descriptor)
+    os.replace(coming, path)  # noqa: PTH105 - the pair of os.open
+    return path

@@ -1,0 +1,95 @@
+"""Stopping an engine whatever state it is in: it is told, and the stop is put down for it as well."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from enum import StrEnum
+from pathlib import Path
+from threading import Event
+from time import monotonic
+
+from ..host import chosen
+from ..stopping import StopLevel
+from ._announcement import Announcement
+from ._client import EngineClient
+from ._errors import EngineError, EngineGone
+from ._kept_stops import put_down
+
+PATIENCE_S = 1.0
+"""How long an engine may take to answer, and then to take what was put down; both take milliseconds [s]."""
+LOOK_S = 0.02
+
+
+class StopDelivery(StrEnum):
+    """How a stop has reached an engine."""
+
+    TOLD = "told"
+    """It has answered."""
+    TAKEN = "taken"
+    """It did not answer, and has taken the stop that was put down for it."""
+    KEPT = "kept"
+    """It did neither: its process lives, and obeys as soon as it comes back."""
+
+
+def stop_engine(
+    engine: Announcement, level: StopLevel | str = StopLevel.RAMP, reason: str = "stopped by the operator"
+) -> StopDelivery:
+    """Stop what an engine drives, and the campaign with it.
+
+    The stop is put down in the state folder before the engine is told, so that it is obeyed within a
+    twentieth of a second even where no connection comes about, and later where the process stands still.
+    A hold is only told: nobody wants one to begin unexpectedly.
+
+    Raises
+    ------
+    EngineGone
+        When the process has ended, or when it could neither be told nor anything be put down.
+
+    """
+    level = chosen(StopLevel, level)
+    if level is StopLevel.HOLD:
+        _tell(engine, level, reason)
+        return StopDelivery.TOLD
+    path, trouble = _put_down(engine, level, reason)
+    try:
+        _tell(engine, level, reason)
+    except EngineError as error:
+        if path is not None:
+            return _taken_or_kept(engine, path)
+        raise EngineGone(
+            f"{error}. Nor could a stop be left for it in the state folder: {trouble}"
+        ) from error
+    if path is not None:
+        with suppress(OSError):
+            path.unlink()
+    return StopDelivery.TOLD
+
+
+def _put_down(engine: Announcement, level: StopLevel, reason: str) -> tuple[Path | None, str]:
+    try:
+        return put_down(engine.pid, engine.process_start, level, reason), ""
+    except OSError as error:
+        return None, str(error)
+
+
+def _tell(engine: Announcement, level: StopLevel, reason: str) -> None:
+    with EngineClient.attach(engine.address, patience_s=PATIENCE_S) as client:
+        client.stop(level, reason)
+
+
+def _taken_or_kept(engine: Announcement, path: Path) -> StopDelivery:
+    if _until(lambda: not path.exists()):
+        return StopDelivery.TAKEN
+    if engine.is_alive:
+        return StopDelivery.KEPT
+    with suppress(OSError):
+        path.unlink()
+    raise EngineGone(f"process {engine.pid} ({engine.what}) has ended; look at the bench")
+
+
+def _until(is_so: Callable[[], bool]) -> bool:
+    give_up_s, pause = monotonic() + PATIENCE_S, Event()
+    while not is_so():
+        if monotonic() > give_up_s:
+            return False
+        pause.wait(LOOK_S)
+    return True

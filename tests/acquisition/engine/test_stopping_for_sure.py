@@ -1,0 +1,208 @@
+"""Nothing keeps a stop from a living engine: a stall, thousands of connections, no descriptors, no socket."""
+
+import json
+import os
+import resource
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from threading import Event
+
+import pytest
+
+from vibench.acquisition import StopLevel, open_recording
+from vibench.acquisition.engine import (
+    EngineClient,
+    EngineGone,
+    EngineSilent,
+    EngineState,
+    StopDelivery,
+    Supervision,
+    announced_engines,
+    start_engine,
+    stop_engine,
+    the_engine,
+)
+from vibench.acquisition.engine._admission import GREETING_S, WAITING_MOST
+from vibench.acquisition.engine._announcement import Announcement
+from vibench.acquisition.engine._kept_stops import engines_folder
+from vibench.acquisition.engine._server import VIEWERS_MOST
+from vibench.acquisition.engine._state import ConnectionRole
+from vibench.acquisition.engine._wire import HEAD, MAGIC
+from vibench.acquisition.rig import load_rig
+
+from .conftest import ROOT, campaign, until, until_state, until_there
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="stalls and descriptors as Linux has them")
+
+PAUSE = Event()
+
+
+@pytest.fixture(scope="module")
+def one_state(tmp_path_factory):
+    """One state folder for all: there the one engine of these tests is found."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("state")
+        patch.setenv("VIBENCH_STATE_DIR", str(folder))
+        yield folder
+
+
+@pytest.fixture(autouse=True)
+def own_state(one_state):
+    """Instead of one for each test."""
+
+
+@pytest.fixture(scope="module")
+def process(one_state):
+    """An unattended engine with an open bench: to start one takes seconds."""
+    with start_engine(Supervision.UNATTENDED) as process:
+        process.client.open(load_rig(ROOT / "hardware_configs" / "virtual_rig.toml"))
+        until_state(process.client, EngineState.READY)
+        yield process
+
+
+@pytest.fixture
+def running(process, tmp_path):
+    """The engine in the middle of a long dwell."""
+    with suppress(EngineGone):  # it may have let go of this viewer
+        process.client.close()
+    process.client = EngineClient.attach(process.address, ConnectionRole.ATTENDING)
+    process.client.arm(campaign("run"), tmp_path)
+    process.client.start()
+    until(process.client, lambda status: status.run is not None and status.run.segment == "dwell")
+    yield process
+    until_state(process.client, EngineState.READY)
+
+
+@contextmanager
+def stalled(process):
+    os.kill(process.pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(process.pid, signal.SIGCONT)
+
+
+@contextmanager
+def connections(address, count, said=b""):
+    """Connections that say nothing, or no more than the beginning of something."""
+    with ExitStack() as all_of_them:
+        for _ in range(count):
+            each = all_of_them.enter_context(socket.socket())
+            each.setblocking(False)
+            each.connect_ex((address.host, address.port))
+            if said:
+                with suppress(OSError):
+                    each.send(said)
+        yield
+
+
+@contextmanager
+def without_descriptors(process):
+    """Let a process open nothing more than it has open."""
+    before = resource.prlimit(process.pid, resource.RLIMIT_NOFILE)
+    highest = max(int(each.name) for each in Path(f"/proc/{process.pid}/fd").iterdir())
+    # What is closed from now on is free again, and no more than that.
+    resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (highest + 1, before[1]))
+    try:
+        yield
+    finally:
+        resource.prlimit(process.pid, resource.RLIMIT_NOFILE, before)
+
+
+def ended_by(tmp_path, reason):
+    until_there(tmp_path / "run.h5")
+    with open_recording(tmp_path / "run.h5") as recording:
+        assert recording.reason == reason
+        return recording
+
+
+class TestAStallDoesNotMakeAnEngineUnstoppable:
+    def test_a_stop_during_it_is_kept_and_obeyed_when_the_engine_comes_back(self, running, tmp_path):
+        with stalled(running):
+            told = the_engine(None)
+            assert told.pid == running.pid
+            assert stop_engine(told, StopLevel.ABORT, "smoke") is StopDelivery.KEPT
+            assert [each.pid for each in announced_engines()] == [running.pid]
+        ended_by(tmp_path, "smoke")
+        assert list(engines_folder().glob("*.stop-*")) == []
+
+    def test_a_stop_after_it_finds_the_engine(self, running, tmp_path):
+        with stalled(running), pytest.raises(EngineSilent, match=r"does not answer within 0\.3 s"):
+            EngineClient.attach(running.address, patience_s=0.3)
+        assert stop_engine(the_engine(running.pid), "abort", "afterwards") is StopDelivery.TOLD
+        ended_by(tmp_path, "afterwards")
+
+
+class TestConnectionsWithoutATokenKeepNobodyOut:
+    def test_two_thousand_of_them_leave_a_stop_its_way(self, running, tmp_path):
+        before = len(list(Path(f"/proc/{running.pid}/fd").iterdir()))
+        with connections(running.address, 2000):
+            assert stop_engine(the_engine(None), StopLevel.ABORT, "in spite of all") in StopDelivery
+            ended_by(tmp_path, "in spite of all")
+            now = len(list(Path(f"/proc/{running.pid}/fd").iterdir()))
+            assert now <= before + WAITING_MOST + VIEWERS_MOST
+
+    def test_what_they_declare_costs_no_memory(self, process):
+        process.client.status()
+        before = resident_bytes(process.pid)
+        with connections(process.address, 150, HEAD.pack(MAGIC, 32_000_000, 64_000_000) + bytes(8000)):
+            for _ in range(20):
+                EngineClient.attach(process.address).close()
+            assert resident_bytes(process.pid) - before < 20e6
+
+    def test_a_slow_one_has_one_deadline_for_all_that_it_says(self, process):
+        at = process.address
+        with socket.create_connection((at.host, at.port)) as slow:
+            slow.sendall(HEAD.pack(MAGIC, 900, 0))
+            began_s = time.monotonic()
+            slow.settimeout(0.05)
+            while time.monotonic() < began_s + 2 * GREETING_S:
+                with suppress(BrokenPipeError):
+                    slow.send(b" ")
+                try:
+                    if slow.recv(1) == b"":
+                        break
+                except TimeoutError:
+                    continue
+                except ConnectionResetError:
+                    break
+            assert GREETING_S * 0.9 < time.monotonic() - began_s < GREETING_S * 1.5
+
+    def test_with_one_viewer_too_many_the_quietest_goes(self, process):
+        with ExitStack() as viewers:
+            attached = [
+                viewers.enter_context(EngineClient.attach(process.address)) for _ in range(VIEWERS_MOST + 3)
+            ]
+            attached[-1].status()
+            process.client.status()  # it attends: visitors go first
+            with pytest.raises(EngineGone):
+                attached[0].status()
+
+
+def resident_bytes(pid):
+    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+class TestAnnouncements:
+    def test_one_whose_number_was_given_to_another_process_is_swept_away(self, process):
+        told = the_engine(process.pid)
+        with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as other:
+            taken = told.model_copy(update={"pid": other.pid, "process_start": "1"})
+            path = engines_folder() / f"{other.pid}.json"
+            path.write_text(taken.model_dump_json())
+            assert [each.pid for each in announced_engines()] == [process.pid]
+            assert not path.exists()
+            other.stdin.close()
+
+    def test_one_of_another_computer_is_left_alone(self, process):
+        told = the_engine(process.pid)
+        path = engines_folder() / "4.json"
+        path.write_text(told.model_copy(update={"pid": 4, "computer": "elsewhere"}).model_dump_json())
+        assert [each.pid for each in announced_engines()] == [process.pid]
+        assert Announcement.model_validate(json.loads(path.read_text())).computer == "elsewhere"
+        path.unlink()
