@@ -70,7 +70,10 @@ from .periodic import (
 )
 from .scene import (
     AutomaticDuration as AutomaticDuration,
+    Ensemble as Ensemble,
+    EscapeRate as EscapeRate,
     FixedDuration as FixedDuration,
+    FoundMotion as FoundMotion,
     Given as Given,
     Method as Method,
     MotionKind as MotionKind,
@@ -79,6 +82,8 @@ from .scene import (
     Scene as Scene,
     ScenePlan as ScenePlan,
     ScenePrediction as ScenePrediction,
+    Share as Share,
+    StartMemory as StartMemory,
     plan_scene as plan_scene,
     solve_scene as solve_scene,
 )

@@ -57,7 +57,7 @@ def computed_in(path, study, solver=solve_scene, cancelled=None):
 
 
 def test_every_field_of_a_prediction_is_kept_or_has_another_length_for_every_scene():
-    kept = set(NUMBERS) | {"motion", "method", "outcome", "ended", "final_state"}
+    kept = set(NUMBERS) | {"motion", "method", "outcome", "ended", "final_state", "memory", "ensemble"}
     of_the_study = {"frequency_hz", "amplitude_m", "accuracy", "start"}
     of_any_length = {"section", "spectrum", "spectrum_hz"}
     assert set(ScenePrediction.__dataclass_fields__) == kept | of_the_study | of_any_length

@@ -3,9 +3,12 @@ from ._plan import (
     plan_scene as plan_scene,
 )
 from ._prediction import (
+    Ensemble as Ensemble,
+    FoundMotion as FoundMotion,
     Method as Method,
     MotionKind as MotionKind,
     ScenePrediction as ScenePrediction,
+    StartMemory as StartMemory,
 )
 from ._scene import (
     AutomaticDuration as AutomaticDuration,
@@ -14,6 +17,10 @@ from ._scene import (
     Observable as Observable,
     Rest as Rest,
     Scene as Scene,
+)
+from ._shares import (
+    EscapeRate as EscapeRate,
+    Share as Share,
 )
 from ._solve import (
     solve_scene as solve_scene,

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..kernels import Floats
 from ..model import Outcome
+from ._shares import EscapeRate, Share
 
 State = tuple[float, float, float, float, float, float]
 """x, y, z, vx, vy, vz, absolute [m, m/s]."""
@@ -23,6 +24,63 @@ class MotionKind(StrEnum):
     """It does not repeat, and forgets where it began."""
     UNDECIDED = "undecided"
     """It was not followed for long enough to tell."""
+    CHAOTIC_SO_FAR = "chaotic so far"
+    """Chaotic for as long as it was followed, which does not tell whether it stays so: the chaos of other
+    starts died out, or all were followed for too short a time. `Ensemble.escape` says how long it lasts."""
+
+
+class StartMemory(StrEnum):
+    """Whether the start decides which motion is reached."""
+
+    KEPT = "kept"
+    """A start a millionth of a gap away came the same way."""
+    LOST = "lost"
+    """On the way a small change grew until nothing of the start was left: another run of the same scene, on
+    another machine or at another accuracy, may reach another motion."""
+    UNKNOWN = "unknown"
+    """It was not looked for: there was no budget."""
+
+
+@dataclass(frozen=True)
+class FoundMotion:
+    """One of the motions that were reached from starts too near to each other to be told apart.
+
+    Motions are the same when kind and period are and all responses agree to a thousandth, or within the
+    scatter of chaos. Symmetric partners, whose responses are equal, are one motion.
+    """
+
+    motion: MotionKind
+    period: int | None
+    """Of a periodic motion, in drive periods."""
+    response_i: float | None
+    """Largest abs(x) over the drive amplitude; the mean over its starts, as the next three."""
+    response_ii: float | None
+    relative_i: float | None
+    relative_ii: float | None
+    error_estimate: float | None
+    """Relative; of Response I of one more run that reaches this motion."""
+    starts: int
+    """How many reached it."""
+    share: Share
+    """Of all starts. The intervals of all motions hold together in 19 cases of 20."""
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """What became of a scene whose start was forgotten, from several starts a millionth of a gap apart."""
+
+    starts: int
+    """The one that was asked for among them."""
+    motions: tuple[FoundMotion, ...]
+    """Found, the one with the largest share first."""
+    asked: int
+    """Which of them the start that was asked for came to."""
+    unseen_share: float
+    """A motion that was not found has less than this share, in 39 cases of 40."""
+    escape: EscapeRate | None
+    """How often chaos died out; None where there was none to speak of."""
+    followed_s: float
+    """Time that all starts together were followed."""
 
 
 class Method(StrEnum):
@@ -90,13 +148,26 @@ class ScenePrediction:
     """Frequencies of the lines, where a spectrum was asked for, shape (lines,)."""
     spectrum: Floats | None = None
     """Amplitude of x at each of them over the drive amplitude, shape (lines,)."""
+    memory: StartMemory = StartMemory.UNKNOWN
+    """Whether the start decided which motion was reached."""
+    ensemble: Ensemble | None = None
+    """What other starts came to where it did not; None where it did, or where there was no budget."""
+
+    @property
+    def is_one_of_several(self) -> bool:
+        """The numbers are those of one motion, and other starts reached others."""
+        return self.ensemble is not None and len(self.ensemble.motions) > 1
 
     def to_dict(self) -> dict[str, object]:
         """Plain values for JSON: None where there is no number."""
-        return {field.name: _plain(getattr(self, field.name)) for field in fields(self)}
+        return _fields_of(self)
 
 
-def _plain(value: object) -> object:
+def _fields_of(value: ScenePrediction | Ensemble | FoundMotion | Share | EscapeRate) -> dict[str, object]:
+    return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+
+
+def _plain(value: object) -> object:  # noqa: PLR0911 - a row for each kind of value
     match value:
         case Outcome():
             return value.text
@@ -108,5 +179,7 @@ def _plain(value: object) -> object:
             return None
         case tuple():
             return [_plain(each) for each in value]
+        case Ensemble() | FoundMotion() | Share() | EscapeRate():
+            return _fields_of(value)
         case _:
             return value

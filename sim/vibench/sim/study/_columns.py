@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from ..model import Outcome
-from ..scene import Method, MotionKind
+from ..scene import Method, MotionKind, StartMemory
 from ._layout import STATE, STATE_DTYPE, PointState
 
 Cell = float | int | bytes | tuple[float, ...]
@@ -15,6 +15,9 @@ MISSING_WHOLE = -1
 """Stands for a missing whole number or flag; CF's ``_FillValue``."""
 COORDINATE = "coordinate"
 COORDINATES = ("x", "y", "z", "vx", "vy", "vz")
+FOUND_MOTION = "found_motion"
+MOST_FOUND = 8
+"""Motions of an ensemble that have a place; of more, those with the largest shares."""
 IDENTITY_DIGITS = 32
 TEXT_BYTES = 200
 """Kept of a text; longer ones are cut."""
@@ -22,6 +25,7 @@ TEXT_BYTES = 200
 TAKEN, SESSION, MESSAGE, IDENTITY = "taken", "session", "message", "scene"
 CONTINUES, PHASE, FINAL_STATE, OUTCOME = "continues", "drive_phase", "final_state", "outcome"
 DURATION, MOTION, METHOD, ENDED = "duration", "motion", "method", "ended"
+MEMORY, STARTS = "start_memory", "starts_followed"
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,9 @@ class Column:
     meanings: tuple[str, ...] = ()
     """Of the values 0, 1, 2, ... of a flag."""
     components: int = 1
-    """More than one: with an axis of its own at the end."""
+    """More than one: with another axis at the end."""
+    along: str = COORDINATE
+    """Name of that axis."""
 
     @property
     def missing(self) -> float | int | bytes:
@@ -83,8 +89,47 @@ NUMBERS = {
     "lyapunov_error_per_s": Column("lyapunov_error", REAL, "s-1", "standard error of the largest exponent"),
 }
 """By the field of `ScenePrediction` that they keep."""
+
+
+def _of_motion(name: str, dtype: str, long_name: str, meanings: tuple[str, ...] = ()) -> Column:
+    return Column(name, dtype, "1" if not meanings else "", long_name, meanings, MOST_FOUND, FOUND_MOTION)
+
+
+FOUND_KIND = _of_motion("found_kind", WHOLE, "what this motion of an ensemble is", _meanings(MotionKind))
+FOUND_NUMBERS = {
+    "period": _of_motion("found_period", WHOLE, "drive periods after which this motion repeats"),
+    "response_i": _of_motion("found_response_i", REAL, "Response I of this motion"),
+    "response_ii": _of_motion("found_response_ii", REAL, "Response II of this motion"),
+    "relative_i": _of_motion("found_relative_i", REAL, "largest y - z of this motion"),
+    "relative_ii": _of_motion("found_relative_ii", REAL, "y - z of this motion at the drive frequency"),
+    "error_estimate": _of_motion("found_error", REAL, "relative error of its responses, estimated"),
+    "starts": _of_motion("found_starts", WHOLE, "starts that came to this motion"),
+}
+"""By the field of `FoundMotion` that they keep."""
+FOUND_SHARE = {
+    "share": _of_motion("found_share", REAL, "share of starts that come to this motion"),
+    "low": _of_motion("found_share_low", REAL, "lower end of its interval"),
+    "high": _of_motion("found_share_high", REAL, "upper end of its interval"),
+}
+"""By the field of `Share` that they keep."""
+ENSEMBLE_NUMBERS = {
+    "starts": Column(STARTS, WHOLE, "1", "starts followed where the start is forgotten"),
+    "asked": Column("found_asked", WHOLE, "1", "place of the motion that the start asked for came to"),
+    "unseen_share": Column("unseen_share", REAL, "1", "share that a motion not found has at most"),
+    "followed_s": Column("followed_in_all", REAL, "s", "time that all starts together were followed"),
+}
+"""By the field of `Ensemble` that they keep."""
+ESCAPE_NUMBERS = {
+    "rate_per_s": Column("escape_rate", REAL, "s-1", "rate at which chaos dies out"),
+    "low_per_s": Column("escape_rate_low", REAL, "s-1", "lower end of its interval"),
+    "high_per_s": Column("escape_rate_high", REAL, "s-1", "upper end of its interval"),
+    "escapes": Column("escapes", WHOLE, "1", "starts whose chaos died out"),
+    "chaotic_s": Column("chaotic_time", REAL, "s", "time that all starts together were in chaos"),
+}
+"""By the field of `EscapeRate` that they keep."""
 OTHERS = (
     Column(MOTION, WHOLE, "", "what the motion has come to", _meanings(MotionKind)),
+    Column(MEMORY, WHOLE, "", "whether the start decides which motion is reached", _meanings(StartMemory)),
     Column(METHOD, WHOLE, "", "how the scene was answered", _meanings(Method)),
     Column(OUTCOME, WHOLE, "", "how the run ended", _meanings(Outcome)),
     Column(ENDED, f"S{TEXT_BYTES}", "", "why it was followed no longer"),
@@ -97,4 +142,12 @@ OTHERS = (
     Column(MESSAGE, f"S{TEXT_BYTES}", "", "why the scene could not be computed"),
     Column(STATE, STATE_DTYPE, "", "what is known of the point", _meanings(PointState)),
 )
-COLUMNS = (*NUMBERS.values(), *OTHERS)
+COLUMNS = (
+    *NUMBERS.values(),
+    *ENSEMBLE_NUMBERS.values(),
+    *ESCAPE_NUMBERS.values(),
+    FOUND_KIND,
+    *FOUND_NUMBERS.values(),
+    *FOUND_SHARE.values(),
+    *OTHERS,
+)

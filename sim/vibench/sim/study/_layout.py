@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 FORMAT = "vibench-study"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 """Raised whenever an older reader would misunderstand the file."""
 CONVENTIONS = "CF-1.11"
 LIBVER = ("earliest", "v110")

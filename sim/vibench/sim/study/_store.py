@@ -23,7 +23,15 @@ import numpy as np
 from . import _layout as layout
 from ._arrays import Arrays, PointAnswer, empty_arrays, put
 from ._axes import StudyAxis
-from ._columns import COLUMNS, COORDINATE, COORDINATES, SESSION, Column
+from ._columns import (
+    COLUMNS,
+    COORDINATE,
+    COORDINATES,
+    FOUND_MOTION,
+    MOST_FOUND,
+    SESSION,
+    Column,
+)
 from ._disk import Disk, SoleWriter, sync_file, sync_folder
 from ._errors import StudyError
 from ._file_reading import places_of, read_arrays, read_study
@@ -31,6 +39,9 @@ from ._software import software
 from ._study import Study
 
 MAKING_SUFFIX = ".making"
+_MOTIONS = StudyAxis(
+    FOUND_MOTION, tuple(float(k) for k in range(MOST_FOUND)), "1", "motions of an ensemble, by their share"
+)
 HEAD_BYTES = 2_000_000
 """More than sessions, axes and attributes take together."""
 
@@ -103,10 +114,13 @@ def _fill(file: h5py.File, study: Study) -> None:
     text = study.model_dump_json().encode()
     file.create_dataset(layout.STUDY, data=np.array(text, dtype=h5py.string_dtype("utf-8", len(text))))
     scales = [_scale(file, axis) for axis in study.axes]
-    coordinate = _scale(file, StudyAxis(COORDINATE, COORDINATES, "", "x, y, z and their velocities"))
+    last = {
+        COORDINATE: _scale(file, StudyAxis(COORDINATE, COORDINATES, "", "x, y, z and their velocities")),
+        FOUND_MOTION: _scale(file, _MOTIONS),
+    }
     for column in COLUMNS:
         dataset = _column(file, column, study.grid.shape)
-        for index, scale in enumerate([*scales, coordinate][: dataset.ndim]):
+        for index, scale in enumerate([*scales, last[column.along]][: dataset.ndim]):
             dataset.dims[index].attach_scale(scale)
     _sessions(file)
 
