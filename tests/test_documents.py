@@ -28,7 +28,7 @@ FACES_WITH_AN_EXAMPLE = [
     "vibench.sim",
     "vibench.sim.study",
     "vibench.sim.chain",
-    "vibench.sim.stepping",
+    "vibench.sim.shaker",
     "vibench.sim.accuracy_benchmark",
     "vibench.virtual_rig",
     "vibench.acquisition",

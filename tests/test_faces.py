@@ -29,7 +29,7 @@ FOR_PEOPLE = (
 )
 FOR_OUR_PROGRAMS = (
     "vibench.sim.kernels",
-    "vibench.sim.stepping",
+    "vibench.sim.shaker",
     "vibench.sim.accuracy_benchmark",
     "vibench.analysis.simulation",
     "vibench.analysis.reproduction",

@@ -17,6 +17,7 @@ FACES = (
     "vibench.sim",
     "vibench.sim.accuracy_benchmark",
     "vibench.sim.chain",
+    "vibench.sim.shaker",
     "vibench.sim.stepping",
     "vibench.sim.study",
 )

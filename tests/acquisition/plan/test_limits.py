@@ -18,7 +18,7 @@ from vibench.acquisition.plan import (
     shortest_ramp_s,
 )
 from vibench.acquisition.plan._limits import limit_checks
-from vibench.acquisition.rig import BaseQuantity, RigModel
+from vibench.acquisition.rig import BaseQuantity, RigModel, shaker_of
 
 
 def plan(excitation, **fields):
@@ -61,8 +61,7 @@ def test_a_waveform_s_peaks_are_those_of_an_integration_in_time(rig):
     fine = 8
     held = np.tile(np.repeat(step.play.values, fine), 3)
     time_s = np.arange(len(held)) / (8192 * fine * 2)
-    model = RigModel(rig)
-    space = model.shaker_equations()
+    space = shaker_of(rig).equations()
     terminal_v = held * 0.5 * 2.0 * rig.generator.terminal_factor()
     # The amplifier's band edges are far outside 20 to 200 Hz: its gain alone stands for it here.
     voltage = terminal_v * rig.amplifier.gain

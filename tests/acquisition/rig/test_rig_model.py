@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig, suspended_mass_kg
+from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig, shaker_of, suspended_mass_kg
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 MODEL = RigModel(RIG)
@@ -80,7 +80,7 @@ def test_velocity_and_acceleration_are_derivatives_of_the_stroke(frequency_hz):
 
 @given(st.floats(0.5, 20e3))
 def test_the_state_equations_and_the_transfer_are_the_same_system(frequency_hz):
-    equations = MODEL.shaker_equations()
+    equations = shaker_of(RIG).equations()
     s = 2j * np.pi * frequency_hz
     voltage = complex(MODEL.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, frequency_hz))
     state = np.linalg.solve(s * np.eye(3) - equations.A, equations.B[:, 0]) * voltage

@@ -216,7 +216,7 @@ class TestEffects:
         with VirtualRig(scripted(fault("turn_amplifier_gain", 0.1, gain_db=20, for_s=0.1))) as virtual:
             gains = []
             for _ in range(3):
-                gains.append(virtual.world.plant._tables.gain)
+                gains.append(virtual.world.plant.gain)
                 virtual.world.advance(0.11)
             assert gains == pytest.approx([10**0.5, 10.0, 10**0.5])
 

@@ -7,10 +7,10 @@ import pytest
 
 from vibench.acquisition import ConfigurationError, LimitExceeded, validated
 from vibench.acquisition.plan import Dwell, Measurement, require_within_limits
-from vibench.acquisition.rig import Rig, highest_carried_hz, load_rig, specimen_of
+from vibench.acquisition.rig import Rig, amplifier_of, highest_carried_hz, load_rig, shaker_of, specimen_of
 from vibench.acquisition.rig._virtual import COARSEST_GRID_RATE_HZ, WATCHED_HZ, level_error
+from vibench.sim.shaker import MOTION_COLUMNS, LoadedShaker
 from vibench.virtual_rig.world import World
-from vibench.virtual_rig.world._plant import TRUTH_COLUMNS, Plant
 from vibench.virtual_rig.world._sensors import RunningFilter, resonant
 from vibench.virtual_rig.world._time_grid import TimeGrid
 
@@ -25,13 +25,20 @@ def rig_with(sample_rate_hz, **virtual):
     return validated(content, Rig, "rig.toml")
 
 
+def switched_on(grid):
+    return LoadedShaker(amplifier_of(RIG), shaker_of(RIG), specimen_of(RIG), grid.step_s)
+
+
 def moved(frequency_hz, amplitude_v, grid):
     """Complex amplitude of base and m0 in the fifth second, shape (2,) [m]."""
-    plant, count = Plant(RIG, specimen_of(RIG), grid.step_s), int(grid.rate_hz)
+    plant, count = (
+        LoadedShaker(amplifier_of(RIG), shaker_of(RIG), specimen_of(RIG), grid.step_s),
+        int(grid.rate_hz),
+    )
     edges = 2 * np.pi * frequency_hz * grid.step_s * np.arange(5 * count + 1)
     drive = -amplitude_v * np.diff(np.cos(edges)) / (edges[1] - edges[0])
-    truth = plant.move(drive, np.zeros(len(drive)), len(drive)).truth[-count:]
-    seen = truth[:, [TRUTH_COLUMNS.index("base_displacement"), TRUTH_COLUMNS.index("x")]]
+    truth = plant.move(drive, np.zeros(len(drive)), len(drive)).ends[-count:]
+    seen = truth[:, [MOTION_COLUMNS.index("base_displacement"), MOTION_COLUMNS.index("x")]]
     return 2 * np.exp(-2j * np.pi * frequency_hz * grid.step_s * np.arange(count)) @ seen / count
 
 
@@ -57,7 +64,7 @@ def test_a_resonance_beyond_the_grid_is_left_out_and_not_folded_into_the_band():
 def test_impacts_are_resolved_inside_a_coarse_step():
     rates = []
     for grid in (TimeGrid(), COARSE):
-        plant = Plant(RIG, specimen_of(RIG), grid.step_s)
+        plant = switched_on(grid)
         count = 3 * int(grid.rate_hz)
         plant.move(0.75 * np.sin(2 * np.pi * 250 * grid.step_s * np.arange(count)), np.zeros(count))
         rates.append(plant.impacts / 3)

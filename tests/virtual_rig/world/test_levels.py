@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig, specimen_of
-from vibench.virtual_rig.world._plant import TRUTH_COLUMNS, Plant
+from vibench.acquisition.rig import BaseQuantity, RigModel, amplifier_of, load_rig, shaker_of, specimen_of
+from vibench.sim.shaker import MOTION_COLUMNS, LoadedShaker
 from vibench.virtual_rig.world._time_grid import USUAL_GRID
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
@@ -23,7 +23,7 @@ DWELL_HZ = 260.0
 
 
 def switched_on():
-    return Plant(RIG, specimen_of(RIG), STEP_S)
+    return LoadedShaker(amplifier_of(RIG), shaker_of(RIG), specimen_of(RIG), STEP_S)
 
 
 def moved(plant, drive):
@@ -77,9 +77,9 @@ def test_the_strongest_sine_stays_within_the_shakers_limits_from_fifty_hertz_up(
 
 def test_weak_noise_never_makes_an_impact_and_strong_noise_makes_hundreds():
     weak, strong = switched_on(), switched_on()
-    truth = moved(weak, noise(WEAK_VPP, 1)).truth
+    truth = moved(weak, noise(WEAK_VPP, 1)).ends
     moved(strong, noise(STRONG_VPP, 1))
-    p = truth[:, TRUTH_COLUMNS.index("y")] - truth[:, TRUTH_COLUMNS.index("z")]
+    p = truth[:, MOTION_COLUMNS.index("y")] - truth[:, MOTION_COLUMNS.index("z")]
     assert weak.impacts == 0
     assert np.max(np.abs(p)) < 0.3 * RIG.specimen.gap_m
     assert strong.impacts > 300

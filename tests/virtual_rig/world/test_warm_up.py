@@ -8,16 +8,16 @@ ROOT = Path(__file__).parents[3]
 PROGRAM = """
 from pathlib import Path
 from vibench.acquisition import open_bench
+from vibench.sim.shaker import _loaded_shaker as loaded_shaker
 from vibench.virtual_rig.world import (
     _conversion as conversion,
     _decimation as decimation,
     _input_stage as input_stage,
-    _plant as plant,
     _recursive_filter as recursive_filter,
 )
 
 kernels = (
-    plant._move, decimation._weigh, input_stage._clipped, conversion._quantise, recursive_filter._run
+    loaded_shaker._move, decimation._weigh, input_stage._clipped, conversion._quantise, recursive_filter._run
 )
 with open_bench(Path("hardware_configs/virtual_rig.toml")) as bench:
     before = [len(each.signatures) for each in kernels]

@@ -10,11 +10,11 @@ from hypothesis import given, settings, strategies as st
 from vibench.acquisition import ConfigurationError
 from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig, specimen_of
 from vibench.sim import base_transmissibility
+from vibench.sim.shaker import MOTION_COLUMNS
 from vibench.virtual_rig.analogue import Coupling, Input
 from vibench.virtual_rig.world import World, relative_clock_ppm
 from vibench.virtual_rig.world._conversion import volts_per_count
 from vibench.virtual_rig.world._decimation import GROUP_DELAY_SAMPLES
-from vibench.virtual_rig.world._plant import TRUTH_COLUMNS
 from vibench.virtual_rig.world._time_grid import USUAL_GRID
 
 GRID_RATE_HZ, STEP_S = USUAL_GRID.rate_hz, USUAL_GRID.step_s
@@ -212,12 +212,12 @@ def test_an_output_that_is_not_wired_moves_nothing():
 def test_truth_shows_what_no_instrument_does_and_is_off_by_default():
     world = World(QUIET, Tone(260.0, 3.0))
     world.advance(0.1)
-    assert world.truth().shape == (0, len(TRUTH_COLUMNS))
+    assert world.truth().shape == (0, len(MOTION_COLUMNS))
     world.keep_truth()
     world.advance(0.1)
     truth = world.truth()
-    assert truth.shape == (round(0.1 * GRID_RATE_HZ), len(TRUTH_COLUMNS))
-    p = truth[:, TRUTH_COLUMNS.index("y")] - truth[:, TRUTH_COLUMNS.index("z")]
+    assert truth.shape == (round(0.1 * GRID_RATE_HZ), len(MOTION_COLUMNS))
+    p = truth[:, MOTION_COLUMNS.index("y")] - truth[:, MOTION_COLUMNS.index("z")]
     assert RIG.specimen.gap_m < np.max(np.abs(p)) < 1.2 * RIG.specimen.gap_m
     assert world.plant.impacts > 10
     assert world.truth().shape[0] == 0

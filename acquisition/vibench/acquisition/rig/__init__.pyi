@@ -32,6 +32,8 @@ from ._model import (
     BaseQuantity as BaseQuantity,
     ComplexArray as ComplexArray,
     RigModel as RigModel,
+    amplifier_of as amplifier_of,
+    shaker_of as shaker_of,
     specimen_of as specimen_of,
     suspended_mass_kg as suspended_mass_kg,
 )

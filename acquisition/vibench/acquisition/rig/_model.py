@@ -7,11 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vibench.sim import Specimen, gong2025
+from vibench.sim.shaker import Amplifier, Shaker
 
 from ._configuration import AmplifierConfig, Rig, ShakerConfig
 
 ComplexArray = NDArray[np.complex128]
-FloatArray = NDArray[np.float64]
+_PEAK_OVER_RMS = 2.0**0.5
+"""The current limiter's setting is the rms of the largest sine it lets pass."""
 
 
 class BaseQuantity(StrEnum):
@@ -29,16 +31,6 @@ class BaseQuantity(StrEnum):
     """Of the table [m/s]."""
     ACCELERATION = "acceleration"
     """Of the table [m/s2]."""
-
-
-@dataclass(frozen=True)
-class StateSpace:
-    """A linear system s' = A s + B u; for a shaker s = (displacement, velocity, current) in SI units."""
-
-    A: FloatArray
-    """Shape (3, 3)."""
-    B: FloatArray
-    """Shape (3, 2): columns for the voltage at the coil [V] and an outside force on the table [N]."""
 
 
 @dataclass(frozen=True)
@@ -88,24 +80,6 @@ class RigModel:
                 result = s**2 * stroke
         return np.asarray(result, dtype=np.complex128)
 
-    def shaker_equations(self) -> StateSpace:
-        """Return the shaker alone as first-order equations, driven by voltage and by a force on the table."""
-        shaker = self.rig.shaker
-        mass = suspended_mass_kg(shaker)
-        force_constant, inductance = shaker.force_constant_n_per_a, shaker.coil_inductance_h
-        table = np.array(
-            [
-                -shaker.suspension_stiffness_n_per_m,
-                -shaker.suspension_damping_ns_per_m,
-                force_constant,
-            ]
-        )
-        coil = np.array([0.0, -force_constant, -shaker.coil_resistance_ohm])
-        return StateSpace(
-            A=np.array([[0.0, 1.0, 0.0], table / mass, coil / inductance]),
-            B=np.array([[0.0, 0.0], [0.0, 1 / mass], [1 / inductance, 0.0]]),
-        )
-
 
 def suspended_mass_kg(shaker: ShakerConfig) -> float:
     """Everything rigid that the coil moves [kg]: moving element and fixture, without the specimen."""
@@ -130,3 +104,29 @@ def specimen_of(rig: Rig) -> Specimen:
     """Make the specimen that a rig describes."""
     config = rig.specimen
     return gong2025(damping_time_s=config.damping_time_s, gap_m=config.gap_m, contact=config.contact)
+
+
+def amplifier_of(rig: Rig) -> Amplifier:
+    """Give the numbers of a rig's amplifier that the simulated table is driven with."""
+    amplifier = rig.amplifier
+    return Amplifier(
+        gain=amplifier.gain,
+        low_cut_hz=amplifier.low_cut_hz,
+        high_cut_hz=amplifier.high_cut_hz,
+        clip_v=amplifier.clip_v,
+        current_limit_a=amplifier.current_limit_a.value * _PEAK_OVER_RMS,
+    )
+
+
+def shaker_of(rig: Rig) -> Shaker:
+    """Give the numbers of a rig's shaker, its fixture included."""
+    shaker = rig.shaker
+    return Shaker(
+        moving_mass_kg=suspended_mass_kg(shaker),
+        suspension_stiffness_n_per_m=shaker.suspension_stiffness_n_per_m,
+        suspension_damping_ns_per_m=shaker.suspension_damping_ns_per_m,
+        force_constant_n_per_a=shaker.force_constant_n_per_a,
+        coil_resistance_ohm=shaker.coil_resistance_ohm,
+        coil_inductance_h=shaker.coil_inductance_h,
+        stroke_m=shaker.limits.stroke_m.value,
+    )

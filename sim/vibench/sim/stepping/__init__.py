@@ -3,9 +3,9 @@
 A run advances one state vector in place; what is sampled or observed on the way never changes a step.
 Harmonic drives go from event to event (`advance_harmonic`); other drives are cut into intervals on which
 the base is a cubic, U(tau) = c0 + c1 tau + c2 tau^2 + c3 tau^3 [m]
-(docs/decisions/0004-contact-integration.md). The face is for programs that step a specimen inside a loop of
-their own, as the virtual rig does: tables once, a state, then one call an interval, also from a compiled
-kernel (`kernel`). Tables may be shared by threads.
+(docs/decisions/0004-contact-integration.md). `vibench.sim.shaker` steps a specimen inside a loop of its own:
+tables once, a state, then one call an interval, also from a compiled kernel (`kernel`). Tables may be shared
+by threads.
 
 >>> import numpy as np
 >>> from vibench.sim import gong2025

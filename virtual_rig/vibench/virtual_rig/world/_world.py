@@ -11,9 +11,17 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.acquisition import ConfigurationError
-from vibench.acquisition.rig import Rig, VirtualConfig, fastest_sample_rate_hz, specimen_of
+from vibench.acquisition import AcquisitionError, ConfigurationError
+from vibench.acquisition.rig import (
+    Rig,
+    VirtualConfig,
+    amplifier_of,
+    fastest_sample_rate_hz,
+    shaker_of,
+    specimen_of,
+)
 from vibench.sim import Specimen
+from vibench.sim.shaker import MOTION_COLUMNS, LoadedShaker, MotionFailed, ShakenMotion
 
 from ..analogue import Input
 from ._analogue_output import AnalogueOutput
@@ -22,7 +30,6 @@ from ._decimation import history_steps
 from ._disturbance import Disturbance, RandomDropouts
 from ._input_stage import InputStage
 from ._noise import NoiseStream
-from ._plant import TRUTH_COLUMNS, Plant
 from ._sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer
 from ._time_grid import PPM, USUAL_GRID, TimeGrid
 from ._wiring import OPEN_INPUT, Cable, Signal, amplifier_input, cables_of
@@ -89,7 +96,7 @@ class World:
             grid,
         )
         step_s = grid.physical_step_s(virtual.converter_clock_ppm)
-        self.plant = Plant(rig, specimen or specimen_of(rig), step_s)
+        self.plant = LoadedShaker(amplifier_of(rig), shaker_of(rig), specimen or specimen_of(rig), step_s)
         self._accelerometer = Accelerometer(
             rig.accelerometer, virtual.accelerometer_noise_m_per_s2, noise("accelerometer"), grid
         )
@@ -188,7 +195,7 @@ class World:
     def set_amplifier_gain_db(self, gain_db: float) -> None:
         """Turn the amplifier's knob."""
         with self._turn:
-            self.plant.set_gain(10 ** (gain_db / 20))
+            self.plant.gain = 10 ** (gain_db / 20)
 
     def restore_amplifier_gain(self) -> None:
         """Turn the amplifier's knob to what the rig's configuration says."""
@@ -222,11 +229,11 @@ class World:
     def truth(self) -> FloatArray:
         """Hand over what was written down and go on with a clean sheet, shape (steps, 9).
 
-        Columns as in ``TRUTH_COLUMNS``; a row belongs to the end of a step.
+        Columns as in ``MOTION_COLUMNS`` of `vibench.sim.shaker`; a row belongs to the end of a step.
         """
         with self._turn:
             kept, self._truth = self._truth or [], []
-            return np.concatenate(kept) if kept else np.empty((0, len(TRUTH_COLUMNS)))
+            return np.concatenate(kept) if kept else np.empty((0, len(MOTION_COLUMNS)))
 
     def _plug(self, physical_channel: str, cable: Cable) -> None:
         with self._turn:
@@ -259,9 +266,7 @@ class World:
             if channel == self._amplifier_input:
                 drive += played
         noise = self._amplifier_noise_v * self._amplifier_noise.draw(first, steps)
-        motion = self.plant.move(drive, noise, steps if self._truth is not None else 0)
-        if self._truth is not None:
-            self._truth.append(motion.truth)
+        motion = self._moved(drive, noise)
         signals = np.empty((len(Signal), steps))
         signals[Signal.DRIVE] = drive
         signals[Signal.AMPLIFIER] = motion.amplifier_voltage
@@ -271,6 +276,15 @@ class World:
         self._remember(signals)
         for conversion in self._conversions:
             conversion.take(signals, first)
+
+    def _moved(self, drive: FloatArray, noise: FloatArray) -> ShakenMotion:
+        try:
+            motion = self.plant.move(drive, noise, len(drive) if self._truth is not None else 0)
+        except MotionFailed as error:
+            raise AcquisitionError(f"{error}. The virtual rig stands still: restart it") from error
+        if self._truth is not None:
+            self._truth.append(motion.ends)
+        return motion
 
     def _remember(self, signals: FloatArray) -> None:
         steps, kept = signals.shape[1], self._history.shape[1]

@@ -1,31 +1,22 @@
-"""The moving part of the rig, step by step: amplifier, coil and table, and the specimen on it.
+"""Amplifier, coil and table, and the specimen that pushes back on it, step by step under a voltage.
 
 Every quantity handed over is its mean over a step: of the voltage because it is held, of the base's
 acceleration and of m0's velocity because their integrals are known at both ends. Means alias nothing
 that happens inside a step and all lie at the step's middle, so channels agree in phase.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import expm
 
-from vibench.acquisition import AcquisitionError
-from vibench.acquisition.rig import Rig, RigModel
-from vibench.sim import Specimen
-from vibench.sim.kernels import kernel
-from vibench.sim.stepping import IntervalTables, advance_interval, base_reaction, interval_tables, new_state
-
-FloatArray = NDArray[np.float64]
-
-_STOP_STIFFNESS_N_PER_M = 2e5
-"""Of the rubber stops that end the stroke; assumed: 45 N press 0.2 mm into them."""
-_STOP_DAMPING_NS_PER_M = 50.0
-"""Of the same; assumed: the table comes back with about half its energy."""
-_PEAK_OVER_RMS = 2.0**0.5
-"""The current limiter's setting is the rms of the largest sine it lets pass."""
+from ..kernels import kernel
+from ..model import Specimen
+from ..stepping import IntervalTables, advance_interval, base_reaction, interval_tables, new_state
+from ._parts import Amplifier, FloatArray, Shaker
 
 BASE_DISPLACEMENT, BASE_VELOCITY, COIL_CURRENT = range(3)
 """State of the shaker [m, m/s, A]."""
@@ -33,15 +24,15 @@ LOW_CUT, HIGH_CUT = range(3, 5)
 """State of the amplifier's band edges [V]."""
 REACTION_BEFORE = 5
 """The specimen's force on the base one step earlier [N]."""
-_PLANT_SIZE = 6
+_STATE_SIZE = 6
 
-TRUTH_COLUMNS = ("base_displacement", "base_velocity", "current", "x", "y", "z", "vx", "vy", "vz")
-"""What the truth holds at the end of a step, SI; the specimen's as in vibench.sim.model."""
+MOTION_COLUMNS = ("base_displacement", "base_velocity", "current", "x", "y", "z", "vx", "vy", "vz")
+"""Of shaker and specimen at the end of a step, SI units; x, y and z are absolute."""
 _SHAKER_SIZE = 3
 
 
-class PlantTables(NamedTuple):
-    """Numbers of the plant that do not change."""
+class _ShakerTables(NamedTuple):
+    """What a step is computed with."""
 
     step: float
     """Physical length of a step [s]."""
@@ -64,107 +55,151 @@ class PlantTables(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Motion:
+class ShakenMotion:
     """What happened in a stretch of steps; arrays of one value a step, means over the step."""
 
     amplifier_voltage: FloatArray
-    """[V]"""
+    """At the coil [V]."""
     base_acceleration: FloatArray
     """[m/s2]"""
     m0_velocity: FloatArray
     """[m/s]"""
-    truth: FloatArray
-    """Shape (steps, 9), columns TRUTH_COLUMNS, at the ends of the steps; no rows unless asked for."""
+    ends: FloatArray
+    """Shape (steps, 9), columns MOTION_COLUMNS, at the ends of the steps; no rows unless asked for."""
 
 
-class Plant:
-    """Amplifier, shaker and specimen, from rest, driven by the voltage at the amplifier's input."""
+class MotionFailed(ArithmeticError):
+    """The motion is no longer finite, or a contact makes no progress; nothing can follow it."""
 
-    def __init__(self, rig: Rig, specimen: Specimen, step_s: float) -> None:
-        """Start from rest; ``step_s`` is the physical length of a step."""
+
+class LoadedShaker:
+    """Amplifier, shaker and specimen, moved by the voltage at the amplifier's input.
+
+    Coil and table are solved exactly for a voltage and a force that are held over a step; the specimen
+    exactly between its impacts, which are resolved inside a step (`vibench.sim.stepping`). The specimen's
+    force on the table is extrapolated to the middle of the step, at a cost of about (5/12)(omega h)^2 of it
+    (docs/decisions/0006-virtual-rig.md). One thread at a time.
+    """
+
+    def __init__(
+        self,
+        amplifier: Amplifier,
+        shaker: Shaker,
+        specimen: Specimen,
+        step_s: float,
+        start: ArrayLike = (0.0,) * 6,
+    ) -> None:
+        """Start with the table at rest.
+
+        Parameters
+        ----------
+        amplifier, shaker, specimen
+            What is moved. A specimen of any contact law.
+        step_s
+            Length of a step [s]; a hundredth of the shortest period of interest errs by 1e-3.
+        start
+            The specimen's x, y, z, vx, vy, vz [m, m/s], absolute, shape (6,).
+
+        Raises
+        ------
+        ValueError
+            When the step is not positive and finite, or the specimen cannot start so.
+
+        """
         self.impacts = 0
-        """Contacts begun since the rig was switched on."""
+        """Contacts begun since the start."""
         self.bumps = 0
         """Steps that the table has spent in its rubber stops."""
         self.limited_steps = 0
         """Steps in which the amplifier clipped or limited its current."""
-        self._tables = _plant_tables(rig, specimen, step_s)
-        self._state = np.zeros(_PLANT_SIZE)
-        self._specimen = new_state(specimen)
+        self._tables = _shaker_tables(amplifier, shaker, specimen, step_s)
+        self._state = np.zeros(_STATE_SIZE)
+        self._specimen = new_state(specimen, start)
         self._counts = np.zeros(3, dtype=np.int64)
 
-    def set_gain(self, gain: float) -> None:
-        """Turn the amplifier's knob to a gain (output volts per input volt)."""
+    @property
+    def gain(self) -> float:
+        """Output volts of the amplifier per input volt; may be changed between stretches."""
+        return self._tables.gain
+
+    @gain.setter
+    def gain(self, gain: float) -> None:
         self._tables = self._tables._replace(gain=gain)
 
-    def move(self, drive_v: FloatArray, noise_v: FloatArray, truth_rows: int = 0) -> Motion:
-        """Advance by as many steps as ``drive_v`` has means; ``noise_v`` adds at the amplifier's output.
+    def move(self, drive_v: FloatArray, noise_v: FloatArray | None = None, end_rows: int = 0) -> ShakenMotion:
+        """Advance by as many steps as ``drive_v`` has values.
+
+        Parameters
+        ----------
+        drive_v
+            Mean voltage at the amplifier's input over each step [V], shape (steps,).
+        noise_v
+            Added at the amplifier's output [V], shape (steps,).
+        end_rows
+            For how many steps, counted from the first, the state at their ends is kept.
 
         Raises
         ------
-        AcquisitionError
-            When the specimen's motion is no longer finite.
+        MotionFailed
+            When the motion is no longer finite; this shaker cannot go on.
 
         """
         count = len(drive_v)
-        motion = Motion(
-            np.empty(count), np.empty(count), np.empty(count), np.empty((truth_rows, len(TRUTH_COLUMNS)))
+        motion = ShakenMotion(
+            np.empty(count), np.empty(count), np.empty(count), np.empty((end_rows, len(MOTION_COLUMNS)))
         )
         self._counts[:] = 0
         good = _move(
             drive_v,
-            noise_v,
+            np.zeros(count) if noise_v is None else noise_v,
             self._state,
             self._specimen,
             self._tables,
             motion.amplifier_voltage,
             motion.base_acceleration,
             motion.m0_velocity,
-            motion.truth,
+            motion.ends,
             self._counts,
         )
         if good < count:
-            raise AcquisitionError(
-                f"The simulated specimen lost its way {good} steps into a stretch of {count}: its motion is "
-                "not finite or a contact made no progress. The rig stands still: lower the drive, restart it"
+            msg = (
+                f"The specimen's motion was lost {good} steps into a stretch of {count}: it is not finite, "
+                "or a contact made no progress. Lower the drive, or check it for values that are no numbers"
             )
+            raise MotionFailed(msg)
         self.impacts += int(self._counts[0])
         self.bumps += int(self._counts[1])
         self.limited_steps += int(self._counts[2])
         return motion
 
 
-def _plant_tables(rig: Rig, specimen: Specimen, step_s: float) -> PlantTables:
-    amplifier, shaker = rig.amplifier, rig.shaker
-    equations = RigModel(rig).shaker_equations()
+def _shaker_tables(amplifier: Amplifier, shaker: Shaker, specimen: Specimen, step_s: float) -> _ShakerTables:
+    specimen_tables = interval_tables(specimen, step_s)
+    equations = shaker.equations()
     inputs = equations.B.shape[1]
     joint = np.zeros((_SHAKER_SIZE + inputs, _SHAKER_SIZE + inputs))
     joint[:_SHAKER_SIZE] = np.hstack([equations.A, equations.B])
     low, high = (2 * np.pi * cut * step_s for cut in (amplifier.low_cut_hz, amplifier.high_cut_hz))
-    return PlantTables(
+    return _ShakerTables(
         step=step_s,
         gain=amplifier.gain,
-        low_decay=float(np.exp(-low)),
+        low_decay=math.exp(-low),
         low_mean=_mean_of_decay(low),
-        high_decay=float(np.exp(-high)),
+        high_decay=math.exp(-high),
         high_mean=_mean_of_decay(high),
         clip=amplifier.clip_v,
-        current_limit=amplifier.current_limit_a.value * _PEAK_OVER_RMS,
+        current_limit=amplifier.current_limit_a,
         transition=np.ascontiguousarray(expm(joint * step_s)[:_SHAKER_SIZE]),
-        stroke=shaker.limits.stroke_m.value,
-        stop_stiffness=_STOP_STIFFNESS_N_PER_M,
-        stop_damping=_STOP_DAMPING_NS_PER_M,
-        specimen=interval_tables(specimen, step_s),
+        stroke=shaker.stroke_m,
+        stop_stiffness=shaker.stop_stiffness_n_per_m,
+        stop_damping=shaker.stop_damping_ns_per_m,
+        specimen=specimen_tables,
     )
 
 
 def _mean_of_decay(steps_per_time_constant: float) -> float:
     """Mean of exp(-t) from zero to the argument: 1 where nothing decays."""
-    return (
-        float(-np.expm1(-steps_per_time_constant) / steps_per_time_constant)
-        if steps_per_time_constant
-        else 1.0
-    )
+    return -math.expm1(-steps_per_time_constant) / steps_per_time_constant if steps_per_time_constant else 1.0
 
 
 @kernel
@@ -173,11 +208,11 @@ def _move(
     noise: FloatArray,
     state: FloatArray,
     specimen: FloatArray,
-    tables: PlantTables,
+    tables: _ShakerTables,
     amplifier_voltage: FloatArray,
     base_acceleration: FloatArray,
     m0_velocity: FloatArray,
-    truth: FloatArray,
+    ends: FloatArray,
     counts: NDArray[np.int64],
 ) -> int:
     """Advance step by step; return the steps done, fewer than asked for when the specimen failed."""
@@ -224,16 +259,16 @@ def _move(
         amplifier_voltage[n] = voltage
         base_acceleration[n] = (v1 - v0) / h
         m0_velocity[n] = (specimen[0] - x0) / h
-        if truth.shape[0] > n:
-            truth[n, 0] = u1
-            truth[n, 1] = v1
-            truth[n, 2] = current
-            truth[n, 3:9] = specimen[:6]
+        if ends.shape[0] > n:
+            ends[n, 0] = u1
+            ends[n, 1] = v1
+            ends[n, 2] = current
+            ends[n, 3:9] = specimen[:6]
     return int(drive.size)
 
 
 @kernel
-def _amplified(volts: float, state: FloatArray, tables: PlantTables) -> float:
+def _amplified(volts: float, state: FloatArray, tables: _ShakerTables) -> float:
     """Mean output over a step of the amplifier as far as it is linear, its input held."""
     low, high = state[LOW_CUT], state[HIGH_CUT]
     below = volts + (low - volts) * tables.low_mean if tables.low_decay < 1.0 else 0.0
@@ -245,7 +280,7 @@ def _amplified(volts: float, state: FloatArray, tables: PlantTables) -> float:
 
 
 @kernel
-def _stop_force(displacement: float, velocity: float, tables: PlantTables) -> float:
+def _stop_force(displacement: float, velocity: float, tables: _ShakerTables) -> float:
     """Force of the rubber stops on the table; they push and never pull."""
     if displacement > tables.stroke:
         pressed = tables.stop_stiffness * (displacement - tables.stroke) + tables.stop_damping * velocity

@@ -1,0 +1,25 @@
+"""Amplifier, coil and table under a voltage, with the specimen's push, moved step by step.
+
+The specimen stands on the table and pushes back on it: base and specimen answer the voltage together.
+A `LoadedShaker` takes numbers (`Amplifier`, `Shaker`, a specimen) and the mean voltage of each step, and
+gives means over the step (docs/decisions/0006-virtual-rig.md). An amplifier without numbers passes every
+voltage on: so the table is driven by a voltage that was recorded at the coil. SI units.
+
+>>> import numpy as np
+>>> from vibench.sim import gong2025
+>>> from vibench.sim.shaker import Amplifier, LoadedShaker, Shaker
+>>> table = Shaker(
+...     moving_mass_kg=0.127, suspension_stiffness_n_per_m=9932.0, suspension_damping_ns_per_m=21.51,
+...     force_constant_n_per_a=6.78, coil_resistance_ohm=2.6, coil_inductance_h=1e-4,
+... )
+>>> step_s = 1e-5
+>>> shaken = LoadedShaker(Amplifier(), table, gong2025(), step_s)
+>>> drive_v = 0.1 * np.sin(2 * np.pi * 260.0 * step_s * np.arange(100_000))
+>>> motion = shaken.move(drive_v)
+>>> shaken.impacts, round(float(np.std(motion.base_acceleration[50_000:])), 1)  # m/s2
+(0, 0.8)
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

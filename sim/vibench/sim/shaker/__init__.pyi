@@ -1,0 +1,10 @@
+from ._loaded_shaker import (
+    MOTION_COLUMNS as MOTION_COLUMNS,
+    LoadedShaker as LoadedShaker,
+    MotionFailed as MotionFailed,
+    ShakenMotion as ShakenMotion,
+)
+from ._parts import (
+    Amplifier as Amplifier,
+    Shaker as Shaker,
+)

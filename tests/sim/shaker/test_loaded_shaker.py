@@ -1,0 +1,269 @@
+"""Amplifier, shaker and specimen together: closed forms, energy, limits, the coil's voltage as drive."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vibench.sim import base_transmissibility, gong2025
+from vibench.sim.shaker import MOTION_COLUMNS, Amplifier, LoadedShaker, MotionFailed, Shaker
+
+AMPLIFIER = Amplifier(
+    gain=10**0.5, low_cut_hz=0.3, high_cut_hz=30e3, clip_v=21.0, current_limit_a=5.0 * np.sqrt(2.0)
+)
+SHAKER = Shaker(
+    moving_mass_kg=0.127,
+    suspension_stiffness_n_per_m=9932.0,
+    suspension_damping_ns_per_m=21.51,
+    force_constant_n_per_a=6.78,
+    coil_resistance_ohm=2.6,
+    coil_inductance_h=1e-4,
+    stroke_m=4e-3,
+)
+RATE_HZ = 102_400.0
+STEP_S = 1 / RATE_HZ
+SECOND = int(RATE_HZ)
+LINES_HZ = np.array([30, 94, 150, 201, 266, 310, 436, 500, 777])
+COLUMN = {name: number for number, name in enumerate(MOTION_COLUMNS)}
+
+
+def shaken(specimen=None, amplifier=AMPLIFIER, start=(0.0,) * 6):
+    return LoadedShaker(amplifier, SHAKER, specimen or gong2025(), STEP_S, start)
+
+
+def tones(amplitude_v, frequencies_hz, seconds=1):
+    """Means over the steps of sines of equal amplitude, a whole number of periods in a second."""
+    edges_s = np.arange(seconds * SECOND + 1) * STEP_S
+    phases = 2 * np.pi * np.asarray(frequencies_hz, dtype=float)[:, None] * edges_s
+    rates = 2 * np.pi * np.asarray(frequencies_hz, dtype=float)[:, None] * STEP_S
+    return amplitude_v * np.sum(-np.diff(np.cos(phases + np.arange(len(phases))[:, None])) / rates, axis=0)
+
+
+def settled(table, drive, seconds):
+    for _ in range(seconds):
+        table.move(drive, np.zeros(len(drive)))
+    return table.move(drive, np.zeros(len(drive)), len(drive))
+
+
+def stroke_per_volt(frequency_hz, specimen=None):
+    """Table displacement and m0's per volt at the input, the specimen's push included: the closed form."""
+    s = 2j * np.pi * frequency_hz
+    dynamic = (
+        SHAKER.suspension_stiffness_n_per_m
+        + s * SHAKER.suspension_damping_ns_per_m
+        + s**2 * SHAKER.moving_mass_kg
+    )
+    moved = 1.0
+    if specimen is not None:
+        moved = base_transmissibility(specimen, frequency_hz)[:, 0]
+        dynamic = dynamic - (specimen.stiffnesses[0] + s * specimen.dampings[0]) * (moved - 1)
+    impedance = SHAKER.coil_resistance_ohm + s * SHAKER.coil_inductance_h
+    force_constant = SHAKER.force_constant_n_per_a
+    volts = amplified(frequency_hz)
+    base = force_constant * volts / (impedance * dynamic + s * force_constant**2)
+    return base, moved * base
+
+
+def amplified(frequency_hz):
+    s = 2j * np.pi * frequency_hz
+    low, high = 2 * np.pi * AMPLIFIER.low_cut_hz, 2 * np.pi * AMPLIFIER.high_cut_hz
+    return AMPLIFIER.gain * s / (s + low) / (1 + s / high)
+
+
+def per_volt(frequency_hz, specimen=None):
+    """Base acceleration and m0 velocity per volt."""
+    s = 2j * np.pi * frequency_hz
+    base, moved = stroke_per_volt(frequency_hz, specimen)
+    return s**2 * base, s * moved
+
+
+def lines(means):
+    """Complex amplitudes of a second of means at LINES_HZ, the mean's droop and middle undone."""
+    angle = np.pi * LINES_HZ * STEP_S
+    return np.fft.rfft(means)[LINES_HZ] * 2 / len(means) / np.sinc(angle / np.pi) * np.exp(-1j * angle)
+
+
+@pytest.fixture(scope="module")
+def linear_motion():
+    """A second of periodic motion far below the first contact."""
+    table = shaken()
+    drive = tones(1e-3, LINES_HZ)
+    motion = settled(table, drive, 4)
+    assert table.impacts == 0
+    return drive, motion
+
+
+def test_base_and_specimen_answer_as_the_closed_form_of_the_loaded_rig(linear_motion):
+    drive, motion = linear_motion
+    acceleration, velocity = per_volt(LINES_HZ.astype(float), gong2025())
+    assert lines(motion.base_acceleration) / lines(drive) == pytest.approx(acceleration, rel=1e-3)
+    assert lines(motion.m0_velocity) / lines(drive) == pytest.approx(velocity, rel=1e-3)
+
+
+def test_the_specimen_notches_the_base_where_it_resonates(linear_motion):
+    drive, motion = linear_motion
+    measured = np.abs(lines(motion.base_acceleration) / lines(drive))
+    alone = np.abs(per_volt(LINES_HZ)[0])
+    at_resonance = np.abs(measured / alone - 1)[LINES_HZ == 266]
+    beside = np.abs(measured / alone - 1)[LINES_HZ == 777]
+    assert at_resonance > 0.03
+    assert beside < 0.02
+    acceleration, _ = per_volt(np.arange(255.0, 275.0, 0.1), gong2025())
+    assert np.min(np.abs(acceleration)) < 0.97 * alone[LINES_HZ == 266]
+
+
+def test_without_a_specimen_to_speak_of_the_table_answers_as_coil_and_suspension_alone():
+    dust = gong2025(contact="linear")
+    dust = type(dust)(
+        masses=tuple(1e-6 * m for m in dust.masses),
+        stiffnesses=tuple(1e-6 * k for k in dust.stiffnesses),
+        dampings=tuple(1e-6 * c for c in dust.dampings),
+        gap_m=dust.gap_m,
+        contact=dust.contact,
+    )
+    drive = tones(1e-3, LINES_HZ)
+    motion = settled(shaken(dust), drive, 2)
+    expected, _ = per_volt(LINES_HZ)
+    assert lines(motion.base_acceleration) / lines(drive) == pytest.approx(expected, rel=5e-4)
+    assert lines(motion.amplifier_voltage) / lines(drive) == pytest.approx(amplified(LINES_HZ), rel=5e-4)
+
+
+@pytest.mark.parametrize("amplitude_v", [1e-3, 0.4])
+def test_electrical_work_is_heat_friction_and_stored_energy(amplitude_v):
+    specimen = gong2025()
+    table = shaken(specimen)
+    drive = amplitude_v * np.sin(2 * np.pi * 260 * STEP_S * np.arange(SECOND))
+    before = table.move(drive, np.zeros(SECOND), SECOND).ends[-1]
+    motion = table.move(drive, np.zeros(SECOND), SECOND)
+    assert (table.impacts > 100) == (amplitude_v > 0.1)
+    ends = np.vstack([before, motion.ends])
+    state = {name: ends[:, number] for name, number in COLUMN.items()}
+
+    def integral(power):
+        return STEP_S * np.sum((power[1:] + power[:-1]) / 2)
+
+    current, base_velocity = state["current"], state["base_velocity"]
+    work = STEP_S * np.sum(motion.amplifier_voltage * (current[1:] + current[:-1]) / 2)
+    heat = SHAKER.coil_resistance_ohm * integral(current**2)
+    friction = SHAKER.suspension_damping_ns_per_m * integral(base_velocity**2)
+    slips = (state["vx"] - base_velocity, state["vy"] - state["vz"], state["vz"] - state["vx"])
+    friction += sum(c * integral(slip**2) for c, slip in zip(specimen.dampings, slips, strict=True))
+    stored = stored_energy(specimen, state)
+    assert work == pytest.approx(heat + friction + stored[-1] - stored[0], rel=1e-3)
+
+
+def stored_energy(specimen, state):
+    kinetic = SHAKER.moving_mass_kg * state["base_velocity"] ** 2
+    kinetic += sum(m * state[v] ** 2 for m, v in zip(specimen.masses, ("vx", "vy", "vz"), strict=True))
+    stretches = (state["x"] - state["base_displacement"], state["y"] - state["z"], state["z"] - state["x"])
+    elastic = SHAKER.suspension_stiffness_n_per_m * state["base_displacement"] ** 2
+    elastic += sum(k * stretch**2 for k, stretch in zip(specimen.stiffnesses, stretches, strict=True))
+    return 0.5 * (kinetic + elastic + SHAKER.coil_inductance_h * state["current"] ** 2)
+
+
+def test_the_amplifier_clips_at_its_largest_voltage():
+    table = shaken(amplifier=replace(AMPLIFIER, clip_v=5.0))
+    drive = tones(5.0, [100.0])
+    motion = table.move(drive, np.zeros(SECOND))
+    assert np.max(np.abs(motion.amplifier_voltage)) == pytest.approx(5.0)
+    assert table.limited_steps > SECOND / 2
+
+
+def test_the_amplifier_gives_no_more_current_than_its_limiter_is_set_to():
+    table = shaken(amplifier=replace(AMPLIFIER, current_limit_a=1.0))
+    motion = table.move(tones(3.0, [200.0]), np.zeros(SECOND), SECOND)
+    current = motion.ends[:, COLUMN["current"]]
+    assert np.max(np.abs(current)) == pytest.approx(1.0)
+    assert table.limited_steps > 0
+
+
+def test_noise_is_added_at_the_amplifiers_output():
+    table = shaken()
+    noise = np.random.default_rng(1).standard_normal(SECOND)
+    assert np.array_equal(table.move(np.zeros(SECOND), noise).amplifier_voltage, noise)
+
+
+def test_the_rubber_stops_end_the_stroke_and_are_counted():
+    table = shaken()
+    free = abs(stroke_per_volt(8.0)[0]) * 6.0
+    stroke = SHAKER.stroke_m
+    assert free > 1.2 * stroke
+    motion = table.move(tones(6.0, [8.0]), np.zeros(SECOND), SECOND)
+    reached = np.max(np.abs(motion.ends[:, COLUMN["base_displacement"]]))
+    assert stroke < reached < 1.15 * stroke
+    assert table.bumps > 0
+
+
+def test_a_small_drive_never_touches_the_rubber_stops():
+    table = shaken()
+    table.move(tones(0.5, [50.0]), np.zeros(SECOND))
+    assert table.bumps == 0
+    assert table.limited_steps == 0
+
+
+def test_a_motion_that_is_not_finite_is_an_error_that_says_where():
+    table = shaken()
+    drive = np.zeros(100)
+    drive[40] = np.nan
+    with pytest.raises(MotionFailed, match="40 steps into a stretch of 100"):
+        table.move(drive, np.zeros(100))
+
+
+def test_the_state_at_the_ends_of_steps_is_kept_only_when_asked_for():
+    table = shaken()
+    assert table.move(np.zeros(10), np.zeros(10)).ends.shape == (0, len(MOTION_COLUMNS))
+    assert table.move(np.zeros(10), np.zeros(10), 10).ends.shape == (10, len(MOTION_COLUMNS))
+
+
+def test_two_stretches_are_one_stretch():
+    drive = tones(0.7, [260.0])
+    whole, parts = shaken(), shaken()
+    expected = whole.move(drive, np.zeros(SECOND)).m0_velocity
+    got = [parts.move(part, np.zeros(len(part))).m0_velocity for part in np.split(drive, [1, 2, 777, 50_000])]
+    assert np.array_equal(np.concatenate(got), expected)
+    assert parts.impacts == whole.impacts > 0
+
+
+def test_the_voltage_recorded_at_the_coil_moves_the_table_as_the_amplifier_did():
+    drive = tones(0.7, [266.0])
+    measured = shaken()
+    recorded = measured.move(drive, 0.01 * np.random.default_rng(2).standard_normal(SECOND))
+    driven = shaken(amplifier=Amplifier())
+    again = driven.move(recorded.amplifier_voltage)
+    assert driven.impacts == measured.impacts > 0
+    assert again.base_acceleration == pytest.approx(recorded.base_acceleration, rel=1e-9, abs=1e-9)
+    assert driven.limited_steps == 0
+
+
+def test_a_specimen_that_starts_away_from_rest_pushes_the_table_that_nothing_drives():
+    start = (2e-6, 1e-6, 1e-6, 0.0, 0.0, 0.0)
+    motion = shaken(start=start).move(np.zeros(1000), end_rows=1000)
+    assert motion.ends[0, 3:6] == pytest.approx(start[:3], rel=0.01)
+    # The first push is k0 x on the table, before anything else has moved.
+    push = gong2025().stiffnesses[0] * start[0] / SHAKER.moving_mass_kg
+    assert motion.base_acceleration[1] == pytest.approx(push, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("part", "wrong"),
+    [
+        (AMPLIFIER, {"gain": 0.0}),
+        (AMPLIFIER, {"gain": np.nan}),
+        (AMPLIFIER, {"low_cut_hz": -1.0}),
+        (AMPLIFIER, {"high_cut_hz": 0.2}),
+        (AMPLIFIER, {"clip_v": np.nan}),
+        (AMPLIFIER, {"current_limit_a": 0.0}),
+        (SHAKER, {"moving_mass_kg": 0.0}),
+        (SHAKER, {"coil_inductance_h": np.inf}),
+        (SHAKER, {"stroke_m": np.nan}),
+    ],
+)
+def test_numbers_that_no_amplifier_or_shaker_has_are_refused(part, wrong):
+    with pytest.raises(ValueError, match="is not allowed"):
+        replace(part, **wrong)
+
+
+@pytest.mark.parametrize("step_s", [0.0, -1.0, np.inf, np.nan])
+def test_a_step_that_is_no_length_of_time_is_refused(step_s):
+    with pytest.raises(ValueError, match="Interval"):
+        LoadedShaker(AMPLIFIER, SHAKER, gong2025(), step_s)
