@@ -49,6 +49,9 @@ class LoopbackWorld:
     streams: bool = False
     played: int = 0
     drive_factor: float = 1.0
+    stays_on: bool = False
+    """Whatever the output is told."""
+    hum_v: float = 0.0
     base_factor: float = 1.0
     background_m_per_s2: float = 0.0
     overloads: tuple = ()
@@ -127,7 +130,7 @@ class LoopbackGenerator:
 
     def stop(self) -> None:
         self._world.call("stop")
-        self._world.is_on = False
+        self._world.is_on = self._world.stays_on
 
     def close(self) -> None:
         self.stop()
@@ -207,7 +210,7 @@ class LoopbackDigitizer:
         angle = 2 * np.pi * 160.0 * (world.samples + np.arange(samples)) / SAMPLE_RATE_HZ
         base = drive * self._accelerance * world.base_factor + world.background_m_per_s2 * np.sin(angle)
         physical = {
-            Role.DRIVE_VOLTAGE: drive * world.drive_factor,
+            Role.DRIVE_VOLTAGE: drive * world.drive_factor + world.hum_v * np.sin(angle * 50 / 160),
             Role.AMPLIFIER_VOLTAGE: drive * world.rig.amplifier.gain,
             Role.BASE_ACCELERATION: base,
             Role.M0_VELOCITY: self._integrated(base),

@@ -3,6 +3,7 @@
 import json
 import os
 import resource
+import shutil
 import signal
 import socket
 import subprocess
@@ -20,6 +21,7 @@ from vibench.acquisition.engine import (
     EngineGone,
     EngineSilent,
     EngineState,
+    MessageKind,
     StopDelivery,
     Supervision,
     announced_engines,
@@ -29,10 +31,11 @@ from vibench.acquisition.engine import (
 )
 from vibench.acquisition.engine._admission import GREETING_S, WAITING_MOST
 from vibench.acquisition.engine._announcement import Announcement
-from vibench.acquisition.engine._kept_stops import engines_folder
+from vibench.acquisition.engine._kept_stops import engines_folder, put_down
 from vibench.acquisition.engine._server import VIEWERS_MOST
 from vibench.acquisition.engine._state import ConnectionRole
 from vibench.acquisition.engine._wire import HEAD, MAGIC
+from vibench.acquisition.host import process_start
 from vibench.acquisition.rig import load_rig
 
 from .conftest import ROOT, campaign, until, until_state, until_there
@@ -75,7 +78,9 @@ def running(process, tmp_path):
     process.client.start()
     until(process.client, lambda status: status.run is not None and status.run.segment == "dwell")
     yield process
-    until_state(process.client, EngineState.READY)
+    stop_engine(the_engine(None), StopLevel.OFF, "the test has ended")
+    with EngineClient.attach(process.address) as visitor:
+        until_state(visitor, EngineState.READY)
 
 
 @contextmanager
@@ -182,6 +187,26 @@ class TestConnectionsWithoutATokenKeepNobodyOut:
             process.client.status()  # it attends: visitors go first
             with pytest.raises(EngineGone):
                 attached[0].status()
+
+
+class TestNoDescriptorIsLeft:
+    def test_a_stop_is_told_and_a_recording_is_finished(self, running, tmp_path):
+        with without_descriptors(running):
+            assert stop_engine(the_engine(None), StopLevel.ABORT, "no descriptors") in StopDelivery
+            ended_by(tmp_path, "no descriptors")
+
+    def test_a_stop_is_obeyed_that_was_only_put_down(self, running, tmp_path):
+        with without_descriptors(running):
+            put_down(running.pid, process_start(running.pid), StopLevel.ABORT, "put down")
+            until_there(tmp_path / "run.h5")
+
+
+class TestAFolderIsRemoved:
+    def test_the_engine_says_so_and_goes_on(self, running, tmp_path):
+        shutil.rmtree(tmp_path)
+        told = until_state(running.client, EngineState.READY).messages[-1]
+        assert told.kind is MessageKind.FAULT
+        assert "was removed" in told.what + told.done + told.next_step
 
 
 def resident_bytes(pid):

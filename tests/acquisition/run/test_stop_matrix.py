@@ -7,9 +7,12 @@ minutes (``pytest -m slow``); without it each state meets each stop, and each fa
 
 import itertools
 import os
+import shutil
 import signal
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from threading import Event
 
 import numpy as np
 import pytest
@@ -17,13 +20,14 @@ import pytest
 from vibench.acquisition import (
     AcquisitionError,
     InstrumentLost,
+    RecordingError,
     StopLevel,
     open_bench,
     open_recording,
     stop_on_signal,
 )
 from vibench.acquisition.plan import Dwell, Measurement, RunState, shortest_ramp_s
-from vibench.acquisition.recording import RecordingState, create_recording
+from vibench.acquisition.recording import RecordingState, create_recording, recover
 from vibench.acquisition.rig import CalibrationRule, confirm_simulated
 from vibench.acquisition.run import BLOCK_S
 from vibench.acquisition.run._run import Run
@@ -212,8 +216,6 @@ def check_recording(path, run, stop, error, disk):
     if disk.is_full and not path.exists():
         # Nothing more could be written, the ending included: what was committed is recovered.
         disk.is_full = False
-        from vibench.acquisition.recording import recover
-
         recover(path)
         with open_recording(path) as recording:
             assert recording.samples >= 0
@@ -255,3 +257,43 @@ def test_every_stop_beside_every_fault_in_every_state(laboratory, tmp_path, stat
 
 def test_the_stated_time_of_an_abort_is_that_of_the_shipped_rig(rig):
     assert shortest_ramp_s(rig) + BLOCK_S < ABORT_S
+
+
+@pytest.mark.parametrize("state", [RunState.RAMPING_UP, RunState.RECORDING, RunState.RAMPING_DOWN])
+@pytest.mark.parametrize("what", ["removed", "moved"])
+def test_a_folder_that_goes_away_leaves_silence_and_a_sentence(laboratory, tmp_path, state, what):
+    virtual, connected = laboratory()
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    with open_bench(connected, confirm_simulated, CalibrationRule.WAIVED) as bench:
+        run = Run(bench, PLAN, folder / "run.h5")
+        upto(run, state)
+        shutil.rmtree(folder) if what == "removed" else folder.rename(tmp_path / "elsewhere")
+        with pytest.raises(RecordingError, match="was removed") as told:
+            deque(run, maxlen=0)
+        assert terminal_v(virtual) < SILENT_V
+    assert "\n" not in str(told.value)
+    assert run.outcome.state is RunState.FAILED
+    if what == "moved":  # and put back: nothing is lost
+        assert recover(tmp_path / "elsewhere" / "run.h5").exists()
+
+
+def test_an_abort_at_wall_pace_is_recorded_until_its_silence(rig, tmp_path):
+    assert rig.virtual is not None
+    on_the_wall = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
+    with open_bench(on_the_wall) as bench, Run(bench, PLAN, tmp_path / "run.h5") as run:
+        upto(run, RunState.RECORDING)
+        Event().wait(0.7)  # a process that stands still: what it reads then is of the past
+        run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.ABORT, "abort"))
+        for _ in run:
+            pass
+    with open_recording(tmp_path / "run.h5") as recording:
+        drive = recording.read("drive_voltage")
+        stopped = next(each.sample for each in recording.events if each.kind == "end")
+        said = next(each.text for each in recording.events if each.kind == "silence")
+        rate_hz = recording.sample_rate_hz
+    assert np.max(np.abs(drive[-round(0.01 * rate_hz) :])) < SILENT_V
+    measured_s = (np.flatnonzero(np.abs(drive) > SILENT_V)[-1] - stopped) / rate_hz
+    told_s = float(said.removeprefix("abort: ").partition(" ")[0])
+    assert told_s > 0.6  # the stop was seen that late
+    assert told_s == pytest.approx(measured_s, abs=0.02)

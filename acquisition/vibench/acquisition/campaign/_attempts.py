@@ -6,7 +6,7 @@ from pathlib import Path
 from time import monotonic
 
 from ..bench import RunBench
-from ..errors import AcquisitionError, InstrumentError
+from ..errors import AcquisitionError, InstrumentError, RecordingError
 from ..plan import Point, Retryable, RetryPolicy, RunState
 from ..recording import open_recording
 from ..run import BLOCK_S, Outcome, Progress, run_measurement
@@ -148,7 +148,10 @@ class Attempts:
 
     def _failed(self, point: Point, path: Path, error: AcquisitionError) -> None:
         reason_code = reason_code_of(error)
-        self._journal.end(point.name, JournalPointState.FAILED, reason_code, str(error))
+        try:
+            self._journal.end(point.name, JournalPointState.FAILED, reason_code, str(error))
+        except RecordingError as second:  # lies in the same folder: the first is the cause
+            error.add_note(str(second))
         self._say(
             CampaignEvent(
                 CampaignEventKind.FAULT,

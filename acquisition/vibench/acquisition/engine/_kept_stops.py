@@ -38,6 +38,8 @@ class KeptStops:
         }
         self._press = press
         self._obeyed: dict[Path, tuple[int, int]] = {}
+        self._reserve = os.open(os.devnull, os.O_RDONLY)
+        """Given back to read a reason by."""
 
     @classmethod
     def of_this_process(cls, press: Callable[[StopLevel, str], None]) -> "KeptStops":
@@ -55,16 +57,25 @@ class KeptStops:
             if self._obeyed.get(path) == mark:
                 continue
             self._obeyed[path] = mark  # where it cannot be taken away, it is still obeyed only once
-            self._press(level, _reason(path))
+            self._press(level, self._reason(path))
             with suppress(OSError):
                 path.unlink()
 
+    def close(self) -> None:
+        """Look no more."""
+        if self._reserve >= 0:
+            os.close(self._reserve)
+            self._reserve = -1
 
-def _reason(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8", errors="replace") or SILENT_REASON
-    except OSError:  # not even one descriptor is left
-        return SILENT_REASON
+    def _reason(self, path: Path) -> str:
+        self.close()
+        try:
+            return path.read_text(encoding="utf-8", errors="replace") or SILENT_REASON
+        except OSError:  # somebody else has taken the descriptor
+            return SILENT_REASON
+        finally:
+            with suppress(OSError):
+                self._reserve = os.open(os.devnull, os.O_RDONLY)
 
 
 def put_down(pid: int, process_start: str, level: StopLevel, reason: str) -> Path:

@@ -172,7 +172,7 @@ def serving(handler: RequestHandler, what: str, host: str = LOOPBACK) -> Iterato
     with ExitStack() as inside:
         server = inside.enter_context(closing(Server(handler, host)))
         inside.enter_context(closing(Watchdog(handler.enforce_deadlines, "engine watchdog")))
-        kept = KeptStops.of_this_process(handler.stop)
+        kept = inside.enter_context(closing(KeptStops.of_this_process(handler.stop)))
         inside.enter_context(closing(Watchdog(kept.obey, "engine kept stops")))
         inside.enter_context(announced(server.address, what))
         yield server

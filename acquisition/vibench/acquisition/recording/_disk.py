@@ -60,8 +60,10 @@ class PositionedFile:
             rest, offset = rest[written:], offset + written
 
     def sync(self) -> None:
-        """Push data and what is needed to find it to the disk."""
+        """Push data and what is needed to find it to the disk; a file without a name can never be found."""
         _sync_data(self._descriptor)
+        if os.fstat(self._descriptor).st_nlink == 0:
+            raise FileNotFoundError(errno.ENOENT, "the file, or its folder, was removed")
 
     def reserve(self, offset: int, size: int) -> None:
         """Allocate blocks where the system can; elsewhere the check of free space must do."""

@@ -11,6 +11,7 @@ import zlib
 from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import h5py
@@ -100,8 +101,8 @@ def finalise(part: Path) -> Path:
     tmp = layout.tmp_of(final)
     if final.exists():
         raise RecordingError(f"{final} exists, and nothing is ever overwritten; move it away.")
-    room = _largest_size(part)
     try:
+        room = _largest_size(part)
         claim_room(tmp, room, room)
         _copy(part, tmp, room)
         sync_file(tmp)
@@ -109,18 +110,30 @@ def finalise(part: Path) -> Path:
         sync_folder(final.parent)
     except (OSError, RuntimeError) as error:  # HDF5 reports a full disk as either
         # Incomplete, and made by this call; everything in it is in the .part.
-        tmp.unlink(missing_ok=True)
-        raise RecordingError(
-            f"{final} could not be written: {error}. All committed samples are safe in {part};"
-            " make room, then recover that file."
-        ) from error
+        with suppress(OSError):
+            tmp.unlink()
+        raise RecordingError(f"{final} could not be written: {error}. {_whereabouts(part)}") from error
     return final
 
 
+def _whereabouts(part: Path) -> str:
+    try:
+        is_there = part.exists()
+    except OSError:  # the folder does not answer
+        is_there = False
+    if is_there:
+        return f"All committed samples are safe in {part}; make room, then recover that file."
+    return (
+        f"{part} is not there: it or its folder was removed, moved or cut off while it was recorded;"
+        " put it back and recover it, or measure again."
+    )
+
+
 def discard(part: Path) -> None:
-    """Delete ``NAME.h5.part`` once ``NAME.h5`` is safe."""
-    part.unlink()
-    sync_folder(part.parent)
+    """Delete ``NAME.h5.part`` once ``NAME.h5`` is safe; one that stays harms nobody."""
+    with suppress(OSError):
+        part.unlink()
+        sync_folder(part.parent)
 
 
 def _largest_size(part: Path) -> int:

@@ -8,6 +8,7 @@
         writer.finish(RecordingState.COMPLETE, "the plan was carried out")
 """
 
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -20,6 +21,7 @@ from . import _layout as layout
 from ._attributes import encoded
 from ._committer import COMMIT_INTERVAL_S, Batch, Committer
 from ._counts import Counts, CountScale
+from ._descriptor_reserve import DescriptorReserve
 from ._disk import Buffer, Disk
 from ._disk_trouble import open_disk
 from ._finalise import discard, finalise
@@ -55,8 +57,13 @@ def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWri
                 f"{taken} exists, and nothing is ever overwritten. Nothing was recorded; choose another name"
                 " (a .part or .tmp is what an interrupted recording left: recover it first)."
             )
-    places = preallocate(path, part, header)
-    return RecordingWriter(path, header, places, open_disk(part))
+    reserve = DescriptorReserve()
+    try:
+        places = preallocate(path, part, header)
+        return RecordingWriter(path, header, places, open_disk(part), reserve=reserve)
+    except BaseException:
+        reserve.close()
+        raise
 
 
 class RecordingWriter:
@@ -73,11 +80,13 @@ class RecordingWriter:
         places: Places,
         disk: Disk,
         commit_interval_s: float = COMMIT_INTERVAL_S,
+        reserve: DescriptorReserve | None = None,
     ) -> None:
         self._path = path
         self._header = header
         self._places = places
         self._disk = disk
+        self._reserve = reserve
         self._scale = CountScale(header.channels)
         self._journal = Journal(places.tables, tuple(channel.role for channel in header.channels))
         self._committer = Committer(disk, round(QUEUE_S * header.sample_rate_hz), commit_interval_s)
@@ -160,6 +169,8 @@ class RecordingWriter:
         if self._is_finished:
             return self._path
         self._is_finished = True
+        if self._reserve is not None:
+            self._reserve.close()
         self._committer.close()
         failure = self._committer.failure
         if failure is not None:
@@ -169,7 +180,9 @@ class RecordingWriter:
             self._write_ending(state, reason)
             finalise(part)
         finally:
-            self._disk.close()
+            # What a close can still refuse (a network folder), the ending's sync has refused before.
+            with suppress(OSError):
+                self._disk.close()
         discard(part)
         self._committer.raise_unseen_failure()
         return self._path

@@ -50,6 +50,11 @@ class AcquisitionLoop:
         return self._segment
 
     @property
+    def samples(self) -> int:
+        """Samples recorded so far."""
+        return self._samples
+
+    @property
     def elapsed_s(self) -> float:
         """Time recorded so far [s]."""
         return self._samples / self._digitizer.sample_rate_hz

@@ -11,6 +11,7 @@ from ._acquisition_loop import BLOCK_S, AcquisitionLoop
 from ._drive import Drive
 from ._ending import Progress
 from ._limit_monitor import LimitMonitor
+from ._silence_watch import LISTEN_S, LONGEST_S, SilenceWatch
 
 HOLD_LONGEST_S = HOLD_ROOM_S
 """How long a run may be held in all [s]: its recording has room for that."""
@@ -36,6 +37,7 @@ class PhaseRunner:
         drive: Drive,
         loop: AcquisitionLoop,
         limit_monitor: LimitMonitor,
+        silence: SilenceWatch,
         switch: StopSwitch,
         total_s: float,
     ) -> None:
@@ -43,6 +45,7 @@ class PhaseRunner:
         self.loop = loop
         self._drive = drive
         self._limit_monitor = limit_monitor
+        self._silence = silence
         self._switch = switch
         self._total_s = total_s
         self._look: Callable[[Block], None] = self._go_on
@@ -60,14 +63,15 @@ class PhaseRunner:
     def ramp_down_early(
         self, reason: str, level: StopLevel, ramp_s: Callable[[StopLevel], float]
     ) -> Iterator[Progress]:
-        """Ramp down from wherever the run is, unwatched; a segment that is open stays incomplete.
+        """Ramp down from wherever the run is, within no limits; a segment that is open stays incomplete.
 
         A harder stop that is asked for on the way takes over. ``ramp_s`` tells how long each takes [s].
+        The end is silence that was measured; raises InstrumentError when it does not come.
         """
-        self._look = _look_away
+        self._look = self._silence.take
         self.loop.log(EventKind.END, reason)
         self.loop.cut()
-        since_s = self.loop.elapsed_s
+        self._silence.begin(self.loop.samples)
         if self._drive.is_playing:
             self._enter(RunState.RAMPING_DOWN)
         while level is not StopLevel.OFF and self._drive.is_playing:
@@ -77,10 +81,17 @@ class PhaseRunner:
                     level = harder.level
                     self.loop.log(EventKind.END, harder.reason)
                     break
-        if level is StopLevel.OFF:
-            self._drive.cut()
-        took_s = self.loop.elapsed_s - since_s
-        self.loop.log(EventKind.SILENCE, f"{level.value}: {took_s:.3f} s after the stop was seen")
+        self._drive.cut()
+        yield from self._listened()
+        self.loop.log(EventKind.SILENCE, f"{level.value}: {self._silence.text()}")
+        self._silence.require_silence()
+
+    def _listened(self) -> Iterator[Progress]:
+        """Go on recording until the drive is silent where it is measured."""
+        give_up_s = self.loop.elapsed_s + LONGEST_S
+        yield from self._read(LISTEN_S)
+        while not self._silence.is_silent and self.loop.elapsed_s < give_up_s:
+            yield from self._read(LISTEN_S)
 
     def _read(self, duration_s: float, into: list[Block] | None = None) -> Iterator[Progress]:
         for block in self.loop.read_for(duration_s):
@@ -133,7 +144,3 @@ class PhaseRunner:
         if state is not self.state:
             self.state = state
             self.loop.log(EventKind.STATE, state.value)
-
-
-def _look_away(block: Block) -> None:
-    """Let a block pass: the run is ending already."""

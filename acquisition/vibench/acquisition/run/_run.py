@@ -33,6 +33,7 @@ from ._ending import Ending, Outcome, Progress
 from ._limit_monitor import LimitMonitor
 from ._low_level_check import LowLevelCheck, judged, require_checkable
 from ._phase_runner import PhaseRunner, Stopped
+from ._silence_watch import SilenceWatch
 
 
 def controller_for(bench: RunBench, measurement: Measurement) -> Controller[None] | None:
@@ -136,6 +137,7 @@ class Run(ClosedOnLeaving):
         self._bench_check = bench_check
         self._create = create
         self._drive: Drive  # chosen when the plan is admitted; nothing plays before
+        self._silence: SilenceWatch  # made when the plan is admitted: the drive is recorded then
         self._controller: Controller[None] | None = None
         self._limit_monitor = LimitMonitor(
             bench.rig, bench.channels, measurement.limits, bench.digitizer.sample_rate_hz
@@ -178,7 +180,10 @@ class Run(ClosedOnLeaving):
     def _carry_out(self) -> Generator[Progress, None, None]:
         sink = self._admitted()
         loop = AcquisitionLoop(self._bench.digitizer, sink)
-        self._runner = PhaseRunner(self._drive, loop, self._limit_monitor, self._switch, self._total_s)
+        self._silence = SilenceWatch(self._bench.channels, self._bench.digitizer.sample_rate_hz)
+        self._runner = PhaseRunner(
+            self._drive, loop, self._limit_monitor, self._silence, self._switch, self._total_s
+        )
         try:
             yield from self._played_or_stopped(self._runner)
         except (GeneratorExit, LimitExceeded):
@@ -267,6 +272,7 @@ class Run(ClosedOnLeaving):
         during: list[Block] = []
         silence, settling, measuring = check_phases(self._measurement)
         yield from runner.run_phase(silence, before)
+        self._silence.learn_hum(phase_samples(before).volts)
         yield from runner.run_phase(settling)
         yield from runner.run_phase(measuring, during)
         figures = judged(
