@@ -98,6 +98,11 @@ COMMANDS = {
         "show_catalogue",
         "List the recordings of a folder and the folders in it: what, when, how they ended, how large.",
     ),
+    "specimen": Place(
+        "specimen",
+        "show_specimen",
+        "List the specimens and contact laws that there are, or say what one specimen amounts to.",
+    ),
     "predict": Place("predict", "predict", "Predict the responses of m0 and of p over frequency."),
     "study": Place(
         "study", "study", "Predict responses over every combination of what a file lists, longest first."

@@ -7,12 +7,14 @@ from typing import Annotated
 
 import typer
 
+from vibench.acquisition import save_toml
 from vibench.analysis import (
     AnalysisFailure,
     CampaignResults,
     Estimator,
     FailedStep,
     FrequencyResponseRequest,
+    InvalidRequest,
     MagnitudeScale,
     ProgressObserver,
     Simulation,
@@ -29,6 +31,7 @@ from vibench.analysis.report import write_report
 from .output import bold, console, print_json
 from .paths import AsJson, room_for_folder, unused
 from .reading_bar import reading_bar
+from .specimen_option import SpecimenOption, described
 
 NOISE = "Transmission of noise"
 """Heading of the options that no other excitation takes notice of."""
@@ -52,9 +55,9 @@ def analyse(
             help="Fit damping, frequencies and gap to the recordings first, and lay that specimen over them.",
         ),
     ] = False,
+    specimen: SpecimenOption = None,
     estimator: Annotated[
         Estimator,
-        FailedStep,
         typer.Option(
             help="drive: referenced to the drive voltage, free of any channel's noise.", rich_help_panel=NOISE
         ),
@@ -122,6 +125,10 @@ def analyse(
         confidence=confidence,
         view=quantities_named(quantity, scale),
     )
+    if fit and specimen is not None:
+        raise InvalidRequest(
+            "--fit and --specimen were given; one of the two says which specimen is laid over"
+        )
     paths = recordings_in(recording) if recording.is_dir() else (recording,)
     # "." has no name of its own.
     place = recording if recording.name.strip(".") else recording.resolve()
@@ -133,8 +140,10 @@ def analyse(
     with reading_bar() as observer:
         simulation = Simulation.LAID_OVER if simulate else Simulation.LEFT_OUT
         updated = fitted_to(paths, name, observer) if fit else None
-        specimen = None if updated is None else updated.specimen
-        results = analyse_files(paths, name, simulation, request, observer, specimen)
+        laid = None if updated is None else updated.specimen
+        if specimen is not None:
+            laid = described(specimen).specimen()
+        results = analyse_files(paths, name, simulation, request, observer, laid)
     if updated is not None:
         results = replace(results, model_said=updated.sentences)
     if as_json:
@@ -144,6 +153,8 @@ def analyse(
         console.print(sentence)
     if results.results and has_report:
         report = write_report(results, unused(folder / "report.html"), folder / "figures")
+        if updated is not None:
+            save_toml(updated.description, unused(folder / "specimen.toml"))
         if not as_json:
             console.print("The report:", bold(report.resolve()))
     complain_about(results)

@@ -27,6 +27,7 @@ from .interruption import told_to_stop
 from .output import console, print_json, print_warnings
 from .paths import AsJson
 from .progress_bars import study_bar
+from .specimen_option import LAWS_HELP, SpecimenOption, described, given_options
 from .study import Cluster, Workers, complain_about_points
 
 AUTO: Literal["auto"] = "auto"
@@ -54,13 +55,12 @@ def predict(
     frequency: Annotated[
         str, typer.Option("--frequency", metavar="F|START:STOP:STEP", help="One frequency or a range [Hz].")
     ],
-    model: Annotated[
-        str, typer.Option("--model", help="hertz, linear, linear_gap, rigid:0.8, power:5, power:3+5+7, ...")
-    ] = "hertz",
+    specimen: SpecimenOption = None,
+    model: Annotated[str | None, typer.Option("--model", help=LAWS_HELP)] = None,
     damping_time: Annotated[
-        float, typer.Option("--damping-time", metavar="S", help="c_i = damping time * k_i.")
-    ] = 2e-5,
-    gap: Annotated[float, typer.Option("--gap", metavar="M", help="Clearance at both stops.")] = 45e-6,
+        float | None, typer.Option("--damping-time", metavar="S", help="c_i = damping time * k_i.")
+    ] = None,
+    gap: Annotated[float | None, typer.Option("--gap", metavar="M", help="Clearance at both stops.")] = None,
     duration: Annotated[
         str, typer.Option("--duration", metavar="S|auto", help="Length of each run, or until it settles.")
     ] = "30",
@@ -86,10 +86,9 @@ def predict(
     """Predict the responses of m0 and of p over frequency."""
     asked = _study(
         {
-            "models": (model,),
+            "specimen": described(specimen),
+            **given_options(models=model, gaps_m=gap, damping_times_s=damping_time),
             "amplitudes_m": (amplitude,),
-            "gaps_m": (gap,),
-            "damping_times_s": (damping_time,),
             "frequencies_hz": frequencies(frequency),
             "observe": _observables(observe),
             "starts": (start,),

@@ -7,6 +7,8 @@ from .exponents import (
     lyapunov_spectrum as lyapunov_spectrum,
 )
 from .model import (
+    CONTACT_LAWS as CONTACT_LAWS,
+    USUAL_SPECIMEN as USUAL_SPECIMEN,
     Accuracy as Accuracy,
     AccuracyWord as AccuracyWord,
     BaseResponse as BaseResponse,
@@ -25,11 +27,17 @@ from .model import (
     RigidStops as RigidStops,
     Sampled as Sampled,
     Specimen as Specimen,
+    SpecimenDescription as SpecimenDescription,
+    SpecimenTable as SpecimenTable,
+    UnknownSpecimenError as UnknownSpecimenError,
     base_response as base_response,
     base_transmissibility as base_transmissibility,
     bound_matrices as bound_matrices,
     gong2025 as gong2025,
     hertz_stiffness as hertz_stiffness,
+    load_specimen as load_specimen,
+    shipped_specimens as shipped_specimens,
+    usual_specimen as usual_specimen,
 )
 from .motion import (
     FollowedMotion as FollowedMotion,

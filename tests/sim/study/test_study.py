@@ -1,7 +1,8 @@
 import pytest
 from pydantic import ValidationError
 
-from vibench.sim import gong2025
+from vibench.sim import RigidStops, gong2025
+from vibench.sim.scene import Rest
 from vibench.sim.study import Start, Study
 from vibench.sim.study._axes import FREQUENCY
 from vibench.sim.study._study import GivenStart
@@ -19,10 +20,27 @@ def test_a_study_comes_back_from_json_as_it_was():
     assert Study.model_validate_json(study.model_dump_json()) == study
 
 
-def test_the_structure_is_the_papers_when_nothing_else_is_said():
+def test_the_specimen_is_the_papers_when_nothing_else_is_said():
     study = Study(**LEAST)
-    assert study.structure.specimen("hertz", 2e-5, 45e-6) == gong2025()
-    assert study.structure.specimen("power:5", 0.0, 30e-6) == gong2025(0.0, 30e-6, "power:5")
+    assert study.specimen.specimen() == gong2025()
+    assert study.specimen.specimen("power:5", 0.0, 30e-6) == gong2025(0.0, 30e-6, "power:5")
+    assert (study.models, study.damping_times_s, study.gaps_m) == (("hertz",), (2e-5,), (45e-6,))
+
+
+def test_what_a_study_does_not_vary_is_as_its_specimen_has_it():
+    own = {"model": "asymmetric", "dampings_ns_per_m": [0.5, 0.01, 0.3], "contact": "rigid:0.7"}
+    study = Study(**LEAST, specimen=own)
+    scene = study.scene((0,) * 6, Rest())
+    assert scene.specimen.gaps_m == (30e-6, 60e-6)
+    assert scene.specimen.dampings == (0.5, 0.01, 0.3)
+    assert scene.specimen.contact == RigidStops(0.7)
+    assert [axis.values for axis in study.axes[:3]] == [("rigid:0.7",), ("as described",), ("as described",)]
+    assert Study.model_validate_json(study.model_dump_json()) == study
+
+
+def test_a_study_of_an_earlier_file_has_its_structure_as_its_specimen():
+    structure = {"masses_kg": [5e-3, 2e-3, 2e-3]}
+    assert Study(**LEAST, structure=structure).specimen.masses_kg == (5e-3, 2e-3, 2e-3)
 
 
 def test_the_grid_has_a_point_for_every_combination():

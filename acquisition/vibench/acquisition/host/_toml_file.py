@@ -21,7 +21,9 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def load_toml(path: Path, model: type[Model]) -> Model:
-    """Read a TOML file as ``model``.
+    """Read a TOML file as ``model``; what it names by a path is looked for beside it.
+
+    Validators find the file's folder as ``folder`` in their context.
 
     Raises
     ------
@@ -41,13 +43,13 @@ def load_toml(path: Path, model: type[Model]) -> Model:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigurationError(f"{path}: is not valid TOML: {error}; correct that line") from error
-    return validated(content, model, str(path))
+    return validated(content, model, str(path), path.absolute().parent)
 
 
-def validated(content: dict[str, Any], model: type[Model], origin: str) -> Model:
+def validated(content: dict[str, Any], model: type[Model], origin: str, folder: Path | None = None) -> Model:
     """Validate ``content`` as ``model``; errors name ``origin`` and the key."""
     try:
-        return model.model_validate(content)
+        return model.model_validate(content, context={"folder": folder})
     except ValidationError as error:
         raise ConfigurationError(f"{origin}: {complaints(error)}") from error
 

@@ -8,6 +8,8 @@ from typing import Literal, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
+from vibench.sim import SpecimenTable
+
 from ..errors import ConfigurationError
 from ..host import FrozenModel, load_toml
 from ._output import OutputConfig
@@ -193,14 +195,9 @@ class DaqConfig(FrozenModel):
         return self
 
 
-class SpecimenConfig(FrozenModel):
-    """The specimen on the shaker, as far as it is known."""
+class SpecimenConfig(SpecimenTable):
+    """The specimen on the shaker, as far as it is known: one that it names, and what differs from it."""
 
-    model: Literal["gong2025"] = "gong2025"
-    contact: Literal["hertz", "linear"] = "hertz"
-    damping_time_s: PositiveFloat = 2e-5
-    """c_i = damping_time_s * k_i."""
-    gap_m: PositiveFloat = 45e-6
     amplitude_limit_m: Sourced
     """Largest displacement of a mass that the springs bear."""
 

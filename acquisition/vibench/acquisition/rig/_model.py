@@ -6,7 +6,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vibench.sim import Specimen, gong2025
+from vibench.sim import Specimen
 from vibench.sim.shaker import Amplifier, Shaker
 
 from ._configuration import AmplifierConfig, Rig, ShakerConfig
@@ -102,8 +102,7 @@ def _dynamic_stiffness(shaker: ShakerConfig, s: ComplexArray) -> ComplexArray:
 
 def specimen_of(rig: Rig) -> Specimen:
     """Make the specimen that a rig describes."""
-    config = rig.specimen
-    return gong2025(damping_time_s=config.damping_time_s, gap_m=config.gap_m, contact=config.contact)
+    return rig.specimen.specimen()
 
 
 def amplifier_of(rig: Rig) -> Amplifier:

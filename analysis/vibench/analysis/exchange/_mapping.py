@@ -8,6 +8,7 @@ from pydantic import AwareDatetime, Field, NonNegativeFloat, PositiveFloat, Posi
 from vibench.acquisition import FrozenModel
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import ROLE_PATTERN, Origin
+from vibench.sim import SpecimenTable
 
 from ..recordings import BASE, DRIVE, RESPONSE
 
@@ -87,14 +88,6 @@ class Part(FrozenModel):
         return self
 
 
-class SpecimenFacts(FrozenModel):
-    """What was on the shaker, where it was not the paper's."""
-
-    contact: Literal["hertz", "linear"] | None = None
-    damping_time_s: PositiveFloat | None = None
-    gap_m: PositiveFloat | None = None
-
-
 class ImportMapping(FrozenModel):
     """Everything an analysis must know that the file does not say."""
 
@@ -110,7 +103,8 @@ class ImportMapping(FrozenModel):
     parts: tuple[Part, ...] = ()
     """Where each part of the plan was recorded, when it is not simply one after the other."""
     channels: tuple[ChannelMapping, ...] = Field(min_length=1)
-    specimen: SpecimenFacts | None = None
+    specimen: SpecimenTable | None = None
+    """What was on the shaker, where it was not the paper's."""
     calibration_valid_days: PositiveInt | None = None
     confirmations: dict[str, str | float] = Field(default_factory=dict)
     """What else is known, for the report."""

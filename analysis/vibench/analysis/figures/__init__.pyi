@@ -7,6 +7,9 @@ from ._bench_levels import (
 from ._comparison import (
     comparison_figure as comparison_figure,
 )
+from ._contact_forces import (
+    contact_forces_figure as contact_forces_figure,
+)
 from ._distortion import (
     distortion_figure as distortion_figure,
 )

@@ -8,7 +8,6 @@ import numpy as np
 from vibench.acquisition.plan import Approach, Measurement, base_motion
 from vibench.acquisition.rig import Rig
 
-from ..recordings import specimen_of
 from ..signals import Flags, Reals
 from ._overlay import prediction_grid
 from ._prediction import ResponsePrediction, predicted
@@ -32,6 +31,8 @@ class MeasurementPrediction:
     """Where the base amplitude comes from."""
     approach: Approach
     """Where each simulated point begins."""
+    specimen_name: str
+    """As the rig calls it."""
 
     @property
     def collision_bands_hz(self) -> tuple[tuple[float, float], ...]:
@@ -47,13 +48,13 @@ class MeasurementPrediction:
     @property
     def model(self) -> str:
         """The model that said so, for a legend."""
-        specimen = self.prediction.specimen
-        return f"gong2025, gap {specimen.gap_m * 1e6:g} µm"
+        gaps = " and ".join(f"{1e6 * each:g}" for each in dict.fromkeys(self.prediction.specimen.gaps_m))
+        return f"{self.specimen_name}, gap {gaps} µm"
 
 
 def predict_measurement(measurement: Measurement, rig: Rig) -> MeasurementPrediction:
     """Simulate the specimen of a rig over the band that a measurement excites."""
-    specimen = specimen_of({"specimen": rig.specimen.model_dump()})
+    specimen = rig.specimen.specimen()
     low_hz, high_hz = measurement.excitation.band_hz
     approach = measurement.excitation.approach
     match approach:
@@ -63,7 +64,7 @@ def predict_measurement(measurement: Measurement, rig: Rig) -> MeasurementPredic
             grid, each_s = np.linspace(low_hz, high_hz, FOLLOWED_POINTS, dtype=np.float64), FOLLOWED_S
     base = base_motion(measurement.excitation, rig, grid)
     prediction = predicted(specimen, grid, base.amplitude_m, duration_s=each_s, approach=approach)
-    return MeasurementPrediction(measurement, prediction, base.basis, approach)
+    return MeasurementPrediction(measurement, prediction, base.basis, approach, rig.specimen.name)
 
 
 def bands_of(frequency_hz: Reals, is_inside: Flags) -> tuple[tuple[float, float], ...]:

@@ -76,7 +76,7 @@ def fit_gap(
         low=best.low_m,
         high=best.high_m,
         sd=float("nan"),
-        nominal=linear.gap_m,
+        nominal=min(linear.gaps_m),
     )
 
 

@@ -45,25 +45,36 @@ def parameter_value(specimen: Specimen, parameter: Parameter) -> float:
             link = LINEAR.index(parameter) - 1
             return float(np.sqrt(stiffnesses[link] / masses[link]) / (2.0 * np.pi))
         case Parameter.GAP:
-            return specimen.gap_m
+            return min(specimen.gaps_m)
         case _:
             assert_never(parameter)
 
 
 def with_values(specimen: Specimen, values: Mapping[Parameter, float]) -> Specimen:
-    """Give a specimen other parameters; the masses stay, and dampings follow their stiffnesses."""
-    beta = values.get(Parameter.DAMPING_TIME, parameter_value(specimen, Parameter.DAMPING_TIME))
+    """Give a specimen other parameters; the masses stay, and dampings follow their stiffnesses.
+
+    Dampings keep their proportions to the stiffnesses, and two gaps theirs to each other.
+    """
+    old = parameter_value(specimen, Parameter.DAMPING_TIME)
+    beta = values.get(Parameter.DAMPING_TIME, old)
+    shares = [
+        c / k / old if old else 1.0 for c, k in zip(specimen.dampings, specimen.stiffnesses, strict=True)
+    ]
     stiffnesses = tuple(
         mass * (2.0 * np.pi * values.get(name, parameter_value(specimen, name))) ** 2
         for mass, name in zip(specimen.masses, LINEAR[1:], strict=True)
     )
     k0, k1, k2 = (float(each) for each in stiffnesses)
-    gap_m = values.get(Parameter.GAP, specimen.gap_m)
+    c0, c1, c2 = (share * beta * k for share, k in zip(shares, (k0, k1, k2), strict=True))
+    nearest = min(specimen.gaps_m)
+    wider = values.get(Parameter.GAP, nearest) / nearest
+    lower, upper = specimen.gaps_m
     return replace(
         specimen,
         stiffnesses=(k0, k1, k2),
-        dampings=(beta * k0, beta * k1, beta * k2),
-        gap_m=gap_m,
+        dampings=(c0, c1, c2),
+        gap_m=wider * upper,
+        lower_gap_m=None if specimen.lower_gap_m is None else wider * lower,
     )
 
 

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from vibench.sim import Specimen, base_transmissibility
+from vibench.sim import Specimen, SpecimenDescription, SpecimenTable, base_transmissibility
 
 from ..errors import AnalysisError, NotEnoughData
-from ..recordings import specimen_of
+from ..recordings import described_specimen
 from ..results import CampaignResults
 from ..sine import DwellAnalysis
 from ._gap_fit import fit_gap
@@ -60,7 +60,7 @@ def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedVa
         low=best.low_m,
         high=best.high_m,
         sd=float("nan"),
-        nominal=linear.gap_m,
+        nominal=min(linear.gaps_m),
     )
 
 
@@ -100,6 +100,7 @@ _SHOWN = {
     Parameter.F2: ("f2", 1.0, "Hz"),
     Parameter.GAP: ("gap", 1e6, "µm"),
 }
+_NOT_FITTED = ("masses_kg", "contact", "hertz_stiffness")
 _LEFT_OVER = 2.0
 """A reduced chi square above which the model is said to leave more than the scatter explains."""
 
@@ -117,6 +118,32 @@ class UpdatedSpecimen:
     lines: int
     not_told: tuple[str, ...]
     """A sentence for everything that stays as the bench says, and why."""
+    nominal: SpecimenTable
+    """As the bench describes it."""
+
+    @property
+    def description(self) -> SpecimenDescription:
+        """The fitted specimen as a file has it; what was not fitted is the bench's."""
+        lower, upper = self.specimen.gaps_m
+        fitted = {each.parameter.value for each in self.values}
+        return SpecimenDescription(
+            name=f"{self.nominal.name}_fitted",
+            about=f"{self.nominal.name}, fitted to recordings: {', '.join(sorted(fitted))}",
+            masses_kg=self.specimen.masses,
+            stiffnesses_n_per_m=self.specimen.stiffnesses,
+            dampings_ns_per_m=self.specimen.dampings,
+            gap_m=upper if lower == upper else (lower, upper),
+            contact=self.nominal.contact,
+            hertz_stiffness=self.nominal.hertz_stiffness,
+            sources={
+                **{key: source for key, source in self.nominal.sources.items() if key in _NOT_FITTED},
+                **(
+                    {"stiffnesses_n_per_m": self.linear_from, "dampings_ns_per_m": self.linear_from}
+                    if self.linear_from
+                    else {}
+                ),
+            },
+        )
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -146,6 +173,7 @@ class UpdatedSpecimen:
             "lines": self.lines,
             "reduced_chi_square": self.reduced_chi_square if np.isfinite(self.reduced_chi_square) else None,
             "not_told": list(self.not_told),
+            "specimen": self.description.model_dump(mode="json", exclude_none=True),
         }
 
 
@@ -176,7 +204,8 @@ def update_model(results: CampaignResults) -> UpdatedSpecimen:
     """
     if not results.results:
         raise NotEnoughData(f"{results.name!r} has no result to which a specimen could be fitted")
-    nominal = specimen_of(results.facts[0].bench)
+    described = described_specimen(results.facts[0].bench)
+    nominal = described.specimen()
     not_told: list[str] = []
     linear, linear_from = _linear(results, nominal, not_told)
     model = nominal if linear is None else linear.specimen
@@ -193,6 +222,7 @@ def update_model(results: CampaignResults) -> UpdatedSpecimen:
         reduced_chi_square=float("nan") if linear is None else linear.reduced_chi_square,
         lines=0 if linear is None else linear.lines,
         not_told=tuple(not_told),
+        nominal=described,
     )
 
 

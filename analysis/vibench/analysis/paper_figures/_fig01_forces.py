@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from vibench.sim import spring_of
-from vibench.sim.study import Structure
+from vibench.sim import gong2025, spring_of
 
 from ..figures import LEVEL_STYLES, LEVELS, MEASURED, DrawnFigure, legend_above, new_figure, styled
 from ..tables import table
@@ -20,9 +19,7 @@ def forces_figure(options: FigureOptions) -> DrawnFigure:
     """Draw force over relative displacement for all models."""
     p = np.linspace(0.0, _REACH * options.gap_m, 481)
     forces = {
-        model: spring_of(Structure().specimen(model, options.damping_time_s, options.gap_m)).force(
-            p, np.zeros_like(p)
-        )
+        model: spring_of(gong2025(options.damping_time_s, options.gap_m, model)).force(p, np.zeros_like(p))
         for model in ("hertz", *_MODELS)
     }
     with styled():

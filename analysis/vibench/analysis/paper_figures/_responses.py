@@ -45,7 +45,7 @@ def responses(results: StudyResults, **fixed: float | str) -> Responses:
 
 def specimen_of(study: Study, model: str, options: FigureOptions) -> Specimen:
     """Give the specimen of a study at the options' damping and gap."""
-    return study.structure.specimen(model, options.damping_time_s, options.gap_m)
+    return study.specimen.specimen(model, options.damping_time_s, options.gap_m)
 
 
 def drive_at(frequency_hz: float, amplitude_m: float) -> Harmonic:

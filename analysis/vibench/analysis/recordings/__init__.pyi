@@ -23,6 +23,7 @@ from ._checks import (
 )
 from ._facts import (
     RecordingFacts as RecordingFacts,
+    described_specimen as described_specimen,
     recording_facts as recording_facts,
     specimen_of as specimen_of,
 )

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from vibench.acquisition import Identity
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import FeedbackNote, Origin, Recording, RecordingState, feedback_note
-from vibench.sim import Specimen, gong2025
+from vibench.sim import Specimen, SpecimenTable
 
 from ..errors import UnusableData
 from ._channel_levels import ChannelLevel, OnRead, channel_levels, ignore_reading
@@ -125,7 +125,22 @@ def plan_of(recording: Recording) -> Measurement:
 
 
 def specimen_of(bench: Mapping[str, Any]) -> Specimen:
-    """Give the specimen that the bench configuration describes; the paper's where it says nothing."""
+    """Build the specimen that the bench configuration describes; as `described_specimen`."""
+    return described_specimen(bench).specimen()
+
+
+def described_specimen(bench: Mapping[str, Any]) -> SpecimenTable:
+    """Give the specimen that the bench configuration describes; the paper's where it says nothing.
+
+    Raises UnusableData when what it says is no specimen.
+    """
     said = bench.get("specimen", {})
-    chosen = {key: said[key] for key in ("damping_time_s", "gap_m", "contact") if key in said}
-    return gong2025(**chosen)
+    known = {key: said[key] for key in said if key in SpecimenTable.model_fields or key == "model"}
+    try:
+        return SpecimenTable.model_validate(known)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise UnusableData(
+            f"the specimen that the recording describes is not allowed ({'.'.join(map(str, first['loc']))}: "
+            f"{first['msg']}); its samples can be read with h5py"
+        ) from error

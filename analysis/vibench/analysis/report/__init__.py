@@ -15,6 +15,7 @@ on speed and accuracy is docs/accuracy.md. Results are taken as they are: nothin
 from ..figures import (
     DrawnFigure,
     ImageKind,
+    contact_forces_figure,
     tradeoff_figure,
 )
 from ..paper_figures import (
@@ -49,6 +50,7 @@ __all__ = [
     "FrequencyGrid",
     "ImageKind",
     "accuracy_document",
+    "contact_forces_figure",
     "levels_figure",
     "recording_figures",
     "result_figures",

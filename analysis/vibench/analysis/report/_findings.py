@@ -82,10 +82,11 @@ def limits(results: CampaignResults) -> Iterator[str]:
     if laid:
         specimen = laid[0].specimen
         damping = specimen.dampings[0] / specimen.stiffnesses[0]
+        gaps = " and ".join(f"{1e6 * each:.3g}" for each in dict.fromkeys(specimen.gaps_m))
         lowest_hz = min(each.base_low_hz for each in laid)
         yield (
             f"The simulation takes the damping as c = {damping:.3g} s · k and a gap of "
-            f"{1e6 * specimen.gap_m:.3g} µm. The paper leaves the damping open; other readings of it give "
+            f"{gaps} µm. The paper leaves the damping open; other readings of it give "
             "other collision regions."
         )
         yield (

@@ -47,7 +47,14 @@ def bench_rows(facts: RecordingFacts) -> Rows:
     ]
     specimen = facts.bench.get("specimen")
     if specimen:
-        rows.append(("specimen", ", ".join(f"{k} = {_value(v)}" for k, v in specimen.items())))
+        rows.append(
+            (
+                "specimen",
+                ", ".join(
+                    f"{k} = {_value(v)}" for k, v in specimen.items() if v is not None and k != "sources"
+                ),
+            )
+        )
     rows.append(("bench check", bench_check_text(facts)))
     rate = f"{facts.sample_rate_hz:.6g} samples/s, {facts.requested_sample_rate_hz:.6g} asked for"
     rows.append(("sample rate", rate))

@@ -71,7 +71,8 @@ def _run(run: SimulatedRun) -> Json:
         "masses_kg": run.specimen.masses,
         "stiffnesses_n_per_m": run.specimen.stiffnesses,
         "dampings_ns_per_m": run.specimen.dampings,
-        "gap_m": run.specimen.gap_m,
+        "gap_m": min(run.specimen.gaps_m),
+        "gaps_m": run.specimen.gaps_m,
         "impacts": run.impacts,
         "impact_rate_hz": run.impact_rate_hz,
     }

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from vibench.sim import Accuracy, PowerLaw, gong2025
+from vibench.sim import Accuracy, PowerLaw
 
 from ._request import Exponent, SimulationRequest
 
@@ -41,7 +41,7 @@ def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
     """Say what a request's accuracy costs and errs, and how long it takes on so many idle cores."""
     level = MEASURED[request.accuracy]
     each_s = request.simulated_s / len(request.models)
-    laws = [gong2025(gap_m=request.gap_m, contact=model).contact for model in request.models]
+    laws = [request.specimen_under(model).contact for model in request.models]
     powers = [isinstance(law, PowerLaw) for law in laws]
     shortest_s = sum(each_s / (level.power if is_power else level.free) for is_power in powers)
     longest_s = sum(each_s / (level.power if is_power else level.chaos) for is_power in powers)

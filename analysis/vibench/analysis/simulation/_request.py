@@ -5,12 +5,20 @@ What comes back of a simulation, piece by piece, small enough to cross from the 
 
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import Field, PositiveFloat, model_validator
+from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat, model_validator
 
 from vibench.acquisition import FrozenModel
-from vibench.sim import Accuracy, Observable
+from vibench.sim import (
+    USUAL_SPECIMEN,
+    Accuracy,
+    Observable,
+    Specimen,
+    SpecimenTable,
+    load_specimen,
+)
 from vibench.sim.study import Study, frequency_range
 
 from ..signals import Reals
@@ -41,7 +49,8 @@ class SimulatedSignal:
     """x, of m0."""
     relative_m: Reals
     """p = y - z, between the stops."""
-    gap_m: float
+    gaps_m: tuple[float, float]
+    """Of the stops at negative and at positive p."""
 
 
 @dataclass(frozen=True)
@@ -63,17 +72,25 @@ class Exponent(StrEnum):
     COMPUTED = "computed"
 
 
+def _known(specimen: str) -> str:
+    load_specimen(specimen)
+    return specimen
+
+
 class SimulationRequest(FrozenModel):
     """A scene at every frequency of a range."""
 
-    model: str = "hertz"
-    """Contact: hertz, linear, linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, power:3+5+7, ..."""
+    specimen: Annotated[str, AfterValidator(_known)] = USUAL_SPECIMEN
+    """gong2025, heavy, asymmetric, hardening, rigid_stops, linear_gap, or the path of a specimen's file."""
+    model: str = ""
+    """Contact: hertz, linear, linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, power:3+5+7, ...; empty for
+    the specimen's own."""
     compared_with: str = "linear"
     """A second model, for similarity with the first; empty for none."""
-    damping_time_s: Annotated[float, Field(ge=0.0)] = 2e-5
-    """Damping over stiffness of every link: c = damping time times k."""
-    gap_m: PositiveFloat = 45e-6
-    """Clearance at both stops."""
+    damping_time_s: NonNegativeFloat | None = None
+    """Damping over stiffness of every link: c = damping time times k; empty for the specimen's own."""
+    gap_m: PositiveFloat | None = None
+    """Clearance at both stops; empty for the specimen's own."""
     amplitude_m: PositiveFloat = 5e-6
     """Of the base displacement."""
     start_hz: PositiveFloat = 50.0
@@ -108,17 +125,33 @@ class SimulationRequest(FrozenModel):
     @property
     def models(self) -> tuple[str, ...]:
         """The first is the reference of the similarity."""
+        first = self.model.strip() or load_specimen(self.specimen).contact
         second = self.compared_with.strip()
-        return (self.model,) if second in ("", self.model) else (self.model, second)
+        return (first,) if second in ("", first) else (first, second)
+
+    def specimen_under(self, model: str) -> Specimen:
+        """Build what is simulated, with one of the contact laws."""
+        return load_specimen(self.specimen).specimen(model, self.damping_time_s, self.gap_m)
+
+    @property
+    def specimen_text(self) -> str:
+        """The specimen and what of it is replaced, for a caption."""
+        said = [Path(self.specimen).stem]
+        if self.gap_m is not None:
+            said.append(f"gap {1e6 * self.gap_m:g} µm")
+        if self.damping_time_s is not None:
+            said.append(f"damping time {self.damping_time_s:g} s")
+        return ", ".join(said)
 
     @property
     def study(self) -> Study:
         """The same as every program of the house computes it."""
         exponents = (Observable.LYAPUNOV,) if self.exponent is Exponent.COMPUTED else ()
+        varied = {"damping_times_s": self.damping_time_s, "gaps_m": self.gap_m}
         return Study(
+            specimen=SpecimenTable.model_validate(load_specimen(self.specimen).model_dump()),
             models=self.models,
-            damping_times_s=(self.damping_time_s,),
-            gaps_m=(self.gap_m,),
+            **{name: (value,) for name, value in varied.items() if value is not None},
             amplitudes_m=(self.amplitude_m,),
             frequencies_hz=frequency_range(self.start_hz, self.stop_hz, self.step_hz),
             observe=(Observable.RESPONSE, *exponents),

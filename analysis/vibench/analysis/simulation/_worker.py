@@ -85,8 +85,7 @@ def simulated_signal(
     request: SimulationRequest, model: str, frequency_hz: float
 ) -> SimulatedSignal | Trouble:
     """Follow the specimen from rest, and give the last periods."""
-    study = request.study
-    specimen = study.structure.specimen(model, request.damping_time_s, request.gap_m)
+    specimen = request.specimen_under(model)
     drive = Harmonic(frequency_hz, request.amplitude_m)
     shown_s = min(SIGNAL_PERIODS / frequency_hz, 0.5 * request.duration_s)
     lead_s = request.duration_s - shown_s
@@ -109,7 +108,7 @@ def simulated_signal(
         time_s=np.asarray(end.time_s),
         displacement_m=states[:, 0],
         relative_m=states[:, 1] - states[:, 2],
-        gap_m=request.gap_m,
+        gaps_m=specimen.gaps_m,
     )
 
 

@@ -72,6 +72,16 @@ from ._specimen import (
     bound_matrices as bound_matrices,
     gong2025 as gong2025,
 )
+from ._specimen_description import (
+    USUAL_SPECIMEN as USUAL_SPECIMEN,
+    ContactWord as ContactWord,
+    SpecimenDescription as SpecimenDescription,
+    SpecimenTable as SpecimenTable,
+    UnknownSpecimenError as UnknownSpecimenError,
+    load_specimen as load_specimen,
+    shipped_specimens as shipped_specimens,
+    usual_specimen as usual_specimen,
+)
 from ._state import (
     VX as VX,
     VY as VY,

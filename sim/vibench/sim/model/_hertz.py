@@ -32,4 +32,4 @@ def _made(detail: str, reference: Reference) -> Hertz:
     return Hertz(reference.stiffness)
 
 
-HERTZ = LawWord("hertz", _made)
+HERTZ = LawWord("hertz", "an elastic sphere on a plane, force as d^1.5", "hertz", _made)

@@ -42,4 +42,6 @@ def _made(detail: str, reference: Reference) -> HuntCrossley:
     return HuntCrossley(reference.stiffness, number_in(detail))
 
 
-HUNT_CROSSLEY = LawWord("hunt_crossley:s/m", _made)
+HUNT_CROSSLEY = LawWord(
+    "hunt_crossley:s/m", "hertz with a loss that grows with the speed", "hunt_crossley:2", _made
+)

@@ -38,4 +38,4 @@ def _made(detail: str, reference: Reference) -> LinearGap:
     return LinearGap(number_in(detail)) if detail else fitted_linear_gap(reference.stiffness)
 
 
-LINEAR_GAP = LawWord("linear_gap[:N/m]", _made)
+LINEAR_GAP = LawWord("linear_gap[:N/m]", "stops that are springs", "linear_gap", _made)

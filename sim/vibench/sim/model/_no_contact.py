@@ -27,4 +27,4 @@ def _made(detail: str, _reference: Reference) -> NoContact:
     return NoContact()
 
 
-LINEAR = LawWord("linear", _made)
+LINEAR = LawWord("linear", "no stops", "linear", _made)

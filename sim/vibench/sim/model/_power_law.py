@@ -112,4 +112,6 @@ def _made(detail: str, reference: Reference) -> PowerLaw:
     return fitted_power_law(exponents, reference.stiffness, reference.gap_m, shares=shares)
 
 
-POWER = LawWord("power:3+5+7 or power:3@0.2+7@0.8", _made)
+POWER = LawWord(
+    "power:3+5+7 or power:3@0.2+7@0.8", "odd powers of p instead of stops, with shares", "power:5", _made
+)

@@ -58,6 +58,10 @@ class LawWord(Generic[Law_co]):
 
     form: str
     """What may be written, for a message."""
+    about: str
+    """What it is, in a few words, for a list."""
+    example: str
+    """One that is written so, for a picture."""
     made: Callable[[str, Reference], Law_co]
     """Takes what stands behind the colon; raises `UnreadableLawError` for what is no number."""
 

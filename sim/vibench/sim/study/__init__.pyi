@@ -46,7 +46,6 @@ from ._store import (
 )
 from ._study import (
     Start as Start,
-    Structure as Structure,
     Study as Study,
     StudyObservable as StudyObservable,
 )

@@ -1,12 +1,12 @@
-"""A study: every combination of models, dampings, gaps, amplitudes, starts and frequencies, as one value."""
+"""A study: every combination of contact laws, dampings, gaps, amplitudes, starts and frequencies."""
 
-import math
 from enum import StrEnum
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
+    AliasChoices,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -17,17 +17,11 @@ from pydantic import (
 )
 
 from ..model import (
-    ALUMINIUM,
-    PAPER_FREQUENCIES_HZ,
-    PAPER_MASSES,
-    PAPER_RADIUS_M,
-    STEEL,
     Accuracy,
+    ContactWord,
     Harmonic,
-    Specimen,
-    Triple,
-    hertz_stiffness,
-    model_named,
+    SpecimenTable,
+    usual_specimen,
 )
 from ..scene import AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
 from ._axes import FREQUENCY, MODEL, START, Grid, StudyAxis, grid_of
@@ -35,36 +29,8 @@ from ._frequency_range import listed
 
 MOST_POINTS = 10_000_000
 """A file of 2 GB: a range that asks for more is a slip of the pen."""
-ANY_GAP_M = 1e-5
-"""For asking whether a model's name is known, which depends on no gap."""
-
-
-class Structure(BaseModel):
-    """The paper's specimen where nothing else is said (Gong et al. 2025, section 2)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
-
-    masses_kg: Triple = PAPER_MASSES
-    """m0, m1, m2."""
-    single_frequencies_hz: Triple = PAPER_FREQUENCIES_HZ
-    """f0, f1, f2 of the single oscillators: k_i = m_i (2 pi f_i)^2."""
-    hertz_stiffness: float = hertz_stiffness(STEEL, ALUMINIUM, PAPER_RADIUS_M)
-    """k of F = k d^(3/2) at a stop [N/m^1.5]; what other models are fitted to."""
-
-    def specimen(self, model: str, damping_time_s: float, gap_m: float) -> Specimen:
-        """Build one specimen; raises ValueError in one sentence when a number or the model is not allowed."""
-        stiffnesses = tuple(
-            m * (2.0 * math.pi * f) ** 2
-            for m, f in zip(self.masses_kg, self.single_frequencies_hz, strict=True)
-        )
-        k0, k1, k2 = stiffnesses
-        return Specimen(
-            masses=self.masses_kg,
-            stiffnesses=(k0, k1, k2),
-            dampings=(damping_time_s * k0, damping_time_s * k1, damping_time_s * k2),
-            gap_m=gap_m,
-            contact=model_named(model, self.hertz_stiffness, gap_m),
-        )
+AS_DESCRIBED = "as described"
+"""The one label of an axis that leaves to the specimen what a single number cannot say."""
 
 
 class Start(StrEnum):
@@ -101,13 +67,6 @@ def _ascending(values: Numbers) -> Numbers:
     return values
 
 
-def _known(model: str) -> str:
-    """Refuse a name that no structure would understand, with its key."""
-    Structure().specimen(model, damping_time_s=0.0, gap_m=ANY_GAP_M)
-    return model
-
-
-Model = Annotated[str, AfterValidator(_known)]
 Positive = Annotated[tuple[PositiveFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
 NotNegative = Annotated[tuple[NonNegativeFloat, ...], Field(min_length=1), AfterValidator(_ascending)]
 Frequencies = Annotated[Positive, BeforeValidator(listed)]
@@ -115,21 +74,45 @@ StudyObservable = Literal[Observable.RESPONSE, Observable.LYAPUNOV, Observable.S
 """What has one number a point."""
 
 
+def _own_law(said: dict[str, Any]) -> tuple[str, ...]:
+    return (_described(said).contact,)
+
+
+def _own_damping(said: dict[str, Any]) -> tuple[float, ...] | None:
+    own_s = _described(said).damping_time_s
+    return None if own_s is None else (own_s,)
+
+
+def _own_gap(said: dict[str, Any]) -> tuple[float, ...] | None:
+    own_m = _described(said).gap_m
+    return (own_m,) if isinstance(own_m, float) else None
+
+
+def _described(said: dict[str, Any]) -> SpecimenTable:
+    """Give the specimen of a study that is being read; the usual one where its own is not allowed."""
+    found: SpecimenTable = said.get("specimen") or usual_specimen()
+    return found
+
+
 class Study(BaseModel):
     """What is to be predicted, completely: two equal studies have equal answers."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
+    specimen: SpecimenTable = Field(
+        default_factory=usual_specimen, validation_alias=AliasChoices("specimen", "structure")
+    )
+    """A name or a path, or a table that may start from one (``model``); the paper's when absent."""
     frequencies_hz: Frequencies
     """A list, or a table with start, stop and step, or several of these in a list."""
     amplitudes_m: Positive
     """Amplitudes of the base displacement."""
-    models: Annotated[tuple[Model, ...], Field(min_length=1)] = ("hertz",)
-    """Contact laws as `vibench.sim.model` spells them."""
-    damping_times_s: NotNegative = (2e-5,)
-    """c_i = damping time * k_i."""
-    gaps_m: Positive = (45e-6,)
-    """Clearance at both stops."""
+    models: Annotated[tuple[ContactWord, ...], Field(min_length=1, default_factory=_own_law)]
+    """Contact laws as `vibench.sim.model` spells them; the specimen's own when absent."""
+    damping_times_s: Annotated[NotNegative | None, Field(default_factory=_own_damping)]
+    """c_i = damping time * k_i; as the specimen has it when absent."""
+    gaps_m: Annotated[Positive | None, Field(default_factory=_own_gap)]
+    """Clearance at both stops; as the specimen has it when absent."""
     starts: Annotated[tuple[Start | GivenStart, ...], Field(min_length=1)] = (Start.REST,)
     """Where each point begins: the state that is reached may depend on it."""
     observe: tuple[StudyObservable, ...] = (Observable.RESPONSE,)
@@ -140,8 +123,6 @@ class Study(BaseModel):
     """Length of each run; "auto" runs until the motion has settled."""
     window_s: PositiveFloat = 5.0
     """Length of the end of the run that is observed."""
-    structure: Structure = Structure()
-    """Masses, springs and Hertz stiffness; the paper's when absent."""
 
     @model_validator(mode="after")
     def _labels_differ(self) -> Self:
@@ -155,7 +136,7 @@ class Study(BaseModel):
     def _scenes_are_allowed(self) -> Self:
         """Refuse now, and not in each point, a model that nobody knows or a window that is too short."""
         for model in range(len(self.models)):
-            for gap in range(len(self.gaps_m)):
+            for gap in range(1 if self.gaps_m is None else len(self.gaps_m)):
                 self.scene((model, 0, gap, 0, 0, 0), Rest())
         return self
 
@@ -176,8 +157,8 @@ class Study(BaseModel):
         """Dimensions of the results, in order."""
         return (
             StudyAxis(MODEL, self.models, "", "contact law"),
-            StudyAxis("damping_time", self.damping_times_s, "s", "damping over stiffness of every link"),
-            StudyAxis("gap", self.gaps_m, "m", "clearance at both stops"),
+            _axis("damping_time", self.damping_times_s, "s", "damping over stiffness of every link"),
+            _axis("gap", self.gaps_m, "m", "clearance at both stops"),
             StudyAxis("amplitude", self.amplitudes_m, "m", "amplitude of the base displacement"),
             StudyAxis(START, self.start_labels, "", "state from which a point begins"),
             StudyAxis(FREQUENCY, self.frequencies_hz, "Hz", "drive frequency"),
@@ -199,8 +180,10 @@ class Study(BaseModel):
         """
         model, damping, gap, amplitude, _, frequency = place
         return Scene(
-            specimen=self.structure.specimen(
-                self.models[model], self.damping_times_s[damping], self.gaps_m[gap]
+            specimen=self.specimen.specimen(
+                self.models[model],
+                None if self.damping_times_s is None else self.damping_times_s[damping],
+                None if self.gaps_m is None else self.gaps_m[gap],
             ),
             drive=Harmonic(self.frequencies_hz[frequency], self.amplitudes_m[amplitude], phase_rad),
             observe=self.observe,
@@ -220,3 +203,12 @@ class Study(BaseModel):
         """Names of what differs between two studies."""
         mine, theirs = self.model_dump(mode="json"), other.model_dump(mode="json")
         return tuple(name for name in mine if mine[name] != theirs[name])
+
+
+def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> StudyAxis:
+    """Give an axis of numbers, or of the one label of what only the specimen says."""
+    return (
+        StudyAxis(name, (AS_DESCRIBED,), "", long_name)
+        if values is None
+        else StudyAxis(name, values, units, long_name)
+    )

@@ -109,10 +109,11 @@ class AnswerPlots(QWidget):
             line = self.motion.curve(curve_style(number, Dash.DOTTED), f"p = y - z, {signal.model}")
             line.setData(time_s, signal.relative_m)
         if progress.signals:
-            gap_m = progress.signals[0].gap_m
-            for stop_m in (gap_m, -gap_m):
+            lower_m, upper_m = progress.signals[0].gaps_m
+            stops_m = [each for each in (upper_m, -lower_m) if np.isfinite(each)]
+            for stop_m in stops_m:
                 self.motion.level(LIMIT, stop_m, "stop")
-            reach_m = max(gap_m, progress.largest_signal_m)
+            reach_m = max(*np.abs(stops_m), progress.largest_signal_m)
             self.motion.setYRange(-1.1 * reach_m, 1.1 * reach_m, padding=0.0)
 
     def _likeness(self, progress: SimulationProgress) -> None:

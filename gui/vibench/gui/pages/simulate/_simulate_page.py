@@ -73,8 +73,8 @@ class SimulatePage(Page):
         if request is None:
             return
         note = (
-            f"A0 = {1e6 * request.amplitude_m:g} µm, gap {1e6 * request.gap_m:g} µm, damping time "
-            f"{request.damping_time_s:g} s, {request.duration_s:g} s from rest, {request.accuracy.value}"
+            f"{request.specimen_text}, A0 = {1e6 * request.amplitude_m:g} µm, "
+            f"{request.duration_s:g} s from rest, {request.accuracy.value}"
         )
         self._progress = SimulationProgress(request.amplitude_m, request.points, note)
         self._is_stale = True

@@ -1,0 +1,96 @@
+"""`vibench specimen`: the specimens and contact laws that there are, or what one of them amounts to."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.acquisition import toml_text
+from vibench.sim import CONTACT_LAWS, Specimen, shipped_specimens
+
+from .output import bold, console, print_json
+from .paths import AsJson, room_for_folder
+from .specimen_option import described
+
+
+def show_specimen(
+    specimen: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="NAME|FILE.toml", help="One that comes with vibench, or your own; all if absent."
+        ),
+    ] = None,
+    forces: Annotated[
+        Path | None,
+        typer.Option(
+            "--forces",
+            metavar="DIR",
+            help="Draw the force of its stops over p = y - z, or of every contact law.",
+        ),
+    ] = None,
+    as_toml: Annotated[
+        bool, typer.Option("--toml", help="Print it whole, as a file of its own to start from.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """List the specimens and contact laws that there are, or say what one specimen amounts to."""
+    if forces is not None:
+        _draw(specimen, forces)
+        return
+    if specimen is None:
+        _list(as_json)
+        return
+    table = described(specimen)
+    facts = figures_of(table.specimen())
+    if as_json:
+        print_json({**table.model_dump(mode="json", exclude_none=True), **facts})
+    elif as_toml:
+        typer.echo(toml_text(table), nl=False)
+    else:
+        console.print(f"{table.name}: {table.about}", markup=False)
+        for name, value in facts.items():
+            console.print(f"  {name.replace('_', ' ')}: {_shown(value)}", markup=False)
+
+
+def figures_of(specimen: Specimen) -> dict[str, object]:
+    """Say what follows from a specimen's numbers: stiffnesses, resonances, damping ratios."""
+    return {
+        "masses_kg": specimen.masses,
+        "stiffnesses_n_per_m": specimen.stiffnesses,
+        "dampings_ns_per_m": specimen.dampings,
+        "resonances_without_contact_hz": specimen.natural_frequencies_hz.tolist(),
+        "damping_ratios": specimen.damping_ratios.tolist(),
+        "resonances_with_m1_held_hz": specimen.bound_frequencies_hz.tolist(),
+        "gaps_m": specimen.gaps_m,
+        "contact_law": str(specimen.contact),
+    }
+
+
+def _draw(specimen: str | None, folder: Path) -> None:
+    from vibench.analysis.report import contact_forces_figure  # noqa: PLC0415 - a list needs no pictures
+
+    table = described(specimen)
+    laws = [each.example for each in CONTACT_LAWS.values()] if specimen is None else [table.contact]
+    drawn = contact_forces_figure({law: table.specimen(law) for law in laws})
+    room_for_folder(folder)
+    console.print("The forces of the stops:", bold(drawn.save(folder)[0]))
+
+
+def _list(as_json: bool) -> None:
+    specimens = {name: each.about for name, each in shipped_specimens().items()}
+    laws = {law.form: law.about for law in CONTACT_LAWS.values()}
+    if as_json:
+        print_json({"specimens": specimens, "contact_laws": laws})
+        return
+    for title, rows in (("Specimens (--specimen)", specimens), ("Contact laws (--model)", laws)):
+        console.print(title)
+        for name, about in rows.items():
+            console.print(f"  {name:28} {about}", markup=False)
+
+
+def _shown(value: object) -> str:
+    match value:
+        case list() | tuple():
+            return ", ".join(f"{each:.6g}" for each in value)
+        case _:
+            return str(value)

@@ -1,0 +1,322 @@
+"""A specimen as data: its numbers, in a file or in a table of another file, and where they come from.
+
+A description says everything of a specimen; nothing in it is assumed. It may start from another one
+(``model``, by name or by path) and say what differs, as the tables of rigs, studies and imports do.
+"""
+
+import math
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar, Self
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
+
+from ._contact_law import model_named
+from ._elasticity import Elasticity, hertz_stiffness
+from ._specimen import Gaps, Specimen, Triple
+
+BASE = "model"
+"""Key of the described specimen that a table starts from."""
+FOLDER = "folder"
+"""Key of a validation's context: the folder that a path in ``model`` is relative to, given by whoever reads a
+file. Without it only shipped specimens can be named, so that what stands in a recording opens no file."""
+SOURCES = "sources"
+SUFFIX = ".toml"
+DEEPEST = 5
+"""Files that a file may start from, one after the other."""
+USUAL_SPECIMEN = "gong2025"
+"""The specimen of a rig, a study or a command that names none."""
+ALTERNATIVES = (("single_frequencies_hz", "stiffnesses_n_per_m"), ("damping_time_s", "dampings_ns_per_m"))
+"""Pairs of keys that say the same: a specimen has one of each."""
+_ANY_GAP_M = 1e-5
+"""For asking whether a contact law is known, which depends on no gap."""
+PositiveTriple = tuple[PositiveFloat, PositiveFloat, PositiveFloat]
+NonNegativeTriple = tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
+
+
+class UnknownSpecimenError(ValueError):
+    """A specimen that is not shipped, or a file that describes none."""
+
+
+class _Described(BaseModel):
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        allow_inf_nan=False,
+        ser_json_inf_nan="strings",
+        use_attribute_docstrings=True,
+    )
+
+
+class Material(_Described):
+    """How stiff a body is."""
+
+    youngs_modulus_pa: PositiveFloat
+    """E."""
+    poissons_ratio: Annotated[float, Field(gt=-1.0, le=0.5)]
+    """Lateral over axial strain."""
+
+    @property
+    def elasticity(self) -> Elasticity:
+        """The same for a contact."""
+        return Elasticity(self.youngs_modulus_pa, self.poissons_ratio)
+
+
+class SphereOnPlane(_Described):
+    """Two bodies that touch: k = 4/3 E* sqrt(R), Johnson, Contact Mechanics (1985), eq. 4.23."""
+
+    radius_m: PositiveFloat
+    """Of the sphere at the point that touches."""
+    sphere: Material
+    plane: Material
+
+    @property
+    def stiffness(self) -> float:
+        """K of F = k d^(3/2) [N/m^1.5]."""
+        return hertz_stiffness(self.sphere.elasticity, self.plane.elasticity, self.radius_m)
+
+
+def _known_law(word: str) -> str:
+    model_named(word, 1.0, _ANY_GAP_M)
+    return word
+
+
+ContactWord = Annotated[str, AfterValidator(_known_law)]
+"""A contact law as `CONTACT_LAWS` spells it: ``hertz``, ``rigid:0.8``, ``power:3+5+7``."""
+Gap = Annotated[float, Field(gt=0.0, allow_inf_nan=True)]
+
+
+class SpecimenDescription(_Described):
+    """Three masses in a chain, base - m0 - m2 - m1, with stops for m1 on m2 (Gong et al. 2025, eq. 1).
+
+    Fewer or more masses, other places for the stops, springs that harden by themselves, friction and
+    several pairs of stops are not described.
+    """
+
+    name: Annotated[str, Field(min_length=1, max_length=60)]
+    """How the specimen is called in results."""
+    about: str = ""
+    """What it is, in a line."""
+    masses_kg: PositiveTriple
+    """m0, m1, m2."""
+    single_frequencies_hz: PositiveTriple | None = None
+    """f0, f1, f2 of each mass on its own spring: k_i = m_i (2 pi f_i)^2; instead of the stiffnesses."""
+    stiffnesses_n_per_m: PositiveTriple | None = None
+    """k0 (base to m0), k1 (m2 to m1), k2 (m0 to m2)."""
+    damping_time_s: NonNegativeFloat | None = None
+    """c_i = damping time * k_i; instead of the dampings."""
+    dampings_ns_per_m: NonNegativeTriple | None = None
+    """c0, c1, c2, beside k0, k1, k2."""
+    gap_m: Gap | tuple[Gap, Gap]
+    """Clearance between m1 and each stop at rest, or (lower, upper) at negative and at positive p = y - z;
+    infinite for a side without a stop."""
+    contact: ContactWord
+    """Law of the stops: hertz, linear (no stops), linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, ..."""
+    hertz_stiffness: PositiveFloat | SphereOnPlane
+    """k of F = k d^(3/2) at a stop [N/m^1.5], or the bodies that touch; what other laws are fitted to."""
+    sources: dict[str, str] = {}
+    """Where a number comes from, by its key."""
+    _meant: ClassVar[Mapping[str, str]] = {}
+    """What a table says that does not say it."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_its_base(cls, said: object, info: ValidationInfo) -> object:
+        """Fill in what a table leaves to the specimen that it names; a name alone is that specimen."""
+        folder: Path | None = (info.context or {}).get(FOLDER)
+        match said:
+            case str():
+                return _complete({BASE: said}, folder)
+            case Mapping():
+                return _complete({**cls._meant, **said}, folder)
+            case _:
+                return said
+
+    @model_validator(mode="after")
+    def _says_each_thing_once(self) -> Self:
+        for pair in ALTERNATIVES:
+            said = [key for key in pair if getattr(self, key) is not None]
+            if len(said) != 1:
+                have = "both are" if said else "neither is"
+                raise ValueError(f"{' and '.join(pair)} say the same, and {have} given; give one of them")
+        unknown = sorted(self.sources.keys() - type(self).model_fields.keys())
+        if unknown:
+            raise ValueError(f"sources names {unknown[0]!r}, which is no key of a specimen")
+        self.specimen()
+        return self
+
+    def specimen(
+        self,
+        contact: str | None = None,
+        damping_time_s: float | None = None,
+        gap_m: float | Gaps | None = None,
+    ) -> Specimen:
+        """Build the specimen, with another contact law, damping or gap where one is given.
+
+        Parameters
+        ----------
+        contact
+            A word of `CONTACT_LAWS`, with its numbers.
+        damping_time_s
+            c_i = damping_time_s * k_i [s].
+        gap_m
+            Clearance at both stops [m], or (lower, upper). A power law is fitted at the nearer one.
+
+        Raises
+        ------
+        ValueError
+            In one sentence, when a number or the law is not allowed.
+
+        """
+        gap = self.gap_m if gap_m is None else gap_m
+        lower, upper = gap if isinstance(gap, tuple) else (None, gap)
+        nearest = upper if lower is None else min(lower, upper)
+        return Specimen(
+            masses=self.masses_kg,
+            stiffnesses=self.stiffnesses,
+            dampings=self._dampings(damping_time_s),
+            gap_m=upper,
+            contact=model_named(self.contact if contact is None else contact, self.hertz_k, nearest),
+            lower_gap_m=lower,
+        )
+
+    @property
+    def stiffnesses(self) -> Triple:
+        """k0, k1, k2 [N/m]."""
+        if self.stiffnesses_n_per_m is not None:
+            return self.stiffnesses_n_per_m
+        assert self.single_frequencies_hz is not None, "one of the two is given"
+        k0, k1, k2 = (
+            m * (2.0 * math.pi * f) ** 2
+            for m, f in zip(self.masses_kg, self.single_frequencies_hz, strict=True)
+        )
+        return k0, k1, k2
+
+    @property
+    def hertz_k(self) -> float:
+        """K of F = k d^(3/2) at a stop [N/m^1.5]."""
+        return (
+            self.hertz_stiffness
+            if isinstance(self.hertz_stiffness, float)
+            else self.hertz_stiffness.stiffness
+        )
+
+    def _dampings(self, damping_time_s: float | None) -> Triple:
+        time_s = self.damping_time_s if damping_time_s is None else damping_time_s
+        if time_s is None:
+            assert self.dampings_ns_per_m is not None, "one of the two is given"
+            return self.dampings_ns_per_m
+        if not 0.0 <= time_s < math.inf:
+            msg = f"Damping time {time_s} s is not allowed: it must be zero or positive."
+            raise ValueError(msg)
+        k0, k1, k2 = self.stiffnesses
+        return time_s * k0, time_s * k1, time_s * k2
+
+
+class SpecimenTable(SpecimenDescription):
+    """A specimen in a rig, a study or an import: what differs from the one that it names, or the paper's."""
+
+    _meant = MappingProxyType({BASE: USUAL_SPECIMEN})
+
+
+def usual_specimen() -> SpecimenTable:
+    """Give the specimen that is meant where none is named: the paper's."""
+    return SpecimenTable.model_validate(USUAL_SPECIMEN)
+
+
+def load_specimen(specimen: str | Path) -> SpecimenDescription:
+    """Read a described specimen: the name of a shipped one, or the path of a TOML file.
+
+    Raises
+    ------
+    UnknownSpecimenError
+        In one sentence, when there is none, or when the file does not describe one.
+
+    """
+    try:
+        return SpecimenDescription.model_validate(str(specimen), context={FOLDER: Path()})
+    except ValidationError as error:
+        raise UnknownSpecimenError(_complaint(str(specimen), error)) from error
+
+
+def shipped_specimens() -> Mapping[str, SpecimenDescription]:
+    """Give the specimens that come with vibench, by the names that may stand for a file."""
+    return {name: SpecimenDescription.model_validate(name) for name in _shipped()}
+
+
+def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dict[str, Any]:
+    """Lay a table over the specimen that it starts from, and that over its own."""
+    if BASE not in table:
+        return table
+    if depth > DEEPEST:
+        raise ValueError(f"a specimen starts from {table[BASE]!r}, which comes back to it; name another one")
+    specimen = str(table.pop(BASE))
+    known = _shipped()
+    if specimen in known:
+        return _laid_over(_complete(tomllib.loads(known[specimen]), None, depth + 1), table)
+    names = ", ".join(known)
+    if folder is None:
+        raise ValueError(f"no specimen that comes with vibench is called {specimen!r}; there are {names}")
+    path = folder / specimen
+    try:
+        base = tomllib.loads(path.read_text("utf-8"))
+    except FileNotFoundError:
+        raise ValueError(
+            f"no specimen is called {specimen!r}, and there is no such file; give the path of a TOML file, "
+            f"or one of {names}"
+        ) from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ValueError(f"{path} cannot be read as TOML ({error}); give the path of a TOML file") from error
+    return _laid_over(_complete(base, path.parent, depth + 1), table)
+
+
+@cache
+def _shipped() -> Mapping[str, str]:
+    """Text of each specimen that comes with vibench, by its name."""
+    found = [each for each in (files("vibench.sim") / "specimens").iterdir() if each.name.endswith(SUFFIX)]
+    return {
+        each.name.removesuffix(SUFFIX): each.read_text("utf-8")
+        for each in sorted(found, key=lambda each: each.name)
+    }
+
+
+def _laid_over(base: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
+    """Replace what is said anew; the other of two keys that say the same goes, and so do its sources."""
+    replaced = {key for pair in ALTERNATIVES if said.keys() & pair for key in pair} | said.keys()
+    kept = {key: value for key, value in base.items() if key not in replaced}
+    sources = {key: source for key, source in base.get(SOURCES, {}).items() if key not in replaced}
+    return {**kept, **said, SOURCES: {**sources, **said.get(SOURCES, {})}}
+
+
+def _complaint(specimen: str, error: ValidationError) -> str:
+    """Say the first fault: the key, what was given, and what is allowed."""
+    first = error.errors()[0]
+    key = ".".join(str(part) for part in first["loc"] if isinstance(part, int) or part in _KEYS)
+    said = first["msg"].removeprefix("Value error, ")
+    match first["type"]:
+        case "missing":
+            fault = f"{key} is missing"
+        case "extra_forbidden":
+            fault = f"{first['loc'][-1]} is no key of a specimen; there are {', '.join(sorted(_KEYS))}"
+        case _ if key:
+            fault = f"{key} = {first['input']!r}: {said}"
+        case _:
+            return said if specimen in said else f"{specimen}: {said}"
+    return f"{specimen} describes no specimen: {fault}"
+
+
+_KEYS = frozenset(SpecimenDescription.model_fields)

@@ -1,0 +1,129 @@
+"""A specimen's file goes every way with the same numbers: prediction, study, rig, recording, overlay."""
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import shipped
+from vibench.acquisition.rig import load_rig
+from vibench.analysis.recordings import specimen_of
+from vibench.sim import FixedDuration, Harmonic, Scene, load_specimen, shipped_specimens, solve_scene
+from vibench.sim.study import Study, open_study
+
+DRIVE = Harmonic(130.0, 20e-6)
+ASKED = (
+    "--amplitude",
+    DRIVE.amplitude_m,
+    "--frequency",
+    DRIVE.frequency_hz,
+    "--duration",
+    0.2,
+    "--window",
+    0.1,
+)
+LAWS = ("hertz", "linear_gap:2e5", "rigid:0.8")
+
+
+def random_specimen(folder, rng):
+    """A file of a random specimen, near enough to the paper's to be moved by the same base."""
+    spread = 2.0 ** rng.uniform(-1.0, 1.0, (3, 3))
+    masses, springs, dampings = spread * [[5.8e-3, 2.1e-3, 2e-3], [2.4e4, 829.0, 1.2e4], [0.47, 0.017, 0.24]]
+    path = folder / "random.toml"
+    path.write_text(
+        f'name = "random"\nmasses_kg = {masses.tolist()}\nstiffnesses_n_per_m = {springs.tolist()}\n'
+        f"dampings_ns_per_m = {dampings.tolist()}\ngap_m = {rng.uniform(1e-5, 6e-5, 2).tolist()}\n"
+        f'contact = "{rng.choice(LAWS)}"\nhertz_stiffness = {rng.uniform(1e9, 9e9)}\n',
+        encoding="utf-8",
+    )
+    return path
+
+
+def every_way_agrees(vibench_here, folder, path):
+    """Say that whoever reads the file builds one specimen, and that its answer is the engine's."""
+    own = load_specimen(path).specimen()
+    known = solve_scene(Scene(own, DRIVE, duration=FixedDuration(0.2, 0.1)))
+
+    said = vibench_here("predict", *ASKED, "--specimen", path, "--json", cwd=folder)
+    assert said.returncode == 0, said.stderr
+    document = json.loads(said.stdout)
+    point = document["points"][0]
+    assert (point["response_i"], point["impacts"]) == (known.response_i, known.impacts)
+    assert Study.model_validate(document["options"]).specimen.specimen() == own
+
+    study = folder / "study.toml"
+    study.write_text(
+        f'specimen = "{path.name}"\nfrequencies_hz = [{DRIVE.frequency_hz}]\n'
+        f"amplitudes_m = [{DRIVE.amplitude_m}]\nduration_s = 0.2\nwindow_s = 0.1\n"
+    )
+    answers = folder / "answers.h5"
+    answers.unlink(missing_ok=True)
+    assert vibench_here("study", study, "--out", answers, cwd=folder.parent).returncode == 0
+    results = open_study(answers)
+    assert next(iter(results.predictions())).response_i == known.response_i
+    assert results.study.specimen.specimen() == own
+
+    rig_text = shipped("hardware_configs/virtual_rig.toml").read_text(encoding="utf-8")
+    changed = rig_text.replace(
+        'model = "gong2025"\ndamping_time_s = 2e-5\ngap_m = 45e-6', f'model = "{path.name}"'
+    )
+    assert changed != rig_text
+    (folder / "rig.toml").write_text(changed, encoding="utf-8")
+    rig = load_rig(folder / "rig.toml")
+    assert rig.specimen.specimen() == own
+    recorded = json.loads(json.dumps(rig.model_dump(mode="json")))
+    assert specimen_of(recorded) == own
+
+
+@pytest.mark.timeout(300)
+def test_two_random_specimens_go_every_way_with_the_same_numbers(vibench_here, tmp_path):
+    rng = np.random.default_rng(1)
+    for _ in range(2):
+        every_way_agrees(vibench_here, tmp_path, random_specimen(tmp_path, rng))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_fifty_random_specimens_go_every_way_with_the_same_numbers(vibench_here, tmp_path):
+    rng = np.random.default_rng(2)
+    for _ in range(50):
+        every_way_agrees(vibench_here, tmp_path, random_specimen(tmp_path, rng))
+
+
+def test_the_list_names_every_specimen_and_every_law(vibench_here, tmp_path):
+    said = json.loads(vibench_here("specimen", "--json", cwd=tmp_path).stdout)
+    assert said["specimens"].keys() == shipped_specimens().keys()
+    assert {"hertz", "linear", "rigid:0..1"} <= said["contact_laws"].keys()
+    assert all(said["specimens"].values())
+    assert all(said["contact_laws"].values())
+
+
+def test_a_printed_specimen_is_a_file_to_start_from(vibench_here, tmp_path):
+    printed = vibench_here("specimen", "asymmetric", "--toml", cwd=tmp_path).stdout
+    own = tmp_path / "own.toml"
+    own.write_text(printed, encoding="utf-8")
+    assert tomllib.loads(printed)["gap_m"] == [30e-6, 60e-6]
+    assert load_specimen(own).specimen() == load_specimen("asymmetric").specimen()
+
+
+def test_the_papers_resonances_stand_in_what_its_specimen_amounts_to(vibench_here, tmp_path):
+    said = json.loads(vibench_here("specimen", "gong2025", "--json", cwd=tmp_path).stdout)
+    assert said["resonances_without_contact_hz"] == pytest.approx([94.6, 266.2, 499.6], abs=0.05)
+    assert said["resonances_with_m1_held_hz"] == pytest.approx([201.5, 436.0], abs=0.05)
+
+
+@pytest.mark.parametrize("command", [("predict", *ASKED), ("specimen",)])
+def test_a_specimen_that_there_is_not_is_one_sentence(vibench_here, tmp_path, command):
+    name, *rest = command
+    options = ("--specimen", "nowhere.toml") if rest else ("nowhere.toml",)
+    ended = vibench_here(name, *rest, *options, cwd=tmp_path)
+    assert ended.returncode != 0
+    assert ended.stderr.count("\n") == 1
+    assert "nowhere.toml" in ended.stderr
+    assert "gong2025" in ended.stderr
+
+
+def test_the_forces_of_all_laws_are_drawn(vibench_here, tmp_path):
+    assert vibench_here("specimen", "--forces", "drawn", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "drawn" / "contact_forces.png").stat().st_size > 10_000

@@ -1,0 +1,138 @@
+"""A specimen is data: one file says all its numbers, and whoever reads them builds the same specimen."""
+
+import math
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from vibench.sim import (
+    Harmonic,
+    SpecimenDescription,
+    SpecimenTable,
+    UnknownSpecimenError,
+    gong2025,
+    load_specimen,
+    shipped_specimens,
+    steady_response,
+)
+
+WHOLE = """
+name = "mine"
+masses_kg = [6e-3, 2e-3, 2e-3]
+stiffnesses_n_per_m = [2e4, 800.0, 1.2e4]
+dampings_ns_per_m = [0.5, 0.02, 0.2]
+gap_m = [30e-6, inf]
+contact = "linear_gap:1e5"
+hertz_stiffness = 4.9e9
+"""
+
+
+def written(folder, text, name="mine.toml"):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_the_papers_specimen_is_one_file_among_others_and_the_same_to_the_last_bit():
+    assert load_specimen("gong2025").specimen() == gong2025()
+    assert {
+        "gong2025",
+        "heavy",
+        "asymmetric",
+        "hardening",
+        "rigid_stops",
+        "linear_gap",
+    } <= shipped_specimens().keys()
+
+
+def test_a_response_through_the_file_is_the_papers_to_the_last_digit():
+    drive = Harmonic(130.0, 20e-6)
+    own, file = (
+        steady_response(each, drive, duration_s=1.0, window_s=0.5)
+        for each in (gong2025(), load_specimen("gong2025").specimen())
+    )
+    assert (own.response_i, own.response_ii, own.impacts) == (file.response_i, file.response_ii, file.impacts)
+
+
+@pytest.mark.parametrize("name", sorted(shipped_specimens()))
+def test_every_shipped_specimen_can_be_moved(name):
+    response = steady_response(
+        load_specimen(name).specimen(), Harmonic(130.0, 20e-6), duration_s=0.1, window_s=0.05
+    )
+    assert math.isfinite(response.response_i)
+
+
+def test_a_file_says_every_number_itself(tmp_path):
+    specimen = load_specimen(written(tmp_path, WHOLE)).specimen()
+    assert specimen.stiffnesses == (2e4, 800.0, 1.2e4)
+    assert specimen.gaps_m == (30e-6, math.inf)
+    assert specimen.contact.stiffness == 1e5
+
+
+def test_a_file_may_start_from_another_beside_it(tmp_path):
+    written(tmp_path, WHOLE, "base.toml")
+    own = written(tmp_path, 'model = "base.toml"\nname = "softer"\ndamping_time_s = 1e-5\n')
+    specimen = load_specimen(own).specimen()
+    assert specimen.dampings == pytest.approx([0.2, 0.008, 0.12])
+    assert specimen.gaps_m == (30e-6, math.inf)
+
+
+def test_a_description_comes_back_from_its_own_text(tmp_path):
+    described = load_specimen(written(tmp_path, WHOLE))
+    assert SpecimenDescription.model_validate_json(described.model_dump_json()) == described
+    assert SpecimenTable.model_validate(described.model_dump(mode="json")).specimen() == described.specimen()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("name =", "nam ="), "nam is no key of a specimen|name is missing"),
+        (("6e-3, 2e-3, 2e-3", "6e-3, 2e-3"), "masses_kg"),
+        (("6e-3,", "-6e-3,"), "masses_kg.0 = -0.006"),
+        (("2e4,", '"stiff",'), "stiffnesses_n_per_m.0 = 'stiff'"),
+        (("[30e-6, inf]", "[inf, inf]"), "one side finite"),
+        (("linear_gap:1e5", "rubber"), "rubber"),
+        (("hertz_stiffness = 4.9e9", ""), "hertz_stiffness is missing"),
+        (("name =", "damping_time_s = 1e-5\nname ="), "both are given"),
+        (("dampings_ns_per_m", "# "), "neither is given"),
+        (("hertz_stiffness", "[sources]\nmass = 'mine'\n[hertz"), "cannot be read as TOML"),
+        (
+            ("hertz_stiffness = 4.9e9", "hertz_stiffness = 4.9e9\nsources = { mass = 'x' }"),
+            "'mass', which is no key",
+        ),
+    ],
+)
+def test_a_broken_file_gets_one_sentence_with_its_name(tmp_path, change, said):
+    path = written(tmp_path, WHOLE.replace(*change))
+    with pytest.raises(UnknownSpecimenError, match=said) as refusal:
+        load_specimen(path)
+    assert "mine.toml" in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_files_that_start_from_each_other_are_refused(tmp_path):
+    written(tmp_path, 'name = "a"\nmodel = "b.toml"\n', "a.toml")
+    with pytest.raises(UnknownSpecimenError, match="comes back to it"):
+        load_specimen(written(tmp_path, 'name = "b"\nmodel = "a.toml"\n', "b.toml"))
+
+
+def test_a_table_without_a_folder_opens_no_file(tmp_path):
+    """What stands in a recording or in a study's answers names shipped specimens only."""
+    with pytest.raises(ValidationError, match="no specimen that comes with vibench"):
+        SpecimenTable.model_validate({"model": str(written(tmp_path, WHOLE))})
+
+
+def test_a_random_specimen_survives_its_file(tmp_path):
+    rng = np.random.default_rng(7)
+    for number in range(20):
+        text = (
+            f'name = "r{number}"\nmasses_kg = {rng.uniform(1e-3, 1e-2, 3).tolist()}\n'
+            f"single_frequencies_hz = {rng.uniform(50.0, 500.0, 3).tolist()}\n"
+            f"dampings_ns_per_m = {rng.uniform(0.0, 1.0, 3).tolist()}\n"
+            f'gap_m = {rng.uniform(1e-5, 1e-4, 2).tolist()}\ncontact = "hertz"\n'
+            f"hertz_stiffness = {rng.uniform(1e9, 1e10)}\n"
+        )
+        described = load_specimen(written(tmp_path, text))
+        again = SpecimenTable.model_validate_json(described.model_dump_json())
+        assert again.specimen() == described.specimen()
