@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from rich.table import Table
 
 from vibench.analysis import InvalidRequest
-from vibench.sim import Accuracy, Observable, Rest, ScenePlan, plan_scene
+from vibench.sim import BUDGET_S, Accuracy, Observable, Rest, ScenePlan, plan_scene
 from vibench.sim.study import (
     ExistingStudy,
     Start,
@@ -22,6 +22,7 @@ from vibench.sim.study import (
     solve_study,
 )
 
+from .found_motions import forgetting_text, motions_table, share_text
 from .frequency_option import frequencies
 from .interruption import told_to_stop
 from .output import console, print_json, print_warnings
@@ -40,6 +41,7 @@ _OPTIONS = {
     "damping_times_s": "--damping-time",
     "duration_s": "--duration",
     "window_s": "--window",
+    "budget_s": "--budget",
 }
 """What the user typed, by the name that the study has for it."""
 _ALLOWED = {
@@ -74,6 +76,15 @@ def predict(
     start: Annotated[
         Start, typer.Option("--start", help="rest, or continued from the next lower (up) or higher (down).")
     ] = Start.REST,
+    budget: Annotated[
+        str,
+        typer.Option(
+            "--budget",
+            metavar="S",
+            help="Processor time a point for other starts, where the start is forgotten, and to see whether "
+            "chaos lasts; 0 looks for neither.",
+        ),
+    ] = f"{BUDGET_S:g}s",
     workers: Workers = None,
     cluster: Cluster = None,
     out: Annotated[
@@ -95,6 +106,7 @@ def predict(
             "accuracy": accuracy,
             "duration_s": _duration(duration),
             "window_s": window,
+            "budget_s": _budget(budget),
         }
     )
     print_warnings(plausibility_warnings(asked))
@@ -140,6 +152,13 @@ def _duration(text: str) -> float | str:
         raise InvalidRequest(f"a duration of {text!r} was given; give seconds, or auto") from error
 
 
+def _budget(text: str) -> float:
+    try:
+        return float(text.removesuffix("s"))
+    except ValueError as error:
+        raise InvalidRequest(f"a budget of {text!r} was given; give seconds, as in 1s or 0.5") from error
+
+
 def document(results: StudyResults, elapsed_s: float) -> dict[str, object]:
     """Say every point with its options, for other programs; what is not known is null."""
     return {
@@ -159,7 +178,9 @@ def explanation(results: StudyResults) -> str:
         (frequency_hz, plan_scene(study.scene((0, 0, 0, 0, 0, index), Rest())))
         for index, frequency_hz in enumerate(study.frequencies_hz)
     ]
-    return "\n".join(_passage(list(run)) for _, run in groupby(plans, lambda each: each[1].alike))
+    passages = [_passage(list(run)) for _, run in groupby(plans, lambda each: each[1].alike)]
+    forgotten = forgetting_text(list(results.predictions()))
+    return "\n".join([*passages, forgotten] if forgotten else passages)
 
 
 def _passage(plans: Sequence[tuple[float, ScenePlan]]) -> str:
@@ -178,7 +199,7 @@ def _passage(plans: Sequence[tuple[float, ScenePlan]]) -> str:
 def _tell(results: StudyResults) -> None:
     rows = Table(title="Responses I and II of m0 and of p = y - z, over the base amplitude")
     has_exponents = Observable.LYAPUNOV in results.study.observe
-    headings = ["f [Hz]", "I", "II", "p: I", "p: II", "impacts", "motion", "error"]
+    headings = ["f [Hz]", "I", "II", "p: I", "p: II", "impacts", "motion", "error", "starts"]
     for heading in headings + ["exponent [1/s]"] * has_exponents:
         rows.add_column(heading, justify="right")
     points = list(results.predictions())
@@ -193,11 +214,15 @@ def _tell(results: StudyResults) -> None:
             str(each.impacts),
             str(each.motion),
             "" if each.error_estimate is None else f"{each.error_estimate:.1g}",
+            share_text(each),
             *([_number(each.lyapunov_per_s)] if has_exponents else []),
         )
     console.print(rows)
     if step > 1:
         console.print(f"every {step}th of {len(points)} points; --json or --out gives all")
+    motions = motions_table(points)
+    if motions is not None:
+        console.print(motions)
 
 
 def _number(value: float | None) -> str:

@@ -77,6 +77,7 @@ from .periodic import (
     structure_of as structure_of,
 )
 from .scene import (
+    BUDGET_S as BUDGET_S,
     AutomaticDuration as AutomaticDuration,
     Ensemble as Ensemble,
     EscapeRate as EscapeRate,

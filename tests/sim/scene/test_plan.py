@@ -39,7 +39,7 @@ def test_a_force_at_every_p_is_followed_throughout():
     [
         (Observable.LYAPUNOV, "A tangent vector is carried for the exponent."),
         (Observable.SPECTRUM, "Samples are kept over the window"),
-        (Observable.SCATTER, "more times"),
+        (Observable.SCATTER, "for their scatter"),
     ],
 )
 def test_only_what_is_observed_is_carried_along(observable, said):

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from vibench.sim import Harmonic, gong2025
-from vibench.sim.scene._scatter import bootstrap_of_largest, scatter_of_starts, window_scatter
+from vibench.sim.scene._scatter import bootstrap_of_largest, window_scatter
 
 
 def test_it_is_the_bootstrap_of_the_largest_in_closed_form():
@@ -37,15 +36,3 @@ def test_two_windows_differ_by_no_more_than_is_said_in_19_cases_of_20(blocks):
         one, another = peaks[-blocks:].max(), random.normal(5.0, 0.2, blocks).max()
         inside += abs(another / one - 1.0) < window_scatter(peaks, blocks).between_runs
     assert 0.93 < inside / 2000 < (0.965 if blocks == 1 else 1.0)
-
-
-def test_starts_a_millionth_of_the_gap_apart_scatter_in_chaos_and_nowhere_else():
-    chaos = scatter_of_starts(gong2025(), Harmonic(260.0, 5e-6), duration_s=4.0, window_s=2.0, members=6)
-    periodic = scatter_of_starts(gong2025(), Harmonic(130.0, 20e-6), duration_s=4.0, window_s=2.0, members=6)
-    assert 0.003 < chaos < 0.2
-    assert periodic < 1e-5
-
-
-def test_an_ensemble_of_one_is_refused():
-    with pytest.raises(ValueError, match="1 members is not allowed"):
-        scatter_of_starts(gong2025(), Harmonic(260.0, 5e-6), members=1)

@@ -19,6 +19,7 @@ def study():
         starts=("rest", "up", "down"),
         duration_s=0.5,
         window_s=0.2,
+        budget_s=0.0,
     )
 
 

@@ -86,6 +86,7 @@ def longer():
         starts=("rest", "up"),
         duration_s=2.0,
         window_s=1.0,
+        budget_s=0.0,
     )
 
 

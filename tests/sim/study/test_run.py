@@ -57,6 +57,7 @@ def small():
         starts=("rest", "up", "down"),
         duration_s=0.2,
         window_s=0.1,
+        budget_s=0.0,
     )
 
 
@@ -112,6 +113,7 @@ def test_the_base_does_not_jump_where_a_chain_changes_frequency():
         starts=["down"],
         duration_s=0.2,
         window_s=0.1,
+        budget_s=0.0,
     )
     results = solve_study(study, workers=1)
     phase = results.values(PHASE).ravel()
@@ -135,6 +137,7 @@ def test_a_given_start_is_the_start_of_every_point():
         starts=[GivenStart(label="kick", state=state)],
         duration_s=0.2,
         window_s=0.1,
+        budget_s=0.0,
     )
     found = list(solve_study(study, workers=2).predictions())
     assert found[1].response_i == alone(130.0, 5e-6, Given(state)).response_i

@@ -38,6 +38,7 @@ def small():
         starts=("rest", "up"),
         duration_s=0.2,
         window_s=0.1,
+        budget_s=0.0,
     )
 
 
@@ -78,6 +79,27 @@ def test_a_prediction_read_back_is_the_one_that_was_computed(small, tmp_path):
     found = next(iter(open_study(tmp_path / "a.h5").predictions()))
     made = solve_scene(small.scene((0,) * 6, REST))
     assert found.to_dict() == made.to_dict()
+
+
+def test_the_motions_of_an_ensemble_come_back_from_the_file(tmp_path):
+    """Chaos that dies out within a few tens of seconds: some starts have settled after twelve."""
+    study = Study(
+        frequencies_hz=[242.0],
+        amplitudes_m=[5e-6],
+        damping_times_s=[3e-5],
+        duration_s=12.0,
+        window_s=2.0,
+        budget_s=0.2,
+    )
+    (found,) = solve_study(study, tmp_path / "a.h5").predictions()
+    made = solve_scene(study.scene((0,) * 6, REST))
+    assert found.ensemble == made.ensemble
+    assert len(found.ensemble.motions) > 1
+    with h5py.File(tmp_path / "a.h5") as file:
+        shares = file["found_share"][...].ravel()
+        assert np.nansum(shares) == pytest.approx(1.0)
+        assert file["found_share"].dims[6][0].name == "/found_motion"
+        assert np.count_nonzero(file["found_kind"][...] >= 0) == len(found.ensemble.motions)
 
 
 REST = Rest()

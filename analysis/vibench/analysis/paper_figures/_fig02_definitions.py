@@ -22,6 +22,7 @@ def definitions_study(options: FigureOptions) -> Study:
         accuracy=options.accuracy,
         duration_s=options.duration_s,
         window_s=options.window_s,
+        budget_s=options.budget_s,
     )
 
 

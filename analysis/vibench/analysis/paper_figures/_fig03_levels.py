@@ -29,6 +29,7 @@ def levels_study(options: FigureOptions, model: str = "hertz") -> Study:
         accuracy=options.accuracy,
         duration_s=options.duration_s,
         window_s=options.window_s,
+        budget_s=options.budget_s,
     )
 
 

@@ -36,6 +36,7 @@ def multi_state_study(options: FigureOptions) -> Study:
         observe=(Observable.RESPONSE, Observable.LYAPUNOV),
         duration_s=options.duration_s,
         window_s=options.window_s,
+        budget_s=options.budget_s,
     )
 
 

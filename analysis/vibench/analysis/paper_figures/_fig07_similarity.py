@@ -46,6 +46,7 @@ def _study(options: FigureOptions, models: tuple[str, ...]) -> Study:
         accuracy=options.accuracy,
         duration_s=options.duration_s,
         window_s=options.window_s,
+        budget_s=options.budget_s,
     )
 
 

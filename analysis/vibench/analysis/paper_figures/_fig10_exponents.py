@@ -40,6 +40,7 @@ def _study(options: FigureOptions, models: tuple[str, ...], amplitudes_m: tuple[
         observe=(Observable.RESPONSE, Observable.LYAPUNOV),
         duration_s=options.duration_s,
         window_s=options.window_s,
+        budget_s=options.budget_s,
     )
 
 

@@ -23,6 +23,7 @@ def clearance_studies(options: FigureOptions) -> tuple[Study, ...]:
             accuracy=options.accuracy,
             duration_s=options.duration_s,
             window_s=options.window_s,
+            budget_s=options.budget_s,
         )
         for gap_m in GAPS_M
     )

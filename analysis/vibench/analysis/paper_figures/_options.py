@@ -47,6 +47,8 @@ class FigureOptions:
     duration_s: float = 30.0
     window_s: float = 5.0
     """The paper's: 30 s from rest, the last 5 s observed."""
+    budget_s: float = 0.0
+    """For other starts: a point of the paper is one run."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.damping_time_s < math.inf:

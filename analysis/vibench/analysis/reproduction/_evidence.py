@@ -88,4 +88,5 @@ def model_study(
         accuracy=options.accuracy,
         duration_s=options.duration_s,
         window_s=options.window_s,
+        budget_s=options.budget_s,
     )

@@ -11,6 +11,7 @@ from ._prediction import (
     StartMemory as StartMemory,
 )
 from ._scene import (
+    BUDGET_S as BUDGET_S,
     AutomaticDuration as AutomaticDuration,
     FixedDuration as FixedDuration,
     Given as Given,

@@ -3,12 +3,6 @@
 It is looked at once a drive period. Where it has not begun to repeat by the time that it should have
 forgotten its start, a small change is carried along and extremes are kept block by block: a motion that
 never repeats is known only by its growth and its statistics.
-
-A motion followed until it has settled, for as long as that takes, and observed then. SI units.
-
-A motion that repeats is observed over one of its own periods, which holds all there is to see. One that does
-not is observed over a window once it is certain that it never will; because chaos can die out, the certainty
-must have lasted for a whole window before.
 """
 
 import math
@@ -19,21 +13,21 @@ import numpy as np
 
 from ..kernels import Floats
 from ..model import Accuracy, Outcome, PowerLaw, Specimen
-from ._followed_run import FollowedRun, ObservedQuantities, Stretch
+from ._followed_run import FollowedRun, Stretch
 from ._observed_window import (
     ObservedWindow,
     follow_strobed,
     observe_window,
+    samples_between,
     states_of,
     whole_periods,
-    window_of,
 )
 from ._prediction import MotionKind
 from ._repetition import Growth, Repetition, Sharpness, kind_of, repetition, section_needed
 
 FORGETTING = 8.0
 """Forgetting times after which a motion that does not repeat is taken to be on its attractor."""
-FEWEST_TIMES = 40.0
+FEWEST_TIMES = 100.0
 """The longest run holds this many forgetting times; slower modes, and undamped ones, count as so slow."""
 FEWEST_PERIODS = 32
 """Drive periods after which a motion that does not repeat is taken to be on its attractor, at least."""
@@ -72,8 +66,12 @@ class Pace:
 
     def repeats(self, stretches: Sequence[Stretch]) -> Repetition | None:
         """Say whether the motion of these stretches, one after the other, repeats at their end."""
+        return self.repeats_in(states_of(stretches))
+
+    def repeats_in(self, section: Floats) -> Repetition | None:
+        """Say whether a motion with these states once a drive period, shape (n, 6), repeats at their end."""
         omega = 2.0 * np.pi * self.frequency_hz
-        return repetition(states_of(stretches), omega, self.forgetting_periods, self.sharpness)
+        return repetition(section, omega, self.forgetting_periods, self.sharpness)
 
 
 def pace_of(
@@ -104,15 +102,24 @@ class SceneRun:
     """When it was known to be settled; None where that was not looked for, or not found."""
     ended: str
     """Why it was followed no longer."""
+    path: tuple[Stretch, ...]
+    """From its beginning until it had settled, or until a small change had surely grown without end."""
+    grew: bool
+    """A small change that was carried along has surely grown without end."""
+    wandered_until_s: float
+    """When it was last seen to change from period to period."""
 
 
 def run_for(run: FollowedRun, duration_s: float, window_s: float, pace: Pace) -> SceneRun:
     """Follow a motion that is at time zero for a while, and observe the last ``window_s`` of it."""
-    last = _last_section(run, duration_s - window_s, pace)
+    lead = _lead(run, max(run.time_s, duration_s - window_s - pace.section_s))
+    last = follow_strobed(run, duration_s - window_s)
     if pace.repeats([last]) is None:
         run.follow_tangent()
     window = observe_window(run, window_s)
-    return judged(run, window, [last], pace, f"the {duration_s:g} s asked for are over")
+    seen = judged(run, window, [last], pace, f"the {duration_s:g} s asked for are over")
+    # Since when it repeats was not looked for.
+    return replace(seen, path=(lead, last, *window.stretches), wandered_until_s=0.0)
 
 
 def judged(
@@ -135,6 +142,9 @@ def judged(
         repeats=None if is_lost else repeats,
         settled_s=None,
         ended=run.outcome.text if is_lost else ended,
+        path=tuple(stretches),
+        grew=growth.is_certain and repeats is None,
+        wandered_until_s=run.time_s if repeats is None else stretches[0].start_s,
     )
 
 
@@ -145,91 +155,12 @@ def growth_of(stretches: Sequence[Stretch]) -> Growth:
     return Growth(logarithms, sum(stretch.length_s for stretch in carried))
 
 
-def _last_section(run: FollowedRun, until_s: float, pace: Pace) -> Stretch:
-    """Advance to an instant; the states of the last periods are kept."""
-    run.follow(max(run.time_s, until_s - pace.section_s))
-    return follow_strobed(run, until_s)
+MOST_LOOKS = 4096
+"""States that are kept of a long lead at most: enough to see other starts part from it."""
 
 
-SLICE_S, SLICE_PERIODS = 0.25, 4
-"""Between two looks pass this long and this many drive periods, if the window is not shorter."""
-WINDOWS = 2
-"""A motion that does not repeat is watched for so many windows; the last of them is the one observed."""
-
-
-def run_until_settled(run: FollowedRun, window_s: float, longest_s: float, pace: Pace) -> SceneRun:
-    """Follow a motion until it repeats or surely never will, and observe it.
-
-    Parameters
-    ----------
-    run
-        At time zero.
-    window_s
-        Observed of a motion that does not repeat [s]; rounded to equal parts of whole drive periods.
-    longest_s
-        The motion is followed no longer, and called undecided if need be [s]; for a window at least.
-    pace
-        What decides whether it has settled.
-
-    """
-    slice_periods, in_window = _slices(window_s, pace.frequency_hz)
-    watched_after_s = min(pace.attractor_s, longest_s - in_window * slice_periods / pace.frequency_hz)
-    early: list[Stretch] = []
-    late: list[Stretch] = []
-    starts: list[FollowedRun] = []
-    made = 0
-    while run.outcome is Outcome.REACHED_END:
-        repeats = pace.repeats([*early, *late])
-        if repeats is not None:
-            return _observe_period(run, repeats, pace)
-        kind = kind_of(None, growth_of(late), pace.forgetting_s)
-        if len(late) >= WINDOWS * in_window and kind is not MotionKind.UNDECIDED:
-            seen = _observed(run, late, starts, in_window, pace, f"it is {kind}")
-            return replace(seen, settled_s=late[0].start_s)
-        made += slice_periods
-        end_s = made / pace.frequency_hz
-        if len(late) >= in_window and end_s > longest_s:
-            break
-        if run.time_s < watched_after_s:
-            early.append(follow_strobed(run, end_s))
-            continue
-        if not late:
-            run.follow_tangent()
-        starts.append(run.apart())
-        late.append(follow_strobed(run, end_s, ObservedQuantities.PEAKS_AND_LINES))
-    before = late or early
-    return _observed(run, before, starts, in_window, pace, f"it has not settled within {longest_s:g} s")
-
-
-def _slices(window_s: float, frequency_hz: float) -> tuple[int, int]:
-    """Drive periods of a slice, and slices of a window."""
-    in_window = max(1, whole_periods(window_s, frequency_hz))
-    periods = min(in_window, max(SLICE_PERIODS, math.ceil(SLICE_S * frequency_hz)))
-    return periods, max(1, round(in_window / periods))
-
-
-def _observe_period(run: FollowedRun, repeats: Repetition, pace: Pace) -> SceneRun:
-    """Observe one period of a motion that repeats."""
-    settled_s, begins = run.time_s, run.apart()
-    end_s = settled_s + repeats.period / pace.frequency_hz
-    one = follow_strobed(run, end_s, ObservedQuantities.PEAKS_AND_LINES)
-    window = window_of(begins, [one], [one.peak_x_m])
-    seen = judged(run, window, [], pace, f"it repeats after {repeats.period} drive period(s)")
-    if run.outcome is not Outcome.REACHED_END:
-        return seen
-    return replace(seen, motion=MotionKind.PERIODIC, repeats=repeats, settled_s=settled_s)
-
-
-def _observed(
-    run: FollowedRun,
-    stretches: Sequence[Stretch],
-    starts: Sequence[FollowedRun],
-    in_window: int,
-    pace: Pace,
-    ended: str,
-) -> SceneRun:
-    """Take the last stretches for the window."""
-    last = stretches[-in_window:]
-    begins = starts[-len(last)] if starts else run
-    window = window_of(begins, last, [stretch.peak_x_m for stretch in last])
-    return judged(run, window, stretches[:-in_window], pace, ended)
+def _lead(run: FollowedRun, until_s: float) -> Stretch:
+    """Advance to an instant, and keep some states on the way."""
+    periods = whole_periods(until_s, run.drive.frequency_hz)
+    rate_hz = run.drive.frequency_hz / max(1, math.ceil(periods / MOST_LOOKS))
+    return run.follow(until_s, samples=samples_between(rate_hz, run.time_s, until_s))

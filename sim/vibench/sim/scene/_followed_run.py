@@ -30,6 +30,7 @@ from ..slots import (
     no_tangent,
 )
 from ..stepping import advance_harmonic, harmonic_tables, new_state
+from ._nominal_cost import nominal_cost_s
 
 
 class ObservedQuantities(Enum):
@@ -66,8 +67,10 @@ class Stretch:
     area_x: complex
     """Integral of x exp(-i (omega t + phase)) [m s]; zero where it was not watched."""
     area_p: complex
+    samples: Samples
+    """Which states were kept."""
     states: Floats
-    """Samples, shape (n, 6)."""
+    """They themselves, shape (n, 6)."""
     growth: float
     """Natural logarithm of how much a small change grew; NaN where no tangent was carried."""
 
@@ -96,6 +99,12 @@ class FollowedRun:
         self._tables = harmonic_tables(specimen, drive)
         self._scales = state_scales(specimen, drive)
         self._tangent = no_tangent()
+        self._cost_s = 0.0
+
+    @property
+    def cost_s(self) -> float:
+        """What following it from its beginning has cost, by `nominal_cost_s`."""
+        return self._cost_s
 
     @property
     def time_s(self) -> float:
@@ -123,6 +132,17 @@ class FollowedRun:
         self._tangent = np.zeros((1, TANGENT_SIZE))
         self._tangent[0, :GROWTH] = self._scales * np.linspace(1.0, 2.0, GROWTH)
 
+    def drop_tangent(self) -> None:
+        """Follow the states alone from now on."""
+        self._tangent = no_tangent()
+
+    def pushed(self, push: Floats) -> Self:
+        """Give another motion, which begins now and a small change of the state, shape (6,), away."""
+        twin = self.apart()
+        state = new_state(self.specimen, start_motion(self.state + push), Accuracy.REFERENCE)
+        twin.__dict__.update(_state=state)
+        return twin
+
     def follow(
         self,
         until_s: float,
@@ -146,6 +166,13 @@ class FollowedRun:
         if self.outcome is Outcome.REACHED_END:
             # Samples that rounding puts a hair beyond the end.
             record.samples[record.counts[NEXT_SAMPLE] :] = self._state[:GROWTH]
+        self._cost_s += nominal_cost_s(
+            self.specimen.contact,
+            self._tolerance,
+            self.time_s - start_s,
+            int(record.counts[IMPACTS]),
+            len(self._tangent),
+        )
         return Stretch(
             start_s=start_s,
             end_s=self.time_s,
@@ -155,6 +182,7 @@ class FollowedRun:
             peak_p_m=float(observations[PEAK_P]),
             area_x=complex(observations[LINE_X_RE], observations[LINE_X_IM]),
             area_p=complex(observations[LINE_P_RE], observations[LINE_P_IM]),
+            samples=kept,
             states=record.samples,
             growth=self._size() - before,
         )

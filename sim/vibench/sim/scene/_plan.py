@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from ..model import PowerLaw, Specimen
 from ._linear_motion import LinearMotion, linear_motion, never_touches
 from ._prediction import Method
-from ._scatter import MEMBERS
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
+from ._several_starts import FEWEST, MOST
 
 DECAYED_SHARE = 1e-9
 """Share of the response that the start may still have where the steady motion stands for it."""
@@ -64,6 +64,7 @@ def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
         _why_followed(scene.specimen, motion, method),
         *_carried(scene.observe),
         _length(scene.duration),
+        *(() if never_touches(scene.specimen, motion) else (_other_starts(scene.budget_s),)),
     )
     return ScenePlan(method, sentences, _cost_s(scene, motion, method), motion.largest_p_m)
 
@@ -122,8 +123,20 @@ def _carried(observe: tuple[Observable, ...]) -> list[str]:
     else:
         sentences.append("No samples are kept but the states once a drive period.")
     if Observable.SCATTER in observe:
-        sentences.append(f"The scene is run {MEMBERS} more times, from starts a millionth of the gap apart.")
+        sentences.append(
+            f"The scene is run from {FEWEST - 1} more starts a millionth of the gap apart, for their scatter."
+        )
     return sentences
+
+
+def _other_starts(budget_s: float) -> str:
+    if budget_s == 0.0:
+        return "Whether the start decides which motion is reached is not looked for: there is no budget."
+    return (
+        "Another start, a millionth of the gap away, is followed beside it. If they part, or the motion is "
+        f"chaotic, the start is forgotten, and which motion is reached is chance: then {FEWEST} to {MOST} "
+        f"starts are followed, and chaos is followed on, for {budget_s:g} s of processor time at most."
+    )
 
 
 def _length(duration: FixedDuration | AutomaticDuration) -> str:
@@ -148,5 +161,6 @@ def _cost_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
     rate_hz = IMPACTS_PER_PERIOD * scene.drive.frequency_hz * math.sqrt(share) * min(1.0, share) ** 2
     per_s = STEPS_S if method is Method.POLYNOMIAL else FLIGHT_S + IMPACT_S * rate_hz
     runs = 1.0 + (TANGENT if Observable.LYAPUNOV in scene.observe else 0.0)
-    runs += MEMBERS if Observable.SCATTER in scene.observe else 0.0
+    runs += FEWEST - 1 if Observable.SCATTER in scene.observe else 0.0
+    runs += 1.0 if scene.budget_s > 0.0 else 0.0
     return CLOSED_FORM_S + per_s * length_s * runs

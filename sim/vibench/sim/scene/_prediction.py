@@ -62,7 +62,8 @@ class FoundMotion:
     starts: int
     """How many reached it."""
     share: Share
-    """Of all starts. The intervals of all motions hold together in 19 cases of 20."""
+    """Of all starts. The intervals of all motions hold together in 19 cases of 20, and also in the end:
+    starts that were chaotic so far, or undecided, may come to any of the motions."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,8 @@ class Ensemble:
     """A motion that was not found has less than this share, in 39 cases of 40."""
     escape: EscapeRate | None
     """How often chaos died out; None where there was none to speak of."""
+    scatter: float | None
+    """Standard deviation of Response I over all starts, over its mean."""
     followed_s: float
     """Time that all starts together were followed."""
 

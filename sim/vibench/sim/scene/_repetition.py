@@ -18,6 +18,8 @@ FEWEST_BETWEEN = 8
 """States that are compared lie at least this many drive periods apart."""
 SLOWEST_RATIO = 0.99
 """A change that shrinks less than this between two comparisons is taken to shrink by this."""
+NEARLY = 0.01
+"""Change over the size of a motion, from one of its periods to the next, up to which it may be settling."""
 TINY = 1e-300
 """Size of a motion that has none."""
 DISTINCT = 20.0
@@ -53,6 +55,11 @@ class Growth:
     def total(self) -> float:
         """Over all stretches."""
         return float(self.logarithms.sum())
+
+    @property
+    def is_certain(self) -> bool:
+        """A small change has surely grown."""
+        return self.total > CERTAIN_GROWTH
 
     @property
     def halves(self) -> tuple[float, float]:
@@ -93,6 +100,8 @@ def repetition(
     """
     points = section / np.repeat([1.0, omega], 3)
     points = points / max(float(np.abs(points).max(initial=0.0)), TINY)
+    if len(points) > MOST_PERIODS and _returns_nowhere(points, sharpness.tolerance):
+        return None
     apart = np.inf
     for period in range(1, MOST_PERIODS + 1):
         lag = period * int(np.ceil(max(forgetting_periods, FEWEST_BETWEEN) / period))
@@ -105,6 +114,21 @@ def repetition(
             return Repetition(period, distance) if is_there else None
         apart = min(apart, step)
     return None
+
+
+def _returns_nowhere(points: Floats, tolerance: float) -> bool:
+    """Whether the last state alone tells that nothing repeats: what chaos costs to look at."""
+    changes = np.abs(points[-1 - MOST_PERIODS : -1] - points[-1]).max(axis=1)
+    return bool(np.all(changes >= tolerance))
+
+
+def wandered_until(section: Floats, omega: float, period: int) -> int:
+    """Find since when the end of a section has come back, nearly, after a period: that many states before."""
+    points = section / np.repeat([1.0, omega], 3)
+    points = points / max(float(np.abs(points).max(initial=0.0)), TINY)
+    changes = np.abs(points[period:] - points[:-period]).max(axis=1)
+    wandering = np.flatnonzero(changes > NEARLY)
+    return int(wandering[-1]) + period + 1 if len(wandering) else 0
 
 
 def _still_to_go(points: Floats, period: int, lag: int, noise: float) -> float:
@@ -129,7 +153,7 @@ def kind_of(repeats: Repetition | None, growth: Growth, forgetting_s: float) -> 
     times = growth.duration_s / forgetting_s
     per_time = growth.total / times if times > 0.0 else 0.0
     earlier, later = growth.halves
-    if growth.total > CERTAIN_GROWTH and per_time > NEUTRAL and min(earlier, later) > 0.25 * growth.total:
+    if growth.is_certain and per_time > NEUTRAL and min(earlier, later) > 0.25 * growth.total:
         return MotionKind.CHAOTIC
     if times >= FEWEST_NEUTRAL and abs(per_time) < NEUTRAL:
         return MotionKind.QUASI_PERIODIC

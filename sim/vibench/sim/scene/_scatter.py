@@ -13,18 +13,11 @@ from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from ..kernels import Floats
-from ..model import Accuracy, Harmonic, Specimen
-from ..motion import steady_response
 
 COVERED = 0.975
 """Share of one tail and the middle: 19 cases of 20 with both tails."""
 FEWEST_BLOCKS = 4
 """With fewer extremes nothing is said."""
-PUSH = 1e-6
-"""Largest difference between starts: displacements over the gap, velocities over gap times 2 pi f."""
-MEMBERS = 16
-"""Runs of an ensemble: its deviation is known to 18 per cent."""
-SEED = 2025
 
 
 @dataclass(frozen=True)
@@ -68,36 +61,3 @@ def bootstrap_of_largest(ascending: Floats, drawn: int) -> tuple[float, float]:
     weights = np.diff((np.arange(count + 1) / count) ** drawn)
     mean = float(weights @ ascending)
     return mean, math.sqrt(float(weights @ (ascending - mean) ** 2))
-
-
-def scatter_of_starts(
-    specimen: Specimen,
-    drive: Harmonic,
-    accuracy: Accuracy = Accuracy.STANDARD,
-    duration_s: float = 30.0,
-    window_s: float = 5.0,
-    start: ArrayLike = (0.0,) * 6,
-    *,
-    members: int = MEMBERS,
-    seed: int = SEED,
-) -> float | None:
-    """Find the relative standard deviation of Response I over starts that differ by a millionth of the gap.
-
-    None when a run was lost. Raises ValueError when fewer than two members are asked for, or as
-    `vibench.sim.motion.steady_response` does.
-    """
-    if members < 2:
-        msg = f"An ensemble of {members} members is not allowed: ask for 2 or more."
-        raise ValueError(msg)
-    scale = PUSH * min(specimen.gaps_m) * np.repeat([1.0, 2.0 * math.pi * drive.frequency_hz], 3)
-    pushes = np.random.default_rng(seed).uniform(-1.0, 1.0, (members, 6)) * scale
-    found = np.array(
-        [
-            steady_response(
-                specimen, drive, accuracy, duration_s, window_s, np.asarray(start) + push
-            ).response_i
-            for push in pushes
-        ]
-    )
-    deviation = float(found.std(ddof=1) / found.mean())
-    return deviation if math.isfinite(deviation) else None

@@ -1,7 +1,8 @@
 """How well shares and rates are known that were counted: intervals that hold in 19 cases of 20."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from scipy.special import chdtri, ndtri
 
@@ -36,14 +37,33 @@ def wilson_share(count: int, trials: int, unsure: float = UNSURE) -> Share:
     )
 
 
-def shares_of(counts: tuple[int, ...]) -> tuple[Share, ...]:
+@dataclass(frozen=True)
+class Count:
+    """Trials with one outcome."""
+
+    trials: int
+    is_final: bool
+    """Otherwise they were not followed to their end, and may come to any outcome."""
+
+
+def shares_of(counts: Sequence[Count]) -> tuple[Share, ...]:
     """Find the shares of several outcomes, whose intervals hold all together in 19 cases of 20.
 
     Of two outcomes one share is the rest of the other. Of more, each interval is made so much wider that
-    together they fail as seldom as one would (Goodman, Technometrics 7 (1965) 247).
+    together they fail as seldom as one would (Goodman, Technometrics 7 (1965) 247). Intervals hold both now
+    and in the end, whatever becomes of trials that are not final.
     """
-    apart = len(counts) if len(counts) > 2 else 1
-    return tuple(wilson_share(count, sum(counts), UNSURE / apart) for count in counts)
+    trials = sum(each.trials for each in counts)
+    pending = sum(each.trials for each in counts if not each.is_final)
+    unsure = UNSURE / (len(counts) if len(counts) > 2 else 1)
+    found = []
+    for each in counts:
+        now = wilson_share(each.trials, trials, unsure)
+        if each.is_final:
+            found.append(replace(now, high=wilson_share(each.trials + pending, trials, unsure).high))
+        else:
+            found.append(replace(now, low=0.0))
+    return tuple(found)
 
 
 @dataclass(frozen=True)

@@ -17,14 +17,18 @@ import numpy as np
 from ..exponents import LyapunovEstimate, Precision, lyapunov_exponent
 from ..kernels import Floats
 from ..model import Accuracy, Outcome
-from ._fixed_run import Pace, SceneRun, pace_of, run_for, run_until_settled
+from ._ensemble import ensemble_of, lasting
+from ._fixed_run import Pace, SceneRun, pace_of, run_for
 from ._followed_run import FollowedRun, ObservedQuantities
-from ._linear_motion import LinearMotion, linear_motion
+from ._linear_motion import LinearMotion, linear_motion, never_touches
 from ._observed_window import ObservedWindow, samples_between, states_of, whole_periods
 from ._plan import plan_of, transient_decay_s
-from ._prediction import Method, MotionKind, ScenePrediction, State
-from ._scatter import WindowScatter, scatter_of_starts, window_scatter
+from ._prediction import Ensemble, Method, MotionKind, ScenePrediction, StartMemory, State
+from ._repetition import FEWEST_NEUTRAL
+from ._scatter import WindowScatter, window_scatter
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
+from ._settling_run import Patience, run_until_settled
+from ._several_starts import Horizon, ReachedMotion, SeveralStarts, forgets_its_start, reached_motion
 
 STRICTER = 1e-2
 """Tolerance of the comparison over that of the run."""
@@ -115,6 +119,8 @@ SAFETY = 2.0
 """Error that is stated over the error that was measured."""
 ROUNDING = 1e-11
 """Relative error of an exact answer."""
+ALONE = 0.5
+"""Share of a budget that is spent on following chaos on; other starts have the rest."""
 EXPONENT_S = 25.0
 """An exponent is averaged for so long, if it is not known well enough before [s]."""
 EXPONENT_PRECISION = Precision(absolute_per_s=0.2, relative=0.01)
@@ -180,6 +186,7 @@ def _in_closed_form(scene: Scene, motion: LinearMotion) -> ScenePrediction:
         outcome=Outcome.REACHED_END,
         method=Method.CLOSED_FORM,
         accuracy=scene.accuracy.value,
+        memory=StartMemory.KEPT,
     )
     if Observable.POINCARE in scene.observe:
         periods = whole_periods(duration_s, scene.drive.frequency_hz)
@@ -193,12 +200,15 @@ def _in_closed_form(scene: Scene, motion: LinearMotion) -> ScenePrediction:
 def _followed(scene: Scene, method: Method, motion: LinearMotion) -> ScenePrediction:
     """Follow the motion in time, and judge it."""
     tolerance = scene.accuracy.tolerance
-    run = FollowedRun(scene.specimen, scene.drive, tolerance, scene.start.state)
+    begin = FollowedRun(scene.specimen, scene.drive, tolerance, scene.start.state)
+    run = begin.apart()
     seen, pace = _seen(scene, run, motion)
     window, amplitude = seen.window, scene.drive.amplitude_m
     is_whole = run.outcome is Outcome.REACHED_END
     error = _integration_error(scene.accuracy, seen, run, pace) if is_whole else None
     drawn = _between_windows(seen) if is_whole else None
+    memory = _memory(scene, begin, seen, motion)
+    ensemble = _ensemble(scene, begin, run, seen, pace, memory, drawn, error) if is_whole else None
     exponent = _exponent(scene, run) if is_whole and Observable.LYAPUNOV in scene.observe else None
     found = ScenePrediction(
         frequency_hz=scene.drive.frequency_hz,
@@ -209,15 +219,15 @@ def _followed(scene: Scene, method: Method, motion: LinearMotion) -> ScenePredic
         relative_ii=abs(window.line_p_m) / amplitude if is_whole else None,
         impacts=window.impacts,
         impact_rate_hz=window.impacts / window.length_s if window.length_s > 0.0 else 0.0,
-        motion=seen.motion,
+        motion=_lasting(scene, seen, ensemble),
         period=None if seen.repeats is None else seen.repeats.period,
         duration_s=run.time_s,
         window_s=window.length_s,
         settled_s=seen.settled_s,
-        ended=seen.ended,
+        ended=_ended(seen, ensemble),
         error_estimate=_error_estimate(seen, error, drawn),
         integration_error=error,
-        scatter=_scatter(scene, seen, run.time_s, drawn) if is_whole else None,
+        scatter=_scatter(scene, ensemble, drawn),
         lyapunov_per_s=_known(exponent.exponent_per_s) if exponent is not None else None,
         lyapunov_error_per_s=_known(exponent.standard_error_per_s) if exponent is not None else None,
         start=scene.start.name,
@@ -225,6 +235,8 @@ def _followed(scene: Scene, method: Method, motion: LinearMotion) -> ScenePredic
         outcome=run.outcome,
         method=method,
         accuracy=scene.accuracy.value,
+        memory=memory,
+        ensemble=ensemble if memory is StartMemory.LOST else None,
     )
     return _with_pictures(scene, found, seen) if is_whole else found
 
@@ -242,7 +254,8 @@ def _seen(scene: Scene, run: FollowedRun, motion: LinearMotion) -> tuple[SceneRu
         case FixedDuration(duration_s=duration_s, window_s=window_s):
             return run_for(run, duration_s, window_s, pace), pace
         case AutomaticDuration(window_s=window_s):
-            return run_until_settled(run, window_s, longest_s, pace), pace
+            patience = Patience(window_s, longest_s, ALONE * scene.budget_s)
+            return run_until_settled(run, patience, pace), pace
 
 
 def _integration_error(accuracy: Accuracy, seen: SceneRun, run: FollowedRun, pace: Pace) -> float | None:
@@ -259,17 +272,83 @@ def _between_windows(seen: SceneRun) -> WindowScatter | None:
     return window_scatter(seen.block_peaks_m, seen.blocks_in_window)
 
 
-def _scatter(scene: Scene, seen: SceneRun, duration_s: float, drawn: WindowScatter | None) -> float | None:
-    """Find the scatter of Response I from many starts if it was asked for."""
+def _memory(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMotion) -> StartMemory:
+    """Say whether the start decided which motion was reached."""
+    if seen.grew:
+        return StartMemory.LOST
+    if never_touches(scene.specimen, motion):
+        return StartMemory.KEPT
+    if scene.budget_s == 0.0:
+        return StartMemory.UNKNOWN
+    return StartMemory.LOST if forgets_its_start(begin, seen.path) else StartMemory.KEPT
+
+
+def _ensemble(
+    scene: Scene,
+    begin: FollowedRun,
+    run: FollowedRun,
+    seen: SceneRun,
+    pace: Pace,
+    memory: StartMemory,
+    drawn: WindowScatter | None,
+    error: float | None,
+) -> Ensemble | None:
+    """Follow other starts, where the start was forgotten or their scatter was asked for."""
+    is_asked = Observable.SCATTER in scene.observe
+    if memory is not StartMemory.LOST and not is_asked:
+        return None
+    period = None if seen.repeats is None else seen.repeats.period
+    asked = reached_motion(run, seen.motion, period, seen.window, drawn, seen.wandered_until_s)
+    several = SeveralStarts(begin, asked, pace, _horizon(scene, pace))
+    several.follow(math.inf if is_asked else max(scene.budget_s - run.cost_s, ALONE * scene.budget_s))
+
+    def error_of(reached: ReachedMotion) -> float | None:
+        return _error_of(scene.accuracy, reached, pace) if reached is not asked else stated
+
+    stated = _error_estimate(seen, error, drawn)
+    return ensemble_of(several, scene.drive.amplitude_m, error_of) if len(several.reached) > 1 else None
+
+
+def _horizon(scene: Scene, pace: Pace) -> Horizon:
+    """Say how far other starts are followed: as far as the one that was asked for."""
+    match scene.duration:
+        case FixedDuration(duration_s=longest_s, window_s=window_s):
+            first_s = longest_s
+        case AutomaticDuration(longest_s=longest_s, window_s=window_s):
+            first_s = pace.attractor_s + pace.section_s
+    judging_s = min(FEWEST_NEUTRAL * pace.forgetting_s, max(0.0, longest_s - window_s))
+    last_s = max(0.0, longest_s - window_s - judging_s)
+    return Horizon(min(first_s, last_s), last_s, judging_s, window_s)
+
+
+def _error_of(accuracy: Accuracy, reached: ReachedMotion, pace: Pace) -> float | None:
+    """Estimate the error of the responses of a motion that another start came to."""
+    if reached.period is None:
+        return None if reached.scatter is None else reached.scatter.between_runs
+    error = error_of_repeating(reached.run, accuracy, reached.period, pace.forgetting_s)
+    return _known(SAFETY * error + pace.sharpness.tolerance + ROUNDING)
+
+
+def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionKind:
+    """Call a motion chaotic that was asked to be followed until it has settled only if it lasts."""
+    escape = None if ensemble is None else ensemble.escape
+    match scene.duration:
+        case FixedDuration() if escape is None or escape.escapes == 0:
+            return seen.motion
+        case _:
+            return lasting(seen.motion, escape)
+
+
+def _ended(seen: SceneRun, ensemble: Ensemble | None) -> str:
+    if seen.motion is MotionKind.CHAOTIC and ensemble is not None and ensemble.escape is not None:
+        return f"{seen.ended} (mean lifetime above {ensemble.escape.lifetime_above_s:.3g} s)"
+    return seen.ended
+
+
+def _scatter(scene: Scene, ensemble: Ensemble | None, drawn: WindowScatter | None) -> float | None:
+    """Give the scatter of Response I over starts, where it was asked for, or else over windows."""
     if Observable.SCATTER in scene.observe:
-        return scatter_of_starts(
-            scene.specimen,
-            scene.drive,
-            scene.accuracy,
-            duration_s,
-            seen.window.length_s,
-            scene.start.state,
-        )
+        return None if ensemble is None else ensemble.scatter
     return None if drawn is None else drawn.relative
 
 

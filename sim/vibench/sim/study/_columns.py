@@ -116,6 +116,7 @@ ENSEMBLE_NUMBERS = {
     "starts": Column(STARTS, WHOLE, "1", "starts followed where the start is forgotten"),
     "asked": Column("found_asked", WHOLE, "1", "place of the motion that the start asked for came to"),
     "unseen_share": Column("unseen_share", REAL, "1", "share that a motion not found has at most"),
+    "scatter": Column("scatter_of_starts", REAL, "1", "relative deviation of Response I over starts"),
     "followed_s": Column("followed_in_all", REAL, "s", "time that all starts together were followed"),
 }
 """By the field of `Ensemble` that they keep."""

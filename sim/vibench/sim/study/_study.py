@@ -23,7 +23,7 @@ from ..model import (
     SpecimenTable,
     usual_specimen,
 )
-from ..scene import AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
+from ..scene import BUDGET_S, AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
 from ._axes import FREQUENCY, MODEL, START, Grid, StudyAxis, grid_of
 from ._frequency_range import listed
 
@@ -123,6 +123,8 @@ class Study(BaseModel):
     """Length of each run; "auto" runs until the motion has settled."""
     window_s: PositiveFloat = 5.0
     """Length of the end of the run that is observed."""
+    budget_s: NonNegativeFloat = BUDGET_S
+    """Processor time a point for other starts, where the start is forgotten, and for following chaos on."""
 
     @model_validator(mode="after")
     def _labels_differ(self) -> Self:
@@ -190,6 +192,7 @@ class Study(BaseModel):
             accuracy=self.accuracy,
             duration=self._duration(),
             start=start,
+            budget_s=self.budget_s,
         )
 
     def _duration(self) -> FixedDuration | AutomaticDuration:

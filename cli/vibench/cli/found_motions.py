@@ -1,0 +1,71 @@
+"""Which motions a scene came to where its start is forgotten: a table beside that of the responses."""
+
+from collections.abc import Iterator, Sequence
+
+from rich.table import Table
+
+from vibench.sim import Ensemble, FoundMotion, ScenePrediction, StartMemory
+
+_SHOWN = 24
+"""Rows on the terminal; all of them are in the JSON and in the file."""
+
+
+def share_text(point: ScenePrediction) -> str:
+    """Say how many starts came to the motion of a point, of how many; nothing where the start decides."""
+    match point:
+        case ScenePrediction(ensemble=Ensemble() as ensemble):
+            return f"{ensemble.motions[ensemble.asked].starts} of {ensemble.starts}"
+        case ScenePrediction(memory=StartMemory.LOST):
+            return "forgotten"
+        case _:
+            return ""
+
+
+def motions_table(points: Sequence[ScenePrediction]) -> Table | None:
+    """Show all motions at the points that came to more than one; None where there is no such point."""
+    several = list(_several(points))
+    if not several:
+        return None
+    rows = Table(
+        title="Where the start is forgotten: the motions that starts a millionth of a gap apart came to",
+        caption=f"{len(several) - _SHOWN} more are in the JSON" if len(several) > _SHOWN else None,
+    )
+    for heading in ("f [Hz]", "I", "II", "p: I", "p: II", "motion", "error", "share"):
+        rows.add_column(heading, justify="right")
+    for point, motion in several[:_SHOWN]:
+        responses = (motion.response_i, motion.response_ii, motion.relative_i, motion.relative_ii)
+        rows.add_row(
+            f"{point.frequency_hz:g}",
+            *("" if value is None else f"{value:.4g}" for value in responses),
+            motion_text(motion),
+            "" if motion.error_estimate is None else f"{motion.error_estimate:.1g}",
+            f"{motion.share.share:.0%} ({100 * motion.share.low:.0f}-{100 * motion.share.high:.0f}%)",
+        )
+    return rows
+
+
+def motion_text(motion: FoundMotion) -> str:
+    """Name a motion, with its period."""
+    return str(motion.motion) if motion.period is None else f"{motion.motion}, {motion.period}"
+
+
+def forgetting_text(points: Sequence[ScenePrediction]) -> str:
+    """Say where starts were forgotten, and what following others took; nothing where none was."""
+    lost = [point for point in points if point.memory is StartMemory.LOST]
+    if not lost:
+        return ""
+    ensembles = [point.ensemble for point in lost if point.ensemble is not None]
+    starts, followed_s = sum(each.starts for each in ensembles), sum(each.followed_s for each in ensembles)
+    return (
+        f"At {len(lost)} of {len(points)} points the start was forgotten: a small change had grown past "
+        f"telling before the motion settled, or it never did. There {starts} starts were followed for "
+        f"{followed_s:.0f} s in all; {sum(each.is_one_of_several for each in lost)} points have more than "
+        "one motion."
+    )
+
+
+def _several(points: Sequence[ScenePrediction]) -> Iterator[tuple[ScenePrediction, FoundMotion]]:
+    for point in points:
+        if point.ensemble is not None and point.is_one_of_several:
+            for motion in point.ensemble.motions:
+                yield point, motion

@@ -1,0 +1,90 @@
+"""The motions that several starts came to, as an answer gives them: what share of starts comes to each."""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from scipy.special import stdtrit
+
+from ._prediction import Ensemble, FoundMotion, MotionKind
+from ._scatter import COVERED
+from ._several_starts import LASTING_S, ReachedMotion, SeveralStarts, motions_among
+from ._shares import Count, EscapeRate, shares_of, wilson_share
+
+PENDING = (MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
+"""Motions that may still come to another."""
+FEWEST_DRAWS = 3
+"""Draws of one motion that its scatter is told from."""
+
+ErrorOf = Callable[[ReachedMotion], float | None]
+"""Gives the relative error of the responses of a motion."""
+
+
+def ensemble_of(several: SeveralStarts, amplitude_m: float, error_of: ErrorOf) -> Ensemble:
+    """Sort what the starts came to into motions, and count them.
+
+    Parameters
+    ----------
+    several
+        Followed as far as they are to be.
+    amplitude_m
+        Of the drive.
+    error_of
+        Asked once for each motion.
+
+    """
+    reached, escape = several.reached, several.escape
+    groups = motions_among(reached)
+    asked = next(group for group in groups if any(each is reached[0] for each in group))
+    groups = sorted(groups, key=len, reverse=True)
+    kinds = [lasting(group[0].motion, escape) for group in groups]
+    shares = shares_of(
+        [Count(len(group), kind not in PENDING) for group, kind in zip(groups, kinds, strict=True)]
+    )
+    return Ensemble(
+        starts=len(reached),
+        motions=tuple(
+            FoundMotion(
+                motion=kind,
+                period=group[0].period,
+                **_responses(group, amplitude_m),
+                error_estimate=_error(group, error_of),
+                starts=len(group),
+                share=share,
+            )
+            for group, kind, share in zip(groups, kinds, shares, strict=True)
+        ),
+        asked=next(place for place, group in enumerate(groups) if group is asked),
+        unseen_share=wilson_share(0, len(reached)).high,
+        escape=escape,
+        scatter=_deviation([each.responses_m[0] for each in reached]),
+        followed_s=several.followed_s,
+    )
+
+
+def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
+    """Call chaos so only where none of it died out, and it surely lasts."""
+    if motion is not MotionKind.CHAOTIC:
+        return motion
+    lasts = escape is not None and escape.escapes == 0 and escape.lifetime_above_s > LASTING_S
+    return motion if lasts else MotionKind.CHAOTIC_SO_FAR
+
+
+def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, float]:
+    means = np.mean([each.responses_m for each in group], axis=0) / amplitude_m
+    return dict(
+        zip(("response_i", "response_ii", "relative_i", "relative_ii"), map(float, means), strict=True)
+    )
+
+
+def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
+    """Give what one more draw of a motion may differ by from the mean of these, in 19 cases of 20."""
+    if group[0].period is not None or len(group) < FEWEST_DRAWS:
+        return error_of(group[0])
+    widened = math.sqrt(1.0 + 1.0 / len(group)) * float(stdtrit(len(group) - 1, COVERED))
+    return widened * (_deviation([each.responses_m[0] for each in group]) or 0.0)
+
+
+def _deviation(values: Sequence[float]) -> float | None:
+    """Divide the standard deviation by the mean; None of a single value."""
+    return float(np.std(values, ddof=1) / np.mean(values)) if len(values) > 1 else None

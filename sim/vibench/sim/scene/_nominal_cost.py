@@ -1,0 +1,30 @@
+"""What it costs to follow a motion on the machine of docs/accuracy.md: the measure of a budget. SI units.
+
+It is not measured where it runs: the same scene with the same budget has the same answer everywhere.
+"""
+
+from ..model import ContactLaw, LinearGap, PowerLaw
+
+FLIGHT, STEPS = 5e-5, 3.5e-4
+"""Seconds for a second between contacts, and for one under a force at every p."""
+HERTZ_IMPACT, LINEAR_IMPACT = 0.9e-6, 2.5e-6
+"""Seconds for an impact: whole, by Gauss points, and step by step."""
+HERTZ_TANGENT, TANGENT = 4.0, 1.6
+"""With a small change carried along; a collision is then resolved step by step."""
+STRICT_TOLERANCE, STRICT = 1e-8, 5.0
+"""Below this tolerance contacts cost so many times more."""
+
+
+def nominal_cost_s(
+    contact: ContactLaw, tolerance: float, length_s: float, impacts: int, changes: int
+) -> float:
+    """Give the processor time for a stretch of motion with so many impacts and small changes."""
+    strict = STRICT if tolerance < STRICT_TOLERANCE else 1.0
+    match contact:
+        case PowerLaw():
+            contacts_s, tangent = (STEPS - FLIGHT) * length_s, TANGENT
+        case LinearGap():
+            contacts_s, tangent = LINEAR_IMPACT * impacts, TANGENT
+        case _:
+            contacts_s, tangent = HERTZ_IMPACT * impacts, HERTZ_TANGENT
+    return FLIGHT * length_s + contacts_s * strict * (tangent if changes else 1.0)

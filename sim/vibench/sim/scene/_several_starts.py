@@ -1,0 +1,256 @@
+"""What becomes of a scene from starts too near to each other to be told apart. SI units.
+
+After transient chaos it is chance which motion is reached, and when: starts a millionth of a gap apart are
+draws of it. They are followed round by round until all have settled, until it is known that chaos lasts, or
+until the budget is used up.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kernels import Floats
+from ..model import Outcome, Specimen
+from ._fixed_run import Pace
+from ._followed_run import FollowedRun, ObservedQuantities, Stretch
+from ._observed_window import ObservedWindow, follow_strobed, observe_window, window_of
+from ._prediction import MotionKind
+from ._repetition import kind_of
+from ._scatter import WindowScatter, window_scatter
+from ._shares import EscapeRate, escape_rate
+from ._states_alone import StatesAlone
+
+PUSH = 1e-6
+"""Largest difference between starts: displacements over the gap, velocities over gap times 2 pi f."""
+SEED = 2025
+PARTED = 0.01
+"""Starts whose displacements have come so far apart, over the size of the motion, have forgotten where they
+began: that is ten thousand times as far as they were."""
+LEAST_SIZE = 1e-3
+"""Of a gap: what a motion counts for at least, when starts are said to have parted."""
+FEWEST, MOST = 16, 64
+"""Starts that are followed, that which was asked for among them: more than the fewest where they came to more
+than one motion, and the budget allows."""
+LEAST_S = 1e-3
+"""Following and observing a start costs this at least."""
+TOO_FEW = 4
+"""Fewer starts say nothing."""
+LASTING_S = 300.0
+"""Chaos counts as lasting when its mean lifetime is surely longer: ten times the paper's run."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReachedMotion:
+    """What one start came to."""
+
+    run: FollowedRun
+    """At its end."""
+    motion: MotionKind
+    period: int | None
+    responses_m: Floats
+    """Largest x, line of x, largest p, line of p, shape (4,)."""
+    scatter: WindowScatter | None
+    """Of the largest x, where nothing repeats."""
+    wandered_until_s: float
+    """When it was last seen to change from period to period."""
+
+
+def pushes(specimen: Specimen, frequency_hz: float, count: int) -> Floats:
+    """Draw small changes of a start, the same ones every time, shape (count, 6)."""
+    scale = PUSH * min(specimen.gaps_m) * np.repeat([1.0, 2.0 * math.pi * frequency_hz], 3)
+    return np.random.default_rng(SEED).uniform(-1.0, 1.0, (count, 6)) * scale
+
+
+def forgets_its_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
+    """Whether another start, pushed away, came far from the path of a motion on its way.
+
+    Parameters
+    ----------
+    begin
+        The motion where it began.
+    path
+        What was seen of it, from there until it had settled.
+
+    """
+    gap_m = min(begin.specimen.gaps_m)
+    farthest_m = max((np.abs(each.states[:, :3]).max(initial=0.0) for each in path), default=0.0)
+    size_m = max(float(farthest_m), LEAST_SIZE * gap_m)
+    twin = begin.pushed(pushes(begin.specimen, begin.drive.frequency_hz, 1)[0])
+    for stretch in path:
+        beside = twin.follow(stretch.end_s, samples=stretch.samples)
+        apart_m = np.abs(beside.states[:, :3] - stretch.states[:, :3]).max(initial=0.0)
+        if not apart_m < PARTED * size_m:
+            return True
+    return False
+
+
+@dataclass(frozen=True)
+class Horizon:
+    """How far other starts are followed."""
+
+    first_s: float
+    """In the first round; in each one after it, twice as far."""
+    last_s: float
+    """At most."""
+    judging_s: float
+    """What does not repeat then is followed so much longer with a small change, to tell what it is."""
+    window_s: float
+    """And observed for so long."""
+
+
+class SeveralStarts:
+    """Starts beside the one that was asked for, and what they came to."""
+
+    def __init__(self, begin: FollowedRun, asked: ReachedMotion, pace: Pace, horizon: Horizon) -> None:
+        self._pace = pace
+        self._horizon = horizon
+        self._waiting = [
+            begin.pushed(change) for change in pushes(begin.specimen, begin.drive.frequency_hz, MOST - 1)
+        ]
+        self._under_way: list[StatesAlone] = []
+        self._reached = [asked]
+
+    @property
+    def reached(self) -> tuple[ReachedMotion, ...]:
+        """What the starts came to, the one that was asked for first."""
+        return tuple(self._reached)
+
+    @property
+    def followed_s(self) -> float:
+        """Time that all starts together were followed."""
+        return sum(each.run.time_s for each in self.reached)
+
+    @property
+    def escape(self) -> EscapeRate | None:
+        """How often chaos died out; None where no motion wandered long enough to tell.
+
+        A motion that wanders when it should have been on its attractor is taken to be chaotic from there on.
+        """
+        lives = [(each.wandered_until_s, each.period is not None) for each in self._reached]
+        lives += [(each.wandered_until_s, each.repeats is not None) for each in self._under_way]
+        chaos = [(until_s - self._pace.attractor_s, is_over) for until_s, is_over in lives]
+        chaotic_s = sum(max(0.0, life_s) for life_s, _ in chaos)
+        if chaotic_s <= 0.0:
+            return None
+        return escape_rate(sum(is_over for life_s, is_over in chaos if life_s > 0.0), chaotic_s)
+
+    def follow(self, budget_s: float) -> None:
+        """Follow as many starts as the budget allows, as far as it takes, and observe them."""
+        asked = self._reached[0].run
+        each_s = asked.cost_s * min(1.0, self._horizon.first_s / asked.time_s)
+        if budget_s < (TOO_FEW - 1) * each_s:
+            return
+        spent_s = self._follow_some(_as_many(FEWEST - 1, budget_s, each_s), budget_s)
+        if any(each.period is not None for each in self.reached) and len(motions_among(self.reached)) > 1:
+            # What a start took tells how many more the budget allows.
+            each_s = spent_s / (len(self.reached) - 1)
+            self._follow_some(_as_many(MOST - FEWEST, budget_s - spent_s, each_s), budget_s - spent_s)
+
+    def _follow_some(self, count: int, budget_s: float) -> float:
+        """Follow so many more starts and observe them; gives what it cost."""
+        self._under_way = [StatesAlone(run, self._pace) for run in self._waiting[:count]]
+        self._waiting = self._waiting[count:]
+        self._follow_rounds(budget_s)
+        found = [self._observed(each) for each in self._under_way]
+        self._under_way = []
+        self._reached += [each for each in found if each.run.outcome is Outcome.REACHED_END]
+        return sum(each.run.cost_s for each in found)
+
+    @property
+    def _cost_s(self) -> float:
+        return sum(each.run.cost_s for each in self._under_way)
+
+    @property
+    def _is_lasting(self) -> bool:
+        """No start has settled, in so long a time that chaos surely lasts."""
+        escape = self.escape
+        settled = any(each.period is not None for each in self._reached)
+        settled = settled or any(each.repeats is not None for each in self._under_way)
+        return not settled and escape is not None and escape.lifetime_above_s > LASTING_S
+
+    def _follow_rounds(self, budget_s: float) -> None:
+        reach_s = min(self._horizon.first_s, self._horizon.last_s)
+        while True:
+            left = [each for each in self._under_way if not each.is_over]
+            for place, each in enumerate(left):
+                allowed_s = max(0.0, budget_s - self._cost_s) / (len(left) - place)
+                each.follow(reach_s, each.run.cost_s + allowed_s)
+            if reach_s >= self._horizon.last_s or self._cost_s >= budget_s or self._is_lasting:
+                return
+            reach_s = min(2.0 * reach_s, self._horizon.last_s)
+
+    def _observed(self, other: StatesAlone) -> ReachedMotion:
+        run = other.run
+        if other.repeats is not None:
+            period, kind = other.repeats.period, MotionKind.PERIODIC
+            begins, end_s = run.apart(), run.time_s + other.repeats.period / self._pace.frequency_hz
+            one = follow_strobed(run, end_s, ObservedQuantities.PEAKS_AND_LINES)
+            window = window_of(begins, [one], [one.peak_x_m])
+            return reached_motion(run, kind, period, window, None, other.wandered_until_s)
+        until_s = other.wandered_until_s
+        growth = other.growth_over(self._horizon.judging_s)
+        window = observe_window(run, self._horizon.window_s)
+        scatter = window_scatter(window.block_peaks_m, len(window.block_peaks_m))
+        kind = kind_of(None, growth, self._pace.forgetting_s)
+        return reached_motion(run, kind, None, window, scatter, until_s)
+
+
+def reached_motion(
+    run: FollowedRun,
+    motion: MotionKind,
+    period: int | None,
+    window: ObservedWindow,
+    scatter: WindowScatter | None,
+    wandered_until_s: float,
+) -> ReachedMotion:
+    """Describe what a run came to by the window at its end."""
+    responses_m = np.array(
+        [window.largest_x_m, abs(window.line_x_m), window.largest_p_m, abs(window.line_p_m)]
+    )
+    return ReachedMotion(run, motion, period, responses_m, scatter, wandered_until_s)
+
+
+def _as_many(wanted: int, budget_s: float, each_s: float) -> int:
+    """How many starts a budget allows."""
+    return math.floor(min(float(wanted), max(0.0, budget_s) / max(each_s, LEAST_S)))
+
+
+SAME = 1e-3
+"""Relative difference of responses up to which two motions are the same."""
+APART = 2.0
+"""Two windows of chaos differ by more than so many times what 19 in 20 do only if they are of two motions."""
+
+
+def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]:
+    """Sort what starts came to into motions."""
+    groups: list[list[ReachedMotion]] = []
+    # Those that repeat first: one that has only just come to such a motion is known by it.
+    for each in sorted(reached, key=lambda one: one.period is None):
+        same = next((group for group in groups if is_same(group[0], each)), None)
+        if same is None:
+            groups.append([each])
+        else:
+            same.append(each)
+    return groups
+
+
+def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
+    """Whether two starts came to the same motion, or to its symmetric partner.
+
+    What repeats is known by its period and all four responses, and by them alone where the other has come to
+    it too late to be seen to repeat. Of chaos only the largest value is compared, within what its windows
+    scatter by: two chaotic motions that differ by less count as one.
+    """
+    if one.period is not None:
+        difference = np.abs(one.responses_m - other.responses_m)
+        is_near = np.all(difference <= SAME * np.maximum(one.responses_m, other.responses_m))
+        return other.period in (one.period, None) and bool(is_near)
+    if one.motion is not other.motion:
+        return False
+    if one.scatter is None or other.scatter is None:
+        return True
+    largest = max(one.responses_m[0], other.responses_m[0])
+    allowed = SAME + APART * max(one.scatter.between_runs, other.scatter.between_runs)
+    return bool(abs(one.responses_m[0] - other.responses_m[0]) <= allowed * largest)

@@ -1,0 +1,50 @@
+"""Intervals of shares and of escape rates hold as often as they say, and agree with known formulas."""
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest
+
+from vibench.sim.scene._shares import Count, escape_rate, shares_of, wilson_share
+
+
+@pytest.mark.parametrize(("count", "trials"), [(0, 16), (1, 16), (5, 16), (16, 16), (37, 64)])
+def test_the_interval_of_a_share_is_wilsons(count, trials):
+    found = wilson_share(count, trials)
+    known = binomtest(count, trials).proportion_ci(0.95, method="wilson")
+    assert found.share == count / trials
+    assert (found.low, found.high) == pytest.approx((known.low, known.high), abs=1e-12)
+
+
+@pytest.mark.parametrize("shares", [(0.3, 0.7), (0.5, 0.3, 0.2), (0.4, 0.3, 0.2, 0.1)])
+def test_the_intervals_of_all_shares_together_hold_about_19_times_in_20(shares):
+    random = np.random.default_rng(11)
+    drawn = random.multinomial(32, shares, 4000)
+    held = 0
+    for counts in drawn:
+        found = shares_of([Count(int(each), is_final=True) for each in counts])
+        held += all(one.low <= truth <= one.high for one, truth in zip(found, shares, strict=True))
+    assert held / len(drawn) > 0.93
+
+
+def test_what_is_not_final_may_come_to_any_outcome():
+    settled, pending = shares_of([Count(6, is_final=True), Count(10, is_final=False)])
+    alone = wilson_share(6, 16)
+    assert (settled.share, settled.low, settled.high) == (alone.share, alone.low, 1.0)
+    assert (pending.share, pending.low, pending.high) == (10 / 16, 0.0, wilson_share(10, 16).high)
+
+
+def test_a_rate_of_escape_is_held_by_its_interval_where_lifetimes_are_cut_off():
+    """Exponential lifetimes of 20 s, each followed for 15 s at most."""
+    random, held = np.random.default_rng(12), 0
+    for _ in range(2000):
+        lives = random.exponential(20.0, 16)
+        found = escape_rate(int(np.count_nonzero(lives < 15.0)), float(np.minimum(lives, 15.0).sum()))
+        held += found.low_per_s <= 1.0 / 20.0 <= found.high_per_s
+    assert 0.93 < held / 2000 < 0.99
+
+
+def test_chaos_that_nothing_escapes_has_a_least_lifetime_and_no_greatest():
+    found = escape_rate(0, 300.0)
+    assert found.lifetime_above_s == pytest.approx(300.0 / np.log(20.0))
+    assert found.lifetime_below_s == np.inf
+    assert (found.rate_per_s, found.low_per_s) == (0.0, 0.0)
