@@ -94,5 +94,6 @@ from .scene import (
     Share as Share,
     StartMemory as StartMemory,
     plan_scene as plan_scene,
+    solve_ensemble as solve_ensemble,
     solve_scene as solve_scene,
 )

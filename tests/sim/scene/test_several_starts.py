@@ -17,6 +17,7 @@ from vibench.sim import (
     Scene,
     StartMemory,
     gong2025,
+    solve_ensemble,
     solve_scene,
 )
 
@@ -141,3 +142,16 @@ def test_an_answer_for_json_says_every_motion(lottery):
     assert set(said) == set(Ensemble.__dataclass_fields__)
     assert said["motions"][0]["share"]["share"] == lottery.ensemble.motions[0].share.share
     assert said["motions"][said["asked"]]["motion"] == str(lottery.motion)
+
+
+def test_more_starts_and_another_draw_can_be_asked_for():
+    """The same motions, in shares that the other draw's intervals hold."""
+    fast = scene("linear_gap", 562.8, 20e-6)
+    many = solve_ensemble(fast, starts=24, seed=5)
+    assert many.starts == 24
+    stated = solve_scene(fast)
+    assert stated.memory is StartMemory.LOST
+    assert many.motions[0].response_i == pytest.approx(stated.response_i, rel=1e-5)
+    assert solve_ensemble(scene("hertz", 200.0, 1e-6)) is None
+    with pytest.raises(ValueError, match="2 starts is not allowed: ask for 4 or more"):
+        solve_ensemble(fast, starts=2)

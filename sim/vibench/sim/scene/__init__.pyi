@@ -24,5 +24,6 @@ from ._shares import (
     Share as Share,
 )
 from ._solve import (
+    solve_ensemble as solve_ensemble,
     solve_scene as solve_scene,
 )

@@ -27,7 +27,7 @@ from ._repetition import Growth, Repetition, Sharpness, kind_of, repetition, sec
 
 FORGETTING = 8.0
 """Forgetting times after which a motion that does not repeat is taken to be on its attractor."""
-FEWEST_TIMES = 100.0
+FEWEST_TIMES = 40.0
 """The longest run holds this many forgetting times; slower modes, and undamped ones, count as so slow."""
 FEWEST_PERIODS = 32
 """Drive periods after which a motion that does not repeat is taken to be on its attractor, at least."""

@@ -57,10 +57,10 @@ class ReachedMotion:
     """When it was last seen to change from period to period."""
 
 
-def pushes(specimen: Specimen, frequency_hz: float, count: int) -> Floats:
-    """Draw small changes of a start, the same ones every time, shape (count, 6)."""
+def pushes(specimen: Specimen, frequency_hz: float, count: int, seed: int) -> Floats:
+    """Draw small changes of a start, shape (count, 6)."""
     scale = PUSH * min(specimen.gaps_m) * np.repeat([1.0, 2.0 * math.pi * frequency_hz], 3)
-    return np.random.default_rng(SEED).uniform(-1.0, 1.0, (count, 6)) * scale
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, (count, 6)) * scale
 
 
 def forgets_its_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
@@ -77,7 +77,7 @@ def forgets_its_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
     gap_m = min(begin.specimen.gaps_m)
     farthest_m = max((np.abs(each.states[:, :3]).max(initial=0.0) for each in path), default=0.0)
     size_m = max(float(farthest_m), LEAST_SIZE * gap_m)
-    twin = begin.pushed(pushes(begin.specimen, begin.drive.frequency_hz, 1)[0])
+    twin = begin.pushed(pushes(begin.specimen, begin.drive.frequency_hz, 1, SEED)[0])
     for stretch in path:
         beside = twin.follow(stretch.end_s, samples=stretch.samples)
         apart_m = np.abs(beside.states[:, :3] - stretch.states[:, :3]).max(initial=0.0)
@@ -100,15 +100,30 @@ class Horizon:
     """And observed for so long."""
 
 
+@dataclass(frozen=True)
+class Draw:
+    """How many starts are followed, and at what cost."""
+
+    fewest: int = FEWEST
+    """That which was asked for among them."""
+    most: int = MOST
+    """Where the fewest came to more than one motion."""
+    seed: int = SEED
+    budget_s: float = math.inf
+    """Nominal cost of all of them."""
+
+
 class SeveralStarts:
     """Starts beside the one that was asked for, and what they came to."""
 
-    def __init__(self, begin: FollowedRun, asked: ReachedMotion, pace: Pace, horizon: Horizon) -> None:
+    def __init__(
+        self, begin: FollowedRun, asked: ReachedMotion, pace: Pace, horizon: Horizon, draw: Draw
+    ) -> None:
         self._pace = pace
         self._horizon = horizon
-        self._waiting = [
-            begin.pushed(change) for change in pushes(begin.specimen, begin.drive.frequency_hz, MOST - 1)
-        ]
+        self._draw = draw
+        changes = pushes(begin.specimen, begin.drive.frequency_hz, draw.most - 1, draw.seed)
+        self._waiting = [begin.pushed(change) for change in changes]
         self._under_way: list[StatesAlone] = []
         self._reached = [asked]
 
@@ -136,17 +151,18 @@ class SeveralStarts:
             return None
         return escape_rate(sum(is_over for life_s, is_over in chaos if life_s > 0.0), chaotic_s)
 
-    def follow(self, budget_s: float) -> None:
+    def follow(self) -> None:
         """Follow as many starts as the budget allows, as far as it takes, and observe them."""
-        asked = self._reached[0].run
+        asked, budget_s = self._reached[0].run, self._draw.budget_s
         each_s = asked.cost_s * min(1.0, self._horizon.first_s / asked.time_s)
         if budget_s < (TOO_FEW - 1) * each_s:
             return
-        spent_s = self._follow_some(_as_many(FEWEST - 1, budget_s, each_s), budget_s)
+        spent_s = self._follow_some(_as_many(self._draw.fewest - 1, budget_s, each_s), budget_s)
         if any(each.period is not None for each in self.reached) and len(motions_among(self.reached)) > 1:
             # What a start took tells how many more the budget allows.
             each_s = spent_s / (len(self.reached) - 1)
-            self._follow_some(_as_many(MOST - FEWEST, budget_s - spent_s, each_s), budget_s - spent_s)
+            more = self._draw.most - self._draw.fewest
+            self._follow_some(_as_many(more, budget_s - spent_s, each_s), budget_s - spent_s)
 
     def _follow_some(self, count: int, budget_s: float) -> float:
         """Follow so many more starts and observe them; gives what it cost."""

@@ -17,18 +17,18 @@ import numpy as np
 from ..exponents import LyapunovEstimate, Precision, lyapunov_exponent
 from ..kernels import Floats
 from ..model import Accuracy, Outcome
-from ._ensemble import ensemble_of, lasting
+from ._ensemble import ErrorOf, lasting
 from ._fixed_run import Pace, SceneRun, pace_of, run_for
 from ._followed_run import FollowedRun, ObservedQuantities
-from ._linear_motion import LinearMotion, linear_motion, never_touches
+from ._linear_motion import LinearMotion, linear_motion
 from ._observed_window import ObservedWindow, samples_between, states_of, whole_periods
+from ._other_starts import ALONE, ensemble_beside, memory_of
 from ._plan import plan_of, transient_decay_s
 from ._prediction import Ensemble, Method, MotionKind, ScenePrediction, StartMemory, State
-from ._repetition import FEWEST_NEUTRAL
 from ._scatter import WindowScatter, window_scatter
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
 from ._settling_run import Patience, run_until_settled
-from ._several_starts import Horizon, ReachedMotion, SeveralStarts, forgets_its_start, reached_motion
+from ._several_starts import FEWEST, SEED, TOO_FEW, Draw, ReachedMotion, reached_motion
 
 STRICTER = 1e-2
 """Tolerance of the comparison over that of the run."""
@@ -119,8 +119,6 @@ SAFETY = 2.0
 """Error that is stated over the error that was measured."""
 ROUNDING = 1e-11
 """Relative error of an exact answer."""
-ALONE = 0.5
-"""Share of a budget that is spent on following chaos on; other starts have the rest."""
 EXPONENT_S = 25.0
 """An exponent is averaged for so long, if it is not known well enough before [s]."""
 EXPONENT_PRECISION = Precision(absolute_per_s=0.2, relative=0.01)
@@ -146,6 +144,52 @@ def solve_scene(scene: Scene) -> ScenePrediction:
     if plan.method is Method.CLOSED_FORM:
         return _in_closed_form(scene, motion)
     return _followed(scene, plan.method, motion)
+
+
+def solve_ensemble(
+    scene: Scene, starts: int = FEWEST, seed: int = SEED, budget_s: float = math.inf
+) -> Ensemble | None:
+    """Follow a scene from so many starts a millionth of the gap apart, whether or not its own is forgotten.
+
+    `solve_scene` does so by itself where the start is forgotten, with as few starts as tell the motions
+    apart; more of them give narrower intervals, and another seed another draw.
+
+    Parameters
+    ----------
+    scene
+        Asked for; its start is the first.
+    starts
+        How many, that one among them; at least 4.
+    seed
+        Of the small changes of the start.
+    budget_s
+        Processor time for all of them, counted as that of a scene; without an end when infinite.
+
+    Returns
+    -------
+    What they came to. None where the motion is known in closed form, was lost, or the budget is too small.
+
+    Raises
+    ------
+    ValueError
+        When fewer than 4 starts are asked for, or the specimen cannot be followed in time.
+
+    """
+    if starts < TOO_FEW:
+        msg = f"An ensemble of {starts} starts is not allowed: ask for {TOO_FEW} or more."
+        raise ValueError(msg)
+    motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
+    if plan_of(scene, motion).method is Method.CLOSED_FORM:
+        return None
+    begin = FollowedRun(scene.specimen, scene.drive, scene.accuracy.tolerance, scene.start.state)
+    run = begin.apart()
+    seen, pace = _seen(scene, run, motion)
+    if run.outcome is not Outcome.REACHED_END:
+        return None
+    drawn, error = _between_windows(seen), _integration_error(scene.accuracy, seen, run, pace)
+    asked = _asked(run, seen, drawn)
+    error_of = _error_of(scene.accuracy, asked, _error_estimate(seen, error, drawn), pace)
+    return ensemble_beside(scene, begin, asked, pace, error_of, Draw(starts, starts, seed, budget_s))
 
 
 def _in_closed_form(scene: Scene, motion: LinearMotion) -> ScenePrediction:
@@ -207,8 +251,12 @@ def _followed(scene: Scene, method: Method, motion: LinearMotion) -> ScenePredic
     is_whole = run.outcome is Outcome.REACHED_END
     error = _integration_error(scene.accuracy, seen, run, pace) if is_whole else None
     drawn = _between_windows(seen) if is_whole else None
-    memory = _memory(scene, begin, seen, motion)
-    ensemble = _ensemble(scene, begin, run, seen, pace, memory, drawn, error) if is_whole else None
+    stated = _error_estimate(seen, error, drawn)
+    memory = memory_of(scene, begin, seen, motion)
+    ensemble: Ensemble | None = None
+    if is_whole and (memory is StartMemory.LOST or Observable.SCATTER in scene.observe):
+        asked = _asked(run, seen, drawn)
+        ensemble = ensemble_beside(scene, begin, asked, pace, _error_of(scene.accuracy, asked, stated, pace))
     exponent = _exponent(scene, run) if is_whole and Observable.LYAPUNOV in scene.observe else None
     found = ScenePrediction(
         frequency_hz=scene.drive.frequency_hz,
@@ -225,7 +273,7 @@ def _followed(scene: Scene, method: Method, motion: LinearMotion) -> ScenePredic
         window_s=window.length_s,
         settled_s=seen.settled_s,
         ended=_ended(seen, ensemble),
-        error_estimate=_error_estimate(seen, error, drawn),
+        error_estimate=stated,
         integration_error=error,
         scatter=_scatter(scene, ensemble, drawn),
         lyapunov_per_s=_known(exponent.exponent_per_s) if exponent is not None else None,
@@ -272,61 +320,24 @@ def _between_windows(seen: SceneRun) -> WindowScatter | None:
     return window_scatter(seen.block_peaks_m, seen.blocks_in_window)
 
 
-def _memory(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMotion) -> StartMemory:
-    """Say whether the start decided which motion was reached."""
-    if seen.grew:
-        return StartMemory.LOST
-    if never_touches(scene.specimen, motion):
-        return StartMemory.KEPT
-    if scene.budget_s == 0.0:
-        return StartMemory.UNKNOWN
-    return StartMemory.LOST if forgets_its_start(begin, seen.path) else StartMemory.KEPT
-
-
-def _ensemble(
-    scene: Scene,
-    begin: FollowedRun,
-    run: FollowedRun,
-    seen: SceneRun,
-    pace: Pace,
-    memory: StartMemory,
-    drawn: WindowScatter | None,
-    error: float | None,
-) -> Ensemble | None:
-    """Follow other starts, where the start was forgotten or their scatter was asked for."""
-    is_asked = Observable.SCATTER in scene.observe
-    if memory is not StartMemory.LOST and not is_asked:
-        return None
+def _asked(run: FollowedRun, seen: SceneRun, drawn: WindowScatter | None) -> ReachedMotion:
+    """Describe what the start that was asked for came to."""
     period = None if seen.repeats is None else seen.repeats.period
-    asked = reached_motion(run, seen.motion, period, seen.window, drawn, seen.wandered_until_s)
-    several = SeveralStarts(begin, asked, pace, _horizon(scene, pace))
-    several.follow(math.inf if is_asked else max(scene.budget_s - run.cost_s, ALONE * scene.budget_s))
+    return reached_motion(run, seen.motion, period, seen.window, drawn, seen.wandered_until_s)
+
+
+def _error_of(accuracy: Accuracy, asked: ReachedMotion, stated: float | None, pace: Pace) -> ErrorOf:
+    """Make what estimates the error of the responses of a motion that some start came to."""
 
     def error_of(reached: ReachedMotion) -> float | None:
-        return _error_of(scene.accuracy, reached, pace) if reached is not asked else stated
+        if reached is asked:
+            return stated
+        if reached.period is None:
+            return None if reached.scatter is None else reached.scatter.between_runs
+        error = error_of_repeating(reached.run, accuracy, reached.period, pace.forgetting_s)
+        return _known(SAFETY * error + pace.sharpness.tolerance + ROUNDING)
 
-    stated = _error_estimate(seen, error, drawn)
-    return ensemble_of(several, scene.drive.amplitude_m, error_of) if len(several.reached) > 1 else None
-
-
-def _horizon(scene: Scene, pace: Pace) -> Horizon:
-    """Say how far other starts are followed: as far as the one that was asked for."""
-    match scene.duration:
-        case FixedDuration(duration_s=longest_s, window_s=window_s):
-            first_s = longest_s
-        case AutomaticDuration(longest_s=longest_s, window_s=window_s):
-            first_s = pace.attractor_s + pace.section_s
-    judging_s = min(FEWEST_NEUTRAL * pace.forgetting_s, max(0.0, longest_s - window_s))
-    last_s = max(0.0, longest_s - window_s - judging_s)
-    return Horizon(min(first_s, last_s), last_s, judging_s, window_s)
-
-
-def _error_of(accuracy: Accuracy, reached: ReachedMotion, pace: Pace) -> float | None:
-    """Estimate the error of the responses of a motion that another start came to."""
-    if reached.period is None:
-        return None if reached.scatter is None else reached.scatter.between_runs
-    error = error_of_repeating(reached.run, accuracy, reached.period, pace.forgetting_s)
-    return _known(SAFETY * error + pace.sharpness.tolerance + ROUNDING)
+    return error_of
 
 
 def _lasting(scene: Scene, seen: SceneRun, ensemble: Ensemble | None) -> MotionKind:

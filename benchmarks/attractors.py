@@ -1,0 +1,81 @@
+"""Do the shares of attractors that an answer states cover those of 400 starts?
+
+Scenes whose start is forgotten are drawn until so many have more than one motion; each is then followed from
+other starts, drawn with another seed, for as long as it takes to settle within 300 s.
+"""
+
+import argparse
+import sys
+
+import numpy as np
+from random_scenes import described, edge_scene, random_scene
+
+from vibench.sim import Ensemble, FoundMotion, MotionKind, ScenePrediction, solve_ensemble, solve_scene
+
+SAME = 2e-3
+"""Relative difference of Response I of one motion that repeats."""
+PENDING = (MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
+SEED = 77_000
+
+
+def main() -> None:
+    """Draw, follow, and count."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--scenes", type=int, default=20, help="with more than one motion")
+    parser.add_argument("--starts", type=int, default=400)
+    asked = parser.parse_args()
+    random = np.random.default_rng(asked.seed)
+    covered = drawn = 0
+    while drawn < asked.scenes:
+        scene = edge_scene(random) if random.random() < 0.5 else random_scene(random)
+        answered = solve_scene(scene)
+        if not answered.is_one_of_several:
+            continue
+        truth = solve_ensemble(scene, asked.starts, SEED + asked.seed)
+        drawn += 1
+        is_covered = _is_covered(answered, truth)
+        covered += is_covered
+        print(f"{'covered' if is_covered else 'MISSED '} {described(scene)}")
+        _tell(answered.ensemble, truth)
+    print(f"\nseed {asked.seed}: shares of {asked.starts} starts are covered in {covered} of {drawn} scenes")
+
+
+def _is_covered(answered: ScenePrediction, truth: Ensemble | None) -> bool:
+    """Whether the interval of each motion holds its share of the many; a motion not found, the share unseen.
+
+    Chaos that lasts and chaos so far are one: it depends on how long they were followed.
+    """
+    stated = answered.ensemble
+    if stated is None or truth is None:
+        return False
+    for motion in truth.motions:
+        same = [each for each in stated.motions if _is_same(each, motion)]
+        low, high = (same[0].share.low, same[0].share.high) if same else (0.0, stated.unseen_share)
+        if not low <= motion.share.share <= high:
+            return False
+    return all(
+        any(_is_same(each, motion) for motion in truth.motions) or each.share.low < 1.0 / truth.starts
+        for each in stated.motions
+    )
+
+
+def _is_same(one: FoundMotion, other: FoundMotion) -> bool:
+    if one.motion in PENDING or other.motion in PENDING:
+        return one.motion in PENDING and other.motion in PENDING
+    is_near = abs((one.response_i or 0.0) / (other.response_i or 1.0) - 1.0) < SAME
+    return one.period == other.period and is_near
+
+
+def _tell(stated: Ensemble | None, truth: Ensemble | None) -> None:
+    for name, ensemble in (("stated", stated), ("many", truth)):
+        for motion in () if ensemble is None else ensemble.motions:
+            print(
+                f"    {name:6} {motion.motion} {motion.period or ''} I {motion.response_i:.4g}: "
+                f"{motion.starts}, {motion.share.share:.0%} [{motion.share.low:.0%}, {motion.share.high:.0%}]"
+            )
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,97 @@
+"""Does `--duration auto` name the motion that a run of 300 s ends in?
+
+Scenes are drawn at random, and near an edge of chaos. The long run is another draw of the same scene: cut
+at other instants, it rounds otherwise. An answer agrees when kind, period and responses do;
+where the start is forgotten, when the long run came to one of the motions that it names. "chaotic so far" and
+"undecided" are counted apart.
+"""
+
+import argparse
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass, replace
+
+import numpy as np
+from random_scenes import described, edge_scene, random_scene
+
+from vibench.sim import FixedDuration, MotionKind, Outcome, Scene, ScenePrediction, solve_scene
+
+LONG = FixedDuration(300.0, 5.0)
+SAME = 2e-3
+"""Relative difference of responses of one motion."""
+CHAOS = (MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR)
+RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One scene."""
+
+    verdict: str
+    cost: float
+    """Over that of the answer without a budget."""
+
+
+def main() -> None:
+    """Compare, and count."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--random", type=int, default=40, help="scenes drawn at random")
+    parser.add_argument("--edge", type=int, default=15, help="scenes near an edge of chaos")
+    asked = parser.parse_args()
+    random = np.random.default_rng(asked.seed)
+    scenes = [random_scene(random) for _ in range(asked.random)]
+    scenes += [edge_scene(random) for _ in range(asked.edge)]
+    compared = [_compared(scene) for scene in scenes]
+    counts = Counter(each.verdict for each in compared)
+    decided = counts["agrees"] + counts["is named"] + counts["DIFFERS"]
+    print(f"\nseed {asked.seed}: {dict(counts)} of {len(scenes)}; long runs that were lost are not counted")
+    print(
+        f"agree or named: {(decided - counts['DIFFERS']) / max(decided, 1):.1%} of {decided} that are decided"
+    )
+    print(f"cost over that without a budget, median: {np.median([each.cost for each in compared]):.2f}")
+
+
+def _compared(scene: Scene) -> Compared:
+    answered, taken_s = _timed(scene)
+    _, alone_s = _timed(replace(scene, budget_s=0.0))
+    truth = solve_scene(replace(scene, duration=LONG, budget_s=0.0))
+    verdict = _verdict(answered, truth)
+    print(
+        f"{verdict:10} {described(scene)}: {answered.motion} {answered.period or ''} "
+        f"I {answered.response_i:.4g}, "
+        f"in the long run {truth.motion} {truth.period or ''} {truth.response_i or 0.0:.4g}; "
+        f"start {answered.memory}, {1e3 * taken_s:.0f} ms over {1e3 * alone_s:.0f} ms"
+    )
+    sys.stdout.flush()
+    return Compared(verdict, taken_s / alone_s)
+
+
+def _timed(scene: Scene) -> tuple[ScenePrediction, float]:
+    solve_scene(replace(scene, duration=FixedDuration(0.5, 0.4), budget_s=0.0))
+    began = time.process_time()
+    found = solve_scene(scene)
+    return found, time.process_time() - began
+
+
+def _verdict(answered: ScenePrediction, truth: ScenePrediction) -> str:
+    if truth.outcome is not Outcome.REACHED_END or truth.motion is MotionKind.UNDECIDED:
+        return "no truth"
+    if answered.motion in {MotionKind.UNDECIDED, MotionKind.CHAOTIC_SO_FAR}:
+        return "undecided"
+    if _is_same(answered, truth):
+        return "agrees"
+    named = () if answered.ensemble is None else answered.ensemble.motions
+    return "is named" if any(_is_same(each, truth) for each in named) else "DIFFERS"
+
+
+def _is_same(one: ScenePrediction, truth: ScenePrediction) -> bool:
+    if truth.motion in CHAOS or one.motion in CHAOS:
+        return one.motion in CHAOS and truth.motion in CHAOS
+    off = [abs(getattr(one, name) / getattr(truth, name) - 1.0) for name in RESPONSES]
+    return one.motion is truth.motion and one.period == truth.period and max(off) < SAME
+
+
+if __name__ == "__main__":
+    main()

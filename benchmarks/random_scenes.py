@@ -1,0 +1,62 @@
+"""Scenes drawn at random over all that is asked: models, damping, gaps, frequencies and amplitudes."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from vibench.sim import AutomaticDuration, Harmonic, MotionKind, Scene, gong2025, solve_scene
+
+MODELS = ("hertz", "linear_gap", "power:3", "power:5", "power:7")
+EDGE = 0.004
+"""How close to an edge of chaos a scene lies, over its frequency."""
+STEP = 0.06
+"""Distance over which a change from chaos is looked for, over the frequency."""
+
+
+def random_scene(random: np.random.Generator) -> Scene:
+    """Draw a scene: 20 to 700 Hz, 0.2 to 200 um, gaps of 5 to 100 um, half of them unequal, damped or not."""
+    model = str(random.choice(MODELS))
+    gap_m = float(random.uniform(5e-6, 100e-6))
+    gaps_m = (gap_m, float(random.uniform(5e-6, 100e-6))) if random.random() < 0.5 else gap_m
+    if model.startswith("power"):
+        gaps_m = gap_m
+    damping_time_s = float(random.uniform(0.0, 5e-5))
+    drive = Harmonic(float(random.uniform(20.0, 700.0)), float(10 ** random.uniform(-6.7, -3.7)))
+    return Scene(gong2025(damping_time_s, gaps_m, model), drive, duration=AutomaticDuration())
+
+
+def edge_scene(random: np.random.Generator) -> Scene:
+    """Draw a scene at the edge of a range of frequencies where the motion is chaotic, on its outer side."""
+    while True:
+        scene = random_scene(random)
+        outside = at(scene, scene.drive.frequency_hz * (1.0 + STEP * float(random.choice([-1.0, 1.0]))))
+        if not is_chaotic(scene) or is_chaotic(outside):
+            continue
+        inner_hz, outer_hz = scene.drive.frequency_hz, outside.drive.frequency_hz
+        while abs(outer_hz / inner_hz - 1.0) > EDGE:
+            middle_hz = 0.5 * (inner_hz + outer_hz)
+            if is_chaotic(at(scene, middle_hz)):
+                inner_hz = middle_hz
+            else:
+                outer_hz = middle_hz
+        return at(scene, inner_hz)
+
+
+def at(scene: Scene, frequency_hz: float) -> Scene:
+    """Drive a scene at another frequency."""
+    return replace(scene, drive=Harmonic(frequency_hz, scene.drive.amplitude_m))
+
+
+def is_chaotic(scene: Scene) -> bool:
+    """Whether a motion is chaotic some seconds after its start."""
+    found = solve_scene(replace(scene, budget_s=0.0))
+    return found.motion in {MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR}
+
+
+def described(scene: Scene) -> str:
+    """Name a scene in a line."""
+    specimen, drive = scene.specimen, scene.drive
+    gaps = "/".join(f"{1e6 * gap_m:.4g}" for gap_m in dict.fromkeys(specimen.gaps_m))
+    damping_s = specimen.dampings[0] / specimen.stiffnesses[0]
+    driven = f"{drive.frequency_hz:.5g} Hz {1e6 * drive.amplitude_m:.4g} um"
+    return f"{specimen.contact.kind} {driven}, gap {gaps} um, {damping_s:.3g} s"
