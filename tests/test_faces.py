@@ -149,6 +149,10 @@ def loaded_by(program):
         ("from vibench.acquisition.engine import EngineClient", {"pyvisa", "nidaqmx", "grpc", "numba"}),
         ("from vibench.virtual_rig import plug_in_remote", {"numba", "nidaqmx"}),
         ("import vibench.cli", {"numpy", "typer"}),
+        (
+            "import vibench.gui.window._page_catalogue",
+            {"pyvisa", "nidaqmx", "grpc", "scipy.signal", "scipy.stats"},
+        ),
     ],
 )
 def test_importing_a_face_loads_no_driver_and_nothing_that_a_name_does_not_need(program, heavy):

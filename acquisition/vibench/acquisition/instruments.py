@@ -23,6 +23,20 @@ class Identity:
 
 
 @dataclass(frozen=True)
+class FoundDevice:
+    """A device of a DAQmx system."""
+
+    name: str
+    """For ``daq.device``."""
+    product: str
+    """For ``daq.product``."""
+    serial: str
+    inputs: tuple[str, ...]
+    """For ``daq.channels.physical``, the part behind the slash."""
+    outputs: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Overload:
     """An input past 95 % of its range: which channel, and which samples of the run."""
 

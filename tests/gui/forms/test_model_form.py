@@ -89,3 +89,12 @@ def test_a_change_of_kind_keeps_what_both_kinds_have(form):
     content = excitation.content()
     assert content["kind"] == "sine_sweep"
     assert content["amplitude_vpp"] == MEASUREMENTS["quick-dwell"].excitation.amplitude_vpp
+
+
+def test_what_a_field_says_of_itself_in_the_plan_is_its_explanation(form):
+    form.show_content(MEASUREMENTS["quick-dwell"].model_dump(mode="json"))
+    excitation = form.editors["excitation"].form
+    assert (
+        "Setting of the generator, peak to peak, as its panel"
+        in excitation.editors["amplitude_vpp"].widget.toolTip()
+    )

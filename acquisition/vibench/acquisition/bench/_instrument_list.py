@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 
-from ..drivers import FoundDevice, list_daqmx_devices, list_visa_resources
+from .. import drivers
 from ..errors import InstrumentError
+from ..instruments import FoundDevice
 from ..rig import Rig
 from ._simulated_rig import simulated_rig
 
@@ -34,11 +35,11 @@ def list_instruments(visa_library: str = "@py", server: str | None = None) -> In
     resources: tuple[str, ...] = ()
     devices: tuple[FoundDevice, ...] = ()
     try:
-        resources = list_visa_resources(visa_library)
+        resources = drivers.list_visa_resources(visa_library)
     except InstrumentError as error:
         remarks.append(str(error))
     try:
-        devices = list_daqmx_devices(server)
+        devices = drivers.list_daqmx_devices(server)
     except InstrumentError as error:
         remarks.append(str(error))
     return InstrumentList(resources, devices, tuple(remarks))

@@ -5,7 +5,6 @@ from ._daqmx import (
     DaqmxDigitizer as DaqmxDigitizer,
 )
 from ._daqmx_discovery import (
-    FoundDevice as FoundDevice,
     list_daqmx_devices as list_daqmx_devices,
 )
 from ._daqmx_output import (

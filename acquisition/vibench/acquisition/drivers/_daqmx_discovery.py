@@ -1,23 +1,8 @@
 """Which converters a DAQmx driver knows, for whoever writes a hardware configuration."""
 
-from dataclasses import dataclass
-
+from ..instruments import FoundDevice
 from ._daqmx_errors import daqmx_call
 from ._daqmx_session import daqmx_session
-
-
-@dataclass(frozen=True)
-class FoundDevice:
-    """A device of a DAQmx system."""
-
-    name: str
-    """For ``daq.device``."""
-    product: str
-    """For ``daq.product``."""
-    serial: str
-    inputs: tuple[str, ...]
-    """For ``daq.channels.physical``, the part behind the slash."""
-    outputs: tuple[str, ...]
 
 
 def list_daqmx_devices(server: str | None) -> tuple[FoundDevice, ...]:

@@ -14,7 +14,7 @@ from ..errors import ConfigurationError
 class FrozenModel(BaseModel):
     """What crosses a file: immutable, complete, and deaf to keys it does not know."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 Model = TypeVar("Model", bound=BaseModel)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import find_peaks
+import scipy
 
 from ..signals import Reals
 from ._curve import Curve
@@ -70,7 +70,7 @@ def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
         return ()
     spread = np.nan_to_num(curve.relative_sd[known])
     least = _LEAST_RISE_DB / _PER_NEPER_DB
-    places, found = find_peaks(height, prominence=least)
+    places, found = scipy.signal.find_peaks(height, prominence=least)
     clear = found["prominences"] > np.maximum(least, _LEAST_RISE_SD * spread[places])
     highest = sorted(places[clear], key=lambda place: -height[place])[:most]
     return tuple(_peak(frequency_hz, height, curve.relative_sd[known], int(p)) for p in sorted(highest))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from ..errors import InvalidRequest, NotEnoughData
 from ..signals import DEFAULT_CONFIDENCE, Complexes, Flags, Integers, Reals, Window, coherence_significance
@@ -256,7 +256,7 @@ class PeriodicSums:
     def _frequency_response(
         self, frequency_hz: Reals, estimate: BestLinearApproximation, period: float
     ) -> FrequencyResponse:
-        quantile = float(stats.t.ppf((1 + self._confidence) / 2, 2 * (estimate.averages - 1)))
+        quantile = float(scipy.stats.t.ppf((1 + self._confidence) / 2, 2 * (estimate.averages - 1)))
         return FrequencyResponse(
             frequency_hz=frequency_hz,
             value=estimate.value,

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.signal import find_peaks
+import scipy
 
 from ..errors import InvalidRequest
 from ..signals import Complexes, Reals
@@ -109,7 +108,7 @@ def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
     size = _smoothed(np.nan_to_num(np.log(np.maximum(band.magnitude, 1e-300)), nan=-700.0), spread)
     significant = np.nan_to_num(band.coherence) > band.coherence_significance
     # A rise of ln(magnitude) by less than this is noise, whatever the line.
-    lines, about = find_peaks(size, prominence=0.0)
+    lines, about = scipy.signal.find_peaks(size, prominence=0.0)
     result = []
     for line, rise in zip(lines, about["prominences"], strict=True):
         if significant[line] and rise > _LEAST_RISE * np.sqrt(2) * spread[line]:
@@ -171,7 +170,9 @@ def _fitted_on(
 
     bounds = ([-span, np.log(1e-6)], [span, np.log(_LARGEST_DAMPING)])
     start = np.clip(start, np.asarray(bounds[0]) + 1e-9, np.asarray(bounds[1]) - 1e-9)
-    result = least_squares(misfit, start, bounds=bounds, x_scale=[0.01, 1.0], xtol=1e-12, ftol=1e-12)
+    result = scipy.optimize.least_squares(
+        misfit, start, bounds=bounds, x_scale=[0.01, 1.0], xtol=1e-12, ftol=1e-12
+    )
     jacobian = np.asarray(result.jac, dtype=np.float64)
     return _resonance(band, result.x, jacobian, result.fun, data, degree)
 

@@ -1,7 +1,7 @@
 """How far an averaged estimate can be trusted: standard deviations, bounds and significance levels."""
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from ._arrays import Reals
 
@@ -28,7 +28,7 @@ def student_half_width(relative: Reals, n_eff: float, confidence: float) -> Real
     its components is Student-distributed; the unbiased variance divides by n - 1.
     """
     freedom = max(2 * (n_eff - 1), _SMALLEST_DEGREES_OF_FREEDOM)
-    quantile = float(stats.t.ppf((1 + confidence) / 2, freedom))
+    quantile = float(scipy.stats.t.ppf((1 + confidence) / 2, freedom))
     return np.asarray(quantile * relative * np.sqrt(n_eff / max(n_eff - 1, _SMALLEST_DEGREES_OF_FREEDOM)))
 
 
@@ -67,6 +67,6 @@ def coherence_significance(n_eff: float, confidence: float) -> float:
 def chi_square_bounds(density: Reals, n_eff: float, confidence: float) -> tuple[Reals, Reals]:
     """Bounds of an averaged spectral density: chi-square with 2 n_eff degrees of freedom."""
     freedom = 2 * n_eff
-    high = float(stats.chi2.ppf((1 + confidence) / 2, freedom))
-    low = float(stats.chi2.ppf((1 - confidence) / 2, freedom))
+    high = float(scipy.stats.chi2.ppf((1 + confidence) / 2, freedom))
+    low = float(scipy.stats.chi2.ppf((1 - confidence) / 2, freedom))
     return np.asarray(density * freedom / high), np.asarray(density * freedom / low)

@@ -3,7 +3,7 @@
 from math import ceil
 
 import numpy as np
-from scipy.signal import firwin, kaiserord, upfirdn
+import scipy
 
 from ..errors import InvalidRequest
 from ._arrays import Reals
@@ -49,7 +49,9 @@ class Decimator:
         if count <= 0:
             self._pending = data
             return data[:, :0]
-        whole = upfirdn(self._taps, data[:, : (count - 1) * self._factor + self._taps.size], 1, self._factor)
+        whole = scipy.signal.upfirdn(
+            self._taps, data[:, : (count - 1) * self._factor + self._taps.size], 1, self._factor
+        )
         # upfirdn starts with the filter only partly over the data; outputs before that are no results.
         shift = self._taps.size - 1
         result = whole[:, shift // self._factor :][:, :count]
@@ -63,9 +65,9 @@ def _taps(factor: int) -> Reals:
     if factor == 1:
         return np.ones(1)
     width = 2 * (1 - 2 * TRUSTED_FRACTION) / factor
-    count, beta = kaiserord(_STOP_DB, width)
+    count, beta = scipy.signal.kaiserord(_STOP_DB, width)
     half = ceil(count / 2 / factor) * factor
-    return np.asarray(firwin(2 * half + 1, 1 / factor, window=("kaiser", beta)))
+    return np.asarray(scipy.signal.firwin(2 * half + 1, 1 / factor, window=("kaiser", beta)))
 
 
 def decimation_factor(sample_rate_hz: float, least_rate_hz: float) -> int:

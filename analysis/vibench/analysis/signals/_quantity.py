@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+import scipy
 from scipy import fft
-from scipy.signal import detrend
 
 from ..errors import InvalidRequest
 from ._arrays import Complexes, Reals
@@ -97,7 +97,7 @@ def converted_signal(
     frequency_hz = fft.rfftfreq(padded, 1 / sample_rate_hz)
     factor = np.zeros(frequency_hz.size, dtype=np.complex128)
     factor[1:] = derivative_factor(frequency_hz[1:], given, wanted) * _band(frequency_hz[1:], low_hz, high_hz)
-    spectrum = fft.rfft(detrend(samples), padded)
+    spectrum = fft.rfft(scipy.signal.detrend(samples), padded)
     result = np.asarray(fft.irfft(spectrum * factor, padded)[: samples.size])
     return ConvertedSignal(result, sample_rate_hz, wanted, low_hz, high_hz, edge)
 

@@ -3,14 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import get_window
 
 from ..errors import InvalidRequest, NotEnoughData
-from ..signals import Reals
+from ..signals import Reals, Window, taper
 
 MOST_COLUMNS = 600
 """A figure has no more pixels to show."""
-_TAPER = "hann"
+_TAPER = Window.HANN
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +66,7 @@ class SpectrogramSums:
         segments = 1 + (samples - self._length) // self._hop
         self._columns = min(MOST_COLUMNS, segments)
         self._segments = segments
-        self._window = get_window(_TAPER, self._length)
+        self._window = taper(_TAPER, self._length)
         self._rate_hz = sample_rate_hz
         self._rows = int(highest_hz * self._length / sample_rate_hz) + 1
         self._power = np.zeros((self._rows, self._columns))

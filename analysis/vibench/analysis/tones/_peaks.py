@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import find_peaks
+import scipy
 
 from ..errors import InvalidRequest
 from ..signals import Reals, Window
@@ -56,7 +56,7 @@ def peaks(
         raise InvalidRequest(
             f"no line lies between {low_hz:g} and {high_hz:g} Hz; they are {spectrum.spacing_hz:g} Hz apart"
         )
-    found = find_peaks(amplitude[first - 1 : last + 2])[0] + first - 1
+    found = scipy.signal.find_peaks(amplitude[first - 1 : last + 2])[0] + first - 1
     found = found[(found >= first) & (found <= last)]
     placed = [_placed(spectrum, amplitude, int(line)) for line in found[np.argsort(-amplitude[found])]]
     return tuple(peak for peak in placed if peak.amplitude > least_ratio * peak.floor)[:count]

@@ -1,11 +1,17 @@
 """What a form says of a field, taken from the plan model: label, unit, limits, explanation."""
 
+import ast
+import inspect
 import re
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
 from typing import Any, get_args
 
 from annotated_types import Ge, Gt, Le, Lt
+from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 UNITS = (
@@ -48,7 +54,7 @@ class FieldFacts:
         return f"{self.label} in {self.unit}" if self.unit else self.label
 
 
-def field_facts(name: str, field: FieldInfo) -> FieldFacts:
+def field_facts(model: type[BaseModel], name: str, field: FieldInfo) -> FieldFacts:
     """Say what a form must know of a field."""
     suffix, unit = next(((s, u) for s, u in UNITS if name.endswith(s)), ("", ""))
     words = name.removesuffix(suffix).replace("_", " ")
@@ -57,8 +63,41 @@ def field_facts(name: str, field: FieldInfo) -> FieldFacts:
         label=words[:1].upper() + words[1:],
         unit=unit,
         limits=_limits(field, unit),
-        explanation=_plain(field.description or ""),
+        explanation=_plain(_explanation(model, name)),
     )
+
+
+def _explanation(model: type[BaseModel], name: str) -> str:
+    """Find the docstring under a field, in the class or the nearest of its bases that declares it."""
+    texts = (
+        _explanations(each.__module__).get((each.__name__, name), "")
+        for each in model.__mro__
+        if name in inspect.get_annotations(each)
+    )
+    return next(texts, "")
+
+
+@cache
+def _explanations(module: str) -> Mapping[tuple[str, str], str]:
+    """Read the docstrings of all fields of a module's classes, when a form first needs one.
+
+    Pydantic's ``use_attribute_docstrings`` reads them for every model when it is made, a tenth of a start.
+    """
+    try:
+        tree = ast.parse(inspect.getsource(sys.modules[module]))
+    except OSError:  # installed without sources: a form has no explanations then
+        return {}
+    return {
+        (each.name, field.target.id): inspect.cleandoc(text.value.value)
+        for each in ast.walk(tree)
+        if isinstance(each, ast.ClassDef)
+        for field, text in pairwise(each.body)
+        if isinstance(field, ast.AnnAssign)
+        and isinstance(field.target, ast.Name)
+        and isinstance(text, ast.Expr)
+        and isinstance(text.value, ast.Constant)
+        and isinstance(text.value.value, str)
+    }
 
 
 def _limits(field: FieldInfo, unit: str) -> str:

@@ -92,7 +92,7 @@ class ModelForm(QWidget):
         self.changed.emit()
 
     def _add(self, name: str, field: FieldInfo) -> None:
-        facts = field_facts(name, field)
+        facts = field_facts(self.model, name, field)
         editor = editor_for(field, facts, self._tell)
         complaint = QLabel()
         complaint.setProperty("rank", "complaint")

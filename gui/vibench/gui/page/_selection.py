@@ -1,10 +1,14 @@
 """What a person means to do: rig, test and campaign as they are being made. Nothing of it has been sent."""
 
+from typing import TYPE_CHECKING
+
 from PySide6.QtCore import QObject, Signal
 
 from vibench.acquisition.plan import Campaign, Measurement
 from vibench.acquisition.rig import Rig
-from vibench.analysis import MeasurementPrediction
+
+if TYPE_CHECKING:
+    from vibench.analysis import MeasurementPrediction
 
 
 class Selection(QObject):
@@ -32,7 +36,7 @@ class Selection(QObject):
         return self._measurement
 
     @property
-    def prediction(self) -> MeasurementPrediction | None:
+    def prediction(self) -> "MeasurementPrediction | None":
         """What the specimen is predicted to do under the test; None while nobody knows."""
         return self._prediction
 
@@ -52,7 +56,7 @@ class Selection(QObject):
             self._measurement, self._prediction = measurement, None
             self.measurement_changed.emit()
 
-    def keep_prediction(self, prediction: MeasurementPrediction) -> None:
+    def keep_prediction(self, prediction: "MeasurementPrediction") -> None:
         """Keep what is predicted of the test."""
         self._prediction = prediction
 

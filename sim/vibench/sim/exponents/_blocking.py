@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.stats import chi2
 
 from ..kernels import Floats
 
@@ -83,5 +83,5 @@ def _first_independent(variances: Floats, correlations: Floats, counts: Floats) 
     # Of independent values the lagged correlation has the mean -1/n and the variance 1/n.
     evidence = np.cumsum((counts * (ratios + 1.0 / counts) ** 2)[::-1])[::-1]
     degrees = np.arange(len(counts), 0, -1)
-    passes = np.flatnonzero(evidence < chi2.ppf(CONFIDENCE, degrees))
+    passes = np.flatnonzero(evidence < scipy.stats.chi2.ppf(CONFIDENCE, degrees))
     return int(passes[0]) if len(passes) else len(counts) - 1

@@ -58,7 +58,6 @@ class _Described(BaseModel):
         extra="forbid",
         allow_inf_nan=False,
         ser_json_inf_nan="strings",
-        use_attribute_docstrings=True,
     )
 
 

@@ -97,7 +97,7 @@ def _described(said: dict[str, Any]) -> SpecimenTable:
 class Study(BaseModel):
     """What is to be predicted, completely: two equal studies have equal answers."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     specimen: SpecimenTable = Field(
         default_factory=usual_specimen, validation_alias=AliasChoices("specimen", "structure")

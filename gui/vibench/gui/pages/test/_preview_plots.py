@@ -1,10 +1,11 @@
 """The signal as it will be played, and what the specimen is predicted to do with it."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from vibench.acquisition.plan import MeasurementPreview
-from vibench.analysis import MeasurementPrediction
 
 from ...plots import (
     FREQUENCY,
@@ -19,6 +20,9 @@ from ...plots import (
     curve_style,
 )
 from ...widgets import Theme
+
+if TYPE_CHECKING:
+    from vibench.analysis import MeasurementPrediction
 
 COLLISION = LineStyle(lambda theme: theme.traces[3], filled=0.18)
 
@@ -40,7 +44,7 @@ class PredictionPlot(Plot):
         self._linear = self.curve(curve_style(2, Dash.DOTTED), "without contact")
         self._stripes = self.stripes(COLLISION)
 
-    def show_prediction(self, seen: MeasurementPrediction | None) -> None:
+    def show_prediction(self, seen: "MeasurementPrediction | None") -> None:
         """Draw a prediction; None clears the plot."""
         if seen is None:
             for curve in (self._first, self._second, self._linear):

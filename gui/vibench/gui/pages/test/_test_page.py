@@ -2,6 +2,7 @@
 
 import tomllib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import (
     QFileDialog,
@@ -19,7 +20,6 @@ from PySide6.QtWidgets import (
 from vibench.acquisition import ConfigurationError, save_toml, toml_text, validated
 from vibench.acquisition.plan import LimitCheck, Measurement, MeasurementPreview, excitation_text
 from vibench.acquisition.rig import BaseQuantity, Rig
-from vibench.analysis import MeasurementPrediction
 
 from ...background import LatestRequest
 from ...forms import Choice
@@ -30,6 +30,9 @@ from ._limit_table import LimitTable
 from ._preview_plots import PredictionPlot, PreviewPlots
 from ._test_form import TestForm
 from ._test_preview import TestPreview, predict_test, preview_test
+
+if TYPE_CHECKING:
+    from vibench.analysis import MeasurementPrediction
 
 _SHOWN = {
     BaseQuantity.STROKE: "stroke",
@@ -148,7 +151,7 @@ class TestPage(Page):
     def _look_failed(self, error: BaseException) -> None:
         self.summary.setText(f"✖ {error}")
 
-    def _predicted(self, seen: MeasurementPrediction) -> None:
+    def _predicted(self, seen: "MeasurementPrediction") -> None:
         self.context.selection.keep_prediction(seen)
         self.prediction.show_prediction(seen)
         bands = ", ".join(f"{low:.0f}–{high:.0f} Hz" for low, high in seen.collision_bands_hz)

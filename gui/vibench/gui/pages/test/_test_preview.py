@@ -1,10 +1,14 @@
 """What is worked out about a test in another process: its outlook, and what the specimen will do."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
+import vibench.analysis
 from vibench.acquisition.plan import Measurement, MeasurementPreview, preview_measurement
 from vibench.acquisition.rig import Rig
-from vibench.analysis import MeasurementPrediction, predict_measurement
+
+if TYPE_CHECKING:
+    from vibench.analysis import MeasurementPrediction
 
 
 @dataclass(frozen=True)
@@ -20,6 +24,6 @@ def preview_test(test: TestPreview) -> MeasurementPreview:
     return preview_measurement(test.measurement, test.rig)
 
 
-def predict_test(test: TestPreview) -> MeasurementPrediction:
+def predict_test(test: TestPreview) -> "MeasurementPrediction":
     """Simulate what the specimen will do."""
-    return predict_measurement(test.measurement, test.rig)
+    return vibench.analysis.predict_measurement(test.measurement, test.rig)
