@@ -2,6 +2,7 @@ from ._accuracy_cost import (
     cost_sentences as cost_sentences,
 )
 from ._progress import (
+    MOTION_COLUMNS as MOTION_COLUMNS,
     SimulationProgress as SimulationProgress,
 )
 from ._request import (

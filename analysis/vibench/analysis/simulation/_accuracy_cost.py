@@ -46,6 +46,8 @@ def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
     shortest_s = sum(each_s / (level.power if is_power else level.free) for is_power in powers)
     longest_s = sum(each_s / (level.power if is_power else level.chaos) for is_power in powers)
     on_top = "; the exponent comes on top" if request.exponent is Exponent.COMPUTED else ""
+    if request.budget_s > 0.0:
+        on_top += f"; a point whose start is forgotten takes {request.budget_s:g} s of a core more, at most"
     error = f"{level.response_i_error:.0e}" if level.response_i_error else "none"
     shortest, longest = _time(shortest_s / cores), _time(longest_s / cores)
     return (

@@ -2,11 +2,27 @@
 
 import numpy as np
 
+from vibench.sim import FoundMotion, StartMemory
+
 from ..comparison import Curve, CurveKind, CurveOrigin
 from ..errors import AnalysisError
 from ..model import Similarity, SimilarityCurve, similarity
 from ..signals import Reals
 from ._request import PartialResult, SimulatedPoint, SimulatedSignal, Trouble
+
+MOTION_COLUMNS = ("Model", "f (Hz)", "Response I", "Response II", "Error", "Share of starts", "Motion")
+
+
+def _motion_words(motion: FoundMotion) -> tuple[str, ...]:
+    """Say the numbers of a motion, its share and what it is."""
+    share, period = motion.share, "" if motion.period is None else f", {motion.period} drive periods"
+    return (
+        "–" if motion.response_i is None else f"{motion.response_i:.4g}",
+        "–" if motion.response_ii is None else f"{motion.response_ii:.4g}",
+        "–" if motion.error_estimate is None else f"{motion.error_estimate:.1g}",
+        f"{share.share:.0%} ({100 * share.low:.0f} to {100 * share.high:.0f} %)",
+        f"{motion.motion}{period}",
+    )
 
 
 class SimulationProgress:
@@ -75,6 +91,35 @@ class SimulationProgress:
         values = [getattr(point, name) for point in points]
         frequency_hz = np.array([point.frequency_hz for point in points], dtype=np.float64)
         return frequency_hz, np.array([np.nan if v is None else v for v in values], dtype=np.float64)
+
+    def other_motions(self, model: str) -> tuple[Reals, Reals]:
+        """Give frequencies, and Response I of each motion that other starts came to there."""
+        found = [
+            (point.frequency_hz, motion.response_i)
+            for point in self._found.get(model, {}).values()
+            if point.ensemble is not None
+            for place, motion in enumerate(point.ensemble.motions)
+            if place != point.ensemble.asked and motion.response_i is not None
+        ]
+        columns = np.array(sorted(found), dtype=np.float64).reshape(-1, 2)
+        return columns[:, 0], columns[:, 1]
+
+    @property
+    def motion_rows(self) -> tuple[tuple[str, ...], ...]:
+        """Words for every motion at every point that came to more than one, by `MOTION_COLUMNS`."""
+        return tuple(
+            (model, f"{point.frequency_hz:g}", *_motion_words(motion))
+            for model, points in self._found.items()
+            for point in (points[key] for key in sorted(points))
+            if point.ensemble is not None and len(point.ensemble.motions) > 1
+            for motion in point.ensemble.motions
+        )
+
+    @property
+    def forgotten(self) -> int:
+        """Points whose start is forgotten: which motion they come to is chance."""
+        points = (point for found in self._found.values() for point in found.values())
+        return sum(point.memory is StartMemory.LOST for point in points)
 
     def collision_bands_hz(self, model: str) -> tuple[tuple[float, float], ...]:
         """Stretches of neighbouring points at which the masses strike."""

@@ -12,11 +12,14 @@ from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat, model_vali
 
 from vibench.acquisition import FrozenModel
 from vibench.sim import (
+    BUDGET_S,
     USUAL_SPECIMEN,
     Accuracy,
+    Ensemble,
     Observable,
     Specimen,
     SpecimenTable,
+    StartMemory,
     load_specimen,
 )
 from vibench.sim.study import Study, frequency_range
@@ -36,6 +39,9 @@ class SimulatedPoint:
     motion: str
     lyapunov_per_s: float | None
     error_estimate: float | None
+    memory: StartMemory = StartMemory.UNKNOWN
+    ensemble: Ensemble | None = None
+    """What other starts came to, where the start is forgotten."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +111,8 @@ class SimulationRequest(FrozenModel):
     """Length of each run, from rest."""
     window_s: PositiveFloat = 5.0
     """Length of its end that is observed."""
+    budget_s: NonNegativeFloat = BUDGET_S
+    """Most processor time a point for other starts, where the start is forgotten; 0 looks for none."""
     exponent: Exponent = Exponent.LEFT_OUT
     """Largest Lyapunov exponent; it about doubles the work."""
     signal_hz: PositiveFloat | None = 260.0
@@ -158,6 +166,7 @@ class SimulationRequest(FrozenModel):
             accuracy=self.accuracy,
             duration_s=self.duration_s,
             window_s=self.window_s,
+            budget_s=self.budget_s,
         )
 
     @property

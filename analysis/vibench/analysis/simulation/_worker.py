@@ -123,6 +123,8 @@ def simulated_point(model: str, found: ScenePrediction) -> SimulatedPoint:
         motion=str(found.motion),
         lyapunov_per_s=found.lyapunov_per_s,
         error_estimate=found.error_estimate,
+        memory=found.memory,
+        ensemble=found.ensemble,
     )
 
 

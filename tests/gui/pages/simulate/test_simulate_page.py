@@ -1,5 +1,7 @@
 """The Simulate page asks another process, draws what comes, and stops at once."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from vibench.analysis.simulation._accuracy_cost import MEASURED
 from vibench.analysis.simulation._request import SimulatedPoint, SimulatedSignal, Trouble
 from vibench.gui.pages.simulate import SimulatePage
 from vibench.gui.widgets import DARK
-from vibench.sim import Accuracy
+from vibench.sim import Accuracy, Ensemble, FoundMotion, MotionKind, Share, StartMemory
 
 LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "start_hz": 50.0, "step_hz": 10.0}
 
@@ -109,12 +111,48 @@ def test_exponents_similarity_impacts_and_motion_are_drawn_as_they_come(page):
     assert len(lines(page.plots.exponents)) == 2
     assert len(lines(page.plots.likeness)) == 1
     time_s = np.linspace(1.0, 1.05, 200)
-    page._grow((SimulatedSignal("a", 260.0, time_s, 1e-6 * np.sin(time_s), 1e-5 * time_s, 45e-6),))
+    page._grow((SimulatedSignal("a", 260.0, time_s, 1e-6 * np.sin(time_s), 1e-5 * time_s, (45e-6, 45e-6)),))
     for _ in page.plots.plots:
         page.refresh()
     (x_s, x), _ = lines(page.plots.motion)
     assert x_s[0] == 0.0
     assert np.array_equal(x, 1e-6 * np.sin(time_s))
+
+
+def test_motions_that_other_starts_came_to_are_dots_and_rows_with_their_shares(page):
+    asked(page, step_hz=100.0)
+    page.cancel()
+    motions = tuple(
+        FoundMotion(kind, period, response, response, 1.0, 1.0, 1e-6, starts, Share(starts / 16, low, high))
+        for kind, period, response, starts, low, high in (
+            (MotionKind.PERIODIC, 1, 0.886, 12, 0.51, 0.90),
+            (MotionKind.PERIODIC, 2, 2.15, 4, 0.10, 0.49),
+        )
+    )
+    ensemble = Ensemble(16, motions, 0, 0.19, None, 0.4, 90.0)
+    lottery = replace(point("a", 562.8, 0.886), memory=StartMemory.LOST, ensemble=ensemble)
+    page._grow((point("a", 500.0), lottery))
+    page._end()
+    for _ in page.plots.plots:
+        page.refresh()
+    assert "At 1 points the start is forgotten." in page._state.text()
+    dots = lines(page.plots.responses)[0]
+    assert (list(dots[0]), list(dots[1])) == ([562.8], [2.15])
+    assert page.motions.isVisible()
+    words = [[page.motions.item(row, column).text() for column in range(7)] for row in range(2)]
+    assert words[1] == [
+        "a",
+        "562.8",
+        "2.15",
+        "2.15",
+        "1e-06",
+        "25% (10 to 49 %)",
+        "periodic, 2 drive periods",
+    ]
+    page._grow((point("a", 562.8),))
+    for _ in page.plots.plots:
+        page.refresh()
+    assert not page.motions.isVisible()
 
 
 def test_points_that_failed_are_told_at_the_end(page):

@@ -84,6 +84,10 @@ class AnswerPlots(QWidget):
             self.responses.rules(_EDGE).show_at(low_hz for low_hz, _ in bands_hz[1:])
             if bands_hz:
                 self.responses.upright(_EDGE, bands_hz[0][0], f"impacts, {model}")
+        elsewhere_hz, elsewhere = progress.other_motions(model)
+        if elsewhere_hz.size:
+            dots = self.responses.dots(curve_style(number), f"other starts, {model}", size=5)
+            dots.setData(elsewhere_hz, elsewhere)
         for name, label, dash in (
             ("response_i", "Response I", Dash.SOLID),
             ("response_ii", "Response II", Dash.DOTTED),

@@ -12,13 +12,22 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from vibench.analysis.simulation import PartialResult, SimulationProgress, SimulationRequest, cost_sentences
+from vibench.analysis.simulation import (
+    MOTION_COLUMNS,
+    PartialResult,
+    SimulationProgress,
+    SimulationRequest,
+    cost_sentences,
+)
 
 from ...forms import JudgedForm
 from ...page import AppContext, Page, SideAndPicture
-from ...widgets import COMPARE, SIMULATE, Notice, NoticeKind, Theme, push_button
+from ...widgets import COMPARE, SIMULATE, Notice, NoticeKind, ReadTable, Theme, push_button
 from ._answer_plots import AnswerPlots
 from ._simulator import Simulator
+
+_LINES = 6
+"""Of the table of motions, headings among them."""
 
 
 class SimulatePage(Page):
@@ -56,6 +65,7 @@ class SimulatePage(Page):
         if self._is_stale and not self._undrawn:
             self._is_stale = False
             self._undrawn = self.plots.steps(self._progress)
+            self._show_motions()
         if self._undrawn:
             self._undrawn.pop(0)()
 
@@ -95,7 +105,9 @@ class SimulatePage(Page):
     def _end(self) -> None:
         self._is_stale = True
         troubles = () if self._progress is None else self._progress.troubles
-        self._say_progress("Complete." if not troubles else f"Complete but for {len(troubles)} points.")
+        said = "Complete." if not troubles else f"Complete but for {len(troubles)} points."
+        forgotten = 0 if self._progress is None else self._progress.forgotten
+        self._say_progress(f"{said} At {forgotten} points the start is forgotten." if forgotten else said)
         if troubles:
             self.context.say(Notice(NoticeKind.WARNING, troubles[0], details="\n".join(troubles[1:])))
 
@@ -104,6 +116,12 @@ class SimulatePage(Page):
             Notice(NoticeKind.FAULT, what, "What had been found is shown.", "Simulate again.", "SIMULATOR")
         )
         self._say_progress("The simulation broke off.")
+
+    def _show_motions(self) -> None:
+        """List the motions of points that came to more than one; the table is there only then."""
+        rows = () if self._progress is None else self._progress.motion_rows
+        self.motions.show_rows(rows)
+        self.motions.setVisible(bool(rows))
 
     def _say_cost(self) -> None:
         request = self.form.value
@@ -169,9 +187,15 @@ class SimulatePage(Page):
         row.addWidget(self._state, 1)
         row.addWidget(self._bar)
         row.addWidget(self._compare)
+        self.motions = ReadTable(
+            "Motions of points whose start is forgotten, and their shares", MOTION_COLUMNS
+        )
+        self.motions.setMaximumHeight(_LINES * self.motions.verticalHeader().defaultSectionSize())
+        self.motions.hide()
         answer = QWidget()
         layout = QVBoxLayout(answer)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.plots, 1)
+        layout.addWidget(self.motions)
         layout.addLayout(row)
         return answer
