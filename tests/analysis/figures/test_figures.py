@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_recording
-from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep, SteppedSine, StreamedNoise
+from vibench.acquisition.plan import (
+    Dwell,
+    Measurement,
+    MultisineNoise,
+    SettledSine,
+    SineSweep,
+    SteppedSine,
+    StreamedNoise,
+)
 from vibench.analysis import Simulation
 from vibench.analysis.figures import (
     SIMULATED,
@@ -175,3 +183,11 @@ def test_quantities_get_the_prefix_in_which_they_read_one_to_a_thousand(largest,
     factor, unit = prefixed(largest, "m")
     assert factor == pytest.approx(expected[0])
     assert unit == expected[1]
+
+
+def test_a_figure_of_steps_is_titled_and_told_by_its_own_kind(stepped_file):
+    found = result(stepped_file).analysis
+    plan = SettledSine(amplitude_vpp=2, frequencies_hz=(200, 210), record_s=0.5)
+    assert STEPPED_FREQUENCIES.title(plan, found.response).startswith("Settled sine, 2 Vpp")
+    assert STEPPED_FREQUENCIES.title(found.excitation, found.response).startswith("Stepped sine")
+    assert STEPPED_FREQUENCIES.caption(plan, found.response).startswith("Settled sine at 2 Vpp")

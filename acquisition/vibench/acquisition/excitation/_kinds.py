@@ -53,6 +53,11 @@ class ExcitationKind:
         return self.word.replace("_", " ")
 
     @property
+    def title(self) -> str:
+        """The label where a sentence or a figure begins with it."""
+        return self.label.capitalize()
+
+    @property
     def is_feedback(self) -> bool:
         """Whether its next step depends on what was measured."""
         return issubclass(self.plan, AbstractFeedback)

@@ -7,7 +7,13 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from matplotlib.axes import Axes
 
-from vibench.acquisition.plan import ResonanceTracking, SettledSine, SteppedLevel, SteppedSine
+from vibench.acquisition.plan import (
+    EXCITATION_KINDS,
+    ResonanceTracking,
+    SettledSine,
+    SteppedLevel,
+    SteppedSine,
+)
 
 from ..model import SteppedSineOverlay
 from ..signals import Reals
@@ -147,8 +153,8 @@ def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse
     """Say where the largest response was."""
     top = int(np.argmax(found.response_ii))
     return (
-        f"Stepped sine at {plan.amplitude_vpp:g} Vpp, {found.frequency_hz.size} steps from "
-        f"{np.min(found.frequency_hz):.4g} to {np.max(found.frequency_hz):.4g} Hz. Response II is largest "
+        f"{EXCITATION_KINDS[plan.kind].title} at {plan.amplitude_vpp:g} Vpp, "
+        f"{found.frequency_hz.size} steps from {np.min(found.frequency_hz):.4g} to {np.max(found.frequency_hz):.4g} Hz. Response II is largest "
         f"at {found.frequency_hz[top]:.4g} Hz: {found.response_ii[top]:.3g} ± "
         f"{2 * found.sd_response_ii[top]:.2g}."
     )
@@ -180,7 +186,7 @@ def tracked_caption(found: SteppedResponse) -> str:
 STEPPED_FREQUENCIES: SteppedLook[SteppedSine | SettledSine] = SteppedLook(
     along=lambda found: found.frequency_hz,
     axis="drive frequency [Hz]",
-    title=lambda plan, _: f"Stepped sine, {plan.amplitude_vpp:g} Vpp",
+    title=lambda plan, _: f"{EXCITATION_KINDS[plan.kind].title}, {plan.amplitude_vpp:g} Vpp",
     caption=_frequencies_caption,
 )
 STEPPED_LEVELS: SteppedLook[SteppedLevel] = SteppedLook(

@@ -5,6 +5,8 @@ What a report cannot say: stated in it, so that nobody reads more out of it than
 
 from collections.abc import Iterator
 
+from vibench.acquisition.plan import EXCITATION_KINDS
+
 from ..figures import regions_text, stepped_level_caption, verdict_text
 from ..kinds import DwellResult, NoiseResult, SteppedSineResult, SweepResult
 from ..model import PREDICTION_S, WINDOW_S
@@ -38,11 +40,11 @@ def sweep_findings(result: SweepResult) -> Iterator[str]:
 
 
 def stepped_findings(result: SteppedSineResult) -> Iterator[str]:
-    """Say how far Response II went in a stepped sine, and what feedback found."""
+    """Say how far Response II went in steps of frequency, and what feedback found."""
     found, plan = result.analysis.response.response_ii, result.analysis.excitation
     text = (
-        f"Stepped sine at {plan.amplitude_vpp:g} Vpp: Response II up to {found.max():.3g} in "
-        f"{found.size} steps."
+        f"{EXCITATION_KINDS[plan.kind].title} at {plan.amplitude_vpp:g} Vpp: Response II "
+        f"up to {found.max():.3g} in {found.size} steps."
     )
     yield " ".join([text, *feedback_sentences(result.analysis.facts.feedback)])
 
