@@ -153,9 +153,9 @@ def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse
     """Say where the largest response was."""
     top = int(np.argmax(found.response_ii))
     return (
-        f"{EXCITATION_KINDS[plan.kind].title} at {plan.amplitude_vpp:g} Vpp, "
-        f"{found.frequency_hz.size} steps from {np.min(found.frequency_hz):.4g} to {np.max(found.frequency_hz):.4g} Hz. Response II is largest "
-        f"at {found.frequency_hz[top]:.4g} Hz: {found.response_ii[top]:.3g} ± "
+        f"{EXCITATION_KINDS[plan.kind].title} at {plan.amplitude_vpp:g} Vpp, {found.frequency_hz.size} "
+        f"steps from {np.min(found.frequency_hz):.4g} to {np.max(found.frequency_hz):.4g} Hz. "
+        f"Response II is largest at {found.frequency_hz[top]:.4g} Hz: {found.response_ii[top]:.3g} ± "
         f"{2 * found.sd_response_ii[top]:.2g}."
     )
 
