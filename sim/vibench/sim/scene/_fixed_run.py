@@ -15,7 +15,9 @@ from ..kernels import Floats
 from ..model import Accuracy, Outcome, PowerLaw, Specimen
 from ._followed_run import FollowedRun, Stretch
 from ._observed_window import (
+    Block,
     ObservedWindow,
+    blocks_of,
     follow_strobed,
     observe_window,
     samples_between,
@@ -93,9 +95,10 @@ class SceneRun:
     """A run's end, and what was learnt on the way."""
 
     window: ObservedWindow
-    block_peaks_m: Floats
-    """Largest abs(x) in equal blocks of the settled motion, those of the window last, shape (blocks,)."""
-    blocks_in_window: int
+    blocks: tuple[Block, ...]
+    """Of the motion that was watched, those of the window last."""
+    was_settled: bool
+    """The motion repeated before the window began."""
     motion: MotionKind
     repeats: Repetition | None
     settled_s: float | None
@@ -114,12 +117,17 @@ def run_for(run: FollowedRun, duration_s: float, window_s: float, pace: Pace) ->
     """Follow a motion that is at time zero for a while, and observe the last ``window_s`` of it."""
     lead = _lead(run, max(run.time_s, duration_s - window_s - pace.section_s))
     last = follow_strobed(run, duration_s - window_s)
-    if pace.repeats([last]) is None:
+    before = pace.repeats([last])
+    if before is None:
         run.follow_tangent()
-    window = observe_window(run, window_s)
+    window = observe_window(run, window_s, 1 if before is None else before.period)
     seen = judged(run, window, [last], pace, f"the {duration_s:g} s asked for are over")
+    if seen.repeats is not None and window.line_periods % seen.repeats.period != 0:
+        # Its period was found only now: the window is gone through once more, for lines that do not leak.
+        seen = replace(seen, window=observe_window(window.begins.apart(), window_s, seen.repeats.period))
     # Since when it repeats was not looked for.
-    return replace(seen, path=(lead, last, *window.stretches), wandered_until_s=0.0)
+    path = (lead, last, *window.stretches)
+    return replace(seen, was_settled=before is not None, path=path, wandered_until_s=0.0)
 
 
 def judged(
@@ -132,12 +140,11 @@ def judged(
     stretches = [*before, *window.stretches]
     repeats = pace.repeats(stretches)
     growth = growth_of(stretches)
-    peaks = [stretch.peak_x_m for stretch in before if stretch.peak_x_m > 0.0]
     is_lost = run.outcome is not Outcome.REACHED_END
     return SceneRun(
         window=window,
-        block_peaks_m=np.array([*peaks, *window.block_peaks_m]),
-        blocks_in_window=len(window.block_peaks_m),
+        blocks=(*blocks_of(before), *window.blocks),
+        was_settled=False,
         motion=MotionKind.UNDECIDED if is_lost else kind_of(repeats, growth, pace.forgetting_s),
         repeats=None if is_lost else repeats,
         settled_s=None,

@@ -11,7 +11,19 @@ from ..motion import WHOLE
 from ._followed_run import FollowedRun, ObservedQuantities, Samples, Stretch
 
 BLOCKS = 10
-"""Parts of a window whose extremes are kept apart: what the scatter of the whole is found from."""
+"""Parts of a window that are kept apart: what the scatter of the whole is found from."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """What was seen in a part of a motion that holds whole drive periods, but for what precedes the first."""
+
+    peak_x_m: float
+    """Largest abs(x)."""
+    peak_p_m: float
+    line_x_m: complex
+    """x = Re(line_x_m * exp(i (omega t + phase))) at the drive frequency."""
+    line_p_m: complex
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,10 +34,11 @@ class ObservedWindow:
     """The run as it was where the window begins."""
     stretches: tuple[Stretch, ...]
     """The parts it was followed in."""
-    block_peaks_m: Floats
-    """Largest abs(x) in equal parts, shape (blocks,)."""
+    blocks: tuple[Block, ...]
+    """Equal parts, but for a drive period."""
     line_periods: int
-    """The lines, over this many whole drive periods before the end: the most that the window holds."""
+    """The lines, over this many whole drive periods before the end: the most that the window holds, of the
+    motion's own periods where it has one."""
     line_x_m: complex
     """x = Re(line_x_m * exp(i (omega t + phase))) at the drive frequency."""
     line_p_m: complex
@@ -44,6 +57,11 @@ class ObservedWindow:
     def largest_p_m(self) -> float:
         """Largest abs(p)."""
         return max(stretch.peak_p_m for stretch in self.stretches)
+
+    @property
+    def responses_m(self) -> Floats:
+        """Largest abs(x), line of x, largest abs(p), line of p, shape (4,); not over the drive."""
+        return np.array([self.largest_x_m, abs(self.line_x_m), self.largest_p_m, abs(self.line_p_m)])
 
     @property
     def impacts(self) -> int:
@@ -70,40 +88,50 @@ def follow_strobed(
     return run.follow(end_s, observe, samples_between(run.drive.frequency_hz, run.time_s, end_s))
 
 
-def observe_window(run: FollowedRun, window_s: float) -> ObservedWindow:
-    """Follow a motion through a window that begins now and holds a drive period or more, and observe it."""
+def observe_window(run: FollowedRun, window_s: float, cycle: int = 1) -> ObservedWindow:
+    """Follow a motion through a window that begins now and holds a drive period or more, and observe it.
+
+    A motion that repeats after ``cycle`` drive periods has its lines taken over a whole multiple of them, as
+    far as the window holds one: over other lengths its other lines leak in.
+    """
     begins, start_s, frequency = run.apart(), run.time_s, run.drive.frequency_hz
     end_s = start_s + window_s
-    line_s = max(end_s - whole_periods(window_s, frequency) / frequency, start_s)
-    edges = [start_s + window_s * k / BLOCKS for k in range(1, BLOCKS)] + [end_s]
-    stretches, peaks = [], []
-    for edge in edges:
-        parts = (
-            [follow_strobed(run, min(line_s, edge), ObservedQuantities.PEAKS)] if run.time_s < line_s else []
-        )
-        if edge > line_s:
-            parts.append(follow_strobed(run, edge, ObservedQuantities.PEAKS_AND_LINES))
-        stretches += parts
-        peaks.append(max(part.peak_x_m for part in parts))
-    return window_of(begins, stretches, peaks)
+    periods = whole_periods(window_s, frequency)
+    periods = cycle * (periods // cycle) or periods
+    line_s = max(end_s - periods / frequency, start_s)
+    count = min(BLOCKS, periods)
+    edges = [end_s - (periods * (count - k) // count) / frequency for k in range(1, count)] + [end_s]
+    head = [follow_strobed(run, line_s, ObservedQuantities.PEAKS)] if run.time_s < line_s else []
+    parts = [follow_strobed(run, edge, ObservedQuantities.PEAKS_AND_LINES) for edge in edges]
+    return window_of(begins, parts, head)
 
 
-def window_of(
-    begins: FollowedRun, stretches: Sequence[Stretch], block_peaks_m: Sequence[float]
-) -> ObservedWindow:
-    """Make a window of stretches, one after the other, whose lines cover whole periods up to the end."""
-    length_s = stretches[-1].end_s - stretches[0].start_s
+def window_of(begins: FollowedRun, parts: Sequence[Stretch], head: Sequence[Stretch] = ()) -> ObservedWindow:
+    """Make a window of parts that hold whole drive periods, after a head of which only peaks are taken."""
     frequency = begins.drive.frequency_hz
-    periods = whole_periods(length_s, frequency)
-    # A line is the mean of twice the motion against the drive.
+    periods = round(sum(part.length_s for part in parts) * frequency)
     scale = 2.0 * frequency / max(periods, 1)
     return ObservedWindow(
         begins=begins,
-        stretches=tuple(stretches),
-        block_peaks_m=np.array(block_peaks_m),
+        stretches=(*head, *parts),
+        blocks=blocks_of(parts),
         line_periods=periods,
-        line_x_m=scale * sum(stretch.area_x for stretch in stretches),
-        line_p_m=scale * sum(stretch.area_p for stretch in stretches),
+        line_x_m=scale * sum(part.area_x for part in parts),
+        line_p_m=scale * sum(part.area_p for part in parts),
+    )
+
+
+def blocks_of(parts: Sequence[Stretch]) -> tuple[Block, ...]:
+    """Take each watched part as a block; a line is the mean of twice the motion against the drive."""
+    return tuple(
+        Block(
+            part.peak_x_m,
+            part.peak_p_m,
+            2.0 * part.area_x / part.length_s,
+            2.0 * part.area_p / part.length_s,
+        )
+        for part in parts
+        if part.peak_x_m > 0.0 and part.length_s > 0.0
     )
 
 

@@ -129,8 +129,6 @@ class ScenePrediction:
     """When the motion was found to be settled; None where the duration was given."""
     ended: str
     """Why it was followed no longer."""
-    error_estimate: float | None
-    """Relative; see `vibench.sim.scene.solve_scene`."""
     integration_error: float | None
     """The part of it that a stricter accuracy would lessen."""
     scatter: float | None
@@ -145,6 +143,13 @@ class ScenePrediction:
     outcome: Outcome
     method: Method
     accuracy: str
+    response_i_error: float | None = None
+    """Relative, as the next three; see `vibench.sim.scene.solve_scene`."""
+    response_ii_error: float | None = None
+    relative_i_error: float | None = None
+    relative_ii_error: float | None = None
+    error_estimate: float | None = None
+    """The largest of the four."""
     section: Floats | None = None
     """States once a drive period within the window, where a Poincare section was asked for, shape (n, 6)."""
     spectrum_hz: Floats | None = None

@@ -6,13 +6,15 @@ slightly different starts tell it directly.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
-from ..kernels import Floats
+from ..kernels import Complex, Floats
+from ._observed_window import Block
 
 COVERED = 0.975
 """Share of one tail and the middle: 19 cases of 20 with both tails."""
@@ -61,3 +63,53 @@ def bootstrap_of_largest(ascending: Floats, drawn: int) -> tuple[float, float]:
     weights = np.diff((np.arange(count + 1) / count) ** drawn)
     mean = float(weights @ ascending)
     return mean, math.sqrt(float(weights @ (ascending - mean) ** 2))
+
+
+def draws_apart(blocks: Sequence[Block], blocks_in_window: int) -> Floats | None:
+    """Find what the responses of two windows differ by, relatively, in 19 cases of 20, shape (4,).
+
+    ``blocks`` are those of one window, the last of them, and others before it. None for too few.
+    """
+    lines = blocks[-blocks_in_window:]
+    along = [window_scatter([block.peak_x_m for block in blocks], blocks_in_window)]
+    along += [window_scatter([block.peak_p_m for block in blocks], blocks_in_window)]
+    if along[0] is None or along[1] is None or len(lines) < FEWEST_BLOCKS:
+        return None
+    return np.array(
+        [
+            along[0].between_runs,
+            _lines_apart(np.array([block.line_x_m for block in lines])),
+            along[1].between_runs,
+            _lines_apart(np.array([block.line_p_m for block in lines])),
+        ]
+    )
+
+
+def _lines_apart(parts: Complex) -> float:
+    """Find what the amplitudes of two lines differ by, relatively, in 19 cases of 20.
+
+    A line is the mean of its parts. Parts that follow one another may be alike: the error of the mean is the
+    larger of that from all of them and that from the means of two (Flyvbjerg and Petersen, J. Chem. Phys.
+    91 (1989) 461). Across the mean only the square of a deviation counts, over the line's size.
+    """
+    line = complex(parts.mean())
+    found = []
+    for each in (parts, 0.5 * (parts[0 : len(parts) // 2 * 2 : 2] + parts[1::2])):
+        if len(each) < FEWEST_BLOCKS:
+            continue
+        times = math.sqrt(2.0) * float(stdtrit(len(each) - 1, COVERED)) / math.sqrt(len(each))
+        turned = each * (line.conjugate() / abs(line)) if line != 0.0 else each
+        deviations = times * np.array([turned.real.std(ddof=1), turned.imag.std(ddof=1)])
+        across = min(float(deviations[1] ** 2) / (2.0 * abs(line)), float(deviations[1]))
+        found.append(float(deviations[0]) + across)
+    return max(found) / abs(line)
+
+
+def draws_of_starts(answer: Floats, others: Sequence[Floats]) -> Floats:
+    """Find what the responses of two starts differ by, relatively, in 19 cases of 20.
+
+    ``answer`` is one of them, ``others`` are more, each of shape (4,). NaN where one was lost.
+    """
+    found = np.array([answer, *others])
+    times = math.sqrt(2.0) * float(stdtrit(len(found) - 1, COVERED))
+    return np.asarray(times * found.std(axis=0, ddof=1) / np.abs(answer))

@@ -92,7 +92,7 @@ def _followed_on(
         )
         for number in range(1, in_window + 1)
     ]
-    window = window_of(begins, last, [stretch.peak_x_m for stretch in last])
+    window = window_of(begins, last)
     seen = judged(run, window, path[-watched:], pace, f"it is chaotic, for {run.time_s:.3g} s at least")
     if run.outcome is not Outcome.REACHED_END:
         return seen
@@ -113,7 +113,7 @@ def _observe_period(run: FollowedRun, repeats: Repetition, path: Sequence[Stretc
     since = wandered_until(section, 2.0 * math.pi * pace.frequency_hz, repeats.period)
     end_s = settled_s + repeats.period / pace.frequency_hz
     one = follow_strobed(run, end_s, ObservedQuantities.PEAKS_AND_LINES)
-    window = window_of(begins, [one], [one.peak_x_m])
+    window = window_of(begins, [one])
     seen = judged(run, window, [], pace, f"it repeats after {repeats.period} drive period(s)")
     if run.outcome is not Outcome.REACHED_END:
         return seen
@@ -122,6 +122,7 @@ def _observe_period(run: FollowedRun, repeats: Repetition, path: Sequence[Stretc
         motion=MotionKind.PERIODIC,
         repeats=repeats,
         settled_s=settled_s,
+        was_settled=True,
         path=tuple(path),
         grew=growth_of(path).is_certain,
         wandered_until_s=settled_s - (len(section) - since) / pace.frequency_hz,
@@ -139,5 +140,5 @@ def _observed(
     """Take the last stretches for the window."""
     last = stretches[-in_window:]
     begins = starts[-len(last)] if starts else run
-    window = window_of(begins, last, [stretch.peak_x_m for stretch in last])
+    window = window_of(begins, last)
     return judged(run, window, stretches[:-in_window], pace, ended)

@@ -203,12 +203,12 @@ class SeveralStarts:
             period, kind = other.repeats.period, MotionKind.PERIODIC
             begins, end_s = run.apart(), run.time_s + other.repeats.period / self._pace.frequency_hz
             one = follow_strobed(run, end_s, ObservedQuantities.PEAKS_AND_LINES)
-            window = window_of(begins, [one], [one.peak_x_m])
+            window = window_of(begins, [one])
             return reached_motion(run, kind, period, window, None, other.wandered_until_s)
         until_s = other.wandered_until_s
         growth = other.growth_over(self._horizon.judging_s)
         window = observe_window(run, self._horizon.window_s)
-        scatter = window_scatter(window.block_peaks_m, len(window.block_peaks_m))
+        scatter = window_scatter([block.peak_x_m for block in window.blocks], len(window.blocks))
         kind = kind_of(None, growth, self._pace.forgetting_s)
         return reached_motion(run, kind, None, window, scatter, until_s)
 
@@ -222,10 +222,7 @@ def reached_motion(
     wandered_until_s: float,
 ) -> ReachedMotion:
     """Describe what a run came to by the window at its end."""
-    responses_m = np.array(
-        [window.largest_x_m, abs(window.line_x_m), window.largest_p_m, abs(window.line_p_m)]
-    )
-    return ReachedMotion(run, motion, period, responses_m, scatter, wandered_until_s)
+    return ReachedMotion(run, motion, period, window.responses_m, scatter, wandered_until_s)
 
 
 def _as_many(wanted: int, budget_s: float, each_s: float) -> int:

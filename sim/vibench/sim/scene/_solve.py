@@ -1,11 +1,5 @@
 """The answer to a scene: what was seen, and how far to trust it. SI units.
 
-How far the steps of contacts have moved the responses: measured against stricter steps. SI units.
-
-A motion is followed twice from the state in which a run ended, as before and with a far smaller tolerance.
-One that repeats is followed until both have forgotten where they began: their responses then differ by the
-error itself. One that never repeats forgets nothing but itself; what counts is what each drive period adds.
-
 Amplitudes of the motion of m0 over frequency, from samples over whole drive periods. SI units.
 """
 
@@ -19,7 +13,7 @@ from ..kernels import Floats
 from ..model import Accuracy, Outcome
 from ._ensemble import ErrorOf, lasting
 from ._fixed_run import Pace, SceneRun, pace_of, run_for
-from ._followed_run import FollowedRun, ObservedQuantities
+from ._followed_run import FollowedRun
 from ._linear_motion import LinearMotion, linear_motion
 from ._observed_window import ObservedWindow, samples_between, states_of, whole_periods
 from ._other_starts import ALONE, ensemble_beside, memory_of
@@ -29,54 +23,16 @@ from ._scatter import WindowScatter, window_scatter
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
 from ._settling_run import Patience, run_until_settled
 from ._several_starts import FEWEST, SEED, TOO_FEW, Draw, ReachedMotion, reached_motion
-
-STRICTER = 1e-2
-"""Tolerance of the comparison over that of the run."""
-STRICTEST = 1e-12
-"""Smaller tolerances are rounding."""
-FORGETTING = 4.0
-"""Forgetting times that a motion which repeats is followed before it is compared."""
-LOOKS = 8
-"""Periods of it, or drive periods of a motion that does not repeat, that are compared."""
-
-
-def error_of_repeating(run: FollowedRun, accuracy: Accuracy, period: int, forgetting_s: float) -> float:
-    """Relative error of the responses of a motion that repeats, the largest of the four; NaN if lost."""
-    cycle_s = period / run.drive.frequency_hz
-    wait_s = cycle_s * np.ceil(FORGETTING * forgetting_s / cycle_s)
-    found = []
-    for tolerance in _tolerances(accuracy):
-        twin = run.apart(tolerance)
-        twin.follow(run.time_s + wait_s)
-        found.append(_responses(twin, LOOKS * cycle_s))
-    return float(np.max(np.abs(found[0] - found[1]) / np.abs(found[1])))
-
-
-def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
-    """Relative error that a drive period adds to a motion's responses, the largest seen; NaN if lost."""
-    loose, strict = _tolerances(accuracy)
-    cycle_s = 1.0 / run.drive.frequency_hz
-    on = run.apart(loose)
-    seen, missed = [], []
-    for _ in range(LOOKS):
-        twin = on.apart(strict)
-        seen.append(_responses(on, cycle_s))
-        missed.append(np.abs(seen[-1] - _responses(twin, cycle_s)))
-    return float(np.max(np.max(missed, axis=0) / np.max(np.abs(seen), axis=0)))
-
-
-def _tolerances(accuracy: Accuracy) -> tuple[float, float]:
-    return accuracy.tolerance, max(STRICTER * accuracy.tolerance, STRICTEST)
-
-
-def _responses(run: FollowedRun, length_s: float) -> Floats:
-    """Largest x and p and both lines over a stretch, shape (4,); NaN if the run was lost."""
-    seen = run.follow(run.time_s + length_s, ObservedQuantities.PEAKS_AND_LINES)
-    if run.outcome is not Outcome.REACHED_END:
-        return np.full(4, np.nan)
-    scale = 2.0 / length_s
-    return np.array([seen.peak_x_m, seen.peak_p_m, scale * abs(seen.area_x), scale * abs(seen.area_p)])
-
+from ._stated_error import (
+    ROUNDING,
+    SAFETY,
+    UNKNOWN_ERRORS,
+    StatedErrors,
+    known,
+    off_settled,
+    stated_errors,
+    with_errors,
+)
 
 LEAST_RATE_HZ = 20_000.0
 """Samples a second, at least: contacts are ten times slower than that, and m0 hardly feels them."""
@@ -115,10 +71,6 @@ def spectrum_of(window: ObservedWindow) -> LineSpectrum:
     return LineSpectrum(frequencies[is_kept], amplitudes[is_kept])
 
 
-SAFETY = 2.0
-"""Error that is stated over the error that was measured."""
-ROUNDING = 1e-11
-"""Relative error of an exact answer."""
 EXPONENT_S = 25.0
 """An exponent is averaged for so long, if it is not known well enough before [s]."""
 EXPONENT_PRECISION = Precision(absolute_per_s=0.2, relative=0.01)
@@ -127,11 +79,12 @@ EXPONENT_PRECISION = Precision(absolute_per_s=0.2, relative=0.01)
 def solve_scene(scene: Scene) -> ScenePrediction:
     """Run a scene as planned, and say what was seen and how far to trust it.
 
-    ``error_estimate`` is how far, relatively, Response I of another run of the same scene at a far stricter
-    accuracy may lie. Where the motion repeats it holds for all four responses: twice the measured difference
-    to a run with a hundredth of the tolerance, both taken on from the end until they have forgotten it.
-    Where it does not repeat, another run is another draw: the estimate is what two draws differ by in 19
-    cases of 20 (`WindowScatter.between_runs`), and what the same comparison finds for single drive periods.
+    Each response has an error: how far, relatively, that of another run of the same scene at a far stricter
+    accuracy may lie; ``error_estimate`` is the largest of the four. It is measured (docs/accuracy.md): where
+    the motion has settled, twice the difference to a run with a hundredth of the tolerance that is taken on
+    from the end until it has forgotten it; where it has not, twice the difference to such a run from the
+    start. Where the two part, the start is forgotten and another run is another draw: the error is then what
+    two draws differ by in 19 cases of 20.
 
     Raises
     ------
@@ -186,9 +139,9 @@ def solve_ensemble(
     seen, pace = _seen(scene, run, motion)
     if run.outcome is not Outcome.REACHED_END:
         return None
-    drawn, error = _between_windows(seen), _integration_error(scene.accuracy, seen, run, pace)
-    asked = _asked(run, seen, drawn)
-    error_of = _error_of(scene.accuracy, asked, _error_estimate(seen, error, drawn), pace)
+    asked = _asked(run, seen, _between_windows(seen))
+    errors = stated_errors(scene, begin, run, seen, pace, motion.slowest_rate)
+    error_of = _error_of(scene.accuracy, asked, errors, pace)
     return ensemble_beside(scene, begin, asked, pace, error_of, Draw(starts, starts, seed, budget_s))
 
 
@@ -220,7 +173,6 @@ def _in_closed_form(scene: Scene, motion: LinearMotion) -> ScenePrediction:
         window_s=window_s,
         settled_s=settled_s,
         ended=ended,
-        error_estimate=motion.share_left(duration_s - window_s) + ROUNDING,
         integration_error=0.0,
         scatter=0.0 if Observable.SCATTER in scene.observe else None,
         lyapunov_per_s=motion.slowest_rate if has_exponent else None,
@@ -232,6 +184,7 @@ def _in_closed_form(scene: Scene, motion: LinearMotion) -> ScenePrediction:
         accuracy=scene.accuracy.value,
         memory=StartMemory.KEPT,
     )
+    found = with_errors(found, np.full(4, motion.share_left(duration_s - window_s) + ROUNDING))
     if Observable.POINCARE in scene.observe:
         periods = whole_periods(duration_s, scene.drive.frequency_hz)
         count = whole_periods(window_s, scene.drive.frequency_hz)
@@ -249,14 +202,14 @@ def _followed(scene: Scene, method: Method, motion: LinearMotion) -> ScenePredic
     seen, pace = _seen(scene, run, motion)
     window, amplitude = seen.window, scene.drive.amplitude_m
     is_whole = run.outcome is Outcome.REACHED_END
-    error = _integration_error(scene.accuracy, seen, run, pace) if is_whole else None
+    rate = motion.slowest_rate
+    errors = stated_errors(scene, begin, run, seen, pace, rate) if is_whole else UNKNOWN_ERRORS
     drawn = _between_windows(seen) if is_whole else None
-    stated = _error_estimate(seen, error, drawn)
     memory = memory_of(scene, begin, seen, motion)
     ensemble: Ensemble | None = None
     if is_whole and (memory is StartMemory.LOST or Observable.SCATTER in scene.observe):
         asked = _asked(run, seen, drawn)
-        ensemble = ensemble_beside(scene, begin, asked, pace, _error_of(scene.accuracy, asked, stated, pace))
+        ensemble = ensemble_beside(scene, begin, asked, pace, _error_of(scene.accuracy, asked, errors, pace))
     exponent = _exponent(scene, run) if is_whole and Observable.LYAPUNOV in scene.observe else None
     found = ScenePrediction(
         frequency_hz=scene.drive.frequency_hz,
@@ -273,11 +226,10 @@ def _followed(scene: Scene, method: Method, motion: LinearMotion) -> ScenePredic
         window_s=window.length_s,
         settled_s=seen.settled_s,
         ended=_ended(seen, ensemble),
-        error_estimate=stated,
-        integration_error=error,
+        integration_error=known(errors.integration),
         scatter=_scatter(scene, ensemble, drawn),
-        lyapunov_per_s=_known(exponent.exponent_per_s) if exponent is not None else None,
-        lyapunov_error_per_s=_known(exponent.standard_error_per_s) if exponent is not None else None,
+        lyapunov_per_s=known(exponent.exponent_per_s) if exponent is not None else None,
+        lyapunov_error_per_s=known(exponent.standard_error_per_s) if exponent is not None else None,
         start=scene.start.name,
         final_state=_state(run.state),
         outcome=run.outcome,
@@ -286,6 +238,7 @@ def _followed(scene: Scene, method: Method, motion: LinearMotion) -> ScenePredic
         memory=memory,
         ensemble=ensemble if memory is StartMemory.LOST else None,
     )
+    found = with_errors(found, errors.stated)
     return _with_pictures(scene, found, seen) if is_whole else found
 
 
@@ -306,18 +259,11 @@ def _seen(scene: Scene, run: FollowedRun, motion: LinearMotion) -> tuple[SceneRu
             return run_until_settled(run, patience, pace), pace
 
 
-def _integration_error(accuracy: Accuracy, seen: SceneRun, run: FollowedRun, pace: Pace) -> float | None:
-    """Measure the error of the steps; None where the comparison was lost."""
-    if seen.repeats is None:
-        return _known(error_per_period(run, accuracy))
-    return _known(error_of_repeating(run, accuracy, seen.repeats.period, pace.forgetting_s))
-
-
 def _between_windows(seen: SceneRun) -> WindowScatter | None:
     """Find the scatter of Response I from blocks, if nothing repeats."""
     if seen.motion is MotionKind.PERIODIC:
         return None
-    return window_scatter(seen.block_peaks_m, seen.blocks_in_window)
+    return window_scatter([block.peak_x_m for block in seen.blocks], len(seen.window.blocks))
 
 
 def _asked(run: FollowedRun, seen: SceneRun, drawn: WindowScatter | None) -> ReachedMotion:
@@ -326,16 +272,16 @@ def _asked(run: FollowedRun, seen: SceneRun, drawn: WindowScatter | None) -> Rea
     return reached_motion(run, seen.motion, period, seen.window, drawn, seen.wandered_until_s)
 
 
-def _error_of(accuracy: Accuracy, asked: ReachedMotion, stated: float | None, pace: Pace) -> ErrorOf:
+def _error_of(accuracy: Accuracy, asked: ReachedMotion, errors: StatedErrors, pace: Pace) -> ErrorOf:
     """Make what estimates the error of the responses of a motion that some start came to."""
 
     def error_of(reached: ReachedMotion) -> float | None:
         if reached is asked:
-            return stated
+            return known(float(np.max(errors.stated)))
         if reached.period is None:
             return None if reached.scatter is None else reached.scatter.between_runs
-        error = error_of_repeating(reached.run, accuracy, reached.period, pace.forgetting_s)
-        return _known(SAFETY * error + pace.sharpness.tolerance + ROUNDING)
+        off = off_settled(reached.run, reached.responses_m, accuracy, reached.period, pace.forgetting_s)
+        return known(SAFETY * float(np.max(off)) + pace.sharpness.tolerance + ROUNDING)
 
     return error_of
 
@@ -361,15 +307,6 @@ def _scatter(scene: Scene, ensemble: Ensemble | None, drawn: WindowScatter | Non
     if Observable.SCATTER in scene.observe:
         return None if ensemble is None else ensemble.scatter
     return None if drawn is None else drawn.relative
-
-
-def _error_estimate(seen: SceneRun, error: float | None, drawn: WindowScatter | None) -> float | None:
-    """Add up what Response I may be off by; None where a part of it is not known."""
-    if error is None:
-        return None
-    if seen.repeats is not None:
-        return SAFETY * error + seen.repeats.distance + ROUNDING
-    return None if drawn is None else drawn.between_runs + SAFETY * error
 
 
 def _exponent(scene: Scene, run: FollowedRun) -> LyapunovEstimate:
@@ -405,7 +342,3 @@ def _with_pictures(scene: Scene, found: ScenePrediction, seen: SceneRun) -> Scen
 def _state(values: Floats) -> State:
     x, y, z, vx, vy, vz = (float(value) for value in values)
     return (x, y, z, vx, vy, vz)
-
-
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -80,7 +80,11 @@ NUMBERS = {
     "duration_s": Column(DURATION, REAL, "s", "how long the specimen was followed"),
     "window_s": Column("window", REAL, "s", "the last part of it, which was observed"),
     "settled_s": Column("settled", REAL, "s", "when the motion was found to be settled"),
-    "error_estimate": Column("error_estimate", REAL, "1", "relative error of the responses, estimated"),
+    "response_i_error": Column("response_i_error", REAL, "1", "relative error of Response I, estimated"),
+    "response_ii_error": Column("response_ii_error", REAL, "1", "relative error of Response II, estimated"),
+    "relative_i_error": Column("relative_i_error", REAL, "1", "relative error of relative_i, estimated"),
+    "relative_ii_error": Column("relative_ii_error", REAL, "1", "relative error of relative_ii, estimated"),
+    "error_estimate": Column("error_estimate", REAL, "1", "the largest of the four errors"),
     "integration_error": Column(
         "integration_error", REAL, "1", "part of it that a stricter accuracy would lessen"
     ),

@@ -1,0 +1,246 @@
+"""How often the error that an answer states covers what an independent code answers, on random scenes.
+
+``python benchmarks/error_coverage.py --seed S --scenes 400 [--shard 1/4] [--levels standard]``. Scenes are
+drawn from the contact laws, damping times, gaps, frequencies and amplitudes below, from rest; a part of them
+asks for a short transient, a part for the end of a longer run. Each is answered at every level and by
+`plain_motion`, whose own error is the difference of two tolerances and is allowed on top of what is stated.
+
+Three kinds of question are counted apart. *Settled*: the motion repeats throughout the window. *Transient*:
+it does not, but both tolerances give the same answer. *Scattering*: they do not, because growth on the way
+has forgotten the start; the answer is then one draw of many, a stated error is that of two draws, and several
+independent draws, from starts a billionth of the gap apart, each count as a part of a scene.
+
+Covered are the four responses, each by its own error, in the mean; "all by one" asks for all four at once by
+``error_estimate``. An answer that says that it is one of several motions covers what any of them covers.
+"""
+
+import argparse
+import json
+import math
+import sys
+import time
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from plain_motion import plain_motion
+
+from vibench.sim import Accuracy, FixedDuration, Harmonic, Scene, gong2025, solve_scene
+
+MODELS = (
+    "hertz",
+    "hertz",
+    "linear_gap",
+    "linear_gap",
+    "power:3",
+    "power:5",
+    "power:7",
+    "power:29",
+    "power:47",
+)
+UNDAMPED = 0.1
+"""Part of the scenes without any damping."""
+UNEVEN = 0.2
+"""Part of the scenes with stops at two distances."""
+TRANSIENT = 0.4
+"""Part of the scenes that end before they can have settled."""
+NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
+TIGHT, LOOSE = 1e-13, 1e-11
+"""Relative error of a step of the independent code, and another by which its own error shows."""
+FORGOTTEN = 1e-3
+"""Where two tolerances differ by more, relatively, the start is forgotten."""
+DRAWS = 5
+NUDGE = 1e-9
+FAR = 10.0
+"""A difference of so many stated errors is a wrong answer."""
+WANTED = 0.92
+
+
+def log_uniform(rng, low, high):
+    """Draw from between two numbers, every factor as likely."""
+    return float(math.exp(rng.uniform(math.log(low), math.log(high))))
+
+
+def drawn_scene(seed, index):
+    """Draw scene ``index``: the same for every shard."""
+    rng = np.random.default_rng([seed, index])
+    model = str(rng.choice(MODELS))
+    damping_s = 0.0 if rng.random() < UNDAMPED else float(rng.uniform(0.0, 5e-5))
+    gaps = log_uniform(rng, 5e-6, 100e-6), log_uniform(rng, 5e-6, 100e-6)
+    frequency_hz, amplitude_m = float(rng.uniform(20.0, 700.0)), log_uniform(rng, 0.2e-6, 200e-6)
+    is_uneven = rng.random() < UNEVEN
+    if rng.random() < TRANSIENT:
+        duration_s = log_uniform(rng, 0.1, 1.0)
+        window_s = max(1.0 / frequency_hz, float(rng.uniform(0.2, 0.8)) * duration_s)
+    else:
+        duration_s, window_s = 5.0, 1.0
+    return Scene(
+        specimen=gong2025(damping_s, gaps if is_uneven else gaps[0], model),
+        drive=Harmonic(frequency_hz, amplitude_m),
+        duration=FixedDuration(duration_s, window_s),
+    )
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the independent code answers: one answer with its own error, or several draws."""
+
+    kind: str
+    answers: np.ndarray
+    """Shape (draws, 4)."""
+    own: np.ndarray
+    """Relative error of the answers, shape (4,)."""
+    period: int | None
+
+
+def truth_of(scene):
+    """Follow a scene by the independent code; None where it gives up."""
+    length = scene.duration.duration_s, scene.duration.window_s
+    tight, loose = (
+        plain_motion(scene.specimen, scene.drive, *length, tolerance=tol) for tol in (TIGHT, LOOSE)
+    )
+    if tight is None or loose is None:
+        return None
+    apart = np.abs(loose.responses / tight.responses - 1.0)
+    if apart.max() < FORGOTTEN:
+        kind = "transient" if tight.period is None else "settled"
+        return Truth(kind, tight.responses[None], apart + 1e-12, tight.period)
+    scale = NUDGE * min(scene.specimen.gaps_m) * np.repeat([1.0, 2.0 * np.pi * scene.drive.frequency_hz], 3)
+    rng = np.random.default_rng(1)
+    draws = [
+        plain_motion(scene.specimen, scene.drive, *length, scale * rng.uniform(-1.0, 1.0, 6), LOOSE)
+        for _ in range(DRAWS - 1)
+    ]
+    answers = [tight.responses, *(draw.responses for draw in draws if draw is not None)]
+    return Truth("scattering", np.array(answers), np.zeros(4), None)
+
+
+def judged(scene, truth, level):
+    """Answer a scene at a level; gives plain values for the table."""
+    began = time.process_time()
+    asked = Scene(scene.specimen, scene.drive, scene.observe, level, scene.duration, scene.start)
+    found = solve_scene(asked)
+    taken_s = time.process_time() - began
+    errors = [getattr(found, f"{name}_error") for name in NAMES]
+    stated = np.array([math.inf if error is None else error for error in errors])
+    off = np.abs(truth.answers / answer_of(found) - 1.0)
+    # Within each of the motions that it names, whichever is nearest.
+    motions = [(answer_of(found), stated)]
+    if found.ensemble is not None:
+        motions += [
+            (answer_of(each), np.full(4, each.error_estimate or 0.0)) for each in found.ensemble.motions
+        ]
+    times = np.min([times_off(truth, *each) for each in motions], axis=0)
+    one = times_off(truth, answer_of(found), np.full(4, stated.max()))
+    return {
+        "level": level.value,
+        "motion": str(found.motion),
+        "period": found.period,
+        "stated": stated.tolist(),
+        "off": off.max(axis=0).tolist(),
+        "covered": (times <= 1.0).mean(axis=0).tolist(),
+        "all_by_one": float((np.minimum(times, one) <= 1.0).all(axis=1).mean()),
+        "times": float(np.median(times.max(axis=1))),
+        "is_silent": any(error is None for error in errors),
+        "cost_s": taken_s,
+    }
+
+
+def answer_of(found):
+    """Give the four responses, shape (4,)."""
+    return np.array([getattr(found, name) for name in NAMES], dtype=np.float64)
+
+
+def times_off(truth, answer, stated):
+    """Say how many stated errors each draw is off, shape (draws, 4)."""
+    return np.maximum(np.abs(truth.answers / answer - 1.0) - truth.own, 0.0) / np.maximum(stated, 1e-300)
+
+
+def described(scene, index):
+    """Say a scene in numbers that let it be repeated."""
+    specimen, drive, duration = scene.specimen, scene.drive, scene.duration
+    return {
+        "scene": index,
+        "contact": repr(specimen.contact),
+        "damping_time_s": specimen.dampings[0] / specimen.stiffnesses[0],
+        "gaps_m": specimen.gaps_m,
+        "frequency_hz": drive.frequency_hz,
+        "amplitude_m": drive.amplitude_m,
+        "duration_s": duration.duration_s,
+        "window_s": duration.window_s,
+    }
+
+
+def told(rows):
+    """Print coverage by level and kind of question, and every scene that was far off."""
+    groups = defaultdict(list)
+    for row in rows:
+        groups[row["level"], row["kind"]].append(row)
+        groups[row["level"], "all"].append(row)
+    heading = f"{'level':10} {'question':11} {'scenes':>6} {'covered':>8} {'all by one':>10}"
+    print(heading + "      I    II  p: I p: II  far off  silent  median stated  median off  median cost")
+    for (level, kind), members in sorted(groups.items()):
+        each = np.mean([row["covered"] for row in members], axis=0)
+        print(
+            f"{level:10} {kind:11} {len(members):6} {each.mean():8.1%}"
+            f" {np.mean([row['all_by_one'] for row in members]):10.1%}  "
+            + " ".join(f"{one:5.0%}" for one in each)
+            + f" {sum(row['times'] > FAR for row in members):8} {sum(row['is_silent'] for row in members):7}"
+            + f" {np.median([max(row['stated']) for row in members]):14.1e}"
+            + f" {np.median([max(row['off']) for row in members]):11.1e}"
+            + f" {np.median([row['cost_s'] for row in members]):10.3f} s"
+        )
+    for row in sorted(rows, key=lambda row: -row["times"]):
+        if row["times"] > FAR:
+            print(
+                f"far off by {row['times']:.0f}: {row['level']} {row['kind']} scene {row['scene']}: "
+                f"{row['contact']}, damping {row['damping_time_s']:.3g} s, gaps {row['gaps_m']}, "
+                f"{row['frequency_hz']:.2f} Hz, {row['amplitude_m']:.4g} m, {row['duration_s']:.3g} s"
+            )
+    every = [members for (_, kind), members in groups.items() if kind == "all"]
+    worst = min(float(np.mean([row["covered"] for row in members])) for members in every)
+    print(f"least coverage of a level {worst:.1%}, wanted {WANTED:.0%}")
+
+
+def main():
+    """Draw, answer, compare, count."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seed", type=int, default=2025)
+    parser.add_argument("--scenes", type=int, default=400)
+    parser.add_argument("--shard", default="1/1", help="i/n: every nth scene, from the ith")
+    parser.add_argument("--levels", default=",".join(Accuracy), help="of accuracy, with commas")
+    parser.add_argument("--only", type=int, help="one scene")
+    parser.add_argument(
+        "--out", type=Path, help="file of JSON lines; the files of all shards can be told together"
+    )
+    parser.add_argument("--tell", type=Path, nargs="+", help="say what is in such files, and compute nothing")
+    arguments = parser.parse_args()
+    if arguments.tell:
+        told([json.loads(line) for path in arguments.tell for line in path.read_text().splitlines()])
+        return
+    shard, shards = (int(part) for part in arguments.shard.split("/"))
+    indices = range(shard - 1, arguments.scenes, shards) if arguments.only is None else [arguments.only]
+    rows, given_up = [], 0
+    for index in indices:
+        scene = drawn_scene(arguments.seed, index)
+        truth = truth_of(scene)
+        if truth is None:
+            given_up += 1
+            print(f"scene {index}: the independent code gave up", file=sys.stderr)
+            continue
+        for level in arguments.levels.split(","):
+            said = described(scene, index) | judged(scene, truth, Accuracy(level))
+            rows.append(said | {"kind": truth.kind, "true_period": truth.period, "own": truth.own.tolist()})
+            if arguments.out is not None:
+                with arguments.out.open("a") as file:
+                    file.write(json.dumps(rows[-1]) + "\n")
+            if arguments.only is not None:
+                print(json.dumps(rows[-1], indent=1))
+    told(rows)
+    if given_up:
+        print(f"{given_up} scenes were given up by the independent code and are not counted")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,209 @@
+"""How far each response of an answer may be off: measured, by the kind of question that was asked. SI units.
+
+A motion that has settled forgets the errors of its steps as they come: it is taken on from its end with a
+hundredth of the tolerance until that has been forgotten too, and what was answered is compared with that. A
+motion that has not settled carries its errors along: it is followed once more from its start with a hundredth
+of the tolerance, and observed in the same window. Where the two part on the way, growth has forgotten
+the start, and another run is another draw: what two draws differ by is found from the parts of the window if
+the motion has become stationary by then, else from a few starts that nobody can tell apart.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..kernels import Floats
+from ..model import Accuracy, Outcome
+from ._fixed_run import Pace, SceneRun
+from ._followed_run import FollowedRun, ObservedQuantities
+from ._observed_window import observe_window
+from ._prediction import MotionKind, ScenePrediction
+from ._scatter import draws_apart, draws_of_starts
+from ._scene import Scene
+from ._several_starts import SEED, pushes
+
+STRICTER = 1e-2
+"""Tolerance of the comparison over that of the run."""
+STRICTEST = 1e-12
+"""Smaller tolerances are rounding."""
+FORGETTING = 4.0
+"""Forgetting times that a motion which repeats is followed before it is compared."""
+LOOKS = 8
+"""Periods of it, or drive periods of a motion that does not repeat, that are compared."""
+SAFETY = 2.0
+"""Error that is stated over the error that was measured."""
+ROUNDING = 1e-11
+"""Relative error of an exact answer."""
+SLOWEST_RATIO = 0.9
+"""A difference that shrinks less than this from one look to the next is taken to shrink by this."""
+FIRST_LOOK = 16
+"""Drive periods after which two runs from one start are compared; then whenever the time has doubled."""
+PARTED = 0.05
+"""Two runs have parted when they differ by this part of the gap, or their responses by this part."""
+MEMORIES = 8.0
+"""Forgetting times of the slowest mode after which a motion that forgets its start is stationary."""
+MEMBERS = 5
+"""Starts beside the one asked for, where a window does not tell how draws differ."""
+
+
+@dataclass(frozen=True, eq=False)
+class StatedErrors:
+    """Relative errors, of Response I and II of x, then of p; NaN where they are not known."""
+
+    stated: Floats
+    """What each response may be off by, shape (4,)."""
+    integration: float
+    """The largest that a stricter accuracy would lessen, as it was measured."""
+
+
+UNKNOWN_ERRORS = StatedErrors(np.full(4, np.nan), np.nan)
+"""Of a run that was lost."""
+
+
+def stated_errors(
+    scene: Scene, begin: FollowedRun, run: FollowedRun, seen: SceneRun, pace: Pace, slowest_rate: float
+) -> StatedErrors:
+    """Find the errors of an answer.
+
+    Parameters
+    ----------
+    scene
+        What was asked.
+    begin, run
+        The motion at time zero, and at its end.
+    seen, pace
+        What was seen of it, and what decided how long is long.
+    slowest_rate
+        Of the slowest mode without contact [1/s], zero or negative.
+
+    """
+    answer = seen.window.responses_m
+    if seen.repeats is not None and seen.was_settled:
+        off = off_settled(run, answer, scene.accuracy, seen.repeats.period, pace.forgetting_s)
+        return StatedErrors(SAFETY * off + seen.repeats.distance + _rounding(answer), float(np.max(off)))
+    strict = _strict_answer(scene, begin, seen, run)
+    if strict is not None:
+        off = np.abs(answer - strict) / np.abs(answer)
+        if float(np.max(off)) < PARTED:
+            return StatedErrors(SAFETY * off + _rounding(answer), float(np.max(off)))
+    added = error_per_period(run, scene.accuracy)
+    return StatedErrors(_drawn(begin, seen, slowest_rate) + SAFETY * added, added)
+
+
+def _rounding(answer: Floats) -> Floats:
+    """Relative errors of exact responses: a line is what is left of a motion as large as its peaks."""
+    return ROUNDING * np.repeat(answer[::2], 2) / answer
+
+
+def _drawn(begin: FollowedRun, seen: SceneRun, slowest_rate: float) -> Floats:
+    """Find what two draws differ by, relatively, shape (4,)."""
+    memories = -slowest_rate * seen.window.begins.time_s
+    if seen.motion is MotionKind.CHAOTIC and memories >= MEMORIES:
+        drawn = draws_apart(seen.blocks, len(seen.window.blocks))
+        if drawn is not None:
+            return drawn
+    return draws_of_starts(seen.window.responses_m, _more_starts(begin, seen))
+
+
+def _more_starts(begin: FollowedRun, seen: SceneRun) -> list[Floats]:
+    """Follow a few more starts, and observe the same window of them; NaN where one is lost."""
+    found = []
+    for push in pushes(begin.specimen, begin.drive.frequency_hz, MEMBERS, SEED):
+        other = begin.pushed(push)
+        other.follow(seen.window.begins.time_s)
+        window = observe_window(other, seen.window.length_s)
+        is_lost = other.outcome is not Outcome.REACHED_END
+        found.append(np.full(4, np.nan) if is_lost else window.responses_m)
+    return found
+
+
+def off_settled(
+    run: FollowedRun, answer: Floats, accuracy: Accuracy, period: int, forgetting_s: float
+) -> Floats:
+    """How far the responses of a motion that repeats are off, relatively; NaN if the comparison was lost.
+
+    What was answered, and what the next periods would answer, whose steps fall elsewhere, against a stricter
+    run, which is followed for as long again: a motion that forgets more slowly than its modes still moves.
+    """
+    cycle_s = period / run.drive.frequency_hz
+    wait_s = cycle_s * np.ceil(FORGETTING * forgetting_s / cycle_s)
+    strict = run.apart(_strict(accuracy))
+    looks = []
+    for _ in range(2):
+        strict.follow(strict.time_s + wait_s)
+        looks.append(_responses(strict, LOOKS * cycle_s))
+    on = run.apart(accuracy.tolerance)
+    seen = [answer, *(_responses(on, cycle_s) for _ in range(LOOKS))]
+    off = np.max(np.abs(np.array(seen) - looks[1]), axis=0)
+    moved = np.abs(looks[1] - looks[0])
+    ratio = np.minimum(
+        moved / np.maximum(np.abs(answer - looks[0]), np.finfo(np.float64).tiny), SLOWEST_RATIO
+    )
+    return np.asarray((off + moved * ratio / (1.0 - ratio)) / np.abs(looks[1]))
+
+
+def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
+    """Relative error that a drive period adds to a motion's responses, the largest seen; NaN if lost."""
+    cycle_s = 1.0 / run.drive.frequency_hz
+    on = run.apart(accuracy.tolerance)
+    seen, missed = [], []
+    for _ in range(LOOKS):
+        twin = on.apart(_strict(accuracy))
+        seen.append(_responses(on, cycle_s))
+        missed.append(np.abs(seen[-1] - _responses(twin, cycle_s)))
+    return float(np.max(np.max(missed, axis=0) / np.max(np.abs(seen), axis=0)))
+
+
+def _strict_answer(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedRun) -> Floats | None:
+    """Responses of the same window by a stricter run from the start; None where it came another way."""
+    loose, strict = begin.apart(scene.accuracy.tolerance), begin.apart(_strict(scene.accuracy))
+    begin_s, frequency = seen.window.begins.time_s, begin.drive.frequency_hz
+    while strict.time_s < begin_s:
+        until_s = min(begin_s, max(2.0 * strict.time_s, FIRST_LOOK / frequency))
+        for each in (loose, strict):
+            each.follow(until_s)
+        if not _are_together(scene, loose, strict):
+            return None
+    cycle = 1 if seen.repeats is None else seen.repeats.period
+    found = observe_window(strict, seen.window.length_s, cycle).responses_m
+    return found if _are_together(scene, run, strict) else None
+
+
+def _are_together(scene: Scene, one: FollowedRun, other: FollowedRun) -> bool:
+    """Whether two runs are at the same place, as far as the stops can tell."""
+    if not one.outcome is other.outcome is Outcome.REACHED_END:
+        return False
+    apart = np.abs(one.state - other.state) / np.repeat([1.0, 2.0 * np.pi * scene.drive.frequency_hz], 3)
+    return bool(np.max(apart) < PARTED * min(scene.specimen.gaps_m))
+
+
+def _strict(accuracy: Accuracy) -> float:
+    return max(STRICTER * accuracy.tolerance, STRICTEST)
+
+
+def _responses(run: FollowedRun, length_s: float) -> Floats:
+    """Responses over a stretch of whole drive periods, shape (4,); NaN if the run was lost."""
+    seen = run.follow(run.time_s + length_s, ObservedQuantities.PEAKS_AND_LINES)
+    if run.outcome is not Outcome.REACHED_END:
+        return np.full(4, np.nan)
+    scale = 2.0 / length_s
+    return np.array([seen.peak_x_m, scale * abs(seen.area_x), seen.peak_p_m, scale * abs(seen.area_p)])
+
+
+def with_errors(found: ScenePrediction, stated: Floats) -> ScenePrediction:
+    """Add the errors of the responses, and the largest of them."""
+    response_i, response_ii, relative_i, relative_ii = (known(float(error)) for error in stated)
+    return replace(
+        found,
+        response_i_error=response_i,
+        response_ii_error=response_ii,
+        relative_i_error=relative_i,
+        relative_ii_error=relative_ii,
+        error_estimate=known(float(np.max(stated))),
+    )
+
+
+def known(value: float) -> float | None:
+    """Give a number, or None where there is none."""
+    return value if math.isfinite(value) else None
