@@ -10,12 +10,14 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import imported_files, toml_files
+from . import engine_messages, imported_files, instrument_messages, toml_files
 from .tally import Attack, Shard, Tally, saved_tally
 
 TARGETS: dict[str, Attack] = {
     "toml": toml_files.attack,
     "imports": imported_files.attack,
+    "engine": engine_messages.attack,
+    "instruments": instrument_messages.attack,
 }
 """What can be attacked, each by its own file."""
 

@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 LONGEST_S = 10.0
-"""A command that reads one damaged file must have ended by then [s]."""
+"""Processor time that a command may take over one damaged file [s]."""
+HANGS_S = 60.0
+"""Time by the clock: other programs may want the processors too, and who waits takes none of them [s]."""
 MOST_BYTES = 1_000_000_000
 """Resident memory that such a command may have had at its peak."""
 LONGEST_COMPLAINT = 2_000
@@ -38,6 +40,8 @@ class Ending:
     out: str
     err: str
     took_s: float
+    """Processor time."""
+    clock_s: float
     peak_bytes: int
     """Largest resident memory, that of the interpreter and its libraries included."""
     made: tuple[str, ...] = ()
@@ -51,10 +55,10 @@ class Ending:
     def _possible_faults(self) -> tuple[tuple[str, bool], ...]:
         complaint = [line for line in self.err.splitlines() if line.startswith("error: ")]
         return (
-            (f"took {self.took_s:.1f} s", self.took_s > LONGEST_S),
+            (f"took {self.took_s:.1f} s", self.took_s > LONGEST_S or self.clock_s > HANGS_S),
             (f"took {self.peak_bytes / 1e6:.0f} MB", self.peak_bytes > MOST_BYTES),
             ("a traceback", "Traceback (most recent call last)" in self.err),
-            (f"exit code {self.code}", self.code not in {0, 1, 2, STOPPED} and self.took_s <= LONGEST_S),
+            (f"exit code {self.code}", self.code not in {0, 1, 2, STOPPED} and self.clock_s <= HANGS_S),
             ("an error, and exit code 0", self.code == 0 and bool(complaint)),
             (f"{len(complaint)} sentences, and exit code 1", self.code == 1 and len(complaint) != 1),
             (f"{len(self.err)} letters of complaint", len(self.err) > LONGEST_COMPLAINT),

@@ -7,12 +7,12 @@ import pytest
 
 from .byte_mutants import mutated_bytes
 from .command_runner import CommandRunner
-from .limits import LONGEST_COMPLAINT, LONGEST_S, MOST_BYTES, Case, Ending
+from .limits import HANGS_S, LONGEST_COMPLAINT, LONGEST_S, MOST_BYTES, Case, Ending
 from .tally import Finding, Shard, Tally, saved_tally
 from .text_mutants import mutated_toml
 from .toml_files import CAMPAIGNS, reading
 
-GOOD = Ending(code=0, out="{}", err="", took_s=1.0, peak_bytes=200_000_000)
+GOOD = Ending(code=0, out="{}", err="", took_s=1.0, clock_s=1.0, peak_bytes=200_000_000)
 REFUSED = replace(GOOD, code=1, err="error: what was given is not allowed; give another\n")
 
 
@@ -25,6 +25,7 @@ def test_an_answer_and_a_sentence_are_no_faults(ending):
     "ending",
     [
         replace(GOOD, took_s=LONGEST_S + 1),
+        replace(GOOD, clock_s=HANGS_S + 1),
         replace(GOOD, peak_bytes=MOST_BYTES + 1),
         replace(GOOD, code=-11),
         replace(GOOD, code=137),

@@ -33,6 +33,7 @@ from .host import (
     load_toml as load_toml,
     save_toml as save_toml,
     shipped as shipped,
+    shortened as shortened,
     toml_text as toml_text,
     validated as validated,
 )

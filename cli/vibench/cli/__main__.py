@@ -3,6 +3,7 @@
 Commands by name only: what a command needs is imported when it is called, not to list it.
 """
 
+import errno
 import importlib
 import sys
 from collections.abc import Mapping
@@ -13,7 +14,7 @@ import typer
 from rich.console import Console
 from typer.core import TyperCommand, TyperGroup
 
-from vibench.acquisition import AcquisitionError
+from vibench.acquisition import AcquisitionError, shortened
 from vibench.analysis import AnalysisError
 from vibench.sim.study import StudyError
 
@@ -164,6 +165,17 @@ def main() -> None:
     except (AcquisitionError, AnalysisError, StudyError) as error:
         complain(error)
         sys.exit(1)
+    except OSError as error:
+        if error.errno != errno.ENAMETOOLONG:
+            raise
+        # Whoever looks at a path first meets it: here is the one place that all paths have behind them.
+        name = shortened(str(error.filename), NAME_SHOWN)
+        complain(OSError(f"the name {name} is too long for this disk; nothing was done, give a shorter one"))
+        sys.exit(1)
+
+
+NAME_SHOWN = 80
+"""Letters of a name that is too long."""
 
 
 def complain(error: BaseException) -> None:

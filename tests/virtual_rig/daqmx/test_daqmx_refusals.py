@@ -211,3 +211,37 @@ def test_a_server_that_is_gone_answers_nothing_until_it_is_back(daq, task):
     assert caught.value.rpc_code is grpc.StatusCode.UNAVAILABLE
     daq.server.faults.clear()
     task.read(1)
+
+
+@pytest.mark.parametrize(
+    ("name", "fields"),
+    [
+        ("CreateAIVoltageChan", {"terminal_config_raw": 77}),
+        (
+            "CreateAIAccelChan",
+            {"current_excit_source_raw": 77, "sensitivity": 1.0, "terminal_config_raw": -1},
+        ),
+        (
+            "CfgSampClkTiming",
+            {"active_edge_raw": 77, "sample_mode_raw": 10123, "rate": 1e3, "samps_per_chan": 9},
+        ),
+        ("TaskControl", {"action_raw": 77}),
+    ],
+)
+def test_a_number_that_is_no_member_of_its_enum_is_refused_by_name(daq, task, name, fields):
+    request = getattr(nidaqmx_pb2, f"{name}Request")(task=Session(name="measure"), **fields)
+    if hasattr(request, "physical_channel"):
+        request.physical_channel = "Dev1/ai2"
+    with pytest.raises(grpc.RpcError) as refused:
+        getattr(nidaqmx_pb2_grpc.NiDAQmxStub(daq.options.grpc_channel), name)(request)
+    assert ("ni-error", str(DAQmxErrors.INVALID_ATTRIBUTE_VALUE.value)) in refused.value.trailing_metadata()
+    assert "Requested Value: 77" in refused.value.details()
+
+
+def test_waveforms_that_are_none_are_refused(daq):
+    output = daq.task("play")
+    output.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-1, max_val=1)
+    request = nidaqmx_pb2.WriteAnalogWaveformsRequest(task=Session(name="play"))
+    with pytest.raises(grpc.RpcError) as refused:
+        nidaqmx_pb2_grpc.NiDAQmxStub(daq.options.grpc_channel).WriteAnalogWaveforms(request)
+    assert "number of waveforms" in refused.value.details()

@@ -1,4 +1,5 @@
 import socket
+import struct
 import threading
 
 import numpy as np
@@ -96,3 +97,12 @@ def test_commands_from_many_threads_and_rendering_never_mix_up_replies(generator
         thread.join()
     assert failures == []
     assert generator.execute(b"SYST:ERR?").data.startswith(b"0,")
+
+
+def test_a_client_that_leaves_without_reading_disturbs_nobody(server, instrument, capsys):
+    for _ in range(5):
+        with socket.create_connection(("127.0.0.1", server.port), timeout=5) as leaving:
+            leaving.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            leaving.sendall(b"DATA:DATA? EMEM\n" * 200)
+    assert float(instrument.query("SOUR1:FREQ?")) > 0
+    assert "Traceback" not in capsys.readouterr().err

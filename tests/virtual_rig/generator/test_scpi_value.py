@@ -70,3 +70,10 @@ def test_a_reply_keeps_twelve_digits(value):
 def test_infinity_reads_as_the_standard_asks():
     assert as_number(9.9e37) == b"9.9E+37"
     assert as_number(0.0) == b"0.0E+00"
+
+
+@pytest.mark.parametrize("text", [b"1e999", b"-1e999", b"9e307kHz"])
+def test_a_number_beyond_all_numbers_is_an_error_and_no_infinity(text):
+    with pytest.raises(ScpiError) as refused:
+        number_or_limit(text, FREQUENCY_UNITS)
+    assert refused.value.code is ErrorCode.EXPONENT_TOO_LARGE

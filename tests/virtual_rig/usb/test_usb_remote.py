@@ -119,3 +119,13 @@ def test_a_connection_closed_on_this_side_is_a_device_that_is_gone(proxy):
 def test_an_address_where_no_rig_answers_is_named_in_the_error():
     with pytest.raises(InstrumentLost, match=r"127\.0\.0\.1:1.*vibench serve-rig"):
         RemoteUsbDevice("127.0.0.1:1")
+
+
+@pytest.mark.parametrize("method", ["BulkIn", "InterruptIn", "Control", "ClearHalt"])
+def test_a_frame_that_is_too_short_is_refused_in_a_sentence(rig, method):
+    with grpc.insecure_channel(rig.address) as channel:
+        call = channel.unary_unary(f"/vibench.virtual.UsbDevice/{method}")
+        with pytest.raises(grpc.RpcError) as refused:
+            call(b"", timeout=5)
+    assert refused.value.code() is grpc.StatusCode.INVALID_ARGUMENT
+    assert f"{method} was called with 0 bytes" in refused.value.details()

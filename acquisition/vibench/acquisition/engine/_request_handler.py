@@ -44,7 +44,10 @@ def armed_plan(bench: Bench, request: CampaignRequest) -> ArmedPlan:
     checks: list[tuple[str, LimitCheck]] = []
     campaign, folder = request.campaign, request.folder
     points = campaign.points()
-    for name, measurement in ((point.name, point.measurement) for point in points):
+    # Repeats share their measurement: judged once, or a long campaign would keep whoever asks waiting.
+    for name, measurement in {
+        id(point.measurement): (point.name, point.measurement) for point in points
+    }.values():
         checks += [(name, check) for check in require_within_limits(measurement, bench.rig)]
         drive_for(bench, measurement)  # refuses what nothing on this bench can play
     planned = planned_recordings(campaign, folder, request.existing)

@@ -82,8 +82,8 @@ def _period(lines: Lines, seed: int, key: tuple[int, ...]) -> Samples:
     return np.fft.irfft(spectrum, MEMORY_POINTS)
 
 
-def require_playable(lines: Lines, stop_hz: float, repetition_hz: float) -> None:
-    """Refuse a band that one memory cannot hold, or whose image comes too near.
+def require_far_image(stop_hz: float, repetition_hz: float) -> None:
+    """Refuse a band whose first image comes too near; what passes has at most ``HIGHEST_LINE`` lines.
 
     Raises
     ------
@@ -91,15 +91,19 @@ def require_playable(lines: Lines, stop_hz: float, repetition_hz: float) -> None
         Which says what would be allowed.
 
     """
-    if len(lines) == 0:
-        raise ConfigurationError(
-            f"no harmonic of {repetition_hz:g} Hz lies in the band up to {stop_hz:g} Hz; "
-            "lower repetition_hz or widen the band"
-        )
     image_hz = MEMORY_POINTS * repetition_hz - stop_hz
     if image_hz < NEAREST_IMAGE_RATIO * stop_hz:
         lowest_hz = (1 + NEAREST_IMAGE_RATIO) * stop_hz / MEMORY_POINTS
         raise ConfigurationError(
             f"repetition_hz = {repetition_hz:g} puts the first image of {stop_hz:g} Hz at {image_hz:g} Hz, "
             f"too near the band; repetition_hz must be at least {lowest_hz:.4g}"
+        )
+
+
+def require_lines(lines: Lines, stop_hz: float, repetition_hz: float) -> None:
+    """Refuse a band in which no line lies; raises ConfigurationError."""
+    if len(lines) == 0:
+        raise ConfigurationError(
+            f"no harmonic of {repetition_hz:g} Hz lies in the band up to {stop_hz:g} Hz; "
+            "lower repetition_hz or widen the band"
         )

@@ -1,12 +1,12 @@
 """A multisine that shows where nonlinearity goes: odd lines only, and some of them left out on purpose."""
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import PositiveInt, model_validator
+from pydantic import Field, PositiveInt, model_validator
 
 from ._multisine import Lines
-from ._periodic_noise import PeriodicNoise
+from ._periodic_noise import MOST_REALISATIONS, PeriodicNoise
 
 GROUP = 4
 """Of every four odd lines one, chosen at random, is left out as a detection line."""
@@ -22,7 +22,7 @@ class OddMultisine(PeriodicNoise):
     """
 
     kind: Literal["odd_multisine"] = "odd_multisine"
-    realisations: PositiveInt = 7
+    realisations: Annotated[int, Field(gt=0, le=MOST_REALISATIONS)] = 7
     """Waveforms with phases of their own, all on the same lines."""
     excited_lines: tuple[PositiveInt, ...] = ()
     """Harmonics of ``repetition_hz`` that are played; left empty, they are drawn from the seed."""

@@ -2,16 +2,19 @@
 
 from abc import abstractmethod
 from collections.abc import Iterator
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from ..recording import SegmentLabel
 from ._band_noise import BandNoise
-from ._multisine import Lines, band_lines, flat_periods, require_playable
+from ._multisine import Lines, band_lines, flat_periods, require_far_image, require_lines
 from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Waveform
+
+MOST_REALISATIONS = 1000
+"""Of one measurement: all their waveforms, of 64 kB each, are of one level and made together."""
 
 
 class PeriodicNoise(BandNoise):
@@ -20,7 +23,7 @@ class PeriodicNoise(BandNoise):
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.REALISATION,)
     repetition_hz: PositiveFloat = 1.0
     """Periods per second, and the distance of the harmonics [Hz]."""
-    realisations: PositiveInt = 10
+    realisations: Annotated[int, Field(gt=0, le=MOST_REALISATIONS)] = 10
     """Waveforms with phases of their own, all on the same lines."""
     periods: PositiveInt = 2
     """Periods recorded of each realisation; two or more show the noise of the sensors."""
@@ -41,13 +44,19 @@ class PeriodicNoise(BandNoise):
 
     @model_validator(mode="after")
     def _band_fits_the_memory(self) -> Self:
-        require_playable(self.candidates, self.band_stop_hz, self.repetition_hz)
+        require_far_image(self.band_stop_hz, self.repetition_hz)
+        require_lines(self.candidates, self.band_stop_hz, self.repetition_hz)
         return self
 
     @property
     def playing_s(self) -> float:
         """Settling and recording of all realisations [s]."""
         return self.realisations * (self.settle_s + self.periods / self.repetition_hz)
+
+    @property
+    def stretches(self) -> int:
+        """One for every realisation."""
+        return self.realisations
 
     def steps(self) -> Iterator[Step]:
         """Yield one step for every realisation."""

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from enum import StrEnum
 from typing import Annotated, ClassVar, Self
 
-from pydantic import Field, PositiveFloat
+from pydantic import Field
 
 from ..host import FrozenModel
 from ..recording import SegmentLabel
@@ -21,7 +21,9 @@ HIGHEST_AMPLITUDE_VPP = 20.0
 """Largest setting of an AFG1022 into an open output, peak to peak [V] (Tektronix data sheet)."""
 
 AmplitudeVpp = Annotated[float, Field(ge=LOWEST_AMPLITUDE_VPP, le=HIGHEST_AMPLITUDE_VPP)]
-FrequencyHz = PositiveFloat
+HIGHEST_FREQUENCY_HZ = 1e5
+"""Beyond what any shaker follows [Hz]."""
+FrequencyHz = Annotated[float, Field(gt=0, le=HIGHEST_FREQUENCY_HZ)]
 
 
 class Family(StrEnum):
@@ -114,6 +116,11 @@ class AbstractExcitation(FrozenModel, ABC):
     @abstractmethod
     def playing_s(self) -> float:
         """Time of all steps, settling included, ramps not [s]; with feedback the longest it may take."""
+
+    @property
+    def stretches(self) -> int:
+        """How often the drive rises out of silence: once for sines, once for every waveform of noise."""
+        return 1
 
     @property
     @abstractmethod

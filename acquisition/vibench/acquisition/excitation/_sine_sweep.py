@@ -44,6 +44,10 @@ class Hold(StrEnum):
         return {Hold.ACCELERATION: 0, Hold.VELOCITY: 1, Hold.DISPLACEMENT: 2}[self]
 
 
+MOST_SWEEP_STEPS = 1_000_000
+"""A day in the usual steps of a tenth of a second."""
+
+
 class MovingSine(AbstractExcitation):
     """A sine sweep, up or down, that the computer steps through: the generator has no sweep time to set.
 
@@ -76,6 +80,12 @@ class MovingSine(AbstractExcitation):
             raise ValueError(
                 f"step_s = {self.step_s:g} is longer than the whole sweep of {self.duration_s:g} s; "
                 "give a shorter step"
+            )
+        if self.duration_s / self.step_s > MOST_SWEEP_STEPS:
+            raise ValueError(
+                f"a sweep of {self.duration_s:g} s in steps of {self.step_s:g} s takes "
+                f"{self.duration_s / self.step_s:.3g} of them, allowed are {MOST_SWEEP_STEPS}; give a longer "
+                "step_s"
             )
         return self
 

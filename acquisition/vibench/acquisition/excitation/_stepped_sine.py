@@ -34,6 +34,13 @@ class FrequencyGrid(FrozenModel):
                 f"stop_hz = {self.stop_hz:g} is below start_hz = {self.start_hz:g}; "
                 "give the grid from low to high and choose the way through it with direction"
             )
+        steps = (self.stop_hz - self.start_hz) / self.step_hz + 1
+        if steps > 2 * MOST_STEPS:
+            # Before any list of them is made: a wrong step could ask for millions.
+            raise ValueError(
+                f"the grid has {steps:.6g} steps; one recording holds at most {MOST_STEPS}: widen step_hz or "
+                "split the measurement"
+            )
         return self
 
     @property

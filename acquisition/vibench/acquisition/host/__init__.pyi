@@ -21,6 +21,7 @@ from ._toml_file import (
     complaints as complaints,
     load_toml as load_toml,
     save_toml as save_toml,
+    shortened as shortened,
     toml_text as toml_text,
     validated as validated,
 )

@@ -1,6 +1,7 @@
 """TOML files: read and validated, or refused with file, key and what is allowed; written to be read back."""
 
 import json
+import reprlib
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -43,6 +44,10 @@ def load_toml(path: Path, model: type[Model]) -> Model:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigurationError(f"{path}: is not valid TOML: {error}; correct that line") from error
+    except RecursionError as error:
+        raise ConfigurationError(
+            f"{path}: holds lists or tables within each other, too many to be read; write them side by side"
+        ) from error
     return validated(content, model, str(path), path.absolute().parent)
 
 
@@ -52,6 +57,30 @@ def validated(content: dict[str, Any], model: type[Model], origin: str, folder: 
         return model.model_validate(content, context={"folder": folder})
     except ValidationError as error:
         raise ConfigurationError(f"{origin}: {complaints(error)}") from error
+    except ArithmeticError as error:
+        raise ConfigurationError(
+            f"{origin}: a number is too large, or too small, to be computed with ({error}); correct it"
+        ) from error
+
+
+MOST_CLAUSES = 5
+"""Faults that one sentence names; further ones are counted."""
+MOST_KEYS = 12
+LONGEST_CLAUSE = 400
+"""Letters; a value that stands in a fault may be as long as its file."""
+LONGEST_SENTENCE = 1600
+
+
+def shortened(text: str, longest: int = LONGEST_CLAUSE) -> str:
+    """Cut the middle out of a text that is too long to be read.
+
+    >>> shortened("0123456789", 7)
+    '01...89'
+    """
+    if len(text) <= longest:
+        return text
+    kept = (longest - 3) // 2
+    return f"{text[:kept]}...{text[len(text) - kept :]}"
 
 
 def complaints(error: ValidationError) -> str:
@@ -64,12 +93,16 @@ def complaints(error: ValidationError) -> str:
         "is not a known key: check its spelling and unit suffix, or remove it",
         "are no known keys: check their spelling and unit suffixes, or give another file",
     )
-    other = (_complaint(each) for each in details if each["type"] not in {"missing", "extra_forbidden"})
-    return "; ".join([*other, *missing, *unknown])
+    other = [_complaint(each) for each in details if each["type"] not in {"missing", "extra_forbidden"}]
+    if len(other) > MOST_CLAUSES:
+        other = [*other[:MOST_CLAUSES], f"and {len(other) - MOST_CLAUSES} more"]
+    return shortened("; ".join([*other, *missing, *unknown]), LONGEST_SENTENCE)
 
 
 def _key_clause(details: Sequence[Any], kind: str, of_one: str, of_many: str) -> tuple[str, ...]:
     keys = [_key(each) for each in details if each["type"] == kind]
+    if len(keys) > MOST_KEYS:
+        keys = [*keys[:MOST_KEYS], f"{len(keys) - MOST_KEYS} more"]
     match keys:
         case []:
             return ()
@@ -80,17 +113,18 @@ def _key_clause(details: Sequence[Any], kind: str, of_one: str, of_many: str) ->
 
 
 def _key(detail: Any) -> str:
-    return ".".join(str(part) for part in detail["loc"]) or "the whole file"
+    return shortened(".".join(str(part) for part in detail["loc"]), 120) or "the whole file"
 
 
 def _complaint(detail: Any) -> str:
-    reason = str(detail["msg"]).removeprefix("Value error, ")
+    reason = shortened(str(detail["msg"]).removeprefix("Value error, "))
     return f"{_key(detail)} = {_shown(detail['input'])}: {reason[0].lower()}{reason[1:]}"
 
 
 def _shown(value: object) -> str:
-    text = repr(value)
     longest = 60
+    # Written whole, a list of a million numbers would take longer than all else.
+    text = reprlib.repr(value) if isinstance(value, list | tuple | dict) else repr(value)
     return text if len(text) <= longest else f"{text[:longest]}..."
 
 

@@ -140,12 +140,21 @@ def _filled_sweep(sweep: object, defaults: Mapping[str, Any]) -> object:
     match sweep:
         case {"measurement": dict(template), **rest}:
             others = [
-                {**defaults.get(str(each.get("kind")), {}), **each} if isinstance(each, dict) else each
+                {**_of_kind(defaults, each.get("kind")), **each} if isinstance(each, dict) else each
                 for each in _listed(rest, "excitations")
             ]
             return {**rest, "measurement": _filled(template, defaults), "excitations": others}
         case _:
             return sweep
+
+
+def _of_kind(defaults: Mapping[str, Any], kind: object) -> Mapping[str, Any]:
+    """Give what excitations of a kind share; ValueError when it is no table."""
+    match defaults.get(str(kind), {}):
+        case dict(shared):
+            return shared
+        case _:
+            raise ValueError(f"defaults.{kind} is no table; write [defaults.{kind}] and its values below it")
 
 
 def _filled(measurement: object, defaults: Mapping[str, Any]) -> object:
@@ -156,7 +165,7 @@ def _filled(measurement: object, defaults: Mapping[str, Any]) -> object:
             own = {**shared, **measurement}
             match own.get("excitation"):
                 case {"kind": str(kind), **values}:
-                    own["excitation"] = {**defaults.get(kind, {}), **values, "kind": kind}
+                    own["excitation"] = {**_of_kind(defaults, kind), **values, "kind": kind}
             return own
         case _:
             return measurement

@@ -15,6 +15,8 @@ from ..host import FrozenModel
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
 """Becomes part of a file's name: letters, digits, ``_`` and ``-``, at most 64 of them."""
 
+LONGEST_S = 30 * 86400.0
+"""Of one recording: a month [s]."""
 Fraction = Annotated[float, Field(gt=0, le=1)]
 
 
@@ -69,6 +71,16 @@ class Measurement(FrozenModel):
             raise ValueError(
                 f"ramp_step_s = {self.ramp_step_s:g} leaves fewer than {fewest} stairs in a ramp of "
                 f"{self.ramp_s:g} s; give at most {self.ramp_s / fewest:g}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _ends_within_a_month(self) -> Self:
+        length_s = self.excitation.playing_s
+        if length_s > LONGEST_S:
+            raise ValueError(
+                f"one measurement would play for {length_s:.4g} s, allowed are {LONGEST_S:g} s (30 days); "
+                "shorten it, or make several of it"
             )
         return self
 

@@ -107,9 +107,9 @@ def duration_s(measurement: Measurement) -> float:
 
     With feedback it is the longest that it may take.
     """
-    if isinstance(measurement.excitation, AbstractFeedback):
-        return HUSH_S + 2 * measurement.ramp_s + measurement.excitation.playing_s
-    return sum(phase.duration_s for phase in phases(measurement))
+    excitation = measurement.excitation
+    hush_s = HUSH_S if isinstance(excitation, AbstractFeedback) else 0.0
+    return hush_s + 2 * measurement.ramp_s * excitation.stretches + excitation.playing_s
 
 
 def lead_in_s(measurement: Measurement) -> float:

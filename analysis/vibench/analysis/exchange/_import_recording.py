@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from itertools import groupby, pairwise
-from math import ceil, log2
+from math import frexp
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from vibench.acquisition.recording import (
     create_recording,
 )
 
-from ..errors import InvalidRequest
+from ..errors import InvalidRequest, UnusableData
 from ..signals import Flags, Reals
 from ._excerpt import BLOCK_SAMPLES, TransferObserver, unobserved
 from ._mapping import ChannelMapping, ImportMapping
@@ -115,6 +115,8 @@ def _told(mapping: ImportMapping, planned: Sequence[_Planned]) -> Iterator[tuple
 
 RATE_TOLERANCE = 1e-4
 """How far a mapping's sample rate may lie from the file's: clocks differ less."""
+LEAST_PEAK, MOST_PEAK = 1e-100, 1e100
+"""Between these a channel's numbers, their squares and their steps are all numbers of a computer."""
 NEAR_FULL_SCALE = 0.95
 """Share of the full scale from which a sample counts as overloaded, as at the bench."""
 
@@ -235,7 +237,23 @@ def _peak(source: Source, channel: SourceChannel, samples: int) -> float:
 
 
 def _power_of_two_above(peak: float) -> float:
-    return 2.0 ** ceil(log2(peak)) if peak > 0 else 1.0
+    """Give the smallest power of two that is not below a peak.
+
+    Raises
+    ------
+    UnusableData
+        When the peak is beyond what a recording's numbers can be scaled by.
+
+    """
+    if not LEAST_PEAK < peak < MOST_PEAK:
+        if peak == 0:
+            return 1.0
+        raise UnusableData(
+            f"a channel's largest number is {peak:g}, and a recording keeps those from {LEAST_PEAK:g} to "
+            f"{MOST_PEAK:g}; convert it to a unit in which it is smaller, or repair the file"
+        )
+    mantissa, exponent = frexp(peak)
+    return 2.0 ** (exponent - 1 if mantissa == 0.5 else exponent)
 
 
 def _bench(path: Path, mapping: ImportMapping, wanted: Sequence[_Wanted]) -> dict[str, Any]:

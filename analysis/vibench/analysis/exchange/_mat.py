@@ -23,6 +23,7 @@ from ..signals import Reals
 from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._facts_document import facts_document
 from ._hdf5_source import Hdf5Source, opened_hdf5
+from ._mat_elements import require_whole
 from ._source_channel import SourceChannel, TableSource
 
 LARGEST_BYTES = 2**31
@@ -133,6 +134,7 @@ def opened_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
         with opened_hdf5(path) as source:
             yield source
         return
+    require_whole(path)
     try:
         content = loadmat(path, simplify_cells=True)
     except (MatReadError, zlib.error) as error:  # neither is a kind of ValueError

@@ -9,6 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
+from vibench.acquisition import shortened
+
 from ..errors import InvalidRequest, UnusableData
 from ..signals import Reals
 from ._csv import opened_csv
@@ -59,6 +61,12 @@ DAMAGE = (
 """What h5py, npTDMS and scipy raise when the inside of a file is not what its outside promised."""
 
 
+CHANNELS_SHOWN, NAME_SHOWN = 20, 60
+"""Channels that a sentence names, and letters of each name."""
+MOST_CHANNELS = 4096
+"""More is no measurement, but a table that lies on its side or a damaged file."""
+
+
 @contextmanager
 def opened_source(path: Path) -> Iterator[Source]:
     """Open a file by its suffix. Nothing in it is ever run: no pickles, no macros.
@@ -85,6 +93,11 @@ def opened_source(path: Path) -> Iterator[Source]:
             if not source.channels:
                 raise UnusableData(
                     f"{path.name} holds no time samples of real numbers; spectra and pictures cannot be read"
+                )
+            if len(source.channels) > MOST_CHANNELS:
+                raise UnusableData(
+                    f"{path.name} holds {len(source.channels)} rows or columns of numbers, and a measurement "
+                    f"has at most {MOST_CHANNELS} channels; export fewer of them"
                 )
         yield _CheckedSource(path, source)
 
@@ -120,7 +133,8 @@ def _readable(path: Path) -> Iterator[None]:
         raise
     except DAMAGE as error:
         raise UnusableData(
-            f"{path.name} is damaged, or not what its suffix says ({error}); copy or export it again"
+            f"{path.name} is damaged, or not what its suffix says ({shortened(str(error))}); copy or export "
+            "it again"
         ) from error
 
 
@@ -138,5 +152,12 @@ def find_channel(source: Source, wanted: str, path: Path) -> SourceChannel:
     if len(found) == 1:
         return found[0]
     many = "several channels" if found else "no channel"
-    held = ", ".join(repr(each.name) + (f" ({each.label})" if each.label else "") for each in source.channels)
-    raise InvalidRequest(f"{path.name} has {many} {wanted!r}; it has {held}")
+    named = [_shown(each) for each in source.channels[:CHANNELS_SHOWN]]
+    rest = len(source.channels) - len(named)
+    held = ", ".join(named) + (f" and {rest} more" if rest else "")
+    raise InvalidRequest(f"{path.name} has {many} {shortened(wanted, NAME_SHOWN)!r}; it has {held}")
+
+
+def _shown(channel: SourceChannel) -> str:
+    label = f" ({shortened(channel.label, NAME_SHOWN)})" if channel.label else ""
+    return repr(shortened(channel.name, NAME_SHOWN)) + label

@@ -1,5 +1,6 @@
 """National Instruments' TDMS as a source, read by npTDMS."""
 
+import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -47,7 +48,8 @@ def opened_tdms(path: Path) -> Iterator[TdmsSource]:
 
     """
     try:
-        from nptdms import TdmsFile  # noqa: PLC0415 - an optional extra
+        import nptdms.log  # noqa: PLC0415 - an optional extra
+        from nptdms import TdmsFile  # noqa: PLC0415 - as above
     except ImportError as error:
         raise InvalidRequest(
             f"{path.name} needs npTDMS to be read, which is not installed: pip install 'vibench[exchange]'"
@@ -57,6 +59,8 @@ def opened_tdms(path: Path) -> Iterator[TdmsSource]:
         if raw.read(len(SIGNATURE)) != SIGNATURE:  # npTDMS would find nothing, and say nothing
             raise UnusableData(f"{path.name} is no TDMS file; copy it again, with its .tdms suffix")
         raw.seek(0)
+        # It writes what it doubts to standard error, at any length; what matters, it raises.
+        nptdms.log.log_manager.set_level(logging.CRITICAL)
         file = TdmsFile.open(raw)
         yield TdmsSource(
             {_channel(each): each for group in file.groups() for each in group.channels() if _is_real(each)}

@@ -2,8 +2,8 @@
 
 import math
 
-LONGEST = 10_000_000
-"""Values of one range; more is a slip of the pen."""
+LONGEST = 1_000_000
+"""Values of all ranges together; more is a slip of the pen."""
 WHOLE = 1e-9
 """A range this close to a whole number of steps includes its stop."""
 
@@ -33,11 +33,21 @@ def listed(given: object) -> object:
             "step": float() | int() as step,
             **rest,
         } if not rest:
-            return frequency_range(float(start), float(stop), float(step))
+            return frequency_range(_number(start), _number(stop), _number(step))
         case list() | tuple():
             return _flattened(given)
         case _:
             return given
+
+
+def _number(given: float) -> float:
+    """Take a number of a file; whole ones may have hundreds of digits."""
+    try:
+        return float(given)
+    except OverflowError as error:
+        raise ValueError(
+            "a range has a number of more than 300 digits; give one that can be a frequency"
+        ) from error
 
 
 def _flattened(given: list[object] | tuple[object, ...]) -> object:
@@ -48,6 +58,8 @@ def _flattened(given: list[object] | tuple[object, ...]) -> object:
                 values.extend(some)
             case one:
                 values.append(one)
+        if len(values) > LONGEST:
+            raise ValueError(f"ranges of more than {LONGEST} values together are too long; widen their steps")
     if all(isinstance(value, (int, float)) for value in values):
         return sorted(set(values))  # type: ignore[type-var]
     return values

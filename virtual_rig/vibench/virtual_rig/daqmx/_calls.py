@@ -7,7 +7,7 @@ from nidaqmx.constants import AcquisitionType, Edge, SampleTimingType, ScaleType
 from nidaqmx.error_codes import DAQmxErrors
 from session_pb2 import Session, SessionInitializationBehavior
 
-from ._errors import DaqmxRefusal, sentence, unsupported_value
+from ._errors import DaqmxRefusal, member, sentence, unsupported_value
 from ._scales import LinearScale, PolynomialScale, TableScale
 from ._system import DaqmxSystem
 from ._task_attributes import set_output_buffer, set_trigger_source
@@ -86,10 +86,7 @@ class TaskCalls:
         return NOTHING
 
     def _control(self, request: Any) -> Fields:
-        code = pick(request, "action")
-        if code not in [mode.value for mode in TaskMode]:
-            raise unsupported_value("task action", code, ", ".join(mode.name for mode in TaskMode))
-        self._task(request).control(TaskMode(code))
+        self._task(request).control(member(TaskMode, pick(request, "action"), "task action"))
         return NOTHING
 
     def _is_done(self, request: Any) -> Fields:
@@ -120,7 +117,7 @@ class TaskCalls:
         task.timing.mode = AcquisitionType(mode)
         task.timing.samples = check_samples(request.samps_per_chan)
         task.timing.clock_source = request.source
-        task.timing.clock_edge = Edge(pick(request, "active_edge"))
+        task.timing.clock_edge = member(Edge, pick(request, "active_edge"), "SampClk_ActiveEdge")
         return NOTHING
 
     def _input_buffer(self, request: Any) -> Fields:
@@ -137,7 +134,7 @@ class TaskCalls:
         task = self._task(request)
         task.require_stopped()
         set_trigger_source(task, request.trigger_source)
-        task.timing.trigger_edge = Edge(pick(request, "trigger_edge"))
+        task.timing.trigger_edge = member(Edge, pick(request, "trigger_edge"), "DigEdge_StartTrig_Edge")
         return NOTHING
 
     def _no_trigger(self, request: Any) -> Fields:

@@ -15,7 +15,7 @@ from nidaqmx.error_codes import DAQmxErrors
 from ._calls import NOTHING, Call, Fields, pick
 from ._channels import MILLIVOLTS_PER_PASCAL, InputChannel, OutputChannel, Sensor
 from ._device_attributes import PhysicalChannel
-from ._errors import DaqmxRefusal, unsupported_value
+from ._errors import DaqmxRefusal, member, unsupported_value
 from ._names import assigned_names
 from ._scales import Scale
 from ._system import DaqmxSystem
@@ -51,7 +51,7 @@ class ChannelCalls:
         bridge = pick(request, "bridge_config")
         if bridge != BridgeConfiguration.NO_BRIDGE.value or request.use_excit_for_scaling:
             raise unsupported_value("AI_Bridge_Cfg", bridge, "NO_BRIDGE, without scaling by the excitation")
-        source = ExcitationSource(pick(request, "voltage_excit_source"))
+        source = member(ExcitationSource, pick(request, "voltage_excit_source"), "AI_Excit_Src")
         if source is ExcitationSource.INTERNAL and request.voltage_excit_val:
             raise unsupported_value(
                 "AI_Excit_Val", f"{request.voltage_excit_val:g} V", "0 V on these devices"
@@ -101,7 +101,7 @@ class ChannelCalls:
                 raise DaqmxRefusal(DAQmxErrors.PHYS_CHAN_MEAS_TYPE, detail)
             channel = InputChannel(
                 name, place.name, place.device, inputs, measurement, pick(request, "units"), *limits,
-                terminal=TerminalConfiguration(pick(request, "terminal_config")),
+                terminal=member(TerminalConfiguration, pick(request, "terminal_config"), "AI_TermCfg"),
                 excitation=source, excitation_a=current_a,
                 sensor=Sensor(sensor.sensitivity, sensor.sensitivity_units), scale=self._scale(request),
             )  # fmt: skip
@@ -127,7 +127,8 @@ class ChannelCalls:
 
 
 def _excitation(request: Any) -> tuple[ExcitationSource, float]:
-    return ExcitationSource(pick(request, "current_excit_source")), request.current_excit_val
+    source = member(ExcitationSource, pick(request, "current_excit_source"), "AI_Excit_Src")
+    return source, request.current_excit_val
 
 
 def _named(request: Any, places: tuple[PhysicalChannel, ...]) -> list[tuple[PhysicalChannel, str]]:

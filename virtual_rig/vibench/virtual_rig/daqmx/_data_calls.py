@@ -11,7 +11,7 @@ from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
 from ._calls import NOTHING, Call, Fields, pick
-from ._errors import DaqmxRefusal
+from ._errors import DaqmxRefusal, unsupported_value
 from ._generation import LEAD_S, Generation
 from ._reading import READ_ALL, Reading, default_samples, read
 from ._system import DaqmxSystem
@@ -230,7 +230,9 @@ class DataCalls:
         task = self._task(request)
         require_outputs(task)
         rows = [np.array(waveform.y_data) for waveform in request.waveforms]
-        _check_size(task, sum(row.size for row in rows), rows[0].size if rows else 0)
+        if len({row.size for row in rows}) != 1:
+            raise unsupported_value("number of waveforms", len(rows), "one a channel, all of one length")
+        _check_size(task, sum(row.size for row in rows), rows[0].size)
         return {"samps_per_chan_written": write(task, np.stack(rows), _start(request), request.timeout)}
 
     def _binary_writer(self, bits: int) -> Call:

@@ -1,5 +1,8 @@
 """What the simulated DAQmx driver answers when it refuses: a code, a sentence, how many samples moved."""
 
+from enum import Enum
+from typing import TypeVar
+
 from nidaqmx.error_codes import DAQmxErrors
 
 from vibench.acquisition import InstrumentError
@@ -69,6 +72,18 @@ def sentence(code: int) -> str:
     except ValueError:
         return ""
     return name.replace("_", " ").capitalize() + "."
+
+
+Member = TypeVar("Member", bound=Enum)
+
+
+def member(kind: type[Member], code: int, property_name: str) -> Member:
+    """Give the member of one of NI's enums that a request's number stands for, or refuse it (-200077)."""
+    try:
+        return kind(code)
+    except ValueError:
+        allowed = ", ".join(each.name for each in kind)
+        raise unsupported_value(property_name, code, allowed) from None
 
 
 def unsupported_value(property_name: str, requested: object, allowed: str) -> DaqmxRefusal:

@@ -10,7 +10,7 @@ from nidaqmx.error_codes import DAQmxErrors
 
 from ._acquisition import Acquisition
 from ._calls import pick
-from ._errors import DaqmxRefusal, unsupported_value
+from ._errors import DaqmxRefusal, member, unsupported_value
 from ._generation import Generation
 from ._pace import Overflow
 from ._system import DaqmxSystem
@@ -44,7 +44,9 @@ class EventCalls:
         }
 
     def _every_n_samples(self, request: Any, context: grpc.ServicerContext) -> Listener:
-        kind = EveryNSamplesEventType(pick(request, "every_n_samples_event_type"))
+        kind = member(
+            EveryNSamplesEventType, pick(request, "every_n_samples_event_type"), "every N samples event"
+        )
         task = self._system.task(request.task.name)
         if request.n_samples < 1:
             raise DaqmxRefusal(DAQmxErrors.EVERY_N_SAMPS_EVENT_INTERVAL_ZERO_NOT_SUPPORTED)

@@ -15,7 +15,7 @@ from nidaqmx.error_codes import DAQmxErrors
 from ._acquisition import Acquisition
 from ._attributes import Attribute, AttributeGroup, not_supported
 from ._devices import AnalogInputs, Overloads
-from ._errors import DaqmxRefusal, unsupported_value
+from ._errors import DaqmxRefusal, member, unsupported_value
 from ._names import expand, join
 from ._reading import available, default_samples
 from ._tasks import Task, TaskState
@@ -61,7 +61,7 @@ def _set_source(task: Task, source: str) -> None:
 
 
 def _set_edge(task: Task, edge: int) -> None:
-    task.timing.clock_edge = Edge(edge)
+    task.timing.clock_edge = member(Edge, edge, "SampClk_ActiveEdge")
 
 
 TIMING = AttributeGroup[Task](
@@ -98,7 +98,7 @@ def set_trigger_source(task: Task, source: str) -> None:
 
 
 def _set_trigger_edge(task: Task, edge: int) -> None:
-    task.timing.trigger_edge = Edge(edge)
+    task.timing.trigger_edge = member(Edge, edge, "DigEdge_StartTrig_Edge")
 
 
 TRIGGER = AttributeGroup[Task](

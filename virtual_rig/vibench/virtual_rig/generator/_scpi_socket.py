@@ -6,6 +6,7 @@ The real AFG1022 has no network port; this is a way into the simulation, opened 
 
 import socketserver
 import threading
+from contextlib import suppress
 from types import TracebackType
 from typing import Protocol
 
@@ -103,6 +104,8 @@ def _server(device: ScpiDevice, address: tuple[str, int], closing: threading.Eve
             if reply.delay_s and closing.wait(reply.delay_s):
                 return  # the server closed while the instrument was still thinking
             if reply.data:
-                self.request.sendall(reply.data)
+                # A client that has left wants no answer.
+                with suppress(ConnectionError):
+                    self.request.sendall(reply.data)
 
     return _Server(address, Session)

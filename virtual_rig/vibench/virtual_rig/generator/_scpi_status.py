@@ -17,6 +17,7 @@ class ErrorCode(IntEnum):
     MISSING_PARAMETER = -109
     UNDEFINED_HEADER = -113
     SUFFIX_OUT_OF_RANGE = -114
+    EXPONENT_TOO_LARGE = -123
     INVALID_SUFFIX = -131
     INVALID_BLOCK_DATA = -161
     SETTINGS_CONFLICT = -221
@@ -40,6 +41,7 @@ _TEXTS = {
     ErrorCode.MISSING_PARAMETER: "Missing parameter",
     ErrorCode.UNDEFINED_HEADER: "Undefined header",
     ErrorCode.SUFFIX_OUT_OF_RANGE: "Header suffix out of range",
+    ErrorCode.EXPONENT_TOO_LARGE: "Exponent too large",
     ErrorCode.INVALID_SUFFIX: "Invalid suffix",
     ErrorCode.INVALID_BLOCK_DATA: "Invalid block data",
     ErrorCode.SETTINGS_CONFLICT: "Settings conflict",

@@ -1,5 +1,6 @@
 """SCPI parameters and replies: numbers with their unit, words, booleans, binary blocks."""
 
+import math
 import re
 from collections.abc import Mapping
 from decimal import Decimal
@@ -64,7 +65,14 @@ def number_or_limit(parameter: bytes, units: Mapping[str, float]) -> float | Lim
     value, unit = number_and_unit(parameter)
     if unit not in units:
         raise ScpiError(ErrorCode.INVALID_SUFFIX)
-    return value * units[unit]
+    return _finite(value * units[unit])
+
+
+def _finite(value: float) -> float:
+    """Refuse what overflows: -123, the exponent is too large (SCPI-1999, volume 2, 21.8.9)."""
+    if not math.isfinite(value):
+        raise ScpiError(ErrorCode.EXPONENT_TOO_LARGE)
+    return value
 
 
 def number_and_unit(parameter: bytes) -> tuple[float, str]:
@@ -72,7 +80,7 @@ def number_and_unit(parameter: bytes) -> tuple[float, str]:
     found = _NUMBER.fullmatch(text(parameter))
     if found is None:
         raise ScpiError(ErrorCode.DATA_TYPE_ERROR)
-    return float(found["number"]), found["unit"].upper()
+    return _finite(float(found["number"])), found["unit"].upper()
 
 
 def integer(parameter: bytes) -> int:

@@ -60,16 +60,25 @@ def usb_service(device: UsbDevice) -> grpc.GenericRpcHandler:
         "Control": control,
         "ClearHalt": clear_halt,
     }
-    handlers = {name: grpc.unary_unary_rpc_method_handler(_served(act)) for name, act in methods.items()}
+    handlers = {
+        name: grpc.unary_unary_rpc_method_handler(_served(name, act)) for name, act in methods.items()
+    }
     return grpc.method_handlers_generic_handler(SERVICE, handlers)
 
 
-def _served(act: _Method) -> Callable[[bytes, grpc.ServicerContext], bytes]:
+def _served(name: str, act: _Method) -> Callable[[bytes, grpc.ServicerContext], bytes]:
     """Put the outcome of a transfer in front of its answer."""
 
-    def serve(request: bytes, _: grpc.ServicerContext) -> bytes:
+    def serve(request: bytes, context: grpc.ServicerContext) -> bytes:
         try:
             return _ERRNO.pack(0) + act(request)
+        except struct.error as error:
+            context.set_code(grpc.StatusCode.INVALID_ARGUMENT)
+            context.set_details(
+                f"{name} was called with {len(request)} bytes, which are not its numbers ({error}); nothing "
+                "reached the device"
+            )
+            return b""
         except OSError as error:
             return _ERRNO.pack(error.errno or errno.EIO)
 

@@ -1,0 +1,186 @@
+"""Broken messages to a real engine: before the token and after it, in its frames and in what it is asked."""
+
+import json
+import random
+import socket
+import time
+from contextlib import closing, suppress
+from typing import Any
+
+from vibench.acquisition import load_campaign
+from vibench.acquisition.engine import EngineClient
+from vibench.acquisition.engine._address import EngineAddress
+from vibench.acquisition.engine._wire import HEAD, MAGIC
+from vibench.acquisition.rig import load_rig
+
+from .byte_mutants import EDGES, mutated_bytes
+from .command_runner import ROOT
+from .json_mutants import mutated_json
+from .limits import LONGEST_S, MOST_BYTES
+from .served_process import ServedProcess
+from .tally import Finding, Shard, Tally
+
+NAME = "engine"
+DESCRIPTORS_MORE = 24
+"""Those of the viewers that it holds at most, and what a bench opens."""
+CAMPAIGN = load_campaign(ROOT / "campaigns" / "quick.toml").model_dump(mode="json")
+RIG = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml").model_dump(mode="json")
+REQUESTS: tuple[dict[str, Any], ...] = (
+    {"ask": "open", "rig": RIG},
+    {"ask": "close"},
+    {"ask": "arm", "campaign_request": {"campaign": CAMPAIGN, "folder": "recordings", "check": "waived"}},
+    {"ask": "disarm"},
+    {"ask": "stop", "level": "abort", "reason": "a test"},
+    {"ask": "resume"},
+    {"ask": "mark", "text": "here"},
+    {"ask": "status", "known_rows": -1},
+    {"ask": "beat"},
+    {"ask": "look", "since_sample": 0, "most": 100},
+)
+"""Something right of every verb, but for those that would play or end: `start`, `check` and `shutdown`."""
+
+
+def framed(text: bytes, payload: bytes = b"") -> bytes:
+    """Put a message on the wire."""
+    return HEAD.pack(MAGIC, len(text), len(payload)) + text + payload
+
+
+def broken_frame(chance: random.Random) -> bytes:
+    """Give something that begins like a message, and lies in its head or ends too soon."""
+    text = mutated_json(chance.choice(REQUESTS), chance)
+    match chance.randrange(4):
+        case 0:
+            return HEAD.pack(MAGIC, chance.choice(EDGES) % 2**32, chance.choice(EDGES) % 2**32) + text
+        case 1:
+            return framed(text)[: chance.randrange(len(text) + HEAD.size)]
+        case 2:
+            return mutated_bytes(framed(text), chance)
+        case _:
+            return chance.randbytes(chance.choice((0, 1, 11, 12, 13, 2000)))
+
+
+class Trial:
+    """An engine under attack."""
+
+    def __init__(self, process: ServedProcess) -> None:
+        self._process = process
+        self._address = EngineAddress.model_validate_json(process.until(lambda said: "\n" in said))
+        self._hello = framed(json.dumps({"ask": "hello", "token": self._address.token}).encode())
+        self._viewer: socket.socket | None = None
+        self.descriptors = process.descriptors
+
+    def send(self, chance: random.Random) -> str:
+        """Send one broken message, and say how it was taken; TimeoutError when it never was."""
+        if chance.random() < 0.15:
+            return self._at_the_door(chance)
+        viewer = self._let_in()
+        if chance.random() < 0.1:
+            return self._spoiled(viewer, broken_frame(chance))
+        request = chance.choice(REQUESTS)
+        # What is right brings the engine into its other states.
+        is_right = chance.random() < 0.15
+        viewer.sendall(framed(json.dumps(request).encode() if is_right else mutated_json(request, chance)))
+        taken = self._answer(viewer)
+        if taken == "hung up":
+            raise ConnectionError("a request in a whole frame was not answered")
+        return taken
+
+    def hang_up(self) -> None:
+        """Close the viewer's connection; the next message opens another."""
+        if self._viewer is not None:
+            self._viewer.close()
+            self._viewer = None
+
+    def status_faults(self) -> tuple[str, ...]:
+        """Ask as a viewer would, and look at the process from outside."""
+        process = self._process
+        with EngineClient.attach(self._address) as client:
+            client.stop("off")
+            client.status()
+        more = process.descriptors - self.descriptors
+        return tuple(
+            said
+            for said, is_so in (
+                ("a traceback", "Traceback (most recent call last)" in process.err),
+                (f"took {process.peak_bytes / 1e6:.0f} MB", process.peak_bytes > MOST_BYTES),
+                (f"holds {more} descriptors more", more > DESCRIPTORS_MORE),
+            )
+            if is_so
+        )
+
+    def _at_the_door(self, chance: random.Random) -> str:
+        with closing(self._connected()) as stranger:
+            hello = mutated_json({"ask": "hello", "token": "x" * 43, "role": "visiting"}, chance)
+            said = framed(hello) if chance.random() < 0.5 else broken_frame(chance)
+            return "door: " + self._spoiled(stranger, said)
+
+    def _spoiled(self, connection: socket.socket, said: bytes) -> str:
+        """Say something that may be cut, and leave: the other side may answer or hang up."""
+        with suppress(OSError):
+            connection.sendall(said)
+            connection.shutdown(socket.SHUT_WR)
+        taken = self._answer(connection)
+        if connection is self._viewer:
+            self.hang_up()
+        return taken
+
+    def _answer(self, connection: socket.socket) -> str:
+        try:
+            head = self._exactly(connection, HEAD.size)
+            magic, text, payload = HEAD.unpack(head)
+            facts = json.loads(self._exactly(connection, text))
+            self._exactly(connection, payload)
+        except ConnectionError:
+            return "hung up"
+        assert magic == MAGIC
+        return "refused" if "refused" in facts else "answered"
+
+    @staticmethod
+    def _exactly(connection: socket.socket, count: int) -> bytes:
+        found = b""
+        while len(found) < count:
+            piece = connection.recv(min(count - len(found), 1 << 16))
+            if not piece:
+                raise ConnectionError
+            found += piece
+        return found
+
+    def _connected(self) -> socket.socket:
+        return socket.create_connection((self._address.host, self._address.port), LONGEST_S)
+
+    def _let_in(self) -> socket.socket:
+        if self._viewer is None:
+            self._viewer = self._connected()
+            self._viewer.sendall(self._hello)
+            assert self._answer(self._viewer) == "answered"
+        return self._viewer
+
+
+LOOK_EVERY = 25
+"""Messages between two looks at the process."""
+
+
+def attack(shard: Shard) -> Tally:
+    """Send broken messages to an engine without a bench, or with a virtual one as it comes."""
+    tally = Tally(NAME)
+    words = ("vibench.acquisition.engine", "--attendance", "unattended", "--forgotten-s", "36000")
+    with ServedProcess(*words) as process:
+        trial = Trial(process)
+        known = ""
+        for number, chance in shard.chances():
+            began_s = time.monotonic()
+            faults: tuple[str, ...] = ()
+            try:
+                taken = trial.send(chance)
+                if number % LOOK_EVERY < shard.of or not process.is_alive or process.err != known:
+                    faults = trial.status_faults()
+            except (OSError, AssertionError, ValueError) as error:
+                trial.hang_up()
+                taken, faults = "lost", (f"{type(error).__name__}: {error}",)
+            told, known = process.err.removeprefix(known), process.err
+            tally.count(taken, time.monotonic() - began_s, process.peak_bytes if process.is_alive else 0)
+            if faults and (told or taken == "lost"):
+                tally.findings.append(Finding(NAME, shard.seed, number, faults, told[-1500:]))
+            if not process.is_alive:
+                break
+    return tally

@@ -1,0 +1,95 @@
+"""A server of ours as a process of its own, watched from outside: its output, memory and descriptors."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Self
+
+from .command_runner import ROOT
+
+STARTING_S = 300.0
+"""The first one after a change of the simulation compiles its kernels [s]."""
+LOOK_S = 0.05
+PAGE = os.sysconf("SC_PAGE_SIZE")
+
+
+class ServedProcess:
+    """A Python module that runs until it is closed, in a folder and with a state folder of its own."""
+
+    def __init__(self, *words: str) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="vibench_attack_")
+        self.folder = Path(self._folder.name)
+        self._err = (self.folder / "err.txt").open("w+b")
+        self._out = (self.folder / "out.txt").open("w+b")
+        state = {"VIBENCH_STATE_DIR": str(self.folder / "state"), "COLUMNS": "200", "PYTHONUNBUFFERED": "1"}
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", *words],
+            stdin=subprocess.PIPE,
+            stdout=self._out,
+            stderr=self._err,
+            cwd=self.folder,
+            env={**os.environ, "PYTHONPATH": str(ROOT), **state},
+        )
+
+    @property
+    def out(self) -> str:
+        """What it has written on standard output."""
+        return (self.folder / "out.txt").read_text(encoding="utf-8", errors="replace")
+
+    @property
+    def err(self) -> str:
+        """What it has written on standard error."""
+        return (self.folder / "err.txt").read_text(encoding="utf-8", errors="replace")
+
+    def until(self, is_there: Callable[[str], bool]) -> str:
+        """Wait until its output is as it should be."""
+        give_up_s = time.monotonic() + STARTING_S
+        while not is_there(said := self.out):
+            if time.monotonic() > give_up_s or self._process.poll() is not None:
+                raise RuntimeError(f"it did not come up: {said!r}, {self.err!r}")
+            time.sleep(LOOK_S)
+        return said
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it still runs."""
+        return self._process.poll() is None
+
+    @property
+    def resident_bytes(self) -> int:
+        """Its memory now."""
+        return int(Path(f"/proc/{self._process.pid}/statm").read_text().split()[1]) * PAGE
+
+    @property
+    def peak_bytes(self) -> int:
+        """Its largest memory so far."""
+        status = Path(f"/proc/{self._process.pid}/status").read_text().splitlines()
+        return 1024 * next(int(line.split()[1]) for line in status if line.startswith("VmHWM"))
+
+    @property
+    def descriptors(self) -> int:
+        """How many files and sockets it holds."""
+        return sum(1 for _ in Path(f"/proc/{self._process.pid}/fd").iterdir())
+
+    def close(self) -> None:
+        """End it."""
+        self._process.terminate()
+        try:
+            self._process.wait(20.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._process.stdin.close()
+        self._err.close()
+        self._out.close()
+        self._folder.cleanup()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

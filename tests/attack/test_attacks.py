@@ -1,0 +1,31 @@
+"""A few hundred broken files and messages of every kind, the same ones each time: ``pytest -m attack``.
+
+More of them, with other seeds and for hours: ``python -m tests.attack --help``.
+"""
+
+import pytest
+
+from . import engine_messages, imported_files, instrument_messages, toml_files
+from .tally import Shard
+
+SEED = 2025
+
+
+@pytest.mark.attack
+@pytest.mark.timeout(400)
+@pytest.mark.parametrize(
+    ("attack", "count"),
+    [
+        (toml_files.attack, 150),
+        (imported_files.attack, 200),
+        (engine_messages.attack, 500),
+        (instrument_messages.attack, 1500),
+    ],
+    ids=["toml", "imports", "engine", "instruments"],
+)
+def test_nothing_that_is_broken_does_what_none_may_do(attack, count):
+    tally = attack(Shard(SEED, count))
+    assert tally.tried == count
+    assert tally.findings == [], tally.line()
+    # An attack whose every message is turned away at the first look says little.
+    assert len(tally.codes) > 1

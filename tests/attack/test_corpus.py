@@ -1,0 +1,62 @@
+"""Cases that attacks have found, each a file: refused in one sentence, quickly, and nothing is left of them.
+
+`corpus/campaign` and `corpus/study` are read as such, `corpus/imports` by `vibench import`. Whatever an
+attack finds is made small and put there, under a name that says what is wrong with it.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from . import imported_files, toml_files
+from .command_runner import CommandRunner
+from .limits import Case
+
+CORPUS = Path(__file__).with_name("corpus")
+
+
+def found(folder: str) -> list[Path]:
+    return sorted((CORPUS / folder).iterdir())
+
+
+@pytest.fixture(scope="module")
+def runner():
+    with CommandRunner() as one:
+        yield one
+
+
+@pytest.mark.parametrize("path", [*found("campaign"), *found("study")], ids=lambda path: path.stem)
+def test_a_broken_toml_file_is_refused_in_a_sentence_that_names_it(runner, path):
+    ending = runner.run(toml_files.reading(path.parent.name, path.read_bytes()))
+    assert (ending.code, ending.faults, ending.made) == (1, (), ())
+    assert ending.err.startswith("error: broken.toml: ")
+
+
+@pytest.mark.parametrize("path", found("imports"), ids=lambda path: path.stem)
+def test_a_broken_file_of_another_program_is_refused_in_a_sentence_that_names_it(runner, path):
+    case = imported_files.reading(path.suffix, path.read_bytes(), *imported_files.MAKING)
+    ending = runner.run(case)
+    assert (ending.code, imported_files.faults(case, ending)) == (1, ())
+    assert ending.err.startswith(f"error: broken{path.suffix} ") or "largest number" in ending.err
+
+
+LONG = "x" * 300
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("analyse", LONG),
+        ("export", f"{LONG}.h5", "--to", "csv"),
+        ("import", f"{LONG}.csv"),
+        ("measure", "good.toml", "--out", LONG, "--estimate"),
+        ("catalogue", LONG),
+        ("recover", f"{LONG}.h5.part"),
+        ("figure", "2", "--out", LONG),
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_a_name_that_no_disk_takes_is_one_sentence(runner, arguments):
+    ending = runner.run(Case(arguments, toml_files.GOOD))
+    assert (ending.code, ending.faults) == (1, ())
+    assert "is too long" in ending.err
