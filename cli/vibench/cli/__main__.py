@@ -174,6 +174,8 @@ def main() -> None:
         sys.exit(1)
 
 
+LONGEST_SENTENCE = 1800
+"""Letters: whatever a file holds may stand in a sentence about it."""
 NAME_SHOWN = 80
 """Letters of a name that is too long."""
 
@@ -181,7 +183,7 @@ NAME_SHOWN = 80
 def complain(error: BaseException) -> None:
     """Show an error on standard error: its sentence, then what else went wrong on the way out."""
     console = Console(stderr=True, highlight=False, soft_wrap=True)
-    console.print(f"[bold red]error:[/] {_plain(str(error))}")
+    console.print(f"[bold red]error:[/] {_plain(shortened(str(error), LONGEST_SENTENCE))}")
     for note in getattr(error, "__notes__", ()):
         console.print(f"  {_plain(note)}")
 
