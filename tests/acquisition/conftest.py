@@ -124,6 +124,15 @@ class LoopbackGenerator:
         self._world.call("set_amplitude", amplitude_vpp)
         self._set(amplitude_vpp)
 
+    def arm_burst(self, cycles: int) -> None:
+        self._world.call("arm_burst", cycles)
+
+    def trigger(self) -> None:
+        self._world.call("trigger")
+
+    def end_burst(self) -> None:
+        self._world.call("end_burst")
+
     def start(self) -> None:
         self._world.call("start")
         self._world.is_on = True

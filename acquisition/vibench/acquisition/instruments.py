@@ -80,6 +80,15 @@ class FunctionGenerator(Protocol):
     def set_amplitude(self, amplitude_vpp: float) -> None:
         """Change the peak-to-peak amplitude of what is playing."""
 
+    def arm_burst(self, cycles: int) -> None:
+        """Play so many periods at each `trigger` instead of playing on; 0 V before and after."""
+
+    def trigger(self) -> None:
+        """Fire an armed burst."""
+
+    def end_burst(self) -> None:
+        """Play on without a trigger."""
+
     def start(self) -> None:
         """Turn the output on."""
 

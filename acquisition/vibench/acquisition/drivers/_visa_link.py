@@ -59,6 +59,8 @@ def open_link(resource: str, visa_library: str, timeout_s: float = TIMEOUT_S) ->
     message_link = cast("MessageBasedResource", link)
     message_link.timeout = timeout_s * _MS_PER_S
     message_link.write_termination = "\n"
+    if resource.upper().endswith("::SOCKET"):  # a stream does not tell where a reply ends, USB does
+        message_link.read_termination = "\n"
     return cast("Link", message_link)
 
 

@@ -13,6 +13,7 @@ from ._engine import (
     Engine as Engine,
 )
 from ._errors import (
+    EngineError as EngineError,
     EngineGone as EngineGone,
     EngineSilent as EngineSilent,
 )

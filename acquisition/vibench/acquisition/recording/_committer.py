@@ -8,6 +8,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from ..errors import RecordingError
@@ -15,6 +16,8 @@ from ._disk import Buffer, Disk
 
 COMMIT_INTERVAL_S = 0.5
 """Half of the promised second; the other half is for a slow disk."""
+CLOSING_PATIENCE_S = 30.0
+"""How long the last commit may take [s]: a network folder that has gone away never returns."""
 QUEUE_PATIENCE_S = 2.0
 """How long a full queue is waited for before the disk is called too slow."""
 
@@ -40,10 +43,12 @@ class Committer:
         self._disk = disk
         self._queue_samples = queue_samples
         self._interval_s = interval_s
+        self._closing_patience_s = CLOSING_PATIENCE_S
         self._changed = threading.Condition()
         self._queue: deque[Batch] = deque()
         self._waiting_samples = 0
         self._is_closing = False
+        self._is_abandoned = False
         self._failure: OSError | None = None
         self._is_failure_seen = False
         self._counters: dict[int, int] = {}
@@ -80,11 +85,25 @@ class Committer:
             self._changed.notify_all()
 
     def close(self) -> None:
-        """Write and commit everything queued, and end the thread. Legal at any time."""
+        """Write and commit everything queued, and end the thread. Legal at any time.
+
+        Raises
+        ------
+        RecordingError
+            When the disk does not return; nothing that touches it must be tried then.
+
+        """
         with self._changed:
             self._is_closing = True
             self._changed.notify_all()
-        self._thread.join()
+        self._thread.join(self._closing_patience_s)
+        self._is_abandoned = self._thread.is_alive()
+        if self._is_abandoned:
+            raise RecordingError(
+                f"The disk has not answered for {self._closing_patience_s:g} s (is it a network folder that"
+                f" has gone away?). The {self._committed_samples} samples committed before are kept there;"
+                " recover the recording when the disk is back."
+            )
 
     def raise_unseen_failure(self) -> None:
         """Raise a failure that no call has reported yet, so that none stays unseen."""
@@ -124,6 +143,9 @@ class Committer:
         finally:
             with self._changed:
                 self._changed.notify_all()
+            if self._is_abandoned:  # the disk is back, and nobody waits for it any more
+                with suppress(OSError):
+                    self._disk.close()
 
     def _step(self) -> bool:
         batch, is_last = self._next()

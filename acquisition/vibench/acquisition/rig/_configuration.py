@@ -42,6 +42,17 @@ class GeneratorConfig(FrozenModel):
     """The largest setting that this bench allows, peak to peak [V]."""
     settle_s: NonNegativeFloat = 0.0
     """Pause after each command that the instrument needs [s]."""
+    dead_man_s: float | None = Field(default=None, ge=0.2, le=60.0)
+    """Where given, sines play as bursts of this length that the run triggers again while it lives: should
+    this computer hang, the drive ends with the burst [s]. docs/safety.md says what it costs in signal."""
+
+    @model_validator(mode="after")
+    def _has_bursts(self) -> Self:
+        if self.dead_man_s is not None and self.channel != 1:
+            raise ValueError(
+                "dead_man_s needs bursts, which channel 1 alone has; use channel 1, or none of it"
+            )
+        return self
 
     def terminal_factor(self) -> float:
         """Volts at the terminal per volt on the panel: 2 when 50 ohm are set and nothing loads it."""

@@ -5,8 +5,9 @@ from typing import Protocol
 
 from ..bench import RunBench
 from ..errors import ConfigurationError
-from ..plan import DriveSource, Measurement, Phase, drive_source_of
-from ._generator_drive import GeneratorDrive
+from ..excitation import Tone
+from ..plan import DriveSource, Measurement, Phase, drive_source_of, known_phases
+from ._generator_drive import DeadMan, GeneratorDrive
 from ._stream_drive import StreamDrive
 
 
@@ -67,7 +68,7 @@ def drive_for(bench: RunBench, measurement: Measurement) -> Drive:
     """
     match drive_source_of(measurement, bench.rig), bench.output:
         case DriveSource.GENERATOR, _:
-            return GeneratorDrive(bench.generator, measurement)
+            return GeneratorDrive(bench.generator, measurement, _dead_man(bench, measurement))
         case DriveSource.OUTPUT, None:
             raise ConfigurationError(
                 "streamed noise needs an analogue output, and this bench has none: its function generator "
@@ -76,3 +77,19 @@ def drive_for(bench: RunBench, measurement: Measurement) -> Drive:
             )
         case DriveSource.OUTPUT, output:
             return StreamDrive(output, measurement, bench.rig.generator.terminal_factor())
+
+
+def _dead_man(bench: RunBench, measurement: Measurement) -> DeadMan | None:
+    """Give the dead man that the configuration asks for; raises ConfigurationError where it cannot be."""
+    longest_s = bench.rig.generator.dead_man_s
+    if longest_s is None:
+        return None
+    plays = [phase.play for phase in known_phases(measurement) if phase.play is not None]
+    frequencies = {play.frequency_hz if isinstance(play, Tone) else None for play in plays}
+    if None in frequencies or len(frequencies) != 1:  # nothing is known of what is decided while it plays
+        raise ConfigurationError(
+            f"{measurement.name} is no sine of one frequency, and generator.dead_man_s lets only those play, "
+            "as bursts that are triggered while the run lives. Nothing was played; leave dead_man_s out of "
+            "the hardware configuration for this campaign"
+        )
+    return DeadMan(bench.generator, longest_s)

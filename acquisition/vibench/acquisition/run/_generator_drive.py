@@ -15,22 +15,70 @@ QUIET_VPP = 1.25 * LOWEST_AMPLITUDE_VPP
 the smallest setting that the generator takes."""
 
 
+GUARD_S = 0.02
+"""A burst is triggered so long after the last one must have ended: what a trigger does to one that still
+plays is not documented for every firmware, and the times of reading vary by some milliseconds [s]."""
+MOST_CYCLES = 50_000
+_ROUNDING_S = 1e-9
+
+
+class DeadMan:
+    """A sine as bursts, each triggered while the run lives; without it the drive ends with its burst.
+
+    See docs/decisions/0030-dead-man.md.
+    """
+
+    def __init__(self, generator: FunctionGenerator, longest_s: float) -> None:
+        self._generator = generator
+        self._longest_s = longest_s
+        self._period_s = 0.0
+        self._left_s = 0.0
+
+    def arm(self, frequency_hz: float) -> None:
+        """Get ready for bursts of whole periods; the output is off or quiet."""
+        cycles = max(1, min(MOST_CYCLES, int(self._longest_s * frequency_hz)))
+        self._period_s = cycles / frequency_hz + GUARD_S
+        self._generator.arm_burst(cycles)
+
+    def trigger(self) -> None:
+        """Let the next burst begin."""
+        self._generator.trigger()
+        self._left_s = self._period_s
+
+    def pieces(self, duration_s: float) -> Iterator[float]:
+        """Divide a time of playing so that each burst is triggered when the last one has ended."""
+        while duration_s > _ROUNDING_S:
+            piece_s = min(duration_s, self._left_s)
+            yield piece_s
+            duration_s -= piece_s
+            self._left_s -= piece_s
+            if self._left_s <= _ROUNDING_S:
+                self.trigger()
+
+
 class GeneratorDrive:
     """A `Drive` whose commands take effect when they are given: each phase is commanded as it begins."""
 
     drive_source = DriveSource.GENERATOR
     pause_s = 0.0
     """A generator need not know what is coming."""
-    can_hold = True
 
-    def __init__(self, generator: FunctionGenerator, measurement: Measurement) -> None:
+    def __init__(
+        self, generator: FunctionGenerator, measurement: Measurement, dead_man: DeadMan | None = None
+    ) -> None:
         self._generator = generator
+        self._dead_man = dead_man
         self._amplitude_vpp = measurement.excitation.amplitude_vpp
         self._stairs = stairs(measurement)
         self._play: Play | None = None
         self._level = 0.0
         self._is_on = False
         self._setting_vpp = 0.0
+
+    @property
+    def can_hold(self) -> bool:
+        """Whether what is played goes on by itself: not where it needs a trigger every time."""
+        return self._dead_man is None
 
     @property
     def setting_vpp(self) -> float:
@@ -61,7 +109,7 @@ class GeneratorDrive:
                 yield from self._ramp(phase.end_level, phase.duration_s)
             case _:
                 self._begin(phase.play)
-                yield phase.duration_s
+                yield from self._pieces(phase.duration_s)
 
     def ramp_down(self, ramp_s: float) -> Iterator[float]:
         """Ramp down from the level of now, in as many stairs as any; yields how long to read on each [s]."""
@@ -103,7 +151,20 @@ class GeneratorDrive:
         if play != self._play:
             self._load(play)
         if not self._is_on:
-            self._start()
+            self._begin_bursts(play)
+
+    def _begin_bursts(self, play: Play | None) -> None:
+        """Turn the output on; where there is a dead man, with the first of its bursts."""
+        match play:
+            case Tone(frequency_hz, _) if self._dead_man is not None:
+                self._dead_man.arm(frequency_hz)
+                self._start()
+                self._dead_man.trigger()
+            case _:
+                self._start()
+
+    def _pieces(self, duration_s: float) -> Iterator[float]:
+        return iter((duration_s,)) if self._dead_man is None else self._dead_man.pieces(duration_s)
 
     def _load(self, play: Play | None) -> None:
         before, self._play = self._play, play
@@ -134,7 +195,7 @@ class GeneratorDrive:
         begin = self._level
         for stair in range(1, self._stairs + 1):
             self._set_level(begin + (target - begin) * half_cosine(stair / self._stairs))
-            yield ramp_s / self._stairs
+            yield from self._pieces(ramp_s / self._stairs)
 
     def _start(self) -> None:
         # Before the command: should it fail half-way, the output counts as on.
@@ -143,6 +204,8 @@ class GeneratorDrive:
 
     def _stop(self) -> None:
         self._generator.stop()
+        if self._is_on and self._dead_man is not None:
+            self._generator.end_burst()
         self._is_on = False
         self._level = 0.0
 

@@ -109,7 +109,8 @@ class PhaseRunner:
         ramped down.
         """
         if not self._drive.can_hold:
-            reason = f"a stream from the {self._drive.drive_source.value} cannot be held: it was ramped down"
+            source = self._drive.drive_source.value
+            reason = f"what the {source} plays must be fed and cannot be held: it was ramped down"
             raise Stopped(StopRequest.by(Cause.OPERATOR, reason))
         before = self.state
         self._enter(RunState.HELD)

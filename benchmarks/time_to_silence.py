@@ -1,0 +1,453 @@
+"""How long until the generator's terminal is silent, for each cause, state of a run and condition?
+
+    python benchmarks/time_to_silence.py [--cells SHARE] [--seed N]
+    python benchmarks/time_to_silence.py --tries 10000 --commands 200
+
+This process is the laboratory: the virtual rig on the wall's clock, and a witness at the generator's
+terminal that notes when it was last loud. The engine is a process of its own, which reaches it as it reaches
+real instruments. A cell of the table is one run: it is brought into a state, the condition is made, the cause
+happens, and the witness waits for silence. Counted is from the cause, or from the engine's continuation where
+it stood still. ``--cells 0.1`` measures a tenth of the cells, drawn with the seed. The second form counts how
+often an engine that lives was not found, through the client and through the command. Linux only.
+"""
+
+import argparse
+import os
+import random
+import resource
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from vibench.acquisition import CheckRule, StopLevel
+from vibench.acquisition.engine import (
+    CampaignRequest,
+    EngineClient,
+    EngineError,
+    EngineProcess,
+    EngineState,
+    Heartbeat,
+    StopDelivery,
+    start_engine,
+    stop_engine,
+    the_engine,
+)
+from vibench.acquisition.plan import Campaign
+from vibench.acquisition.rig import KnobSheet, Rig, load_rig
+from vibench.virtual_rig import VirtualRig
+
+RIG = Path(__file__).parent.parent / "hardware_configs" / "virtual_rig.toml"
+BUSY = "while True: sum(i * i for i in range(100_000))"
+LOUD_V = 5e-3
+"""At the terminal; the dwell has 0.75 V."""
+SILENT_FOR_S = 0.4
+PATIENCE_S = 30.0
+ATTEMPTS = 5
+STALL_S = 1.0
+RAMP_S = 0.5
+ABORT_S = 0.067
+BLOCK_S = 0.1
+PLAN = {
+    "name": "silence",
+    "measurements": [
+        {
+            "name": "run",
+            "ramp_s": RAMP_S,
+            "ramp_step_s": 0.05,
+            "excitation": {
+                "kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "settle_s": 1.0, "duration_s": 120
+            },
+        }
+    ],
+}  # fmt: skip
+STATES = ("checking", "ramping_up", "settling", "recording", "held", "ramping_down")
+
+
+class Witness:
+    """Looks at what the generator's terminal gives, as it is rendered, and notes when it was last loud."""
+
+    def __init__(self, virtual: VirtualRig) -> None:
+        self._render = virtual.generator.render
+        self.last_loud_s = -1.0
+        self.last_look_s = 0.0
+        virtual.generator.render = self._look  # type: ignore[method-assign]
+
+    def _look(self, start_s: float, interval_s: float, count: int) -> np.ndarray:
+        volts = self._render(start_s, interval_s, count)
+        self.last_look_s = time.monotonic()
+        if count and np.max(np.abs(volts)) > LOUD_V:
+            self.last_loud_s = self.last_look_s
+        return volts
+
+    def silent_since_s(self) -> float:
+        """Wait until it has been silent for a while; returns the moment at which that began."""
+        give_up_s = time.monotonic() + PATIENCE_S
+        while self.last_look_s - self.last_loud_s < SILENT_FOR_S:
+            if time.monotonic() > give_up_s:
+                return float("inf")
+            time.sleep(0.01)
+        return self.last_loud_s
+
+
+class Laboratory:
+    """A rig, its witness, and an engine that is there whenever it is needed."""
+
+    def __init__(self, virtual: VirtualRig, folder: Path) -> None:
+        self.virtual = virtual
+        self.witness = Witness(virtual)
+        self.folder = folder
+        self.served = virtual.rig.model_copy(
+            update={
+                "virtual": None,
+                "daq": virtual.rig.daq.model_copy(update={"server": virtual.daq_address}),
+                "generator": virtual.rig.generator.model_copy(update={"resource": virtual.socket_resource}),
+            }
+        )
+        self.engine: EngineProcess | None = None
+        self.client: EngineClient
+        self._number = 0
+        self._beats = threading.Event()
+        self._beats.set()
+        self._heart: Heartbeat | None = None
+        threading.Thread(target=self._attend, daemon=True).start()
+
+    @property
+    def pid(self) -> int:
+        """The engine's process."""
+        assert self.engine is not None
+        return self.engine.pid
+
+    def ready(self) -> None:
+        """Have an engine with an open bench, a new one if need be."""
+        if self.engine is not None and not self.engine.is_alive:
+            self.close()
+        if self.engine is None:
+            self.engine = start_engine()
+            self._heart = Heartbeat(self.engine.address)
+        self._beats.set()
+        self.client = EngineClient.attach(self.engine.address)
+        if self.client.status().state in (EngineState.CLOSED, EngineState.FAULT):
+            knobs = self.virtual.rig.knobs
+            sheet = KnobSheet(operator="laboratory", confirmed=datetime.now(UTC), knobs=knobs)
+            self.client.open(self.served, sheet)
+        self.until(lambda: self.client.status().state is EngineState.READY, "an open bench")
+
+    def run_into(self, state: str) -> None:
+        """Begin a recording and wait for a state of it; on a crowded computer one may fail its check."""
+        for _ in range(ATTEMPTS):
+            self._begin()
+            first = "recording" if state in ("held", "ramping_down") else state
+            self.until(
+                lambda: self.has_ended() or (self.run_state() == first and self.is_loud()),  # noqa: B023
+                first,
+            )
+            if not self.has_ended():
+                break
+        if state == "held":
+            self.client.stop(StopLevel.HOLD)
+        elif state == "ramping_down":
+            self.client.stop(StopLevel.RAMP)
+        self.until(lambda: self.run_state() == state, state)
+
+    def has_ended(self) -> bool:
+        """Whether nothing runs any more."""
+        return self.client.status().state is EngineState.READY
+
+    def _begin(self) -> None:
+        self._number += 1
+        request = CampaignRequest(
+            campaign=Campaign.model_validate(PLAN),
+            folder=self.folder / str(self._number),
+            check=CheckRule.WAIVED,
+        )
+        self.client.arm_request(request)
+        self.client.start()
+
+    def run_state(self) -> str:
+        """Where the run stands."""
+        run = self.client.status().run
+        return "" if run is None else run.run_state.value
+
+    def is_loud(self) -> bool:
+        """Whether anything was at the terminal a moment ago."""
+        return time.monotonic() - self.witness.last_loud_s < 0.1
+
+    def until(self, is_so: Callable[[], bool], what: str) -> None:
+        """Wait, or end the program."""
+        give_up_s = time.monotonic() + PATIENCE_S
+        while not is_so():
+            if time.monotonic() > give_up_s:
+                raise SystemExit(f"no {what} within {PATIENCE_S:g} s: {self.client.status()}")
+            time.sleep(0.005)
+
+    def forget_viewer(self) -> None:
+        """Attend no more."""
+        self._beats.clear()
+
+    def close(self) -> None:
+        """End the engine."""
+        heart, self._heart = self._heart, None
+        if heart is not None:
+            heart.close()
+        if self.engine is not None:
+            self.engine.close()
+            self.engine = None
+
+    def _attend(self) -> None:
+        while True:
+            self._beats.wait()
+            heart = self._heart
+            if heart is not None:
+                heart.beat()
+            time.sleep(0.05)
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What ends a run, and within what time the terminal is silent by what docs/safety.md states [s]."""
+
+    happen: Callable[[Laboratory], None]
+    within_s: float
+
+
+def told(level: StopLevel) -> Callable[[Laboratory], None]:
+    """Stop as the command does."""
+
+    def stop(laboratory: Laboratory) -> None:
+        assert stop_engine(the_engine(laboratory.pid), level, "measured") in StopDelivery
+
+    return stop
+
+
+def refuse_writing(laboratory: Laboratory) -> None:
+    """Let the engine's disk take nothing more."""
+    resource.prlimit(laboratory.pid, resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
+
+
+def lose_samples(laboratory: Laboratory) -> None:
+    """Let the converter's buffer run over."""
+    laboratory.virtual.faults.overrun()
+
+
+MARGIN_S = 1.0
+"""Commands over the cable, the watchdog's round, and a computer that has other things to do."""
+CAUSES = {
+    "stop --level ramp": Cause(told(StopLevel.RAMP), BLOCK_S + RAMP_S + MARGIN_S),
+    "stop --level abort": Cause(told(StopLevel.ABORT), BLOCK_S + ABORT_S + MARGIN_S),
+    "stop --level off": Cause(told(StopLevel.OFF), BLOCK_S + MARGIN_S),
+    "viewer gone": Cause(Laboratory.forget_viewer, 0.55 + BLOCK_S + ABORT_S + MARGIN_S),
+    "limit passed": Cause(
+        lambda laboratory: laboratory.virtual.faults.turn_amplifier_gain(40.0),
+        2 * BLOCK_S + ABORT_S + MARGIN_S,
+    ),
+    "samples lost": Cause(lose_samples, BLOCK_S + MARGIN_S),
+    "disk refuses": Cause(refuse_writing, 0.5 + BLOCK_S + MARGIN_S),
+    "SIGTERM": Cause(
+        lambda laboratory: os.kill(laboratory.pid, signal.SIGTERM), BLOCK_S + ABORT_S + MARGIN_S
+    ),
+}
+
+
+@contextmanager
+def idle(_: Laboratory) -> Iterator[None]:
+    """Nothing."""
+    yield
+
+
+@contextmanager
+def busy(_: Laboratory) -> Iterator[None]:
+    """As many processes as there are cores calculate."""
+    with ExitStack() as stack:
+        for _ in range(os.cpu_count() or 1):
+            process = subprocess.Popen([sys.executable, "-c", BUSY])
+            stack.callback(process.wait)
+            stack.callback(process.kill)
+        time.sleep(0.2)
+        yield
+
+
+@contextmanager
+def connections(laboratory: Laboratory) -> Iterator[None]:
+    """Two thousand connections to the engine that say nothing."""
+    assert laboratory.engine is not None
+    address = laboratory.engine.address
+    with ExitStack() as stack:
+        for _ in range(2000):
+            each = stack.enter_context(socket.socket())
+            each.setblocking(False)  # noqa: FBT003 - the socket's own parameter
+            each.connect_ex((address.host, address.port))
+        yield
+
+
+@contextmanager
+def limited(laboratory: Laboratory, what: int, most: int) -> Iterator[None]:
+    """Set a limit of the engine's process, and take it back."""
+    pid = laboratory.pid
+    before = resource.prlimit(pid, what)
+    resource.prlimit(pid, what, (most, before[1]))
+    try:
+        yield
+    finally:
+        with suppress(ProcessLookupError):
+            resource.prlimit(pid, what, before)
+
+
+@contextmanager
+def no_descriptors(laboratory: Laboratory) -> Iterator[None]:
+    """Let the engine open nothing more."""
+    highest = max(int(each.name) for each in Path(f"/proc/{laboratory.pid}/fd").iterdir())
+    with limited(laboratory, resource.RLIMIT_NOFILE, highest + 1):
+        yield
+
+
+@contextmanager
+def disk_full(laboratory: Laboratory) -> Iterator[None]:
+    """Every write to a file is refused."""
+    with limited(laboratory, resource.RLIMIT_FSIZE, 0):
+        yield
+
+
+@contextmanager
+def stalled(laboratory: Laboratory) -> Iterator[None]:
+    """Let the engine stand still for a second, and go on."""
+    os.kill(laboratory.pid, signal.SIGSTOP)
+    begun_s = time.monotonic()
+    try:
+        yield
+    finally:
+        time.sleep(max(0.0, begun_s + STALL_S - time.monotonic()))
+        os.kill(laboratory.pid, signal.SIGCONT)
+
+
+CONDITIONS = {
+    "idle": idle,
+    "both cores busy": busy,
+    "stopped, continued": stalled,
+    "2,000 connections": connections,
+    "no descriptors": no_descriptors,
+    "disk full": disk_full,
+}
+
+
+def measured(laboratory: Laboratory, cause: str, state: str, condition: str) -> float:
+    """Time to silence of one cell [s]."""
+    laboratory.ready()
+    before = resource.prlimit(laboratory.pid, resource.RLIMIT_FSIZE)
+    with ExitStack() as stack:
+        stack.callback(laboratory.virtual.faults.turn_gain_back)
+        stack.callback(laboratory.virtual.faults.heal_daq)
+        laboratory.run_into(state)
+        if condition == "stopped, continued":
+            with stalled(laboratory):
+                CAUSES[cause].happen(laboratory)
+            since_s = time.monotonic()
+        else:
+            stack.enter_context(CONDITIONS[condition](laboratory))
+            since_s = time.monotonic()
+            CAUSES[cause].happen(laboratory)
+        took_s = laboratory.witness.silent_since_s() - since_s
+    with suppress(ProcessLookupError):
+        resource.prlimit(laboratory.pid, resource.RLIMIT_FSIZE, before)
+    if cause == "SIGTERM":
+        laboratory.until(lambda: laboratory.engine is None or not laboratory.engine.is_alive, "end")
+    else:
+        with suppress(EngineError):
+            laboratory.client.close()
+    return max(took_s, 0.0)
+
+
+def table(laboratory: Laboratory, share: float, seed: int) -> bool:
+    """Measure cells in a random order, print the worst of each cause and condition; says whether all held."""
+    cells = list(product(CAUSES, STATES, CONDITIONS))
+    random.Random(seed).shuffle(cells)
+    cells = cells[: max(1, round(share * len(cells)))]
+    found: dict[tuple[str, str], list[tuple[float, str]]] = {}
+    for number, (cause, state, condition) in enumerate(cells, start=1):
+        took_s = measured(laboratory, cause, state, condition)
+        found.setdefault((cause, condition), []).append((took_s, state))
+        late = "  LATE" if took_s > CAUSES[cause].within_s else ""
+        print(f"{number:3d} {cause:20s} {state:14s} {condition:20s} {took_s:6.3f} s{late}", flush=True)
+    print(f"\n| cause | within | {' | '.join(CONDITIONS)} |")
+    print(f"|---|---|{'---|' * len(CONDITIONS)}")
+    for cause, facts in CAUSES.items():
+        worst = [max(found.get((cause, each), [(np.nan, "")])) for each in CONDITIONS]
+        row = " | ".join("" if np.isnan(took_s) else f"{took_s:.2f} ({state})" for took_s, state in worst)
+        print(f"| {cause} | {facts.within_s:.2f} | {row} |")
+    return all(took_s <= CAUSES[cause].within_s for (cause, _), each in found.items() for took_s, _ in each)
+
+
+def tried(laboratory: Laboratory, tries: int, commands: int) -> bool:
+    """Look for a living engine again and again under each condition, and count how often it was not found."""
+    missed = 0
+    for condition, make in CONDITIONS.items():
+        laboratory.ready()
+        # Each stop of one that stands still takes its patience: there are fewer of those.
+        count, most = tries // len(CONDITIONS), commands // len(CONDITIONS) + 1
+        delivered: dict[str, int] = {}
+        began_s = time.monotonic()
+        with make(laboratory):
+            for number in range(count):
+                try:
+                    engine = the_engine(laboratory.pid)
+                    is_due = condition != "stopped, continued" or number < 10
+                    how = stop_engine(engine, StopLevel.ABORT).value if is_due else "found"
+                except EngineError as error:
+                    how, missed = f"MISSED: {error}", missed + 1
+                delivered[how] = delivered.get(how, 0) + 1
+            for _ in range(most):
+                command = [sys.executable, "-m", "vibench.cli", "stop", "--pid", str(laboratory.pid)]
+                said = subprocess.run(command, capture_output=True, text=True, check=False)
+                how = "the command: " + (
+                    "MISSED" if "no engine" in said.stderr else f"exit {said.returncode}"
+                )
+                missed += "no engine" in said.stderr
+                delivered[how] = delivered.get(how, 0) + 1
+        print(f"{condition}: {delivered} in {time.monotonic() - began_s:.0f} s", flush=True)
+    print(f"a living engine was not found {missed} times")
+    return missed == 0
+
+
+def wall_rig() -> Rig:
+    """Put the shipped rig on the wall's clock, with a world that leaves the cores to the conditions."""
+    rig = load_rig(RIG)
+    assert rig.virtual is not None
+    virtual = rig.virtual.model_copy(update={"pace": "wall", "grid_rate_hz": 25_600.0})
+    daq = rig.daq.model_copy(update={"sample_rate_hz": 12_800.0})
+    return rig.model_copy(update={"virtual": virtual, "daq": daq})
+
+
+def main() -> None:
+    """Measure, and tell by the exit code whether every bound held."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--cells", type=float, default=1.0, help="share of the table")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--tries", type=int, default=0)
+    parser.add_argument("--commands", type=int, default=0)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder, VirtualRig(wall_rig()) as virtual:
+        os.environ["VIBENCH_STATE_DIR"] = str(Path(folder) / "state")
+        laboratory = Laboratory(virtual, Path(folder))
+        try:
+            if options.tries or options.commands:
+                holds = tried(laboratory, options.tries, options.commands)
+            else:
+                holds = table(laboratory, options.cells, options.seed)
+        finally:
+            laboratory.close()
+    raise SystemExit(not holds)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,127 @@
+"""Disks that are slow, small, or gone, and clocks that jump: silence, one sentence, and a recording."""
+
+import errno
+import os
+import time
+from collections import deque
+from dataclasses import dataclass, field
+from threading import Event, enumerate as threads
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import AcquisitionError, StopLevel, open_bench, open_recording
+from vibench.acquisition.plan import RunState
+from vibench.acquisition.recording import RecordingState, _journal, create_recording, part_of, recover
+from vibench.acquisition.rig import CalibrationRule, confirm_simulated
+from vibench.acquisition.run._run import Run
+from vibench.acquisition.stopping import Cause, StopRequest
+
+from .test_stop_matrix import PLAN, SILENT_V, terminal_v, upto
+
+PAUSE = Event()
+
+
+@dataclass
+class BadDisk:
+    """A recorder whose disk does, from a moment on, what ``meet`` does before every write and sync."""
+
+    meet: object
+    is_bad: bool = False
+    back: Event = field(default_factory=Event)
+
+    def create(self, path, header):
+        writer = create_recording(path, header)
+        writer._committer._closing_patience_s = 0.5
+        write, sync = writer._disk.write, writer._disk.sync
+
+        def bad_write(offset, data):
+            if self.is_bad:
+                self.meet(self, memoryview(data).nbytes)
+            write(offset, data)
+
+        def bad_sync():
+            if self.is_bad:
+                self.meet(self, 0)
+            sync()
+
+        writer._disk.write, writer._disk.sync = bad_write, bad_sync
+        return writer
+
+
+def at_one_megabyte_a_second(disk, count):
+    PAUSE.wait(count / 1e6)
+
+
+def refusing(number):
+    def refuse(disk, count):
+        raise OSError(number, os.strerror(number))
+
+    return refuse
+
+
+def hanging(disk, count):
+    disk.back.wait()
+
+
+DISKS = {
+    "1 MB/s": at_one_megabyte_a_second,
+    "full": refusing(errno.ENOSPC),
+    "quota": refusing(errno.EDQUOT),
+    "network gone": refusing(errno.ESTALE),
+    "input/output error": refusing(errno.EIO),
+    "network hangs": hanging,
+}
+
+
+@pytest.mark.parametrize("name", DISKS)
+def test_whatever_the_disk_does_there_is_silence_a_sentence_and_a_recording(laboratory, tmp_path, name):
+    virtual, connected = laboratory()
+    disk, path, said = BadDisk(DISKS[name]), tmp_path / "run.h5", ""
+    with open_bench(connected, confirm_simulated, CalibrationRule.WAIVED) as bench:
+        try:
+            with Run(bench, PLAN, path, create=disk.create) as run:
+                upto(run, RunState.RECORDING)
+                PAUSE.wait(0.6)  # a commit has been made
+                disk.is_bad = True
+                deque(run, maxlen=0)
+        except AcquisitionError as error:
+            said = str(error)
+        assert terminal_v(virtual) < SILENT_V
+    disk.is_bad = False
+    disk.back.set()
+    assert said or run.outcome.state is RunState.FINISHED
+    assert "\n" not in said
+    if not path.exists():
+        if name == "network hangs":  # its thread lets go of the file when the folder is back
+            give_up_s = time.monotonic() + 20
+            while any("committer" in each.name for each in threads()) and time.monotonic() < give_up_s:
+                PAUSE.wait(0.01)
+        assert part_of(path).exists()
+        recover(path)
+    with open_recording(path) as recording:
+        assert recording.samples > 0
+        assert np.isfinite(recording.read("drive_voltage")).all()
+
+
+@pytest.mark.parametrize("by_s", [3600.0, -3600.0])
+def test_a_clock_that_jumps_an_hour_changes_labels_and_nothing_else(laboratory, tmp_path, monkeypatch, by_s):
+    """Of the calendar; deadlines go by a clock that no one can set."""
+    virtual, connected = laboratory()
+    now = time.time
+    with open_bench(connected, confirm_simulated, CalibrationRule.WAIVED) as bench:
+        with Run(bench, PLAN, tmp_path / "run.h5") as run:
+            upto(run, RunState.RECORDING)
+            # The recording's own look at the clock: gRPC's must agree with that of its core.
+            monkeypatch.setattr(_journal, "time", SimpleNamespace(time=lambda: now() + by_s))
+            run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.ABORT, "enough"))
+            deque(run, maxlen=0)
+        assert terminal_v(virtual) < SILENT_V
+    with open_recording(tmp_path / "run.h5") as recording:
+        assert recording.state is RecordingState.STOPPED
+        assert recording.gaps == ()
+        times = [each.unix_time_s for each in recording.events]
+        assert max(times) - min(times) > 3500  # what is labelled says what the clock said
+        samples = [each.sample for each in recording.events]
+        assert samples == sorted(samples)
