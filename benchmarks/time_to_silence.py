@@ -250,7 +250,8 @@ CAUSES = {
     "viewer gone": Cause(Laboratory.forget_viewer, 0.55 + BLOCK_S + ABORT_S + MARGIN_S),
     "limit passed": Cause(
         lambda laboratory: laboratory.virtual.faults.turn_amplifier_gain(40.0),
-        2 * BLOCK_S + ABORT_S + MARGIN_S,
+        # Counted from the turn of the gain: while the drive rises, the limit is passed that much later.
+        RAMP_S + 2 * BLOCK_S + ABORT_S + MARGIN_S,
     ),
     "samples lost": Cause(lose_samples, BLOCK_S + MARGIN_S),
     "disk refuses": Cause(refuse_writing, 0.5 + BLOCK_S + MARGIN_S),

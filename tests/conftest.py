@@ -78,6 +78,8 @@ LONG = (
     "tests/gui/plots/test_logical_line.py",
     "tests/analysis/reproduction/test_reproduction.py",
     "tests/acquisition/engine/test_stopping_for_sure.py",
+    "tests/acquisition/engine/test_time_to_silence.py",
+    "tests/acquisition/run/test_disks.py",
     "tests/acquisition/engine/test_heartbeat.py",
     "tests/analysis/frequency_response/test_noise_response.py",
     "tests/cli/test_campaign_commands.py",

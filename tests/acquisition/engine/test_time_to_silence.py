@@ -1,0 +1,39 @@
+"""The table of docs/safety.md, measured again at a few of its cells: by the wall's clock, at the terminal."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="stalls and limits as Linux has them")
+
+
+def measured(*options):
+    script = str(ROOT / "benchmarks" / "time_to_silence.py")
+    return subprocess.run(
+        [sys.executable, script, *options], capture_output=True, text=True, check=False, env={**os.environ}
+    )
+
+
+def test_two_cells_of_the_table_are_silent_within_their_bounds():
+    told = measured("--cells", "0.007", "--seed", "7")
+    assert told.returncode == 0, told.stdout + told.stderr
+    assert told.stdout.count(" s\n") == 2
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_a_quarter_of_the_table_is_silent_within_its_bounds():
+    told = measured("--cells", "0.25", "--seed", "8")
+    assert told.returncode == 0, told.stdout + told.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_a_living_engine_is_always_found():
+    told = measured("--tries", "600", "--commands", "12")
+    assert told.returncode == 0, told.stdout + told.stderr
