@@ -41,12 +41,11 @@ def main() -> None:
     parser.add_argument("--edge", type=int, default=15, help="scenes near an edge of chaos")
     asked = parser.parse_args()
     random = np.random.default_rng(asked.seed)
-    scenes = [random_scene(random) for _ in range(asked.random)]
-    scenes += [edge_scene(random) for _ in range(asked.edge)]
-    compared = [_compared(scene) for scene in scenes]
+    compared = [_compared(random_scene(random)) for _ in range(asked.random)]
+    compared += [_compared(edge_scene(random)) for _ in range(asked.edge)]
     counts = Counter(each.verdict for each in compared)
     decided = counts["agrees"] + counts["is named"] + counts["DIFFERS"]
-    print(f"\nseed {asked.seed}: {dict(counts)} of {len(scenes)}; long runs that were lost are not counted")
+    print(f"\nseed {asked.seed}: {dict(counts)} of {len(compared)}; long runs that were lost are not counted")
     print(
         f"agree or named: {(decided - counts['DIFFERS']) / max(decided, 1):.1%} of {decided} that are decided"
     )

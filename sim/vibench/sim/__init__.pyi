@@ -96,4 +96,5 @@ from .scene import (
     plan_scene as plan_scene,
     solve_ensemble as solve_ensemble,
     solve_scene as solve_scene,
+    wilson_share as wilson_share,
 )

@@ -1,6 +1,7 @@
 """Verdicts follow from the numbers alone: the defaults first, then the options, in order."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, strategies as st
@@ -11,6 +12,7 @@ from vibench.analysis.report import FigureOptions
 from vibench.analysis.reproduction import AS_CHOSEN, Case, Evidence
 from vibench.analysis.reproduction._case import compared_up_to, damping, logarithm, swept_at
 from vibench.analysis.reproduction._claim import Claim, Expectation, Verdict, about, at_least, at_most, judged
+from vibench.analysis.reproduction._document import verdict_text
 
 CASE = Case(AS_CHOSEN, FigureOptions())
 DAMPED, VERY_DAMPED = damping(3e-5), damping(5e-5)
@@ -49,6 +51,36 @@ def test_a_claim_that_no_option_upholds_fails_and_keeps_all_that_was_tried():
     assert found.verdict is Verdict.FAILS
     assert found.met_under is None
     assert [each.values for each in found.findings] == [(1.0,), (2.0,), (3.0,)]
+
+
+def test_a_claim_that_some_starts_uphold_holds_for_a_share_of_them_and_no_option_is_tried():
+    last_hz = (310.0, 288.0, 291.0, 330.0)
+    sweep = replace(
+        claim(lambda _, case: (last_hz[case.draw],), about("last", "Hz", 290.0, 5.0), alternatives=(DAMPED,)),
+        draws=4,
+    )
+    found = judged(sweep, Evidence(no_studies), CASE)
+    assert found.verdict is Verdict.HOLDS_FOR_SHARE
+    (only,) = found.findings
+    assert (only.met, only.values, only.spread(0)) == (2, (310.0,), (288.0, 330.0))
+    assert verdict_text(found) == "holds for a share of starts: 2 of 4 (15 to 85 %)"
+
+
+def test_a_claim_that_every_start_upholds_holds_and_one_that_none_does_is_tried_under_options():
+    def measure(_evidence, case):
+        return (100.0 + case.draw if case.options.damping_time_s == 3e-5 else 10.0,)
+
+    both = replace(claim(measure, at_least("exponent", "1/s", 50.0), alternatives=(DAMPED,)), draws=3)
+    found = judged(both, Evidence(no_studies), CASE)
+    assert found.verdict is Verdict.HOLDS_UNDER
+    assert [len(each.draws) for each in found.findings] == [3, 3]
+
+
+def test_other_starts_are_a_millionth_of_the_gap_from_rest_and_the_same_again():
+    assert CASE.start == (0.0,) * 6
+    moved = replace(CASE, draw=3)
+    assert 0.0 < max(abs(value) for value in moved.start[:3]) <= 1e-6 * CASE.options.gap_m
+    assert moved.start == replace(CASE, draw=3).start != replace(CASE, draw=4).start
 
 
 def test_one_number_out_of_bounds_is_enough_to_fail():

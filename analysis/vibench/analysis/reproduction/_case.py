@@ -3,8 +3,11 @@
 The dampings at which claims are measured again: the paper leaves its unit open.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ..model import LogarithmOf
 from ..paper_figures import FigureOptions
@@ -13,6 +16,9 @@ SWEEP_AMPLITUDE_M = 5e-6
 """Base amplitude of the sweep of Fig. 13(d): the one that the paper sets beside 1.5 V."""
 EQUAL_PARTS = "power:3+5+7"
 AS_CHOSEN = "the defaults"
+PUSH, PUSHED_HZ = 1e-6, 260.0
+"""Of other starts: displacements over the gap, and velocities over those at this frequency."""
+State = tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -24,6 +30,17 @@ class Case:
     sweep_amplitude_m: float = SWEEP_AMPLITUDE_M
     sum_model: str = EQUAL_PARTS
     """The model n = 3+5+7, and how its terms share the force."""
+    draw: int = 0
+    """Start: 0 is rest; every other number is another start, a millionth of the gap away from it."""
+
+    @property
+    def start(self) -> State:
+        """X, y, z, vx, vy, vz [m, m/s] at the beginning."""
+        if self.draw == 0:
+            return (0.0,) * 6
+        speed = 2.0 * math.pi * PUSHED_HZ
+        x, y, z, vx, vy, vz = PUSH * self.options.gap_m * np.random.default_rng(self.draw).uniform(-1, 1, 6)
+        return (float(x), float(y), float(z), float(speed * vx), float(speed * vy), float(speed * vz))
 
 
 @dataclass(frozen=True)

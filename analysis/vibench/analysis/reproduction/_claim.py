@@ -5,13 +5,13 @@ A number that a claim wants, with how far it may be off.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
 from ..errors import InvalidRequest
-from ._case import Alternative, Case
+from ._case import AS_CHOSEN, Alternative, Case
 from ._evidence import Evidence
 
 
@@ -78,6 +78,8 @@ class Verdict(StrEnum):
 
     HOLDS = "holds"
     """Under the defaults."""
+    HOLDS_FOR_SHARE = "holds for a share of starts"
+    """Under the defaults, from some of the starts that were tried: which, is chance."""
     HOLDS_UNDER = "holds under"
     """Not under the defaults, but under a named option."""
     FAILS = "does not hold"
@@ -102,6 +104,8 @@ class Claim:
     """Options tried where the defaults do not uphold it, in this order."""
     remark: str = ""
     """What a reader should know where it does not hold; without numbers, which the page measures."""
+    draws: int = 1
+    """Starts that it is measured from: more where its numbers hang on which motion chaos ends in, or when."""
     is_scored: bool = True
     """Whether it is measured again at every damping of the score; not where that would take too long."""
 
@@ -112,7 +116,23 @@ class Finding:
 
     case: Case
     values: tuple[float, ...]
+    """From rest."""
     is_met: bool
+    """By every start."""
+    draws: tuple[tuple[float, ...], ...] = ()
+    """The numbers of every start, rest first."""
+    met: int = 0
+    """Starts that uphold the claim."""
+
+    @property
+    def is_met_in_part(self) -> bool:
+        """By some starts, and not by all."""
+        return 0 < self.met < len(self.draws)
+
+    def spread(self, number: int) -> tuple[float, float]:
+        """Give the smallest and the largest of one number over all starts; NaN where one has none."""
+        values = [draw[number] for draw in self.draws]
+        return float(np.min(values)), float(np.max(values))
 
 
 @dataclass(frozen=True)
@@ -127,6 +147,8 @@ class Judgement:
         """Say whether the claim holds, and how."""
         if self.findings[0].is_met:
             return Verdict.HOLDS
+        if self.findings[0].is_met_in_part:
+            return Verdict.HOLDS_FOR_SHARE
         return Verdict.FAILS if self.met_under is None else Verdict.HOLDS_UNDER
 
     @property
@@ -136,7 +158,9 @@ class Judgement:
 
 
 def found(claim: Claim, evidence: Evidence, case: Case) -> Finding:
-    """Measure a claim under one case.
+    """Measure a claim under one case, from every start.
+
+    From rest alone under an option that does not uphold it there: then it is not upheld by every start.
 
     Raises
     ------
@@ -144,21 +168,32 @@ def found(claim: Claim, evidence: Evidence, case: Case) -> Finding:
         When the measure gives another count of numbers than the claim wants.
 
     """
+    draws = [_measured(claim, evidence, case)]
+    if _is_met(claim, draws[0]) or case.name == AS_CHOSEN:
+        draws += [_measured(claim, evidence, replace(case, draw=number)) for number in range(1, claim.draws)]
+    met = sum(_is_met(claim, values) for values in draws)
+    return Finding(case, draws[0], met == len(draws), tuple(draws), met)
+
+
+def _measured(claim: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
     values = claim.measure(evidence, case)
     if len(values) != len(claim.wanted):
         raise InvalidRequest(
             f"the claim {claim.key!r} wants {len(claim.wanted)} numbers and {len(values)} were measured; "
             "give one for each"
         )
-    is_met = all(wanted.is_met_by(value) for wanted, value in zip(claim.wanted, values, strict=True))
-    return Finding(case, values, is_met)
+    return values
+
+
+def _is_met(claim: Claim, values: tuple[float, ...]) -> bool:
+    return all(wanted.is_met_by(value) for wanted, value in zip(claim.wanted, values, strict=True))
 
 
 def judged(claim: Claim, evidence: Evidence, case: Case) -> Judgement:
     """Measure a claim under a case; where it is not upheld, under each of its alternatives until one does."""
     findings = [found(claim, evidence, case)]
     for alternative in claim.alternatives:
-        if findings[-1].is_met:
+        if findings[-1].is_met or findings[0].is_met_in_part:
             break
         findings.append(found(claim, evidence, alternative.of(case)))
     return Judgement(claim, tuple(findings))

@@ -3,7 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from ._claim import Claim, Finding, Judgement, Verdict
+from vibench.sim import wilson_share
+
+from ._claim import Claim, Expectation, Finding, Judgement, Verdict
 from ._page_tables import PageTable, score_table
 from ._score import DampingScore
 
@@ -74,7 +76,9 @@ def _summary(found: Reproduction) -> Iterator[str]:
         f"Made by `{COMMAND}`; not edited by hand.",
         "Every claim of Gong et al. (2025) that has a number or a direction, measured on our simulation of",
         "their specimen, with what we want to see and the verdict. Chaotic motion is a draw: another run of",
-        "it differs by some per cent, and the bounds are wide enough for that. The paper gives hardly any",
+        "it differs by some per cent, and the bounds are wide enough for that. Where it is chance which",
+        "motion chaos ends in, or when, a claim is measured from several starts, a millionth of the gap",
+        "apart, and the spread of each number stands behind it. The paper gives hardly any",
         "tolerances: the bounds are ours, and some were settled after a first look at the numbers. Where a",
         "claim does not hold, options are tried one by one, in the order listed, until one upholds it.",
         "The experiment of Figs. 12 to 14 is repeated on the virtual rig by `vibench demo`.",
@@ -83,6 +87,7 @@ def _summary(found: Reproduction) -> Iterator[str]:
         found.made_with,
         "",
         f"Of {len(found.judgements)} claims {found.count(Verdict.HOLDS)} hold under the defaults,",
+        f"{found.count(Verdict.HOLDS_FOR_SHARE)} for a share of starts,",
         f"{found.count(Verdict.HOLDS_UNDER)} under another named option,",
         f"{found.count(Verdict.FAILS)} under none that was tried.",
     )
@@ -130,15 +135,29 @@ def _row(judgement: Judgement) -> str:
 
 def verdict_text(judgement: Judgement) -> str:
     """Say the verdict, with the option that it rests on."""
-    under = judgement.met_under
+    under, first = judgement.met_under, judgement.findings[0]
+    if judgement.verdict is Verdict.HOLDS_FOR_SHARE:
+        share = wilson_share(first.met, len(first.draws))
+        return (
+            f"{judgement.verdict.value}: {first.met} of {len(first.draws)} "
+            f"({100 * share.low:.0f} to {100 * share.high:.0f} %)"
+        )
     if judgement.verdict is Verdict.HOLDS_UNDER and under is not None:
         return f"holds under {under.case.name}"
     return judgement.verdict.value if judgement.verdict is Verdict.HOLDS else f"**{judgement.verdict.value}**"
 
 
 def _values(claim: Claim, finding: Finding) -> str:
-    shown = zip(claim.wanted, finding.values, strict=True)
-    return "; ".join(f"{wanted.name}: {wanted.shown(value)}" for wanted, value in shown)
+    return "; ".join(_value(wanted, finding, number) for number, wanted in enumerate(claim.wanted))
+
+
+def _value(wanted: Expectation, finding: Finding, number: int) -> str:
+    """Say one number, and its spread over starts where there are several."""
+    said = f"{wanted.name}: {wanted.shown(finding.values[number])}"
+    if len(finding.draws) < 2:
+        return said
+    low, high = finding.spread(number)
+    return f"{said} ({wanted.shown(low, '')} to {wanted.shown(high)} over {len(finding.draws)} starts)"
 
 
 def wanted_text(claim: Claim) -> str:

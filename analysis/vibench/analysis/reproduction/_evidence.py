@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from vibench.sim import Observable, Specimen, gong2025
-from vibench.sim.study import Study, StudyObservable, StudyResults
+from vibench.sim.study import GivenStart, Start, Study, StudyObservable, StudyResults
 
 from ..paper_figures import AMPLITUDES_M, Responses, responses
 from ._case import Case
@@ -89,4 +89,5 @@ def model_study(
         duration_s=options.duration_s,
         window_s=options.window_s,
         budget_s=options.budget_s,
+        starts=(Start.REST if case.draw == 0 else GivenStart(label=f"draw {case.draw}", state=case.start),),
     )

@@ -1,7 +1,7 @@
 """How many claims hold at each damping: the paper leaves its unit open, and much turns on it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,7 +34,7 @@ def scores(claims: Sequence[Claim], evidence: Evidence, case: Case) -> tuple[Dam
 
 
 def _score(claims: Sequence[Claim], evidence: Evidence, case: Case) -> DampingScore:
-    is_met = {claim.key: found(claim, evidence, case).is_met for claim in claims}
+    is_met = {claim.key: found(replace(claim, draws=1), evidence, case).is_met for claim in claims}
     weak, moderate = (
         float(np.nanmax(level(evidence, case, each).exponent_per_s)) for each in (WEAK_M, MODERATE_M)
     )

@@ -22,6 +22,8 @@ _HIGH_RATE = 0.8
 _CURVE_POINTS = 200
 _MOSTLY_SEVENTH = "power:3@0.05+5@0.15+7@0.8"
 """The paper does not say how its three terms share the force."""
+RATE_DRAWS = 4
+"""Rates compare responses in chaos, and on either of several motions: each draw follows every model anew."""
 OPEN: tuple[Alternative, ...] = (
     compared_up_to(600.0),
     *(logarithm(each) for each in LogarithmOf if each is not LogarithmOf.MILLIMETRES),
@@ -134,6 +136,7 @@ SIMILARITY_CLAIMS = (
         measured_by="Eqs. 6 and 7 on the grid, at 1 and 50 µm.",
         wanted=(about("1 µm", "%", 0.83, _READ_OFF), about("50 µm", "%", 0.42, _READ_OFF)),
         measure=_cubic_first,
+        draws=RATE_DRAWS,
         alternatives=(*OPEN, *DAMPINGS),
     ),
     Claim(
@@ -147,6 +150,7 @@ SIMILARITY_CLAIMS = (
             about("50 µm", "%", 0.78, _READ_OFF),
         ),
         measure=_cubic_second,
+        draws=RATE_DRAWS,
         alternatives=(*OPEN, *DAMPINGS),
     ),
     Claim(
@@ -156,6 +160,7 @@ SIMILARITY_CLAIMS = (
         measured_by="Rate at 50 µm less that at 1 µm.",
         wanted=tuple(at_most(each, "%", 0.0) for each in _NAMES),
         measure=_falling,
+        draws=RATE_DRAWS,
         alternatives=OPEN,
         is_scored=False,
     ),
@@ -166,6 +171,7 @@ SIMILARITY_CLAIMS = (
         measured_by="Largest step of the rate from one amplitude to the next.",
         wanted=tuple(at_most(each, "%", _READ_OFF) for each in _NAMES),
         measure=_steps_down,
+        draws=RATE_DRAWS,
         alternatives=OPEN,
         is_scored=False,
     ),
@@ -176,6 +182,7 @@ SIMILARITY_CLAIMS = (
         measured_by="How far the smaller rate of 5 and 10 µm lies below the smaller of 1 and 50 µm.",
         wanted=tuple(at_least(each, "%", 0.0) for each in _NAMES),
         measure=_falling_then_rising,
+        draws=RATE_DRAWS,
         alternatives=OPEN,
         is_scored=False,
     ),
@@ -186,6 +193,7 @@ SIMILARITY_CLAIMS = (
         measured_by="Rate of n = 7 less that of n = 3, mean of the four amplitudes.",
         wanted=(at_least("Response I", "%", 0.0), at_least("Response II", "%", 0.0)),
         measure=_better_with_order,
+        draws=RATE_DRAWS,
         alternatives=OPEN,
         is_scored=False,
     ),
@@ -196,6 +204,7 @@ SIMILARITY_CLAIMS = (
         measured_by="Rate of n = 7 less that of the sum, mean of the four amplitudes.",
         wanted=(at_least("Response I", "%", 0.0), at_least("Response II", "%", 0.0)),
         measure=_sum_below_seventh,
+        draws=RATE_DRAWS,
         alternatives=OPEN,
         is_scored=False,
     ),

@@ -132,6 +132,10 @@ class SpecimenDescription(_Described):
     _meant: ClassVar[Mapping[str, str]] = {}
     """What a table says that does not say it."""
 
+    def __hash__(self) -> int:
+        # A table of sources has no hash of its own; all that is said is in the text.
+        return hash(self.model_dump_json())
+
     @model_validator(mode="before")
     @classmethod
     def _from_its_base(cls, said: object, info: ValidationInfo) -> object:

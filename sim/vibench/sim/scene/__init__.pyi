@@ -22,6 +22,7 @@ from ._scene import (
 from ._shares import (
     EscapeRate as EscapeRate,
     Share as Share,
+    wilson_share as wilson_share,
 )
 from ._solve import (
     solve_ensemble as solve_ensemble,

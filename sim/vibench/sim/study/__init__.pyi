@@ -45,6 +45,7 @@ from ._store import (
     MemoryStore as MemoryStore,
 )
 from ._study import (
+    GivenStart as GivenStart,
     Start as Start,
     Study as Study,
     StudyObservable as StudyObservable,
