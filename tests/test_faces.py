@@ -30,6 +30,7 @@ FOR_PEOPLE = (
 FOR_OUR_PROGRAMS = (
     "vibench.sim.kernels",
     "vibench.sim.shaker",
+    "vibench.sim.hdf5_files",
     "vibench.sim.accuracy_benchmark",
     "vibench.analysis.simulation",
     "vibench.analysis.reproduction",

@@ -137,6 +137,11 @@ COMMANDS = {
         "recover_recording",
         "Finish a recording that was cut off: all that was committed becomes NAME.h5.",
     ),
+    "verify": Place(
+        "verify",
+        "verify",
+        "Hold every recording of a folder against its seal, samples and all, and against journals.",
+    ),
     "serve-rig": Place(
         "serve_rig", "serve_rig", "Serve the virtual rig to any pyvisa and nidaqmx program until Ctrl-C."
     ),

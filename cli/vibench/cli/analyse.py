@@ -28,6 +28,7 @@ from vibench.analysis import (
 )
 from vibench.analysis.report import write_report
 
+from .external_data import AllowExternal, external_data
 from .output import bold, console, print_json
 from .paths import AsJson, room_for_folder, unused
 from .reading_bar import reading_bar
@@ -111,6 +112,7 @@ def analyse(
         float,
         typer.Option(metavar="P", help="That the bounds of a line hold the truth.", rich_help_panel=NOISE),
     ] = FrequencyResponseRequest.confidence,
+    allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
     """Analyse recordings, complete, interrupted or still growing, and write one HTML report."""
@@ -129,6 +131,20 @@ def analyse(
         raise InvalidRequest(
             "--fit and --specimen were given; one of the two says which specimen is laid over"
         )
+    with external_data(allow_external):
+        _analyse(recording, out, request, simulate=simulate, fit=fit, specimen=specimen, as_json=as_json)
+
+
+def _analyse(
+    recording: Path,
+    out: Path | None,
+    request: FrequencyResponseRequest,
+    *,
+    simulate: bool,
+    fit: bool,
+    specimen: Path | None,
+    as_json: bool,
+) -> None:
     paths = recordings_in(recording) if recording.is_dir() else (recording,)
     # "." has no name of its own.
     place = recording if recording.name.strip(".") else recording.resolve()

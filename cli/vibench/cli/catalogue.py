@@ -1,5 +1,6 @@
 """`vibench catalogue`: what lies in a folder of recordings."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -8,6 +9,7 @@ import typer
 
 from vibench.acquisition.campaign import CatalogueEntry, Refresh, list_recordings
 
+from .external_data import AllowExternal, external_data
 from .output import console, print_json
 from .paths import AsJson
 
@@ -19,13 +21,28 @@ def show_catalogue(
     rebuild: Annotated[
         bool, typer.Option("--rebuild", help="Read every file again, not only what has changed.")
     ] = False,
+    allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
     """List the recordings of a folder and the folders in it: what, when, how they ended, how large."""
-    entries = list_recordings(folder, Refresh.ALL if rebuild else Refresh.CHANGED)
+    with external_data(allow_external):
+        entries = list_recordings(folder, Refresh.ALL if rebuild else Refresh.CHANGED)
     if as_json:
         print_json({"folder": str(folder.resolve()), "recordings": [asdict(each) for each in entries]})
-        return
+    else:
+        _show(entries)
+    for each in entries:
+        if each.is_bad:
+            typer.echo(f"error: {_named(each)}", err=True)
+    if any(each.is_bad for each in entries):
+        raise typer.Exit(1)
+
+
+def _named(entry: CatalogueEntry) -> str:
+    return entry.reason if entry.path in entry.reason else f"{entry.path}: {entry.reason}"
+
+
+def _show(entries: Sequence[CatalogueEntry]) -> None:
     rows = [COLUMNS, *(_row(each) for each in entries)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(COLUMNS))]
     for row in rows:

@@ -8,6 +8,7 @@ import typer
 from vibench.acquisition import open_recording
 from vibench.analysis.exchange import Format, Results, excerpt, export_samples
 
+from .external_data import AllowExternal, external_data
 from .output import console
 from .progress_bars import transfer_bar
 
@@ -32,9 +33,10 @@ def export(
     results: Annotated[
         bool, typer.Option("--results", help="Results that were saved in the recording, too.")
     ] = False,
+    allow_external: AllowExternal = False,
 ) -> None:
     """Write a recording's samples, with units and times, as a file that other programs read."""
-    with open_recording(recording) as opened:
+    with external_data(allow_external), open_recording(recording) as opened:
         chosen = excerpt(opened, tuple(channels.split(",")) if channels else (), from_s, to_s)
         path = recording.with_name(f"{chosen.name}.{to.value}") if out is None else out
         included = Results.INCLUDED if results else Results.LEFT_OUT

@@ -10,6 +10,7 @@ from vibench.acquisition import load_toml
 from vibench.analysis import InvalidRequest
 from vibench.analysis.exchange import ImportMapping, SourceChannel, import_recording, opened_source
 
+from .external_data import AllowExternal, external_data
 from .output import console, print_json
 from .paths import AsJson
 from .progress_bars import transfer_bar
@@ -25,9 +26,15 @@ def import_file(
         Path | None,
         typer.Option("--out", metavar="NAME.h5", help="The new recording; beside FILE if absent."),
     ] = None,
+    allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
     """Make a recording of another program's file, or say what is in it."""
+    with external_data(allow_external):
+        _import(file, mapping, out, as_json=as_json)
+
+
+def _import(file: Path, mapping: Path | None, out: Path | None, *, as_json: bool) -> None:
     if mapping is None:
         if out is not None:
             raise InvalidRequest(f"{out} cannot be made without a mapping; give --mapping MAP.toml")

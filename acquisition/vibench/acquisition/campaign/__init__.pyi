@@ -49,3 +49,7 @@ from ._reconnecting_bench import (
 from ._run_campaign import (
     run_campaign as run_campaign,
 )
+from ._verify import (
+    VerifiedRecording as VerifiedRecording,
+    verify_recordings as verify_recordings,
+)

@@ -2,11 +2,10 @@
 
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from ..errors import RecordingError
 from ..plan import Measurement
-from ..recording import SUFFIX, Recording, RecordingState, open_recording, part_of, tmp_of
+from ..recording import SUFFIX, SealDepth, part_of, tmp_of
+from ._kept_recording import KeptRecording, looked_at
 
 
 def attempts_in(folder: Path, name: str) -> tuple[Path, ...]:
@@ -22,8 +21,10 @@ def next_attempt(folder: Path, name: str) -> Path:
     return _attempt(folder, name, len(attempts_in(folder, name)) + 1)
 
 
-def complete_attempt(folder: Path, name: str, measurement: Measurement) -> Path | None:
-    """Find a complete recording of a point.
+def complete_attempt(
+    folder: Path, name: str, measurement: Measurement, depth: SealDepth
+) -> KeptRecording | None:
+    """Find a complete recording of a point; the last damaged one where there is no sound one, or None.
 
     Raises
     ------
@@ -31,27 +32,22 @@ def complete_attempt(folder: Path, name: str, measurement: Measurement) -> Path 
         When one is complete, but was made by another plan.
 
     """
+    damaged: KeptRecording | None = None
     for path in attempts_in(folder, name):
         if not path.exists():
             continue
-        with open_recording(path) as recording:
-            if recording.state is not RecordingState.COMPLETE:
-                continue
-            if not is_made_by(recording, measurement):
-                raise RecordingError(
-                    f"{path} is complete, but was made by another plan than the campaign's {name!r}. "
-                    "Nothing was recorded; give the measurement another name, or another folder"
-                )
-            return path
-    return None
-
-
-def is_made_by(recording: Recording, measurement: Measurement) -> bool:
-    """Whether a recording was made by this plan, as this version understands what stands in it."""
-    try:
-        return Measurement.model_validate(recording.plan) == measurement
-    except ValidationError:
-        return False
+        found = looked_at(path, measurement, depth)
+        if found.damage:
+            damaged = found
+        if not found.is_complete:
+            continue
+        if not found.is_of_this_plan:
+            raise RecordingError(
+                f"{path} is complete, but was made by another plan than the campaign's {name!r}. "
+                "Nothing was recorded; give the measurement another name, or another folder"
+            )
+        return found
+    return damaged
 
 
 def _attempt(folder: Path, name: str, number: int) -> Path:

@@ -132,7 +132,13 @@ class Attempts:
 
     def _ended(self, point: Point, outcome: Outcome) -> PointResult:
         if outcome.state is not RunState.FINISHED:
-            self._journal.end(point.name, JournalPointState.INTERRUPTED, ReasonCode.STOPPED, outcome.reason)
+            self._journal.end(
+                point.name,
+                JournalPointState.INTERRUPTED,
+                ReasonCode.STOPPED,
+                outcome.reason,
+                _seal_of(outcome.path),
+            )
             self._tell(
                 CampaignEventKind.POINT_STOPPED, f"{point.name}: {outcome.reason}", point, outcome.path
             )
@@ -142,14 +148,14 @@ class Attempts:
         over = _over_range(outcome.path, point.measurement.excitation.result_labels)
         reason_code = ReasonCode.OVER_RANGE if over else ReasonCode.CARRIED_OUT
         reason = f"{outcome.reason}; {over}" if over else outcome.reason
-        self._journal.end(point.name, JournalPointState.DONE, reason_code, reason)
+        self._journal.end(point.name, JournalPointState.DONE, reason_code, reason, _seal_of(outcome.path))
         self._tell(CampaignEventKind.POINT_DONE, f"{point.name}: {reason}", point, outcome.path)
         return PointResult(point.name, PointOutcome.RECORDED, outcome.path, reason, reason_code)
 
     def _failed(self, point: Point, path: Path, error: AcquisitionError) -> None:
         reason_code = reason_code_of(error)
         try:
-            self._journal.end(point.name, JournalPointState.FAILED, reason_code, str(error))
+            self._journal.end(point.name, JournalPointState.FAILED, reason_code, str(error), _seal_of(path))
         except RecordingError as second:  # lies in the same folder: the first is the cause
             error.add_note(str(second))
         self._say(
@@ -201,6 +207,15 @@ class Attempts:
 
     def _tell(self, kind: CampaignEventKind, text: str, point: Point, path: Path) -> None:
         self._say(CampaignEvent(kind, text, {"point": point.name, "file": path.name}))
+
+
+def _seal_of(path: Path) -> str:
+    """Give the seal that a recording got at its end; empty where it came to none."""
+    try:
+        with open_recording(path) as recording:
+            return recording.seal
+    except RecordingError:
+        return ""
 
 
 def _over_range(path: Path, labels: Collection[str]) -> str:

@@ -4,6 +4,7 @@ The catalogue is a copy of what the files say, kept in ``catalogue.sqlite`` besi
 and made again at any time.
 """
 
+import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
@@ -17,7 +18,7 @@ from ..recording import PART_SUFFIX, SUFFIX
 from ._catalogue_entry import CatalogueEntry, read_entry
 
 CATALOGUE_NAME = "catalogue.sqlite"
-VERSION = 1
+VERSION = 2
 """Raised whenever an entry changes; an older catalogue is then made again."""
 WAIT_S = 10.0
 """For another program that is writing the same catalogue."""
@@ -32,7 +33,7 @@ class Refresh(StrEnum):
     """Which recordings are read again."""
 
     CHANGED = "changed"
-    """Those whose size or time has changed, and those that are not finished."""
+    """Those that anybody has written to since, and those that are not finished."""
     ALL = "all"
 
 
@@ -83,35 +84,40 @@ def _prepared(connection: sqlite3.Connection) -> sqlite3.Connection:
     if version != VERSION:
         columns = ", ".join(f"{name} {_TYPES.get(name, 'TEXT')}" for name in _COLUMNS)
         connection.execute("DROP TABLE IF EXISTS recordings")
-        connection.execute(f"CREATE TABLE recordings ({columns}, mtime_ns INTEGER, PRIMARY KEY (path))")
+        connection.execute(f"CREATE TABLE recordings ({columns}, stamp TEXT, PRIMARY KEY (path))")
         connection.execute(f"PRAGMA user_version = {VERSION}")
     return connection
 
 
 def _update(folder: Path, connection: sqlite3.Connection) -> None:
     """Read what is new or changed, and forget what is gone; all in one transaction."""
-    rows = connection.execute("SELECT path, size_bytes, mtime_ns FROM recordings")
-    known = {path: (size, mtime) for path, size, mtime in rows}
-    for path in _recordings(folder):
+    known = dict(connection.execute("SELECT path, stamp FROM recordings").fetchall())
+    for path in recordings_below(folder):
         try:
             found = path.stat()
         except FileNotFoundError:  # it got its final name while we looked
             continue
         where = path.relative_to(folder).as_posix()
-        stamp = (found.st_size, found.st_mtime_ns)
+        stamp = _stamp(found)
         # A .part says "interrupted" when its program is dead, and no byte of it changes for that.
         if known.pop(where, None) != stamp or path.suffix == PART_SUFFIX:
             entry = read_entry(folder, path, found.st_size)
             marks = ", ".join("?" * (len(_COLUMNS) + 1))
             connection.execute(
                 f"INSERT OR REPLACE INTO recordings VALUES ({marks})",  # noqa: S608 - question marks alone
-                (*astuple(entry), found.st_mtime_ns),
+                (*astuple(entry), stamp),
             )
     connection.executemany("DELETE FROM recordings WHERE path = ?", ((path,) for path in known))
     connection.execute("COMMIT")
 
 
-def _recordings(folder: Path) -> Iterator[Path]:
+def _stamp(found: os.stat_result) -> str:
+    """Give what differs after any write: no program sets back the time that the file system noted."""
+    return f"{found.st_ino} {found.st_size} {found.st_mtime_ns} {found.st_ctime_ns}"
+
+
+def recordings_below(folder: Path) -> Iterator[Path]:
+    """Give every recording of a folder and the folders in it, finished or not."""
     yield from sorted(folder.rglob(f"*{SUFFIX}"))
     yield from sorted(folder.rglob(f"*{SUFFIX}{PART_SUFFIX}"))
 

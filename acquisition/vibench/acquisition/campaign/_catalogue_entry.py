@@ -5,10 +5,20 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import RecordingError
-from ..recording import PART_SUFFIX, Recording, RecordingState, open_recording
+from ..recording import (
+    PART_SUFFIX,
+    Recording,
+    RecordingState,
+    SealCheck,
+    SealDepth,
+    SealState,
+    open_recording,
+)
 
 UNREADABLE = "unreadable"
 """State of a file that is no recording, or damaged; its reason says what is wrong."""
+DAMAGED = "damaged"
+"""State of a recording that opens, and is not as it was sealed."""
 GOOD = "good"
 _FREQUENCIES = ("frequency_hz", "start_hz", "stop_hz", "low_hz", "high_hz", "band_start_hz", "band_stop_hz")
 
@@ -22,7 +32,7 @@ class CatalogueEntry:
     name: str
     """Of the measurement."""
     state: str
-    """As in `recording.layout.RecordingState`, or ``unreadable``."""
+    """As in `recording.layout.RecordingState`, ``damaged`` or ``unreadable``."""
     reason: str
     verdict: str
     """``good``, or what is to be minded: ended early, near full scale, samples lost."""
@@ -42,6 +52,13 @@ class CatalogueEntry:
     operator: str
     notes: str
     recording_id: str
+    seal: str
+    """``intact`` as far as a quick look shows, ``damaged``, ``unsealed`` or ``unfinished``; or empty."""
+
+    @property
+    def is_bad(self) -> bool:
+        """Whether the file is damaged, or cannot be read."""
+        return self.state in (UNREADABLE, DAMAGED)
 
     @property
     def is_finished(self) -> bool:
@@ -60,18 +77,21 @@ def read_entry(folder: Path, path: Path, size_bytes: int) -> CatalogueEntry:
 
 
 def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
-    excitation = recording.plan.get("excitation", {})
+    said = recording.plan.get("excitation")
+    excitation = said if isinstance(said, dict) else {}
     low_hz, high_hz = _band(excitation)
+    seal = recording.check_seal(SealDepth.QUICK)
+    is_damaged = seal.state is SealState.DAMAGED
     return CatalogueEntry(
         path=where,
         name=str(recording.plan.get("name", Path(where).name.split(".")[0])),
-        state=recording.state.value,
-        reason=recording.reason,
-        verdict=_verdict(recording),
+        state=DAMAGED if is_damaged else recording.state.value,
+        reason=seal.sentence if is_damaged else recording.reason,
+        verdict=_verdict(recording, seal),
         started_utc=recording.started_utc,
         origin=recording.origin.value,
         kind=str(excitation.get("kind", "")),
-        amplitude_vpp=excitation.get("amplitude_vpp"),
+        amplitude_vpp=_number(excitation.get("amplitude_vpp")),
         frequency_low_hz=low_hz,
         frequency_high_hz=high_hz,
         duration_s=recording.duration_s,
@@ -81,6 +101,7 @@ def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
         operator=str(recording.confirmations.get("operator", "")),
         notes=str(recording.plan.get("notes", "")),
         recording_id=recording.recording_id,
+        seal=seal.state.value,
     )
 
 
@@ -104,21 +125,37 @@ def _unreadable(where: str, reason: str, size_bytes: int) -> CatalogueEntry:
         operator="",
         notes="",
         recording_id="",
+        seal="",
     )
 
 
 def _band(excitation: dict[str, Any]) -> tuple[float | None, float | None]:
     """Lowest and highest frequency of an excitation, as its plan names them."""
-    grid = excitation.get("grid") or {}
-    named = [table.get(key) for table in (excitation, grid) for key in _FREQUENCIES]
+    grid, listed = excitation.get("grid"), excitation.get("frequencies_hz")
+    tables = (excitation, grid) if isinstance(grid, dict) else (excitation,)
+    named = [table.get(key) for table in tables for key in _FREQUENCIES]
     found = [
-        each for each in (*named, *excitation.get("frequencies_hz", ())) if isinstance(each, int | float)
+        number
+        for each in (*named, *(listed if isinstance(listed, list) else ()))
+        if (number := _number(each)) is not None
     ]
     return (min(found), max(found)) if found else (None, None)
 
 
-def _verdict(recording: Recording) -> str:
-    minded = [] if recording.state is RecordingState.COMPLETE else [recording.state.value]
+def _number(value: object) -> float | None:
+    """Give a number that a plan says, whatever version wrote it; None for anything else."""
+    try:
+        return float(value) if isinstance(value, int | float) else None
+    except OverflowError:
+        return None
+
+
+def _verdict(recording: Recording, seal: SealCheck) -> str:
+    minded = [f"damaged: {seal.sentence}"] if seal.state is SealState.DAMAGED else []
+    if recording.state is not RecordingState.COMPLETE:
+        minded.append(recording.state.value)
+    if seal.state is SealState.UNSEALED:
+        minded.append("no seal")
     roles = ", ".join(dict.fromkeys(each.channel for each in recording.overloads))
     if roles:
         minded.append(f"near full scale: {roles}")

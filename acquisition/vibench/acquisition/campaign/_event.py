@@ -15,6 +15,8 @@ class CampaignEventKind(StrEnum):
     POINT_STOPPED = "point_stopped"
     FAULT = "fault"
     """An attempt failed, or the campaign met something that ends it."""
+    DAMAGED = "damaged"
+    """A recording that was complete is not as it was sealed, or is gone; its point is made again."""
     RETRY = "retry"
     RESTING = "resting"
     """Silence between two recordings."""

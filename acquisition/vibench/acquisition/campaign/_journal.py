@@ -16,7 +16,7 @@ from ..errors import RecordingError
 from ..host import ClosedOnLeaving
 from ..plan import Campaign, Point
 from ._bench_identity import BenchIdentity
-from ._journal_database import SCHEMA, VERSION, connected, require_version, sentences
+from ._journal_database import SCHEMA, VERSION, brought_up, connected, require_version, sentences
 from ._journal_point import JournalPoint, JournalPointState, points_of
 from ._point_outcome import ReasonCode
 
@@ -67,6 +67,8 @@ class Journal(ClosedOnLeaving):
         connection = connected(path)
         try:
             require_version(path, connection)
+            with sentences(path):
+                brought_up(connection)
         except RecordingError:
             connection.close()
             raise
@@ -96,21 +98,24 @@ class Journal(ClosedOnLeaving):
         """Say that an attempt begins, before anything plays."""
         with self._transaction() as connection:
             self._set(connection, name, JournalPointState.RUNNING, ReasonCode.RUNNING, "")
-            connection.execute("UPDATE points SET file = ? WHERE name = ?", (file, name))
+            connection.execute("UPDATE points SET file = ?, seal = '' WHERE name = ?", (file, name))
             connection.execute(
-                "INSERT INTO attempts SELECT ?, COUNT(*) + 1, ?, 'running', ?, '', ?, '' FROM attempts "
+                "INSERT INTO attempts SELECT ?, COUNT(*) + 1, ?, 'running', ?, '', ?, '', '' FROM attempts "
                 "WHERE name = ?",
                 (name, file, ReasonCode.RUNNING, _now(), name),
             )
 
-    def end(self, name: str, state: JournalPointState, reason_code: ReasonCode, reason: str) -> None:
-        """Say how the running attempt came out."""
+    def end(
+        self, name: str, state: JournalPointState, reason_code: ReasonCode, reason: str, seal: str = ""
+    ) -> None:
+        """Say how the running attempt came out, and how its recording is sealed."""
         with self._transaction() as connection:
             self._set(connection, name, state, reason_code, reason)
+            connection.execute("UPDATE points SET seal = ? WHERE name = ?", (seal, name))
             connection.execute(
-                "UPDATE attempts SET state = ?, why = ?, reason = ?, ended_utc = ? "
+                "UPDATE attempts SET state = ?, why = ?, reason = ?, ended_utc = ?, seal = ? "
                 "WHERE name = ? AND state = 'running'",
-                (state, reason_code, reason, _now(), name),
+                (state, reason_code, reason, _now(), seal, name),
             )
 
     def requeue(self, name: str, reason_code: ReasonCode, reason: str) -> None:
@@ -118,11 +123,11 @@ class Journal(ClosedOnLeaving):
         with self._transaction() as connection:
             self._set(connection, name, JournalPointState.QUEUED, reason_code, reason)
 
-    def keep(self, name: str, file: str) -> None:
+    def keep(self, name: str, file: str, seal: str) -> None:
         """Count a recording that lies in the folder already."""
         with self._transaction() as connection:
             self._set(connection, name, JournalPointState.DONE, ReasonCode.FOUND, "complete before")
-            connection.execute("UPDATE points SET file = ? WHERE name = ?", (file, name))
+            connection.execute("UPDATE points SET file = ?, seal = ? WHERE name = ?", (file, seal, name))
 
     def follow_up(self, name: str, further: Sequence[Point] = ()) -> None:
         """Put what a result asks for behind it, and note that it has been asked; both or neither."""
@@ -158,7 +163,7 @@ class Journal(ClosedOnLeaving):
     ) -> None:
         try:
             connection.executemany(
-                "INSERT INTO points VALUES (?, ?, ?, ?, ?, 'queued', ?, '', '', 0)",
+                "INSERT INTO points VALUES (?, ?, ?, ?, ?, 'queued', ?, '', '', 0, '')",
                 (
                     (
                         each.name,

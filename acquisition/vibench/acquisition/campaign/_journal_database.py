@@ -10,7 +10,12 @@ from pathlib import Path
 
 from ..errors import RecordingError
 
-VERSION = 1
+VERSION = 2
+
+SEAL_COLUMNS = tuple(
+    f"ALTER TABLE {table} ADD COLUMN seal TEXT NOT NULL DEFAULT ''" for table in ("points", "attempts")
+)
+"""What version 1 lacks."""
 
 SCHEMA = """
 CREATE TABLE campaign (
@@ -31,7 +36,8 @@ CREATE TABLE points (
     why TEXT NOT NULL,
     reason TEXT NOT NULL,
     file TEXT NOT NULL,
-    is_followed_up INTEGER NOT NULL
+    is_followed_up INTEGER NOT NULL,
+    seal TEXT NOT NULL
 );
 CREATE TABLE attempts (
     name TEXT NOT NULL REFERENCES points (name),
@@ -42,6 +48,7 @@ CREATE TABLE attempts (
     reason TEXT NOT NULL,
     begun_utc TEXT NOT NULL,
     ended_utc TEXT NOT NULL,
+    seal TEXT NOT NULL,
     PRIMARY KEY (name, number)
 );
 """
@@ -94,6 +101,17 @@ def opened_to_look(path: Path) -> sqlite3.Connection:
     except sqlite3.OperationalError:
         return opened(f"{address}?mode=ro")
     return connection
+
+
+def brought_up(connection: sqlite3.Connection) -> None:
+    """Give a journal of version 1 what it lacks, in one transaction."""
+    connection.execute("BEGIN IMMEDIATE")
+    (version,) = connection.execute("SELECT value FROM campaign WHERE key = 'version'").fetchone()
+    if int(version) < VERSION:
+        for statement in SEAL_COLUMNS:
+            connection.execute(statement)
+        connection.execute("UPDATE campaign SET value = ? WHERE key = 'version'", (str(VERSION),))
+    connection.execute("COMMIT")
 
 
 def require_version(path: Path, connection: sqlite3.Connection) -> None:

@@ -43,6 +43,8 @@ class JournalPoint:
     begun_utc: str
     ended_utc: str
     """Of the last attempt."""
+    seal: str
+    """Of its recording; empty before there is one, and of recordings that had none."""
 
 
 def read_journal(path: Path) -> tuple[JournalPoint, ...]:
@@ -77,6 +79,7 @@ def points_of(connection: sqlite3.Connection) -> tuple[JournalPoint, ...]:
             is_followed_up=bool(row["is_followed_up"]),
             begun_utc=row["begun_utc"],
             ended_utc=row["ended_utc"],
+            seal=row["seal"] if "seal" in row.keys() else "",  # noqa: SIM118 - a row iterates over its values
         )
         for row in connection.execute(POINTS)
     )

@@ -80,7 +80,7 @@ class MailMessenger:
         return smtplib.SMTP(settings.host, settings.port, timeout=settings.timeout_s)
 
 
-TOLD_OF = frozenset({CampaignEventKind.FAULT, CampaignEventKind.ENDED})
+TOLD_OF = frozenset({CampaignEventKind.FAULT, CampaignEventKind.DAMAGED, CampaignEventKind.ENDED})
 COMMAND_LONGEST_S = 30.0
 """A command that takes longer is ended [s]."""
 

@@ -11,13 +11,14 @@ from typing import assert_never
 from ..bench import RunBench
 from ..errors import CheckFailed, LimitExceeded, RecordingError
 from ..plan import Campaign, Measurement, Point, require_within_limits
-from ..recording import RecordingState, open_recording, part_of, recover
+from ..recording import RecordingState, SealDepth, part_of, recover
 from ..run import drive_for
-from ._attempt_files import attempts_in, complete_attempt, is_made_by, next_attempt
+from ._attempt_files import attempts_in, complete_attempt, next_attempt
 from ._bench_identity import BenchIdentity
 from ._journal import Journal, journal_path
 from ._journal_database import is_begun
 from ._journal_point import JournalPoint, JournalPointState, read_journal
+from ._kept_recording import KeptRecording, looked_at
 from ._point_outcome import ChangedBench, ExistingRecordings, ReasonCode
 
 PROGRAM_ENDED = "its program ended in the middle of it"
@@ -28,7 +29,8 @@ def reconcile(journal: Journal, folder: Path) -> None:
 
     A point that was running is done when its recording is complete (only the word in the journal was
     missing), and interrupted otherwise; what was left of its recording becomes a readable file. A
-    done point whose recording has been taken away is queued again.
+    done point is queued again when its recording has been taken away, or is not as it was sealed: that
+    one stays where it is, and the next attempt is made beside it.
     """
     for point in journal.points():
         match point.state:
@@ -36,10 +38,16 @@ def reconcile(journal: Journal, folder: Path) -> None:
                 journal.end(point.name, *_ended(point, folder))
             case JournalPointState.DONE if not (folder / point.file).exists():
                 journal.requeue(point.name, ReasonCode.GONE, f"{point.file} is no longer in the folder")
+            case JournalPointState.DONE:
+                found = looked_at(folder / point.file, point.measurement, SealDepth.WHOLE, point.seal)
+                if found.damage:
+                    journal.requeue(point.name, ReasonCode.DAMAGED, found.damage)
 
 
-def found_complete(points: Sequence[Point], folder: Path) -> dict[str, Path]:
+def found_recordings(points: Sequence[Point], folder: Path, depth: SealDepth) -> dict[str, KeptRecording]:
     """Find what lies in the folder already, for a campaign whose journal is lost, or older than journals.
+
+    Damaged recordings are among them.
 
     Raises
     ------
@@ -47,11 +55,11 @@ def found_complete(points: Sequence[Point], folder: Path) -> dict[str, Path]:
         When a recording is complete, but was made by another plan.
 
     """
-    found = {each.name: complete_attempt(folder, each.name, each.measurement) for each in points}
-    return {name: path for name, path in found.items() if path is not None}
+    found = {each.name: complete_attempt(folder, each.name, each.measurement, depth) for each in points}
+    return {name: kept for name, kept in found.items() if kept is not None}
 
 
-def _ended(point: JournalPoint, folder: Path) -> tuple[JournalPointState, ReasonCode, str]:
+def _ended(point: JournalPoint, folder: Path) -> tuple[JournalPointState, ReasonCode, str, str]:
     path = folder / point.file
     try:
         if part_of(path).exists():
@@ -59,28 +67,31 @@ def _ended(point: JournalPoint, folder: Path) -> tuple[JournalPointState, Reason
         if path.exists():
             return _judged(path, point.measurement)
     except RecordingError as error:
-        return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, f"{PROGRAM_ENDED}; {error}"
+        return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, f"{PROGRAM_ENDED}; {error}", ""
     return (
         JournalPointState.INTERRUPTED,
         ReasonCode.PROGRAM_ENDED,
         f"{PROGRAM_ENDED}, before anything was recorded",
+        "",
     )
 
 
-def _judged(path: Path, measurement: Measurement) -> tuple[JournalPointState, ReasonCode, str]:
-    with open_recording(path) as recording:
-        state, reason = recording.state, recording.reason
-        if state is RecordingState.COMPLETE and is_made_by(recording, measurement):
-            return JournalPointState.DONE, ReasonCode.CARRIED_OUT, reason
-        if state is RecordingState.INTERRUPTED:
-            reason = f"{PROGRAM_ENDED}, {recording.duration_s:.1f} s into its recording"
-    match state:
+def _judged(path: Path, measurement: Measurement) -> tuple[JournalPointState, ReasonCode, str, str]:
+    found = looked_at(path, measurement, SealDepth.WHOLE)
+    if found.damage:
+        return JournalPointState.INTERRUPTED, ReasonCode.DAMAGED, found.damage, found.seal
+    if found.is_complete and found.is_of_this_plan:
+        return JournalPointState.DONE, ReasonCode.CARRIED_OUT, found.reason, found.seal
+    match found.state:
         case RecordingState.FAILED:
-            return JournalPointState.FAILED, ReasonCode.FAULT, reason
+            return JournalPointState.FAILED, ReasonCode.FAULT, found.reason, found.seal
         case RecordingState.STOPPED:
-            return JournalPointState.INTERRUPTED, ReasonCode.STOPPED, reason
+            return JournalPointState.INTERRUPTED, ReasonCode.STOPPED, found.reason, found.seal
+        case RecordingState.INTERRUPTED:
+            reason = f"{PROGRAM_ENDED}, {found.duration_s:.1f} s into its recording"
+            return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, reason, found.seal
         case _:
-            return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, reason
+            return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, found.reason, found.seal
 
 
 MOST_DIFFERENCES = 5
@@ -159,10 +170,13 @@ def opened_journal(
         case ExistingRecordings.RESUME if is_begun(path):
             return _gone_on_with(path, campaign, identity, folder, changed)
         case ExistingRecordings.RESUME:
-            found = found_complete(campaign.points(), folder)
+            found = found_recordings(campaign.points(), folder, SealDepth.WHOLE)
             journal = Journal.begin(path, campaign, identity)
-            for name, recording in found.items():
-                journal.keep(name, recording.name)
+            for name, kept in found.items():
+                if kept.damage:
+                    journal.requeue(name, ReasonCode.DAMAGED, kept.damage)
+                else:
+                    journal.keep(name, kept.path.name, kept.seal)
             return journal
         case _:
             assert_never(existing)
@@ -243,14 +257,16 @@ def require_new(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> 
 def _resumable(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> tuple[PlannedRecording, ...]:
     path = journal_path(folder, campaign.name)
     if not is_begun(path):
-        found = found_complete(points, folder)
+        kept = found_recordings(points, folder, SealDepth.QUICK)
+        found = {name: each.path for name, each in kept.items() if each.is_complete}
         wanted = [(each.name, each.measurement) for each in points]
     else:
         known = read_journal(path)
         found = {
             each.name: folder / each.file
             for each in known
-            if each.state is JournalPointState.DONE and (folder / each.file).exists()
+            if each.state is JournalPointState.DONE
+            and not looked_at(folder / each.file, each.measurement, SealDepth.QUICK, each.seal).damage
         }
         wanted = [(each.name, each.measurement) for each in known]
     return tuple(

@@ -33,6 +33,8 @@ class ReasonCode(StrEnum):
     """A complete recording of the same plan lay in the folder."""
     GONE = "gone"
     """It was done, and its recording has been taken away."""
+    DAMAGED = "damaged"
+    """It was done, and its recording is not as it was sealed; that one is kept, and it is made again."""
     STOPPED = "stopped"
     """Somebody asked for a stop; the sentence says who."""
     PROGRAM_ENDED = "program_ended"

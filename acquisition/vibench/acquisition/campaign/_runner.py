@@ -21,6 +21,7 @@ from ._point_outcome import (
     Finished,
     PointOutcome,
     PointResult,
+    ReasonCode,
     reason_code_of,
 )
 
@@ -64,6 +65,7 @@ class CampaignRunner:
         )
         text = f"{campaign.name}: {self._count} points, {done} done before"
         self._say(CampaignEvent(begun, text, {"points": self._count, "done": done}))
+        self._name_damaged()
         try:
             while self._coming and self._may_begin(self._coming[0]):
                 point = self._coming.popleft()
@@ -88,6 +90,14 @@ class CampaignRunner:
             raise
         self._ended(f"{campaign.name} {self._closing()}", "stopped" if self._coming else "carried_out")
         return tuple(self._results)
+
+    def _name_damaged(self) -> None:
+        """Say of which points the recordings no longer count."""
+        for point in self._coming:
+            if point.reason_code in (ReasonCode.DAMAGED, ReasonCode.GONE):
+                text = f"{point.name} is made again: {point.reason}"
+                facts = {"point": point.name, "file": point.file, "why": point.reason_code.value}
+                self._say(CampaignEvent(CampaignEventKind.DAMAGED, text, facts))
 
     def _may_begin(self, point: JournalPoint) -> bool:
         """Rest before a point that is to be made; a stop ends the rest, and the campaign."""

@@ -127,6 +127,8 @@ class Engine:
         def on_campaign_event(event: CampaignEvent) -> None:
             if event.kind is CampaignEventKind.RESTING:
                 self.published.note_pause(request.campaign.rest_s, event.text)
+            if event.kind is CampaignEventKind.DAMAGED:
+                self.published.messages.warn(event.text)
             on_event(event)
 
         self.published.begin(request.campaign, request.folder)

@@ -63,6 +63,13 @@ from ._results import (
     ResultArray as ResultArray,
     SavedResult as SavedResult,
 )
+from ._seal import (
+    SealCheck as SealCheck,
+    SealDepth as SealDepth,
+    SealKey as SealKey,
+    SealState as SealState,
+    seal_key as seal_key,
+)
 from ._segment_label import (
     SegmentLabel as SegmentLabel,
 )

@@ -41,11 +41,16 @@ def write_attributes(target: h5py.HLObject, values: Mapping[str, Attribute]) -> 
             target.attrs[name] = value
 
 
+READ_KINDS = "iufS"
+"""Numbers and text of fixed length. HDF5 believes any length that a variable one claims, up to 16 GB."""
+
+
 def read_attributes(target: h5py.HLObject) -> dict[str, Attribute]:
     """Every scalar number and text attached to an object, text as ``str``."""
     values: dict[str, Attribute] = {}
     for name in target.attrs:
-        if target.attrs.get_id(name).shape != ():
+        found = target.attrs.get_id(name)
+        if found.shape != () or found.dtype.kind not in READ_KINDS:
             continue
         value = target.attrs[name]
         values[name] = decoded(value) if isinstance(value, bytes) else np.asarray(value).item()
@@ -60,8 +65,11 @@ def write_text_dataset(group: h5py.Group, name: str, text: str) -> None:
 
 
 def read_text_dataset(group: h5py.Group, name: str) -> str:
-    """Text of a scalar dataset."""
-    return decoded(group[name][()])
+    """Text of a scalar dataset; ValueError where something else stands."""
+    dataset = group[name]
+    if not isinstance(dataset, h5py.Dataset) or dataset.shape != () or dataset.dtype.kind != "S":
+        raise ValueError(f"{group.name}/{name} is no text")
+    return decoded(dataset[()])
 
 
 def _write_text(target: h5py.HLObject, name: str, text: str) -> None:

@@ -219,7 +219,9 @@ def feedback_note(event: Event) -> FeedbackNote | None:
         return None
     try:
         numbers = json.loads(event.text)
-    except json.JSONDecodeError:
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(numbers, dict):
         return None
     try:
         return _NOTES.validate_python({**numbers, "kind": event.kind})

@@ -1,4 +1,4 @@
-"""A recording becomes ``NAME.h5``: compressed, checked, named, and only then is ``NAME.h5.part`` let go.
+"""A recording becomes ``NAME.h5``: compressed, sealed, checked, named, and then ``NAME.h5.part`` is let go.
 
 HDF5's own filter pipeline runs on one core under a global lock. zlib releases the interpreter, so the same
 bytes are made here in threads: shuffle (all first bytes, all second bytes, ...), then deflate.
@@ -9,7 +9,7 @@ import os
 import time
 import zlib
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -26,6 +26,7 @@ from ._disk_room import claim_room, extend_room, release_room
 from ._layout import COUNT_DTYPE, DEFLATE_LEVEL, RecordingState, Table
 from ._overview import BIN_BYTES, OverviewSums, bins_of, write_overview
 from ._preallocate import HEAD_BYTES, ITEM_BYTES
+from ._seal import SealDepth, SealKey, SealState, check_seal, write_seal
 from ._tables import Columns
 
 IN_FLIGHT_PER_WORKER = 4
@@ -85,10 +86,11 @@ INT32_SAMPLES = 2**31
 """Longer recordings (11 h at 51.2 kS/s) number their samples with 64 bits."""
 
 
-def finalise(part: Path) -> Path:
-    """Make ``NAME.h5`` of ``NAME.h5.part``, which stays for :func:`discard`.
+def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None = None) -> Path:
+    """Make ``NAME.h5`` of ``NAME.h5.part``, which stays for :func:`discard`, and seal it.
 
-    The caller holds the file: its writer, or a recovery.
+    The caller holds the file: its writer, or a recovery. ``written`` has the checksum of each channel as it
+    was handed over; a recovery does not know them.
 
     Raises
     ------
@@ -104,7 +106,7 @@ def finalise(part: Path) -> Path:
     try:
         room = _largest_size(part)
         claim_room(tmp, room, room)
-        _copy(part, tmp, room)
+        _copy(part, tmp, room, key, written)
         sync_file(tmp)
         os.replace(tmp, final)  # noqa: PTH105 - the pair of os.fsync
         sync_folder(final.parent)
@@ -113,6 +115,10 @@ def finalise(part: Path) -> Path:
         with suppress(OSError):
             tmp.unlink()
         raise RecordingError(f"{final} could not be written: {error}. {_whereabouts(part)}") from error
+    except RecordingError:
+        with suppress(OSError):
+            tmp.unlink()
+        raise
     return final
 
 
@@ -145,7 +151,7 @@ def _largest_size(part: Path) -> int:
     return HEAD_BYTES + samples * (channels * ITEM_BYTES + TIME_BYTES) + bins
 
 
-def _copy(part: Path, tmp: Path, room: int) -> None:
+def _copy(part: Path, tmp: Path, room: int, key: SealKey | None, written: Mapping[str, str] | None) -> None:
     with (
         h5py.File(part, "r", locking=False) as source,
         h5py.File(tmp, "w", libver=layout.LIBVER, locking=False) as copy,
@@ -154,15 +160,27 @@ def _copy(part: Path, tmp: Path, room: int) -> None:
         samples = int(source[layout.N_VALID][0])
         _copy_file_attributes(source, copy, samples)
         source.copy(layout.CONFIGURATION, copy)
-        time_axis = _write_time(copy, samples, float(source.attrs["sample_rate_hz"]))
+        digests: dict[str, str] = {}
+        time_axis = _write_time(copy, samples, float(source.attrs["sample_rate_hz"]), digests)
         for role in str(read_attributes(source)["roles"]).split():
-            _copy_channel(source[role], copy, role, samples, time_axis)
+            digests[f"/{role}"] = _copy_channel(source[role], copy, role, samples, time_axis)
+            if written is not None and written[role] != digests[f"/{role}"]:
+                raise RecordingError(
+                    f"{part} does not give back {role!r} as recorded; check disk and memory. It is kept"
+                    " as it is; what can be read of it becomes a recording when it is recovered."
+                )
         for table in layout.TABLES:
             _write_table(copy, table, _rows(source, table, samples))
         copy.create_group(layout.RESULTS)
+        write_seal(copy, digests, key)
     release_room(tmp)
     with h5py.File(tmp, "r", locking=False) as copy:
-        _check(copy)
+        found = check_seal(copy, SealDepth.WHOLE, key)
+    if found.state is not SealState.INTACT:
+        raise RecordingError(
+            f"{tmp} does not read back as it was written ({found.sentence}); check disk and memory. All"
+            f" committed samples are safe in {part}; recover that file."
+        )
 
 
 def _copy_file_attributes(source: h5py.File, copy: h5py.File, samples: int) -> None:
@@ -173,14 +191,20 @@ def _copy_file_attributes(source: h5py.File, copy: h5py.File, samples: int) -> N
     write_attributes(copy, {**read_attributes(source), "state": state, "reason": reason, "samples": samples})
 
 
-def _write_time(copy: h5py.File, samples: int, sample_rate_hz: float) -> h5py.Dataset:
+def _write_time(
+    copy: h5py.File, samples: int, sample_rate_hz: float, digests: dict[str, str]
+) -> h5py.Dataset:
     """Write the time axis: sample numbers with the sample interval as scale, so that it compresses well."""
     dtype = np.dtype(layout.COUNT_DTYPE if samples < INT32_SAMPLES else layout.COUNTER_DTYPE)
     settings = {"chunks": (min(layout.CHUNK_SAMPLES, samples),), "compression": "gzip", "shuffle": True}
     dataset = copy.create_dataset(layout.TIME, shape=(samples,), dtype=dtype, **(settings if samples else {}))
+    digest = hashlib.sha256()
     for begin in range(0, samples, layout.CHUNK_SAMPLES):
         end = min(begin + layout.CHUNK_SAMPLES, samples)
-        dataset[begin:end] = np.arange(begin, end, dtype=dtype)
+        numbers = np.arange(begin, end, dtype=dtype)
+        dataset[begin:end] = numbers
+        digest.update(numbers.data)
+    digests[f"/{layout.TIME}"] = digest.hexdigest()
     write_attributes(
         dataset,
         {
@@ -197,7 +221,7 @@ def _write_time(copy: h5py.File, samples: int, sample_rate_hz: float) -> h5py.Da
 
 def _copy_channel(
     source: h5py.Dataset, copy: h5py.File, role: str, samples: int, time_axis: h5py.Dataset
-) -> None:
+) -> str:
     dataset = create_counts(copy, role, samples, layout.CHUNK_SAMPLES)
     digest, overview = hashlib.sha256(), OverviewSums()
     write_chunks(dataset, overview.summed(_hashed(_pieces(source, samples), digest)))
@@ -205,6 +229,7 @@ def _copy_channel(
     dataset.attrs["_FillValue"] = np.int32(layout.MISSING_COUNT)
     dataset.dims[0].attach_scale(time_axis)
     write_overview(copy, role, overview.overview(), float(copy.attrs["sample_rate_hz"]))
+    return digest.hexdigest()
 
 
 def _pieces(dataset: h5py.Dataset, samples: int) -> Iterator[Counts]:
@@ -253,16 +278,3 @@ def _narrowest(values: np.ndarray[tuple[int], np.dtype[np.generic]]) -> np.dtype
     longest = max((len(value) for value in values.tolist()), default=0)
     dtype: np.dtype[np.generic] = h5py.string_dtype("utf-8", max(longest, 1))
     return dtype
-
-
-def _check(copy: h5py.File) -> None:
-    """Read every sample back through HDF5 and compare with what was recorded."""
-    for role in str(read_attributes(copy)["roles"]).split():
-        dataset = copy[role]
-        digest = hashlib.sha256()
-        for piece in _pieces(dataset, len(dataset)):
-            digest.update(piece.data)
-        if digest.hexdigest() != read_attributes(dataset)["sha256"]:
-            raise RecordingError(
-                f"{role!r} does not read back from {copy.filename} as it was recorded; check disk and memory."
-            )

@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields
 
 from ..errors import RecordingError
@@ -151,11 +151,7 @@ class RecordingHeader:
     provenance: Provenance = field(default_factory=collect_provenance)
 
     def __post_init__(self) -> None:
-        roles = [channel.role for channel in self.channels]
-        if not roles or len(set(roles)) != len(roles):
-            raise RecordingError(
-                f"A recording needs one or more channels with different names; given: {roles}."
-            )
+        require_different(self.channels)
         _require_positive("sample_rate_hz", self.sample_rate_hz)
         if self.expected_samples is not None:
             _require_positive("expected_samples", self.expected_samples)
@@ -190,6 +186,15 @@ class RecordingHeader:
             "software_commit": self.provenance.commit,
             "roles": " ".join(channel.role for channel in self.channels),
         }
+
+
+def require_different(channels: Iterable[ChannelHeader]) -> tuple[ChannelHeader, ...]:
+    """Refuse a recording without channels, or with two of one name; raises RecordingError."""
+    given = tuple(channels)
+    roles = [channel.role for channel in given]
+    if not roles or len(set(roles)) != len(roles):
+        raise RecordingError(f"A recording needs one or more channels with different names; given: {roles}.")
+    return given
 
 
 def _require_positive(name: str, value: float) -> None:

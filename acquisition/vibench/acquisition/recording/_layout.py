@@ -39,6 +39,7 @@ ROW = "row"
 CONFIGURATION = "configuration"
 RESULTS = "results"
 OVERVIEW = "overview"
+SEAL = "seal"
 BIN = "bin"
 SETTINGS = "settings"
 
@@ -127,6 +128,7 @@ RESERVED_NAMES = frozenset(
         CONFIGURATION,
         RESULTS,
         OVERVIEW,
+        SEAL,
         *(table.name for table in TABLES),
     }
 )

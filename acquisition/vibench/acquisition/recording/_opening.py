@@ -6,6 +6,8 @@ from pathlib import Path
 
 import h5py
 
+from vibench.sim import hdf5_files
+
 from ..errors import RecordingError
 from . import _layout as layout
 from ._attributes import read_attributes
@@ -32,7 +34,9 @@ def open_hdf5(path: Path) -> h5py.File:
     """
     _require_file(path)
     try:
-        file = h5py.File(path, "r", locking=False)
+        file = hdf5_files.open_hdf5(path, locking=False)
+    except hdf5_files.UnsafeHdf5 as error:
+        raise RecordingError(f"{path} was not read: {error}") from error
     except OSError as error:
         raise RecordingError(
             f"{path} is no readable HDF5 file ({error}). It was cut short, or is something else;"

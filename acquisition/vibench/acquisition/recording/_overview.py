@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from . import _layout as layout
-from ._attributes import write_attributes
+from ._attributes import read_attributes, write_attributes
 from ._counts import Counts
 
 BIN_SAMPLES = 128
@@ -96,13 +96,19 @@ def write_overview(file: h5py.File, role: str, overview: CountOverview, sample_r
 def read_overview(file: h5py.File, role: str, samples: int) -> CountOverview | None:
     """Read a channel's overview; None in a file that has none that fits: the samples are there anyway."""
     group = file.get(layout.OVERVIEW)
-    if group is None or int(group.attrs.get("samples_per_bin", 0)) != BIN_SAMPLES:
+    if not isinstance(group, h5py.Group) or read_attributes(group).get("samples_per_bin") != BIN_SAMPLES:
+        return None
+    extremes = [group.get(role + suffix) for suffix in (LOW_SUFFIX, HIGH_SUFFIX)]
+    if any(
+        not isinstance(each, h5py.Dataset)
+        or each.shape != (bins_of(samples),)
+        or each.dtype != np.dtype(layout.COUNT_DTYPE)
+        for each in extremes
+    ):
         return None
     try:
-        low, high = group[role + LOW_SUFFIX][:], group[role + HIGH_SUFFIX][:]
-    except (OSError, KeyError):
-        return None
-    if low.size != high.size or low.size != bins_of(samples):
+        low, high = (each[:] for each in extremes)
+    except OSError:
         return None
     return CountOverview(low, high)
 

@@ -1,9 +1,9 @@
 """Reading a recording, days later, on another machine, or while it is still growing."""
 
 import hashlib
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from enum import Enum, auto
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -14,20 +14,22 @@ import numpy as np
 from ..errors import RecordingError
 from ..instruments import Identity, Overload, Samples
 from . import _layout as layout, _tables as tables
-from ._attributes import decoded, json_text, read_attributes, read_text_dataset
+from ._attributes import decoded, json_text, read_attributes
+from ._contents import channel_header, configuration_facts, file_facts
 from ._counts import Counts
 from ._disk import is_being_recorded
-from ._header import ChannelHeader
+from ._header import ChannelHeader, require_different
 from ._layout import Origin, RecordingState
 from ._opening import name_now, open_hdf5
 from ._overview import CountOverview, read_overview
 from ._replacing import replace_with_change
-from ._results import ResultArray, SavedResult, Setting, read_results, write_result
+from ._results import ResultArray, SavedResult, Setting, read_results, result_groups, write_result
+from ._seal import SealCheck, SealDepth, SealKey, SealState, check_result, check_seal, seal_key, seal_of
 from ._tables import Event, EventKind, Gap, Segment
 
 RESULT_HEAD_BYTES = 100_000
 """More than HDF5 needs to describe one array of a result."""
-DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError)
+DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError)
 """What h5py raises when a file's inside is not what its outside promised."""
 
 
@@ -38,6 +40,13 @@ class RecordedBlock:
     first_sample: int
     values: Samples
     """Shape (channels, samples), in each channel's physical unit."""
+
+
+class Growth(Enum):
+    """Whether samples may still come."""
+
+    FINISHED = auto()
+    GROWING = auto()
 
 
 class _OpenFile:
@@ -81,6 +90,8 @@ class Recording:
     instruments: Mapping[str, Identity]
     confirmations: Mapping[str, str | float]
     provenance: Mapping[str, Any]
+    seal: str
+    """SHA-256 of the manifest, as the file says it; empty without one. see `check_seal`."""
     bench_check: Mapping[str, Any]
     """The last check of the bench before it: ``checked``, ``verdict``, ``findings``, ...; may be empty."""
     segments: tuple[Segment, ...]
@@ -171,16 +182,51 @@ class Recording:
             digest.update(self.read_counts(role, first, stop).astype(layout.COUNT_DTYPE).data)
         return digest.hexdigest() == read_attributes(self._open.file[role])["sha256"]
 
+    def check_seal(self, depth: SealDepth | str, key: SealKey | None = None) -> SealCheck:
+        """Hold the recording against the seal that it got at its end.
+
+        Parameters
+        ----------
+        depth
+            ``"quick"`` reads all attributes, texts and tables, ``"whole"`` every sample too.
+        key
+            As `seal_key` reads it, to see whether it was signed with it; by default the one that the variable
+            VIBENCH_SEAL_KEY names.
+
+        Returns
+        -------
+        SealCheck
+            Its state, a few words on it, and the seal.
+
+        Raises
+        ------
+        RecordingError
+            When the key cannot be read.
+
+        """
+        if self.path.suffix == layout.PART_SUFFIX:
+            return SealCheck(SealState.UNFINISHED, "it is sealed when it is finished or recovered", "")
+        return check_seal(self._open.file, SealDepth(depth), seal_key() if key is None else key)
+
+    def check_result_seals(self, key: SealKey | None = None) -> dict[str, SealCheck]:
+        """Hold every saved result against its own seal; the key is that of `check_seal`."""
+        used = seal_key() if key is None else key
+        return {name: check_result(group, used) for name, group in result_groups(self._open.file).items()}
+
     @property
     def results(self) -> dict[str, SavedResult]:
         """What analyses have saved, by name."""
-        return read_results(self._open.file)
+        try:
+            return read_results(self._open.file)
+        except DAMAGE as error:
+            raise RecordingError(
+                f"The results in {self.path} cannot be read: {error}. Its samples are as before; analyse it."
+            ) from error
 
     @property
     def result_names(self) -> tuple[str, ...]:
         """Names of what analyses have saved, without reading it."""
-        file = self._open.file
-        return tuple(file[layout.RESULTS]) if layout.RESULTS in file else ()
+        return tuple(result_groups(self._open.file))
 
     def save_results(
         self,
@@ -207,8 +253,12 @@ class Recording:
             np.asarray(each.values).nbytes for each in arrays.values()
         )
         room += len(json_text(f"The settings of result {name!r}", settings))
+        key = seal_key()
+        seal = self.check_seal(SealDepth.QUICK)
+        if seal.state is SealState.DAMAGED:
+            raise RecordingError(f"{self.path} is damaged ({seal.sentence}), so nothing was added to it.")
         given = replace_with_change(
-            self.path, room, lambda file: write_result(file, name, arrays, settings, used)
+            self.path, room, lambda file: write_result(file, name, arrays, settings, used, key)
         )
         self._open.reopen()
         return given
@@ -254,49 +304,49 @@ def open_recording(path: Path | str) -> Recording:
     handle = _OpenFile(Path(path))
     try:
         return _read(handle)
-    except RecordingError:
-        handle.file.close()
-        raise
-    except DAMAGE as error:
+    except (RecordingError, *DAMAGE) as error:
         handle.file.close()
         raise RecordingError(
-            f"{path} is damaged: {error}. Copy it again from where it was recorded."
+            f"{path} is damaged, or no recording of vibench: {error}. Copy it again from where it was"
+            " recorded."
         ) from error
 
 
 def _read(handle: _OpenFile) -> Recording:
+    """Read everything but samples and results, and believe none of it unseen."""
     file = handle.file
-    attributes = read_attributes(file)
     is_part = layout.N_VALID in file
-    samples = int(file[layout.N_VALID][0] if is_part else attributes["samples"])
-    state, reason = _ending(handle) if is_part else (attributes["state"], attributes["reason"])
+    growing = _growing(handle) if is_part else {}
+    facts = file_facts(read_attributes(file), **growing)
+    roles = tuple(facts.roles.split())
+    for role in roles:
+        _require_channel(file, role, facts.samples, Growth.GROWING if is_part else Growth.FINISHED)
     columns = {
-        table.name: tables.clipped(tables.read_columns(file, table), table, samples)
+        table.name: tables.clipped(tables.read_columns(file, table), table, facts.samples)
         for table in layout.TABLES
     }
-    configuration = _configuration(file)
-    expected = int(attributes["expected_samples"])
+    for table in layout.TABLES:
+        tables.require_ranges(columns[table.name], table, facts.samples, roles)
+    configuration = configuration_facts(file)
     return Recording(
         path=handle.path,
-        state=RecordingState(str(state)),
-        reason=str(reason),
-        samples=samples,
-        sample_rate_hz=float(attributes["sample_rate_hz"]),
-        requested_sample_rate_hz=float(attributes["requested_sample_rate_hz"]),
-        expected_samples=expected if expected >= 0 else None,
-        origin=Origin(str(attributes["origin"])),
-        started_utc=str(attributes["started_utc"]),
-        recording_id=str(attributes["recording_id"]),
-        channels=tuple(
-            ChannelHeader.from_attributes(role, read_attributes(file[role]))
-            for role in str(attributes["roles"]).split()
-        ),
-        plan=configuration["plan_json"],
-        bench=configuration["bench_json"],
-        instruments={name: Identity(**each) for name, each in configuration["instruments_json"].items()},
-        confirmations=configuration["confirmations_json"],
-        provenance=configuration["provenance_json"],
-        bench_check=configuration.get("bench_check_json", {}),  # absent from files of earlier versions
+        state=facts.state,
+        reason=facts.reason,
+        samples=facts.samples,
+        sample_rate_hz=facts.sample_rate_hz,
+        requested_sample_rate_hz=facts.requested_sample_rate_hz,
+        expected_samples=facts.expected_samples if facts.expected_samples >= 0 else None,
+        origin=facts.origin,
+        started_utc=facts.started_utc,
+        recording_id=facts.recording_id,
+        channels=require_different(channel_header(role, file[role]) for role in roles),
+        plan=configuration.plan_json,
+        bench=configuration.bench_json,
+        instruments=configuration.instruments_json,
+        confirmations=configuration.confirmations_json,
+        provenance=configuration.provenance_json,
+        seal="" if is_part else seal_of(file),
+        bench_check=configuration.bench_check_json,
         segments=tables.segments(columns[layout.SEGMENTS.name]),
         events=tables.events(columns[layout.EVENTS.name]),
         overloads=tables.overloads(columns[layout.OVERLOADS.name]),
@@ -305,14 +355,33 @@ def _read(handle: _OpenFile) -> Recording:
     )
 
 
-def _configuration(file: h5py.File) -> dict[str, Any]:
-    group = file[layout.CONFIGURATION]
-    return {name: json.loads(read_text_dataset(group, name)) for name in group}
+def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -> None:
+    """Refuse a channel that does not hold the samples that the recording has; raises RecordingError."""
+    dataset = file.get(role)
+    if (
+        not isinstance(dataset, h5py.Dataset)
+        or dataset.ndim != 1
+        or dataset.dtype != np.dtype(layout.COUNT_DTYPE)
+    ):
+        raise RecordingError(f"the channel {role!r} is no row of counts")
+    if len(dataset) < samples or (growth is Growth.FINISHED and len(dataset) != samples):
+        raise RecordingError(f"the channel {role!r} has {len(dataset)} samples, and the recording {samples}")
+    if dataset.chunks is not None and dataset.id.get_num_chunks() != -(-len(dataset) // dataset.chunks[0]):
+        raise RecordingError(f"the channel {role!r} lacks some of its samples")
 
 
-def _ending(handle: _OpenFile) -> tuple[str, str]:
+def _growing(handle: _OpenFile) -> dict[str, object]:
     """Say how a ``.part`` stands: it says "recording" until its end, which a dead program never wrote."""
-    state, reason = decoded(handle.file[layout.STATE][0]), decoded(handle.file[layout.REASON][0])
+    file = handle.file
+    state, reason = (_text(file, name) for name in (layout.STATE, layout.REASON))
     if state == RecordingState.RECORDING and not is_being_recorded(handle.path):
-        return RecordingState.INTERRUPTED.value, "its program ended before it could say how the run ended"
-    return state, reason
+        state = RecordingState.INTERRUPTED.value
+        reason = "its program ended before it could say how the run ended"
+    return {"samples": tables.first_number(file, layout.N_VALID), "state": state, "reason": reason}
+
+
+def _text(file: h5py.File, name: str) -> str:
+    dataset = file.get(name)
+    if not isinstance(dataset, h5py.Dataset) or dataset.shape != (1,) or dataset.dtype.kind != "S":
+        raise RecordingError(f"/{name} is no text")
+    return decoded(dataset[0])

@@ -2,14 +2,12 @@
 
 from pathlib import Path
 
-import h5py
-
 from ..errors import RecordingError
 from . import _layout as layout
-from ._attributes import read_attributes
 from ._disk import sole_use
 from ._finalise import discard, finalise
-from ._opening import opened_recording
+from ._reader import open_recording
+from ._seal import SealDepth, SealKey, SealState, seal_key
 
 
 def recover(path: Path | str) -> Path:
@@ -30,8 +28,9 @@ def recover(path: Path | str) -> Path:
     part = layout.part_of(final)
     if not part.exists():
         raise RecordingError(f"{part} does not exist, so there is nothing to recover.")
+    key = seal_key()
     try:
-        _finish(part, final)
+        _finish(part, final, key)
         discard(part)
     except RecordingError:
         raise
@@ -43,23 +42,28 @@ def recover(path: Path | str) -> Path:
     return final
 
 
-def _finish(part: Path, final: Path) -> None:
+def _finish(part: Path, final: Path, key: SealKey | None) -> None:
     with sole_use(part):
-        with opened_recording(part) as source:
-            is_done = final.exists() and _holds(final, source)
+        with open_recording(part) as source:
+            is_done = final.exists() and _holds(final, source.recording_id, part)
         if not is_done:
             # Left by a crash while the copy was made; everything in it is in the .part.
             layout.tmp_of(final).unlink(missing_ok=True)
-            finalise(part)
+            finalise(part, key)
 
 
-def _holds(final: Path, source: h5py.File) -> bool:
-    """Whether the finished file is the copy of this very recording."""
-    with opened_recording(final) as copy:
-        same = read_attributes(copy)["recording_id"] == read_attributes(source)["recording_id"]
+def _holds(final: Path, recording_id: str, part: Path) -> bool:
+    """Whether the finished file is the copy of this very recording, and whole."""
+    with open_recording(final) as copy:
+        same, seal = copy.recording_id == recording_id, copy.check_seal(SealDepth.WHOLE)
     if not same:
         raise RecordingError(
-            f"{final} is another recording than {layout.part_of(final)}, and nothing is ever overwritten."
+            f"{final} is another recording than {part}, and nothing is ever overwritten."
             " Nothing was changed; rename one of the two and try again."
+        )
+    if seal.state is SealState.DAMAGED:
+        raise RecordingError(
+            f"{final} is damaged ({seal.sentence}), and {part} still holds what it was made of."
+            f" Nothing was changed; rename {final.name} and try again."
         )
     return same

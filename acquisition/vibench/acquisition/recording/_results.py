@@ -13,12 +13,16 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from . import _layout as layout
 from ._attributes import json_text, read_attributes, read_text_dataset, write_attributes, write_text_dataset
+from ._contents import json_object
 from ._provenance import collect_provenance
+from ._seal import SealKey, SealState, check_result, seal_result
 
 REAL_SUFFIX, IMAG_SUFFIX = "_real", "_imag"
 COMPLEX_PART = "complex_part"
 """Attribute of the two halves of a complex array; complex numbers themselves are h5py's own habit."""
 SETTINGS_JSON = "settings_json"
+AXES = "axes_json"
+"""Attribute of an array: the names of the arrays along its dimensions."""
 RAW_SHA256 = "raw_sha256_"
 
 Setting = Any
@@ -56,8 +60,9 @@ def write_result(
     arrays: Mapping[str, ResultArray],
     settings: Mapping[str, Setting],
     roles: Sequence[str],
+    key: SealKey | None,
 ) -> str:
-    """Add a result; a name that exists gets ``-2``, ``-3``, ... The name that was used comes back."""
+    """Add a result, sealed; a name that exists gets ``-2``, ``-3``, ... The name that was used comes back."""
     _require_axes(name, arrays)
     results = file.require_group(layout.RESULTS)
     free_name = _free_name(results, name)
@@ -76,14 +81,36 @@ def write_result(
     scalars = {key: value for key, value in settings.items() if type(value) in {int, float, str}}
     write_attributes(group.create_group(layout.SETTINGS), scalars)
     _write_arrays(group, arrays)
+    seal_result(group, key)
     return free_name
 
 
+def result_groups(file: h5py.File) -> dict[str, h5py.Group]:
+    """Give the group of every result, by name; RecordingError where something else stands."""
+    results = file.get(layout.RESULTS)
+    found = {} if results is None else dict(results.items())
+    for name, group in found.items():
+        if not isinstance(group, h5py.Group):
+            raise RecordingError(f"{name!r} among the results is no result")
+    return found
+
+
 def read_results(file: h5py.File) -> dict[str, SavedResult]:
-    """Every result of a recording, by name."""
-    if layout.RESULTS not in file:
-        return {}
-    return {name: _read_result(name, group) for name, group in file[layout.RESULTS].items()}
+    """Every result of a recording, by name.
+
+    Raises
+    ------
+    RecordingError
+        When one is not as it was sealed, or is none.
+
+    """
+    found = {}
+    for name, group in result_groups(file).items():
+        seal = check_result(group, None)
+        if seal.state is SealState.DAMAGED:
+            raise RecordingError(f"the result {name!r} is damaged ({seal.sentence})")
+        found[name] = _read_result(name, group)
+    return found
 
 
 def _free_name(results: h5py.Group, name: str) -> str:
@@ -117,7 +144,8 @@ def _write_arrays(group: h5py.Group, arrays: Mapping[str, ResultArray]) -> None:
         array = arrays[key]
         for name, values, part in _real_parts(key, np.asarray(array.values)):
             dataset = group.create_dataset(name, data=values)
-            write_attributes(dataset, {"units": array.unit, **part})
+            axes_text = {AXES: json.dumps(array.axes)} if array.axes else {}
+            write_attributes(dataset, {"units": array.unit, **part, **axes_text})
             if key in axes:
                 dataset.make_scale(key)
             for dimension, axis in enumerate(array.axes):
@@ -139,7 +167,7 @@ def _read_result(name: str, group: h5py.Group) -> SavedResult:
     return SavedResult(
         name=name,
         arrays=_read_arrays(group),
-        settings=json.loads(read_text_dataset(group, SETTINGS_JSON)),
+        settings=json_object(read_text_dataset(group, SETTINGS_JSON)),
         saved_utc=str(attributes["saved_utc"]),
         software_version=str(attributes["software_version"]),
         software_commit=str(attributes["software_commit"]),
@@ -158,7 +186,7 @@ def _read_arrays(group: h5py.Group) -> dict[str, ResultArray]:
             continue
         dataset = group[name]
         attributes = read_attributes(dataset)
-        axes = tuple(scale.name.rsplit("/", 1)[-1] for dim in dataset.dims for scale in dim.values())
+        axes = _axes(group, name, attributes)
         unit = str(attributes["units"])
         match attributes.get(COMPLEX_PART):
             case "real":
@@ -168,3 +196,20 @@ def _read_arrays(group: h5py.Group) -> dict[str, ResultArray]:
             case None:
                 arrays[name] = ResultArray(dataset[()], unit, axes)
     return arrays
+
+
+def _axes(group: h5py.Group, name: str, attributes: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of an array's axes; where they are not noted (earlier versions), scales of the right lengths."""
+    if AXES in attributes:
+        axes = tuple(json.loads(attributes[AXES]))
+        if not all(isinstance(axis, str) for axis in axes):
+            raise RecordingError(f"the axes of {name!r} are no names")
+        return axes
+    scales = [each for each in group if read_attributes(group[each]).get("CLASS") == "DIMENSION_SCALE"]
+    if name in scales:
+        return ()
+    return tuple(
+        next(each for each in scales if group[each].shape == (length,))
+        for length in group[name].shape
+        if any(group[each].shape == (length,) for each in scales)
+    )

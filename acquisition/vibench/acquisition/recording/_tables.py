@@ -1,7 +1,6 @@
 """Events, segments, overloads and gaps as they are read from a recording."""
 
-import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -10,11 +9,13 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import RecordingError
 from ..instruments import Overload
 from . import _layout as layout
 from ._attributes import decoded
+from ._contents import json_object
 from ._journal import Number
-from ._layout import Table
+from ._layout import Column, Table
 
 Columns = dict[str, NDArray[Any]]
 
@@ -77,10 +78,69 @@ class Segment:
 
 
 def read_columns(file: h5py.File, table: Table) -> Columns:
-    """Columns of a table, as many rows as are valid."""
-    group = file[table.name]
-    rows = int(group[layout.N_ROWS][0]) if layout.N_ROWS in group else None
-    return {column.name: group[column.name][:rows] for column in table.columns}
+    """Columns of a table, as many rows as are valid.
+
+    Raises
+    ------
+    RecordingError
+        When one is missing, of another type or width, or longer than a table can be.
+
+    """
+    group = file.get(table.name)
+    if not isinstance(group, h5py.Group):
+        raise RecordingError(f"the table {table.name} is missing")
+    datasets = [_column(group, table, column) for column in table.columns]
+    if layout.N_ROWS in group:
+        rows = first_number(group, layout.N_ROWS)
+        if not 0 <= rows <= min(len(each) for each in datasets):
+            raise RecordingError(f"the table {table.name} counts {rows} rows, and holds fewer")
+    else:
+        (rows, *others) = {len(each) for each in datasets}
+        if others:
+            raise RecordingError(f"the columns of the table {table.name} differ in length")
+    return {column.name: dataset[:rows] for column, dataset in zip(table.columns, datasets, strict=True)}
+
+
+def _column(group: h5py.Group, table: Table, column: Column) -> h5py.Dataset:
+    dataset, wanted = group.get(column.name), np.dtype(column.dtype)
+    if (
+        not isinstance(dataset, h5py.Dataset)
+        or dataset.ndim != 1
+        or dataset.dtype.kind != wanted.kind
+        or dataset.dtype.itemsize > wanted.itemsize
+        or len(dataset) > table.capacity + 1  # a recovery adds its own event
+    ):
+        raise RecordingError(
+            f"the column {column.name} of the table {table.name} is no column of {column.dtype} of at most "
+            f"{table.capacity + 1} rows"
+        )
+    return dataset
+
+
+def first_number(group: h5py.Group, name: str) -> int:
+    """Give the whole number of a dataset of one; RecordingError where something else stands."""
+    dataset = group.get(name)
+    if not isinstance(dataset, h5py.Dataset) or dataset.shape != (1,) or dataset.dtype.kind != "i":
+        raise RecordingError(f"{group.name}/{name} is no whole number")
+    return int(dataset[0])
+
+
+def require_ranges(columns: Columns, table: Table, samples: int, roles: Sequence[str]) -> None:
+    """Refuse rows that speak of samples or channels that are not there; raises RecordingError."""
+    if table is layout.EVENTS:
+        is_right = (columns["sample"] >= 0) & np.isfinite(columns["unix_time_s"])
+    else:
+        first, last = columns["first_sample"], columns["last_sample"]
+        shortest = 0 if table is layout.SEGMENTS else 1
+        is_right = (first >= 0) & (last < samples) & (last - first + 1 >= shortest)
+    if table is layout.SEGMENTS:
+        is_right &= np.isin(columns["is_complete"], (0, 1))
+    if table is layout.OVERLOADS:
+        is_right &= np.isin(columns["channel"], [role.encode() for role in roles])
+    if not is_right.all():
+        raise RecordingError(
+            f"row {int(np.argmin(is_right))} of the table {table.name} speaks of what is not in the recording"
+        )
 
 
 def clipped(columns: Columns, table: Table, n_valid: int) -> Columns:
@@ -102,7 +162,9 @@ def clipped(columns: Columns, table: Table, n_valid: int) -> Columns:
 def _clipped_segments(columns: Columns, n_valid: int) -> Columns:
     first = np.minimum(columns["first_sample"], n_valid)
     last = columns["last_sample"]
-    is_cut = (last == layout.OPEN_SEGMENT) & (columns["is_complete"] == 0) | (last >= n_valid)
+    # After a power cut "complete" may stand there already, and the end not yet; only an empty one ends at -1.
+    is_open = (last == layout.OPEN_SEGMENT) & ((columns["is_complete"] == 0) | (first > 0))
+    is_cut = is_open | (last >= n_valid)
     return {
         **columns,
         "first_sample": first,
@@ -127,12 +189,20 @@ def segments(columns: Columns) -> tuple[Segment, ...]:
             first_sample=int(first),
             last_sample=int(last),
             is_complete=bool(is_complete),
-            numbers=json.loads(decoded(numbers)),
+            numbers=_numbers(decoded(numbers)),
         )
         for first, last, is_complete, label, numbers in zip(
             *(columns[column.name] for column in layout.SEGMENTS.columns), strict=True
         )
     )
+
+
+def _numbers(text: str) -> dict[str, Number]:
+    numbers = json_object(text)
+    for name, value in numbers.items():
+        if not isinstance(value, int | float | str):
+            raise RecordingError(f"the number {name!r} of a segment is a JSON {type(value).__name__}")
+    return numbers
 
 
 def overloads(columns: Columns) -> tuple[Overload, ...]:

@@ -8,6 +8,7 @@
         writer.finish(RecordingState.COMPLETE, "the plan was carried out")
 """
 
+import hashlib
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -29,6 +30,7 @@ from ._header import RecordingHeader
 from ._journal import Journal, Number
 from ._layout import RecordingState
 from ._preallocate import ITEM_BYTES, MARGIN_S, RESERVE_AHEAD_S, Places, preallocate
+from ._seal import SealKey, seal_key
 
 QUEUE_S = 10.0
 """Seconds of samples that may wait for the disk; the slowest sync measured took 0.12 s."""
@@ -57,10 +59,11 @@ def create_recording(path: Path | str, header: RecordingHeader) -> "RecordingWri
                 f"{taken} exists, and nothing is ever overwritten. Nothing was recorded; choose another name"
                 " (a .part or .tmp is what an interrupted recording left: recover it first)."
             )
+    key = seal_key()
     reserve = DescriptorReserve()
     try:
         places = preallocate(path, part, header)
-        return RecordingWriter(path, header, places, open_disk(part), reserve=reserve)
+        return RecordingWriter(path, header, places, open_disk(part), reserve=reserve, key=key)
     except BaseException:
         reserve.close()
         raise
@@ -81,6 +84,7 @@ class RecordingWriter:
         disk: Disk,
         commit_interval_s: float = COMMIT_INTERVAL_S,
         reserve: DescriptorReserve | None = None,
+        key: SealKey | None = None,
     ) -> None:
         self._path = path
         self._header = header
@@ -90,6 +94,8 @@ class RecordingWriter:
         self._scale = CountScale(header.channels)
         self._journal = Journal(places.tables, tuple(channel.role for channel in header.channels))
         self._committer = Committer(disk, round(QUEUE_S * header.sample_rate_hz), commit_interval_s)
+        self._key = key
+        self._digests = {channel.role: hashlib.sha256() for channel in header.channels}
         self._samples = 0
         self._reserved = places.reserved
         self._is_finished = False
@@ -178,7 +184,7 @@ class RecordingWriter:
         part = layout.part_of(self._path)
         try:
             self._write_ending(state, reason)
-            finalise(part)
+            finalise(part, self._key, self._written() if failure is None else None)
         finally:
             # What a close can still refuse (a network folder), the ending's sync has refused before.
             with suppress(OSError):
@@ -256,7 +262,13 @@ class RecordingWriter:
             self._committer.put(Batch(writes=self._channel_writes(begin, counts), samples=counts.shape[1]))
         self._committer.put(self._journal.gap(first, stop - 1))
 
+    def _written(self) -> dict[str, str]:
+        """Checksum of each channel as it was handed over."""
+        return {role: digest.hexdigest() for role, digest in self._digests.items()}
+
     def _channel_writes(self, first_sample: int, counts: Counts) -> tuple[tuple[int, Buffer], ...]:
+        for digest, row in zip(self._digests.values(), counts, strict=True):
+            digest.update(row.data)
         return tuple(
             (base + first_sample * ITEM_BYTES, row.data)
             for base, row in zip(self._places.channels, counts, strict=True)

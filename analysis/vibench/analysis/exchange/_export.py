@@ -7,6 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol
 
+from ..recordings import require_intact
 from ._csv import write_csv_samples
 from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._facts_document import facts_path, write_facts
@@ -53,10 +54,13 @@ def export_samples(
     ------
     InvalidRequest
         When a name is taken, the disk refuses, or the format cannot hold so much; nothing is left of it.
+    UnusableData
+        When the recording is not as it was sealed.
     NotEnoughData
         When results are asked for and none is saved.
 
     """
+    require_intact(excerpt.recording)
     return EXPORTERS[to].export(excerpt, path, results, observer)
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from vibench.sim.hdf5_files import UnsafeHdf5, open_hdf5, walk
+
 from ..errors import UnusableData
 from ..signals import Reals
 from ._source_channel import SourceChannel
@@ -31,8 +33,8 @@ class _Place:
 class Hdf5Source:
     """Datasets of one dimension, and rows or columns of those with two: ``"/data#1"``, counted from one.
 
-    CF's ``scale_factor``, ``add_offset`` and ``_FillValue`` are applied. Data in other files
-    (external links and storage, virtual datasets) are left alone.
+    CF's ``scale_factor``, ``add_offset`` and ``_FillValue`` are applied. A file whose data lie in other files
+    (external links and storage, virtual datasets) is refused, unless that was allowed.
     """
 
     file: h5py.File
@@ -65,7 +67,9 @@ class Hdf5Source:
 def opened_hdf5(path: Path) -> Iterator[Hdf5Source]:
     """Open a file; UnusableData when it is not HDF5."""
     try:
-        file = h5py.File(path, "r", locking=False)
+        file = open_hdf5(path, locking=False)
+    except UnsafeHdf5 as error:
+        raise UnusableData(f"{path.name} was not read: {error}") from error
     except OSError as error:
         raise UnusableData(f"{path.name} is no HDF5 file ({error}); copy or export it again") from error
     with file:
@@ -73,9 +77,7 @@ def opened_hdf5(path: Path) -> Iterator[Hdf5Source]:
 
 
 def _places(file: h5py.File) -> Iterator[tuple[SourceChannel, _Place]]:
-    datasets: list[h5py.Dataset] = []
-    file.visititems(lambda _, item: datasets.append(item) if _holds_samples(item) else None)
-    for dataset in datasets:
+    for dataset in (item for _, item in walk(file) if _holds_samples(item)):
         if dataset.ndim == 1:
             yield _channel(dataset, dataset.name, dataset.shape[0]), _Place(dataset.name, None)
             continue
@@ -93,8 +95,6 @@ def _holds_samples(item: h5py.HLObject) -> bool:
         and item.ndim in {1, 2}
         and min(item.shape) > 0
         and max(item.shape) >= FEWEST_SAMPLES
-        and not item.is_virtual
-        and item.external is None
     )
 
 

@@ -27,3 +27,6 @@ from ._facts import (
     recording_facts as recording_facts,
     specimen_of as specimen_of,
 )
+from ._intact import (
+    require_intact as require_intact,
+)

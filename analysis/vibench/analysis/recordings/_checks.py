@@ -6,7 +6,7 @@ from datetime import date
 from enum import StrEnum
 from typing import Generic, TypeVar
 
-from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.recording import RecordingState, SealState
 
 from ._channels import DRIVE
 from ._facts import RecordingFacts
@@ -56,6 +56,7 @@ def measurement_checks(facts: RecordingFacts) -> tuple[Check, ...]:
     """Look at how a recording ended, at overloads, lost samples, levels, rates and calibrations."""
     return (
         _ending(facts),
+        _seal(facts),
         _stretches(facts),
         _overloads(facts),
         _lost(facts),
@@ -73,6 +74,17 @@ def _ending(facts: RecordingFacts) -> Check:
     text = f"{facts.state.value}{why}; {facts.duration_s:.1f} s recorded{planned}"
     verdict = Verdict.PASSED if facts.state is RecordingState.COMPLETE else Verdict.WARNING
     return Check("How it ended", verdict, text)
+
+
+def _seal(facts: RecordingFacts) -> Check:
+    match facts.seal.state:
+        case SealState.INTACT:
+            verdict = Verdict.PASSED
+        case SealState.OTHER_KEY:
+            verdict = Verdict.WARNING
+        case _:
+            verdict = Verdict.NOTE
+    return Check("Seal", verdict, facts.seal.sentence)
 
 
 def _stretches(facts: RecordingFacts) -> Check:

@@ -3,17 +3,25 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import ValidationError
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
 from vibench.acquisition import Identity
 from vibench.acquisition.plan import Measurement
-from vibench.acquisition.recording import FeedbackNote, Origin, Recording, RecordingState, feedback_note
+from vibench.acquisition.recording import (
+    FeedbackNote,
+    Origin,
+    Recording,
+    RecordingState,
+    SealCheck,
+    feedback_note,
+)
 from vibench.sim import Specimen, SpecimenTable
 
 from ..errors import UnusableData
 from ._channel_levels import ChannelLevel, OnRead, channel_levels, ignore_reading
+from ._intact import require_intact
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +52,7 @@ class RecordingFacts:
     whole_stretches: int
     check: str
     """What the check of the bench found before the run; empty when it was left out."""
+    seal: SealCheck
     bench_check: Mapping[str, Any]
     """The last check of the whole bench before it, as the recording has it; may be empty."""
     feedback: tuple[FeedbackNote, ...] = ()
@@ -67,12 +76,14 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
     Raises
     ------
     UnusableData
-        When its plan is not one that this version knows.
+        When it is not as it was sealed, or says of plan or bench what this version does not know.
     NotEnoughData
         When it holds no samples.
 
     """
+    seal = require_intact(recording)
     measurement = plan_of(recording)
+    _require_bench(recording)
     rate = recording.sample_rate_hz
     overload_s: dict[str, float] = {}
     for each in recording.overloads:
@@ -105,6 +116,7 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
         planned_stretches=len(steps),
         whole_stretches=sum(each.is_complete for each in played),
         check=recording.check_text,
+        seal=seal,
         bench_check=recording.bench_check,
         feedback=tuple(note for _, note in noted),
         feedback_s=tuple(time_s for time_s, _ in noted),
@@ -143,4 +155,58 @@ def described_specimen(bench: Mapping[str, Any]) -> SpecimenTable:
         raise UnusableData(
             f"the specimen that the recording describes is not allowed ({'.'.join(map(str, first['loc']))}: "
             f"{first['msg']}); its samples can be read with h5py"
+        ) from error
+
+
+class _Finding(BaseModel):
+    model_config = ConfigDict(extra="allow")
+
+    name: str
+    value: JsonValue
+    verdict: str
+    expected: JsonValue
+
+
+class _BenchCheck(BaseModel):
+    model_config = ConfigDict(extra="allow")
+
+    checked: AwareDatetime
+    verdict: str
+    findings: tuple[_Finding, ...]
+
+
+class _Bench(BaseModel):
+    """What analysis reads of a bench configuration, whatever version wrote it; the rest is left alone."""
+
+    model_config = ConfigDict(extra="allow")
+
+    name: str = ""
+    calibration_valid_days: Annotated[int, Field(ge=0, le=1_000_000)] = 0
+    specimen: dict[str, JsonValue] | None = None
+    amplifier: dict[str, JsonValue] | None = None
+    shaker: dict[str, JsonValue] | None = None
+    vibrometer: dict[str, JsonValue] | None = None
+    accelerometer: dict[str, JsonValue] | None = None
+
+
+class _Provenance(BaseModel):
+    model_config = ConfigDict(extra="allow")
+
+    packages: dict[str, str] = Field(default_factory=dict)
+
+
+def _require_bench(recording: Recording) -> None:
+    """Refuse a bench, its check, or a provenance that later steps could not read; raises UnusableData."""
+    try:
+        _Bench.model_validate(recording.bench)
+        _Provenance.model_validate(recording.provenance)
+        if recording.bench_check:
+            _BenchCheck.model_validate(recording.bench_check)
+        described_specimen(recording.bench)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise UnusableData(
+            f"what {recording.path.name} says of its bench cannot be read ({place}: {first['msg']}); "
+            "read the samples with h5py, or update vibench"
         ) from error

@@ -5,7 +5,7 @@ from typing import Any
 
 from vibench.acquisition.recording import Recording, open_recording
 
-from ..errors import AnalysisError
+from ..errors import AnalysisError, UnusableData
 from ..frequency_response import DEFAULT_REQUEST, FrequencyResponseRequest
 from ..kinds import ANALYSES
 from ..recordings import (
@@ -19,6 +19,8 @@ from ..recordings import (
 )
 
 UNOBSERVED = Unobserved()
+CONTRADICTIONS = (ArithmeticError, LookupError, MemoryError, TypeError, ValueError)
+"""What a calculation raises over a recording that is well formed, and whose parts do not go together."""
 
 
 def analyse(
@@ -59,4 +61,9 @@ def analyse(
     except AnalysisError as error:
         ended = f"{facts.state.value}" + (f": {facts.reason}" if facts.reason else "")
         raise type(error)(f"{recording.path.name} ({ended}): {error}") from error
+    except CONTRADICTIONS as error:
+        raise UnusableData(
+            f"{recording.path.name} cannot be analysed: its samples and tables are not what its plan says "
+            f"({type(error).__name__}: {error}); read them with h5py"
+        ) from error
     return found

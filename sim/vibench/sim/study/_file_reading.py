@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 from pydantic import ValidationError
 
+from ..hdf5_files import UnsafeHdf5, open_hdf5
 from . import _layout as layout
 from ._arrays import Arrays
 from ._columns import COLUMNS
@@ -95,7 +96,9 @@ def _opened(path: Path) -> Iterator[h5py.File]:
     try:
         # With HDF5's usual lock, which the writer's allows: a process that has the file open elsewhere, in
         # xarray for example, cannot open it with another one.
-        file = h5py.File(path, "r")
+        file = open_hdf5(path)
+    except UnsafeHdf5 as error:
+        raise StudyError(f"{path} was not read: {error}") from error
     except OSError as error:
         raise StudyError(
             f"{path} is no readable HDF5 file ({error}); give the path of a study's file."

@@ -1,0 +1,108 @@
+"""Every recording of a folder held against its seal, and against the campaigns' journals beside it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import RecordingError
+from ..recording import SUFFIX, SealDepth, SealKey, SealState, open_recording
+from ._catalogue import recordings_below
+from ._catalogue_entry import UNREADABLE
+from ._journal import JOURNAL_SUFFIX
+from ._journal_point import JournalPoint, JournalPointState, read_journal
+
+MISSING = "missing"
+"""Verdict on a recording that a journal counts on, and that is not there."""
+BAD = frozenset({SealState.DAMAGED.value, SealState.OTHER_KEY.value, UNREADABLE, MISSING})
+
+
+@dataclass(frozen=True)
+class VerifiedRecording:
+    """What was found of one file."""
+
+    path: str
+    """Below the folder, with ``/``; the name of a single file."""
+    verdict: str
+    """``intact``, ``damaged``, ``unsealed``, ``unfinished``, ``other_key``, ``unreadable`` or ``missing``."""
+    sentence: str
+    seal: str
+    results: dict[str, str]
+    """Verdict on each result that was saved in it."""
+
+    @property
+    def is_bad(self) -> bool:
+        """Whether the file, or a result in it, is not as it was made."""
+        return self.verdict in BAD or not BAD.isdisjoint(self.results.values())
+
+
+def verify_recordings(
+    place: Path,
+    depth: SealDepth | str = SealDepth.WHOLE,
+    key: SealKey | None = None,
+) -> tuple[VerifiedRecording, ...]:
+    """Hold a recording, or all of a folder and of those in it, against seals and journals; changes nothing.
+
+    Parameters
+    ----------
+    place
+        A recording or a folder.
+    depth
+        ``"quick"`` reads attributes, texts and tables, ``"whole"`` every sample too.
+    key
+        What they should be signed with, as `vibench.acquisition.recording.seal_key` reads it.
+
+    Raises
+    ------
+    RecordingError
+        When there is no such place, or the key cannot be read.
+
+    """
+    if not place.exists():
+        raise RecordingError(f"{place} does not exist; give a recording, or a folder of recordings.")
+    is_folder = place.is_dir() and not place.name.endswith(SUFFIX)
+    paths = tuple(recordings_below(place)) if is_folder else (place,)
+    root = place if is_folder else place.parent
+    folders = sorted({path.parent for path in paths} | ({place} if is_folder else set()))
+    known = {path: point for folder in folders for path, point in _counted_on(folder)}
+    found = [_verified(path, root, known.get(path), SealDepth(depth), key) for path in paths]
+    if is_folder:
+        found += [_missing(path, root, point) for path, point in known.items() if not path.exists()]
+    return tuple(found)
+
+
+def _counted_on(folder: Path) -> Iterator[tuple[Path, JournalPoint]]:
+    """Give the recordings that the journals of a folder call done; a broken journal counts on none."""
+    for journal in sorted(folder.glob(f"*{JOURNAL_SUFFIX}")):
+        try:
+            points = read_journal(journal)
+        except RecordingError:
+            continue
+        for point in points:
+            if point.state is JournalPointState.DONE:
+                yield folder / point.file, point
+
+
+def _verified(
+    path: Path, root: Path, point: JournalPoint | None, depth: SealDepth, key: SealKey | None
+) -> VerifiedRecording:
+    where = path.relative_to(root).as_posix()
+    try:
+        with open_recording(path) as recording:
+            found = recording.check_seal(depth, key)
+            results = {name: each.state.value for name, each in recording.check_result_seals(key).items()}
+    except RecordingError as error:
+        return VerifiedRecording(where, UNREADABLE, str(error), "", {})
+    state, sentence = found.state, found.sentence
+    if point is not None and point.seal and point.seal != found.seal and state is not SealState.DAMAGED:
+        state = SealState.DAMAGED
+        sentence = f"its seal is not the one that the campaign noted for {point.name}: another recording"
+    bad = [name for name, each in results.items() if each in BAD]
+    if bad:
+        sentence += f"; not as they were saved: results {', '.join(bad)}"
+    return VerifiedRecording(where, state.value, sentence, found.seal, results)
+
+
+def _missing(path: Path, root: Path, point: JournalPoint) -> VerifiedRecording:
+    return VerifiedRecording(
+        path.relative_to(root).as_posix(), MISSING, f"the campaign made it for {point.name}", point.seal, {}
+    )

@@ -1,0 +1,191 @@
+"""What the attributes and texts of a recording may say: held against these models once, when it is opened."""
+
+import json
+import math
+from collections.abc import Mapping
+from datetime import date, datetime
+from typing import Annotated, Any, TypeVar
+
+import h5py
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, JsonValue, ValidationError
+
+from ..errors import RecordingError
+from ..instruments import Identity
+from ._attributes import Attribute, read_attributes, read_text_dataset
+from ._header import ChannelHeader
+from ._layout import CONFIGURATION, Origin, RecordingState
+
+DEEPEST_JSON = 40
+"""Lists and objects in one another; a plan has about five."""
+SAME_SCALE = 1e-9
+"""How far scale_factor and add_offset may lie from what the other attributes give; they are exact copies."""
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def _iso_moment(text: str) -> str:
+    datetime.fromisoformat(text)
+    return text
+
+
+def _iso_date(text: str) -> str:
+    if text:
+        date.fromisoformat(text)
+    return text
+
+
+def _unknown_as_none(value: object) -> object:
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Unknown = BeforeValidator(_unknown_as_none)
+"""NaN in the file where a number is not known."""
+Rate = Annotated[float, Field(ge=1e-6, le=1e12)]
+"""From a sample in a fortnight to a terahertz [1/s]."""
+
+
+class _AbstractFacts(BaseModel):
+    """Attributes of one object; those of other programs and of later versions are left alone."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="ignore")
+
+
+class FileFacts(_AbstractFacts):
+    """Attributes of the file."""
+
+    sample_rate_hz: Rate
+    requested_sample_rate_hz: Rate
+    expected_samples: Annotated[int, Field(ge=-1)]
+    origin: Annotated[Origin, Field(strict=False)]
+    started_utc: Annotated[str, AfterValidator(_iso_moment)]
+    recording_id: str
+    roles: str
+    samples: Annotated[int, Field(ge=0)]
+    state: Annotated[RecordingState, Field(strict=False)]
+    reason: str
+
+
+class ChannelFacts(_AbstractFacts):
+    """Attributes of a channel."""
+
+    physical_channel: str
+    quantity: str
+    units: str
+    physical_per_volt: Finite
+    range_v: Positive
+    volts_per_count: Annotated[Positive | None, Unknown]
+    volts_at_zero_count: Finite
+    physical_offset: Finite
+    coupling: str
+    iepe_current_a: Finite
+    sensitivity: Annotated[Finite | None, Unknown]
+    sensitivity_unit: str
+    serial: str
+    calibration_date: Annotated[str, AfterValidator(_iso_date)]
+    delay_s: Annotated[float, Field(ge=-3600, le=3600)]
+    long_name: str
+    scale_factor: Finite
+    add_offset: Finite
+
+
+class ConfigurationFacts(_AbstractFacts):
+    """Texts of the group ``/configuration``, as what they say."""
+
+    model_config = ConfigDict(strict=False)
+
+    plan_json: dict[str, JsonValue]
+    bench_json: dict[str, JsonValue]
+    instruments_json: dict[str, Identity]
+    confirmations_json: dict[str, str | float]
+    provenance_json: dict[str, JsonValue]
+    bench_check_json: dict[str, JsonValue] = Field(default_factory=dict)
+    """Absent from files of earlier versions."""
+
+
+def file_facts(attributes: Mapping[str, Attribute], **found: object) -> FileFacts:
+    """Read the attributes of the file; ``found`` replaces what a growing one says elsewhere."""
+    return _read("the file", FileFacts, {**attributes, **found})
+
+
+def channel_header(role: str, dataset: h5py.Dataset) -> ChannelHeader:
+    """Read the attributes of a channel.
+
+    Raises
+    ------
+    RecordingError
+        When one is missing, is of another type or range, or contradicts the others.
+
+    """
+    attributes = read_attributes(dataset)
+    facts = _read(f"the channel {role!r}", ChannelFacts, attributes)
+    header = ChannelHeader.from_attributes(role, attributes)
+    for name, said, follows in (
+        ("scale_factor", facts.scale_factor, header.scale_factor),
+        ("add_offset", facts.add_offset, header.add_offset),
+    ):
+        if not math.isclose(said, follows, rel_tol=SAME_SCALE):
+            raise RecordingError(
+                f"the channel {role!r} says {name} = {said:g}, and its other attributes give {follows:g}"
+            )
+    return header
+
+
+def configuration_facts(file: h5py.File) -> ConfigurationFacts:
+    """Read the texts of the configuration; raises RecordingError."""
+    group = file[CONFIGURATION]
+    texts = {name: _parsed(name, read_text_dataset(group, name)) for name in group}
+    return _read("the configuration", ConfigurationFacts, texts)
+
+
+def json_object(text: str) -> dict[str, Any]:
+    """Read a JSON object of finite numbers that is not deeper than any of ours; raises ValueError."""
+    try:
+        value = json.loads(text, parse_constant=_refused, parse_float=_finite)
+    except RecursionError as error:
+        raise ValueError("its lists and objects lie too deep in one another") from error
+    if not isinstance(value, dict):
+        raise ValueError(f"it is a JSON {type(value).__name__}, and an object is needed")  # noqa: TRY004
+    if _is_deeper(value, DEEPEST_JSON):
+        raise ValueError(f"its lists and objects lie more than {DEEPEST_JSON} deep in one another")
+    return value
+
+
+def _parsed(name: str, text: str) -> dict[str, Any]:
+    try:
+        return json_object(text)
+    except ValueError as error:
+        raise RecordingError(f"{name} cannot be read: {error}") from error
+
+
+def _refused(constant: str) -> float:
+    raise ValueError(f"{constant} is no number of JSON")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is too large a number")
+    return value
+
+
+def _is_deeper(value: object, levels: int) -> bool:
+    match value:
+        case dict():
+            below: Any = value.values()
+        case list():
+            below = value
+        case _:
+            return False
+    return levels == 0 or any(_is_deeper(each, levels - 1) for each in below)
+
+
+def _read(what: str, model: type[Model], values: Mapping[str, object]) -> Model:
+    try:
+        return model.model_validate(dict(values))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(str(part) for part in first["loc"])
+        given = "" if first["type"] == "missing" else f"; it is {str(first['input'])[:80]!r}"
+        raise RecordingError(f"{place} of {what}: {first['msg'].lower()}{given}") from error

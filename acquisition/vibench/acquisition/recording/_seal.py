@@ -1,0 +1,274 @@
+"""The seal of a recording: a checksum of everything in it, made at its end, by which any change shows.
+
+A manifest lists every group and dataset with two checksums: of its attributes, type and shape, and of its
+data. The SHA-256 of the manifest is the seal. Whoever gives a key has it signed too (HMAC, RFC 2104): a seal
+alone shows damage, since who can change the file can make a new one; a signature cannot be made without the
+key. ``docs/recording-format.md`` shows how a stranger checks it. Reasons: docs/decisions/0031-seals.md.
+"""
+
+import hashlib
+import hmac
+import json
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from vibench.sim.hdf5_files import walk
+
+from ..errors import RecordingError
+from . import _layout as layout
+from ._attributes import READ_KINDS, read_attributes, read_text_dataset, write_attributes, write_text_dataset
+
+MANIFEST = "manifest_json"
+SHA256, HMAC, KEY_ID = "sha256", "hmac_sha256", "key_id"
+RESULT_MARKS = (f"seal_{SHA256}", f"seal_{HMAC}", f"seal_{KEY_ID}")
+"""Attributes of a result's group, which its own seal leaves out."""
+LINKS = ("DIMENSION_LIST", "REFERENCE_LIST")
+"""How HDF5 notes which axis belongs to what: addresses inside the file, by which no number is read."""
+PIECE_ITEMS = 20 * layout.CHUNK_SAMPLES
+QUICK_BYTES = 65_536
+"""A quick look reads datasets up to this size: all texts and tables, and no samples of a whole recording."""
+KEY_VARIABLE = "VIBENCH_SEAL_KEY"
+"""Names the file with the key, for every command and program."""
+SHORTEST_KEY = 16
+
+Manifest = dict[str, dict[str, str]]
+
+
+class SealDepth(StrEnum):
+    """How much of a recording is held against its seal."""
+
+    QUICK = "quick"
+    """All attributes, texts and tables; no samples."""
+    WHOLE = "whole"
+
+
+class SealState(StrEnum):
+    """What a recording's seal says."""
+
+    INTACT = "intact"
+    DAMAGED = "damaged"
+    """Something is not as it was sealed."""
+    UNSEALED = "unsealed"
+    """Made before recordings had seals, or its seal is gone."""
+    UNFINISHED = "unfinished"
+    """Still being recorded, or cut off: it is sealed when it is finished or recovered."""
+    OTHER_KEY = "other_key"
+    """As it was sealed, but not with the key that was given."""
+
+
+@dataclass(frozen=True)
+class SealCheck:
+    """What was found of a seal."""
+
+    state: SealState
+    sentence: str
+    seal: str
+    """SHA-256 of the manifest; empty without one."""
+
+
+class SealKey:
+    """The secret that a user gives: whoever has it can sign, and tell what was signed with it."""
+
+    def __init__(self, secret: bytes) -> None:
+        self._secret = secret
+
+    @property
+    def name(self) -> str:
+        """Tells keys apart, and does not give them away."""
+        return self.signature(b"name of this key")[:16]
+
+    def signature(self, text: bytes) -> str:
+        """Sign a text: HMAC-SHA-256 in hexadecimal digits."""
+        return hmac.new(self._secret, text, hashlib.sha256).hexdigest()
+
+
+def seal_key(path: Path | None = None) -> SealKey | None:
+    """Read the key from a file, by default the one that VIBENCH_SEAL_KEY names; None where none is given.
+
+    Raises
+    ------
+    RecordingError
+        When the file cannot be read, or is too short to be a secret.
+
+    """
+    named = os.environ.get(KEY_VARIABLE, "") if path is None else str(path)
+    if not named:
+        return None
+    try:
+        secret = Path(named).expanduser().read_bytes().strip()
+    except OSError as error:
+        raise RecordingError(
+            f"The key {named} for seals cannot be read ({error.strerror}). Nothing was done; give the file"
+            f" that holds it (--key, or the variable {KEY_VARIABLE}), or none."
+        ) from error
+    if len(secret) < SHORTEST_KEY:
+        raise RecordingError(
+            f"The key {named} for seals has {len(secret)} bytes; at least {SHORTEST_KEY} are needed. Make one"
+            " with: head -c 32 /dev/urandom | base64"
+        )
+    return SealKey(secret)
+
+
+def write_seal(file: h5py.File, known: Mapping[str, str], key: SealKey | None) -> None:
+    """Seal a finished recording; ``known`` has the checksums of data that was hashed while it was written."""
+    manifest = {
+        path: {
+            "attributes": _described(item),
+            "data": known[path] if path in known else _data_sha256(item),
+        }
+        for path, item in _sealed_objects(file)
+    }
+    text = json.dumps(manifest, sort_keys=True)
+    group = file.create_group(layout.SEAL)
+    write_text_dataset(group, MANIFEST, text)
+    write_attributes(group, _marks(text, key, (SHA256, HMAC, KEY_ID)))
+
+
+def check_seal(file: h5py.File, depth: SealDepth, key: SealKey | None) -> SealCheck:
+    """Hold a finished recording against its seal."""
+    if layout.SEAL not in file:
+        return SealCheck(SealState.UNSEALED, "it has no seal: it was made before recordings had one", "")
+    try:
+        marks = read_attributes(file[layout.SEAL])
+        text = read_text_dataset(file[layout.SEAL], MANIFEST)
+        manifest: Manifest = json.loads(text)
+        seal = _sha256(text.encode())
+        if marks.get(SHA256) != seal:
+            return SealCheck(SealState.DAMAGED, "the seal itself was changed", "")
+        differing = list(_differing(file, manifest, depth))
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
+        return SealCheck(SealState.DAMAGED, f"it cannot be read as it was sealed ({error})", "")
+    if differing:
+        more = f" and {len(differing) - 3} more" if len(differing) > 3 else ""
+        return SealCheck(SealState.DAMAGED, f"not as it was sealed: {', '.join(differing[:3])}{more}", seal)
+    return _judged_signature(text, [str(marks.get(each, "")) for each in (HMAC, KEY_ID)], key, seal)
+
+
+def seal_of(file: h5py.File) -> str:
+    """Give the seal that a recording carries, unchecked; empty without one."""
+    return str(read_attributes(file[layout.SEAL]).get(SHA256, "")) if layout.SEAL in file else ""
+
+
+def seal_result(group: h5py.Group, key: SealKey | None) -> None:
+    """Seal a result that has just been added, together with the seal of its recording."""
+    write_attributes(group, _marks(_result_text(group), key, RESULT_MARKS))
+
+
+def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
+    """Hold a result against its own seal."""
+    try:
+        marks = read_attributes(group)
+        said, signature, key_id = (str(marks.get(each, "")) for each in RESULT_MARKS)
+        if not said:
+            return SealCheck(SealState.UNSEALED, "it has no seal: it was saved before results had one", "")
+        text = _result_text(group)
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
+        return SealCheck(SealState.DAMAGED, f"it cannot be read as it was sealed ({error})", "")
+    if _sha256(text.encode()) != said:
+        return SealCheck(SealState.DAMAGED, "not as it was sealed", said)
+    return _judged_signature(text, [signature, key_id], key, said)
+
+
+def _pieces(dataset: h5py.Dataset) -> Iterator[NDArray[Any]]:
+    """Give a dataset's data in pieces, in the order in which it is hashed."""
+    if dataset.ndim != 1:
+        yield np.asarray(dataset[()])
+        return
+    for begin in range(0, len(dataset), PIECE_ITEMS):
+        yield np.ascontiguousarray(dataset[begin : begin + PIECE_ITEMS])
+
+
+def _sealed_objects(file: h5py.File) -> Iterator[tuple[str, h5py.HLObject]]:
+    """Everything but the seal itself and what is added later."""
+    for path, item in walk(file):
+        if path.split("/")[1] not in (layout.SEAL, layout.RESULTS):
+            yield path, item
+
+
+def _differing(file: h5py.File, manifest: Manifest, depth: SealDepth) -> Iterator[str]:
+    found = dict(_sealed_objects(file))
+    yield from (f"{path} is new" for path in found if path not in manifest)
+    for path, said in manifest.items():
+        item = found.get(path)
+        if item is None:
+            yield f"{path} is missing"
+        elif said["attributes"] != _described(item):
+            yield f"attributes, type or length of {path}"
+        elif isinstance(item, h5py.Group) or (depth is SealDepth.QUICK and item.nbytes > QUICK_BYTES):
+            continue
+        elif said["data"] != _data_or_nothing(item):
+            yield f"data of {path}"
+
+
+def _described(item: h5py.HLObject) -> str:
+    """Checksum of an object's attributes, type and shape."""
+    described: dict[str, Any] = {}
+    for name in item.attrs:
+        if name in LINKS or name in RESULT_MARKS:
+            continue
+        if item.attrs.get_id(name).dtype.kind not in READ_KINDS:
+            raise ValueError(f"the attribute {name!r} of {item.name} is neither number nor text")
+        value = np.asarray(item.attrs[name])
+        described[name] = [value.dtype.str, list(value.shape), value.tobytes().hex()]
+    if isinstance(item, h5py.Dataset):
+        described["/"] = [item.dtype.str, list(item.shape)]
+    return _sha256(json.dumps(described, sort_keys=True).encode())
+
+
+def _data_sha256(item: h5py.HLObject) -> str:
+    if not isinstance(item, h5py.Dataset):
+        return ""
+    if item.dtype.kind not in READ_KINDS:
+        raise ValueError(f"{item.name} holds neither numbers nor text")
+    digest = hashlib.sha256()
+    for piece in _pieces(item):
+        digest.update(piece.tobytes() if piece.dtype.kind == "S" else piece.data)
+    return digest.hexdigest()
+
+
+def _data_or_nothing(item: h5py.Dataset) -> str:
+    """Give a word that is no checksum where data cannot be read."""
+    try:
+        return _data_sha256(item)
+    except OSError:
+        return "unreadable"
+
+
+def _result_text(group: h5py.Group) -> str:
+    objects = {
+        path: {"attributes": _described(item), "data": _data_sha256(item)} for path, item in walk(group)
+    }
+    return json.dumps({"recording": seal_of(group.file), "objects": objects}, sort_keys=True)
+
+
+def _marks(text: str, key: SealKey | None, names: tuple[str, str, str]) -> dict[str, str | int | float]:
+    raw = text.encode()
+    values = (_sha256(raw),) if key is None else (_sha256(raw), key.signature(raw), key.name)
+    return dict(zip(names, values, strict=False))
+
+
+def _judged_signature(text: str, signed: list[str], key: SealKey | None, seal: str) -> SealCheck:
+    signature, key_id = signed
+    if key is None:
+        also = f"; signed with the key {key_id}, which was not given" if key_id else ""
+        return SealCheck(SealState.INTACT, f"as it was sealed{also}", seal)
+    if not signature or key_id != key.name:
+        by = f"with the key {key_id}" if key_id else "without a key"
+        return SealCheck(
+            SealState.OTHER_KEY, f"as it was sealed, but {by}, not with the one given ({key.name})", seal
+        )
+    if not hmac.compare_digest(signature.encode(), key.signature(text.encode()).encode()):
+        return SealCheck(SealState.DAMAGED, "its signature is not that of the key: it was forged", seal)
+    return SealCheck(SealState.INTACT, f"as it was sealed, and signed with the key {key.name}", seal)
+
+
+def _sha256(raw: bytes) -> str:
+    return hashlib.sha256(raw).hexdigest()

@@ -1,0 +1,21 @@
+"""`--allow-external`: files whose data lie in other files are read only when the user says so."""
+
+from contextlib import AbstractContextManager, nullcontext
+from typing import Annotated
+
+import typer
+
+from vibench.sim.hdf5_files import external_data_allowed
+
+AllowExternal = Annotated[
+    bool,
+    typer.Option(
+        "--allow-external",
+        help="Follow an HDF5 file into other files: external storage and links, virtual datasets.",
+    ),
+]
+
+
+def external_data(allowed: bool) -> AbstractContextManager[None]:
+    """Allow it while inside, if the user said so."""
+    return external_data_allowed() if allowed else nullcontext()

@@ -1,0 +1,54 @@
+"""`vibench verify`: whether recordings are what they were when they were sealed."""
+
+from collections import Counter
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.acquisition.campaign import verify_recordings
+from vibench.acquisition.recording import SealDepth, seal_key
+
+from .external_data import AllowExternal, external_data
+from .output import console, print_json
+from .paths import AsJson
+
+
+def verify(
+    place: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Folder of recordings, or one recording, NAME.h5.")
+    ],
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Attributes, texts and tables only, not every sample.")
+    ] = False,
+    key: Annotated[
+        Path | None,
+        typer.Option(
+            "--key",
+            metavar="FILE",
+            help="What they should be signed with; if absent, what VIBENCH_SEAL_KEY names.",
+        ),
+    ] = None,
+    allow_external: AllowExternal = False,
+    as_json: AsJson = False,
+) -> None:
+    """Hold every recording of a folder against its seal, samples and all, and against journals."""
+    with external_data(allow_external):
+        found = verify_recordings(place, SealDepth.QUICK if quick else SealDepth.WHOLE, seal_key(key))
+    counts = Counter(each.verdict for each in found)
+    if as_json:
+        print_json(
+            {
+                "place": str(place.resolve()),
+                "depth": "quick" if quick else "whole",
+                "counts": dict(counts),
+                "recordings": [asdict(each) | {"is_bad": each.is_bad} for each in found],
+            }
+        )
+    else:
+        for each in found:
+            console.print(f"{each.verdict:10}  {each.path}: {each.sentence}", markup=False)
+        console.print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()) or "no recordings")
+    if any(each.is_bad for each in found):
+        raise typer.Exit(1)

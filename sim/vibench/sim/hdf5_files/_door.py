@@ -1,0 +1,185 @@
+"""What every HDF5 file must pass before anything in it is read: its own data only, and sizes that can be."""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import h5py
+
+MOST_OBJECTS = 20_000
+"""Groups and datasets of one file; a recording has about forty."""
+DEEPEST = 32
+"""Groups in groups."""
+LARGEST_ATTRIBUTE_BYTES = 1_000_000
+LARGEST_CHUNK_BYTES = 256_000_000
+"""Of a foreign program's chunks; ours have 200 kB."""
+LARGEST_RATIO = 1100
+"""Deflate makes at most 1030 bytes of one (zlib's documentation)."""
+UNSTORED_BYTES = 1_000_000
+"""What a dataset may declare without having anything stored."""
+OWN_FILTERS = frozenset(
+    {
+        h5py.h5z.FILTER_DEFLATE,
+        h5py.h5z.FILTER_SHUFFLE,
+        h5py.h5z.FILTER_FLETCHER32,
+        h5py.h5z.FILTER_SZIP,
+        h5py.h5z.FILTER_NBIT,
+        h5py.h5z.FILTER_SCALEOFFSET,
+        h5py.h5z.FILTER_LZF,
+    }
+)
+"""Any other filter is a plug-in: a library that HDF5 would look for on this machine and run."""
+
+_allowances: list[None] = []
+"""One for each `external_data_allowed` that is on in this process, whichever thread asks."""
+
+
+class UnsafeHdf5(ValueError):
+    """The file points outside itself, or says of itself what cannot be; the text does not name the file."""
+
+
+@contextmanager
+def external_data_allowed() -> Iterator[None]:
+    """Let every file that this process opens inside hand out the bytes of other files, as HDF5 does."""
+    _allowances.append(None)
+    try:
+        yield
+    finally:
+        _allowances.pop()
+
+
+def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
+    """Open a file for reading, and look at everything in it but the data.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    locking
+        As of ``h5py.File``: HDF5's own choice if None.
+
+    Raises
+    ------
+    OSError
+        When HDF5 cannot open it.
+    UnsafeHdf5
+        When it points outside itself, or its sizes cannot be.
+
+    """
+    file = h5py.File(path, "r", locking=locking)
+    try:
+        size_bytes = path.stat().st_size
+        for _, item in walk(file):
+            _require_attributes(item)
+            if isinstance(item, h5py.Dataset):
+                _require_dataset(item, size_bytes)
+    except (RuntimeError, KeyError, TypeError, OverflowError) as error:
+        # What h5py raises where the description of an object cannot be read.
+        file.close()
+        raise UnsafeHdf5(f"its inside cannot be read ({error})") from error
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
+    """Give every group and dataset below a group, itself first, by path; each once, in the order of names.
+
+    Raises
+    ------
+    UnsafeHdf5
+        At a link that leaves the file, when that is not allowed; links inside a file are left alone.
+
+    """
+    seen = {_address(file)}
+    waiting = [(file.name, file, 0)]
+    while waiting:
+        path, item, depth = waiting.pop()
+        yield path, item
+        if not isinstance(item, h5py.Group):
+            continue
+        if depth == DEEPEST:
+            raise UnsafeHdf5(f"its groups lie more than {DEEPEST} deep in one another")
+        for name in sorted(item, reverse=True):
+            if not _leads_to_own_object(item, name):
+                continue
+            below = item[name]
+            if _address(below) in seen:
+                continue
+            seen.add(_address(below))
+            if len(seen) > MOST_OBJECTS:
+                raise UnsafeHdf5(f"it holds more than {MOST_OBJECTS} objects")
+            waiting.append((f"{path.rstrip('/')}/{name}", below, depth + 1))
+
+
+def _leads_to_own_object(group: h5py.Group, name: str) -> bool:
+    link = group.get(name, getlink=True)
+    if isinstance(link, h5py.HardLink):
+        return True
+    if isinstance(link, h5py.ExternalLink) and not _allowances:
+        raise UnsafeHdf5(_pointing_out(f"{group.name.rstrip('/')}/{name}", link.filename))
+    return False
+
+
+def _pointing_out(place: str, where: str) -> str:
+    return f"{place} points into another file ({where}); read it with --allow-external if you trust this file"
+
+
+def _address(item: h5py.HLObject) -> tuple[int, int]:
+    found = h5py.h5o.get_info(item.id)
+    return found.fileno, found.addr
+
+
+def _require_attributes(item: h5py.HLObject) -> None:
+    for name in item.attrs:
+        attribute = item.attrs.get_id(name)
+        size = math.prod(attribute.shape or ()) * attribute.dtype.itemsize
+        if size > LARGEST_ATTRIBUTE_BYTES:
+            raise UnsafeHdf5(f"the attribute {name!r} of {item.name} claims {size} bytes")
+
+
+def _require_dataset(dataset: h5py.Dataset, size_bytes: int) -> None:
+    settings = dataset.id.get_create_plist()
+    if settings.get_external_count():
+        if not _allowances:
+            raise UnsafeHdf5(
+                _pointing_out(dataset.name, settings.get_external(0)[0].decode(errors="replace"))
+            )
+        return
+    match settings.get_layout():
+        case h5py.h5d.VIRTUAL:
+            if not _allowances:
+                raise UnsafeHdf5(_pointing_out(dataset.name, "it is a virtual dataset"))
+        case h5py.h5d.CHUNKED:
+            _require_chunks(dataset, settings, size_bytes)
+        case h5py.h5d.CONTIGUOUS:
+            begin, stored = dataset.id.get_offset(), dataset.id.get_storage_size()
+            if begin is not None and begin + stored > size_bytes:
+                raise UnsafeHdf5(
+                    f"{dataset.name} ends at byte {begin + stored}, and the file has {size_bytes}"
+                )
+            _require_size(dataset, stored, 1)
+        case _:
+            _require_size(dataset, dataset.id.get_storage_size(), 1)
+
+
+def _require_chunks(dataset: h5py.Dataset, settings: h5py.h5p.PropDCID, size_bytes: int) -> None:
+    for number in range(settings.get_nfilters()):
+        code = settings.get_filter(number)[0]
+        if code not in OWN_FILTERS:
+            raise UnsafeHdf5(f"{dataset.name} is packed by filter {code}, which is no part of HDF5")
+    chunk_bytes = math.prod(settings.get_chunk()) * dataset.dtype.itemsize
+    if chunk_bytes > LARGEST_CHUNK_BYTES:
+        raise UnsafeHdf5(f"{dataset.name} has chunks of {chunk_bytes} bytes")
+    stored = dataset.id.get_storage_size()
+    if stored > size_bytes:
+        raise UnsafeHdf5(f"{dataset.name} claims {stored} bytes, and the file has {size_bytes}")
+    _require_size(dataset, stored, LARGEST_RATIO if settings.get_nfilters() else 1, chunk_bytes)
+
+
+def _require_size(dataset: h5py.Dataset, stored: int, ratio: int, spare_bytes: int = 0) -> None:
+    declared = math.prod(dataset.shape or ()) * dataset.dtype.itemsize
+    if declared > ratio * stored + spare_bytes + UNSTORED_BYTES:
+        raise UnsafeHdf5(f"{dataset.name} declares {declared} bytes, of which {stored} are stored")
