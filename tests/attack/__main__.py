@@ -10,7 +10,15 @@ import argparse
 import sys
 from pathlib import Path
 
-from . import engine_messages, imported_files, instrument_messages, toml_files
+from . import (
+    engine_messages,
+    imported_files,
+    instrument_messages,
+    recordings_flips,
+    recordings_kills,
+    recordings_mutants,
+    toml_files,
+)
 from .tally import Attack, Shard, Tally, saved_tally
 
 TARGETS: dict[str, Attack] = {
@@ -18,6 +26,9 @@ TARGETS: dict[str, Attack] = {
     "imports": imported_files.attack,
     "engine": engine_messages.attack,
     "instruments": instrument_messages.attack,
+    "recordings": recordings_mutants.attack,
+    "flips": recordings_flips.attack,
+    "kills": recordings_kills.attack,
 }
 """What can be attacked, each by its own file."""
 

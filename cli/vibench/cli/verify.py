@@ -14,6 +14,9 @@ from .external_data import AllowExternal, external_data
 from .output import console, print_json
 from .paths import AsJson
 
+MOST_NAMED = 10
+"""Recordings that the sentence at the end names."""
+
 
 def verify(
     place: Annotated[
@@ -50,5 +53,8 @@ def verify(
         for each in found:
             console.print(f"{each.verdict:10}  {each.path}: {each.sentence}", markup=False)
         console.print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()) or "no recordings")
-    if any(each.is_bad for each in found):
+    bad = [each for each in found if each.is_bad]
+    if bad:
+        named = ", ".join(each.path for each in bad[:MOST_NAMED]) + (" and more" if bad[MOST_NAMED:] else "")
+        typer.echo(f"error: {len(bad)} of {len(found)} recordings cannot be trusted: {named}", err=True)
         raise typer.Exit(1)

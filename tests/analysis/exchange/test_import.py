@@ -24,6 +24,7 @@ from vibench.analysis.exchange import (
     import_recording,
     opened_source,
 )
+from vibench.sim.hdf5_files import external_data_allowed
 
 RATE_HZ = 8000.0
 SAMPLES = 60_000
@@ -393,8 +394,17 @@ def test_objects_inside_hdf5_are_never_offered(tmp_path):
         file.create_dataset("pickled", data=np.void(b"\x80\x04K\x01."))
         file.create_dataset("text", data=["a", "b"], dtype=h5py.string_dtype())
         file.create_dataset("complex", data=np.ones(9, dtype=complex))
-        file["elsewhere"] = h5py.ExternalLink("b.h5", "/v")
     with opened_source(tmp_path / "a.h5") as source:
+        assert [each.name for each in source.channels] == ["/v"]
+
+
+def test_a_file_that_points_into_another_one_is_read_only_when_that_is_allowed(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["v"] = signals()[0]
+        file["elsewhere"] = h5py.ExternalLink("b.h5", "/v")
+    with pytest.raises(UnusableData, match=r"/elsewhere points into another file \(b.h5\).*--allow-external"):
+        opened_source(tmp_path / "a.h5").__enter__()
+    with external_data_allowed(), opened_source(tmp_path / "a.h5") as source:
         assert [each.name for each in source.channels] == ["/v"]
 
 

@@ -11,7 +11,7 @@ from typing import assert_never
 from ..bench import RunBench
 from ..errors import CheckFailed, LimitExceeded, RecordingError
 from ..plan import Campaign, Measurement, Point, require_within_limits
-from ..recording import RecordingState, SealDepth, part_of, recover
+from ..recording import RecordingState, SealDepth, part_of, recover, tmp_of
 from ..run import drive_for
 from ._attempt_files import attempts_in, complete_attempt, next_attempt
 from ._bench_identity import BenchIdentity
@@ -64,6 +64,7 @@ def _ended(point: JournalPoint, folder: Path) -> tuple[JournalPointState, Reason
     try:
         if part_of(path).exists():
             recover(path)
+        tmp_of(path).unlink(missing_ok=True)  # alone it was being prepared: not a sample is in it
         if path.exists():
             return _judged(path, point.measurement)
     except RecordingError as error:

@@ -12,8 +12,8 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from ..errors import RecordingError
 from ..instruments import Identity
 from ._attributes import Attribute, read_attributes, read_text_dataset
-from ._header import ChannelHeader
-from ._layout import CONFIGURATION, Origin, RecordingState
+from ._header import ROLE_PATTERN, ChannelHeader
+from ._layout import CONFIGURATION, ROLE_WIDTH, TEXT_WIDTH, Origin, RecordingState
 
 DEEPEST_JSON = 40
 """Lists and objects in one another; a plan has about five."""
@@ -31,6 +31,13 @@ def _iso_moment(text: str) -> str:
 def _iso_date(text: str) -> str:
     if text:
         date.fromisoformat(text)
+    return text
+
+
+def _names(text: str) -> str:
+    for name in text.split():
+        if len(name) > ROLE_WIDTH or not ROLE_PATTERN.fullmatch(name):
+            raise ValueError(f"{name[:ROLE_WIDTH]!r} is no name of a channel")
     return text
 
 
@@ -61,10 +68,10 @@ class FileFacts(_AbstractFacts):
     origin: Annotated[Origin, Field(strict=False)]
     started_utc: Annotated[str, AfterValidator(_iso_moment)]
     recording_id: str
-    roles: str
+    roles: Annotated[str, AfterValidator(_names)]
     samples: Annotated[int, Field(ge=0)]
     state: Annotated[RecordingState, Field(strict=False)]
-    reason: str
+    reason: Annotated[str, Field(max_length=TEXT_WIDTH)]
 
 
 class ChannelFacts(_AbstractFacts):

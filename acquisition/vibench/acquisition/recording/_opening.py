@@ -1,7 +1,5 @@
 """Opening a file that may be anything: ours, broken, empty, cut short, or from a newer version."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
@@ -12,15 +10,8 @@ from ..errors import RecordingError
 from . import _layout as layout
 from ._attributes import read_attributes
 
-
-@contextmanager
-def opened_recording(path: Path) -> Iterator[h5py.File]:
-    """Open a recording for reading, without a lock, and close it again."""
-    file = open_hdf5(path)
-    try:
-        yield file
-    finally:
-        file.close()
+LONGEST = 300
+"""Letters that are shown of what is wrong: names and texts in a broken file may be of any length."""
 
 
 def open_hdf5(path: Path) -> h5py.File:
@@ -36,7 +27,7 @@ def open_hdf5(path: Path) -> h5py.File:
     try:
         file = hdf5_files.open_hdf5(path, locking=False)
     except hdf5_files.UnsafeHdf5 as error:
-        raise RecordingError(f"{path} was not read: {error}") from error
+        raise RecordingError(f"{path} was not read: {str(error)[:LONGEST]}") from error
     except OSError as error:
         raise RecordingError(
             f"{path} is no readable HDF5 file ({error}). It was cut short, or is something else;"
@@ -80,11 +71,11 @@ def _require_ours(path: Path, file: h5py.File) -> None:
     if attributes.get("format") != layout.FORMAT:
         raise RecordingError(
             f"{path} is an HDF5 file, but no recording of vibench: its attribute 'format' is"
-            f" {attributes.get('format', 'missing')!r}, not {layout.FORMAT!r}."
+            f" {str(attributes.get('format', 'missing'))[:LONGEST]!r}, not {layout.FORMAT!r}."
         )
     version = attributes.get("format_version")
     if version != layout.FORMAT_VERSION:
         raise RecordingError(
-            f"{path} has format version {version}; this vibench reads version {layout.FORMAT_VERSION}."
-            " Update vibench to read it."
+            f"{path} has format version {str(version)[:LONGEST]}; this vibench reads version"
+            f" {layout.FORMAT_VERSION}. Update vibench to read it."
         )

@@ -20,7 +20,7 @@ from ._counts import Counts
 from ._disk import is_being_recorded
 from ._header import ChannelHeader, require_different
 from ._layout import Origin, RecordingState
-from ._opening import name_now, open_hdf5
+from ._opening import LONGEST, name_now, open_hdf5
 from ._overview import CountOverview, read_overview
 from ._replacing import replace_with_change
 from ._results import ResultArray, SavedResult, Setting, read_results, result_groups, write_result
@@ -307,8 +307,8 @@ def open_recording(path: Path | str) -> Recording:
     except (RecordingError, *DAMAGE) as error:
         handle.file.close()
         raise RecordingError(
-            f"{path} is damaged, or no recording of vibench: {error}. Copy it again from where it was"
-            " recorded."
+            f"{path} is damaged, or no recording of vibench: {str(error)[:LONGEST]}."
+            " Copy it again from where it was recorded."
         ) from error
 
 

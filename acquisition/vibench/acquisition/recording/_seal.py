@@ -32,7 +32,7 @@ RESULT_MARKS = (f"seal_{SHA256}", f"seal_{HMAC}", f"seal_{KEY_ID}")
 """Attributes of a result's group, which its own seal leaves out."""
 LINKS = ("DIMENSION_LIST", "REFERENCE_LIST")
 """How HDF5 notes which axis belongs to what: addresses inside the file, by which no number is read."""
-PIECE_ITEMS = 20 * layout.CHUNK_SAMPLES
+PIECE_ITEMS = 4 * layout.CHUNK_SAMPLES
 QUICK_BYTES = 65_536
 """A quick look reads datasets up to this size: all texts and tables, and no samples of a whole recording."""
 KEY_VARIABLE = "VIBENCH_SEAL_KEY"

@@ -69,7 +69,7 @@ def opened_hdf5(path: Path) -> Iterator[Hdf5Source]:
     try:
         file = open_hdf5(path, locking=False)
     except UnsafeHdf5 as error:
-        raise UnusableData(f"{path.name} was not read: {error}") from error
+        raise UnusableData(f"{path.name} was not read: {str(error)[:300]}") from error
     except OSError as error:
         raise UnusableData(f"{path.name} is no HDF5 file ({error}); copy or export it again") from error
     with file:

@@ -1,0 +1,60 @@
+"""Hold a recording against its seal with h5py and hashlib alone. No vibench is needed for it.
+
+    python examples/verify_a_recording_with_h5py.py recordings/noise.h5 [KEYFILE]
+
+The seal is a manifest: for every group and dataset a checksum of its attributes, type and shape, and one of
+its data. docs/recording-format.md says the same in words.
+"""
+
+import hashlib
+import hmac
+import json
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+LINKS = ("DIMENSION_LIST", "REFERENCE_LIST")  # how HDF5 notes what is whose axis: addresses, no content
+
+
+def attributes_sha256(item):
+    """Of what an object says of itself: attributes, type and shape, as JSON."""
+    said = {}
+    for name in item.attrs:
+        if name not in LINKS:
+            value = np.asarray(item.attrs[name])
+            said[name] = [value.dtype.str, list(value.shape), value.tobytes().hex()]
+    if isinstance(item, h5py.Dataset):
+        said["/"] = [item.dtype.str, list(item.shape)]
+    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+
+
+def data_sha256(item):
+    """Of a dataset's numbers or texts, one after the other; a group has none."""
+    if not isinstance(item, h5py.Dataset):
+        return ""
+    return hashlib.sha256(np.asarray(item[()]).tobytes()).hexdigest()
+
+
+with h5py.File(sys.argv[1]) as file:
+    text = file["seal/manifest_json"][()]
+    manifest, marks = json.loads(text), {name: each.decode() for name, each in file["seal"].attrs.items()}
+    if hashlib.sha256(text).hexdigest() != marks["sha256"]:
+        sys.exit(print("the seal itself was changed") or 1)
+    items = {"/": file}
+    file.visititems(lambda path, item: items.update({f"/{path}": item}))
+    found = {
+        path: {"attributes": attributes_sha256(item), "data": data_sha256(item)}
+        for path, item in items.items()
+        if path.split("/")[1] not in ("seal", "results")  # results are added later, with seals of their own
+    }
+
+changed = sorted(path for path in manifest.keys() | found.keys() if manifest.get(path) != found.get(path))
+if changed:
+    sys.exit(print("not as it was sealed:", ", ".join(changed)) or 1)
+if len(sys.argv) > 2:
+    key = Path(sys.argv[2]).read_bytes().strip()
+    if marks.get("hmac_sha256") != hmac.new(key, text, hashlib.sha256).hexdigest():
+        sys.exit(print("not signed with this key") or 1)
+print("as it was sealed:", marks["sha256"])

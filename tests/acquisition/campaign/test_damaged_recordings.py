@@ -1,0 +1,197 @@
+"""A recording that is not as it was sealed counts no longer: it is named, kept, and its point made again."""
+
+import os
+import shutil
+import sqlite3
+
+import h5py
+import pytest
+
+from vibench.acquisition import open_recording, run_campaign
+from vibench.acquisition.campaign import (
+    CampaignEventKind,
+    ExistingRecordings,
+    PointOutcome,
+    list_recordings,
+    planned_recordings,
+    read_journal,
+    verify_recordings,
+)
+from vibench.acquisition.plan import Campaign, Dwell, Measurement
+
+
+def dwell(name, frequency_hz):
+    excitation = Dwell(amplitude_vpp=1.0, frequency_hz=frequency_hz, settle_s=0.2, duration_s=0.5)
+    return Measurement(name=name, excitation=excitation, ramp_s=0.2, ramp_step_s=0.02)
+
+
+CAMPAIGN = Campaign(name="c", measurements=(dwell("one", 260.0), dwell("two", 261.0), dwell("three", 262.0)))
+
+
+def truncated(folder):
+    content = (folder / "two.h5").read_bytes()
+    (folder / "two.h5").write_bytes(content[: len(content) // 2])
+
+
+def emptied(folder):
+    (folder / "two.h5").write_bytes(b"")
+
+
+def made_random(folder):
+    (folder / "two.h5").write_bytes(os.urandom(20_000))
+
+
+def with_another_sample(folder):
+    with h5py.File(folder / "two.h5", "r+") as file:
+        file["m0_velocity"][100] += 1
+
+
+def with_another_scale(folder):
+    with h5py.File(folder / "two.h5", "r+") as file:
+        for name in ("scale_factor", "physical_per_volt"):
+            file["m0_velocity"].attrs[name] *= 2.0
+
+
+def exchanged(folder):
+    shutil.copy(folder / "three.h5", folder / "two.h5")
+
+
+def exchanged_for_an_older_one(folder):
+    """Another sound recording of the very same plan."""
+    shutil.copy(folder / "older" / "two.h5", folder / "two.h5")
+
+
+def replaced_by_a_folder(folder):
+    (folder / "two.h5").unlink()
+    (folder / "two.h5").mkdir()
+
+
+DAMAGES = (
+    truncated, emptied, made_random, with_another_sample, with_another_scale, exchanged,
+    exchanged_for_an_older_one, replaced_by_a_folder,
+)  # fmt: skip
+
+
+@pytest.fixture
+def folder(bench, tmp_path):
+    run_campaign(bench, CAMPAIGN, tmp_path)
+    run_campaign(bench, CAMPAIGN, tmp_path / "older")
+    return tmp_path
+
+
+def outcomes(point_results):
+    return {each.name: (each.outcome, each.path.name) for each in point_results}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_point_is_named_kept_and_made_again_beside_it(bench, folder, damage):
+    damage(folder)
+    left = (folder / "two.h5").read_bytes() if (folder / "two.h5").is_file() else None
+    said = []
+    made = run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME, on_event=said.append)
+    assert outcomes(made) == {
+        "one": (PointOutcome.KEPT, "one.h5"),
+        "two": (PointOutcome.RECORDED, "two.2.h5"),
+        "three": (PointOutcome.KEPT, "three.h5"),
+    }
+    (event,) = (each for each in said if each.kind is CampaignEventKind.DAMAGED)
+    assert event.text.startswith("two is made again: ")
+    assert "two.h5" in event.text
+    assert event.facts["why"] == "damaged"
+    assert left is None or (folder / "two.h5").read_bytes() == left
+    again = run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
+    assert {outcome for outcome, _ in outcomes(again).values()} == {PointOutcome.KEPT}
+
+
+@pytest.mark.parametrize("damage", [truncated, with_another_sample, replaced_by_a_folder])
+def test_without_its_journal_a_campaign_does_not_count_on_a_damaged_recording_either(bench, folder, damage):
+    damage(folder)
+    (folder / "c.campaign.sqlite").unlink()
+    made = run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
+    assert outcomes(made)["two"] == (PointOutcome.RECORDED, "two.2.h5")
+    assert outcomes(made)["one"] == (PointOutcome.KEPT, "one.h5")
+
+
+@pytest.mark.parametrize("damage", [truncated, with_another_scale, exchanged, replaced_by_a_folder])
+def test_what_a_resume_would_make_is_known_before_it_plays(folder, damage):
+    damage(folder)
+    planned = planned_recordings(CAMPAIGN, folder, ExistingRecordings.RESUME)
+    assert [each.is_complete for each in planned] == [True, False, True]
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_verifying_finds_every_damage(folder, damage):
+    assert {each.verdict for each in verify_recordings(folder)} == {"intact"}
+    damage(folder)
+    bad = [each for each in verify_recordings(folder) if each.is_bad]
+    assert [each.path for each in bad] == ["two.h5"]
+
+
+def test_verifying_misses_a_recording_that_a_journal_counts_on(folder):
+    (folder / "two.h5").unlink()
+    assert [(each.path, each.verdict) for each in verify_recordings(folder) if each.is_bad] == [
+        ("two.h5", "missing")
+    ]
+
+
+@pytest.mark.parametrize("damage", [truncated, emptied, made_random, with_another_scale])
+def test_the_catalogue_does_not_call_a_damaged_recording_good(folder, damage):
+    assert {each.verdict for each in list_recordings(folder)} == {"good"}
+    damage(folder)
+    (bad,) = (each for each in list_recordings(folder) if each.is_bad)
+    assert bad.path == "two.h5"
+    assert bad.verdict.startswith(("damaged", "cannot be read"))
+
+
+def test_a_change_that_hides_its_time_is_seen_by_the_catalogue(folder):
+    list_recordings(folder)
+    path = folder / "two.h5"
+    before = path.stat()
+    content = path.read_bytes()
+    assert content.count(b"m s-2") > 0
+    with path.open("r+b") as file:
+        file.write(content.replace(b"m s-2", b"m s-3"))
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert path.stat().st_size == before.st_size
+    assert [each.path for each in list_recordings(folder) if each.is_bad] == ["two.h5"]
+
+
+def test_the_journal_keeps_every_seal(folder):
+    for point in read_journal(folder / "c.campaign.sqlite"):
+        with open_recording(folder / point.file) as recording:
+            assert point.seal == recording.seal != ""
+    connection = sqlite3.connect(folder / "c.campaign.sqlite")
+    seals = connection.execute("SELECT seal FROM attempts").fetchall()
+    connection.close()
+    assert len({seal for (seal,) in seals}) == 3
+
+
+def test_a_journal_from_before_seals_is_gone_on_with(bench, folder):
+    connection = sqlite3.connect(folder / "c.campaign.sqlite")
+    for table in ("points", "attempts"):
+        connection.execute(f"ALTER TABLE {table} DROP COLUMN seal")
+    connection.execute("UPDATE campaign SET value = '1' WHERE key = 'version'")
+    connection.execute("UPDATE points SET state = 'queued', file = '' WHERE name = 'three'")
+    connection.commit()
+    connection.close()
+    assert {each.seal for each in read_journal(folder / "c.campaign.sqlite")} == {""}
+    made = run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
+    assert outcomes(made) == {
+        "one": (PointOutcome.KEPT, "one.h5"),
+        "two": (PointOutcome.KEPT, "two.h5"),
+        "three": (PointOutcome.RECORDED, "three.2.h5"),
+    }
+    one, _, three = read_journal(folder / "c.campaign.sqlite")
+    assert (one.seal, len(three.seal)) == ("", 64)
+
+
+def test_recordings_from_before_seals_are_kept_and_told_as_such(bench, folder):
+    (folder / "c.campaign.sqlite").unlink()
+    for path in folder.glob("*.h5"):
+        with h5py.File(path, "r+") as file:
+            del file["seal"]
+    made = run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
+    assert {each.outcome for each in made} == {PointOutcome.KEPT}
+    own = [each for each in verify_recordings(folder) if "/" not in each.path]
+    assert {(each.verdict, each.is_bad) for each in own} == {("unsealed", False)}
+    assert {each.verdict for each in list_recordings(folder) if "/" not in each.path} == {"no seal"}

@@ -1,0 +1,312 @@
+"""The seal of a recording: whatever is changed afterwards is found, and results have seals of their own."""
+
+import hashlib
+import hmac
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from vibench.acquisition import RecordingError, open_recording
+from vibench.acquisition.recording import (
+    RecordingState,
+    ResultArray,
+    SealDepth,
+    SealState,
+    create_recording,
+    part_of,
+    recover,
+    seal_key,
+)
+
+EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "verify_a_recording_with_h5py.py"
+KEY = b"a key that nobody else has"
+
+
+@pytest.fixture
+def recorded(tmp_path, make_header, make_block):
+    def record(name="a.h5"):
+        with create_recording(tmp_path / name, make_header()) as writer:
+            writer.begin_segment("dwell", frequency_hz=260.0)
+            writer.append(make_block(0, 1000)[1])
+            writer.append(make_block(1200, 1300)[1])  # with a gap before it
+            writer.end_segment()
+            writer.log("mark", "somebody knocked")
+        return tmp_path / name
+
+    return record
+
+
+@pytest.fixture
+def key_file(tmp_path, monkeypatch):
+    path = tmp_path / "key"
+    path.write_bytes(KEY + b"\n")
+    monkeypatch.setenv("VIBENCH_SEAL_KEY", str(path))
+    return path
+
+
+def state_of(path, depth="whole", key=None):
+    with open_recording(path) as recording:
+        return recording.check_seal(depth, key).state
+
+
+def example_says(path, *more):
+    found = subprocess.run(
+        [sys.executable, EXAMPLE, path, *more], capture_output=True, text=True, check=False
+    )
+    return found.returncode, found.stdout.strip()
+
+
+def test_a_recording_is_sealed_at_its_end(recorded):
+    path = recorded()
+    assert state_of(path) is state_of(path, "quick") is SealState.INTACT
+    with open_recording(path) as recording:
+        assert recording.seal == recording.check_seal(SealDepth.WHOLE).seal
+        assert len(recording.seal) == 64
+
+
+def test_a_stranger_verifies_a_seal_with_h5py_and_hashlib(recorded):
+    path = recorded()
+    with open_recording(path) as recording:
+        seal = recording.seal
+    assert example_says(path) == (0, f"as it was sealed: {seal}")
+    with h5py.File(path, "r+") as file:
+        file["m0_velocity"].attrs["delay_s"] = 0.1
+    assert example_says(path) == (1, "not as it was sealed: /m0_velocity")
+
+
+def test_a_stranger_with_the_key_verifies_the_signature(recorded, key_file):
+    path = recorded()
+    assert example_says(path, key_file)[0] == 0
+    other = key_file.with_name("other")
+    other.write_bytes(b"another key, which is wrong")
+    assert example_says(path, other) == (1, "not signed with this key")
+
+
+def change_sample(file):
+    file["m0_velocity"][17] += 1
+
+
+def change_scale(file):
+    file["m0_velocity"].attrs["units"] = np.bytes_(b"km/s ")
+
+
+def change_segment(file):
+    file["segments/last_sample"][0] -= 1
+
+
+def change_time(file):
+    file["time"].attrs["scale_factor"] = 0.002
+
+
+def change_plan(file):
+    raw = file["configuration/plan_json"][()].replace(b"260", b"261")
+    file["configuration/plan_json"][()] = raw
+
+
+def change_identity(file):
+    file.attrs["recording_id"] = np.bytes_(b"0" * 32)
+
+
+def change_overview(file):
+    file["overview/m0_velocity_low"][0] += 1
+
+
+def add_a_dataset(file):
+    file["notes"] = 1
+
+
+def take_a_table(file):
+    del file["overview"]
+
+
+CHANGES = (
+    change_scale, change_segment, change_time, change_plan, change_identity, change_overview, add_a_dataset,
+    take_a_table,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("depth", SealDepth)
+def test_every_change_beside_the_samples_shows_at_a_quick_look(recorded, change, depth):
+    path = recorded()
+    with h5py.File(path, "r+") as file:
+        change(file)
+    assert state_of(path, depth) is SealState.DAMAGED
+
+
+def test_a_changed_sample_shows_when_the_whole_is_read(recorded):
+    path = recorded()
+    with h5py.File(path, "r+") as file:
+        change_sample(file)
+    with open_recording(path) as recording:
+        found = recording.check_seal("whole")
+    assert (found.state, found.sentence) == (SealState.DAMAGED, "not as it was sealed: data of /m0_velocity")
+
+
+def test_a_new_seal_over_changed_content_has_another_name(recorded):
+    path = recorded()
+    with open_recording(path) as recording:
+        before = recording.seal
+    with h5py.File(path, "r+") as file:
+        manifest = json.loads(file["seal/manifest_json"][()])
+        manifest["/"]["data"] = "x"
+        text = json.dumps(manifest, sort_keys=True)
+        del file["seal/manifest_json"]
+        file["seal"].create_dataset("manifest_json", data=np.bytes_(text.encode()))
+    assert state_of(path) is SealState.DAMAGED
+    with h5py.File(path, "r+") as file:
+        file["seal"].attrs["sha256"] = np.bytes_(hashlib.sha256(text.encode()).hexdigest().encode())
+    with open_recording(path) as recording:
+        assert recording.seal != before
+
+
+def test_a_recording_without_a_seal_is_told_as_such(recorded):
+    path = recorded()
+    with h5py.File(path, "r+") as file:
+        del file["seal"]
+    with open_recording(path) as recording:
+        found = recording.check_seal("whole")
+        assert (found.state, recording.seal) == (SealState.UNSEALED, "")
+        assert "before recordings had one" in found.sentence
+
+
+def test_a_recovered_recording_is_sealed_when_it_is_recovered(tmp_path, make_header, make_block):
+    writer = create_recording(tmp_path / "a.h5", make_header())
+    writer.append(make_block(0, 2000)[1])
+    writer._committer.close()
+    writer._disk.close()
+    assert state_of(tmp_path / "a.h5.part") is SealState.UNFINISHED
+    path = recover(tmp_path / "a.h5.part")
+    assert state_of(path) is SealState.INTACT
+    assert example_says(path)[0] == 0
+
+
+def test_a_damaged_copy_does_not_cost_the_samples_it_was_made_of(recorded, tmp_path, make_header, make_block):
+    path = recorded("kept.h5")
+    writer = create_recording(tmp_path / "a.h5", make_header())
+    writer.append(make_block(0, 2000)[1])
+    writer._committer.close()
+    part = part_of(tmp_path / "a.h5").read_bytes()
+    writer.finish(RecordingState.COMPLETE)
+    part_of(tmp_path / "a.h5").write_bytes(part)  # as if the end had come before it was deleted
+    with h5py.File(tmp_path / "a.h5", "r+") as file:
+        change_sample(file)
+    with pytest.raises(RecordingError, match=r"a.h5 is damaged.*Nothing was changed"):
+        recover(tmp_path / "a.h5")
+    assert part_of(tmp_path / "a.h5").read_bytes() == part
+    assert path.exists()
+
+
+def test_samples_that_changed_between_recording_and_end_are_not_sealed(tmp_path, make_header, make_block):
+    writer = create_recording(tmp_path / "a.h5", make_header())
+    writer.append(make_block(0, 2000)[1])
+    writer._committer.close()
+    with h5py.File(tmp_path / "a.h5.part", "r+", locking=False) as file:
+        change_sample(file)
+    with pytest.raises(RecordingError, match="does not give back 'm0_velocity' as recorded"):
+        writer.finish(RecordingState.COMPLETE)
+    assert [each.name for each in tmp_path.iterdir()] == ["a.h5.part"]
+
+
+def test_with_a_key_a_seal_is_signed(recorded, key_file, monkeypatch):
+    path = recorded()
+    with h5py.File(path) as file:
+        manifest, signature = file["seal/manifest_json"][()], file["seal"].attrs["hmac_sha256"]
+    assert hmac.new(KEY, manifest, hashlib.sha256).hexdigest().encode() == signature
+    assert state_of(path) is SealState.INTACT
+    monkeypatch.delenv("VIBENCH_SEAL_KEY")
+    with open_recording(path) as recording:
+        assert "signed with the key" in recording.check_seal("quick").sentence
+        assert recording.check_seal("quick").state is SealState.INTACT
+    other = key_file.with_name("other")
+    other.write_bytes(b"another key of somebody else")
+    assert state_of(path, key=seal_key(other)) is SealState.OTHER_KEY
+
+
+def test_who_seals_anew_without_the_key_is_found_out(recorded, key_file):
+    path = recorded()
+    with h5py.File(path, "r+") as file:
+        change_sample(file)
+        manifest = json.loads(file["seal/manifest_json"][()])
+        manifest["/m0_velocity"]["data"] = hashlib.sha256(file["m0_velocity"][:].tobytes()).hexdigest()
+        text = json.dumps(manifest, sort_keys=True).encode()
+        file["seal/manifest_json"][()] = text
+        file["seal"].attrs["sha256"] = np.bytes_(hashlib.sha256(text).hexdigest().encode())
+    with open_recording(path) as recording:
+        found = recording.check_seal("whole")
+    assert (found.state, "forged" in found.sentence) == (SealState.DAMAGED, True)
+    assert state_of(path, key=seal_key(key_file)) is SealState.DAMAGED
+
+
+@pytest.mark.parametrize(
+    ("content", "said"), [(None, "cannot be read"), (b"short", "has 5 bytes; at least 16")]
+)
+def test_a_key_that_is_none_is_refused_before_anything_is_recorded(
+    tmp_path, make_header, monkeypatch, content, said
+):
+    monkeypatch.setenv("VIBENCH_SEAL_KEY", str(tmp_path / "key"))
+    if content is not None:
+        (tmp_path / "key").write_bytes(content)
+    with pytest.raises(RecordingError, match=said):
+        create_recording(tmp_path / "a.h5", make_header())
+    assert not list(tmp_path.glob("a.h5*"))
+
+
+@pytest.fixture
+def with_result(recorded):
+    path = recorded()
+    arrays = {"H": ResultArray(np.arange(3.0), "1", ("f",)), "f": ResultArray(np.arange(3.0), "Hz")}
+    with open_recording(path) as recording:
+        recording.save_results("spectrum", arrays, {"window": "hann"})
+    return path
+
+
+def test_a_result_has_a_seal_of_its_own_and_leaves_that_of_its_recording_alone(with_result):
+    with open_recording(with_result) as recording:
+        assert recording.check_seal("whole").state is SealState.INTACT
+        assert [each.state for each in recording.check_result_seals().values()] == [SealState.INTACT]
+        assert recording.results["spectrum"].arrays["H"].axes == ("f",)
+
+
+def test_a_changed_result_is_refused_and_its_recording_is_not(with_result):
+    with h5py.File(with_result, "r+") as file:
+        file["results/spectrum/H"][1] = 7.0
+    with open_recording(with_result) as recording:
+        assert recording.check_seal("whole").state is SealState.INTACT
+        assert [each.state for each in recording.check_result_seals().values()] == [SealState.DAMAGED]
+        with pytest.raises(RecordingError, match="the result 'spectrum' is damaged"):
+            _ = recording.results
+
+
+def test_a_result_of_another_recording_is_refused(with_result, tmp_path, make_header, make_block):
+    with create_recording(tmp_path / "b.h5", make_header()) as writer:
+        writer.append(make_block(0, 500)[1])
+    with h5py.File(with_result) as source, h5py.File(tmp_path / "b.h5", "r+") as target:
+        source.copy("results/spectrum", target["results"])
+    with open_recording(tmp_path / "b.h5") as recording:
+        assert [each.state for each in recording.check_result_seals().values()] == [SealState.DAMAGED]
+
+
+def test_a_result_that_was_saved_before_results_had_seals_is_read(with_result):
+    with h5py.File(with_result, "r+") as file:
+        for name in [each for each in file["results/spectrum"].attrs if each.startswith("seal_")]:
+            del file["results/spectrum"].attrs[name]
+        del file["results/spectrum/H"].attrs["axes_json"]
+    with open_recording(with_result) as recording:
+        assert recording.results["spectrum"].arrays["H"].axes == ("f",)
+        assert [each.state for each in recording.check_result_seals().values()] == [SealState.UNSEALED]
+
+
+def test_nothing_is_added_to_a_damaged_recording(recorded):
+    path = recorded()
+    with h5py.File(path, "r+") as file:
+        change_time(file)
+    before = path.read_bytes()
+    with open_recording(path) as recording, pytest.raises(RecordingError, match="nothing was added"):
+        recording.save_results("spectrum", {}, {})
+    assert path.read_bytes() == before

@@ -1,0 +1,152 @@
+"""Single bits turned over in recordings: each is noticed, or changes no number that analysis gives.
+
+Each flip is judged in a fork of its own: it refuses the file, or its numbers are compared with those of the
+good file, bit for bit. Even numbers turn a bit of the whole file over, odd ones a bit outside the samples.
+"""
+
+import hashlib
+import json
+import os
+import pickle
+import random
+import resource
+import signal
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+from vibench.acquisition import RecordingError, open_recording
+from vibench.analysis import AnalysisError, Simulation, analyse_files, campaign_summary
+
+from .limits import LONGEST_S, MOST_BYTES
+from .recordings_corpus import good_recordings
+from .tally import Finding, Shard, Tally
+
+FINISHED = ("dwell.h5", "sweep.h5", "noise.h5", "with_result.h5", "recovered.h5")
+
+
+@cache
+def beside_samples(name: str) -> tuple[range, ...]:
+    """Give the bytes of a file in which no samples are."""
+    content = good_recordings()[name]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, name)
+        path.write_bytes(content)
+        chunks: list[tuple[int, int]] = []
+        with h5py.File(path) as file:
+            for dataset in file.values():
+                if isinstance(dataset, h5py.Dataset) and dataset.chunks:
+                    found = [dataset.id.get_chunk_info(k) for k in range(dataset.id.get_num_chunks())]
+                    chunks += [(each.byte_offset, each.byte_offset + each.size) for each in found]
+    edges = [0, *(edge for chunk in sorted(chunks) for edge in chunk), len(content)]
+    return tuple(
+        range(start, stop) for start, stop in zip(edges[::2], edges[1::2], strict=True) if stop > start
+    )
+
+
+def flipped(number: int, chance: random.Random) -> tuple[str, int, bytes]:
+    """Turn a bit over; gives the file's name, the place, and the bytes."""
+    name = chance.choice(FINISHED)
+    data = bytearray(good_recordings()[name])
+    if number % 2:
+        parts = beside_samples(name)
+        place = chance.choice(chance.choices(parts, [len(each) for each in parts])[0])
+    else:
+        place = chance.randrange(len(data))
+    data[place] ^= 1 << chance.randrange(8)
+    return name, place, bytes(data)
+
+
+def numbers_of(path: Path) -> str:
+    """Give a checksum of every number that analysis gives of a recording, or the sentence that refuses it."""
+    results = analyse_files((path,), "flips", Simulation.LEFT_OUT)
+    if results.failures:
+        return f"refused: {results.failures[0].sentence}"
+    summary = campaign_summary(results)
+    for each in summary["results"]:
+        each["checks"] = [check for check in each["checks"] if check["what"] != "Seal"]
+    try:
+        with open_recording(path) as recording:
+            saved = recording.results
+    except RecordingError as error:
+        return f"refused: {error}"
+    arrays = [
+        (name, key, array.values.tobytes())
+        for name, each in saved.items()
+        for key, array in each.arrays.items()
+    ]
+    content = [
+        json.dumps(summary, sort_keys=True),
+        arrays,
+        [each.analysis.response for each in results.results],
+    ]
+    return hashlib.sha256(pickle.dumps(content)).hexdigest()
+
+
+def judged(path: Path) -> tuple[str, float, int]:
+    """Say in a process of its own what a file's numbers are; what processor time it took, and memory."""
+    reading, writing = os.pipe()
+    number = os.fork()
+    if number == 0:
+        os.close(reading)
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        signal.alarm(round(2 * LONGEST_S))
+        try:
+            said = numbers_of(path)
+        except (AnalysisError, RecordingError) as error:
+            said = f"refused: {error}"
+        except BaseException as error:
+            said = f"traceback: {type(error).__name__}: {error}"
+        os.write(writing, said.encode()[:4000])
+        os._exit(0)
+    os.close(writing)
+    with os.fdopen(reading, "rb") as pipe:
+        said = pipe.read().decode()
+    _, status, usage = os.wait4(number, 0)
+    if os.WIFSIGNALED(status):
+        said = f"died: signal {os.WTERMSIG(status)}"
+    return said, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024
+
+
+def faults(said: str, expected: str, took_s: float, peak_bytes: int) -> tuple[str, ...]:
+    """Say what may not be."""
+    found: list[tuple[str, bool]] = [
+        (said[:300], said.startswith(("traceback", "died"))),
+        (
+            "other numbers, unnoticed",
+            said[:9] not in {"refused: ", "traceback", "died: sig"} and said != expected,
+        ),
+        (f"took {took_s:.1f} s", took_s > LONGEST_S),
+        (f"took {peak_bytes / 1e6:.0f} MB", peak_bytes > MOST_BYTES),
+    ]
+    return tuple(text for text, is_so in found if is_so)
+
+
+def attack(shard: Shard) -> Tally:
+    """Turn bits over."""
+    tally = Tally("flips")
+    with tempfile.TemporaryDirectory(prefix="vibench_flips_") as folder:
+        expected: dict[str, Any] = {}
+        for name, content in good_recordings().items():
+            path = Path(folder, name)
+            path.write_bytes(content)
+            if name in FINISHED:
+                expected[name] = judged(path)[0]
+                if expected[name].startswith(("refused", "traceback", "died")):
+                    raise RuntimeError(f"{name} should be good, and was {expected[name]}")
+        for number, chance in shard.chances():
+            name, place, content = flipped(number, chance)
+            path = Path(folder, name)
+            path.write_bytes(content)
+            said, took_s, peak_bytes = judged(path)
+            kind = "noticed" if said.startswith("refused") else "same numbers"
+            if found := faults(said, expected[name], took_s, peak_bytes):
+                kind = "found"
+                tally.findings.append(
+                    Finding("flips", shard.seed, number, (f"{name} byte {place}", *found), said[-300:])
+                )
+            tally.count(kind, took_s, peak_bytes)
+    return tally

@@ -1,0 +1,346 @@
+"""Campaigns killed at a random moment, or at the n-th write, sync, rename or commit, and resumed, and killed.
+
+Each number is one campaign of short points, dwells and streamed noise in turn, killed up to `KILLS` times
+and then left to its end. One process imports everything and forks itself for each run: a kill ends a fork.
+"""
+
+import json
+import os
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+from vibench.acquisition import open_recording
+from vibench.acquisition.campaign import JournalPointState, read_journal, verify_recordings
+from vibench.acquisition.recording import RecordingState
+
+from .tally import Finding, Shard, Tally
+
+ROOT = Path(__file__).resolve().parents[2]
+KILLS = 10
+"""Of one campaign."""
+KINDS = ("moment", "write", "torn write", "sync", "rename", "commit")
+LONGEST_S = 120.0
+"""A campaign of a few points that has not ended by then hangs [s]."""
+RATE = ("sample_rate_hz = 51200", "sample_rate_hz = 5120")
+CAMPAIGNS = {
+    "virtual_rig": """
+name = "killed"
+[[sweeps]]
+name = "line"
+amplitude_vpp = [0.05]
+frequency_hz = { start = 200, stop = 203, step = 1 }
+[sweeps.measurement]
+ramp_s = 0.08
+ramp_step_s = 0.02
+excitation = { kind = "dwell", settle_s = 0.3, duration_s = 0.1 }
+""",
+    "virtual_rig_streaming": """
+name = "killed"
+[defaults]
+ramp_s = 0.1
+ramp_step_s = 0.02
+[[measurements]]
+name = "weak"
+excitation = { kind = "streamed_noise", amplitude_vpp = 0.05, band_start_hz = 50, band_stop_hz = 600, \
+settle_s = 0.3, duration_s = 0.5, seed = 1 }
+[[measurements]]
+name = "strong"
+excitation = { kind = "streamed_noise", amplitude_vpp = 0.1, band_start_hz = 50, band_stop_hz = 600, \
+settle_s = 0.3, duration_s = 0.5, seed = 2 }
+""",
+}
+POINTS = {"virtual_rig": 4, "virtual_rig_streaming": 2}
+
+
+class KilledCampaigns:
+    """Runs campaigns in forks of one process; use it in a ``with``."""
+
+    def __init__(self) -> None:
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
+        self._server = subprocess.Popen(
+            [sys.executable, "-m", f"{__package__}.{Path(__file__).stem}"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=ROOT,
+            env=environment,
+        )
+
+    def run(self, folder: Path, *options: str, kind: str = "", number: int = 0, moment_s: float = 0.0) -> Any:
+        """Measure the campaign of a folder, or die at the n-th operation of a kind, or at a moment."""
+        order = {"folder": str(folder), "options": options, "kind": kind, "number": number, "s": moment_s}
+        self._server.stdin.write(json.dumps(order) + "\n")
+        self._server.stdin.flush()
+        return json.loads(self._server.stdout.readline())
+
+    def __enter__(self) -> "KilledCampaigns":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._server.stdin.close()
+        self._server.wait()
+        self._server.stdout.close()
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What must not be lost by a kill and what follows it."""
+
+    seals: dict[str, str]
+    """Of the recordings that the journal calls done, by file."""
+    committed: dict[str, dict[str, bytes]]
+    """Counts that a recording under way had committed, by file and channel."""
+
+
+def laid(folder: Path, bench: str) -> None:
+    """Write campaign and bench into a folder."""
+    text = (ROOT / "hardware_configs" / f"{bench}.toml").read_text(encoding="utf-8")
+    (folder / "bench.toml").write_text(text.replace(*RATE), encoding="utf-8")
+    (folder / "campaign.toml").write_text(CAMPAIGNS[bench], encoding="utf-8")
+
+
+def kept_in(out: Path) -> Kept:
+    """Look at what a kill has left."""
+    journal = out / "killed.campaign.sqlite"
+    points = read_journal(journal) if journal.exists() and _is_begun(journal) else ()
+    seals = {each.file: each.seal for each in points if each.state is JournalPointState.DONE}
+    committed = {}
+    for part in out.glob("*.h5.part"):
+        with h5py.File(part, "r", locking=False) as file:
+            samples = int(file["n_valid"][0])
+            roles = file.attrs["roles"].decode().split()
+            committed[part.name.removesuffix(".part")] = {
+                role: file[role][:samples].tobytes() for role in roles
+            }
+    return Kept(seals, committed)
+
+
+def _is_begun(journal: Path) -> bool:
+    connection = sqlite3.connect(journal)
+    try:
+        return (
+            connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'campaign'").fetchone() is not None
+        )
+    finally:
+        connection.close()
+
+
+def lost(kept: Kept, out: Path) -> list[str]:
+    """Say what is not there any more, after a later run."""
+    now = kept_in(out)
+    said = [
+        f"{file} was done, and is not, or not with its seal"
+        for file, seal in kept.seals.items()
+        if now.seals.get(file) != seal or not (out / file).exists()
+    ]
+    for name, channels in kept.committed.items():
+        where = out / name if (out / name).exists() else out / f"{name}.part"
+        if not where.exists():
+            said.append(f"{name} had committed samples, and is gone")
+            continue
+        with h5py.File(where, "r", locking=False) as file:
+            said += [
+                f"{name}: committed samples of {role} are gone or others"
+                for role, counts in channels.items()
+                if file[role][: len(counts) // 4].tobytes() != counts
+            ]
+    return said
+
+
+def at_the_end(out: Path, points: int) -> list[str]:
+    """Say what is wrong with a campaign that came to its end."""
+    journal = read_journal(out / "killed.campaign.sqlite")
+    said = [f"{each.name} is {each.state}" for each in journal if each.state is not JournalPointState.DONE]
+    said += [
+        f"{each.path}: {each.verdict}, {each.sentence}" for each in verify_recordings(out) if each.is_bad
+    ]
+    said += [f"{path.name} is left" for path in (*out.glob("*.part"), *out.glob("*.tmp"))]
+    made: Counter[str] = Counter()
+    for path in out.glob("*.h5"):
+        with open_recording(path) as recording:
+            if recording.check_seal("whole").state.value != "intact":
+                said.append(f"{path.name} has no right seal")
+            made[str(recording.plan["name"])] += recording.state is RecordingState.COMPLETE
+    said += [f"{name} has {count} complete recordings" for name, count in made.items() if count != 1]
+    if len(made) != points:
+        said.append(f"{len(made)} of {points} points were made")
+    return said
+
+
+def attacked(runs: KilledCampaigns, chance: random.Random, tally: Tally, kills: int = KILLS) -> list[str]:
+    """Kill one campaign up to ``kills`` times, let it end, and say what was lost or wrong."""
+    bench = chance.choice(tuple(CAMPAIGNS))
+    with tempfile.TemporaryDirectory(prefix="vibench_kills_") as name:
+        folder = Path(name)
+        laid(folder, bench)
+        out, said = folder / "out", []
+        for attempt in range(kills):
+            kept = kept_in(out) if out.exists() else Kept({}, {})
+            kind = chance.choice(KINDS)
+            ended = runs.run(
+                folder,
+                *(("--resume",) if out.exists() else ()),
+                kind=kind,
+                number=1 + int(MOST_OPERATIONS[kind] * chance.random() ** 2),
+                moment_s=chance.uniform(0.0, LATEST_S),
+            )
+            said += [f"kill {attempt} ({kind}): {each}" for each in lost(kept, out)] if out.exists() else []
+            if ended["code"] != -signal.SIGKILL:
+                tally.count(f"not reached, exit {ended['code']}")
+                said += [ended["err"]] if ended["code"] else []
+                break
+            tally.count(kind, ended["took_s"])
+        kept = kept_in(out) if out.exists() else Kept({}, {})
+        ended = runs.run(folder, *(("--resume",) if out.exists() else ()))
+        if ended["code"] != 0:
+            return [*said, f"the last run ended with {ended['code']}: {ended['err']}"]
+        return [*said, *lost(kept, out), *at_the_end(out, POINTS[bench])]
+
+
+def attack(shard: Shard) -> Tally:
+    """Kill campaigns; each number is one of them, and what is counted are kills."""
+    tally = Tally("kills")
+    with KilledCampaigns() as runs:
+        for number, chance in shard.chances():
+            if said := attacked(runs, chance, tally):
+                tally.findings.append(Finding("kills", shard.seed, number, tuple(said[:5]), ""))
+    return tally
+
+
+MOST_OPERATIONS = {"moment": 0, "write": 150, "torn write": 150, "sync": 60, "rename": 8, "commit": 10}
+"""About as many as a run of these campaigns has; small numbers are tried more often."""
+LATEST_S = 4.0
+"""About as long as such a run takes [s]."""
+
+
+def serve() -> None:
+    """Fork for each line of standard input, and say on standard output how the run ended."""
+    import vibench.cli.blas_threads  # noqa: I001 - numpy reads its setting, so it comes first
+    import vibench.cli.__main__
+    import vibench.cli.measure  # noqa: F401
+
+    for line in sys.stdin:
+        order = json.loads(line)
+        with tempfile.TemporaryFile() as err:
+            began_s = time.monotonic()
+            number = os.fork()
+            if number == 0:
+                _become_run(order, err.fileno())
+            timer = threading.Timer(LONGEST_S, os.kill, (number, signal.SIGABRT))
+            timer.start()
+            _, status = os.waitpid(number, 0)
+            timer.cancel()
+            err.seek(0)
+            answer = {
+                "code": os.waitstatus_to_exitcode(status),
+                "took_s": time.monotonic() - began_s,
+                "err": err.read().decode(errors="replace")[-600:],
+            }
+        print(json.dumps(answer), flush=True)
+
+
+def _become_run(order: dict[str, Any], err: int) -> None:
+    """Never returns."""
+    silent = os.open(os.devnull, os.O_RDWR)
+    os.dup2(silent, 0)
+    os.dup2(silent, 1)
+    os.dup2(err, 2)
+    os.chdir(order["folder"])
+    if order["kind"]:
+        _prepare_to_die(order["kind"], order["number"], order["s"])
+    paths = ["campaign.toml", "--bench", "bench.toml", "--out", "out", "--check", "waived"]
+    sys.argv = ["vibench", "measure", *paths, *order["options"]]
+    code = 1
+    try:
+        from vibench.cli.__main__ import main
+
+        main()
+        code = 0
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else int(end.code is not None)
+    finally:
+        sys.stderr.flush()
+        os._exit(code)
+
+
+def _prepare_to_die(kind: str, number: int, moment_s: float) -> None:
+    """Arrange for the end of this process; odd numbers end it before the operation, even ones behind it."""
+    match kind:
+        case "moment":
+            threading.Timer(moment_s, _die).start()
+        case "write":
+            os.pwrite = _deadly(os.pwrite, number)
+        case "torn write":
+            os.pwrite = _torn(os.pwrite, number)
+        case "sync":
+            os.fdatasync = os.fsync = _deadly(os.fsync, number)
+        case "rename":
+            os.replace = os.rename = _deadly(os.replace, number)
+        case "commit":
+            sqlite3.connect = _deadly_connect(sqlite3.connect, number)
+
+
+def _die() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _deadly(operation: Callable[..., Any], number: int) -> Callable[..., Any]:
+    left = [number]
+
+    def operate(*given: Any, **named: Any) -> Any:
+        left[0] -= 1
+        if left[0] == 0 and number % 2:
+            _die()
+        answer = operation(*given, **named)
+        if left[0] == 0:
+            _die()
+        return answer
+
+    return operate
+
+
+def _torn(write: Callable[..., int], number: int) -> Callable[..., int]:
+    left = [number]
+
+    def operate(descriptor: int, data: Any, offset: int) -> int:
+        left[0] -= 1
+        if left[0] == 0:
+            write(descriptor, bytes(data)[: len(data) // 2], offset)
+            _die()
+        return write(descriptor, data, offset)
+
+    return operate
+
+
+def _deadly_connect(connect: Callable[..., Any], number: int) -> Callable[..., Any]:
+    class Connection(sqlite3.Connection):
+        left = number
+
+        def execute(self, statement: str, *given: Any) -> Any:
+            is_commit = statement.strip().upper() == "COMMIT"
+            Connection.left -= is_commit
+            if is_commit and Connection.left == 0 and number % 2:
+                _die()
+            answer = super().execute(statement, *given)
+            if is_commit and Connection.left == 0:
+                _die()
+            return answer
+
+    return lambda *given, **named: connect(*given, **{**named, "factory": Connection})
+
+
+if __name__ == "__main__":
+    serve()

@@ -1,0 +1,139 @@
+"""`vibench verify`, and what other commands say of recordings that are damaged or made to harm."""
+
+import json
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+
+from vibench.acquisition import Block
+from vibench.acquisition.recording import ChannelHeader, Origin, RecordingHeader, create_recording
+
+SECRET = b"root:x:0:0:root:/root:/bin/bash\n" * 200
+
+
+@pytest.fixture
+def folder(tmp_path):
+    channels = tuple(
+        ChannelHeader(role, "ai0", "voltage", "V", 1.0, 5.0)
+        for role in ("drive_voltage", "base_acceleration", "m0_velocity")
+    )
+    for name in ("one", "two", "three"):
+        header = RecordingHeader(channels, 1000.0, 500, Origin.SIMULATED)
+        with create_recording(tmp_path / f"{name}.h5", header) as writer:
+            writer.append(Block(0, np.sin(0.1 * np.arange(1500)).reshape(3, 500)))
+    return tmp_path
+
+
+def damage(path):
+    with h5py.File(path, "r+") as file:
+        file["m0_velocity"][7] += 1
+
+
+def point_outside(path):
+    """Let a recording give out a local file as its samples."""
+    path.with_name("passwd").write_bytes(SECRET)
+    with h5py.File(path, "r+") as file:
+        kept = {name: value for name, value in file["m0_velocity"].attrs.items() if name != "DIMENSION_LIST"}
+        del file["m0_velocity"], file["seal"]
+        where = [(str(path.with_name("passwd")), 0, 2000)]
+        made = file.create_dataset("m0_velocity", shape=(500,), dtype="<i4", external=where)
+        made.attrs.update(kept)
+
+
+def test_every_recording_of_a_folder_is_verified(vibench_here, folder):
+    good = vibench_here("verify", ".", "--json", cwd=folder)
+    assert good.returncode == 0, good.stderr
+    assert json.loads(good.stdout)["counts"] == {"intact": 3}
+    damage(folder / "two.h5")
+    bad = vibench_here("verify", ".", "--json", cwd=folder)
+    assert bad.returncode == 1
+    assert bad.stderr == "error: 1 of 3 recordings cannot be trusted: two.h5\n"
+    told = {each["path"]: each for each in json.loads(bad.stdout)["recordings"]}
+    assert told["two.h5"]["sentence"] == "not as it was sealed: data of /m0_velocity"
+    assert (told["one.h5"]["verdict"], told["two.h5"]["verdict"]) == ("intact", "damaged")
+    assert vibench_here("verify", "two.h5", cwd=folder).returncode == 1
+    assert vibench_here("verify", "one.h5", cwd=folder).returncode == 0
+
+
+def test_a_key_is_asked_for_by_name(vibench_here, folder):
+    (folder / "key").write_text("a key that was not used here")
+    found = vibench_here("verify", ".", "--key", "key", "--json", cwd=folder)
+    assert found.returncode == 1
+    assert json.loads(found.stdout)["counts"] == {"other_key": 3}
+    none = vibench_here("verify", ".", "--key", "nowhere", cwd=folder)
+    assert none.returncode == 1
+    assert "error: The key nowhere for seals cannot be read" in none.stderr
+
+
+@pytest.mark.parametrize("arguments", [("analyse", "two.h5", "--json"), ("export", "two.h5", "--to", "csv")])
+def test_no_number_is_taken_from_a_damaged_recording(vibench_here, folder, arguments):
+    damage(folder / "two.h5")
+    found = vibench_here(*arguments, cwd=folder)
+    assert found.returncode == 1
+    assert "error: two.h5 is damaged (not as it was sealed: data of /m0_velocity)" in found.stderr
+    assert not list(folder.glob("two*.csv"))
+
+
+def test_the_catalogue_names_a_damaged_recording_and_fails(vibench_here, folder):
+    with h5py.File(folder / "two.h5", "r+") as file:
+        file["m0_velocity"].attrs["delay_s"] = 1.0
+    found = vibench_here("catalogue", ".", "--json", cwd=folder)
+    assert found.returncode == 1
+    assert found.stderr.startswith("error: two.h5: not as it was sealed: attributes")
+    assert [each["seal"] for each in json.loads(found.stdout)["recordings"]] == [
+        "intact",
+        "damaged",
+        "intact",
+    ]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("analyse", "two.h5", "--json"),
+        ("export", "two.h5", "--to", "csv"),
+        ("verify", "two.h5"),
+        ("catalogue", "."),
+        ("import", "two.h5", "--json"),
+    ],
+)
+def test_a_recording_that_gives_out_other_files_is_refused(vibench_here, folder, arguments):
+    point_outside(folder / "two.h5")
+    found = vibench_here(*arguments, cwd=folder)
+    assert found.returncode == 1
+    said = found.stderr + found.stdout
+    assert "points into another file" in said
+    assert "--allow-external" in said
+    assert not list(folder.glob("*.csv"))
+
+
+def test_it_is_read_when_the_user_says_so(vibench_here, folder):
+    point_outside(folder / "two.h5")
+    found = vibench_here("export", "two.h5", "--to", "csv", "--allow-external", cwd=folder)
+    assert found.returncode == 0, found.stderr
+    assert (folder / "two.csv").exists()
+
+
+def test_one_bad_recording_does_not_spoil_a_folder(vibench_here, folder):
+    shutil.copy(folder / "one.h5", folder / "four.h5")
+    with h5py.File(folder / "four.h5", "r+") as file:
+        del file["seal"]
+        file.attrs["started_utc"] = np.bytes_(b"-5")
+    with h5py.File(folder / "two.h5", "r+") as file:
+        del file["seal"], file["configuration/plan_json"]
+        file["configuration/plan_json"] = np.bytes_(b"[1, 2]")
+    found = vibench_here("catalogue", ".", "--json", cwd=folder)
+    entries = {each["path"]: each for each in json.loads(found.stdout)["recordings"]}
+    assert {name: each["state"] for name, each in entries.items()} == {
+        "one.h5": "complete",
+        "two.h5": "unreadable",
+        "three.h5": "complete",
+        "four.h5": "unreadable",
+    }
+    assert "started_utc" in entries["four.h5"]["reason"]
+    assert "plan_json" in entries["two.h5"]["reason"]
+    analysed = vibench_here("analyse", ".", "--json", cwd=folder)
+    assert analysed.returncode == 1
+    assert len([line for line in analysed.stderr.splitlines() if line.startswith("error: ")]) == 4

@@ -1,0 +1,95 @@
+import h5py
+import numpy as np
+import pytest
+
+from vibench.sim.hdf5_files import UnsafeHdf5, external_data_allowed, open_hdf5, walk
+
+
+def external_storage(file):
+    file.create_dataset("x", shape=(4,), dtype="u1", external=[("secret.txt", 0, 4)])
+
+
+def external_link(file):
+    file["x"] = h5py.ExternalLink("secret.h5", "/y")
+
+
+def virtual_dataset(file):
+    layout = h5py.VirtualLayout(shape=(4,), dtype="i4")
+    layout[:] = h5py.VirtualSource("secret.h5", "y", shape=(4,))
+    file.create_virtual_dataset("x", layout)
+
+
+def external_storage_deep_inside(file):
+    external_storage(file.create_group("a/b/c"))
+
+
+POINTING = (external_storage, external_link, virtual_dataset, external_storage_deep_inside)
+
+
+@pytest.fixture
+def make(tmp_path):
+    def write(fill):
+        (tmp_path / "secret.txt").write_bytes(b"root:x:0:0")
+        with h5py.File(tmp_path / "secret.h5", "w") as file:
+            file["y"] = np.arange(4, dtype="i4")
+        with h5py.File(tmp_path / "a.h5", "w") as file:
+            file["own"] = np.arange(3)
+            fill(file)
+        return tmp_path / "a.h5"
+
+    return write
+
+
+@pytest.mark.parametrize("fill", POINTING)
+def test_a_file_that_gives_out_other_files_is_refused_unless_that_is_allowed(make, fill):
+    path = make(fill)
+    with pytest.raises(UnsafeHdf5, match=r"/x points into another file.*--allow-external"):
+        open_hdf5(path)
+    with external_data_allowed(), open_hdf5(path) as file:
+        assert list(file["own"]) == [0, 1, 2]
+    with pytest.raises(UnsafeHdf5):
+        open_hdf5(path)
+
+
+def huge(file):
+    file.create_dataset("x", shape=(10**12,), dtype="i4", chunks=(51_200,), compression="gzip")
+
+
+def huge_chunks(file):
+    file.create_dataset("x", shape=(10**9,), dtype="i4", chunks=(10**9,), compression="gzip")
+
+
+def too_deep(file):
+    file.create_group("/".join("abcdefghij" * 4))
+
+
+@pytest.mark.parametrize(
+    ("fill", "said"),
+    [
+        (huge, "declares 4000000000000 bytes, of which 0 are stored"),
+        (huge_chunks, "chunks of 4000000000 bytes"),
+        (too_deep, "more than 32 deep"),
+    ],
+)
+def test_sizes_that_cannot_be_are_refused_before_anything_is_read(make, fill, said):
+    with pytest.raises(UnsafeHdf5, match=said):
+        open_hdf5(make(fill))
+
+
+def test_a_file_that_was_cut_short_is_refused(make):
+    path = make(lambda file: file.create_dataset("x", data=np.arange(10_000)))
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) - 2000])
+    with pytest.raises(OSError, match="truncated"):
+        open_hdf5(path)
+
+
+def test_a_group_that_holds_itself_is_gone_through_once(make):
+    def circle(file):
+        file.create_group("a")
+        file["a/again"] = file["a"]
+        file["a/root"] = file["/"]
+        file["soft"] = h5py.SoftLink("/a/again/again")
+
+    with open_hdf5(make(circle)) as file:
+        assert [path for path, _ in walk(file)] == ["/", "/a", "/own"]
