@@ -94,9 +94,7 @@ def main() -> None:
         print(
             f"finishing it took {sealed_s / before_s:.2f} times as long as without a seal ({before_s:.1f} s)"
         )
-        print(
-            f"checking the whole took {whole_s / read_s:.2f} times as long as reading it ({read_s:.1f} s)"
-        )
+        print(f"checking the whole took {whole_s / read_s:.2f} times as long as reading it ({read_s:.1f} s)")
         print(f"a quick look took {1e3 * quick_s:.0f} ms, opening {1e3 * open_s:.0f} ms")
 
 

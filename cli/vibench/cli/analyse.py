@@ -142,7 +142,7 @@ def _analyse(
     *,
     simulate: bool,
     fit: bool,
-    specimen: Path | None,
+    specimen: str | None,
     as_json: bool,
 ) -> None:
     paths = recordings_in(recording) if recording.is_dir() else (recording,)
