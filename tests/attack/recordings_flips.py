@@ -21,7 +21,7 @@ import h5py
 from vibench.acquisition import RecordingError, open_recording
 from vibench.analysis import AnalysisError, Simulation, analyse_files, campaign_summary
 
-from .limits import LONGEST_S, MOST_BYTES
+from .limits import HANGS_S, LONGEST_S, MOST_BYTES
 from .recordings_corpus import good_recordings
 from .tally import Finding, Shard, Tally
 
@@ -93,7 +93,7 @@ def judged(path: Path) -> tuple[str, float, int]:
     if number == 0:
         os.close(reading)
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        signal.alarm(round(2 * LONGEST_S))
+        signal.alarm(round(2 * HANGS_S))
         try:
             said = numbers_of(path)
         except (AnalysisError, RecordingError) as error:

@@ -1,0 +1,73 @@
+"""Recordings are attacked: few in every run, more with ``-m attack``, hours by `tests.attack`."""
+
+import random
+
+import pytest
+
+from . import recordings_flips, recordings_kills, recordings_mutants
+from .command_runner import CommandRunner
+from .recordings_corpus import good_recordings
+from .tally import Shard, Tally
+
+FOUND = (("recordings", 1, 40), ("recordings", 2, 361))
+"""Mutants that once did what none may do: sentences of 50 000 letters."""
+
+
+def found_again(name, seed, number):
+    """Try one mutant that was found once."""
+    case = recordings_mutants.mutant(random.Random(f"{seed}:{number}"))
+    with CommandRunner() as runner:
+        return runner.run(case).faults
+
+
+@pytest.mark.parametrize(("name", "seed", "number"), FOUND)
+@pytest.mark.attack
+def test_what_was_found_once_is_mended(name, seed, number):
+    assert found_again(name, seed, number) == ()
+
+
+def test_good_recordings_of_every_sort_give_numbers(tmp_path):
+    for name in ("dwell.h5", "with_result.h5"):
+        path = tmp_path / name
+        path.write_bytes(good_recordings()[name])
+        said, _, _ = recordings_flips.judged(path)
+        assert len(said) == 64, said
+        assert recordings_flips.judged(path)[0] == said
+
+
+def test_a_flip_that_changed_numbers_unnoticed_would_be_found():
+    assert recordings_flips.faults("1234", "5678", 0.1, 1) == ("other numbers, unnoticed",)
+    assert recordings_flips.faults("refused: it is damaged", "5678", 0.1, 1) == ()
+    assert recordings_flips.faults("5678", "5678", 0.1, 1) == ()
+
+
+@pytest.mark.parametrize(
+    "count",
+    [20, pytest.param(300, marks=pytest.mark.attack), pytest.param(10_000, marks=pytest.mark.slow)],
+)
+@pytest.mark.timeout(7200)
+def test_a_bit_turned_over_is_noticed_or_changes_no_number(count):
+    tally = recordings_flips.attack(Shard(seed=3, count=count))
+    assert tally.findings == []
+    assert tally.tried == count
+    assert tally.codes["noticed"] > count / 5
+
+
+@pytest.mark.parametrize("count", [pytest.param(100, marks=pytest.mark.attack)])
+@pytest.mark.timeout(1800)
+def test_a_broken_recording_is_answered_by_a_sentence(count):
+    tally = recordings_mutants.attack(Shard(seed=3, count=count))
+    assert tally.findings == []
+    assert tally.codes["1"] > count / 2
+
+
+@pytest.mark.attack
+@pytest.mark.timeout(1800)
+def test_fifty_kills_lose_nothing_and_make_no_point_twice():
+    tally = Tally("kills")
+    for number in range(20):
+        tally.add(recordings_kills.attack(Shard(seed=3, count=number + 1, part=number)))
+        if tally.tried - sum(count for code, count in tally.codes.items() if code.startswith("not")) >= 50:
+            break
+    assert tally.findings == []
+    assert sum(tally.codes.get(kind, 0) for kind in recordings_kills.KINDS) >= 50
