@@ -48,10 +48,11 @@ def good(noise, tmp_path_factory):
 
 
 def changed(good, folder, change):
-    """Copy a recording and change something inside."""
+    """Copy a recording and change something inside, as if another version had written it: without a seal."""
     path = folder / "changed.h5"
     shutil.copy(good, path)
     with h5py.File(path, "r+") as file:
+        del file["seal"]
         change(file)
     return path
 
@@ -137,7 +138,7 @@ def newer(file):
 
 def renamed(file):
     file.move("m0_velocity", "laser")
-    file.attrs["roles"] = "drive_voltage base_acceleration laser"
+    file.attrs["roles"] = np.bytes_(b"drive_voltage base_acceleration laser")
 
 
 def without_scale(file):
@@ -146,7 +147,7 @@ def without_scale(file):
 
 def without_plan(file):
     del file["configuration/plan_json"]
-    file["configuration/plan_json"] = "{}"
+    file["configuration/plan_json"] = np.bytes_(b"{}")
 
 
 @pytest.mark.parametrize(
@@ -154,7 +155,10 @@ def without_plan(file):
     [
         (newer, "format version 99; this vibench reads version 1. Update"),
         (renamed, "no channel m0_velocity; the recording has drive_voltage, base_acceleration, laser"),
-        (without_scale, "physical_per_volt of 'm0_velocity' is nan"),
+        (
+            without_scale,
+            "physical_per_volt of the channel 'm0_velocity': input should be a finite number; it is 'nan'",
+        ),
         (without_plan, "the plan in changed.h5 is not one this version of vibench can read"),
     ],
 )

@@ -47,7 +47,7 @@ def folder(tmp_path_factory, record):
     record(folder, "stopped", 95.0, RecordingState.STOPPED)
     shutil.copyfile(folder / "whole.h5", folder / "old.h5")
     with h5py.File(folder / "old.h5", "r+") as file:
-        del file["overview"]
+        del file["overview"], file["seal"]
     (folder / "broken.h5").write_bytes(b"no HDF5")
     _begin_campaign(folder)
     return folder
