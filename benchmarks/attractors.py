@@ -12,7 +12,7 @@ from random_scenes import described, edge_scene, random_scene
 
 from vibench.sim import Ensemble, FoundMotion, MotionKind, ScenePrediction, solve_ensemble, solve_scene
 
-SAME = 2e-3
+SAME = 1e-3
 """Relative difference of Response I of one motion that repeats."""
 PENDING = (MotionKind.CHAOTIC, MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
 SEED = 77_000

@@ -136,3 +136,33 @@ def test_what_cannot_be_predicted_is_said_in_one_sentence(vibench_here, tmp_path
     (line,) = [each for each in ran.stderr.splitlines() if each.startswith("error:")]
     assert said in line
     assert list(tmp_path.iterdir()) == []
+
+
+FORGETFUL = ("--amplitude", 5e-6, "--frequency", 242, "--damping-time", 3e-5, "--duration", 12, "--window", 2)
+
+
+@pytest.mark.timeout(COMPILING_S)
+def test_a_forgotten_start_is_answered_with_motions_and_shares(vibench_here, tmp_path):
+    """Chaos that dies out within tens of seconds: after twelve, some starts have settled."""
+    asked = ("predict", *FORGETFUL, "--budget", "0.2s", "--explain")
+    ran = vibench_here(*asked, "--json", cwd=tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    (point,) = json.loads(ran.stdout)["points"]
+    assert point["memory"] == "lost"
+    motions = point["ensemble"]["motions"]
+    assert len(motions) > 1
+    assert sum(each["starts"] for each in motions) == point["ensemble"]["starts"] >= 8
+    assert all(each["share"]["low"] <= each["share"]["share"] <= each["share"]["high"] for each in motions)
+    assert "At 1 of 1 points the start was forgotten" in ran.stderr
+    assert "starts are followed, and chaos is followed on, for 0.2 s" in ran.stderr
+    told = vibench_here(*asked, cwd=tmp_path)
+    assert "Where the start is forgotten" in told.stdout
+    assert "%)" in told.stdout
+
+
+@pytest.mark.timeout(COMPILING_S)
+def test_a_budget_that_is_no_number_is_refused_in_a_sentence(vibench_here, tmp_path):
+    for given, said in (("soon", "a budget of 'soon' was given"), ("-1", "--budget was given as -1")):
+        ran = vibench_here("predict", *FORGETFUL, f"--budget={given}", cwd=tmp_path)
+        assert ran.returncode != 0
+        assert said in ran.stderr
