@@ -14,8 +14,10 @@ from vibench.analysis import InvalidRequest
 from vibench.analysis.report import accuracy_document, tradeoff_figure, worst_error
 from vibench.sim import Accuracy
 from vibench.sim.accuracy_benchmark import (
+    LOTTERIES,
     MOTIONS,
     AccuracyBenchmark,
+    LotteryFigures,
     MotionBenchmark,
     Thoroughness,
     measure_accuracy,
@@ -49,18 +51,19 @@ def tradeoff(
         room_for_folder(folder)
     columns = (TextColumn("{task.description:<28}"), BarColumn(bar_width=30), MofNCompleteColumn())
     with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True)) as bars:
-        bar = bars.add_task("", total=len(MOTIONS))
+        bar = bars.add_task("", total=len(MOTIONS) + len(LOTTERIES))
 
         def step(name: str) -> None:
             bars.update(bar, description=name, advance=0 if bars.tasks[0].description == "" else 1)
 
         benchmark = measure_accuracy(Thoroughness(span_s=span), step)
-        bars.update(bar, completed=len(MOTIONS))
+        bars.update(bar, completed=len(MOTIONS) + len(LOTTERIES))
     if as_json:
         print_json(_document(benchmark))
     else:
         for each in benchmark.motions:
             _tell(each)
+        _tell_lotteries(benchmark.lotteries)
     if folder is not None:
         _save(benchmark, folder, markdown)
 
@@ -94,6 +97,23 @@ def _tell(found: MotionBenchmark) -> None:
     console.print(f"{found.advice}\n")
 
 
+def _tell_lotteries(lotteries: tuple[LotteryFigures, ...]) -> None:
+    rows = Table(title="start forgotten: shares of motions", title_justify="left")
+    for heading in ("", "Response I", "share stated", "of many starts", "cost over one run"):
+        rows.add_column(heading)
+    for each in lotteries:
+        for stated in each.shares:
+            share = stated.motion.share
+            rows.add_row(
+                each.lottery.name,
+                f"{stated.motion.response_i:.4g}",
+                f"{share.share:.0%} ({100 * share.low:.0f} to {100 * share.high:.0f} %)",
+                f"{stated.of_many:.0%} of {each.starts}",
+                f"{each.cost:.1f}",
+            )
+    console.print(rows)
+
+
 def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.1e}"
 
@@ -104,6 +124,16 @@ def _document(benchmark: AccuracyBenchmark) -> dict[str, object]:
         "software": benchmark.software,
         "motions": [
             {**asdict(each), "name": each.motion.name, "advice": each.advice} for each in benchmark.motions
+        ],
+        "lotteries": [
+            {
+                "name": each.lottery.name,
+                "answer": each.answered.to_dict(),
+                "shares_of_many": [stated.of_many for stated in each.shares],
+                "starts": each.starts,
+                "cost": each.cost,
+            }
+            for each in benchmark.lotteries
         ],
         "promises": [
             {"level": level.value, "promised": level.promise, "worst": worst_error(benchmark, level)}

@@ -7,14 +7,18 @@ import pytest
 
 from vibench.analysis.report import accuracy_document, tradeoff_figure, worst_error
 from vibench.sim import Accuracy
-from vibench.sim.accuracy_benchmark import MOTIONS, Thoroughness, measure_accuracy
+from vibench.sim.accuracy_benchmark import LOTTERIES, MOTIONS, Thoroughness, measure_accuracy
 
 PAGE = Path(__file__).parents[3] / "docs" / "accuracy.md"
 
 
 @pytest.fixture(scope="module")
 def benchmark():
-    return measure_accuracy(Thoroughness(span_s=0.03, solver_span_s=0.01), motions=(MOTIONS[1], MOTIONS[-1]))
+    return measure_accuracy(
+        Thoroughness(span_s=0.03, solver_span_s=0.01, starts=8),
+        motions=(MOTIONS[1], MOTIONS[-1]),
+        lotteries=(LOTTERIES[1],),
+    )
 
 
 def headings(text):
@@ -30,9 +34,19 @@ def test_the_page_holds_every_level_and_solver_of_every_motion(benchmark):
     assert page.count("](images/tradeoff.png)") == 1
 
 
+def test_the_page_has_the_shares_of_scenes_whose_start_is_forgotten(benchmark):
+    page = accuracy_document(benchmark, "x.png")
+    (lottery,) = benchmark.lotteries
+    rows = [line for line in page.splitlines() if line.startswith(f"| {lottery.lottery.name}")]
+    assert len(rows) == len(lottery.answered.ensemble.motions)
+    assert all("yes" in row or "**no**" in row for row in rows)
+    without = accuracy_document(replace(benchmark, lotteries=()), "x.png")
+    assert "start is forgotten" not in without
+
+
 def test_the_page_says_when_a_promise_is_not_kept(benchmark):
     assert worst_error(benchmark, Accuracy.QUICK) <= Accuracy.QUICK.promise
-    assert "**no**" not in accuracy_document(benchmark, "x.png")
+    assert "**no**" not in accuracy_document(replace(benchmark, lotteries=()), "x.png")
 
 
 def test_the_page_names_the_motions_on_which_a_level_buys_nothing(benchmark):

@@ -7,8 +7,10 @@ from vibench.sim.accuracy_benchmark import (
     LEAST_GAIN,
     AccuracyBenchmark,
     LevelFigures,
+    LotteryFigures,
     MotionBenchmark,
     SolverFigures,
+    StatedShare,
 )
 
 _HEAD = (
@@ -16,6 +18,9 @@ _HEAD = (
     "| of Response I | of Response II | exponent [1/s] |"
 )
 _RULE = "|---|---|---|---|---|---|"
+_LOTTERY_HEAD = (
+    "| scene | motion | Response I | error | share stated | of many | covered | chaos dies out [1/s] | cost |"
+)
 ABSENT = "–"
 
 
@@ -49,7 +54,48 @@ def _lines(benchmark: AccuracyBenchmark, picture: str) -> Iterator[str]:
     )
     for each in benchmark.motions:
         yield from _motion(each)
+    yield from _lotteries(benchmark.lotteries)
     yield from _promises(benchmark)
+
+
+def _lotteries(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
+    """Write shares that answers state, beside those of many starts."""
+    if not lotteries:
+        return
+    yield from (
+        "",
+        "## Where the start is forgotten",
+        "",
+        f"Scenes followed until they settle, and {lotteries[0].starts} more starts of each, a millionth of",
+        "the gap apart, for at most 300 s. What is pending (chaotic, or undecided) may come to any motion;",
+        "intervals of shares, 19 in 20 together, hold for now and in the end. Cost is that of the whole",
+        "answer over one run.",
+        "",
+        _LOTTERY_HEAD,
+        "|---|---|---|---|---|---|---|---|---|",
+    )
+    for each in lotteries:
+        for stated in each.shares:
+            yield _share(each, stated)
+
+
+def _share(found: LotteryFigures, stated: StatedShare) -> str:
+    motion, share = stated.motion, stated.motion.share
+    escape = None if found.answered.ensemble is None else found.answered.ensemble.escape
+    cells = (
+        f"{found.lottery.name}: {found.lottery.about}",
+        f"{motion.motion}" + ("" if motion.period is None else f", {motion.period}"),
+        f"{motion.response_i:.4g}",
+        _number(motion.error_estimate),
+        f"{share.share:.0%} ({100 * share.low:.0f} to {100 * share.high:.0f} %)",
+        f"{stated.of_many:.0%}",
+        "yes" if stated.is_covered else "**no**",
+        ABSENT
+        if escape is None
+        else f"{escape.rate_per_s:.2g} ({escape.low_per_s:.2g} to {escape.high_per_s:.2g})",
+        f"{found.cost:.1f}",
+    )
+    return f"| {' | '.join(cells)} |"
 
 
 def _motion(found: MotionBenchmark) -> Iterator[str]:

@@ -6,6 +6,11 @@ from ._figures import (
     MotionBenchmark as MotionBenchmark,
     SolverFigures as SolverFigures,
 )
+from ._lotteries import (
+    LOTTERIES as LOTTERIES,
+    LotteryFigures as LotteryFigures,
+    StatedShare as StatedShare,
+)
 from ._measuring import (
     Thoroughness as Thoroughness,
     measure_accuracy as measure_accuracy,

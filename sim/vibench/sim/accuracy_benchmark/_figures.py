@@ -8,6 +8,7 @@ from enum import StrEnum
 from itertools import pairwise
 
 from ..model import Accuracy, Harmonic, Specimen, gong2025
+from ._lotteries import LotteryFigures
 
 
 class Regime(StrEnum):
@@ -153,6 +154,7 @@ class AccuracyBenchmark:
     machine: str
     """Processor and cores."""
     software: str
+    lotteries: tuple[LotteryFigures, ...] = ()
 
     def solver_ratio(self, name: str, accuracy: Accuracy) -> dict[str, float]:
         """Cost of a general solver over that of a level, by motion."""

@@ -19,6 +19,7 @@ from ..motion import integrate, smallest_period, state_scales, steady_response, 
 from ..study import software
 from ._figures import MOTIONS, AccuracyBenchmark, LevelFigures, Motion, MotionBenchmark, Regime, SolverFigures
 from ._independent_solution import independent_state, state_error
+from ._lotteries import LOTTERIES, Lottery, measured_lottery
 from ._plain_equations import Place, law_of, numbers_of, rates_at
 
 LEVELS = tuple(Accuracy)
@@ -47,12 +48,15 @@ class Thoroughness:
     """Of the comparison with the independent solution."""
     solver_span_s: float = 0.05
     """Of general solvers, which are slow."""
+    starts: int = 200
+    """Followed of a scene whose start is forgotten."""
 
 
 def measure_accuracy(
     thoroughness: Thoroughness = Thoroughness(),
     step: Step = lambda _: None,
     motions: tuple[Motion, ...] = MOTIONS,
+    lotteries: tuple[Lottery, ...] = LOTTERIES,
 ) -> AccuracyBenchmark:
     """Measure cost and error on every motion.
 
@@ -66,7 +70,11 @@ def measure_accuracy(
     for motion in motions:
         step(motion.name)
         found.append(measured_motion(motion, thoroughness))
-    return AccuracyBenchmark(tuple(found), _machine(), software())
+    drawn = []
+    for lottery in lotteries:
+        step(lottery.name)
+        drawn.append(measured_lottery(lottery, thoroughness.starts))
+    return AccuracyBenchmark(tuple(found), _machine(), software(), tuple(drawn))
 
 
 def measured_motion(motion: Motion, thoroughness: Thoroughness) -> MotionBenchmark:
