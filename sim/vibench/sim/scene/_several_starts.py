@@ -236,11 +236,14 @@ APART = 2.0
 """Two windows of chaos differ by more than so many times what 19 in 20 do only if they are of two motions."""
 
 
+CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
+"""A motion is named by the start that shows it best, in this order."""
+
+
 def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]:
     """Sort what starts came to into motions."""
     groups: list[list[ReachedMotion]] = []
-    # Those that repeat first: one that has only just come to such a motion is known by it.
-    for each in sorted(reached, key=lambda one: one.period is None):
+    for each in sorted(reached, key=_clearness):
         same = next((group for group in groups if is_same(group[0], each)), None)
         if same is None:
             groups.append([each])
@@ -249,21 +252,26 @@ def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]
     return groups
 
 
+def _clearness(one: ReachedMotion) -> int:
+    return CLEAREST.index(one.motion) if one.motion in CLEAREST else len(CLEAREST)
+
+
 def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
     """Whether two starts came to the same motion, or to its symmetric partner.
 
-    What repeats is known by its period and all four responses, and by them alone where the other has come to
-    it too late to be seen to repeat. Of chaos only the largest value is compared, within what its windows
-    scatter by: two chaotic motions that differ by less count as one.
+    Motions are known by their period and all four responses, and by these alone where one start has come to
+    it too late to be seen to repeat, or to be told from chaos. Of chaos only the largest value is compared,
+    within what its windows scatter by: two chaotic motions that differ by less count as one.
     """
-    if one.period is not None:
-        difference = np.abs(one.responses_m - other.responses_m)
-        is_near = np.all(difference <= SAME * np.maximum(one.responses_m, other.responses_m))
-        return other.period in (one.period, None) and bool(is_near)
-    if one.motion is not other.motion:
+    if one.period is not None and other.period is not None and one.period != other.period:
+        return False
+    difference = np.abs(one.responses_m - other.responses_m)
+    if np.all(difference <= SAME * np.maximum(one.responses_m, other.responses_m)):
+        return True
+    if one.motion is not other.motion or one.period is not None:
         return False
     if one.scatter is None or other.scatter is None:
         return True
     largest = max(one.responses_m[0], other.responses_m[0])
     allowed = SAME + APART * max(one.scatter.between_runs, other.scatter.between_runs)
-    return bool(abs(one.responses_m[0] - other.responses_m[0]) <= allowed * largest)
+    return bool(difference[0] <= allowed * largest)
