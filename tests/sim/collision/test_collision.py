@@ -9,7 +9,6 @@ from vibench.sim import Accuracy, Harmonic, gong2025
 from vibench.sim.collision import collide, collision_tables, new_collision
 from vibench.sim.collision._tables import DEPTHS, DURATION, HALF_FORCE, SOFTEST, SPACING
 from vibench.sim.contact import begin_contact
-from vibench.sim.kernels import clock_at
 from vibench.sim.scene._followed_run import FollowedRun, ObservedQuantities, Samples
 from vibench.sim.stepping import harmonic_tables, new_state
 
@@ -31,7 +30,7 @@ def collided(start, tolerance=Accuracy.STANDARD.tolerance, longest=1.0, drive=DR
     begin_contact(state, math.copysign(1.0, start[1]), tables.flight.par, tolerance)
     workspace = new_collision()
     return (
-        collide(state, clock_at(0.0), longest, tolerance, tables.flight, tables.collisions, workspace),
+        collide(state, tables.flight.phase, longest, tolerance, tables.flight, tables.collisions, workspace),
         state,
         workspace,
     )

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contact import ROOT_FLOOR, gap_of
-from ..flight import AT_X, AT_Z, COSINE, P_RATE, SINE, WIDE, X_RATE, Z_RATE, FlightTables, P, drive_phasor
+from ..flight import AT_X, AT_Z, COSINE, P_RATE, SINE, WIDE, X_RATE, Z_RATE, FlightTables, P
 from ..kernels import (
     SimdVector,
     Table,
@@ -69,6 +69,8 @@ SLOW_TERMS = 6
 DEPTHS, FORCE, MISFIT, ACROSS, ACROSS_RATE, WORKSPACE_ROWS = range(6)
 """Rows of a room, at the points: depths over the largest, force [N], misfits of depths; x and vx for who
 watches."""
+UNIT, DEEPER_BY, PLACE = range(3)
+"""Places of `Collision.deepest`."""
 
 
 class Collision(NamedTuple):
@@ -84,7 +86,8 @@ class Collision(NamedTuple):
     after: Vector
     """The motion when it ends."""
     deepest: Vector
-    """The depth that a collision of its speed reaches [m], the unit of depths; `DEEPER` of its shape."""
+    """The depth that a collision of its speed reaches [m], the unit of depths; `DEEPER` of its shape; which
+    shape that is."""
 
 
 def new_collision() -> Collision:
@@ -95,28 +98,31 @@ def new_collision() -> Collision:
         np.zeros(TERMS),
         np.zeros(TERMS),
         np.zeros(WIDE),
-        np.zeros(2),
+        np.zeros(3),
     )
 
 
 @inlined
 def collide(
     state: Vector,
-    clock: Vector,
+    drive: complex,
     longest: float,
     tolerance: float,
     tables: FlightTables,
     collisions: CollisionTables,
     collision: Collision,
 ) -> float:
-    """Carry a state that has just begun a contact to its end; gives the time that took, or zero: not done."""
+    """Carry a state that has just begun a contact to its end; gives the time that took, or zero: not done.
+
+    ``drive`` is exp(i (omega t + phase)) now.
+    """
     speed, par = state[RATE], tables.par
     if tolerance < LEAST_TOLERANCE or state[ROOT] > FRESH * state[ROOT_SCALE] or not speed > 0.0:
         return 0.0
     deepest = (state[ROOT_SCALE] - ROOT_FLOOR) ** 2
     if LONGEST * deepest >= speed * min(longest, LONGEST_TURN / collisions.fastest):
         return 0.0
-    _see_from_its_side(collision.motion, state, clock, tables)
+    _see_from_its_side(collision.motion, state, drive)
     store(collision.course, 0, eight_of_eight(collisions.onto_p, 0, collision.motion))
     duration = _duration(
         collision,
@@ -137,8 +143,8 @@ def collide(
 
 
 @inlined
-def _see_from_its_side(motion: Vector, state: Vector, clock: Vector, tables: FlightTables) -> None:
-    side, drive = state[SIDE], drive_phasor(clock, 0.0, tables)
+def _see_from_its_side(motion: Vector, state: Vector, drive: complex) -> None:
+    side = state[SIDE]
     motion[P], motion[P_RATE] = side * (state[Y] - state[Z]), state[RATE]
     motion[AT_X], motion[AT_Z] = side * state[X], side * state[Z]
     motion[X_RATE], motion[Z_RATE] = side * state[VX], side * state[VZ]
@@ -195,7 +201,8 @@ def _begin(
     store(collision.workspace, DEPTHS, depths)
     later = beside * known[LASTS_BY] + jerk * known[LASTS_BY + 1]
     later += damper * known[LASTS_BY + 2] + spring * known[LASTS_BY + 3]
-    collision.deepest[0], collision.deepest[1] = deepest, known[DEEPER]
+    collision.deepest[UNIT], collision.deepest[DEEPER_BY] = deepest, known[DEEPER]
+    collision.deepest[PLACE] = place
     duration: float = unit * (known[DURATION] + later)
     return duration
 

@@ -6,6 +6,7 @@ from ..kernels import (
     SimdVector,
     Vector,
     eight_of_eight,
+    eight_of_sixteen,
     inlined,
     kernel_without_refcount,
     largest,
@@ -15,9 +16,9 @@ from ..kernels import (
     total,
 )
 from ..slots import LINE_P_IM, LINE_P_RE, LINE_X_IM, LINE_X_RE, MODE, PEAK_P, PEAK_X, PEAKS_AND_LINES
-from ._collision import ACROSS, ACROSS_RATE, DEPTHS, FORCE, Collision
+from ._collision import ACROSS, ACROSS_RATE, DEEPER_BY, DEPTHS, FORCE, UNIT, Collision
 from ._sums import at_heights, pushed
-from ._tables import POINTS, TERMS, CollisionTables, deepest_of
+from ._tables import POINTS, TERMS, CollisionTables, top_of
 
 FIRST_OF_FORCE = 2
 """A force reaches x by way of m2 and a damper: two integrals later."""
@@ -41,11 +42,13 @@ def observe_collision(
     observations[PEAK_X] = max(observations[PEAK_X], abs(motion[AT_X]), abs(after[AT_X]))
     if motion[X_RATE] * after[X_RATE] < 0.0:
         observations[PEAK_X] = _turning_peak(observations[PEAK_X], collision, duration, collisions)
-    unit, depths = collision.deepest[0] * collision.deepest[1], collision.workspace[DEPTHS]
-    if gap + unit * ABOVE_POINTS * largest(sixteen(depths, 0)) > observations[PEAK_P]:
-        observations[PEAK_P] = max(observations[PEAK_P], gap + unit * deepest_of(depths))
     if observations[MODE] == PEAKS_AND_LINES:
         _add_lines(observations, collision, duration, gap, omega, collisions)
+    unit, depths = collision.deepest[UNIT] * collision.deepest[DEEPER_BY], collision.workspace[DEPTHS]
+    if gap + unit * ABOVE_POINTS * largest(sixteen(depths, 0)) > observations[PEAK_P]:
+        # The course of x is needed no more.
+        store(collision.course, 0, eight_of_sixteen(collisions.about_middle, 0, depths))
+        observations[PEAK_P] = max(observations[PEAK_P], gap + unit * top_of(collision.course))
 
 
 @inlined
@@ -68,7 +71,7 @@ def _add_lines(
     cosine, sine = weight * cosine_of(square), weight * (angle * sine_over(square))
     along = drive[COSINE] * cosine - drive[SINE] * sine
     across = drive[COSINE] * sine + drive[SINE] * cosine
-    x, p = sixteen(workspace, ACROSS), gap + collision.deepest[0] * sixteen(workspace, DEPTHS)
+    x, p = sixteen(workspace, ACROSS), gap + collision.deepest[UNIT] * sixteen(workspace, DEPTHS)
     observations[LINE_X_RE] += total(x * along)
     observations[LINE_X_IM] -= total(x * across)
     observations[LINE_P_RE] += total(p * along)

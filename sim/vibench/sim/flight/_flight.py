@@ -30,7 +30,7 @@ from ..kernels import (
 from ..model import VX, VY, VZ, Harmonic, Specimen, X, Y, Z, harmonic_motion, modal_form
 from ..slots import Parameters, parameters
 from ._base_force import FORCE_TERMS
-from ._detection import LARGEST_BOUND, LONGEST_TURN, NEVER, first_contact
+from ._detection import LARGEST_BOUND, LONGEST_TURN, NEVER, first_touch
 
 GRID_TURN = LONGEST_TURN
 """Grid step as the fastest rate times its length [rad]: half as long is slower by a seventh."""
@@ -208,7 +208,7 @@ def fly(
                     continue
             length = min(h, longest - elapsed)
             fill_series(series, terms, tables.series)
-            touch = first_contact(series, length, par.lower, par.upper, bound, reach)
+            touch = first_touch(series, length, par.lower, par.upper, bound, reach)
             if touch != NEVER:
                 return TOUCHES, elapsed + touch
             if length < h:

@@ -50,10 +50,14 @@ def observe_flight(
     """Add a flight of ``length`` seconds from clock time, from ``phasors`` to ``landed``."""
     if observations[MODE] == NOTHING:
         return
-    for place in (PEAK_X, PEAK_P):
-        shape = tables.across if place == PEAK_X else tables.path
-        observations[place] = _flight_peak(
-            observations[place], shape, phasors, now, terms, series, clock, length, tables
+    par = tables.par
+    observations[PEAK_X] = _flight_peak(
+        observations[PEAK_X], tables.across, phasors, landed, now, terms, series, clock, length, tables
+    )
+    # Between stops p is nowhere larger than at a stop.
+    if observations[PEAK_P] < max(par.lower, par.upper):
+        observations[PEAK_P] = _flight_peak(
+            observations[PEAK_P], tables.path, phasors, landed, now, terms, series, clock, length, tables
         )
     if observations[MODE] == PEAKS_AND_LINES:
         _add_flight_lines(observations, phasors, landed, length, tables)
@@ -85,6 +89,7 @@ def _flight_peak(
     best: float,
     shape: Complex,
     phasors: Complex,
+    landed: Complex,
     now: Complex,
     terms: Complex,
     series: Vector,
@@ -94,7 +99,8 @@ def _flight_peak(
 ) -> float:
     """Largest magnitude of Re sum shape_j e_j(t) over a flight, or ``best`` if that is larger.
 
-    A grid step is looked at closely only when the bound on the acceleration lets it beat ``best``.
+    A grid step is looked at only when the bound on the acceleration lets it beat ``best``, and closely only
+    when the rate changes its sign in it.
     """
     h, done = tables.grid, 0.0
     while True:
@@ -107,19 +113,47 @@ def _flight_peak(
             return best
         excess = bound * h * h / 8.0
         steps, made = min(RUN_OF_STEPS, int((length - done) / h)), 0
-        if steps == 0:
-            fill_series(series, terms, tables.series)
-            return series_peak(best, series, 0.0, length - done)
-        while True:
+        while made < steps:
             if abs(sum_now(terms)) + excess <= best:
                 made += march(terms, tables.ahead, steps - made, excess - best, best - excess)
-            if made == steps:
-                break
-            fill_series(series, terms, tables.series)
-            best = series_peak(best, series, 0.0, h)
+                if made == steps:
+                    break
+            value, rate = sum_now(terms), _rate_now(terms, tables.rates)
             propagate_by(terms, tables.ahead, 1)
             made += 1
+            later, rate_later = sum_now(terms), _rate_now(terms, tables.rates)
+            best = max(best, abs(value), abs(later))
+            if _may_peak(best, value, rate, later, rate_later, h):
+                fill_series(series, terms, tables.series)
+                best = series_peak(best, series, -h, 0.0)
         done += steps * h
+        if steps < RUN_OF_STEPS:
+            break
+    value, rate = sum_now(terms), _rate_now(terms, tables.rates)
+    fill_series(series, terms, tables.series)
+    begin_terms(terms, landed, shape, tables)
+    later, rate_later = sum_now(terms), _rate_now(terms, tables.rates)
+    best = max(best, abs(value), abs(later))
+    if _may_peak(best, value, rate, later, rate_later, length - done):
+        best = series_peak(best, series, 0.0, length - done)
+    return best
+
+
+@inlined
+def _rate_now(terms: Complex, rates: Complex) -> float:
+    """Re sum rates_j terms_j."""
+    value = 0.0
+    for j in range(len(terms)):
+        value += rates[j].real * terms[j].real - rates[j].imag * terms[j].imag
+    return value
+
+
+@inlined
+def _may_peak(best: float, value: float, rate: float, later: float, rate_later: float, length: float) -> bool:
+    """Whether a step that turns may beat ``best``: it stays below the tangents of both ends."""
+    return rate * rate_later < 0.0 and (
+        min(abs(value) + length * abs(rate), abs(later) + length * abs(rate_later)) > best
+    )
 
 
 @inlined

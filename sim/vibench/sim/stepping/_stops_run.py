@@ -23,6 +23,7 @@ from ..flight import (
     LIFTS_OFF,
     OUT_OF_RANGE,
     FlightTables,
+    drive_phasor,
     fill_base_force,
     fly,
     observe_flight,
@@ -138,6 +139,8 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
         workspace.memory,
     )
     counts = record.counts
+    # The drive's phasor where a stop has just been touched; zero where it is not known.
+    strikes = complex(0.0, 0.0)
     while True:
         longest = time_until(clock, until)
         if longest <= 0.0:
@@ -155,7 +158,7 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
                     record.observations, phasors, landed, now, scratch, series, clock, length, tables
                 )
             if tangent is not None and len(tangent) > 0:
-                propagate_tangent_flight(tangent, length, tables)
+                propagate_tangent_flight(tangent, length, now, scratch, tables)
             if counts[NEXT_SAMPLE] < len(record.samples):
                 sample_flight(phasors, now, clock, length, tables, record)
             place_on_phasors(state, landed, tables)
@@ -163,6 +166,7 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
                 clock[0], clock[1] = until, 0.0
                 continue
             advance_clock(clock, length)
+            strikes = landed[len(landed) - 1]
             if ends == LIFTS_OFF:
                 continue
             if counts[IMPACTS] == len(record.impact_times):
@@ -187,7 +191,9 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
         else:
             copy_row(shadow, state)
             if collisions is not None:
-                length = collide(state, clock, longest, tolerance, tables, collisions, workspace.collision)
+                drive = drive_phasor(clock, 0.0, tables) if strikes == 0.0 else strikes
+                length = collide(state, drive, longest, tolerance, tables, collisions, workspace.collision)
+                strikes = complex(0.0, 0.0)
                 if length > 0.0:
                     _observe_collision_in_full(
                         shadow, clock, length, tables, tolerance, record, collisions, tangent, workspace
@@ -292,7 +298,7 @@ def _stay_held(
     observe_flight(record.observations, phasors, landed, now, scratch, series, clock, length, flight)
     observe_held(record.observations, side, clock, length, flight)
     if tangent is not None and len(tangent) > 0:
-        propagate_tangent_flight(tangent, length, flight)
+        propagate_tangent_flight(tangent, length, now, scratch, flight)
     sample_flight(phasors, now, clock, length, flight, record)
     for row in range(first, record.counts[NEXT_SAMPLE]):
         record.samples[row, Y] += side * gap_of(side, flight.par.lower, flight.par.upper)
