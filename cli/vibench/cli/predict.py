@@ -1,17 +1,21 @@
 """`vibench predict`: Responses I and II, and exponents, over frequency."""
 
+import math
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 import typer
 from pydantic import ValidationError
 from rich.table import Table
 
 from vibench.analysis import InvalidRequest
 from vibench.sim import BUDGET_S, Accuracy, Observable, Rest, ScenePlan, plan_scene
+from vibench.sim.scene import measure_cost
 from vibench.sim.study import (
     ExistingStudy,
     Start,
@@ -171,29 +175,55 @@ def document(results: StudyResults, elapsed_s: float) -> dict[str, object]:
     }
 
 
+@dataclass(frozen=True)
+class _Planned:
+    """A point, how it was to be answered, and what that took."""
+
+    frequency_hz: float
+    plan: ScenePlan
+    taken_s: float
+    """NaN where kernels were loaded in it."""
+
+
 def explanation(results: StudyResults) -> str:
     """Say how the points are answered: one passage for each run of points that are answered alike."""
     study = results.study
+    scenes = [study.scene((0, 0, 0, 0, 0, index), Rest()) for index in range(len(study.frequencies_hz))]
+    taken_s = np.broadcast_to(results.values("taken").ravel(), len(scenes))
     plans = [
-        (frequency_hz, plan_scene(study.scene((0, 0, 0, 0, 0, index), Rest())))
-        for index, frequency_hz in enumerate(study.frequencies_hz)
+        _Planned(scene.drive.frequency_hz, plan_scene(scene), float(each_s))
+        for scene, each_s in zip(scenes, taken_s, strict=True)
     ]
-    passages = [_passage(list(run)) for _, run in groupby(plans, lambda each: each[1].alike)]
+    passages = []
+    for _, run in groupby(zip(plans, scenes, strict=True), lambda each: each[0].plan.alike):
+        alike = list(run)
+        measure_cost(alike[len(alike) // 2][1])
+        passages.append(_passage([planned for planned, _ in alike]))
     forgotten = forgetting_text(list(results.predictions()))
     return "\n".join([*passages, forgotten] if forgotten else passages)
 
 
-def _passage(plans: Sequence[tuple[float, ScenePlan]]) -> str:
+def _passage(points: Sequence[_Planned]) -> str:
     """Explain points that follow one another and are answered alike, by the one nearest to its stops."""
-    first_hz, last_hz = plans[0][0], plans[-1][0]
-    worst_hz, worst = max(plans, key=lambda each: each[1].largest_p_m)
-    said = " ".join(worst.sentences)
-    if len(plans) == 1:
-        return f"{first_hz:g} Hz: {worst.method.value}. {said}"
+    worst = max(points, key=lambda each: each.plan.largest_p_m)
+    said = f"{' '.join(worst.plan.sentences)} {_cost(points)}"
+    method = worst.plan.method.value
+    if len(points) == 1:
+        return f"{worst.frequency_hz:g} Hz: {method}. {said}"
     return (
-        f"{len(plans)} points, {first_hz:g} to {last_hz:g} Hz: {worst.method.value}. "
-        f"At {worst_hz:g} Hz: {said}"
+        f"{len(points)} points, {points[0].frequency_hz:g} to {points[-1].frequency_hz:g} Hz: {method}. "
+        f"At {worst.frequency_hz:g} Hz: {said}"
     )
+
+
+def _cost(points: Sequence[_Planned]) -> str:
+    """Say what points are estimated to take, and what those took whose kernels were there."""
+    known_s = [each.taken_s for each in points if math.isfinite(each.taken_s)]
+    expected = points[0].plan.cost
+    whole = replace(expected, time_s=sum(each.plan.cost_s for each in points))
+    if not known_s:
+        return f"{whole}"
+    return f"{whole} {len(known_s)} of {len(points)} took {sum(known_s):.2g} s."
 
 
 def _tell(results: StudyResults) -> None:

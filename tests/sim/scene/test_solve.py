@@ -17,6 +17,7 @@ from vibench.sim import (
 )
 from vibench.sim.model import modal_form
 from vibench.sim.scene import AutomaticDuration, FixedDuration, Given, Method, MotionKind
+from vibench.sim.scene._followed_run import FollowedRun
 
 RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
 PERIODIC = [
@@ -82,6 +83,35 @@ def test_a_motion_that_repeats_is_followed_for_a_fraction_of_the_papers_time():
     assert found.window_s == pytest.approx(1.0 / 130.0)
     assert found.settled_s == pytest.approx(found.duration_s - found.window_s)
     assert found.ended == "it repeats after 1 drive period(s)"
+
+
+@pytest.fixture
+def followed_s(monkeypatch):
+    lengths, follow = [], FollowedRun.follow
+
+    def counted(run, *options, **more):
+        stretch = follow(run, *options, **more)
+        lengths.append(stretch.length_s)
+        return stretch
+
+    monkeypatch.setattr(FollowedRun, "follow", counted)
+    return lengths
+
+
+def test_whole_cycles_of_a_motion_that_repeats_are_passed_over(followed_s):
+    specimen, drive = gong2025(), Harmonic(130.0, 20e-6)
+    found = solve_scene(Scene(specimen, drive, duration=FixedDuration(30.0, 5.0)))
+    assert sum(followed_s) < 22.0
+    whole = steady_response(specimen, drive)
+    assert found.response_i == pytest.approx(whole.response_i, rel=1e-9)
+    assert found.response_ii == pytest.approx(whole.response_ii, rel=1e-9)
+    assert np.allclose(found.final_state, whole.final_state, rtol=1e-6, atol=1e-12)
+    assert found.duration_s == pytest.approx(30.0)
+
+
+def test_nothing_of_chaos_is_passed_over(followed_s):
+    solve_scene(Scene(gong2025(), Harmonic(260.0, 5e-6), duration=FixedDuration(30.0, 5.0)))
+    assert sum(followed_s) >= 30.0
 
 
 def test_chaos_is_known_for_what_it_is_and_its_scatter_is_stated():

@@ -16,6 +16,8 @@ from typing import assert_never
 
 from pydantic import ValidationError
 
+from vibench.sim.costs import state_folder
+
 from ..bench import (
     Bench,
     BenchKind,
@@ -29,7 +31,6 @@ from ..bench import (
     rig_digest,
 )
 from ..errors import CheckFailed, RecordingError
-from ..host import state_folder
 from ..rig import Rig
 from ..stopping import StopSwitch
 from ._bench_report import bench_report

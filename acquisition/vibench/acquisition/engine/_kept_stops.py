@@ -11,7 +11,9 @@ from contextlib import suppress
 from pathlib import Path
 from threading import get_ident
 
-from ..host import process_start, state_folder
+from vibench.sim.costs import state_folder
+
+from ..host import process_start
 from ..stopping import StopLevel
 
 LONGEST_REASON = 500

@@ -5,8 +5,9 @@ import os
 import sys
 from pathlib import Path
 
+from vibench.sim.costs import state_folder
+
 from ..errors import InstrumentBusy
-from ..host import state_folder
 from ..rig import Rig
 
 if sys.platform == "win32":

@@ -1,8 +1,7 @@
-"""What the computer provides: TOML files in and out, shipped files, the state folder, processes.
+"""What the computer provides: TOML files in and out, shipped files, processes.
 
 `FrozenModel` is the base of every validated value; what a file says wrongly is refused with file, key,
-what was given and what is allowed. ``VIBENCH_STATE_DIR`` names another state folder. Knows nothing of
-measurements.
+what was given and what is allowed. Knows nothing of measurements.
 """
 
 import lazy_loader

@@ -14,7 +14,6 @@ from ._process_start import (
 from ._shipped import (
     all_shipped as all_shipped,
     shipped as shipped,
-    state_folder as state_folder,
 )
 from ._toml_file import (
     FrozenModel as FrozenModel,

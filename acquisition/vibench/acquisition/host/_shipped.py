@@ -1,7 +1,5 @@
-"""Where vibench's own configurations and campaigns lie, and where this computer keeps locks and checks."""
+"""Where vibench's own configurations and campaigns lie."""
 
-import os
-import sys
 import sysconfig
 from pathlib import Path
 
@@ -26,29 +24,3 @@ def all_shipped(folder: str) -> tuple[Path, ...]:
     """Every TOML file that comes with vibench in a folder, ``"campaigns"`` for example, by name."""
     found = next((place / folder for place in FOLDERS if (place / folder).is_dir()), None)
     return () if found is None else tuple(sorted(found.glob("*.toml")))
-
-
-VARIABLE = "VIBENCH_STATE_DIR"
-
-
-def state_folder() -> Path:
-    """Give the user's own folder, made if need be; ``VIBENCH_STATE_DIR`` names another one."""
-    folder = _named() or _usual()
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    return folder
-
-
-def _named() -> Path | None:
-    given = os.environ.get(VARIABLE)
-    return Path(given) if given else None
-
-
-def _usual() -> Path:
-    home = Path.home()
-    match sys.platform:
-        case "win32":
-            return Path(os.environ.get("LOCALAPPDATA", home / "AppData" / "Local")) / "vibench"
-        case "darwin":
-            return home / "Library" / "Application Support" / "vibench"
-        case _:
-            return Path(os.environ.get("XDG_STATE_HOME", home / ".local" / "state")) / "vibench"

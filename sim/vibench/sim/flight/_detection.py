@@ -165,8 +165,11 @@ def _touch_without_turning(
         tau += step
         # What this correction leaves of the gap is at most half of bound step^2.
         if bound * step * step <= touch:
-            return min(tau, length)
-    return UNPROVED
+            break
+    else:
+        return UNPROVED
+    touched: float = min(tau, length)
+    return touched
 
 
 @kernel_without_refcount

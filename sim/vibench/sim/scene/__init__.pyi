@@ -1,3 +1,7 @@
+from ._measured_cost import (
+    learn_cost as learn_cost,
+    measure_cost as measure_cost,
+)
 from ._plan import (
     ScenePlan as ScenePlan,
     plan_scene as plan_scene,

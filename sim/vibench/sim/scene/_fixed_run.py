@@ -37,6 +37,8 @@ SETTLED = {Accuracy.QUICK: 1e-5, Accuracy.STANDARD: 1e-6, Accuracy.REFERENCE: 1e
 """Distance from the motion that it repeats, over its size, at which it counts as settled."""
 ROUNDING = 1e-10
 """Noise of exact flight and of contacts that begin and end as they did a period before."""
+EXACTLY = 1e-9
+"""Distance at which a motion is passed over: what is left of the way is less than any level promises."""
 STEPPING = 100.0
 """Noise over the tolerance where steps follow one another without a break: they fall elsewhere in each
 period. Measured: 70 at most (p^7 at 130 Hz and 20 um)."""
@@ -115,7 +117,7 @@ class SceneRun:
 
 def run_for(run: FollowedRun, duration_s: float, window_s: float, pace: Pace) -> SceneRun:
     """Follow a motion that is at time zero for a while, and observe the last ``window_s`` of it."""
-    lead = _lead(run, max(run.time_s, duration_s - window_s - pace.section_s))
+    lead, is_settled = _lead(run, max(run.time_s, duration_s - window_s - pace.section_s), pace)
     last = follow_strobed(run, duration_s - window_s)
     before = pace.repeats([last])
     if before is None:
@@ -125,8 +127,8 @@ def run_for(run: FollowedRun, duration_s: float, window_s: float, pace: Pace) ->
     if seen.repeats is not None and window.line_periods % seen.repeats.period != 0:
         # Its period was found only now: the window is gone through once more, for lines that do not leak.
         seen = replace(seen, window=observe_window(window.begins.apart(), window_s, seen.repeats.period))
+    path = lead if is_settled else (*lead, last, *window.stretches)
     # Since when it repeats was not looked for.
-    path = (lead, last, *window.stretches)
     return replace(seen, was_settled=before is not None, path=path, wandered_until_s=0.0)
 
 
@@ -164,10 +166,32 @@ def growth_of(stretches: Sequence[Stretch]) -> Growth:
 
 MOST_LOOKS = 4096
 """States that are kept of a long lead at most: enough to see other starts part from it."""
+SECTIONS = 16
+"""How often it is looked for on a long lead whether the motion repeats: a look costs a section of states."""
 
 
-def _lead(run: FollowedRun, until_s: float) -> Stretch:
-    """Advance to an instant, and keep some states on the way."""
-    periods = whole_periods(until_s, run.drive.frequency_hz)
-    rate_hz = run.drive.frequency_hz / max(1, math.ceil(periods / MOST_LOOKS))
-    return run.follow(until_s, samples=samples_between(rate_hz, run.time_s, until_s))
+def _lead(run: FollowedRun, until_s: float, pace: Pace) -> tuple[tuple[Stretch, ...], bool]:
+    """Advance to an instant, and keep some states on the way; and whether the motion repeated before.
+
+    What repeats to rounding is followed no further: the whole cycles that are left are passed over. Where
+    steps follow one another without a break nothing repeats so nearly.
+    """
+    exact = replace(pace, sharpness=replace(pace.sharpness, tolerance=EXACTLY))
+    may_repeat = pace.sharpness.noise < EXACTLY
+    section_s = pace.section_s if may_repeat else 0.0
+    look_s = max(section_s, until_s / SECTIONS) if may_repeat else until_s
+    rate_hz = pace.frequency_hz / max(1, math.ceil(whole_periods(until_s, pace.frequency_hz) / MOST_LOOKS))
+    path: list[Stretch] = []
+    while run.outcome is Outcome.REACHED_END and run.time_s < until_s:
+        look_at_s = min(until_s, run.time_s + look_s)
+        before_s = max(run.time_s, look_at_s - section_s)
+        path.append(run.follow(before_s, samples=samples_between(rate_hz, run.time_s, before_s)))
+        if not may_repeat:
+            continue
+        path.append(follow_strobed(run, look_at_s))
+        repeats = exact.repeats(path[-1:])
+        if repeats is not None:
+            left = (until_s - run.time_s) * pace.frequency_hz
+            run.pass_over(int(left / repeats.period) * repeats.period)
+            return tuple(path), True
+    return tuple(path), False

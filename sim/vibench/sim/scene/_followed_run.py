@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels import Floats, clock_at
+from ..kernels import Floats, advance_clock, clock_at
 from ..model import Accuracy, Harmonic, Outcome, Specimen
 from ..motion import MAX_IMPACT_RATE_HZ, new_record, start_motion, state_scales
 from ..slots import (
@@ -126,6 +126,10 @@ class FollowedRun:
             _tolerance=self._tolerance if tolerance is None else tolerance,
         )
         return twin
+
+    def pass_over(self, drive_periods: int) -> None:
+        """Let so many drive periods pass in which the motion comes back to its state."""
+        advance_clock(self._clock, drive_periods / self.drive.frequency_hz)
 
     def follow_tangent(self) -> None:
         """Carry a small change along from now on, in no special direction."""

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from ..costs import Expected, cost_ledger
 from ..model import PowerLaw, Specimen
 from ._linear_motion import LinearMotion, linear_motion, never_touches
 from ._prediction import Method
@@ -13,13 +14,14 @@ DECAYED_SHARE = 1e-9
 """Share of the response that the start may still have where the steady motion stands for it."""
 
 CLOSED_FORM_S = 5e-4
-"""Time for a closed form [s]; this and the next three as measured on one core of a small machine."""
-FLIGHT_S, IMPACT_S, STEPS_S = 5e-5, 6e-6, 4e-3
+"""Time for a closed form [s]; this and the next three as a plan counts it. What a machine makes of it, and of
+all that a plan cannot know, is learnt from what runs took (`vibench.sim.costs`)."""
+FLIGHT_S, IMPACT_S, STEPS_S = 5e-5, 1e-6, 3e-4
 """Time for a second of flight, for an impact, and for a second under a force at every p [s]."""
 TANGENT = 1.5
 """Time with a tangent vector over the time without."""
 SETTLING_S = 10.0
-"""Duration that an automatic one is planned as; one that repeats is done in a tenth of it [s]."""
+"""Duration that an automatic one is planned as [s]."""
 IMPACTS_PER_PERIOD = 2.0
 """Where p would pass both stops once a period; more where it would pass them by far."""
 MICROMETRES = 1e6
@@ -32,8 +34,10 @@ class ScenePlan:
     method: Method
     sentences: tuple[str, ...]
     """What is modelled, what is carried along, what is not, and why."""
-    cost_s: float
-    """Estimated time on one core."""
+    planned_s: float
+    """The work in it, in seconds of a machine that nobody has."""
+    kind: str
+    """What runs have taken is learnt for each kind, and for what it begins with."""
     largest_p_m: float
     """As long as no stop is touched, abs(p) stays below this."""
 
@@ -42,9 +46,19 @@ class ScenePlan:
         """Two scenes with the same are answered in the same way, whatever their numbers."""
         return (self.method.value, *self.sentences[1:])
 
+    @property
+    def cost(self) -> Expected:
+        """How long it will take on one core of this machine, by what such runs took lately."""
+        return cost_ledger().expected(self.kind, self.planned_s)
+
+    @property
+    def cost_s(self) -> float:
+        """The same without how far it may be off [s]."""
+        return self.cost.time_s
+
     def explain(self) -> str:
         """Say the plan to a reader."""
-        return "\n".join((*self.sentences, f"Estimated time on one core: {self.cost_s:.1g} s."))
+        return "\n".join((*self.sentences, str(self.cost)))
 
 
 def plan_scene(scene: Scene) -> ScenePlan:
@@ -59,14 +73,16 @@ def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
     """Plan a scene whose motion, as long as nothing is touched, is ``motion``."""
     method = _method(scene.specimen, motion, scene.duration)
     if method is Method.CLOSED_FORM:
-        return ScenePlan(method, (_why_closed(scene.specimen, motion),), CLOSED_FORM_S, motion.largest_p_m)
+        why = _why_closed(scene.specimen, motion)
+        return ScenePlan(method, (why,), CLOSED_FORM_S, method.value, motion.largest_p_m)
     sentences = (
         _why_followed(scene.specimen, motion, method),
         *_carried(scene.observe),
         _length(scene.duration),
         *(() if never_touches(scene.specimen, motion) else (_other_starts(scene.budget_s),)),
     )
-    return ScenePlan(method, sentences, _cost_s(scene, motion, method), motion.largest_p_m)
+    planned_s = _planned_s(scene, motion, method)
+    return ScenePlan(method, sentences, planned_s, _kind(scene, method), motion.largest_p_m)
 
 
 def transient_decay_s(motion: LinearMotion) -> float:
@@ -151,7 +167,18 @@ def _length(duration: FixedDuration | AutomaticDuration) -> str:
             )
 
 
-def _cost_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
+def _kind(scene: Scene, method: Method) -> str:
+    """Name the runs that take about as long as their plans say, or are all off alike."""
+    match scene.duration:
+        case FixedDuration():
+            duration = "fixed"
+        case AutomaticDuration():
+            duration = "automatic"
+    observed = "+".join(sorted(each.value for each in scene.observe))
+    return "/".join((method.value, scene.specimen.contact.kind, scene.accuracy.value, duration, observed))
+
+
+def _planned_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
     match scene.duration:
         case FixedDuration(duration_s=length_s):
             pass

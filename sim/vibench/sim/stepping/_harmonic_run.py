@@ -19,7 +19,7 @@ from ..kernels import Table, Vector, kernel_without_refcount
 from ..model import Harmonic, PowerLaw, RigidStops, Specimen, bound_motion, harmonic_motion
 from ..power_law import PowerTables, advance_under_power, power_tables
 from ..slots import PowerTerms, Record, power_terms
-from ..sticking import HeldTables, held_tables
+from ..sticking import HeldTables, held_tables, pressed_tables
 from ._stops_run import advance_between_stops
 from ._workspace import Workspace, workspace_for
 
@@ -33,7 +33,7 @@ class HarmonicTables(NamedTuple):
     steps: PowerTables | None
     """Of long steps under a power law."""
     held: HeldTables | None
-    """Of rigid stops."""
+    """Of rigid stops, and of stops that are springs."""
     collisions: CollisionTables | None
     """Of Hertz's stops."""
 
@@ -50,7 +50,9 @@ def harmonic_tables(specimen: Specimen, drive: Harmonic) -> HarmonicTables:
         flight=flight,
         power=power_terms(specimen),
         steps=power_tables(specimen, omega, force, rates) if is_power else None,
-        held=held_tables(flight, bound_motion(specimen, omega, drive.amplitude_m)) if is_rigid else None,
+        held=held_tables(flight, bound_motion(specimen, omega, drive.amplitude_m), specimen)
+        if is_rigid
+        else pressed_tables(specimen, drive),
         collisions=collision_tables(specimen, omega, force, rates),
     )
 

@@ -52,6 +52,7 @@ from ..slots import (
     MODE,
     NEXT_SAMPLE,
     NOTHING,
+    PEAK_P,
     REACHED_END,
     SIDE,
     STUCK,
@@ -59,7 +60,7 @@ from ..slots import (
     Parameters,
     Record,
 )
-from ..sticking import HeldTables, closed_for, hold, lift_off, observe_held, place_held
+from ..sticking import LETS_GO, HeldTables, closed_for, hold, lift_off, observe_rest
 from ._touch import contact_onset
 from ._workspace import Workspace
 
@@ -126,8 +127,8 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
 ) -> int:
     """Advance ``state`` and ``clock`` to the instant ``until`` [s]; returns an `Outcome` code.
 
-    ``held`` is how m1 moves on a stop that holds it, None where stops yield; ``collisions`` are known of
-    Hertz's stops alone.
+    ``held`` is how m1 moves on a stop that holds it or is a spring, None where stops yield otherwise;
+    ``collisions`` are known of Hertz's stops alone.
     """
     phasors, landed, now = workspace.phasors, workspace.landed, workspace.now
     scratch, series = workspace.terms, workspace.series
@@ -149,7 +150,9 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
             return LOST
         if state[SIDE] == 0.0:
             start_flight(phasors, state, clock, tables)
-            ends, length = _fly_on(phasors, now, scratch, series, clock, longest, tables, held)
+            ends, length = _fly_on(
+                phasors, now, scratch, series, clock, longest, tables, held, tables.par.restitution
+            )
             if ends == OUT_OF_RANGE:
                 return LOST
             propagate_phasors(landed, phasors, length, clock, tables)
@@ -180,7 +183,8 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
             if held is not None:
                 _propagate_tangent_impact(tangent, shadow, state, tables.par, tables.par.restitution)
         elif held is not None:
-            ends, length = _stay_held(state, clock, longest, series, record, held, tangent)
+            gap = gap_of(state[SIDE], tables.par.lower, tables.par.upper)
+            ends, length = _stay_held(state, gap, clock, longest, record, held, tangent, workspace)
             if ends == OUT_OF_RANGE:
                 return LOST
             if ends == CLEAR:
@@ -230,9 +234,10 @@ def _fly_on(
     longest: float,
     tables: FlightTables,
     held: HeldTables | None,
+    restitution: float | None,
 ) -> tuple[int, float]:
     """Find how long a flight lasts, as `vibench.sim.flight.fly`; off a rigid stop it first departs."""
-    if held is not None:
+    if held is not None and restitution is not None:
         if not is_resolved(closed_for(phasors, tables), tables.par):
             return OUT_OF_RANGE, 0.0
         leaves = lift_off(phasors, terms, series, tables)
@@ -275,32 +280,41 @@ def _propagate_tangent_impact(
         propagate_tangent_impact(tangent, before, after, par, restitution)
 
 
-@kernel
+@inlined
 def _stay_held(
     state: Vector,
+    gap: float,
     clock: Vector,
     longest: float,
-    series: Vector,
     record: Record,
     held: HeldTables,
     tangent: Table | None,
+    workspace: Workspace,
 ) -> tuple[int, float]:
-    """Advance while a rigid stop holds m1, to where it lets go or by ``longest``."""
-    flight = held.flight
+    """Advance while m1 is on a stop at ``gap``, to where that lets go or by ``longest``."""
+    flight, observations = held.flight, record.observations
     terms, side, first = len(flight.rates), state[SIDE], record.counts[NEXT_SAMPLE]
-    phasors, now = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
-    landed, scratch = np.zeros(terms, np.complex128), np.zeros(terms, np.complex128)
+    phasors, now = workspace.phasors[:terms], workspace.now[:terms]
+    landed, scratch, series = workspace.landed[:terms], workspace.terms[:terms], workspace.series
+    rests = held.rests * gap
+    state[Y] -= side * rests
     start_flight(phasors, state, clock, flight)
-    ends, length = hold(side, phasors, now, scratch, series, clock, longest, flight, held.pulls)
+    ends, length = hold(side, held.let_go * gap, phasors, now, scratch, series, clock, longest, held)
     if ends == OUT_OF_RANGE:
         return ends, length
     propagate_phasors(landed, phasors, length, clock, flight)
-    observe_flight(record.observations, phasors, landed, now, scratch, series, clock, length, flight)
-    observe_held(record.observations, side, clock, length, flight)
+    if observations[MODE] != NOTHING:
+        # The phasors know nothing of the constant part of p, which has the sign of the rest.
+        observations[PEAK_P] = max(observations[PEAK_P], gap) - rests
+        observe_flight(observations, phasors, landed, now, scratch, series, clock, length, flight)
+        observations[PEAK_P] += rests
+        observe_rest(observations, side * rests, clock, length, flight)
     if tangent is not None and len(tangent) > 0:
         propagate_tangent_flight(tangent, length, now, scratch, flight)
-    sample_flight(phasors, now, clock, length, flight, record)
-    for row in range(first, record.counts[NEXT_SAMPLE]):
-        record.samples[row, Y] += side * gap_of(side, flight.par.lower, flight.par.upper)
-    place_held(state, side, landed, flight)
+    if first < len(record.samples):
+        sample_flight(phasors, now, clock, length, flight, record)
+        for row in range(first, record.counts[NEXT_SAMPLE]):
+            record.samples[row, Y] += side * rests
+    place_on_phasors(state, landed, flight)
+    state[Y] = state[Z] + side * gap if ends == LETS_GO else state[Y] + side * rests
     return ends, length

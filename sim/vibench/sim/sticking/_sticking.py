@@ -1,11 +1,12 @@
-"""Sticking, m1 held by a rigid stop: exact motion of two bodies, until the stop would have to pull. SI.
+"""Motion with m1 on a stop that holds it or is a spring: exact, until the stop would have to pull. SI.
 
-`vibench.sim.model` says what moves. The stop lets go where the acceleration that presses m1 on it
-(`vibench.sim.rigid.press_on`) falls to zero: found like a touch, by the same proof, with it in the gap's
-place.
+A rigid stop makes two bodies of three (`vibench.sim.model`), a spring a stiffer specimen about another place
+of rest. The stop lets go where the acceleration that presses m1 on it (`vibench.sim.rigid.press_on`), or the
+indentation, falls to zero: found like a touch, by the same proof, with it in the gap's place.
 """
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ from ..flight import (
     derivative_bound,
     drive_phasor,
     first_contact,
-    place_on_phasors,
+    flight_tables,
     place_on_series,
     propagate_phasors,
 )
@@ -34,30 +35,50 @@ from ..kernels import (
     Table,
     Vector,
     fill_series,
+    inlined,
     kernel_without_refcount,
     march,
     series_rows,
     steps_ahead,
     sum_now,
 )
-from ..model import PULL, RATE, ROW, SHAPE, VX, VY, VZ, X, Y, Z
-from ..slots import LINE_P_IM, LINE_P_RE, MODE, NOTHING, PEAK_P, PEAKS_AND_LINES, SIDE, Parameters
+from ..model import (
+    PULL,
+    RATE,
+    ROW,
+    SHAPE,
+    VX,
+    VY,
+    VZ,
+    Harmonic,
+    LinearGap,
+    NoContact,
+    Specimen,
+    X,
+    Y,
+    Z,
+)
+from ..slots import LINE_P_IM, LINE_P_RE, MODE, PEAKS_AND_LINES, SIDE, Parameters
 
 LETS_GO = TOUCHES
 """How a hold ends when it does not last: the place of a touch in a flight."""
 
 
 class HeldTables(NamedTuple):
-    """How m1 and m2 move while a rigid stop holds m1."""
+    """How the specimen moves while m1 is on a stop that holds it, or that is a spring."""
 
     flight: FlightTables
-    """The bound modes in the place of the free ones; p, being constant, is left out."""
+    """Modes of that motion in the place of the free ones; the part of p that is constant is left out."""
     pulls: Complex
-    """What unit phasors add to the force by which m2 pulls at m0 [N]."""
+    """What unit phasors add to what the stop at positive p must pull, for m1 to stay."""
+    let_go: float
+    """What it pushes at rest over the gap, in the same measure."""
+    rests: float
+    """The constant part of abs(p), over the gap."""
 
 
-def held_tables(tables: FlightTables, bound: Complex) -> HeldTables:
-    """Make them of a specimen's free motion and its `vibench.sim.model`."""
+def held_tables(tables: FlightTables, bound: Complex, specimen: Specimen) -> HeldTables:
+    """Make them for a rigid stop, from the free motion and `vibench.sim.model.bound_motion`."""
     rates = bound[:, RATE].copy()
     grid = GRID_TURN / float(np.abs(rates).max())
     flight = tables._replace(
@@ -71,69 +92,79 @@ def held_tables(tables: FlightTables, bound: Complex) -> HeldTables:
         ahead=steps_ahead(rates, grid),
         series=series_rows(rates),
     )
-    return HeldTables(flight, bound[:, PULL].copy())
+    pulls = bound[:, PULL] / specimen.masses[2]
+    return HeldTables(flight, pulls, specimen.stiffnesses[1] / tables.par.reduced_mass, 1.0)
 
 
-@kernel_without_refcount
+def pressed_tables(specimen: Specimen, drive: Harmonic) -> HeldTables | None:
+    """Make them for a stop that is a spring beside that of m1: exact too, with modes of its own.
+
+    None for other laws, and where two of these modes coincide.
+    """
+    match specimen.contact:
+        case LinearGap(stiffness=stop):
+            k0, k1, k2 = specimen.stiffnesses
+        case _:
+            return None
+    stiff = replace(specimen, stiffnesses=(k0, k1 + stop, k2), contact=NoContact())
+    try:
+        flight = flight_tables(stiff, drive)
+    except ValueError:
+        return None
+    return HeldTables(flight, flight.path, k1 / (k1 + stop), stop / (k1 + stop))
+
+
+@inlined
 def hold(
     side: float,
+    level: float,
     phasors: Complex,
     now: Complex,
     terms: Complex,
     series: Vector,
     clock: Vector,
     longest: float,
-    held: FlightTables,
-    pulls: Complex,
+    held: HeldTables,
 ) -> tuple[int, float]:
-    """Find how long a stop holds m1: until it lets go, or ``longest`` [s]; see `flight.fly`."""
-    par, elapsed = held.par, 0.0
-    weight, spring = -side / par.mass2, par.k1 * gap_of(side, par.lower, par.upper) / par.reduced_mass
+    """Find how long m1 stays on a stop: until it lets go, or ``longest`` [s]; see `flight.fly`.
+
+    ``level`` is what the stop pushes at rest, as `HeldTables.let_go` measures it.
+    """
+    flight, elapsed = held.flight, 0.0
+    grid = flight.grid
     while elapsed < longest:
-        propagate_phasors(now, phasors, elapsed, clock, held)
-        reach, bound = spring, 0.0
+        propagate_phasors(now, phasors, elapsed, clock, flight)
+        reach, bound = level, 0.0
         for j in range(len(now)):
-            terms[j] = weight * now[j] * pulls[j]
+            terms[j] = -side * now[j] * held.pulls[j]
             reach += abs(terms[j])
-            bound += abs(terms[j]) * held.squares[j]
+            bound += abs(terms[j]) * flight.squares[j]
         if not bound < LARGEST_BOUND:
             return OUT_OF_RANGE, elapsed
-        steps = min(RUN_OF_STEPS, int((longest - elapsed) / held.grid))
-        high = -spring - bound * held.grid**2 / 8.0
-        made = march(terms, held.ahead, steps, -math.inf, high) if sum_now(terms) < high else 0
-        if made > 0:
-            elapsed += made * held.grid
-            continue
-        length = min(held.grid, longest - elapsed)
-        fill_series(series, terms, held.series)
-        series[0] += spring
+        steps = min(RUN_OF_STEPS, int((longest - elapsed) / grid))
+        high = -level - bound * grid * grid / 8.0
+        if steps > 0 and sum_now(terms) < high:
+            made = march(terms, flight.ahead, steps, -math.inf, high)
+            elapsed += made * grid
+            if made == steps:
+                continue
+        length = min(grid, longest - elapsed)
+        fill_series(series, terms, flight.series)
+        series[0] += level
         free = first_contact(series, length, math.inf, 0.0, bound, reach)
         if free != NEVER:
             return LETS_GO, elapsed + free
-        elapsed = longest if length < held.grid else elapsed + length
+        elapsed = longest if length < grid else elapsed + length
     return CLEAR, longest
 
 
 @kernel_without_refcount
-def place_held(state: Vector, side: float, phasors: Complex, held: FlightTables) -> None:
-    """Write the motion of the phasors to ``state``, m1 on its stop."""
-    place_on_phasors(state, phasors, held)
-    state[Y] = state[Z] + side * gap_of(side, held.par.lower, held.par.upper)
-
-
-@kernel_without_refcount
-def observe_held(observations: Vector, side: float, clock: Vector, length: float, held: FlightTables) -> None:
-    """Add what the constant p does to its peak and line; `observe_flight` does the rest."""
-    if observations[MODE] == NOTHING:
-        return
-    gap = gap_of(side, held.par.lower, held.par.upper)
-    observations[PEAK_P] = max(observations[PEAK_P], gap)
+def observe_rest(observations: Vector, p: float, clock: Vector, length: float, flight: FlightTables) -> None:
+    """Add what the constant part of p does to its line; `observe_flight` does the rest."""
     if observations[MODE] == PEAKS_AND_LINES:
         # The integral of exp(-i (omega t + phase)): its middle value times sin(q)/q, q half the turn.
-        half = 0.5 * held.omega * length
-        line = (
-            side * gap * length * math.sin(half) / half * drive_phasor(clock, 0.5 * length, held).conjugate()
-        )
+        half = 0.5 * flight.omega * length
+        line = p * length * math.sin(half) / half * drive_phasor(clock, 0.5 * length, flight).conjugate()
         observations[LINE_P_RE] += line.real
         observations[LINE_P_IM] += line.imag
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..scene import Scene, ScenePrediction
+from ..scene import Method, Scene, ScenePrediction, learn_cost
 
 
 @dataclass(frozen=True)
@@ -91,4 +91,7 @@ def solve_timed(scene: Scene, solver: Solver) -> Solved:
     prediction = solver(scene)
     taken_s = time.thread_time() - start_s
     _solved_before.add(kind)
+    # To plan a closed form takes about as long as to evaluate it.
+    if is_compiled and prediction.method is not Method.CLOSED_FORM:
+        learn_cost(scene, taken_s)
     return Solved(prediction, taken_s if is_compiled else math.nan)

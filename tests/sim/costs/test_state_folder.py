@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vibench.acquisition.host import state_folder
+from vibench.sim.costs import state_folder
 
 
 def test_the_variable_comes_before_everything(monkeypatch, tmp_path):

@@ -1,0 +1,38 @@
+"""What runs of a scene's kind take on this machine: learnt from each, or measured where none was made."""
+
+import time
+from dataclasses import replace
+
+from ..costs import FEWEST, cost_ledger
+from ._plan import plan_scene
+from ._scene import Scene
+from ._solve import solve_scene
+
+MEASURED_S = 0.5
+"""Processor time after which no further run is made to measure a cost [s]."""
+DETUNED = (0.93, 1.07, 0.87, 1.13, 1.0)
+"""Frequencies of the runs by which a cost is measured, over the scene's: neighbours differ as runs do."""
+
+
+def learn_cost(scene: Scene, taken_s: float) -> None:
+    """Note the processor time that a scene took whose kernels were compiled and loaded before."""
+    plan = plan_scene(scene)
+    cost_ledger().learn(plan.kind, plan.planned_s, taken_s)
+
+
+def measure_cost(scene: Scene) -> None:
+    """Run a few scenes like one that has been run, if what such scenes take on this machine is not known yet.
+
+    It takes less than a second, unless one such scene takes longer; the first of all loads its kernels.
+    """
+    kind, spent_s = plan_scene(scene).kind, 0.0
+    for part in DETUNED:
+        if cost_ledger().runs_of(kind) >= FEWEST or spent_s > MEASURED_S:
+            return
+        drive = replace(scene.drive, frequency_hz=part * scene.drive.frequency_hz)
+        neighbour = replace(scene, drive=drive)
+        begun_s = time.thread_time()
+        solve_scene(neighbour)
+        taken_s = time.thread_time() - begun_s
+        learn_cost(neighbour, taken_s)
+        spent_s += taken_s

@@ -1,0 +1,84 @@
+import math
+
+import numpy as np
+import pytest
+
+from vibench.sim.costs import FEWEST, CostLedger
+
+KIND = "event driven/hertz/standard"
+
+
+@pytest.fixture
+def ledger(tmp_path):
+    return CostLedger(tmp_path / "costs" / "here.json")
+
+
+def test_where_nothing_was_run_a_plan_stands_as_it_is_and_says_how_little_is_known(ledger):
+    expected = ledger.expected(KIND, 2.0)
+    assert (expected.time_s, expected.runs) == (2.0, 0)
+    assert expected.factor >= 10.0
+    assert "too few such runs" in str(expected)
+
+
+@pytest.mark.parametrize("scatter", [0.05, 0.4, 1.0])
+def test_the_stated_factor_holds_as_often_as_it_says(ledger, scatter):
+    random = np.random.default_rng(7)
+    held = []
+    for run in range(600):
+        planned_s = 10.0 ** random.uniform(-4.0, 1.0)
+        taken_s = 0.13 * planned_s * math.exp(scatter * random.standard_normal())
+        expected = ledger.expected(KIND, planned_s)
+        if run >= 30:
+            held.append(expected.time_s / expected.factor <= taken_s <= expected.time_s * expected.factor)
+        ledger.learn(KIND, planned_s, taken_s)
+    # 19 of 20 are meant, more where the scatter is less than the least factor.
+    assert np.mean(held) > 0.91
+    assert np.mean(held) < 0.985 or scatter < 0.2
+
+
+def test_a_machine_that_slows_down_is_followed(ledger):
+    for taken_s in [1.0] * 100 + [3.0] * 100:
+        ledger.learn(KIND, 1.0, taken_s)
+    assert ledger.expected(KIND, 1.0).time_s == pytest.approx(3.0, rel=0.05)
+
+
+def test_a_new_kind_is_expected_as_the_nearest_that_is_known(ledger):
+    for _ in range(FEWEST):
+        ledger.learn("event driven/hertz/standard", 1.0, 0.5)
+        ledger.learn("polynomial/power/standard", 1.0, 4.0)
+    assert ledger.expected("event driven/hertz/quick", 1.0).time_s == pytest.approx(0.5)
+    assert ledger.expected("polynomial/power/quick", 1.0).time_s == pytest.approx(4.0)
+    assert ledger.runs_of("event driven/hertz/quick") == 0
+
+
+def test_the_next_process_knows_it_still(ledger, tmp_path):
+    for taken_s in (0.2, 0.3, 0.25):
+        ledger.learn(KIND, 1.0, taken_s)
+    ledger.save()
+    again = CostLedger(tmp_path / "costs" / "here.json")
+    assert again.expected(KIND, 3.0) == ledger.expected(KIND, 3.0)
+    assert [path.name for path in (tmp_path / "costs").iterdir()] == ["here.json"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{", "[]", '{"a": 1}', '{"a": {"runs": -3, "mean": 0.0, "variance": 1.0}}', '{"a": {"mean": NaN}}'],
+)
+def test_a_damaged_file_is_as_none(tmp_path, text):
+    path = tmp_path / "here.json"
+    path.write_text(text)
+    assert CostLedger(path).expected("a", 1.0).runs == 0
+
+
+def test_a_folder_that_cannot_be_written_to_costs_nothing_but_the_memory(tmp_path):
+    (tmp_path / "costs").write_text("a file in the way")
+    ledger = CostLedger(tmp_path / "costs" / "here.json")
+    ledger.learn(KIND, 1.0, 1.0)
+    ledger.save()
+    assert ledger.runs_of(KIND) == 1
+
+
+def test_times_that_no_clock_saw_teach_nothing(ledger):
+    ledger.learn(KIND, 1.0, 0.0)
+    ledger.learn(KIND, 0.0, 1.0)
+    assert ledger.runs_of(KIND) == 0

@@ -1,0 +1,69 @@
+"""What is said of a scene's cost before it is run, against what it takes."""
+
+import time
+
+import numpy as np
+import pytest
+
+from vibench.sim import Harmonic, Observable, Scene, gong2025, plan_scene, solve_scene
+from vibench.sim.costs import FEWEST, CostLedger
+from vibench.sim.scene import AutomaticDuration, FixedDuration, learn_cost, measure_cost
+
+SCENES = 12
+
+
+@pytest.fixture
+def ledger(tmp_path, monkeypatch):
+    new = CostLedger(tmp_path / "costs.json")
+    for module in ("_plan", "_measured_cost"):
+        monkeypatch.setattr(f"vibench.sim.scene.{module}.cost_ledger", lambda: new)
+    return new
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize(
+    ("contact", "duration", "observe"),
+    [
+        ("hertz", FixedDuration(3.0, 1.0), (Observable.RESPONSE,)),
+        ("hertz", AutomaticDuration(longest_s=20.0), (Observable.RESPONSE,)),
+        ("power:5", FixedDuration(2.0, 1.0), (Observable.RESPONSE,)),
+        ("linear", FixedDuration(2.0, 1.0), (Observable.RESPONSE,)),
+        ("hertz", FixedDuration(2.0, 1.0), (Observable.RESPONSE, Observable.LYAPUNOV)),
+    ],
+    ids=["hertz", "hertz, automatic", "power:5", "linear", "with a tangent"],
+)
+def test_scenes_take_what_was_said_within_the_factor_that_was_said(ledger, contact, duration, observe):
+    random = np.random.default_rng(3)
+    scenes = [
+        Scene(
+            gong2025(contact=contact),
+            Harmonic(random.uniform(100.0, 400.0), 10.0 ** random.uniform(-5.3, -4.5)),
+            duration=duration,
+            observe=observe,
+        )
+        for _ in range(SCENES)
+    ]
+    solve_scene(scenes[0])
+    begun_s = time.thread_time()
+    measure_cost(scenes[0])
+    assert time.thread_time() - begun_s < 3.0
+    assert ledger.runs_of(plan_scene(scenes[0]).kind) >= FEWEST or time.thread_time() - begun_s > 0.5
+    held = []
+    for scene in scenes:
+        cost = plan_scene(scene).cost
+        begun_s = time.thread_time()
+        solve_scene(scene)
+        taken_s = time.thread_time() - begun_s
+        held.append(cost.time_s / cost.factor <= taken_s <= cost.time_s * cost.factor)
+        learn_cost(scene, taken_s)
+    assert np.count_nonzero(held) >= SCENES - 3
+
+
+def test_a_plan_says_its_cost_how_far_off_it_may_be_and_whence_it_knows(ledger):
+    scene = Scene(gong2025(), Harmonic(260.0, 5e-6), duration=FixedDuration(3.0, 1.0))
+    assert "too few such runs" in plan_scene(scene).explain()
+    for _ in range(FEWEST):
+        learn_cost(scene, 1e-3)
+    assert (
+        "0.001 s within a factor of 1.5, as 3 such runs took on this machine" in plan_scene(scene).explain()
+    )
