@@ -5,13 +5,13 @@
 and the page says so.
 
 Every solver begins in the same settled state; its error is the distance from the independent solution's end
-after 0.2 s, in chaos after 0.03 s. Costs are processor time over simulated time in runs of three seconds,
-least of several, with everything made beforehand that depends on the specimen alone. Peers are given the
-plain equations: scipy with a compiled right-hand side; numbalsoda's LSODA and DOP853 wholly compiled;
-heyoka's Taylor method with terminal events at the stops, because its series must not meet a kink.
-heyoka stands here twice more as its best user would write it, in the variables in which its series is at
-home (in contact the penetration is w^2, and time runs as w): one trajectory at a time, and eight in its batch
-mode, from starts a millionth of the gap apart, whose time is divided by eight.
+after 0.2 s, in chaos after 0.03 s. Costs are processor time over simulated time in runs of three seconds
+(scipy: of 0.3 s), least of several, with everything made beforehand that depends on the specimen alone.
+Peers are given the plain equations: scipy with a compiled right-hand side; numbalsoda's LSODA and DOP853
+wholly compiled; heyoka's Taylor method with terminal events at the stops, because its series must not meet
+a kink. heyoka stands here twice more as its best user would write it, in the variables in which its series
+is at home (in contact the penetration is w^2, and time runs as w): one trajectory at a time, and eight in
+its batch mode, from starts a millionth of the gap apart, whose time is divided by eight.
 """
 
 import argparse
@@ -37,8 +37,9 @@ from vibench.sim.study import software
 
 PERIODIC_S, CHAOTIC_S = 0.2, 0.03
 """For errors. Chaos of 112 per second makes e^3 of an error in 0.03 s: still the error of the solver."""
-COST_S = 3.0
-"""For costs: what a call costs beside its motion is next to nothing then."""
+COST_S, SLOW_COST_S = 3.0, 0.3
+"""For costs, and for those of solvers that are a thousand times slower: what a call costs beside its motion
+is next to nothing then."""
 REPEATS = 5
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
 LOWEST_M = 1e-13
@@ -103,9 +104,11 @@ class Solver:
     """State after a span, by tolerance, start and span [s]; None where it gave up."""
     cost: Callable[[float, Floats, float], float | None]
     """Processor time over simulated time, likewise."""
+    cost_s: float = COST_S
+    """Simulated in a run for costs [s]."""
 
 
-def solver_of(name, prepare):
+def solver_of(name, prepare, cost_s=COST_S):
     """Make a solver of what prepares a job that gives the end."""
 
     def cost(tolerance, start, span_s):
@@ -114,17 +117,17 @@ def solver_of(name, prepare):
         end = job()
         return (time.thread_time() - before) / span_s if is_end(end) else None
 
-    return Solver(name, lambda *run: prepare(*run)(), cost)
+    return Solver(name, lambda *run: prepare(*run)(), cost, cost_s)
 
 
 def least_cost(solver, tolerance, start):
     """Least processor time over simulated time; None where the solver gave up."""
     best, spent = math.inf, 0.0
     for _ in range(REPEATS):
-        cost = solver.cost(tolerance, start, COST_S)
+        cost = solver.cost(tolerance, start, solver.cost_s)
         if cost is None:
             return None
-        best, spent = min(best, cost), spent + cost * COST_S
+        best, spent = min(best, cost), spent + cost * solver.cost_s
         if spent > 2.0:
             break
     return best
@@ -137,7 +140,7 @@ def solvers_of(motion):
     """Give every solver of a motion."""
     yield solver_of(OURS, lambda tolerance, start, span_s: ours(motion, tolerance, start, span_s))
     for method in ("DOP853", "LSODA"):
-        yield solver_of(f"scipy {method}", lambda *run, m=method: with_scipy(motion, m, *run))
+        yield solver_of(f"scipy {method}", lambda *run, m=method: with_scipy(motion, m, *run), SLOW_COST_S)
     if importlib.util.find_spec("numbalsoda"):
         for method in ("lsoda", "dop853"):
             yield solver_of(f"numbalsoda {method}", lambda *run, m=method: with_numbalsoda(motion, m, *run))

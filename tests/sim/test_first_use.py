@@ -15,16 +15,16 @@ from vibench.sim import Harmonic, Sampled
 from vibench.sim.power_law import advance_under_power
 from vibench.sim.rigid import rebound
 from vibench.sim import follow_samples
-from vibench.sim.sticking import hold, hold_on_series
+from vibench.sim.sticking import hold_on_series
 from vibench.sim.stepping._stops_run import advance_between_stops
-from vibench.sim.contact import carry_through_steps
+from vibench.sim.contact import propagate_tangent_steps
 from vibench.sim import steady_response
 from vibench.sim import gong2025
 
 start, specimen = time.process_time(), gong2025()
 steady_response(specimen, Harmonic(260.0, 5e-6), Accuracy.QUICK, duration_s=0.2, window_s=0.1)
 follow_samples(specimen, Sampled(np.zeros(100), 51_200.0))
-kernels = (advance_under_power, rebound, hold, hold_on_series, carry_through_steps, advance_between_stops)
+kernels = (advance_under_power, rebound, hold_on_series, propagate_tangent_steps, advance_between_stops)
 print(json.dumps([time.process_time() - start, {k.__name__: len(k.signatures) for k in kernels}]))
 """
 ALLOWED_S = 32.0

@@ -97,4 +97,5 @@ def test_newtons_method_finds_the_touch_that_the_careful_search_finds(seed, plac
         assert careful == quick or max(careful, quick) > length * (1.0 - 1e-9)
         return
     slope = np.polynomial.polynomial.polyval(careful, series[1:] * orders[1:])
-    assert abs(quick - careful) * abs(slope) < 1e-15
+    # The careful search advances by a femtosecond at least, and calls a touch where the gap is 1e-12 of all.
+    assert abs(quick - careful) * abs(slope) < 2e-16 + 2e-15 * abs(slope)
