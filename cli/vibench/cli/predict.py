@@ -14,8 +14,7 @@ from pydantic import ValidationError
 from rich.table import Table
 
 from vibench.analysis import InvalidRequest
-from vibench.sim import BUDGET_S, Accuracy, Observable, Rest, ScenePlan, plan_scene
-from vibench.sim.scene import measure_cost
+from vibench.sim import BUDGET_S, Accuracy, Observable, Rest, ScenePlan, measure_cost, plan_scene
 from vibench.sim.study import (
     ExistingStudy,
     Start,

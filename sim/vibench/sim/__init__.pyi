@@ -1,3 +1,6 @@
+from .costs import (
+    state_folder as state_folder,
+)
 from .exponents import (
     ExponentVerdict as ExponentVerdict,
     LyapunovEstimate as LyapunovEstimate,
@@ -93,6 +96,7 @@ from .scene import (
     ScenePrediction as ScenePrediction,
     Share as Share,
     StartMemory as StartMemory,
+    measure_cost as measure_cost,
     plan_scene as plan_scene,
     solve_ensemble as solve_ensemble,
     solve_scene as solve_scene,

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from threading import get_ident
 
-from vibench.sim.costs import state_folder
+from vibench.sim import state_folder
 
 from ..host import process_start
 from ..stopping import StopLevel

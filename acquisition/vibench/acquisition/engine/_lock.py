@@ -5,7 +5,7 @@ import os
 import sys
 from pathlib import Path
 
-from vibench.sim.costs import state_folder
+from vibench.sim import state_folder
 
 from ..errors import InstrumentBusy
 from ..rig import Rig
