@@ -3,6 +3,7 @@ from ._balance_agreement import (
     check_balance as check_balance,
 )
 from ._balance_branch import (
+    balance_branch_within as balance_branch_within,
     balance_specimen as balance_specimen,
     harmonic_balance_branch as harmonic_balance_branch,
 )
@@ -20,7 +21,13 @@ from ._condensation import (
     structure_of as structure_of,
 )
 from ._continuation import (
+    ArcEnd as ArcEnd,
     ArcSteps as ArcSteps,
+)
+from ._drive_path import (
+    AmplitudePath as AmplitudePath,
+    DrivePath as DrivePath,
+    FrequencyPath as FrequencyPath,
 )
 from ._first_order_balance import (
     FirstOrderState as FirstOrderState,
@@ -36,9 +43,11 @@ from ._harmonic_balance import (
 )
 from ._orbit_branch import (
     periodic_branch as periodic_branch,
+    periodic_branch_within as periodic_branch_within,
 )
 from ._period_map import (
     OrbitShape as OrbitShape,
+    PeriodMap as PeriodMap,
 )
 from ._restoring_force import (
     PowerSpring as PowerSpring,
@@ -47,5 +56,6 @@ from ._restoring_force import (
 )
 from ._shooting import (
     PeriodicOrbit as PeriodicOrbit,
+    ShootingEnd as ShootingEnd,
     periodic_orbit as periodic_orbit,
 )

@@ -12,9 +12,18 @@ from ..kernels import Table, Vector
 from ..model import Harmonic, Specimen, Y, Z, chosen
 from ._balance_solver import BalanceOptions, Guess, balance, described, linear_guess
 from ._branch import Branch, Parameter, ParameterWord
-from ._branch_following import Followed, OrbitReport, branch_range, follow
+from ._branch_following import (
+    Followed,
+    OrbitReport,
+    branch_range,
+    follow,
+    follow_both_ways,
+    parameter_value,
+    range_scale,
+)
 from ._condensation import LinearStructure, condense, structure_of
 from ._continuation import ArcEnd, ArcSteps
+from ._drive_path import DrivePath, path_from
 from ._floquet import Motion, crossings, multipliers, transition
 from ._frequency_time import phasors_of
 from ._harmonic_balance import (
@@ -38,9 +47,7 @@ class BalanceFamily:
     """Solutions of the balance at one number of harmonics; the last component is the parameter / scale."""
 
     problem: BalanceProblem
-    parameter: Parameter
-    fixed: float
-    """The drive amplitude [m] along frequency, the frequency [Hz] along amplitude."""
+    path: DrivePath
     scale: float
     """Hz, or m, per unit of length."""
     options: BalanceOptions
@@ -52,16 +59,16 @@ class BalanceFamily:
 
     def drive(self, point: Vector) -> tuple[float, float]:
         """Frequency [Hz] and amplitude [m] at a point."""
-        value = float(point[-1]) * self.scale
-        return (value, self.fixed) if self.parameter is Parameter.FREQUENCY else (self.fixed, value)
+        return self.path.drive(float(point[-1]) * self.scale)
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:
         """Residual and its derivatives by all unknowns and the parameter."""
         frequency, amplitude = self.drive(point)
         omega = 2.0 * math.pi * frequency
         residual, jacobian, by_omega, by_amplitude = self.problem.linearised(point[:-1], omega, amplitude)
-        along = {Parameter.FREQUENCY: 2.0 * math.pi * by_omega, Parameter.AMPLITUDE: by_amplitude}
-        return residual, np.column_stack([jacobian, along[self.parameter] * self.scale])
+        df, da = self.path.slopes(float(point[-1]) * self.scale)
+        along = (2.0 * math.pi * df * by_omega + da * by_amplitude) * self.scale
+        return residual, np.column_stack([jacobian, along])
 
     def report(self, point: Vector) -> OrbitReport:
         """Responses, multipliers and contacts."""
@@ -89,7 +96,7 @@ class BalanceFamily:
             return None
         harmonics = harmonics_up_to(more, self.options.kept)
         problem = BalanceProblem(self.problem.structure, self.problem.spring, harmonics)
-        finer = BalanceFamily(problem, self.parameter, self.fixed, self.scale, self.options)
+        finer = BalanceFamily(problem, self.path, self.scale, self.options)
         return finer, self._carried(point, problem), self._carried(tangent, problem)
 
     def _carried(self, point: Vector, problem: BalanceProblem) -> Vector:
@@ -103,7 +110,7 @@ def orbit_signs(
 ) -> OrbitSigns:
     """Stability and contacts of a solution, by the exact variational equation along it."""
     motion = Motion(found.frequency_hz, found.harmonics, found.relative)
-    contacts = len(crossings(spring, motion, 2.0 * math.pi))
+    contacts = len(crossings(spring, motion, 2.0 * math.pi)) // 2
     if kept is HarmonicSet.ODD:
         half = -transition(structure, spring, motion, math.pi)
         return OrbitSigns(multipliers(half), contacts, Symmetry.MIRRORED)
@@ -142,26 +149,58 @@ def _followed(
     options: BalanceOptions,
     steps: ArcSteps,
 ) -> Followed:
+    _refuse_no_solution(start)
+    value, scale = branch_range(parameter, start.frequency_hz, start.amplitude_m, stop)
+    path = path_from(parameter, start.frequency_hz, start.amplitude_m)
+    family, point = _family_at(structure, spring, start, path, value, scale, options)
+    here, there = value / scale, stop / scale
+    return follow(family, point, there - here, (min(here, there), max(here, there)), steps)
+
+
+def balance_branch_within(
+    structure: LinearStructure,
+    spring: RestoringForce,
+    start: Balance,
+    path: DrivePath,
+    low: float,
+    high: float,
+    options: BalanceOptions = BalanceOptions(),  # noqa: B008 - frozen
+    steps: ArcSteps = ArcSteps(),  # noqa: B008 - frozen
+) -> Branch:
+    """Follow a solution both ways along a drive path to the ends of a range, ascending [Hz, or m].
+
+    As `periodic_branch_within`; harmonics are added where those left out would matter.
+
+    Raises
+    ------
+    ValueError
+        When the start did not converge, or lies outside.
+
+    """
+    _refuse_no_solution(start)
+    value = parameter_value(path, Harmonic(start.frequency_hz, start.amplitude_m))
+    scale = range_scale(low, high, value)
+    family, point = _family_at(structure, spring, start, path, value, scale, options)
+    return follow_both_ways(family, point, (low / scale, high / scale), steps)
+
+
+def _refuse_no_solution(start: Balance) -> None:
     if start.outcome is BalanceEnd.NO_SOLUTION:
         msg = f"A branch cannot start at {start.frequency_hz} Hz and {start.amplitude_m} m: {start.outcome}."
         raise ValueError(msg)
-    family, point = _family_at(structure, spring, start, parameter, stop, options)
-    here, there = float(point[-1]), stop / family.scale
-    return follow(family, point, there - here, (min(here, there), max(here, there)), steps, parameter)
 
 
 def _family_at(
     structure: LinearStructure,
     spring: RestoringForce,
     start: Balance,
-    parameter: Parameter,
-    stop: float,
+    path: DrivePath,
+    value: float,
+    scale: float,
     options: BalanceOptions,
 ) -> tuple[BalanceFamily, Vector]:
-    value, scale = branch_range(parameter, start.frequency_hz, start.amplitude_m, stop)
-    fixed = start.amplitude_m if parameter is Parameter.FREQUENCY else start.frequency_hz
     problem = BalanceProblem(structure, spring, start.harmonics)
-    family = BalanceFamily(problem, parameter, fixed, scale, options)
+    family = BalanceFamily(problem, path, scale, options)
     return family, np.append(problem.packed(start.relative), value / scale)
 
 

@@ -70,10 +70,15 @@ class Branch:
     multipliers: Complex
     """Floquet multipliers over one period of the motion, largest first, shape (m, 2 n)."""
     left_out: Floats
-    """Error estimate of each point as part of the fundamental of p, shape (m,)."""
+    """Error estimate of each point as part of the fundamental of p, shape (m,): of a balance by the harmonics
+    left out, of a shot motion by how far it is from coming back."""
+    contacts: NDArray[np.int64]
+    """Contacts that begin in a period of the motion, shape (m,)."""
     events: tuple[BranchEvent, ...]
     end: ArcEnd
-    """Why the branch was left."""
+    """Why the branch was left at its last point."""
+    begin: ArcEnd | None = None
+    """Why it was left at its first, where it was followed both ways; None where it was begun there."""
 
     @property
     def is_stable(self) -> NDArray[np.bool_]:
@@ -84,3 +89,16 @@ class Branch:
     def parameters(self) -> Floats:
         """The one that changes, shape (m,)."""
         return self.frequencies_hz if self.parameter is Parameter.FREQUENCY else self.amplitudes_m
+
+
+POINTWISE = (
+    "frequencies_hz",
+    "amplitudes_m",
+    "response_i",
+    "response_ii",
+    "states",
+    "multipliers",
+    "left_out",
+    "contacts",
+)
+"""Fields of a branch with one row a point."""

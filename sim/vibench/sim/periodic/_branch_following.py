@@ -1,15 +1,17 @@
 """Follow any family of periodic motions along a parameter, and gather what is on the way into a branch."""
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..kernels import Vector
-from ._branch import BifurcationKind, Branch, BranchEvent, Parameter
+from ..model import Harmonic
+from ._branch import POINTWISE, BifurcationKind, Branch, BranchEvent, Parameter
 from ._continuation import ArcEnd, ArcPoint, ArcSteps, Curve, correct, locate, trace
-from ._orbit_events import OrbitSigns, bifurcations_between, sign_of
+from ._drive_path import DrivePath
+from ._orbit_events import OrbitSigns, bifurcations_between, is_joined, sign_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +32,11 @@ class OrbitReport:
 
 class Family(Curve, Protocol):
     """A curve whose points are periodic motions."""
+
+    @property
+    def path(self) -> DrivePath:
+        """Along which the drive changes."""
+        ...
 
     @property
     def tolerance(self) -> float:
@@ -82,13 +89,21 @@ def branch_range(
     return value, abs(stop - value) / RANGE_LENGTH
 
 
+def parameter_value(path: DrivePath, drive: Harmonic) -> float:
+    """Read where on a path a drive lies [Hz, or m]."""
+    return drive.frequency_hz if path.parameter is Parameter.FREQUENCY else drive.amplitude_m
+
+
+def range_scale(low: float, high: float, value: float) -> float:
+    """Give how much of a range [Hz, or m] is a unit of length."""
+    if not 0.0 < low < high < math.inf or not low <= value <= high:
+        msg = f"A branch from {low} to {high} through {value} is not allowed: positive, ascending, within."
+        raise ValueError(msg)
+    return (high - low) / RANGE_LENGTH
+
+
 def follow(
-    family: Family,
-    start: Vector,
-    toward: float,
-    bounds: tuple[float, float],
-    steps: ArcSteps,
-    parameter: Parameter,
+    family: Family, start: Vector, toward: float, bounds: tuple[float, float], steps: ArcSteps
 ) -> Followed:
     """Follow a family from a point on it; the resolution rises where the error estimate asks for it.
 
@@ -102,23 +117,50 @@ def follow(
         Sign of the first step, and range, of the family's scaled parameter.
     steps
         Lengths and tolerances.
-    parameter
-        What the family's parameter is.
 
     """
     gathered = _Gathered([], [])
+    parameter = family.path.parameter
     while True:
         end, last = _follow_at(family, start, toward, bounds, steps, gathered)
         if end is not None:
             return Followed(_branch(gathered, parameter, end), family, last.point)
         refined = family.refined(last.point, last.tangent)
         if refined is None:
-            return Followed(_branch(gathered, parameter, ArcEnd.STEP_TOO_SHORT), family, last.point)
+            return _lost(gathered, family, last)
         finer, guess, normal = refined
         point, iterations = correct(finer, guess, normal / np.linalg.norm(normal), steps.tolerance)
         if iterations == 0:
-            return Followed(_branch(gathered, parameter, ArcEnd.STEP_TOO_SHORT), family, last.point)
+            return _lost(gathered, family, last)
         family, start, toward = finer, point, float(last.tangent[-1])
+
+
+NEARLY_GRAZING = 0.01
+"""A branch lost with a contact this close to beginning or ending, over the gap, is lost by grazing."""
+
+
+def _lost(gathered: _Gathered, family: Family, last: ArcPoint) -> Followed:
+    """End a branch that no step goes on from; at a rigid stop grazing does that, and is named."""
+    if gathered.reports[-1].signs.grazing_distance < NEARLY_GRAZING:
+        gathered.add_event(BifurcationKind.GRAZING, gathered.reports[-1])
+    return Followed(_branch(gathered, family.path.parameter, ArcEnd.STEP_TOO_SHORT), family, last.point)
+
+
+def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float], steps: ArcSteps) -> Branch:
+    """Follow a family from a point on it to both ends; a branch that closes on itself, once round."""
+    onward = follow(family, start, 1.0, bounds, steps).branch
+    if onward.end is ArcEnd.CLOSED:
+        return replace(onward, begin=ArcEnd.CLOSED)
+    back = follow(family, start, -1.0, bounds, steps).branch
+    before = len(back.frequencies_hz) - 1
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(back, name)[:0:-1], getattr(onward, name)]) for name in POINTWISE
+    }
+    events = (
+        *(replace(each, index=max(before - 1 - each.index, 0)) for each in reversed(back.events)),
+        *(replace(each, index=before + each.index) for each in onward.events),
+    )
+    return replace(onward, **arrays, events=events, begin=back.end)
 
 
 def _follow_at(
@@ -141,6 +183,9 @@ def _follow_at(
         if here.end is ArcEnd.STEP_TOO_SHORT:
             return None, here
         report = family.report(here.point)
+        if is_joined(signs, report.signs) and not here.is_fold:
+            _add_joined(family, before, here, signs, steps, gathered)
+            return ArcEnd.JOINED, here
         if here.is_fold:
             gathered.add_event(BifurcationKind.FOLD, report)
             continue
@@ -155,6 +200,30 @@ def _follow_at(
             return here.end, here
         before, signs = here, report.signs
     return ArcEnd.TOO_MANY_POINTS, before
+
+
+def _add_joined(
+    family: Family,
+    before: ArcPoint,
+    after: ArcPoint,
+    signs: OrbitSigns,
+    steps: ArcSteps,
+    gathered: _Gathered,
+) -> None:
+    """End a branch on the simpler motion through which it would turn into its own twin."""
+
+    def measure(point: ArcPoint) -> float:
+        return float(family.report(point.point).signs.apart @ signs.apart)
+
+    found = locate(family, before, after, measure, steps.tolerance) or before
+    report = family.report(found.point)
+    last = len(gathered.reports) - 1
+    gathered.events[:] = [
+        each for each in gathered.events if not (each.kind is BifurcationKind.FOLD and each.index == last)
+    ]
+    assert signs.joins is not None
+    gathered.add_event(signs.joins, report)
+    gathered.reports.append(report)
 
 
 def _add_located(
@@ -189,6 +258,7 @@ def _branch(gathered: _Gathered, parameter: Parameter, end: ArcEnd) -> Branch:
         states=np.array([r.state for r in reports]),
         multipliers=np.array([r.signs.over_period for r in reports]),
         left_out=np.array([r.left_out for r in reports]),
+        contacts=np.array([r.signs.contacts for r in reports], dtype=np.int64),
         events=tuple(gathered.events),
         end=end,
     )

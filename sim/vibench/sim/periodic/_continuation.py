@@ -48,6 +48,8 @@ class ArcEnd(StrEnum):
     """Why a curve was left."""
 
     REACHED_BOUND = "the parameter reached an end of its range"
+    CLOSED = "the branch closed on itself: an isolated one"
+    JOINED = "the motion became one of a shorter period or a higher symmetry, whose branch goes on"
     TOO_MANY_POINTS = "more points than allowed: raise most_points, or lengthen the longest step"
     STEP_TOO_SHORT = (
         "no solution within the shortest step: a kink or an end of the branch, or too few harmonics"
@@ -80,6 +82,10 @@ LONGEST_LEAP = 5.0
 LOCATING_ITERATIONS = 40
 LOCATED = 1e-9
 """What is sought (a tangent's component, a multiplier's distance) counts as zero below this."""
+NEAR_START = 0.2
+"""A step that passes its start at less than this part of its length is looked at for closing."""
+SAME_POINT = 1e-6
+"""Along the curve: closer than that the start has been met again."""
 SHORTEST_BRACKET = 1e-12
 """Along the curve: closer than that nothing is told apart."""
 
@@ -144,7 +150,7 @@ def trace(
     """
     along = np.zeros(len(start))
     along[-1] = math.copysign(1.0, toward)
-    here = ArcPoint(start, tangent_at(curve, start, along))
+    here = first = ArcPoint(start, tangent_at(curve, start, along))
     yield here
     step = steps.first
     for _ in range(steps.most_points):
@@ -167,6 +173,10 @@ def trace(
         if not inside:
             yield _at_bound(curve, here if fold is None else fold, ahead, bounds, steps)
             return
+        if _passes(curve, first, here, ahead, steps):
+            arc = here.arc + float(np.linalg.norm(first.point - here.point))
+            yield ArcPoint(first.point, first.tangent, arc, end=ArcEnd.CLOSED)
+            return
         yield ahead
         here = ahead
     yield _ended(here, ArcEnd.TOO_MANY_POINTS)
@@ -186,6 +196,23 @@ def _advance(curve: Curve, here: ArcPoint, step: float, steps: ArcSteps) -> tupl
                 return ahead, min(steps.longest, step * _stretch(iterations, turn, steps))
         step *= 0.5
     return None, step
+
+
+def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, steps: ArcSteps) -> bool:
+    """Say whether the step from one point to the next went through the start of the curve."""
+    step = ahead.point - here.point
+    length = float(np.linalg.norm(step))
+    part = float((start.point - here.point) @ step) / length**2
+    nearest = here.point + part * step
+    aside = float(np.linalg.norm(start.point - nearest))
+    if here is start or not 0.0 < part <= 1.0 or aside > NEAR_START * length:
+        return False
+    if float(start.tangent @ ahead.tangent) < 0.0:
+        return False
+    # The curve's own point across the start: another sheet of it may lie as near.
+    guess = nearest + start.tangent * float((start.point - nearest) @ start.tangent)
+    point, iterations = correct(curve, guess, start.tangent, steps.tolerance)
+    return iterations > 0 and float(np.linalg.norm(point - start.point)) < SAME_POINT
 
 
 def _leap(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None:

@@ -9,12 +9,13 @@ there -1 of the half map means that the symmetry breaks, and +1 is a fold.
 """
 
 import itertools
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
 
-from ..kernels import Complex
+from ..kernels import Complex, Vector
 from ._branch import BifurcationKind
 
 COMPLEX_PART = 1e-6
@@ -37,6 +38,12 @@ class OrbitSigns:
     contacts: int
     """Crossings of the stops in a period."""
     symmetry: Symmetry
+    apart: Vector = field(default_factory=lambda: np.zeros(0))
+    """How far the motion is from a simpler one that such a branch may join, shape (6,); empty for none."""
+    joins: BifurcationKind | None = None
+    """What happens on the simpler one's branch where they are one."""
+    grazing_distance: float = math.inf
+    """How far a contact is from beginning or ending, over the gap or the gap times 2 pi f."""
 
     @property
     def over_period(self) -> Complex:
@@ -73,6 +80,19 @@ def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[Bifurcat
     if before.torus * after.torus < 0.0 and (before.has_pair_on_circle or after.has_pair_on_circle):
         found.append(BifurcationKind.NEIMARK_SACKER)
     return found
+
+
+NEAR_SIMPLER = 0.5
+"""A motion this close to a simpler one, over the gap, may pass through it within a step."""
+
+
+def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
+    """Say whether a motion passed through a simpler one between two neighbouring points: its twin follows."""
+    if before.joins is None or before.apart.size == 0:
+        return False
+    turned = float(before.apart @ after.apart) <= 0.0
+    furthest = max(float(np.linalg.norm(each.apart)) for each in (before, after))
+    return turned and furthest < NEAR_SIMPLER
 
 
 def sign_of(kind: BifurcationKind, here: OrbitSigns, before: OrbitSigns) -> float:

@@ -29,7 +29,7 @@ class OrbitShape(StrEnum):
     """How a periodic motion repeats."""
 
     MIRRORED = "mirrored"
-    """Its mirror image after half a drive period; needs equal stops."""
+    """Its mirror image after half an odd number of drive periods; needs equal stops."""
     REPEATED = "repeated"
     """Itself after a whole number of drive periods."""
 
@@ -44,20 +44,30 @@ class PeriodMap:
     specimen: Specimen
     shape: OrbitShape = OrbitShape.REPEATED
     periods: int = 1
-    """Drive periods of a repeated motion."""
+    """Drive periods of the whole motion."""
 
     def __post_init__(self) -> None:
         if self.periods < 1:
             msg = f"A motion of {self.periods} periods is not allowed: 1 or more."
             raise ValueError(msg)
-        if self.shape is OrbitShape.MIRRORED and self.periods != 1:
-            msg = f"A mirrored motion of {self.periods} periods is not offered: look for a repeated one."
+        if self.shape is OrbitShape.MIRRORED and self.periods % 2 == 0:
+            msg = f"A mirrored motion of {self.periods} periods cannot be: an odd number, or a repeated one."
             raise ValueError(msg)
 
     @property
     def turns(self) -> float:
         """Drive periods that the map takes."""
-        return 0.5 if self.shape is OrbitShape.MIRRORED else float(self.periods)
+        return 0.5 * self.periods if self.shape is OrbitShape.MIRRORED else float(self.periods)
+
+    @property
+    def simpler(self) -> "PeriodMap | None":
+        """Map of a motion of half the period, or of one that mirrors itself, which this one may become."""
+        if self.shape is OrbitShape.MIRRORED:
+            return None
+        if self.periods % 2 == 0:
+            return replace(self, periods=self.periods // 2)
+        lower, upper = self.specimen.gaps_m
+        return replace(self, shape=OrbitShape.MIRRORED) if lower == upper else None
 
     def image(self, state: Vector, drive: Harmonic) -> Vector:
         """State that the map makes of ``state``, shape (6,), at the drive's phase zero; NaN if lost."""
@@ -68,8 +78,7 @@ class PeriodMap:
 
     def orbit(self, state: Vector, drive: Harmonic, samples: int) -> Trajectory:
         """Follow the whole motion, sampled ``samples`` times a drive period."""
-        turns = math.ceil(self.turns)
-        return self._run(state, drive, float(turns), samples * drive.frequency_hz)
+        return self._run(state, drive, float(self.periods), samples * drive.frequency_hz)
 
     def derivative(self, state: Vector, drive: Harmonic) -> Table:
         """D image / d state, both over their scales, shape (6, 6)."""

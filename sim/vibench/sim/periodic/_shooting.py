@@ -11,9 +11,10 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels import Complex, Vector
-from ..model import Harmonic, Specimen, X, Y, Z, chosen
-from ..motion import integrate, start_motion, state_scales
+from ..kernels import Complex, Table, Vector
+from ..model import Harmonic, NoContact, PowerLaw, Specimen, X, Y, Z, chosen
+from ..motion import Trajectory, integrate, start_motion, state_scales
+from ._branch import BifurcationKind
 from ._floquet import multipliers
 from ._frequency_time import phasors_of
 from ._orbit_events import OrbitSigns, Symmetry
@@ -23,6 +24,8 @@ NEWTON_ITERATIONS = 30
 MOST_HALVINGS = 8
 RETURNED = 1e-9
 """A motion is periodic when it comes back this close, over the state's scale."""
+FLOW_ERROR = 1e-10
+"""Of a period at reference accuracy, over the state's scale: measured at a tenth of it (docs/accuracy.md)."""
 SAMPLES = 4096
 """Samples of a drive period from which responses are taken."""
 SETTLING_PERIODS = 400
@@ -47,6 +50,9 @@ class PeriodicOrbit:
     signs: OrbitSigns
     defect: float
     """How far from itself the motion comes back, over the state's scale."""
+    error: float
+    """How far the true motion may be, as part of the fundamental of p: the defect and the error of the flow,
+    multiplied as the map multiplies them. It grows beyond all bounds at a fold."""
     response_i: Vector
     """Largest magnitude of x, y, z and p over the drive amplitude, shape (4,)."""
     response_ii: Vector
@@ -111,7 +117,7 @@ def periodic_orbit(
         state, gone, is_better = _damped(mapping, drive, state, step, gone)
         if not is_better:
             break
-    return described_orbit(mapping, drive, state, _size(gone))
+    return described_orbit(mapping, drive, state, gone)
 
 
 def _damped(
@@ -132,24 +138,71 @@ def _size(values: Vector) -> float:
     return size if math.isfinite(size) else math.inf
 
 
-def described_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, defect: float) -> PeriodicOrbit:
-    """Stability and responses of a motion that starts at ``state``."""
+def described_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vector) -> PeriodicOrbit:
+    """Stability and responses of a motion that starts at ``state`` and misses it by ``gone``, over scales."""
     run = mapping.orbit(state, drive, SAMPLES)
-    turns = math.ceil(mapping.turns)
-    moved = run.states[: turns * SAMPLES]
+    moved = run.states[: mapping.periods * SAMPLES]
     waves = np.column_stack([moved[:, X], moved[:, Y], moved[:, Z], moved[:, Y] - moved[:, Z]])
     derivative = mapping.derivative(state, drive)
-    is_mirrored = mapping.shape is OrbitShape.MIRRORED
-    symmetry = Symmetry.MIRRORED if is_mirrored else Symmetry.NONE
-    lines = np.array([abs(phasors_of(wave)[turns]) for wave in waves.T])
+    lines = np.array([abs(phasors_of(wave)[mapping.periods]) for wave in waves.T])
+    defect = _size(gone)
     found = bool(defect <= RETURNED and np.all(np.isfinite(derivative)))
     return PeriodicOrbit(
         drive=drive,
         period_map=mapping,
         state=state,
-        signs=OrbitSigns(multipliers(np.nan_to_num(derivative)), run.impacts.count, symmetry),
+        signs=_signs(mapping, drive, state, np.nan_to_num(derivative), run),
         defect=defect,
+        error=_missing(derivative, gone) * float(state_scales(mapping.specimen, drive)[0] / lines[3]),
         response_i=np.abs(waves).max(axis=0) / drive.amplitude_m,
         response_ii=lines / drive.amplitude_m,
         outcome=ShootingEnd.CONVERGED if found else ShootingEnd.NO_ORBIT,
     )
+
+
+def _missing(derivative: Table, gone: Vector) -> float:
+    """Bound how far the true motion is: the errors of flow and return, through the inverse of the map."""
+    slope = derivative - np.eye(6)
+    if not bool(np.all(np.isfinite(slope)) and np.all(np.isfinite(gone))):
+        return math.inf
+    return float(np.abs(np.linalg.pinv(slope)).sum(axis=1).max() * (_size(gone) + FLOW_ERROR))
+
+
+def _signs(
+    mapping: PeriodMap, drive: Harmonic, state: Vector, derivative: Table, run: Trajectory
+) -> OrbitSigns:
+    simpler = mapping.simpler
+    scales = state_scales(mapping.specimen, drive)
+    apart = np.zeros(0) if simpler is None else (simpler.image(state, drive) - state) / scales
+    joins = None
+    if simpler is not None:
+        is_mirror = simpler.shape is OrbitShape.MIRRORED
+        joins = BifurcationKind.SYMMETRY_BREAKING if is_mirror else BifurcationKind.PERIOD_DOUBLING
+    return OrbitSigns(
+        multipliers(derivative),
+        run.impacts.count,
+        Symmetry.MIRRORED if mapping.shape is OrbitShape.MIRRORED else Symmetry.NONE,
+        apart,
+        joins,
+        _grazing_distance(mapping.specimen, drive, run),
+    )
+
+
+def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> float:
+    """How far the nearest contact is from beginning or ending, over the gap or the gap times 2 pi f."""
+    match specimen.contact:
+        case NoContact() | PowerLaw():
+            return math.inf
+        case _:
+            pass
+    lower, upper = specimen.gaps_m
+    p = run.states[:, Y] - run.states[:, Z]
+    gap = min(lower, upper)
+    short = np.minimum(upper - p, lower + p)
+    dips = (short[1:-1] <= short[:-2]) & (short[1:-1] <= short[2:]) & (short[1:-1] > 0.0)
+    nearest = float(short[1:-1][dips].min(initial=math.inf)) / gap
+    rate = np.abs(run.states[:, Y + 3] - run.states[:, Z + 3])
+    # The speed at the sample before each touch.
+    places = np.searchsorted(run.time_s, run.impacts.times_s) - 1
+    slowest = float(rate[np.clip(places, 0, None)].min(initial=math.inf))
+    return min(nearest, slowest / (gap * 2.0 * math.pi * drive.frequency_hz))
