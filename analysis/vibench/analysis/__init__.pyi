@@ -50,6 +50,7 @@ from .results import (
     analyse_files as analyse_files,
     campaign_summary as campaign_summary,
     compare_recording as compare_recording,
+    level_of_drive as level_of_drive,
     merged_results as merged_results,
     recordings_in as recordings_in,
     result_summary as result_summary,

@@ -105,6 +105,16 @@ COMMANDS = {
         "List the specimens and contact laws that there are, or say what one specimen amounts to.",
     ),
     "predict": Place("predict", "predict", "Predict the responses of m0 and of p over frequency."),
+    "branches": Place(
+        "branches",
+        "branches",
+        "Find and follow periodic motions over frequency or level, stable and unstable; name bifurcations.",
+    ),
+    "spectrum": Place(
+        "spectrum",
+        "spectrum",
+        "Compute all Lyapunov exponents over frequency or level, their sum, and the Kaplan-Yorke dimension.",
+    ),
     "study": Place(
         "study", "study", "Predict responses over every combination of what a file lists, longest first."
     ),

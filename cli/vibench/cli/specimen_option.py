@@ -1,10 +1,12 @@
 """Which specimen a command is about, and what of it is replaced: options that several commands share."""
 
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
 import typer
+from pydantic import ValidationError
 
 from vibench.analysis import InvalidRequest
+from vibench.analysis.dynamics import SpecimenChoice
 from vibench.sim import (
     CONTACT_LAWS,
     SpecimenTable,
@@ -23,6 +25,12 @@ LAWS_HELP = "Contact law instead of the specimen's own: " + "; ".join(
 SpecimenOption = Annotated[
     str | None, typer.Option("--specimen", metavar="NAME|FILE.toml", help=SPECIMENS_HELP)
 ]
+LawOption = Annotated[str | None, typer.Option("--model", help=LAWS_HELP)]
+DampingTime = Annotated[
+    float | None, typer.Option("--damping-time", metavar="S", help="c_i = damping time * k_i.")
+]
+Gap = Annotated[float | None, typer.Option("--gap", metavar="M", help="Clearance at both stops.")]
+Asked = TypeVar("Asked", bound=SpecimenChoice)
 
 
 def described(specimen: str | None) -> SpecimenTable:
@@ -45,3 +53,30 @@ def described(specimen: str | None) -> SpecimenTable:
 def given_options(**options: object) -> dict[str, object]:
     """Keep what was typed, each as an axis of one value; what was not is left to the specimen."""
     return {name: (value,) for name, value in options.items() if value is not None}
+
+
+def asked_of_specimen(
+    kind: type[Asked],
+    specimen: str | None,
+    model: str | None,
+    damping_time: float | None,
+    gap: float | None,
+    **options: Any,
+) -> Asked:
+    """Make a question about a specimen, or say in one sentence which option is not allowed.
+
+    Raises
+    ------
+    InvalidRequest
+        With what was given.
+
+    """
+    replaced = {"model": model, "damping_time_s": damping_time, "gap_m": gap}
+    given = {name: value for name, value in replaced.items() if value is not None}
+    try:
+        return kind.model_validate({"described": described(specimen), **given, **options})
+    except ValidationError as error:
+        first = error.errors()[0]
+        said = first["msg"].removeprefix("Value error, ")
+        place = ".".join(str(each) for each in first["loc"])
+        raise InvalidRequest(f"{place} was given as {first['input']!r}: {said}" if place else said) from error

@@ -54,6 +54,8 @@ from .motion import (
     steady_response as steady_response,
 )
 from .periodic import (
+    AmplitudePath as AmplitudePath,
+    ArcEnd as ArcEnd,
     ArcSteps as ArcSteps,
     Balance as Balance,
     BalanceCheck as BalanceCheck,
@@ -61,7 +63,9 @@ from .periodic import (
     BifurcationKind as BifurcationKind,
     Branch as Branch,
     BranchEvent as BranchEvent,
+    DrivePath as DrivePath,
     FirstOrderState as FirstOrderState,
+    FrequencyPath as FrequencyPath,
     HarmonicSet as HarmonicSet,
     LinearStructure as LinearStructure,
     OrbitShape as OrbitShape,
@@ -75,6 +79,7 @@ from .periodic import (
     harmonic_balance_branch as harmonic_balance_branch,
     jump_frequencies as jump_frequencies,
     periodic_branch as periodic_branch,
+    periodic_branch_within as periodic_branch_within,
     periodic_orbit as periodic_orbit,
     spring_of as spring_of,
     structure_of as structure_of,

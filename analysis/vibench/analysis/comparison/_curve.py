@@ -24,6 +24,10 @@ class CurveOrigin(StrEnum):
     """The specimen under the recorded base motion, through the same estimator."""
     PREDICTED = "predicted"
     """The specimen under sines."""
+    STABLE = "stable branches"
+    """Periodic motions that an experiment can rest on; several at one frequency."""
+    UNSTABLE = "unstable branches"
+    """Periodic motions that only feedback holds; several at one frequency."""
 
 
 class CurveKind(StrEnum):
@@ -36,7 +40,7 @@ class CurveKind(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One curve; arrays of shape (points,), frequencies ascending."""
+    """One curve; arrays of shape (points,), frequencies ascending but on branches."""
 
     source: str
     """Name of the recording or of the prediction."""
@@ -54,6 +58,11 @@ class Curve:
     def name(self) -> str:
         """``"sweep_weak, Response II, measured"``."""
         return f"{self.source}, {self.response.value}, {self.origin.value}"
+
+    @property
+    def is_single_valued(self) -> bool:
+        """Each frequency has one value: no branches, which fold."""
+        return self.origin not in (CurveOrigin.STABLE, CurveOrigin.UNSTABLE)
 
     @property
     def lower(self) -> Reals:
@@ -78,9 +87,12 @@ class Curve:
         return np.minimum(2 * self.relative_sd, np.log(10.0))
 
     def at(self, frequency_hz: Reals) -> "Curve":
-        """Read the curve at other frequencies, straight between points in both logarithms; NaN outside."""
+        """Read the curve at other frequencies, straight between points in both logarithms; NaN outside.
+
+        NaN everywhere on branches, which have several values at one frequency.
+        """
         known = np.isfinite(self.magnitude) & (self.magnitude > 0)
-        if not known.any():
+        if not known.any() or not self.is_single_valued:
             return replace(
                 self,
                 frequency_hz=frequency_hz,
@@ -113,6 +125,12 @@ def curve_difference(curve: Curve, reference: Curve) -> CurveDifference:
         When the two have no frequency in common.
 
     """
+    for each in (curve, reference):
+        if not each.is_single_valued:
+            raise NotEnoughData(
+                f"{each.name} has several values at one frequency, so that there is no one difference; "
+                "compare curves of recordings or predictions"
+            )
     low = max(curve.frequency_hz[0], reference.frequency_hz[0])
     high = min(curve.frequency_hz[-1], reference.frequency_hz[-1])
     shared = (curve.frequency_hz >= low) & (curve.frequency_hz <= high) & np.isfinite(curve.magnitude)

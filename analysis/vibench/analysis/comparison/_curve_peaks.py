@@ -63,10 +63,10 @@ class CurvePeak:
 
 
 def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
-    """Find the highest peaks, in the order of frequency."""
+    """Find the highest peaks, in the order of frequency; none of branches, which fold there."""
     known = np.isfinite(curve.magnitude) & (curve.magnitude > 0)
     frequency_hz, height = curve.frequency_hz[known], np.log(curve.magnitude[known])
-    if height.size < 3:
+    if height.size < 3 or not curve.is_single_valued:
         return ()
     spread = np.nan_to_num(curve.relative_sd[known])
     least = _LEAST_RISE_DB / _PER_NEPER_DB

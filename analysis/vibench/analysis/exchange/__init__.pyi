@@ -12,6 +12,9 @@ from ._import_recording import (
 from ._mapping import (
     ImportMapping as ImportMapping,
 )
+from ._new_file import (
+    new_file as new_file,
+)
 from ._source import (
     opened_source as opened_source,
 )

@@ -4,6 +4,10 @@ from ._backbone import (
 from ._bench_levels import (
     bench_levels_figure as bench_levels_figure,
 )
+from ._branches import (
+    branches_figure as branches_figure,
+    draw_line as draw_line,
+)
 from ._comparison import (
     comparison_figure as comparison_figure,
 )
@@ -22,6 +26,9 @@ from ._dwells import (
 )
 from ._excitation import (
     excitation_figure as excitation_figure,
+)
+from ._exponent_spectrum import (
+    exponent_spectrum_figure as exponent_spectrum_figure,
 )
 from ._hysteresis import (
     hysteresis_figure as hysteresis_figure,

@@ -14,7 +14,13 @@ from ._style import BOUNDS, LEVELS, MEASURED, frequency_axis, legend_above, magn
 
 _HEIGHT_IN = 4.6
 _DIFFERENCE_IN = 1.4
-_STYLES = {CurveOrigin.MEASURED: "-", CurveOrigin.SIMULATED: "--", CurveOrigin.PREDICTED: ":"}
+_STYLES = {
+    CurveOrigin.MEASURED: "-",
+    CurveOrigin.SIMULATED: "--",
+    CurveOrigin.PREDICTED: ":",
+    CurveOrigin.STABLE: "-",
+    CurveOrigin.UNSTABLE: "--",
+}
 _LONE = 1
 """A curve of one point is drawn as a mark."""
 _SINGLE_BAND = 0.2
@@ -108,8 +114,8 @@ def _heights(curves: Sequence[Curve]) -> tuple[float, float]:
 
 
 def _span(curves: Sequence[Curve]) -> tuple[float, float]:
-    low = min(float(each.frequency_hz[0]) for each in curves)
-    high = max(float(each.frequency_hz[-1]) for each in curves)
+    low = min(float(np.min(each.frequency_hz)) for each in curves)
+    high = max(float(np.max(each.frequency_hz)) for each in curves)
     return (low, high) if high > low else (low * (1 - _SINGLE_BAND), high * (1 + _SINGLE_BAND))
 
 

@@ -16,6 +16,8 @@ from ..figures import (
     DrawnFigure,
     ImageKind,
     contact_forces_figure,
+    branches_figure,
+    exponent_spectrum_figure,
     tradeoff_figure,
 )
 from ..paper_figures import (
@@ -51,6 +53,8 @@ __all__ = [
     "ImageKind",
     "accuracy_document",
     "contact_forces_figure",
+    "branches_figure",
+    "exponent_spectrum_figure",
     "levels_figure",
     "recording_figures",
     "result_figures",

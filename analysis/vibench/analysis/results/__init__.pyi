@@ -12,6 +12,7 @@ from ._compared_recording import (
     ComparedRecording as ComparedRecording,
     compare_recording as compare_recording,
     kept_result as kept_result,
+    level_of_drive as level_of_drive,
 )
 from ._measurement_analysis import (
     UNOBSERVED as UNOBSERVED,

@@ -8,10 +8,13 @@ from pathlib import Path
 from vibench.acquisition import open_recording
 
 from ..comparison import Curve, CurveOrigin, predicted_curves, sorted_curve
+from ..dynamics import recorded_level
+from ..errors import NotEnoughData
 from ..frequency_response import FrequencyResponseRequest
 from ..kinds import ANALYSES, AnyResult
 from ..model import Simulation
 from ..recordings import Verdict
+from ..sine import SteppedResponse, SweepResponse
 from ._campaign_results import AnalysisFailure, result_of
 
 
@@ -58,6 +61,26 @@ def kept_result(compared: ComparedRecording) -> tuple[AnyResult, tuple[AnalysisF
     """Open the whole result again; the bytes were made by this program a moment ago, never by a file."""
     result, failures = pickle.loads(compared.kept)  # noqa: S301
     return result, failures
+
+
+def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ...]:
+    """Give the base amplitude [m] over frequency [Hz] of a stepped sine or a sweep, as pairs that ascend.
+
+    Raises
+    ------
+    NotEnoughData
+        When the recording is of another kind, or of one frequency.
+
+    """
+    result, _ = kept_result(compared)
+    match result.analysis.response:
+        case (SweepResponse() | SteppedResponse()) as found:
+            return recorded_level(found.frequency_hz, found.drive_amplitude_m)
+        case _:
+            raise NotEnoughData(
+                f"{compared.name} is a {result.kind}, whose level over frequency is not known; take a "
+                "stepped sine or a sweep"
+            )
 
 
 def _curves(result: AnyResult, name: str) -> Iterator[Curve]:

@@ -8,15 +8,17 @@ calculation.
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import t as student
 
 from ..kernels import Floats
 from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, Specimen, chosen, state_matrix
 from ..motion import MAX_IMPACT_RATE_HZ, state_scales
 from ..slots import UNITS
-from ._blocking import blocked_mean
+from ._blocking import BlockedMean, blocked_mean
 from ._lyapunov import ExponentVerdict, Source, intervals_to_skip, verdict_of
 from ._settling import FinalMotion, settling
 from ._tangent_run import TangentRun, interval_for, run_with_tangent
@@ -32,6 +34,8 @@ class LyapunovSpectrum:
     """Descending, shape (6,); minus infinity for a direction that a stop which holds m1 has taken away."""
     standard_errors_per_s: Floats
     """Shape (6,); zero where the exponents are those of the modes."""
+    blocks: NDArray[np.int64]
+    """Independent stretches of the run behind each standard error, shape (6,)."""
     verdict: ExponentVerdict
     """Of the largest."""
     source: Source
@@ -41,6 +45,8 @@ class LyapunovSpectrum:
     """Since time zero."""
     impact_rate_hz: float
     """In the final motion."""
+    dimension_standard_error: float
+    """Of `dimension`, with the exponents' errors as they go together; 0 where it is a whole number."""
     final_state: Floats
     end_time_s: float
     outcome: Outcome
@@ -54,6 +60,22 @@ class LyapunovSpectrum:
     def dimension(self) -> float:
         """Kaplan and Yorke's dimension of the attractor's stroboscopic section; one more in time."""
         return kaplan_yorke(self.exponents_per_s)
+
+    def intervals_per_s(self, confidence: float = 0.95) -> Floats:
+        """Bounds of each exponent, shape (6, 2): Student's, with a degree of freedom less than blocks."""
+        reach = self._reach(confidence) * self.standard_errors_per_s
+        return np.column_stack([self.exponents_per_s - reach, self.exponents_per_s + reach])
+
+    def dimension_interval(self, confidence: float = 0.95) -> tuple[float, float]:
+        """Bounds of the dimension, by the fewest blocks of all exponents; never outside 0 to 6."""
+        reach = float(self._reach(confidence).max()) * self.dimension_standard_error
+        return max(0.0, self.dimension - reach), min(float(UNITS), self.dimension + reach)
+
+    def _reach(self, confidence: float) -> Floats:
+        if not 0.0 < confidence < 1.0:
+            msg = f"A confidence of {confidence} is not allowed: it must lie between 0 and 1."
+            raise ValueError(msg)
+        return np.asarray(student.ppf(0.5 + 0.5 * confidence, np.maximum(self.blocks - 1, 1)))
 
 
 def lyapunov_spectrum(
@@ -81,52 +103,99 @@ def lyapunov_spectrum(
     length = interval.length_s
     if run.outcome is not Outcome.REACHED_END:
         nothing = np.full(UNITS, math.nan)
-        parts = (nothing, nothing, ExponentVerdict.UNKNOWN, Source.AVERAGE, FinalMotion.THROUGHOUT, 0)
+        parts = _Taken(
+            nothing,
+            nothing,
+            ONE_BLOCK,
+            math.nan,
+            ExponentVerdict.UNKNOWN,
+            Source.AVERAGE,
+            FinalMotion.THROUGHOUT,
+            0,
+        )
     else:
         parts = _taken(specimen, drive, run, skipped)
-    exponents, errors, verdict, source, motion, since = parts
+    since = parts.since
     lasting = (len(run.growth) - since) * length
     return LyapunovSpectrum(
         drive=drive,
         accuracy=accuracy,
-        exponents_per_s=exponents,
-        standard_errors_per_s=errors,
-        verdict=verdict,
-        source=source,
-        motion=motion,
+        exponents_per_s=parts.exponents,
+        standard_errors_per_s=parts.errors,
+        blocks=parts.blocks,
+        verdict=parts.verdict,
+        source=parts.source,
+        motion=parts.motion,
         since_s=since * length,
         impacts=len(run.impact_times_s),
         impact_rate_hz=float(run.impacts[since:].sum()) / lasting if lasting > 0.0 else 0.0,
+        dimension_standard_error=parts.dimension_error,
         final_state=run.final_state,
         end_time_s=run.end_time_s,
         outcome=run.outcome,
     )
 
 
-def _taken(
-    specimen: Specimen, drive: Harmonic, run: TangentRun, skipped: int
-) -> tuple[Floats, Floats, ExponentVerdict, Source, FinalMotion, int]:
+ONE_BLOCK = np.ones(UNITS, dtype=np.int64)
+
+
+class _Taken(NamedTuple):
+    """What is read off a run."""
+
+    exponents: Floats
+    errors: Floats
+    blocks: NDArray[np.int64]
+    dimension_error: float
+    verdict: ExponentVerdict
+    source: Source
+    motion: FinalMotion
+    since: int
+
+
+def _taken(specimen: Specimen, drive: Harmonic, run: TangentRun, skipped: int) -> _Taken:
     end = settling(run, state_scales(specimen, drive))
     if end.motion is FinalMotion.QUIET:
         system, _ = state_matrix(specimen)
         decays = np.sort(np.linalg.eigvals(system).real)[::-1]
         verdict = verdict_of(float(decays[0]), 0.0)
-        return decays, np.zeros(UNITS), verdict, Source.MODES, end.motion, end.since
+        return _Taken(decays, np.zeros(UNITS), ONE_BLOCK, 0.0, verdict, Source.MODES, end.motion, end.since)
     # A motion that settles late may leave little to average: never less than half of what was asked for.
     since = min(max(skipped, end.since), (len(run.growth) + skipped) // 2)
-    means = [_mean(rates) for rates in run.rates[since:].T]
-    exponents, errors = np.array([mean for mean, _ in means]), np.array([error for _, error in means])
-    order = np.argsort(-exponents, kind="stable")
-    verdict = verdict_of(float(exponents[order[0]]), float(errors[order[0]]))
-    return exponents[order], errors[order], verdict, Source.AVERAGE, end.motion, since
+    rates = run.rates[since:]
+    means = [_mean(each) for each in rates.T]
+    order = np.argsort([-each.mean for each in means], kind="stable")
+    exponents = np.array([means[k].mean for k in order])
+    errors = np.array([means[k].standard_error for k in order])
+    return _Taken(
+        exponents,
+        errors,
+        np.array([means[k].blocks for k in order], dtype=np.int64),
+        _dimension_error(rates[:, order], exponents),
+        verdict_of(float(exponents[0]), float(errors[0])),
+        Source.AVERAGE,
+        end.motion,
+        since,
+    )
 
 
-def _mean(rates: Floats) -> tuple[float, float]:
+def _mean(rates: Floats) -> BlockedMean:
     """Mean of local exponents with its error; minus infinity where the direction was lost."""
     if not bool(np.all(np.isfinite(rates))):
-        return -math.inf, 0.0
-    found = blocked_mean(rates)
-    return found.mean, found.standard_error
+        return BlockedMean(-math.inf, 0.0, 1, len(rates), 1.0, is_long_enough=True)
+    return blocked_mean(rates)
+
+
+def _dimension_error(rates: Floats, exponents: Floats) -> float:
+    """Give the standard error of the dimension: its linear part in the local exponents, averaged like one.
+
+    D = j - S / l with S = l_1 + ... + l_j and l = l_(j+1) < 0: dD = -dS / l + S dl / l^2.
+    """
+    kept = math.floor(kaplan_yorke(exponents))
+    if kept in (0, len(exponents)) or not math.isfinite(exponents[kept]):
+        return 0.0
+    total, next_one = float(np.sum(exponents[:kept])), float(exponents[kept])
+    moved = -rates[:, :kept].sum(axis=1) / next_one + total * rates[:, kept] / next_one**2
+    return blocked_mean(moved).standard_error
 
 
 def kaplan_yorke(exponents: Floats) -> float:

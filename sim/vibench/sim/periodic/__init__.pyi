@@ -6,15 +6,21 @@ from ._balance_branch import (
     balance_branch_within as balance_branch_within,
     balance_specimen as balance_specimen,
     harmonic_balance_branch as harmonic_balance_branch,
+    orbit_guess as orbit_guess,
 )
 from ._balance_solver import (
     BalanceOptions as BalanceOptions,
+    balance as balance,
+    first_order_guesses as first_order_guesses,
 )
 from ._branch import (
     BifurcationKind as BifurcationKind,
     Branch as Branch,
     BranchEvent as BranchEvent,
     Parameter as Parameter,
+)
+from ._branch_following import (
+    parameter_value as parameter_value,
 )
 from ._condensation import (
     LinearStructure as LinearStructure,
@@ -39,6 +45,7 @@ from ._floquet import (
 )
 from ._harmonic_balance import (
     Balance as Balance,
+    BalanceEnd as BalanceEnd,
     HarmonicSet as HarmonicSet,
 )
 from ._orbit_branch import (

@@ -69,10 +69,17 @@ def first_guess(
     """Start from the weakest first-order motion of a power law, else from the motion without the spring."""
     match spring:
         case PowerSpring():
-            weakest = first_order_states(structure, spring, frequency_hz, amplitude_m)[0]
-            return Guess(np.array([1]), np.array([weakest.relative]))
+            return first_order_guesses(structure, spring, frequency_hz, amplitude_m)[0]
         case _:
             return linear_guess(structure, frequency_hz, amplitude_m)
+
+
+def first_order_guesses(
+    structure: LinearStructure, spring: PowerSpring, frequency_hz: float, amplitude_m: float
+) -> list[Guess]:
+    """Start from each of the first-order motions of a power law."""
+    states = first_order_states(structure, spring, frequency_hz, amplitude_m)
+    return [Guess(np.array([1]), np.array([state.relative])) for state in states]
 
 
 def balance(

@@ -50,6 +50,10 @@ class BranchEvent:
     index: int
     """It lies after this point of the branch, and before the next."""
 
+    def parameter(self, parameter: Parameter) -> float:
+        """Frequency [Hz] or amplitude [m]."""
+        return self.frequency_hz if parameter is Parameter.FREQUENCY else self.amplitude_m
+
 
 @dataclass(frozen=True, eq=False)
 class Branch:

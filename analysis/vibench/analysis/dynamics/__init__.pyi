@@ -1,0 +1,31 @@
+from ._branch_lines import (
+    BranchDiagram as BranchDiagram,
+    BranchLine as BranchLine,
+    LineEvent as LineEvent,
+)
+from ._branch_request import (
+    BranchMethod as BranchMethod,
+    BranchRequest as BranchRequest,
+)
+from ._computing import (
+    branch_lines as branch_lines,
+    diagram_of as diagram_of,
+    exponent_spectrum as exponent_spectrum,
+    spectrum_points as spectrum_points,
+)
+from ._dynamics_file import (
+    read_diagram as read_diagram,
+    write_diagram as write_diagram,
+    write_spectrum as write_spectrum,
+)
+from ._recorded_level import (
+    recorded_level as recorded_level,
+)
+from ._specimen_choice import (
+    SpecimenChoice as SpecimenChoice,
+)
+from ._spectrum_request import (
+    ExponentSpectrum as ExponentSpectrum,
+    SpectrumPoint as SpectrumPoint,
+    SpectrumRequest as SpectrumRequest,
+)

@@ -1,0 +1,244 @@
+"""An answer on branches: columns of numbers a branch, its special points, and what it cost."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibench.sim import Parameter
+from vibench.sim.branches import FoundBranch
+
+from ..comparison import Curve, CurveKind, CurveOrigin
+from ..signals import Reals
+from ._branch_request import BranchRequest
+
+
+@dataclass(frozen=True)
+class LineEvent:
+    """A special point of a branch."""
+
+    kind: str
+    """fold, period doubling, Neimark-Sacker, symmetry breaking or grazing."""
+    frequency_hz: float
+    amplitude_m: float
+    index: int
+    """It lies after this point of the branch, and before the next."""
+    response_ii: float
+    """Of m0 there, between the two points."""
+
+
+@dataclass(frozen=True, eq=False)
+class BranchLine:
+    """One branch; n points in the order in which it runs."""
+
+    frequency_hz: Reals
+    amplitude_m: Reals
+    response_i: Reals
+    """Largest |x|, |y|, |z| and |p| over the drive amplitude, shape (n, 4)."""
+    response_ii: Reals
+    """Amplitude at the drive frequency over the drive amplitude, likewise."""
+    states: Reals
+    """x, y, z, vx, vy, vz at the drive's time zero, shape (n, 6) [m, m/s]."""
+    multiplier_real: Reals
+    """Floquet multipliers over the period of the motion, largest first, shape (n, 6)."""
+    multiplier_imaginary: Reals
+    impacts: NDArray[np.int64]
+    """Contacts that begin in the period of the motion, shape (n,)."""
+    error_estimate: Reals
+    """How far the true motion may be, as part of the fundamental of p, shape (n,)."""
+    events: tuple[LineEvent, ...]
+    periods: int
+    """Drive periods of a motion."""
+    shape: str
+    """mirrored: its own mirror image after half its period; or repeated."""
+    has_twin: bool
+    """The mirror images of these motions are another branch."""
+    is_isolated: bool
+    """It closes on itself."""
+    origin: str
+    """How it was found."""
+    begin: str
+    """Why it was left at its first point."""
+    end: str
+    """Why it was left at its last."""
+    elapsed_s: float
+
+    @property
+    def points(self) -> int:
+        """How many."""
+        return len(self.frequency_hz)
+
+    @property
+    def largest_multiplier(self) -> Reals:
+        """Magnitude, shape (n,)."""
+        return np.hypot(self.multiplier_real[:, 0], self.multiplier_imaginary[:, 0])
+
+    @property
+    def is_stable(self) -> NDArray[np.bool_]:
+        """All multipliers inside the unit circle, shape (n,)."""
+        return np.asarray(self.largest_multiplier < 1.0)
+
+    def along(self, parameter: Parameter) -> Reals:
+        """Frequencies [Hz] or amplitudes [m]."""
+        return self.frequency_hz if parameter is Parameter.FREQUENCY else self.amplitude_m
+
+    def pieces(self) -> Iterator[tuple[bool, slice]]:
+        """Give stretches that are stable throughout, or not; neighbours share a point."""
+        is_stable = self.is_stable[1:] & self.is_stable[:-1]
+        edges = [0, *(np.flatnonzero(is_stable[1:] != is_stable[:-1]) + 1).tolist(), self.points - 1]
+        for first, last in pairwise(edges):
+            if last > first:
+                yield bool(is_stable[first]), slice(first, last + 1)
+
+
+def line_of(found: FoundBranch) -> BranchLine:
+    """Take a branch as it was found."""
+    branch = found.branch
+    return BranchLine(
+        frequency_hz=branch.frequencies_hz,
+        amplitude_m=branch.amplitudes_m,
+        response_i=branch.response_i,
+        response_ii=branch.response_ii,
+        states=branch.states,
+        multiplier_real=branch.multipliers.real.copy(),
+        multiplier_imaginary=branch.multipliers.imag.copy(),
+        impacts=branch.contacts,
+        error_estimate=branch.left_out,
+        events=tuple(
+            LineEvent(
+                each.kind.value,
+                each.frequency_hz,
+                each.amplitude_m,
+                each.index,
+                _response_at(found, each.index, each.parameter(branch.parameter)),
+            )
+            for each in branch.events
+        ),
+        periods=found.periods,
+        shape=found.shape.value,
+        has_twin=found.has_twin,
+        is_isolated=found.is_isolated,
+        origin=found.origin.value,
+        begin="it was begun there" if branch.begin is None else branch.begin.value,
+        end=branch.end.value,
+        elapsed_s=found.elapsed_s,
+    )
+
+
+def _response_at(found: FoundBranch, index: int, value: float) -> float:
+    """Read Response II of m0 between a point and the next, by the parameter."""
+    branch = found.branch
+    two = slice(index, index + 2)
+    place, size = branch.parameters[two], branch.response_ii[two, 0]
+    if len(place) < 2 or place[0] == place[1]:
+        return float(size[0])
+    part = min(max((value - place[0]) / (place[1] - place[0]), 0.0), 1.0)
+    return float(size[0] + part * (size[1] - size[0]))
+
+
+@dataclass(frozen=True, eq=False)
+class BranchDiagram:
+    """Everything that was found for one request."""
+
+    request: BranchRequest
+    lines: tuple[BranchLine, ...]
+    elapsed_s: float
+
+    @property
+    def points(self) -> int:
+        """Motions on all branches."""
+        return sum(line.points for line in self.lines)
+
+    @property
+    def largest_error(self) -> float:
+        """Of all points but those beside a fold, where any error grows; NaN where there are none."""
+        errors = [np.median(line.error_estimate) for line in self.lines]
+        return float(max(errors, default=float("nan")))
+
+    @property
+    def cost_sentence(self) -> str:
+        """Say what was found, with its error and its cost."""
+        if not self.lines:
+            return f"No periodic motion was found; {self.elapsed_s:.1f} s."
+        isolated = sum(line.is_isolated for line in self.lines)
+        worst = max(float(np.max(line.error_estimate)) for line in self.lines)
+        return (
+            f"{len(self.lines)} branches ({isolated} isolated), {self.points} motions in "
+            f"{self.elapsed_s:.1f} s; error {self.largest_error:.1g} of the fundamental of p in the middle of the worst branch, "
+            f"{worst:.1g} at the worst point."
+        )
+
+    def to_dict(self) -> dict[str, object]:
+        """Say everything, for other programs; numbers that are not finite are null."""
+        return {
+            "options": self.request.model_dump(mode="json"),
+            "branches": [_document(line) for line in self.lines],
+            "elapsed_s": self.elapsed_s,
+        }
+
+    def curves(self) -> tuple[Curve, ...]:
+        """Give Responses I and II of m0 over frequency, stable and unstable apart; none along amplitude."""
+        if self.request.along is Parameter.AMPLITUDE:
+            return ()
+        found = []
+        for origin in (CurveOrigin.STABLE, CurveOrigin.UNSTABLE):
+            for kind, name in ((CurveKind.RESPONSE_I, "response_i"), (CurveKind.RESPONSE_II, "response_ii")):
+                frequency_hz, size = self._strung(name, is_stable=origin is CurveOrigin.STABLE)
+                if frequency_hz.size:
+                    unknown = np.full(frequency_hz.shape, np.nan)
+                    note = self.cost_sentence
+                    source = f"branches {self.request.title}"
+                    found.append(Curve(source, origin, kind, frequency_hz, size, unknown, note))
+        return tuple(found)
+
+    def _strung(self, name: str, *, is_stable: bool) -> tuple[Reals, Reals]:
+        """Give all stretches of one stability as one row; NaN keeps them apart."""
+        places: list[Reals] = []
+        sizes: list[Reals] = []
+        for line in self.lines:
+            for stable, piece in line.pieces():
+                if stable is is_stable:
+                    places += [line.frequency_hz[piece], line.frequency_hz[piece][-1:]]
+                    sizes += [getattr(line, name)[piece, 0], np.array([np.nan])]
+        if not places:
+            return np.zeros(0), np.zeros(0)
+        return np.concatenate(places)[:-1], np.concatenate(sizes)[:-1]
+
+
+def _document(line: BranchLine) -> dict[str, object]:
+    return {
+        "periods": line.periods,
+        "shape": line.shape,
+        "has_twin": line.has_twin,
+        "is_isolated": line.is_isolated,
+        "origin": line.origin,
+        "begin": line.begin,
+        "end": line.end,
+        "elapsed_s": line.elapsed_s,
+        "events": [
+            {"kind": each.kind, "frequency_hz": each.frequency_hz, "amplitude_m": each.amplitude_m}
+            for each in line.events
+        ],
+        "points": [
+            {
+                "frequency_hz": float(line.frequency_hz[k]),
+                "amplitude_m": float(line.amplitude_m[k]),
+                "response_i": float(line.response_i[k, 0]),
+                "response_ii": float(line.response_ii[k, 0]),
+                "relative_i": float(line.response_i[k, 3]),
+                "relative_ii": float(line.response_ii[k, 3]),
+                "is_stable": bool(line.is_stable[k]),
+                "largest_multiplier": float(line.largest_multiplier[k]),
+                "impacts": int(line.impacts[k]),
+                "error_estimate": _finite(line.error_estimate[k]),
+                "state": [float(part) for part in line.states[k]],
+            }
+            for k in range(line.points)
+        ],
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,150 @@
+"""What is asked of branches: a specimen, a range of frequency or level, and a method."""
+
+from enum import StrEnum
+from itertools import pairwise
+from typing import Annotated, Self
+
+from pydantic import Field, PositiveFloat, model_validator
+
+from vibench.sim import (
+    AmplitudePath,
+    BalanceOptions,
+    DrivePath,
+    FrequencyPath,
+    HarmonicSet,
+    Parameter,
+    PowerLaw,
+    RigidStops,
+)
+from vibench.sim.branches import MotionSearch
+
+from ._specimen_choice import SpecimenChoice
+
+EXACT_ENOUGH = 1e-4
+"""Part of the fundamental of p that harmonics left out may move it by, unless one harmonic is asked for."""
+
+
+class BranchMethod(StrEnum):
+    """How motions are found and followed."""
+
+    SHOOTING = "shooting"
+    """Exact motions of any period, with every contact; every law."""
+    BALANCE = "balance"
+    """Harmonic balance, with as many harmonics as it needs; motions of the drive's period, no rigid stops."""
+    FIRST_ORDER = "first-order"
+    """Harmonic balance with one harmonic, the paper's eq. 5; power laws only."""
+
+
+class BranchRequest(SpecimenChoice):
+    """All periodic motions that are found over a range."""
+
+    method: BranchMethod = BranchMethod.SHOOTING
+    """Exact, or balanced with many harmonics, or with one."""
+    along: Parameter = Parameter.FREQUENCY
+    """What changes: the drive's frequency, or its amplitude."""
+    amplitude_m: PositiveFloat | tuple[tuple[PositiveFloat, PositiveFloat], ...] = 5e-6
+    """Of the base displacement, along frequency; or pairs of frequency [Hz] and amplitude, as recorded."""
+    frequency_hz: PositiveFloat = 260.0
+    """Of the drive, along amplitude."""
+    start: PositiveFloat = 50.0
+    """Lower end of the range, in Hz or in m."""
+    stop: PositiveFloat = 600.0
+    """Upper end of the range, in Hz or in m."""
+    harmonics: Annotated[int, Field(ge=3, le=1023)] = 511
+    """Highest that a balance may use."""
+    places: Annotated[int, Field(ge=2, le=1000)] = 8
+    """Values in the range at which motions are looked for."""
+    starts: Annotated[int, Field(ge=0, le=10_000)] = 12
+    """Random states at each of them: more find more isolated branches."""
+    most_periods: Annotated[int, Field(ge=1, le=16)] = 4
+    """Longest motion that is looked for, in drive periods."""
+    seed: Annotated[int, Field(ge=0)] = 1
+    """Of the random states."""
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Self:
+        if not self.start < self.stop:
+            raise ValueError(
+                f"the range {self.start:g} to {self.stop:g} does not ascend; give the lower first"
+            )
+        self._refuse_other_laws()
+        match self.amplitude_m:
+            case tuple() as pairs:
+                if self.along is Parameter.AMPLITUDE:
+                    raise ValueError(
+                        "a recorded level goes with frequencies; along amplitude give one frequency"
+                    )
+                if len(pairs) < 2 or not all(a[0] < b[0] for a, b in pairwise(pairs)):
+                    raise ValueError("a recorded level needs two or more ascending frequencies")
+            case _:
+                pass
+        return self
+
+    def _refuse_other_laws(self) -> None:
+        law = self.specimen.contact
+        match self.method, law:
+            case BranchMethod.FIRST_ORDER, PowerLaw():
+                pass
+            case BranchMethod.FIRST_ORDER, _:
+                raise ValueError(
+                    f"one harmonic cannot describe {self.model}: take a power law such as power:5, or the "
+                    "method balance or shooting"
+                )
+            case BranchMethod.BALANCE, RigidStops():
+                raise ValueError(
+                    "rigid stops push with no finite force, so that they have no harmonic balance; take the "
+                    "method shooting"
+                )
+            case _:
+                pass
+
+    @property
+    def path(self) -> DrivePath:
+        """How the drive changes."""
+        if self.along is Parameter.AMPLITUDE:
+            return AmplitudePath(self.frequency_hz)
+        match self.amplitude_m:
+            case tuple() as pairs:
+                return FrequencyPath(tuple(a for _, a in pairs), tuple(f for f, _ in pairs))
+            case amplitude_m:
+                return FrequencyPath((float(amplitude_m),))
+
+    @property
+    def search(self) -> MotionSearch:
+        """Where motions are looked for."""
+        return MotionSearch(
+            places=self.places, starts=self.starts, most_periods=self.most_periods, seed=self.seed
+        )
+
+    @property
+    def balance_options(self) -> BalanceOptions:
+        """Harmonics, for the two methods that balance them."""
+        lower, upper = self.specimen.gaps_m
+        kept = HarmonicSet.ODD if lower == upper else HarmonicSet.ALL
+        if self.method is BranchMethod.FIRST_ORDER:
+            return BalanceOptions(kept, fewest=1, most=1, tolerance=EXACT_ENOUGH)
+        return BalanceOptions(
+            kept, fewest=min(15, self.harmonics), most=self.harmonics, tolerance=EXACT_ENOUGH
+        )
+
+    @property
+    def title(self) -> str:
+        """Name curves and figures by it."""
+        if self.along is Parameter.AMPLITUDE:
+            where = f"{self.frequency_hz:g} Hz"
+        else:
+            match self.amplitude_m:
+                case tuple():
+                    where = "recorded level"
+                case amplitude_m:
+                    where = f"{1e6 * float(amplitude_m):g} µm"
+        return f"{self.model}, {where}, {self.method.value}"
+
+    @property
+    def sentence(self) -> str:
+        """Say the options under a figure."""
+        return (
+            f"{self.title}; c = {self.damping_time_s:.3g} s · k, gap {1e6 * self.gap_m:g} µm; motions looked "
+            f"for at {self.places} places from {self.starts} random states each, seed {self.seed}, up to "
+            f"{self.most_periods} drive periods long."
+        )

@@ -1,0 +1,48 @@
+"""Answers to requests, one by one as they are computed."""
+
+import time
+from collections.abc import Iterator
+
+from vibench.sim import Harmonic, lyapunov_spectrum
+from vibench.sim.branches import FoundBranch, balanced_branches, shot_branches
+
+from ._branch_lines import BranchDiagram, BranchLine, line_of
+from ._branch_request import BranchMethod, BranchRequest
+from ._spectrum_request import ExponentSpectrum, SpectrumPoint, SpectrumRequest, point_of
+
+
+def branch_lines(request: BranchRequest) -> Iterator[BranchLine]:
+    """Give each branch as soon as it has been followed; stop asking, and no more is computed."""
+    return (line_of(found) for found in _found(request))
+
+
+def _found(request: BranchRequest) -> Iterator[FoundBranch]:
+    where = request.specimen, request.path, request.start, request.stop
+    if request.method is BranchMethod.SHOOTING:
+        return shot_branches(*where, request.search)
+    return balanced_branches(*where, request.balance_options, request.search)
+
+
+def diagram_of(request: BranchRequest) -> BranchDiagram:
+    """Compute everything."""
+    began = time.perf_counter()
+    lines = tuple(branch_lines(request))
+    return BranchDiagram(request, lines, time.perf_counter() - began)
+
+
+def spectrum_points(request: SpectrumRequest) -> Iterator[SpectrumPoint]:
+    """Give each point as soon as it has been computed."""
+    specimen = request.specimen
+    for value in request.values:
+        began = time.perf_counter()
+        drive = Harmonic(*request.drive(value))
+        found = lyapunov_spectrum(specimen, drive, request.accuracy, request.duration_s, request.settle_s)
+        elapsed_s = time.perf_counter() - began
+        yield point_of(found, request.damping_sum_per_s, request.confidence, elapsed_s)
+
+
+def exponent_spectrum(request: SpectrumRequest) -> ExponentSpectrum:
+    """Compute everything."""
+    began = time.perf_counter()
+    points = tuple(spectrum_points(request))
+    return ExponentSpectrum(request, points, time.perf_counter() - began)

@@ -1,0 +1,143 @@
+"""Branches and spectra as HDF5 files that other programs read: columns with units, and what was asked."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import fields
+from pathlib import Path
+
+import h5py
+import numpy as np
+from pydantic import ValidationError
+
+from vibench.sim.study import software
+
+from ..errors import InvalidRequest
+from ..exchange import new_file
+from ._branch_lines import BranchDiagram, BranchLine, LineEvent
+from ._branch_request import BranchRequest
+from ._spectrum_request import ExponentSpectrum
+
+BRANCHES_FORMAT, SPECTRUM_FORMAT = "vibench branches", "vibench spectrum"
+FORMAT_VERSION = 1
+_UNITS = {
+    "frequency_hz": "Hz",
+    "amplitude_m": "m",
+    "response_i": "1",
+    "response_ii": "1",
+    "states": "m, m, m, m/s, m/s, m/s",
+    "multiplier_real": "1",
+    "multiplier_imaginary": "1",
+    "impacts": "1",
+    "error_estimate": "1",
+}
+"""Columns of a branch, a dataset each."""
+_WORDS = ("periods", "shape", "has_twin", "is_isolated", "origin", "begin", "end", "elapsed_s")
+"""What else is known of a branch, an attribute each."""
+_EVENT_COLUMNS = ("frequency_hz", "amplitude_m", "index", "response_ii")
+_SPECTRUM_UNITS = {
+    "frequency_hz": "Hz",
+    "amplitude_m": "m",
+    "exponents_per_s": "1/s",
+    "low_per_s": "1/s",
+    "high_per_s": "1/s",
+    "sum_per_s": "1/s",
+    "dampers_per_s": "1/s",
+    "dimension": "1",
+    "dimension_low": "1",
+    "dimension_high": "1",
+    "impact_rate_hz": "Hz",
+    "blocks": "1",
+    "elapsed_s": "s",
+}
+_SPECTRUM_WORDS = ("verdict", "motion", "source", "outcome")
+
+
+def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
+    """Write branches, a group each; a file that exists is refused.
+
+    Raises
+    ------
+    InvalidRequest
+        When the name is taken, or nothing can be written there.
+
+    """
+    with _created(path, BRANCHES_FORMAT, diagram.request.model_dump_json(), diagram.elapsed_s) as file:
+        for number, line in enumerate(diagram.lines):
+            group = file.create_group(f"branch_{number:03d}")
+            for name in _WORDS:
+                group.attrs[name] = getattr(line, name)
+            for name, units in _UNITS.items():
+                group.create_dataset(name, data=getattr(line, name)).attrs["units"] = units
+            group.create_dataset("is_stable", data=line.is_stable.astype(np.int8))
+            events = group.create_group("events")
+            for name in _EVENT_COLUMNS:
+                events.create_dataset(name, data=np.array([getattr(each, name) for each in line.events]))
+            events.create_dataset(
+                "kind", data=[each.kind for each in line.events], dtype=h5py.string_dtype("utf-8")
+            )
+    return path
+
+
+def read_diagram(path: Path) -> BranchDiagram:
+    """Read branches back.
+
+    Raises
+    ------
+    InvalidRequest
+        When the file is not there, or holds none.
+
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            if file.attrs.get("format") != BRANCHES_FORMAT:
+                raise InvalidRequest(f"{path} holds no branches; give a file that vibench branches wrote")
+            request = BranchRequest.model_validate_json(str(file.attrs["request"]))
+            lines = tuple(_read_line(file[name]) for name in sorted(file) if name.startswith("branch_"))
+            return BranchDiagram(request, lines, float(file.attrs["elapsed_s"]))
+    except (OSError, KeyError, ValidationError) as error:
+        raise InvalidRequest(
+            f"{path} cannot be read as branches: {error}; give a file that vibench branches wrote"
+        ) from error
+
+
+def _read_line(group: h5py.Group) -> BranchLine:
+    kept: dict[str, object] = {name: group[name][()] for name in _UNITS}
+    for name in _WORDS:
+        value = group.attrs[name]
+        kept[name] = value.item() if isinstance(value, np.generic) else value
+    events = group["events"]
+    rows = zip(events["kind"].asstr()[()], *(events[name][()] for name in _EVENT_COLUMNS), strict=True)
+    kept["events"] = tuple(
+        LineEvent(kind, float(f), float(a), int(index), float(size)) for kind, f, a, index, size in rows
+    )
+    return BranchLine(**{each.name: kept[each.name] for each in fields(BranchLine)})  # type: ignore[arg-type]
+
+
+def write_spectrum(found: ExponentSpectrum, path: Path) -> Path:
+    """Write all exponents, a dataset a quantity; a file that exists is refused.
+
+    Raises
+    ------
+    InvalidRequest
+        When the name is taken, or nothing can be written there.
+
+    """
+    with _created(path, SPECTRUM_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
+        for name, units in _SPECTRUM_UNITS.items():
+            file.create_dataset(name, data=found.column(name)).attrs["units"] = units
+        for name in _SPECTRUM_WORDS:
+            words = [getattr(each, name) for each in found.points]
+            file.create_dataset(name, data=words, dtype=h5py.string_dtype("utf-8"))
+    return path
+
+
+@contextmanager
+def _created(path: Path, kind: str, request: str, elapsed_s: float) -> Iterator[h5py.File]:
+    """Make a new file that says what it holds; nothing is left of one that failed."""
+    with new_file(path) as unfinished, h5py.File(unfinished, "w") as file:
+        file.attrs["format"] = kind
+        file.attrs["format_version"] = FORMAT_VERSION
+        file.attrs["request"] = request
+        file.attrs["software"] = software()
+        file.attrs["elapsed_s"] = elapsed_s
+        yield file

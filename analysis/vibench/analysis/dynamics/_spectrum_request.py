@@ -1,0 +1,206 @@
+"""What is asked of exponents, and the answer at one drive."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import Field, PositiveFloat, model_validator
+
+from vibench.sim import Accuracy, LyapunovSpectrum, Parameter, PowerLaw
+
+from ..signals import Reals
+from ._specimen_choice import SpecimenChoice
+
+MOST_POINTS = 20_000
+ELASTIC = ("hertz", "linear", "linear_gap", "power")
+"""Kinds of contact that take no energy: there the exponents add up to what the dampers take."""
+
+
+class SpectrumRequest(SpecimenChoice):
+    """All exponents at every frequency, or at every level."""
+
+    along: Parameter = Parameter.FREQUENCY
+    """What changes: the drive's frequency, or its amplitude."""
+    amplitudes_m: tuple[PositiveFloat, ...] = (5e-6,)
+    """Of the base displacement; several along amplitude."""
+    frequencies_hz: tuple[PositiveFloat, ...] = (260.0,)
+    """Of the drive; several along frequency."""
+    accuracy: Accuracy = Accuracy.REFERENCE
+    """Of contacts; the sum of the exponents is as exact."""
+    duration_s: PositiveFloat = 25.0
+    """Over which exponents are averaged."""
+    settle_s: Annotated[float, Field(ge=0.0)] = 5.0
+    """Left out before, from rest."""
+    confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
+    """Of the intervals."""
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Self:
+        held = self.amplitudes_m if self.along is Parameter.FREQUENCY else self.frequencies_hz
+        if len(held) != 1 or not 1 <= len(self.values) <= MOST_POINTS:
+            raise ValueError(
+                f"{len(self.frequencies_hz)} frequencies and {len(self.amplitudes_m)} amplitudes were given; "
+                f"give one of the one and 1 to {MOST_POINTS} of the other"
+            )
+        return self
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """What changes [Hz, or m]."""
+        return self.frequencies_hz if self.along is Parameter.FREQUENCY else self.amplitudes_m
+
+    def drive(self, value: float) -> tuple[float, float]:
+        """Frequency and amplitude at a value."""
+        if self.along is Parameter.FREQUENCY:
+            return value, self.amplitudes_m[0]
+        return self.frequencies_hz[0], value
+
+    @property
+    def is_elastic(self) -> bool:
+        """The contact takes no energy, whatever it does."""
+        match self.specimen.contact:
+            case PowerLaw():
+                return True
+            case law:
+                return law.kind in ELASTIC
+
+    @property
+    def title(self) -> str:
+        """Name figures by it."""
+        held = f"{1e6 * self.amplitudes_m[0]:g} µm"
+        if self.along is Parameter.AMPLITUDE:
+            held = f"{self.frequencies_hz[0]:g} Hz"
+        return f"{self.model}, {held}"
+
+
+@dataclass(frozen=True)
+class SpectrumPoint:
+    """All exponents of the motion in which a run from rest ended."""
+
+    frequency_hz: float
+    amplitude_m: float
+    exponents_per_s: tuple[float, ...]
+    """Descending; minus infinity where a stop that holds m1 took a direction away, NaN where the run was
+    lost."""
+    low_per_s: tuple[float, ...]
+    high_per_s: tuple[float, ...]
+    sum_per_s: float
+    dampers_per_s: float
+    """What the sum must be where the contact takes no energy: -tr(M^-1 C)."""
+    dimension: float
+    """Kaplan and Yorke's, of the stroboscopic section."""
+    dimension_low: float
+    dimension_high: float
+    verdict: str
+    motion: str
+    source: str
+    blocks: int
+    """Independent stretches behind the least known exponent: with few, intervals are wide."""
+    impact_rate_hz: float
+    outcome: str
+    elapsed_s: float
+
+    @property
+    def sum_difference(self) -> float:
+        """Sum of the exponents over what the dampers take, less one."""
+        return self.sum_per_s / self.dampers_per_s - 1.0 if self.dampers_per_s else math.nan
+
+    def to_dict(self) -> dict[str, object]:
+        """Say everything; numbers that are not finite are null."""
+        return {
+            "frequency_hz": self.frequency_hz,
+            "amplitude_m": self.amplitude_m,
+            "exponents_per_s": _known(self.exponents_per_s),
+            "low_per_s": _known(self.low_per_s),
+            "high_per_s": _known(self.high_per_s),
+            "sum_per_s": _known([self.sum_per_s])[0],
+            "dampers_per_s": self.dampers_per_s,
+            "sum_difference": _known([self.sum_difference])[0],
+            "dimension": _known([self.dimension])[0],
+            "dimension_low": _known([self.dimension_low])[0],
+            "dimension_high": _known([self.dimension_high])[0],
+            "verdict": self.verdict,
+            "motion": self.motion,
+            "source": self.source,
+            "blocks": self.blocks,
+            "impact_rate_hz": self.impact_rate_hz,
+            "outcome": self.outcome,
+            "elapsed_s": self.elapsed_s,
+        }
+
+
+def point_of(
+    found: LyapunovSpectrum, dampers_per_s: float, confidence: float, elapsed_s: float
+) -> SpectrumPoint:
+    """Take a spectrum as it was computed."""
+    bounds = found.intervals_per_s(confidence)
+    low, high = found.dimension_interval(confidence)
+    is_known = bool(np.isfinite(found.exponents_per_s[0]))
+    return SpectrumPoint(
+        frequency_hz=found.drive.frequency_hz,
+        amplitude_m=found.drive.amplitude_m,
+        exponents_per_s=tuple(float(each) for each in found.exponents_per_s),
+        low_per_s=tuple(float(each) for each in bounds[:, 0]),
+        high_per_s=tuple(float(each) for each in bounds[:, 1]),
+        sum_per_s=found.sum_per_s,
+        dampers_per_s=dampers_per_s,
+        dimension=found.dimension if is_known else math.nan,
+        dimension_low=low if is_known else math.nan,
+        dimension_high=high if is_known else math.nan,
+        verdict=found.verdict.name.lower(),
+        motion=found.motion.value,
+        source=found.source.value,
+        blocks=int(found.blocks.min()),
+        impact_rate_hz=found.impact_rate_hz,
+        outcome=found.outcome.text,
+        elapsed_s=elapsed_s,
+    )
+
+
+@dataclass(frozen=True)
+class ExponentSpectrum:
+    """Everything that was computed for one request."""
+
+    request: SpectrumRequest
+    points: tuple[SpectrumPoint, ...]
+    elapsed_s: float
+
+    def column(self, name: str) -> Reals:
+        """Give one quantity of every point, shape (n,) or (n, 6)."""
+        return np.array([getattr(each, name) for each in self.points], dtype=np.float64)
+
+    @property
+    def largest_sum_difference(self) -> float:
+        """How far the sums are from the dampers' at most, relative; NaN where the contact takes energy."""
+        if not self.request.is_elastic:
+            return math.nan
+        known = [abs(each.sum_difference) for each in self.points if math.isfinite(each.sum_difference)]
+        return max(known, default=math.nan)
+
+    @property
+    def cost_sentence(self) -> str:
+        """Say what was found, with its check and its cost."""
+        chaotic = sum(each.verdict == "chaotic" for each in self.points)
+        if not self.request.is_elastic:
+            check = "the contact takes energy, so that the dampers alone do not give the sum"
+        elif not math.isfinite(self.largest_sum_difference):
+            check = "there is no damping to compare the sums with"
+        else:
+            check = f"sums differ from the dampers' {self.points[0].dampers_per_s:.6g} 1/s by "
+            check += f"{self.largest_sum_difference:.1g} at most"
+        return f"{len(self.points)} points in {self.elapsed_s:.1f} s, {chaotic} chaotic; {check}."
+
+    def to_dict(self) -> dict[str, object]:
+        """Say everything, for other programs."""
+        return {
+            "options": self.request.model_dump(mode="json"),
+            "points": [each.to_dict() for each in self.points],
+            "largest_sum_difference": _known([self.largest_sum_difference])[0],
+            "elapsed_s": self.elapsed_s,
+        }
+
+
+def _known(values: Sequence[float]) -> list[float | None]:
+    return [float(each) if math.isfinite(each) else None for each in values]

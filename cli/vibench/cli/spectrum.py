@@ -1,0 +1,130 @@
+"""`vibench spectrum`: all Lyapunov exponents over frequency or level, with intervals, sum and dimension."""
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from vibench.analysis import InvalidRequest
+from vibench.analysis.dynamics import (
+    ExponentSpectrum,
+    SpectrumPoint,
+    SpectrumRequest,
+    spectrum_points,
+    write_spectrum,
+)
+from vibench.analysis.report import ImageKind, exponent_spectrum_figure
+from vibench.sim import Accuracy, Parameter
+from vibench.sim.study import software
+
+from .interruption import told_to_stop
+from .output import bold, console, print_json
+from .paths import AsJson, room_for_folder
+from .range_option import range_of
+from .specimen_option import DampingTime, Gap, ModelWord, asked_of_specimen
+from .study import STOPPED_EXIT_CODE
+
+FILE = "spectrum.h5"
+_SHOWN = 24
+
+
+def spectrum(
+    amplitude: Annotated[
+        str,
+        typer.Option("--amplitude", metavar="M|START:STOP:STEP", help="Of the base displacement."),
+    ],
+    frequency: Annotated[
+        str, typer.Option("--frequency", metavar="F|START:STOP:STEP", help="One frequency or a range [Hz].")
+    ],
+    model: ModelWord = "hertz",
+    damping_time: DampingTime = 2e-5,
+    gap: Gap = 45e-6,
+    duration: Annotated[
+        float, typer.Option("--duration", metavar="S", help="Over which exponents are averaged.")
+    ] = 25.0,
+    settle: Annotated[float, typer.Option("--settle", metavar="S", help="Left out before, from rest.")] = 5.0,
+    accuracy: Annotated[
+        Accuracy, typer.Option("--accuracy", help="Of contacts; the sum of the exponents is as exact.")
+    ] = Accuracy.REFERENCE,
+    confidence: Annotated[float, typer.Option("--confidence", metavar="P", help="Of the intervals.")] = 0.95,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for spectrum.h5, figure and table.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Compute all Lyapunov exponents over frequency or level, their sum, and the Kaplan-Yorke dimension."""
+    a, f = range_of(amplitude, Parameter.AMPLITUDE, (1, 3)), range_of(frequency, Parameter.FREQUENCY, (1, 3))
+    asked = asked_of_specimen(
+        SpectrumRequest,
+        model,
+        damping_time,
+        gap,
+        along=Parameter.AMPLITUDE if a.stop is not None else Parameter.FREQUENCY,
+        amplitudes_m=a.values(),
+        frequencies_hz=f.values(),
+        accuracy=accuracy,
+        duration_s=duration,
+        settle_s=settle,
+        confidence=confidence,
+    )
+    if out is not None:
+        room_for_folder(out)
+        if (out / FILE).exists():
+            raise InvalidRequest(
+                f"{out / FILE} exists, and nothing is ever overwritten; choose another folder"
+            )
+    found, is_complete = _computed(asked)
+    if as_json:
+        print_json({**found.to_dict(), "is_complete": is_complete, "software": software()})
+    else:
+        _tell(found)
+    if out is not None and found.points:
+        out.mkdir(parents=True, exist_ok=True)
+        write_spectrum(found, out / FILE)
+        drawn = exponent_spectrum_figure(found).save(out, (ImageKind.PNG, ImageKind.SVG))
+        if not as_json:
+            console.print("The figure:", bold(drawn[0].resolve()))
+    if not is_complete:
+        raise typer.Exit(STOPPED_EXIT_CODE)
+
+
+def _computed(asked: SpectrumRequest) -> tuple[ExponentSpectrum, bool]:
+    points: list[SpectrumPoint] = []
+    began = time.perf_counter()
+    try:
+        with told_to_stop() as is_stopped:
+            for point in spectrum_points(asked):
+                points.append(point)
+                if is_stopped():
+                    break
+    except ValueError as error:
+        raise InvalidRequest(str(error)) from error
+    found = ExponentSpectrum(asked, tuple(points), time.perf_counter() - began)
+    return found, len(points) == len(asked.values)
+
+
+def _tell(found: ExponentSpectrum) -> None:
+    along = found.request.along
+    rows = Table(
+        title=f"All exponents [1/s] with {found.request.confidence:.0%} intervals: {found.request.title}"
+    )
+    rows.add_column("f [Hz]" if along is Parameter.FREQUENCY else "A0 [µm]", justify="right")
+    for heading in (*(f"λ{k}" for k in range(1, 7)), "sum", "dimension", "motion"):
+        rows.add_column(heading, justify="right")
+    step = max(1, -(-len(found.points) // _SHOWN))
+    for each in found.points[::step]:
+        place = each.frequency_hz if along is Parameter.FREQUENCY else 1e6 * each.amplitude_m
+        reach = [0.5 * (high - low) for low, high in zip(each.low_per_s, each.high_per_s, strict=True)]
+        rows.add_row(
+            f"{place:g}",
+            *(f"{value:.4g} ± {half:.2g}" for value, half in zip(each.exponents_per_s, reach, strict=True)),
+            f"{each.sum_per_s:.7g}",
+            f"{each.dimension:.3g} ({each.dimension_low:.3g} to {each.dimension_high:.3g})",
+            f"{each.verdict}",
+        )
+    console.print(rows)
+    if step > 1:
+        console.print(f"every {step}th of {len(found.points)} points; --json or --out gives all")
+    console.print(found.cost_sentence)

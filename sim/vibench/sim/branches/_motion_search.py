@@ -1,0 +1,169 @@
+"""Periodic motions at one drive, from many starts: from rest, between the stops, and at random. SI units."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kernels import Floats, Vector
+from ..model import Accuracy, Harmonic, Outcome, Specimen, base_transmissibility
+from ..motion import integrate, smallest_period, state_scales
+from ..periodic import OrbitShape, PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit
+
+SETTLED = 1e-3
+"""A section repeats when it changes by less, over the state's scale: Newton's iteration does the rest."""
+SAME_MOTION = 1e-5
+"""Two motions this close at one moment, over the state's scale, are one."""
+SIMPLER = 1e-6
+"""And a motion this close to half its period, or to its mirror image, is that."""
+NEARLY_MIRRORED = 0.1
+WITHIN = 0.9
+"""Random starts lie between the stops, up to this part of each gap."""
+RANDOM_REACH = 3.0
+"""They spread over this many times the gap, or the motion without stops where that is larger."""
+
+
+@dataclass(frozen=True)
+class MotionSearch:
+    """How many starts are tried, and for how long."""
+
+    places: int = 8
+    """Values of the parameter at which motions are looked for, spread evenly, ends included."""
+    starts: int = 12
+    """Random states at each of them, besides rest."""
+    settling_periods: int = 300
+    most_periods: int = 4
+    """Longest motion that is looked for, in drive periods."""
+    most_branches: int = 60
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        if self.places < 2 or self.starts < 0 or self.settling_periods < 2 * self.most_periods:
+            msg = (
+                f"A search at {self.places} places from {self.starts} starts over {self.settling_periods} "
+                "periods is not allowed: 2 places or more, no negative number, at least twice the longest "
+                "motion."
+            )
+            raise ValueError(msg)
+        if self.most_periods < 1 or self.most_branches < 1:
+            msg = (
+                f"Motions of {self.most_periods} periods, {self.most_branches} branches: at least 1 of each."
+            )
+            raise ValueError(msg)
+
+
+def periodic_motions(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterator[PeriodicOrbit]:
+    """Find periodic motions at one drive, each once; stable ones first of all, unstable ones by good luck.
+
+    Each start is followed for ``search.settling_periods``; where it then repeats, or nearly so, Newton's
+    iteration finds the motion exactly. Of a motion and its mirror image one is given.
+
+    Parameters
+    ----------
+    specimen, drive
+        The drive's phase must be zero.
+    search
+        Starts and their seed.
+
+    """
+    scales = state_scales(specimen, drive)
+    met: list[Floats] = []
+    for start in _starts(specimen, drive, search):
+        orbit = _orbit_from(specimen, drive, start, search)
+        if orbit is None:
+            continue
+        if any(np.abs((orbit.state - each) / scales).max(axis=1).min() < SAME_MOTION for each in met):
+            continue
+        met.append(orbit_states(orbit))
+        yield orbit
+
+
+def orbit_states(orbit: PeriodicOrbit) -> Floats:
+    """States of a motion at the drive's time zero of each period, and of its mirror image, shape (n, 6)."""
+    mapping = orbit.period_map
+    states = [orbit.state]
+    one = PeriodMap(mapping.specimen)
+    for _ in range(mapping.periods - 1):
+        states.append(one.image(states[-1], orbit.drive))
+    lower, upper = mapping.specimen.gaps_m
+    if lower == upper:
+        half = integrate(
+            mapping.specimen, orbit.drive, 0.5 / orbit.drive.frequency_hz, Accuracy.REFERENCE, states[0]
+        )
+        states.append(-half.final_state)
+        for _ in range(mapping.periods - 1):
+            states.append(one.image(states[-1], orbit.drive))
+    return np.array(states)
+
+
+def _starts(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterator[Vector]:
+    """Rest, the motion without stops where it keeps between them, then random states between the stops."""
+    linear = drive.amplitude_m * np.abs(base_transmissibility(specimen, drive.frequency_hz)[0])
+    yield np.zeros(6)
+    if linear[3] < min(specimen.gaps_m):
+        yield _free_state(specimen, drive)
+    lower, upper = specimen.gaps_m
+    near = min(lower, upper)
+    rng = np.random.default_rng([search.seed, int(drive.frequency_hz * 1e3), int(drive.amplitude_m * 1e9)])
+    reach = RANDOM_REACH * max(near, float(linear[2]) if np.isfinite(linear[2]) else near)
+    speed = 2.0 * np.pi * drive.frequency_hz
+    for _ in range(search.starts):
+        x, z = rng.uniform(-reach, reach, 2)
+        p = rng.uniform(-min(lower, 3.0 * near), min(upper, 3.0 * near)) * WITHIN
+        rates = rng.uniform(-reach, reach, 3) * speed
+        yield np.array([x, z + p, z, *rates])
+
+
+def _free_state(specimen: Specimen, drive: Harmonic) -> Vector:
+    """State at time zero of the motion without stops under A0 sin(w t)."""
+    phasors = -1j * drive.amplitude_m * base_transmissibility(specimen, drive.frequency_hz)[0, :3]
+    return np.concatenate([phasors.real, (2j * np.pi * drive.frequency_hz * phasors).real])
+
+
+def _orbit_from(
+    specimen: Specimen, drive: Harmonic, start: Vector, search: MotionSearch
+) -> PeriodicOrbit | None:
+    run = integrate(
+        specimen,
+        drive,
+        search.settling_periods / drive.frequency_hz,
+        Accuracy.STANDARD,
+        start,
+        sample_rate_hz=drive.frequency_hz,
+    )
+    if run.outcome is not Outcome.REACHED_END:
+        return None
+    section = run.states[-2 * search.most_periods :]
+    periods = smallest_period(section, state_scales(specimen, drive), SETTLED, search.most_periods)
+    return settled_orbit(specimen, drive, run.final_state, periods or 1)
+
+
+def settled_orbit(specimen: Specimen, drive: Harmonic, state: Vector, periods: int) -> PeriodicOrbit | None:
+    """Shoot from a state near a motion of so many periods; the motion in its simplest form, None if lost."""
+    lower, upper = specimen.gaps_m
+    shapes = [OrbitShape.REPEATED]
+    if lower == upper and periods % 2 == 1:
+        mirrored = PeriodMap(specimen, OrbitShape.MIRRORED, periods).image(state, drive)
+        off = float(np.abs((mirrored - state) / state_scales(specimen, drive)).max())
+        shapes = [OrbitShape.MIRRORED, *shapes] if off < NEARLY_MIRRORED else [*shapes, OrbitShape.MIRRORED]
+    for shape in shapes:
+        orbit = periodic_orbit(specimen, drive, shape, periods, state)
+        if orbit.outcome is ShootingEnd.CONVERGED:
+            return simplest(orbit)
+    return None
+
+
+def simplest(orbit: PeriodicOrbit) -> PeriodicOrbit:
+    """Tell a motion by the shortest map that it is a fixed point of."""
+    mapping = orbit.period_map.simpler
+    while mapping is not None:
+        off = (mapping.image(orbit.state, orbit.drive) - orbit.state) / state_scales(
+            mapping.specimen, orbit.drive
+        )
+        if not float(np.abs(off).max()) < SIMPLER:
+            break
+        found = periodic_orbit(mapping.specimen, orbit.drive, mapping.shape, mapping.periods, orbit.state)
+        if found.outcome is not ShootingEnd.CONVERGED:
+            break
+        orbit, mapping = found, found.period_map.simpler
+    return orbit
