@@ -132,7 +132,7 @@ def _drive(
         if frequency is not None:
             chosen = range_of(frequency, Parameter.FREQUENCY, (2,))
             low, high = chosen.start, chosen.stop or high
-        return curves, {"along": Parameter.FREQUENCY, "amplitude_m": level, "start": low, "stop": high}
+        return curves, {"along": Parameter.FREQUENCY, "recorded_level": level, "start": low, "stop": high}
     if amplitude is None or frequency is None:
         raise InvalidRequest(
             "--amplitude or --frequency is missing; give both, one of them as a range START:STOP, or --like"
@@ -195,6 +195,6 @@ def _told(number: int, line: BranchLine, along: Parameter) -> str:
     isolated = ", isolated" if line.is_isolated else ""
     return (
         f"{number}: period {line.periods}, {line.shape}{isolated}: {place.min():.5g} to "
-        f"{place.max():.5g} {unit}, {line.points} motions, {line.is_stable.mean():.0%} stable, {line.elapsed_s:.1f} s"
-        + (f"; {named} {unit}" if named else "")
+        f"{place.max():.5g} {unit}, {line.points} motions, {line.is_stable.mean():.0%} stable, "
+        f"{line.elapsed_s:.1f} s" + (f"; {named} {unit}" if named else "")
     )

@@ -20,13 +20,6 @@ class Range:
     stop: float | None = None
     step: float | None = None
 
-    def values(self) -> tuple[float, ...]:
-        """Every value, evenly spaced; both ends where the step fits."""
-        if self.stop is None or self.step is None:
-            return (self.start,)
-        count = math.floor((self.stop - self.start) / self.step * (1.0 + 1e-9)) + 1
-        return tuple(self.start + k * self.step for k in range(count))
-
 
 def range_of(text: str, parameter: Parameter, parts: tuple[int, ...]) -> Range:
     """Read ``260``, ``50:600`` or ``50:600:1``, whichever numbers of parts are allowed.

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from vibench.analysis import InvalidRequest
 from vibench.analysis.dynamics import (
@@ -22,7 +21,7 @@ from vibench.sim.study import software
 from .interruption import told_to_stop
 from .output import bold, console, print_json
 from .paths import AsJson, room_for_folder
-from .range_option import range_of
+from .range_option import Range, range_of
 from .specimen_option import DampingTime, Gap, ModelWord, asked_of_specimen
 from .study import STOPPED_EXIT_CODE
 
@@ -61,9 +60,7 @@ def spectrum(
         model,
         damping_time,
         gap,
-        along=Parameter.AMPLITUDE if a.stop is not None else Parameter.FREQUENCY,
-        amplitudes_m=a.values(),
-        frequencies_hz=f.values(),
+        **_drive(a, f),
         accuracy=accuracy,
         duration_s=duration,
         settle_s=settle,
@@ -90,6 +87,20 @@ def spectrum(
         raise typer.Exit(STOPPED_EXIT_CODE)
 
 
+def _drive(amplitude: Range, frequency: Range) -> dict[str, object]:
+    """Read along what the exponents are computed; one point lies along frequency."""
+    if amplitude.stop is not None and frequency.stop is not None:
+        raise InvalidRequest(
+            "--amplitude and --frequency were both given as ranges; give one of them as one number"
+        )
+    if amplitude.stop is not None:
+        along = {"along": Parameter.AMPLITUDE, "frequency_hz": frequency.start}
+        return {**along, "start": amplitude.start, "stop": amplitude.stop, "step": amplitude.step}
+    stop, step = frequency.stop or frequency.start, frequency.step or 1.0
+    along = {"along": Parameter.FREQUENCY, "amplitude_m": amplitude.start}
+    return {**along, "start": frequency.start, "stop": stop, "step": step}
+
+
 def _computed(asked: SpectrumRequest) -> tuple[ExponentSpectrum, bool]:
     points: list[SpectrumPoint] = []
     began = time.perf_counter()
@@ -107,24 +118,20 @@ def _computed(asked: SpectrumRequest) -> tuple[ExponentSpectrum, bool]:
 
 def _tell(found: ExponentSpectrum) -> None:
     along = found.request.along
-    rows = Table(
-        title=f"All exponents [1/s] with {found.request.confidence:.0%} intervals: {found.request.title}"
-    )
-    rows.add_column("f [Hz]" if along is Parameter.FREQUENCY else "A0 [µm]", justify="right")
-    for heading in (*(f"λ{k}" for k in range(1, 7)), "sum", "dimension", "motion"):
-        rows.add_column(heading, justify="right")
+    console.print(f"All exponents [1/s] with {found.request.confidence:.0%} intervals: {found.request.title}")
     step = max(1, -(-len(found.points) // _SHOWN))
     for each in found.points[::step]:
-        place = each.frequency_hz if along is Parameter.FREQUENCY else 1e6 * each.amplitude_m
-        reach = [0.5 * (high - low) for low, high in zip(each.low_per_s, each.high_per_s, strict=True)]
-        rows.add_row(
-            f"{place:g}",
-            *(f"{value:.4g} ± {half:.2g}" for value, half in zip(each.exponents_per_s, reach, strict=True)),
-            f"{each.sum_per_s:.7g}",
-            f"{each.dimension:.3g} ({each.dimension_low:.3g} to {each.dimension_high:.3g})",
-            f"{each.verdict}",
+        place = (
+            f"{each.frequency_hz:g} Hz" if along is Parameter.FREQUENCY else f"{1e6 * each.amplitude_m:g} µm"
         )
-    console.print(rows)
+        six = ", ".join(
+            f"{value:.4g} ± {0.5 * (high - low):.2g}"
+            for value, low, high in zip(each.exponents_per_s, each.low_per_s, each.high_per_s, strict=True)
+        )
+        console.print(
+            f"{place}: {six}; sum {each.sum_per_s:.9g}; dimension {each.dimension:.3g} "
+            f"({each.dimension_low:.3g} to {each.dimension_high:.3g}); {each.verdict}"
+        )
     if step > 1:
         console.print(f"every {step}th of {len(found.points)} points; --json or --out gives all")
     console.print(found.cost_sentence)

@@ -166,8 +166,8 @@ class BranchDiagram:
         worst = max(float(np.max(line.error_estimate)) for line in self.lines)
         return (
             f"{len(self.lines)} branches ({isolated} isolated), {self.points} motions in "
-            f"{self.elapsed_s:.1f} s; error {self.largest_error:.1g} of the fundamental of p in the middle of the worst branch, "
-            f"{worst:.1g} at the worst point."
+            f"{self.elapsed_s:.1f} s; error {self.largest_error:.1g} of the fundamental of p in the "
+            f"middle of the worst branch, {worst:.1g} at the worst point."
         )
 
     def to_dict(self) -> dict[str, object]:

@@ -42,8 +42,8 @@ class BranchRequest(SpecimenChoice):
     """Exact, or balanced with many harmonics, or with one."""
     along: Parameter = Parameter.FREQUENCY
     """What changes: the drive's frequency, or its amplitude."""
-    amplitude_m: PositiveFloat | tuple[tuple[PositiveFloat, PositiveFloat], ...] = 5e-6
-    """Of the base displacement, along frequency; or pairs of frequency [Hz] and amplitude, as recorded."""
+    amplitude_m: PositiveFloat = 5e-6
+    """Of the base displacement, along frequency."""
     frequency_hz: PositiveFloat = 260.0
     """Of the drive, along amplitude."""
     start: PositiveFloat = 50.0
@@ -60,6 +60,8 @@ class BranchRequest(SpecimenChoice):
     """Longest motion that is looked for, in drive periods."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Of the random states."""
+    recorded_level: tuple[tuple[PositiveFloat, PositiveFloat], ...] = ()
+    """Pairs of frequency [Hz] and base amplitude [m] that stand in the place of one amplitude."""
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
@@ -68,16 +70,11 @@ class BranchRequest(SpecimenChoice):
                 f"the range {self.start:g} to {self.stop:g} does not ascend; give the lower first"
             )
         self._refuse_other_laws()
-        match self.amplitude_m:
-            case tuple() as pairs:
-                if self.along is Parameter.AMPLITUDE:
-                    raise ValueError(
-                        "a recorded level goes with frequencies; along amplitude give one frequency"
-                    )
-                if len(pairs) < 2 or not all(a[0] < b[0] for a, b in pairwise(pairs)):
-                    raise ValueError("a recorded level needs two or more ascending frequencies")
-            case _:
-                pass
+        pairs = self.recorded_level
+        if pairs and self.along is Parameter.AMPLITUDE:
+            raise ValueError("a recorded level goes along frequency; along amplitude give one frequency")
+        if pairs and (len(pairs) < 2 or not all(a[0] < b[0] for a, b in pairwise(pairs))):
+            raise ValueError("a recorded level needs two or more ascending frequencies")
         return self
 
     def _refuse_other_laws(self) -> None:
@@ -103,11 +100,10 @@ class BranchRequest(SpecimenChoice):
         """How the drive changes."""
         if self.along is Parameter.AMPLITUDE:
             return AmplitudePath(self.frequency_hz)
-        match self.amplitude_m:
-            case tuple() as pairs:
-                return FrequencyPath(tuple(a for _, a in pairs), tuple(f for f, _ in pairs))
-            case amplitude_m:
-                return FrequencyPath((float(amplitude_m),))
+        if self.recorded_level:
+            frequencies_hz, amplitudes_m = zip(*self.recorded_level, strict=True)
+            return FrequencyPath(amplitudes_m, frequencies_hz)
+        return FrequencyPath((self.amplitude_m,))
 
     @property
     def search(self) -> MotionSearch:
@@ -130,14 +126,11 @@ class BranchRequest(SpecimenChoice):
     @property
     def title(self) -> str:
         """Name curves and figures by it."""
+        where = f"{1e6 * self.amplitude_m:g} µm"
         if self.along is Parameter.AMPLITUDE:
             where = f"{self.frequency_hz:g} Hz"
-        else:
-            match self.amplitude_m:
-                case tuple():
-                    where = "recorded level"
-                case amplitude_m:
-                    where = f"{1e6 * float(amplitude_m):g} µm"
+        elif self.recorded_level:
+            where = "recorded level"
         return f"{self.model}, {where}, {self.method.value}"
 
     @property

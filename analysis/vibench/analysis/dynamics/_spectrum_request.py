@@ -14,6 +14,8 @@ from ..signals import Reals
 from ._specimen_choice import SpecimenChoice
 
 MOST_POINTS = 20_000
+ROUNDING = 1e-9
+"""A step that fits into the range but for rounding fits."""
 ELASTIC = ("hertz", "linear", "linear_gap", "power")
 """Kinds of contact that take no energy: there the exponents add up to what the dampers take."""
 
@@ -23,10 +25,16 @@ class SpectrumRequest(SpecimenChoice):
 
     along: Parameter = Parameter.FREQUENCY
     """What changes: the drive's frequency, or its amplitude."""
-    amplitudes_m: tuple[PositiveFloat, ...] = (5e-6,)
-    """Of the base displacement; several along amplitude."""
-    frequencies_hz: tuple[PositiveFloat, ...] = (260.0,)
-    """Of the drive; several along frequency."""
+    amplitude_m: PositiveFloat = 5e-6
+    """Of the base displacement, along frequency."""
+    frequency_hz: PositiveFloat = 260.0
+    """Of the drive, along amplitude."""
+    start: PositiveFloat = 240.0
+    """Lower end of the range, in Hz or in m."""
+    stop: PositiveFloat = 280.0
+    """Upper end of the range, in Hz or in m."""
+    step: PositiveFloat = 10.0
+    """Between neighbouring points, in Hz or in m."""
     accuracy: Accuracy = Accuracy.REFERENCE
     """Of contacts; the sum of the exponents is as exact."""
     duration_s: PositiveFloat = 25.0
@@ -38,24 +46,29 @@ class SpectrumRequest(SpecimenChoice):
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
-        held = self.amplitudes_m if self.along is Parameter.FREQUENCY else self.frequencies_hz
-        if len(held) != 1 or not 1 <= len(self.values) <= MOST_POINTS:
+        if self.start > self.stop:
             raise ValueError(
-                f"{len(self.frequencies_hz)} frequencies and {len(self.amplitudes_m)} amplitudes were given; "
-                f"give one of the one and 1 to {MOST_POINTS} of the other"
+                f"the range {self.start:g} to {self.stop:g} does not ascend; give the lower first"
             )
+        if self.points > MOST_POINTS:
+            raise ValueError(f"{self.points} points are asked for; at most {MOST_POINTS}: take a larger step")
         return self
+
+    @property
+    def points(self) -> int:
+        """Scenes that are computed."""
+        return math.floor((self.stop - self.start) / self.step * (1.0 + ROUNDING) + ROUNDING) + 1
 
     @property
     def values(self) -> tuple[float, ...]:
         """What changes [Hz, or m]."""
-        return self.frequencies_hz if self.along is Parameter.FREQUENCY else self.amplitudes_m
+        return tuple(self.start + k * self.step for k in range(self.points))
 
     def drive(self, value: float) -> tuple[float, float]:
         """Frequency and amplitude at a value."""
         if self.along is Parameter.FREQUENCY:
-            return value, self.amplitudes_m[0]
-        return self.frequencies_hz[0], value
+            return value, self.amplitude_m
+        return self.frequency_hz, value
 
     @property
     def is_elastic(self) -> bool:
@@ -69,9 +82,9 @@ class SpectrumRequest(SpecimenChoice):
     @property
     def title(self) -> str:
         """Name figures by it."""
-        held = f"{1e6 * self.amplitudes_m[0]:g} µm"
+        held = f"{1e6 * self.amplitude_m:g} µm"
         if self.along is Parameter.AMPLITUDE:
-            held = f"{self.frequencies_hz[0]:g} Hz"
+            held = f"{self.frequency_hz:g} Hz"
         return f"{self.model}, {held}"
 
 

@@ -8,8 +8,10 @@ from ._progress import (
 from ._request import (
     PartialResult as PartialResult,
     SimulationRequest as SimulationRequest,
+    Trouble as Trouble,
 )
 from ._worker import (
+    Asked as Asked,
     Begin as Begin,
     Cancel as Cancel,
     Ended as Ended,

@@ -5,7 +5,7 @@ A simulation that tells its answers as they come, and stops when it is told to.
 
 import os
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -25,6 +25,7 @@ from vibench.sim.study import (
     run_study,
 )
 
+from ..dynamics import BranchRequest, SpectrumRequest, branch_lines, spectrum_points
 from ._request import PartialResult, SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
 
 Tell = Callable[[tuple[PartialResult, ...]], None]
@@ -128,12 +129,34 @@ def simulated_point(model: str, found: ScenePrediction) -> SimulatedPoint:
     )
 
 
+Asked = SimulationRequest | BranchRequest | SpectrumRequest
+"""What the process answers."""
+
+
+def answer(request: Asked, tell: Tell, cancelled: Cancelled) -> None:
+    """Compute whatever is asked for, telling it piece by piece; returns early when cancelled."""
+    match request:
+        case SimulationRequest():
+            simulate(request, tell, cancelled)
+        case BranchRequest():
+            _tell_each(branch_lines(request), tell, cancelled)
+        case SpectrumRequest():
+            _tell_each(spectrum_points(request), tell, cancelled)
+
+
+def _tell_each(parts: Iterable[PartialResult], tell: Tell, cancelled: Cancelled) -> None:
+    for part in parts:
+        if cancelled():
+            return
+        tell((part,))
+
+
 @dataclass(frozen=True)
 class Begin:
     """Compute this; what was being computed is dropped."""
 
     number: int
-    request: SimulationRequest
+    request: Asked
 
 
 @dataclass(frozen=True)
@@ -192,7 +215,7 @@ def _computed(connection: "Connection[Grown | Ended, Order]", begin: Begin) -> B
         connection.send(Grown(begin.number, parts))
 
     try:
-        simulate(begin.request, tell, is_cancelled)
+        answer(begin.request, tell, is_cancelled)
     except ValueError as error:
         tell((Trouble(str(error)),))
     connection.send(Ended(begin.number))

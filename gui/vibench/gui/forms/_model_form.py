@@ -262,11 +262,17 @@ class JudgedForm(QWidget, Generic[Model]):
 
     changed = Signal()
 
-    def __init__(self, model: type[Model], name: str, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        model: type[Model],
+        name: str,
+        hidden: frozenset[str] = frozenset(),
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
         self._model = model
         self._value: Model | None = None
-        self.form = ModelForm(model)
+        self.form = ModelForm(model, hidden)
         self._complaint = QLabel()
         self._complaint.setProperty("rank", "complaint")
         self._complaint.setWordWrap(True)

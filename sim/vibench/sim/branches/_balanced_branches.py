@@ -25,7 +25,7 @@ from ..periodic import (
 from ._found_branch import BranchOrigin, FoundBranch, known_among
 from ._motion_search import MotionSearch, periodic_motions
 
-STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-10, most_points=3000)
+STEPS = ArcSteps(first=0.01, longest=0.03, shortest=1e-7, tolerance=1e-10, most_points=3000)
 
 
 def balanced_branches(

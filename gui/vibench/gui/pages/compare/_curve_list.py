@@ -16,6 +16,8 @@ _DASHES = {
     CurveOrigin.MEASURED: Dash.SOLID,
     CurveOrigin.SIMULATED: Dash.DASHED,
     CurveOrigin.PREDICTED: Dash.DASH_DOTTED,
+    CurveOrigin.STABLE: Dash.SOLID,
+    CurveOrigin.UNSTABLE: Dash.DASHED,
 }
 _SHOWN_FIRST = {CurveKind.TRANSMISSIBILITY, CurveKind.RESPONSE_I}
 """Of a sweep's two responses the first is shown at once: both lie on one another where nothing collides."""

@@ -16,7 +16,8 @@ MAGNITUDE = PlotAxis("Motion of m0 over base, |x / U|", short="|x / U|", scale=S
 DIFFERENCE = PlotAxis("Difference", "dB")
 _MARKER = LineStyle(lambda theme: theme.accent)
 _BAND, _BAND_COLUMNS = 0.16, 300
-_DOTS = {CurveOrigin.MEASURED: 10, CurveOrigin.SIMULATED: 6, CurveOrigin.PREDICTED: 4}
+_DOTS = {CurveOrigin.MEASURED: 10, CurveOrigin.SIMULATED: 6}
+_OTHER_DOTS = 4
 
 
 class CurvePlots(QWidget):
@@ -93,7 +94,7 @@ class CurvePlots(QWidget):
     def _draw(self, curve: Curve, line_style: LineStyle) -> None:
         lone = curve.frequency_hz.size == 1
         if lone:
-            self.magnitudes.dots(line_style, curve.name, size=_DOTS[curve.origin]).setData(
+            self.magnitudes.dots(line_style, curve.name, size=_DOTS.get(curve.origin, _OTHER_DOTS)).setData(
                 curve.frequency_hz, curve.magnitude
             )
             return

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QProgressBar,
+    QTabWidget,
     QVBoxLayout,
     QWidget,
 )
@@ -24,6 +25,9 @@ from ...forms import JudgedForm
 from ...page import AppContext, Page, SideAndPicture
 from ...widgets import COMPARE, SIMULATE, Notice, NoticeKind, ReadTable, Theme, push_button
 from ._answer_plots import AnswerPlots
+from ._dynamics_kinds import BRANCHES, SPECTRUM
+from ._dynamics_pictures import BranchPicture, SpectrumPicture
+from ._dynamics_view import DynamicsView
 from ._simulator import Simulator
 
 _LINES = 6
@@ -41,6 +45,8 @@ class SimulatePage(Page):
         self._progress: SimulationProgress | None = None
         self._is_stale = False
         self._undrawn: list[Callable[[], None]] = []
+        self.branches = DynamicsView(context, BRANCHES, BranchPicture(context.theme))
+        self.spectrum = DynamicsView(context, SPECTRUM, SpectrumPicture(context.theme))
         self._build()
         self.form.changed.connect(self._say_cost)
         self.simulator.grown.connect(self._grow)
@@ -68,14 +74,20 @@ class SimulatePage(Page):
             self._show_motions()
         if self._undrawn:
             self._undrawn.pop(0)()
+        self.branches.refresh()
+        self.spectrum.refresh()
 
     def left(self) -> None:
         """Keep how the page is divided."""
         self._parts.keep()
+        self.branches.left()
+        self.spectrum.left()
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
         self.plots.retheme(theme)
+        self.branches.retheme(theme)
+        self.spectrum.retheme(theme)
 
     def begin(self) -> None:
         """Simulate what the form says."""
@@ -149,7 +161,12 @@ class SimulatePage(Page):
     def _build(self) -> None:
         self._parts = SideAndPicture(self.context, SIMULATE, self._side(), self._answer())
         layout = QVBoxLayout(self)
-        layout.addWidget(self._parts)
+        self.tabs = QTabWidget()
+        self.tabs.setAccessibleName("What is simulated")
+        self.tabs.addTab(self._parts, "Responses")
+        self.tabs.addTab(self.branches, "Branches")
+        self.tabs.addTab(self.spectrum, "Exponents")
+        layout.addWidget(self.tabs)
 
     def _side(self) -> QWidget:
         scene = QGroupBox("Scene")

@@ -6,7 +6,7 @@ from multiprocessing.context import SpawnProcess
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from vibench.analysis.simulation import Begin, Cancel, Ended, Grown, Order, SimulationRequest, serve
+from vibench.analysis.simulation import Asked, Begin, Cancel, Ended, Grown, Order, serve
 
 POLL_MS = 50
 MOST_AT_ONCE = 200
@@ -38,7 +38,7 @@ class Simulator(QObject):
         """Whether an answer is still to come."""
         return self._is_busy
 
-    def begin(self, request: SimulationRequest) -> None:
+    def begin(self, request: Asked) -> None:
         """Ask; the answer to an earlier request is dropped."""
         connection = self._connected()
         self._number += 1

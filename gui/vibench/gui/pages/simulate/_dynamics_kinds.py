@@ -1,0 +1,57 @@
+"""The two tabs beside the responses: what each asks, and how it tells its answer."""
+
+from typing import cast
+
+from vibench.analysis import Curve
+from vibench.analysis.dynamics import (
+    BranchDiagram,
+    BranchLine,
+    BranchRequest,
+    ExponentSpectrum,
+    SpectrumPoint,
+    SpectrumRequest,
+)
+from vibench.analysis.simulation import PartialResult
+
+from ._dynamics_view import DynamicsKind
+
+
+def _diagram(request: BranchRequest, parts: tuple[PartialResult, ...], elapsed_s: float) -> BranchDiagram:
+    return BranchDiagram(request, cast("tuple[BranchLine, ...]", parts), elapsed_s)
+
+
+def _spectrum(
+    request: SpectrumRequest, parts: tuple[PartialResult, ...], elapsed_s: float
+) -> ExponentSpectrum:
+    return ExponentSpectrum(request, cast("tuple[SpectrumPoint, ...]", parts), elapsed_s)
+
+
+def _no_curves(_answer: ExponentSpectrum) -> tuple[Curve, ...]:
+    """Exponents are no responses: nothing to lay over a recording."""
+    return ()
+
+
+BRANCHES = DynamicsKind(
+    name="branches",
+    request=BranchRequest,
+    hidden=frozenset({"recorded_level"}),
+    answer=_diagram,
+    cost=lambda answer: answer.cost_sentence,
+    curves=lambda answer: answer.curves(),
+    before=(
+        "A search runs every start for 300 drive periods, a branch takes a second to some; the error of each "
+        "motion is told with it (docs/branches.md)."
+    ),
+)
+SPECTRUM = DynamicsKind(
+    name="exponents",
+    request=SpectrumRequest,
+    hidden=frozenset(),
+    answer=_spectrum,
+    cost=lambda answer: answer.cost_sentence,
+    curves=_no_curves,
+    before=(
+        "Each point follows six small changes for its whole duration; the sum of the exponents, which the "
+        "dampers fix, is its check (docs/spectrum.md)."
+    ),
+)

@@ -1,0 +1,206 @@
+"""A tab of the Simulate page: a form, an answer that grows piece by piece, and its cost and error."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Generic, Protocol, TypeVar
+
+from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from vibench.analysis import Curve
+from vibench.analysis.dynamics import SpecimenChoice
+from vibench.analysis.simulation import Asked, PartialResult, Trouble
+
+from ...forms import JudgedForm
+from ...page import AppContext, SideAndPicture
+from ...widgets import COMPARE, Notice, NoticeKind, Theme, push_button
+from ._simulator import Simulator
+
+Request = TypeVar("Request", bound=SpecimenChoice)
+Answer = TypeVar("Answer")
+Shown_contra = TypeVar("Shown_contra", contravariant=True)
+
+
+class AnswerPicture(Protocol[Shown_contra]):
+    """Draws an answer as far as it has come."""
+
+    @property
+    def widget(self) -> QWidget:
+        """What is put into the tab."""
+
+    def show_answer(self, answer: Shown_contra) -> None:
+        """Draw anew."""
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+
+
+@dataclass(frozen=True)
+class DynamicsKind(Generic[Request, Answer]):
+    """What a tab asks, and how its answer is told."""
+
+    name: str
+    request: type[Request]
+    hidden: frozenset[str]
+    """Fields that a form cannot show."""
+    answer: Callable[[Request, tuple[PartialResult, ...], float], Answer]
+    """From the pieces so far, and the seconds they took."""
+    cost: Callable[[Answer], str]
+    curves: Callable[[Answer], tuple[Curve, ...]]
+    before: str
+    """What an answer costs and errs, said before there is one."""
+
+
+@dataclass
+class _Course:
+    """An answer under way."""
+
+    request: Asked
+    began: float
+    parts: list[PartialResult] = field(default_factory=list)
+    troubles: list[str] = field(default_factory=list)
+
+
+class DynamicsView(QWidget, Generic[Request, Answer]):
+    """The form on the left; on the right the picture, its cost and error below it."""
+
+    def __init__(
+        self, context: AppContext, kind: DynamicsKind[Request, Answer], picture: AnswerPicture[Answer]
+    ) -> None:
+        super().__init__()
+        self.context, self.kind, self.picture = context, kind, picture
+        self.form: JudgedForm[Request] = JudgedForm(kind.request, kind.name, kind.hidden)
+        self.simulator = Simulator(self)
+        self.answer: Answer | None = None
+        self._course: _Course | None = None
+        self._is_stale = False
+        self._build()
+        self.form.changed.connect(self._judge)
+        self.simulator.grown.connect(self._grow)
+        self.simulator.ended.connect(self._end)
+        self.simulator.died.connect(self._die)
+        self.destroyed.connect(self.simulator.close)
+        self._judge()
+
+    @property
+    def said(self) -> str:
+        """What stands below the picture."""
+        return self._state.text()
+
+    def refresh(self) -> None:
+        """Draw what has come since the last time."""
+        if self._is_stale and self.answer is not None:
+            self._is_stale = False
+            self.picture.show_answer(self.answer)
+
+    def left(self) -> None:
+        """Keep how the tab is divided."""
+        self._parts.keep()
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self.picture.retheme(theme)
+
+    def begin(self) -> None:
+        """Ask what the form says."""
+        request = self.form.value
+        if request is None:
+            return
+        self._course = _Course(request, time.perf_counter())  # type: ignore[arg-type]
+        self._take(())
+        self.simulator.begin(request)  # type: ignore[arg-type]
+        self._say("Looking; the first answer waits for the program to be made ready…")
+
+    def cancel(self) -> None:
+        """Want no more; what has been found stays."""
+        self.simulator.cancel()
+        self._say("Cancelled; what had been found is shown.")
+
+    def _grow(self, parts: tuple[PartialResult, ...]) -> None:
+        self._take(parts)
+        self._say("Looking…")
+
+    def _take(self, parts: tuple[PartialResult, ...]) -> None:
+        course = self._course
+        if course is None:
+            return
+        for part in parts:
+            match part:
+                case Trouble():
+                    course.troubles.append(part.sentence)
+                case _:
+                    course.parts.append(part)
+        elapsed_s = time.perf_counter() - course.began
+        self.answer = self.kind.answer(course.request, tuple(course.parts), elapsed_s)  # type: ignore[arg-type]
+        self._is_stale = True
+
+    def _end(self) -> None:
+        self._take(())
+        self._say("Complete.")
+        if self._course is not None and self._course.troubles:
+            self.context.say(Notice(NoticeKind.WARNING, self._course.troubles[0]))
+
+    def _die(self, what: str) -> None:
+        self.context.say(
+            Notice(NoticeKind.FAULT, what, "What had been found is shown.", "Ask again.", "SIMULATOR")
+        )
+        self._say("It broke off.")
+
+    def _say(self, text: str) -> None:
+        cost = "" if self.answer is None else self.kind.cost(self.answer)
+        self._state.setText(f"{text} {cost}")
+        self._cancel.setEnabled(self.simulator.is_busy)
+        self._compare.setEnabled(self.answer is not None and bool(self.kind.curves(self.answer)))
+
+    def _judge(self) -> None:
+        self._begin.setEnabled(self.form.value is not None)
+
+    def _hand_to_compare(self) -> None:
+        if self.answer is not None:
+            self.context.prediction_made.emit(self.kind.curves(self.answer))
+            self.context.page_wanted.emit(COMPARE)
+
+    def _build(self) -> None:
+        name = f"simulate {self.kind.name}"
+        self._parts = SideAndPicture(self.context, name, self._side(), self._right())
+        QVBoxLayout(self).addWidget(self._parts)
+
+    def _side(self) -> QWidget:
+        scene = QGroupBox("Scene")
+        QVBoxLayout(scene).addWidget(self.form)
+        before = QLabel(self.kind.before)
+        before.setWordWrap(True)
+        before.setProperty("rank", "second")
+        self._begin = push_button("&Find", "Compute what the form says, in another process", self.begin)
+        self._begin.setProperty("rank", "first")
+        self._cancel = push_button("&Cancel", "Want no more; what has been found stays", self.cancel)
+        self._cancel.setEnabled(False)
+        row = QHBoxLayout()
+        row.addWidget(self._begin, 1)
+        row.addWidget(self._cancel)
+        side = QWidget()
+        layout = QVBoxLayout(side)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scene)
+        layout.addWidget(before)
+        layout.addLayout(row)
+        layout.addStretch(1)
+        return side
+
+    def _right(self) -> QWidget:
+        self._state = QLabel("Nothing has been asked yet.")
+        self._state.setWordWrap(True)
+        self._state.setAccessibleName(f"State, cost and error of the {self.kind.name}")
+        self._compare = push_button(
+            "&Lay over recordings", "Put these curves on the Compare page", self._hand_to_compare
+        )
+        self._compare.setEnabled(False)
+        row = QHBoxLayout()
+        row.addWidget(self._state, 1)
+        row.addWidget(self._compare)
+        right = QWidget()
+        layout = QVBoxLayout(right)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self.picture.widget, 1)
+        layout.addLayout(row)
+        return right

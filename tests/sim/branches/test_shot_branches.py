@@ -1,0 +1,248 @@
+"""Branches of exact motions against solutions that no line of the engine made, and against the exact flow."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.optimize import fsolve
+
+from vibench.sim import (
+    Accuracy,
+    AmplitudePath,
+    ArcEnd,
+    BifurcationKind,
+    FrequencyPath,
+    Harmonic,
+    gong2025,
+    integrate,
+    steady_response,
+)
+from vibench.sim.branches import BranchOrigin, MotionSearch, shot_branches
+from vibench.sim.motion import state_scales
+from vibench.sim.periodic import OrbitShape, PeriodMap
+
+FEW = MotionSearch(places=2, starts=2)
+LEVEL = FrequencyPath((5e-6,))
+
+
+def off(specimen, drive, found, k):
+    """How far the exact flow takes a point of a branch from itself, over its scale."""
+    mapping = PeriodMap(specimen, found.shape, found.periods)
+    state = found.branch.states[k]
+    return float(np.abs((mapping.image(state, drive) - state) / state_scales(specimen, drive)).max())
+
+
+@pytest.fixture(scope="module")
+def near_the_first_resonance():
+    """Branches of the paper's specimen from 88 to 100 Hz at 5 um, around its first resonance."""
+    return list(shot_branches(gong2025(), LEVEL, 88.0, 100.0, MotionSearch(places=3, starts=12)))
+
+
+class PiecewiseLinear:
+    """The specimen between linear stops as two linear systems, solved by matrix exponentials alone."""
+
+    def __init__(self, specimen, drive):
+        mass, damping, stiffness = specimen.mass_matrix, specimen.damping_matrix, specimen.stiffness_matrix
+        b = np.array([0.0, 1.0, -1.0])
+        self.stop = specimen.contact.stiffness
+        self.gap, self.omega, self.mass = specimen.gap_m, 2.0 * math.pi * drive.frequency_hz, mass
+        self.damping = damping
+        self.free, self.pressed = stiffness, stiffness + self.stop * np.outer(b, b)
+        self.b = b
+        self.force = np.zeros(3, complex)
+        self.force[0] = (specimen.stiffnesses[0] + 1j * self.omega * specimen.dampings[0]) * (
+            drive.amplitude_m / 1j
+        )
+
+    def step(self, state, start, length, stiffness, push):
+        inverse = np.linalg.inv(self.mass)
+        system = np.block([[np.zeros((3, 3)), np.eye(3)], [-inverse @ stiffness, -inverse @ self.damping]])
+        x = np.linalg.solve(
+            stiffness - self.omega**2 * self.mass + 1j * self.omega * self.damping, self.force
+        )
+        rest = np.concatenate([np.linalg.solve(stiffness, push), np.zeros(3)])
+
+        def steady(time):
+            turned = x * np.exp(1j * self.omega * time)
+            return np.concatenate([turned.real, (1j * self.omega * turned).real]) + rest
+
+        return expm(system * length) @ (state - steady(start)) + steady(start + length)
+
+    def motion(self, state, touch, contact):
+        """Entry state, its time and its duration of the mirrored motion with one contact a half period."""
+        half = math.pi / self.omega
+
+        def equations(unknowns):
+            entry, start, length = unknowns[:6] * 1e-6, unknowns[6] * 1e-3, unknowns[7] * 1e-5
+            entry = entry * np.repeat([1.0, 1e3], 3)
+            push = self.stop * self.gap * self.b
+            leaving = self.step(entry, start, length, self.pressed, push)
+            back = self.step(leaving, start + length, half - length, self.free, np.zeros(3))
+            p_in, p_out = self.b @ entry[:3], self.b @ leaving[:3]
+            moved = (back + entry) / np.repeat([1e-6, 1e-3], 3)
+            return np.array([*moved, (p_in - self.gap) / 1e-6, (p_out - self.gap) / 1e-6])
+
+        guess = np.array([*(state[:3] / 1e-6), *(state[3:] / 1e-3), touch / 1e-3, contact / 1e-5])
+        found, _, code, said = fsolve(equations, guess, xtol=1e-13, full_output=True)
+        assert code == 1 or np.abs(equations(found)).max() < 1e-7, said
+        entry = found[:6] * np.repeat([1e-6, 1e-3], 3)
+        return entry, found[6] * 1e-3, found[7] * 1e-5
+
+
+def test_between_linear_stops_a_branch_is_the_piecewise_exact_solution():
+    specimen, amplitude = gong2025(contact="linear_gap"), 20e-6
+    found = next(shot_branches(specimen, FrequencyPath((amplitude,)), 128.0, 140.0, FEW))
+    assert found.shape is OrbitShape.MIRRORED
+    branch = found.branch
+    checked = 0
+    for k in range(0, len(branch.frequencies_hz), 8):
+        drive = Harmonic(float(branch.frequencies_hz[k]), amplitude)
+        run = integrate(
+            specimen, drive, 2.0 / drive.frequency_hz, "reference", branch.states[k], 2e5 * drive.frequency_hz
+        )
+        p = run.states[:, 1] - run.states[:, 2]
+        inside = p > specimen.gap_m
+        enters = int(np.flatnonzero(inside[1:] & ~inside[:-1])[0]) + 1
+        lasts = int(np.argmin(inside[enters:])) / (2e5 * drive.frequency_hz)
+        piecewise = PiecewiseLinear(specimen, drive)
+        entry, start, contact = piecewise.motion(run.states[enters], run.time_s[enters], lasts)
+        half = math.pi / piecewise.omega
+        leaving = piecewise.step(
+            entry, start, contact, piecewise.pressed, piecewise.stop * piecewise.gap * piecewise.b
+        )
+        turn = math.ceil((start + contact) * drive.frequency_hz) / drive.frequency_hz
+        ahead = turn - start - contact
+        if ahead < half - contact:
+            exact = piecewise.step(leaving, start + contact, ahead, piecewise.free, np.zeros(3))
+        else:
+            pushed = piecewise.step(leaving, start + contact, half - contact, piecewise.free, np.zeros(3))
+            opposite = -piecewise.step(
+                -pushed, start, contact, piecewise.pressed, piecewise.stop * piecewise.gap * piecewise.b
+            )
+            exact = piecewise.step(
+                opposite, start + half + contact, ahead - half, piecewise.free, np.zeros(3)
+            )
+        difference = (exact - branch.states[k]) / state_scales(specimen, drive)
+        assert np.abs(difference).max() < 1e-7
+        checked += 1
+    assert checked > 5
+
+
+@pytest.mark.parametrize(
+    ("contact", "amplitude", "low", "high"),
+    [("hertz", 5e-6, 88.0, 112.0), ("linear_gap", 20e-6, 125.0, 160.0), ("power:5", 5e-6, 60.0, 100.0)],
+)
+def test_a_run_from_near_a_stable_point_settles_on_it(contact, amplitude, low, high):
+    specimen = gong2025(contact=contact)
+    found = next(shot_branches(specimen, FrequencyPath((amplitude,)), low, high, FEW))
+    branch = found.branch
+    # Those that forget a push within the run.
+    quick = np.flatnonzero(np.abs(branch.multipliers[:, 0]) < 0.95)
+    chosen = np.random.default_rng(8).choice(quick, 17)
+    for k in chosen:
+        drive = Harmonic(float(branch.frequencies_hz[k]), amplitude)
+        pushed = branch.states[k] + 1e-6 * state_scales(specimen, drive)
+        run = steady_response(specimen, drive, "reference", 600 / drive.frequency_hz, 0.2, pushed)
+        assert run.response_ii == pytest.approx(branch.response_ii[k, 0], rel=1e-5)
+        assert run.relative_ii == pytest.approx(branch.response_ii[k, 3], rel=1e-5)
+        assert run.relative_i == pytest.approx(branch.response_i[k, 3], rel=2e-5)
+
+
+def test_every_point_comes_back_within_its_error_whatever_its_stability(near_the_first_resonance):
+    specimen = gong2025()
+    for found in near_the_first_resonance:
+        branch = found.branch
+        # Where a branch joins a simpler one its own map is singular, and the last point only near it.
+        inner = range(1, len(branch.frequencies_hz) - 1)
+        assert max(off(specimen, Harmonic(branch.frequencies_hz[k], 5e-6), found, k) for k in inner) < 2e-9
+        assert np.median(branch.left_out) < 1e-6
+
+
+def test_an_isolated_branch_of_period_three_is_found_from_random_states(near_the_first_resonance):
+    (isolated,) = (each for each in near_the_first_resonance if each.is_isolated)
+    assert isolated.periods == 3
+    assert isolated.branch.begin is isolated.branch.end is ArcEnd.CLOSED
+    assert isolated.origin is BranchOrigin.SEARCH
+    folds = [e.frequency_hz for e in isolated.branch.events if e.kind is BifurcationKind.FOLD]
+    assert sorted(folds) == pytest.approx([94.188, 98.815], abs=0.01)
+    assert 0.2 < isolated.branch.is_stable.mean() < 0.8
+    # A run from there stays there: the motion is real, and not the drive's own period.
+    k = int(np.flatnonzero(isolated.branch.is_stable)[0])
+    drive = Harmonic(float(isolated.branch.frequencies_hz[k]), 5e-6)
+    once = PeriodMap(gong2025()).image(isolated.branch.states[k], drive)
+    assert np.abs((once - isolated.branch.states[k]) / state_scales(gong2025(), drive)).max() > 1e-3
+
+
+def test_where_a_symmetry_breaks_the_other_branch_begins_and_ends(near_the_first_resonance):
+    (mirrored,) = (e for e in near_the_first_resonance if e.periods == 1 and e.shape is OrbitShape.MIRRORED)
+    (broken,) = (e for e in near_the_first_resonance if e.origin is BranchOrigin.SYMMETRY_BREAKING)
+    own = [e.frequency_hz for e in mirrored.branch.events if e.kind is BifurcationKind.SYMMETRY_BREAKING]
+    joins = [e.frequency_hz for e in broken.branch.events if e.kind is BifurcationKind.SYMMETRY_BREAKING]
+    assert broken.has_twin
+    assert broken.branch.begin is broken.branch.end is ArcEnd.JOINED
+    assert sorted(joins) == pytest.approx(sorted(own), abs=0.02)
+
+
+def test_a_grazing_point_is_where_the_linear_motion_reaches_the_gap():
+    specimen = gong2025()
+    free = gong2025(contact="linear")
+    found = next(shot_branches(specimen, AmplitudePath(60.0), 1e-6, 60e-6, FEW))
+    grazing = next(e for e in found.branch.events if e.kind is BifurcationKind.GRAZING)
+    linear = steady_response(free, Harmonic(60.0, 1e-6), "reference", 20.0, 1.0)
+    assert grazing.amplitude_m == pytest.approx(specimen.gap_m / linear.relative_i, rel=1e-4)
+
+
+def test_on_rigid_stops_a_branch_is_exact_and_where_it_is_lost_a_contact_grazes():
+    specimen = gong2025(contact="rigid:0.8")
+    found = list(shot_branches(specimen, FrequencyPath((20e-6,)), 110.0, 150.0, FEW))
+    assert found
+    for each in found:
+        branch = each.branch
+        inner = range(1, len(branch.frequencies_hz) - 1)
+        worst = max(off(specimen, Harmonic(float(branch.frequencies_hz[k]), 20e-6), each, k) for k in inner)
+        assert worst < 2e-9
+        if branch.end is ArcEnd.STEP_TOO_SHORT:
+            assert branch.events[-1].kind is BifurcationKind.GRAZING
+
+
+def test_under_a_recorded_level_each_point_is_a_motion_of_its_own_level():
+    specimen = gong2025()
+    path = FrequencyPath((18e-6, 20e-6, 21e-6), (125.0, 130.0, 140.0))
+    found = next(shot_branches(specimen, path, 126.0, 138.0, FEW))
+    branch = found.branch
+    assert branch.amplitudes_m == pytest.approx([path.drive(f)[1] for f in branch.frequencies_hz])
+    assert np.ptp(branch.amplitudes_m) > 1e-6
+    for k in range(0, len(branch.frequencies_hz), 10):
+        drive = Harmonic(float(branch.frequencies_hz[k]), float(branch.amplitudes_m[k]))
+        assert off(specimen, drive, found, k) < 2e-9
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "frequencies"), [((), ()), ((1e-6, 2e-6), ()), ((1e-6, 2e-6), (2.0, 1.0)), ((0.0,), ())]
+)
+def test_a_level_that_is_none_is_refused(amplitudes, frequencies):
+    with pytest.raises(ValueError, match="not allowed"):
+        FrequencyPath(amplitudes, frequencies)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("contact", ["hertz", "linear_gap", "hunt_crossley:0.1", "power:7", "rigid:0.9"])
+def test_fifty_random_points_of_each_law_come_back(contact):
+    specimen = gong2025(contact=contact)
+    rng = np.random.default_rng(50)
+    checked = 0
+    while checked < 50:
+        low = float(rng.uniform(40.0, 500.0))
+        amplitude = float(10.0 ** rng.uniform(-6.0, -4.5))
+        for found in shot_branches(specimen, FrequencyPath((amplitude,)), low, 1.05 * low, FEW):
+            branch = found.branch
+            for k in rng.choice(len(branch.frequencies_hz), 5):
+                drive = Harmonic(float(branch.frequencies_hz[k]), amplitude)
+                run = integrate(
+                    specimen, drive, found.periods / drive.frequency_hz, Accuracy.REFERENCE, branch.states[k]
+                )
+                scales = state_scales(specimen, drive)
+                growth = max(1.0, abs(branch.multipliers[k, 0]))
+                assert np.abs((run.final_state - branch.states[k]) / scales).max() < 1e-6 * growth
+                checked += 1
