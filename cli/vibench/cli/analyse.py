@@ -26,6 +26,7 @@ from vibench.analysis import (
     recordings_in,
     update_model,
 )
+from vibench.analysis.dynamics import BranchDiagram, read_diagram
 from vibench.analysis.report import write_report
 
 from .external_data import AllowExternal, external_data
@@ -57,6 +58,14 @@ def analyse(
         ),
     ] = False,
     specimen: SpecimenOption = None,
+    branches: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--branches",
+            metavar="BRANCHES.h5",
+            help="Lay what vibench branches found over stepped sines and sweeps; several times for several.",
+        ),
+    ] = None,
     estimator: Annotated[
         Estimator,
         typer.Option(
@@ -131,14 +140,18 @@ def analyse(
         raise InvalidRequest(
             "--fit and --specimen were given; one of the two says which specimen is laid over"
         )
+    diagrams = [read_diagram(each) for each in branches or ()]
     with external_data(allow_external):
-        _analyse(recording, out, request, simulate=simulate, fit=fit, specimen=specimen, as_json=as_json)
+        _analyse(
+            recording, out, request, diagrams, simulate=simulate, fit=fit, specimen=specimen, as_json=as_json
+        )
 
 
 def _analyse(
     recording: Path,
     out: Path | None,
     request: FrequencyResponseRequest,
+    diagrams: Sequence[BranchDiagram],
     *,
     simulate: bool,
     fit: bool,
@@ -168,7 +181,7 @@ def _analyse(
     for sentence in () if as_json else results.model_said:
         console.print(sentence)
     if results.results and has_report:
-        report = write_report(results, unused(folder / "report.html"), folder / "figures")
+        report = write_report(results, unused(folder / "report.html"), folder / "figures", diagrams)
         if updated is not None:
             save_toml(updated.description, unused(folder / "specimen.toml"))
         if not as_json:

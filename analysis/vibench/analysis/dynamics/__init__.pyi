@@ -14,6 +14,7 @@ from ._computing import (
     spectrum_points as spectrum_points,
 )
 from ._dynamics_file import (
+    branch_curves as branch_curves,
     read_diagram as read_diagram,
     write_diagram as write_diagram,
     write_spectrum as write_spectrum,

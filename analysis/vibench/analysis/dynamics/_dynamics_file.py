@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from vibench.sim.study import software
 
+from ..comparison import Curve
 from ..errors import InvalidRequest
 from ..exchange import new_file
 from ._branch_lines import BranchDiagram, BranchLine, LineEvent
@@ -98,6 +99,23 @@ def read_diagram(path: Path) -> BranchDiagram:
         raise InvalidRequest(
             f"{path} cannot be read as branches: {error}; give a file that vibench branches wrote"
         ) from error
+
+
+def branch_curves(path: Path) -> tuple[Curve, ...]:
+    """Read the curves of branches, to be laid over recordings.
+
+    Raises
+    ------
+    InvalidRequest
+        When the file holds none, or branches along the level, which no recording's frequencies fit.
+
+    """
+    found = read_diagram(path).curves()
+    if not found:
+        raise InvalidRequest(
+            f"{path} holds no branches over frequency; find some with --frequency START:STOP"
+        )
+    return found
 
 
 def _read_line(group: h5py.Group) -> BranchLine:

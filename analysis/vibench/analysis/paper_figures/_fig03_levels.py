@@ -5,17 +5,26 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.axes import Axes
 
-from vibench.sim import PowerSpring, Specimen, first_order_states, jump_frequencies, spring_of, structure_of
 from vibench.sim.study import Study, StudyResults
 
-from ..figures import MEASURED, PREDICTED, SIMULATED, TERMINAL, DrawnFigure, legend_above, new_figure, styled
-from ..signals import Reals
+from ..dynamics import BranchMethod, BranchRequest, diagram_of
+from ..figures import (
+    MEASURED,
+    SIMULATED,
+    TERMINAL,
+    DrawnFigure,
+    draw_line,
+    legend_above,
+    new_figure,
+    styled,
+)
 from ..tables import Table, table
 from ._options import AMPLITUDES_M, CASES, FigureOptions
 from ._responses import Responses, draw_linear, finish, responses, shade, specimen_of
 
 _CONTINUOUS = "power:5"
-_BALANCE_STEP_HZ = 1.0
+_PLACES = 60
+"""Frequencies at which every first-order solution is found in closed form: each begins a branch."""
 
 
 def levels_study(options: FigureOptions, model: str = "hertz") -> Study:
@@ -57,49 +66,36 @@ def levels_figure(options: FigureOptions, results: StudyResults) -> DrawnFigure:
 
 def continuous_figure(options: FigureOptions, results: StudyResults) -> DrawnFigure:
     """Draw Fig. 6: the continuous model n = 5, first-order harmonic balance over integration."""
-    specimen = specimen_of(results.study, _CONTINUOUS, options)
 
     def draw(axes: Axes, curve: Responses, amplitude_m: float) -> None:
-        low, high = float(curve.frequency_hz[0]), float(curve.frequency_hz[-1])
-        frequency_hz, size = _balanced(specimen, amplitude_m, low, high)
-        axes.plot(
-            frequency_hz,
-            size,
-            color=PREDICTED,
-            linestyle="none",
-            marker=".",
-            markersize=2,
-            label="harmonic balance (first order)",
+        found = diagram_of(
+            BranchRequest(
+                model=_CONTINUOUS,
+                damping_time_s=options.damping_time_s,
+                gap_m=options.gap_m,
+                method=BranchMethod.FIRST_ORDER,
+                amplitude_m=amplitude_m,
+                start=float(curve.frequency_hz[0]),
+                stop=float(curve.frequency_hz[-1]),
+                places=_PLACES,
+            )
         )
-        spring = spring_of(specimen)
-        assert isinstance(spring, PowerSpring)
+        for line in found.lines:
+            draw_line(axes, line, line.frequency_hz, line.response_ii[:, 0])
         for number, at_hz in enumerate(
-            jump_frequencies(structure_of(specimen), spring, amplitude_m, low, high)
+            each.frequency_hz for line in found.lines for each in line.events if each.kind == "fold"
         ):
             named = "fold: a jump" if number == 0 else None
-            axes.axvline(float(at_hz), color=TERMINAL, linestyle=":", linewidth=0.8, label=named)
+            axes.axvline(at_hz, color=TERMINAL, linestyle=":", linewidth=0.8, label=named)
 
     return _four_panels(
         "figure_6",
         "Figure 6: Responses I and II of the continuous model, n = 5",
-        "Blue: all solutions of the paper's first-order balance; dotted: where they fold. "
+        "Blue: branches of the paper's first-order balance, unstable ones dashed; dotted: where they fold. "
         + options.sentence,
         results,
         draw,
     )
-
-
-def _balanced(specimen: Specimen, amplitude_m: float, low: float, high: float) -> tuple[Reals, Reals]:
-    """Give every first-order solution |x| / A0 on a grid of 1 Hz."""
-    structure, spring = structure_of(specimen), spring_of(specimen)
-    assert isinstance(spring, PowerSpring)
-    found = [
-        (frequency_hz, abs(state.displacements[0]) / amplitude_m)
-        for frequency_hz in np.arange(low, high + 0.5 * _BALANCE_STEP_HZ, _BALANCE_STEP_HZ)
-        for state in first_order_states(structure, spring, float(frequency_hz), amplitude_m)
-    ]
-    frequency_hz, size = np.array(found).T
-    return frequency_hz, size
 
 
 def _four_panels(

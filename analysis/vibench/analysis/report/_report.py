@@ -1,7 +1,7 @@
 """Writing the report of a campaign, or of one recording, as one self-contained HTML file."""
 
 import base64
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -11,6 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from vibench.acquisition.plan import excitation_text
 
+from ..dynamics import BranchDiagram
 from ..errors import NotEnoughData
 from ..figures import DrawnFigure
 from ..kinds import AnyResult
@@ -18,6 +19,7 @@ from ..recordings import Verdict
 from ..results import AnalysisFailure, CampaignResults
 from ._drawings import findings, recording_figures, result_figures, result_tables
 from ._findings import limits
+from ._laid_branches import laid_branches
 from ._recording_section import (
     CHANNEL_HEADINGS,
     Rows,
@@ -64,7 +66,12 @@ class BenchSection:
     versions: Rows
 
 
-def write_report(results: CampaignResults, path: Path, figures_folder: Path | None = None) -> Path:
+def write_report(
+    results: CampaignResults,
+    path: Path,
+    figures_folder: Path | None = None,
+    diagrams: Sequence[BranchDiagram] = (),
+) -> Path:
     """Write one HTML file with all figures inside; an older report of that name is replaced.
 
     Parameters
@@ -75,6 +82,8 @@ def write_report(results: CampaignResults, path: Path, figures_folder: Path | No
         Of the HTML file; its folder is made.
     figures_folder
         Where PNG, SVG and CSV of each figure go beside it; None writes none.
+    diagrams
+        Branches that are laid over the stepped sines and sweeps.
 
     Raises
     ------
@@ -86,6 +95,7 @@ def write_report(results: CampaignResults, path: Path, figures_folder: Path | No
         raise NotEnoughData(f"{results.name!r} has no recordings, so there is nothing to report")
     numbers = iter(range(1, 1000))
     found = [_embedded(next(numbers), each, figures_folder) for each in result_figures(results)]
+    found += [_embedded(next(numbers), each, figures_folder) for each in laid_branches(results, diagrams)]
     sections = [_section(each, numbers, figures_folder) for each in results.results]
     page = _environment().get_template("report.html.j2")
     text = page.render(

@@ -11,6 +11,7 @@ from ._campaign_results import (
 from ._compared_recording import (
     ComparedRecording as ComparedRecording,
     compare_recording as compare_recording,
+    drive_level as drive_level,
     kept_result as kept_result,
     level_of_drive as level_of_drive,
 )

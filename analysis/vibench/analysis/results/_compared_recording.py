@@ -73,14 +73,24 @@ def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ..
 
     """
     result, _ = kept_result(compared)
+    found = drive_level(result)
+    if not found:
+        raise NotEnoughData(
+            f"{compared.name} has no level over a range of frequencies; take a stepped sine or a sweep"
+        )
+    return found
+
+
+def drive_level(result: AnyResult) -> tuple[tuple[float, float], ...]:
+    """Give the same of an analysed recording; nothing where it is of another kind, or of one frequency."""
     match result.analysis.response:
         case (SweepResponse() | SteppedResponse()) as found:
-            return recorded_level(found.frequency_hz, found.drive_amplitude_m)
+            try:
+                return recorded_level(found.frequency_hz, found.drive_amplitude_m)
+            except NotEnoughData:
+                return ()
         case _:
-            raise NotEnoughData(
-                f"{compared.name} is a {result.kind}, whose level over frequency is not known; take a "
-                "stepped sine or a sweep"
-            )
+            return ()
 
 
 def _curves(result: AnyResult, name: str) -> Iterator[Curve]:

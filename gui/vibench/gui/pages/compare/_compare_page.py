@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from vibench.analysis import ComparedRecording, Curve, compare_recording
+from vibench.analysis.dynamics import branch_curves
 
 from ...background import Job
 from ...page import AppContext, Page, SideAndPicture
@@ -166,6 +167,17 @@ class ComparePage(Page):
         if chosen:
             self.add_recordings(tuple(Path(each) for each in chosen))
 
+    def _choose_branches(self) -> None:
+        chosen, _ = QFileDialog.getOpenFileNames(
+            self, "Branches to lay over recordings", str(self.context.folder), "Branches (*.h5)"
+        )
+        self.add_branches(tuple(Path(each) for each in chosen))
+
+    def add_branches(self, paths: tuple[Path, ...]) -> None:
+        """Read what `vibench branches` found, elsewhere, and lay it over the curves that are there."""
+        for path in paths:
+            self.context.background.ask(branch_curves, self.add_prediction, self._refused, path)
+
     def _remove(self) -> None:
         gone = set(self.curves.remove_chosen())
         self._recordings = {
@@ -188,9 +200,13 @@ class ComparePage(Page):
 
     def _side(self) -> QWidget:
         add = push_button("&Add recordings…", "Choose recordings to compare", self._choose_recordings)
+        branches = push_button(
+            "&Branches…", "Choose files that vibench branches wrote", self._choose_branches
+        )
         remove = push_button("&Remove", "Take the chosen curves away", self._remove)
         row = QHBoxLayout()
         row.addWidget(add)
+        row.addWidget(branches)
         row.addWidget(remove)
         side = QWidget()
         layout = QVBoxLayout(side)

@@ -10,7 +10,6 @@ from vibench.sim import Parameter
 
 from ...plots import GUIDE, LOG_FREQUENCY, Dash, LineStyle, Plot, PlotAxis, Scale, curve_style
 from ...widgets import Theme
-from ._answer_plots import EXPONENT
 
 LEVEL = PlotAxis("Base amplitude A0", "µm", factor=1e6)
 RESPONSES = (
@@ -20,10 +19,12 @@ RESPONSES = (
         PlotAxis("Response II of m0, |x at f| / A0", short="Response II", scale=Scale.LOGARITHMIC),
     ),
 )
+EXPONENT = PlotAxis("Lyapunov exponents", "1/s", short="Exponents (1/s)")
 DIMENSION = PlotAxis("Kaplan-Yorke dimension", short="Dimension")
 ACROSS = {Parameter.FREQUENCY: LOG_FREQUENCY, Parameter.AMPLITUDE: LEVEL}
 _SPECIAL = ("fold", "period doubling", "Neimark-Sacker", "symmetry breaking", "grazing")
-_FIRST_SPECIAL_COLOUR = 2
+_FIRST_SPECIAL_COLOUR = 1
+"""The first is that of motions of one period."""
 
 
 class _TwoPlots(QStackedWidget):

@@ -161,8 +161,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
             self.context.page_wanted.emit(COMPARE)
 
     def _build(self) -> None:
-        name = f"simulate {self.kind.name}"
-        self._parts = SideAndPicture(self.context, name, self._side(), self._right())
+        self._parts = SideAndPicture(self.context, self.kind.name.capitalize(), self._side(), self._right())
         QVBoxLayout(self).addWidget(self._parts)
 
     def _side(self) -> QWidget:

@@ -1,0 +1,216 @@
+"""Branches and spectra as they are asked for: refusals, files, curves, levels of recordings, figures."""
+
+import json
+import math
+from dataclasses import fields
+
+import h5py
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from vibench.analysis import (
+    CurveKind,
+    CurveOrigin,
+    InvalidRequest,
+    NotEnoughData,
+    curve_difference,
+    curve_peaks,
+)
+from vibench.analysis.dynamics import (
+    BranchDiagram,
+    BranchLine,
+    BranchMethod,
+    BranchRequest,
+    LineEvent,
+    SpectrumRequest,
+    diagram_of,
+    exponent_spectrum,
+    read_diagram,
+    recorded_level,
+    write_diagram,
+    write_spectrum,
+)
+from vibench.analysis.report import branches_figure, exponent_spectrum_figure
+from vibench.sim import Parameter, gong2025
+
+
+def line(frequency_hz, size, multiplier, events=(), periods=1):
+    n = len(frequency_hz)
+    wide = np.outer(size, np.ones(4))
+    inside = np.zeros((n, 6))
+    inside[:, 0] = multiplier
+    return BranchLine(
+        np.asarray(frequency_hz, float), np.full(n, 5e-6), wide, 0.9 * wide, np.zeros((n, 6)), inside,
+        np.zeros((n, 6)), np.ones(n, np.int64), np.full(n, 1e-8), tuple(events), periods, "mirrored",
+        False, False, "searched", "an end", "an end", 0.5,
+    )  # fmt: skip
+
+
+FOLDED = line(
+    [100.0, 110.0, 120.0, 115.0, 105.0],
+    [1.0, 2.0, 3.0, 2.5, 2.0],
+    [0.5, 0.9, 0.99, 1.2, 1.5],
+    [LineEvent("fold", 120.5, 5e-6, 2, 2.6)],
+)
+DIAGRAM = BranchDiagram(BranchRequest(start=100.0, stop=120.0), (FOLDED,), 1.0)
+
+
+@pytest.fixture(scope="module")
+def computed():
+    """Real branches of the paper's specimen between 88 and 94 Hz."""
+    return diagram_of(BranchRequest(start=88.0, stop=94.0, places=2, starts=2))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"start": 600.0, "stop": 50.0}, "does not ascend"),
+        ({"method": "balance", "model": "rigid:0.8"}, "no finite force"),
+        ({"method": "first-order"}, "one harmonic cannot describe hertz"),
+        ({"model": "hurtz"}, "Contact 'hurtz' is not known"),
+        ({"recorded_level": ((100.0, 1e-6),)}, "two or more ascending"),
+        ({"recorded_level": ((200.0, 1e-6), (100.0, 1e-6))}, "two or more ascending"),
+        ({"recorded_level": ((100.0, 1e-6), (200.0, 1e-6)), "along": "amplitude"}, "goes along frequency"),
+        ({"amplitude_m": 0.0}, "greater than 0"),
+        ({"amplitude_m": math.nan}, "finite"),
+        ({"gap_m": -1.0}, "greater than 0"),
+    ],
+)
+def test_what_branches_cannot_be_asked_is_refused_in_a_sentence(options, said):
+    with pytest.raises(ValidationError, match=said):
+        BranchRequest(**options)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"), [({"start": 9.0, "stop": 8.0}, "does not ascend"), ({"step": 1e-9}, "at most 20000")]
+)
+def test_what_exponents_cannot_be_asked_is_refused_in_a_sentence(options, said):
+    with pytest.raises(ValidationError, match=said):
+        SpectrumRequest(**options)
+
+
+def test_the_ends_of_a_range_are_points_where_the_step_fits():
+    assert SpectrumRequest(start=0.1, stop=0.7, step=0.1).values == pytest.approx(np.arange(1, 8) / 10)
+    assert SpectrumRequest(start=240.0, stop=249.0, step=5.0).values == (240.0, 245.0)
+    assert SpectrumRequest(start=5.0, stop=5.0, step=1.0).values == (5.0,)
+
+
+def test_a_file_holds_everything_and_nothing_is_overwritten(computed, tmp_path):
+    path = write_diagram(computed, tmp_path / "b.h5")
+    again = read_diagram(path)
+    assert again.request == computed.request
+    assert again.elapsed_s == computed.elapsed_s
+    for mine, theirs in zip(computed.lines, again.lines, strict=True):
+        for each in fields(BranchLine):
+            np.testing.assert_array_equal(getattr(mine, each.name), getattr(theirs, each.name))
+    with h5py.File(path) as file:
+        assert file["branch_000/frequency_hz"].attrs["units"] == "Hz"
+        assert json.loads(file.attrs["request"])["amplitude_m"] == 5e-6
+    before = path.read_bytes()
+    with pytest.raises(InvalidRequest, match="never overwritten"):
+        write_diagram(computed, path)
+    assert path.read_bytes() == before
+
+
+def test_another_file_is_no_branches(tmp_path):
+    with h5py.File(tmp_path / "x.h5", "w") as file:
+        file["a"] = 1
+    (tmp_path / "y.h5").write_text("no HDF5")
+    for name in ("x.h5", "y.h5", "z.h5"):
+        with pytest.raises(InvalidRequest, match="give a file that vibench branches wrote"):
+            read_diagram(tmp_path / name)
+
+
+def test_the_document_is_json_with_every_point(computed):
+    found = json.loads(json.dumps(computed.to_dict(), allow_nan=False))
+    assert sum(len(each["points"]) for each in found["branches"]) == computed.points
+    point = found["branches"][0]["points"][0]
+    assert point["is_stable"] is (point["largest_multiplier"] < 1.0)
+    assert {event["kind"] for event in found["branches"][0]["events"]} >= {"grazing", "symmetry breaking"}
+
+
+def test_stable_and_unstable_stretches_are_curves_of_their_own():
+    curves = {(each.origin, each.response): each for each in DIAGRAM.curves()}
+    stable = curves[CurveOrigin.STABLE, CurveKind.RESPONSE_I]
+    unstable = curves[CurveOrigin.UNSTABLE, CurveKind.RESPONSE_I]
+    assert stable.magnitude.tolist() == [1.0, 2.0, 3.0]
+    assert unstable.frequency_hz.tolist() == [120.0, 115.0, 105.0]
+    assert curves[CurveOrigin.STABLE, CurveKind.RESPONSE_II].magnitude == pytest.approx([0.9, 1.8, 2.7])
+    assert curve_peaks(unstable) == ()
+    assert np.isnan(unstable.at(np.array([110.0])).magnitude).all()
+    with pytest.raises(NotEnoughData, match="several values at one frequency"):
+        curve_difference(stable, unstable)
+    along = BranchRequest(along=Parameter.AMPLITUDE, start=1e-6, stop=2e-6)
+    assert BranchDiagram(along, (FOLDED,), 1.0).curves() == ()
+
+
+def test_a_recorded_level_is_the_median_in_each_bin_and_ascends():
+    rng = np.random.default_rng(3)
+    frequency = np.concatenate([np.linspace(50.0, 300.0, 4000), np.linspace(300.0, 50.0, 4000)])
+    level = 1e-6 * (1.0 + 100.0 / frequency) * (1.0 + 0.01 * rng.standard_normal(8000))
+    level[::97] = 5e-3
+    pairs = np.array(recorded_level(frequency, level))
+    assert len(pairs) == 100
+    assert np.all(np.diff(pairs[:, 0]) > 0.0)
+    assert pairs[:, 1] == pytest.approx(1e-6 * (1.0 + 100.0 / pairs[:, 0]), rel=0.03)
+    few = recorded_level(np.array([100.0, 90.0, 110.0]), np.array([1e-6, 2e-6, 3e-6]))
+    assert few == ((90.0, 2e-6), (100.0, 1e-6), (110.0, 3e-6))
+    with pytest.raises(NotEnoughData, match="no drive over a range"):
+        recorded_level(np.full(5, 260.0), np.full(5, 1e-6))
+
+
+@pytest.mark.parametrize("along", list(Parameter))
+def test_a_figure_has_dashes_where_motions_are_unstable_and_marks_at_events(along):
+    request = BranchRequest(along=along, start=1e-6 if along is Parameter.AMPLITUDE else 100.0, stop=120.0)
+    drawn = branches_figure(BranchDiagram(request, (FOLDED,), 1.0))
+    first, second = drawn.figure.axes
+    solid, dashed = first.get_lines()
+    assert solid.get_linestyle() == "-"
+    assert dashed.get_linestyle() == "--"
+    assert solid.get_ydata().tolist() == [1.0, 2.0, 3.0]
+    (fold,) = (each for each in second.get_lines() if each.get_label() == "fold")
+    scale = 1.0 if along is Parameter.FREQUENCY else 1e6
+    assert fold.get_xdata()[0] == pytest.approx(120.5 if scale == 1.0 else 5.0)
+    assert [each.name for each in drawn.tables] == ["branches", "branches_special_points"]
+
+
+def test_a_spectrum_adds_up_and_is_kept(tmp_path):
+    request = SpectrumRequest(start=255.0, stop=260.0, step=5.0, duration_s=1.5, settle_s=0.5)
+    found = exponent_spectrum(request)
+    assert found.largest_sum_difference < 1e-6
+    specimen = gong2025()
+    trace = np.trace(np.linalg.solve(specimen.mass_matrix, specimen.damping_matrix))
+    assert found.points[0].dampers_per_s == pytest.approx(-trace, rel=1e-12)
+    for each in found.points:
+        assert np.all(np.array(each.low_per_s) < np.array(each.exponents_per_s))
+        assert each.dimension_low <= each.dimension <= each.dimension_high
+    path = write_spectrum(found, tmp_path / "s.h5")
+    with h5py.File(path) as file:
+        assert file["exponents_per_s"].shape == (2, 6)
+        assert file["sum_per_s"].attrs["units"] == "1/s"
+    json.dumps(found.to_dict(), allow_nan=False)
+    upper, lower = exponent_spectrum_figure(found).figure.axes
+    assert len(upper.containers) == 6
+    assert lower.get_ylabel() == "dimension"
+
+
+def test_a_lossy_contact_has_no_check_by_the_dampers_and_says_so():
+    request = SpectrumRequest(model="rigid:0.8", start=260.0, stop=260.0, duration_s=1.5, settle_s=0.5)
+    found = exponent_spectrum(request)
+    assert math.isnan(found.largest_sum_difference)
+    assert "the contact takes energy" in found.cost_sentence
+    json.dumps(found.to_dict(), allow_nan=False)
+
+
+def test_a_balance_says_how_far_its_harmonics_reach():
+    options = {"model": "power:5", "start": 60.0, "stop": 80.0, "places": 2, "starts": 0}
+    first = diagram_of(BranchRequest(method=BranchMethod.FIRST_ORDER, **options))
+    many = diagram_of(BranchRequest(method=BranchMethod.BALANCE, **options))
+    exact = diagram_of(BranchRequest(**options))
+    ends = [each.lines[0].response_ii[-1, 3] for each in (first, many, exact)]
+    errors = [each.lines[0].error_estimate[-1] for each in (first, many, exact)]
+    assert abs(ends[0] / ends[2] - 1.0) < 5.0 * errors[0]
+    assert abs(ends[1] / ends[2] - 1.0) < max(5.0 * errors[1], 1e-7)
+    assert errors[1] <= 1e-4 < errors[0]
+    assert errors[2] < 1e-6

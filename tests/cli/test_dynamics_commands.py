@@ -1,0 +1,90 @@
+"""`vibench branches` and `vibench spectrum`, as they are typed."""
+
+import json
+
+import h5py
+import pytest
+from typer.testing import CliRunner
+
+from vibench.cli.__main__ import app
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(each) for each in arguments])
+
+
+def refused(*arguments):
+    """The sentence with which a command refuses."""
+    result = run(*arguments)
+    assert result.exit_code != 0
+    return str(result.exception)
+
+
+def test_branches_are_printed_as_json_and_written_with_figure_and_tables(tmp_path):
+    options = ("--frequency", "60:64", "--amplitude", "5e-6", "--places", 2, "--starts", 1)
+    result = run("branches", *options, "--json", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    (branch,) = json.loads(result.stdout)["branches"]
+    assert branch["points"][0]["frequency_hz"] == 60.0
+    assert all(point["is_stable"] for point in branch["points"])
+    names = {each.name for each in (tmp_path / "out").iterdir()}
+    assert names >= {"branches.h5", "branches.png", "branches.svg", "branches.csv"}
+    assert "never overwritten" in refused("branches", *options, "--out", tmp_path / "out")
+
+
+def test_branches_along_the_level_are_told_in_sentences():
+    result = run("branches", "--frequency", 60, "--amplitude", "1e-6:2e-6", "--places", 2, "--starts", 0)
+    assert result.exit_code == 0, result.output
+    assert "1: period 1, mirrored: 1 to 2 µm" in result.output
+    assert "1 branches (0 isolated)" in result.output
+
+
+def test_exponents_are_printed_as_json_and_written(tmp_path):
+    result = run(
+        "spectrum", "--amplitude", 5e-6, "--frequency", 260, "--duration", 1.5, "--settle", 0.5, "--json",
+        "--out", tmp_path / "s",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    (point,) = found["points"]
+    assert len(point["exponents_per_s"]) == 6
+    assert found["largest_sum_difference"] < 1e-6
+    with h5py.File(tmp_path / "s" / "spectrum.h5") as file:
+        assert file.attrs["format"] == "vibench spectrum"
+    assert (tmp_path / "s" / "spectrum.png").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("branches", "--amplitude", "5e-6"), "--amplitude or --frequency is missing"),
+        (("branches", "--amplitude", "5e-6", "--frequency", "60"), "give one of them as a range"),
+        (("branches", "--amplitude", "1e-6:5e-6", "--frequency", "60:70"), "give one of them as a range"),
+        (("branches", "--amplitude", "5e-6", "--frequency", "70:60"), "70 does not lie below 60"),
+        (("branches", "--amplitude", "x", "--frequency", "60:70"), "'x' is no number"),
+        (("branches", "--amplitude", "-1", "--frequency", "60:70"), "-1 is not above 0"),
+        (
+            ("branches", "--amplitude", "5e-6", "--frequency", "60:70", "--model", "rigid:2"),
+            "Restitution 2.0 is not allowed",
+        ),
+        (
+            ("branches", "--amplitude", "5e-6", "--frequency", "60:70", "--method", "first-order"),
+            "one harmonic cannot describe hertz",
+        ),
+        (
+            ("branches", "--amplitude", "5e-6", "--frequency", "60:70", "--places", "1"),
+            "places was given as 1",
+        ),
+        (("spectrum", "--amplitude", "5e-6", "--frequency", "60:70"), "2 numbers are not allowed here"),
+        (
+            ("spectrum", "--amplitude", "1e-6:2e-6:1e-6", "--frequency", "60:70:1"),
+            "give one of them as one number",
+        ),
+        (
+            ("spectrum", "--amplitude", "5e-6", "--frequency", "260", "--duration", "0.1"),
+            "ask for 32 or more",
+        ),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_in_one_sentence(arguments, said):
+    assert said in refused(*arguments)
