@@ -4,11 +4,8 @@ from vibench.analysis.dynamics import BranchRequest, SpectrumRequest, diagram_of
 
 found = diagram_of(BranchRequest(amplitude_m=5e-6, start=88.0, stop=94.0, places=2, starts=2))
 for line in found.lines:
-    stable = 100.0 * line.is_stable.mean()
-    print(
-        f"period {line.periods}, {line.shape}: {line.frequency_hz.min():.2f} to {line.frequency_hz.max():.2f} Hz, "
-        f"{stable:.0f} % stable"
-    )
+    low, high, stable = line.frequency_hz.min(), line.frequency_hz.max(), 100.0 * line.is_stable.mean()
+    print(f"period {line.periods}, {line.shape}: {low:.2f} to {high:.2f} Hz, {stable:.0f} % stable")
     for event in line.events:
         print(f"  {event.kind} at {event.frequency_hz:.3f} Hz")
 print(found.cost_sentence)

@@ -27,6 +27,7 @@ CODE = re.compile(r"^```python\n(.*?)^```", flags=re.DOTALL | re.MULTILINE)
 FACES_WITH_AN_EXAMPLE = [
     "vibench.sim",
     "vibench.sim.study",
+    "vibench.sim.branches",
     "vibench.sim.chain",
     "vibench.sim.shaker",
     "vibench.sim.accuracy_benchmark",
@@ -40,6 +41,7 @@ FACES_WITH_AN_EXAMPLE = [
     "vibench.analysis",
     "vibench.analysis.live",
     "vibench.analysis.report",
+    "vibench.analysis.dynamics",
     "vibench.analysis.exchange",
     "vibench.analysis.simulation",
     "vibench.analysis.reproduction",

@@ -34,6 +34,15 @@ def test_at_260_hz_the_specimen_strikes_its_stops_at_5_micrometres_but_not_at_1(
     assert int(re.search(r"(\d+) impacts", strong)[1]) > 0
 
 
+def test_branches_break_their_symmetry_and_the_exponents_add_up():
+    lines = lines_of("branches_and_exponents.py")
+    assert sum(line.startswith("period 1, mirrored") for line in lines) == 1
+    assert any(line.startswith("  symmetry breaking at 89.57") for line in lines)
+    total = re.search(r"sum (-[\d.]+) of (-[\d.]+) 1/s", "\n".join(lines))
+    assert float(total[1]) == pytest.approx(float(total[2]), rel=1e-6)
+    assert 4.0 < float(re.search(r"dimension ([\d.]+)", lines[-1])[1]) < 5.0
+
+
 def test_a_recording_is_read_without_vibench(tmp_path):
     channel = ChannelHeader(
         "m0_velocity", "Dev1/ai0", "velocity", "m s-1", physical_per_volt=0.125, range_v=5.0

@@ -14,6 +14,7 @@ PORTIONS = ("sim", "acquisition", "virtual_rig", "analysis", "gui", "cli")
 FOR_PEOPLE = (
     "vibench.sim",
     "vibench.sim.study",
+    "vibench.sim.branches",
     "vibench.sim.chain",
     "vibench.virtual_rig",
     "vibench.acquisition",
@@ -25,6 +26,7 @@ FOR_PEOPLE = (
     "vibench.analysis",
     "vibench.analysis.live",
     "vibench.analysis.report",
+    "vibench.analysis.dynamics",
     "vibench.analysis.exchange",
 )
 FOR_OUR_PROGRAMS = (

@@ -16,6 +16,7 @@ import vibench.sim.study as study
 FACES = (
     "vibench.sim",
     "vibench.sim.accuracy_benchmark",
+    "vibench.sim.branches",
     "vibench.sim.chain",
     "vibench.sim.shaker",
     "vibench.sim.stepping",

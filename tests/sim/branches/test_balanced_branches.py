@@ -50,8 +50,9 @@ def test_every_point_of_a_first_order_branch_solves_the_papers_equation_five(amp
     for each in found:
         for k in range(0, len(each.branch.frequencies_hz), 5):
             states = first_order_states(structure, spring, float(each.branch.frequencies_hz[k]), amplitude)
+            # Beside a fold two solutions meet, and each is known to the root of what the equation is.
             sizes = [abs(state.relative) / amplitude for state in states]
-            assert np.min(np.abs(np.array(sizes) / each.branch.response_ii[k, 3] - 1.0)) < 1e-7
+            assert np.min(np.abs(np.array(sizes) / each.branch.response_ii[k, 3] - 1.0)) < 1e-6
     # And each solution of the equation, at frequencies not searched, is on one of the branches.
     for frequency in np.linspace(65.0, 555.0, 23):
         drive = Harmonic(float(frequency), amplitude)

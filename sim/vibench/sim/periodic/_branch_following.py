@@ -148,10 +148,19 @@ def _lost(gathered: _Gathered, family: Family, last: ArcPoint) -> Followed:
 
 def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float], steps: ArcSteps) -> Branch:
     """Follow a family from a point on it to both ends; a branch that closes on itself, once round."""
-    onward = follow(family, start, 1.0, bounds, steps).branch
-    if onward.end is ArcEnd.CLOSED:
+    onward = follow(family, start, 1.0, bounds, steps).branch if start[-1] < bounds[1] else None
+    if onward is not None and onward.end is ArcEnd.CLOSED:
         return replace(onward, begin=ArcEnd.CLOSED)
-    back = follow(family, start, -1.0, bounds, steps).branch
+    back = follow(family, start, -1.0, bounds, steps).branch if start[-1] > bounds[0] else None
+    if back is None or onward is None:
+        whole = onward or back
+        assert whole is not None
+        return replace(whole, begin=ArcEnd.REACHED_BOUND)
+    return _joined(back, onward)
+
+
+def _joined(back: Branch, onward: Branch) -> Branch:
+    """Turn one branch round and put it before another that begins at the same point."""
     before = len(back.frequencies_hz) - 1
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(back, name)[:0:-1], getattr(onward, name)]) for name in POINTWISE

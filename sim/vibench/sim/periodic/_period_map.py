@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from ..kernels import Table, Vector
-from ..model import Accuracy, Harmonic, Outcome, Specimen
+from ..model import Accuracy, Harmonic, Outcome, RigidStops, Specimen, Y, Z
 from ..motion import Trajectory, flow_derivative, integrate, state_scales
 
 DIFFERENCE = 1e-5
@@ -71,6 +71,8 @@ class PeriodMap:
 
     def image(self, state: Vector, drive: Harmonic) -> Vector:
         """State that the map makes of ``state``, shape (6,), at the drive's phase zero; NaN if lost."""
+        if not self._may_start(state):
+            return np.full(6, math.nan)
         run = self._run(state, drive, self.turns)
         if run.outcome is not Outcome.REACHED_END:
             return np.full(6, math.nan)
@@ -82,6 +84,8 @@ class PeriodMap:
 
     def derivative(self, state: Vector, drive: Harmonic) -> Table:
         """D image / d state, both over their scales, shape (6, 6)."""
+        if not self._may_start(state):
+            return np.full((6, 6), math.nan)
         scales = state_scales(self.specimen, drive)
         duration = self.turns / drive.frequency_hz
         _, derivative = flow_derivative(self.specimen, drive, state, duration, Accuracy.REFERENCE)
@@ -105,6 +109,15 @@ class PeriodMap:
         drives = [replace(drive, amplitude_m=drive.amplitude_m * factor) for factor in factors]
         images = [self.image(state, each) for each in drives]
         return np.asarray(np.dot(WEIGHTS, images) / (DIFFERENCE * scales))
+
+    def _may_start(self, state: Vector) -> bool:
+        """Refuse a start behind a rigid stop: an iteration that tries one has gone astray."""
+        match self.specimen.contact:
+            case RigidStops():
+                lower, upper = self.specimen.gaps_m
+                return bool(-lower <= state[Y] - state[Z] <= upper)
+            case _:
+                return bool(np.all(np.isfinite(state)))
 
     def _run(
         self, state: Vector, drive: Harmonic, turns: float, sample_rate_hz: float | None = None

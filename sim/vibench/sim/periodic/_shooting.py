@@ -11,8 +11,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels import Complex, Table, Vector
-from ..model import Harmonic, NoContact, PowerLaw, Specimen, X, Y, Z, chosen
+from ..kernels import Complex, Floats, Table, Vector
+from ..model import Harmonic, NoContact, PowerLaw, Specimen, Y, Z, chosen
 from ..motion import Trajectory, integrate, start_motion, state_scales
 from ._branch import BifurcationKind
 from ._floquet import multipliers
@@ -142,7 +142,7 @@ def described_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Ve
     """Stability and responses of a motion that starts at ``state`` and misses it by ``gone``, over scales."""
     run = mapping.orbit(state, drive, SAMPLES)
     moved = run.states[: mapping.periods * SAMPLES]
-    waves = np.column_stack([moved[:, X], moved[:, Y], moved[:, Z], moved[:, Y] - moved[:, Z]])
+    waves, rates = (np.column_stack([part, part[:, Y] - part[:, Z]]) for part in (moved[:, :3], moved[:, 3:]))
     derivative = mapping.derivative(state, drive)
     lines = np.array([abs(phasors_of(wave)[mapping.periods]) for wave in waves.T])
     defect = _size(gone)
@@ -154,10 +154,32 @@ def described_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Ve
         signs=_signs(mapping, drive, state, np.nan_to_num(derivative), run),
         defect=defect,
         error=_missing(derivative, gone) * float(state_scales(mapping.specimen, drive)[0] / lines[3]),
-        response_i=np.abs(waves).max(axis=0) / drive.amplitude_m,
+        response_i=_largest(waves, rates, 1.0 / (SAMPLES * drive.frequency_hz)) / drive.amplitude_m,
         response_ii=lines / drive.amplitude_m,
         outcome=ShootingEnd.CONVERGED if found else ShootingEnd.NO_ORBIT,
     )
+
+
+def _largest(waves: Floats, rates: Floats, step_s: float) -> Floats:
+    """Largest magnitudes, shape (n,), of periodic waves, shape (m, n): by the cubics between samples.
+
+    Two samples of a wave and of its rate define a cubic (Hermite); it turns where its slope is zero.
+    """
+    found = np.abs(waves).max(axis=0)
+    ahead, rates_ahead = np.roll(waves, -1, axis=0), np.roll(rates, -1, axis=0)
+    for column in range(waves.shape[1]):
+        turns = np.flatnonzero(rates[:, column] * rates_ahead[:, column] < 0.0)
+        start, end = waves[turns, column], ahead[turns, column]
+        first, last = step_s * rates[turns, column], step_s * rates_ahead[turns, column]
+        cubic, square = 2.0 * (start - end) + first + last, 3.0 * (end - start) - 2.0 * first - last
+        with np.errstate(divide="ignore", invalid="ignore"):
+            root = np.sqrt(np.maximum(square**2 - 3.0 * cubic * first, 0.0))
+            # The form without cancellation; of the two turns the one within the step.
+            places = np.stack([-first / (square + root), -first / (square - root)])
+        inside = np.where((places >= 0.0) & (places <= 1.0), places, 0.0)
+        tops = start + inside * (first + inside * (square + inside * cubic))
+        found[column] = max(found[column], float(np.abs(tops).max(initial=0.0)))
+    return np.asarray(found, dtype=np.float64)
 
 
 def _missing(derivative: Table, gone: Vector) -> float:

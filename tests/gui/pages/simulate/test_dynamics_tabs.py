@@ -1,0 +1,122 @@
+"""The tabs Branches and Exponents of the Simulate page: ask, draw, say error and cost, lay over recordings."""
+
+import numpy as np
+import pytest
+
+from vibench.analysis import CurveOrigin
+from vibench.analysis.dynamics import BranchLine, BranchRequest, LineEvent, SpectrumPoint, SpectrumRequest
+from vibench.gui.pages.simulate import SimulatePage
+from vibench.gui.plots import Dash
+from vibench.gui.widgets import COMPARE, DARK
+from vibench.sim import Parameter
+
+
+@pytest.fixture(scope="module")
+def page(shared_context):
+    """One page, whose processes serve all tests."""
+    page = SimulatePage(shared_context)
+    page.resize(1300, 800)
+    page.show()
+    yield page
+    for view in (page, page.branches, page.spectrum):
+        view.simulator.close()
+    page.close()
+
+
+def lines(plot):
+    return [item for item in plot.getPlotItem().listDataItems() if item.xData is not None]
+
+
+def line(multipliers=(0.5, 0.9, 1.5, 2.0)):
+    n = len(multipliers)
+    size, inside = np.outer(np.linspace(1.0, 2.0, n), np.ones(4)), np.zeros((n, 6))
+    inside[:, 0] = multipliers
+    return BranchLine(
+        np.linspace(100.0, 110.0, n), np.linspace(1e-6, 2e-6, n), size, size, np.zeros((n, 6)), inside,
+        np.zeros((n, 6)), np.ones(n, np.int64), np.full(n, 1e-8), (LineEvent("fold", 105.0, 1.5e-6, 1, 1.5),),
+        1, "mirrored", False, False, "searched", "an end", "an end", 0.5,
+    )  # fmt: skip
+
+
+def asked(view, request):
+    view.form.show_value(request)
+    view.begin()
+
+
+def test_branches_are_found_drawn_and_told_with_error_and_cost(page, waited):
+    view = page.branches
+    asked(view, BranchRequest(start=60.0, stop=62.0, places=2, starts=0))
+    assert view.simulator.is_busy
+    waited(lambda: not view.simulator.is_busy, 100.0)
+    page.refresh()
+    assert view.said.startswith("Complete. 1 branches")
+    assert "of the fundamental of p" in view.said
+    first, _ = view.picture.plots(Parameter.FREQUENCY)
+    (drawn,) = lines(first)
+    assert drawn.getOriginalDataset()[0][0] == pytest.approx(60.0)
+
+
+@pytest.mark.parametrize("along", list(Parameter))
+def test_stable_stretches_are_solid_and_unstable_ones_dashed(page, along):
+    view = page.branches
+    start = 1e-6 if along is Parameter.AMPLITUDE else 100.0
+    asked(view, BranchRequest(along=along, start=start, stop=110.0, places=2, starts=0))
+    view.cancel()
+    view._grow((line(),))
+    page.refresh()
+    solid, dashed = lines(view.picture.plots(along)[0])
+    assert solid.opts["pen"].style() == Dash.SOLID.value
+    assert dashed.opts["pen"].style() == Dash.DASHED.value
+    assert len(lines(view.picture.plots(along)[1])) == 3
+    assert view._compare.isEnabled() is (along is Parameter.FREQUENCY)
+
+
+def test_branches_are_laid_over_recordings(page):
+    view = page.branches
+    view.form.show_value(BranchRequest(start=100.0, stop=110.0))
+    asked(view, BranchRequest(start=100.0, stop=110.0, places=2, starts=0))
+    view.cancel()
+    view._grow((line(),))
+    laid, wanted = [], []
+    page.context.prediction_made.connect(laid.append)
+    page.context.page_wanted.connect(wanted.append)
+    view._hand_to_compare()
+    assert {each.origin for each in laid[0]} == {CurveOrigin.STABLE, CurveOrigin.UNSTABLE}
+    assert wanted == [COMPARE]
+
+
+def test_exponents_are_drawn_with_their_intervals(page):
+    view = page.spectrum
+    asked(view, SpectrumRequest(start=250.0, stop=260.0, step=10.0))
+    view.cancel()
+    six = (100.0, 40.0, 0.0, -80.0, -130.0, -190.0)
+    low, high = tuple(x - 5.0 for x in six), tuple(x + 5.0 for x in six)
+    for place in (250.0, 260.0):
+        view._grow(
+            (
+                SpectrumPoint(
+                    place, 5e-6, six, low, high, -260.0, -260.0, 4.4, 4.3, 4.5, "chaotic", "", "", 40, 300.0,
+                    "", 1.0,
+                ),
+            )
+        )  # fmt: skip
+    page.refresh()
+    upper, lower = view.picture.plots(Parameter.FREQUENCY)
+    assert len(lines(upper)) == 6
+    assert len(lines(lower)) == 1
+    assert "2 chaotic; sums differ from the dampers'" in view.said
+    assert not view._compare.isEnabled()
+
+
+def test_what_is_not_allowed_cannot_be_asked(page):
+    view = page.branches
+    view.form.form.show_content({"method": "first-order"})
+    assert not view._begin.isEnabled()
+    assert "one harmonic cannot describe hertz" in view.form.complaint
+    view.form.form.show_content({})
+    assert view._begin.isEnabled()
+
+
+def test_a_dark_theme_reaches_the_tabs(page):
+    page.retheme(DARK)
+    page.refresh()
