@@ -32,7 +32,7 @@ from .interruption import told_to_stop
 from .output import bold, console, print_json
 from .paths import AsJson, room_for_folder
 from .range_option import Range, range_of
-from .specimen_option import DampingTime, Gap, ModelWord, asked_of_specimen
+from .specimen_option import DampingTime, Gap, LawOption, SpecimenOption, asked_of_specimen
 from .study import STOPPED_EXIT_CODE
 
 FILE = "branches.h5"
@@ -63,9 +63,10 @@ def branches(
         BranchMethod,
         typer.Option("--method", help="Exact; harmonic balance; or with one harmonic, the paper's eq. 5."),
     ] = BranchMethod.SHOOTING,
-    model: ModelWord = "hertz",
-    damping_time: DampingTime = 2e-5,
-    gap: Gap = 45e-6,
+    specimen: SpecimenOption = None,
+    model: LawOption = None,
+    damping_time: DampingTime = None,
+    gap: Gap = None,
     harmonics: Annotated[
         int, typer.Option("--harmonics", metavar="N", help="Highest that a balance may use.")
     ] = 511,
@@ -88,6 +89,7 @@ def branches(
     measured, drive = _drive(amplitude, frequency, like)
     asked = asked_of_specimen(
         BranchRequest,
+        specimen,
         model,
         damping_time,
         gap,

@@ -31,7 +31,7 @@ from .interruption import told_to_stop
 from .output import console, print_json, print_warnings
 from .paths import AsJson
 from .progress_bars import study_bar
-from .specimen_option import LAWS_HELP, SpecimenOption, described, given_options
+from .specimen_option import DampingTime, Gap, LawOption, SpecimenOption, described, given_options
 from .study import Cluster, Workers, complain_about_points
 
 AUTO: Literal["auto"] = "auto"
@@ -61,11 +61,9 @@ def predict(
         str, typer.Option("--frequency", metavar="F|START:STOP:STEP", help="One frequency or a range [Hz].")
     ],
     specimen: SpecimenOption = None,
-    model: Annotated[str | None, typer.Option("--model", help=LAWS_HELP)] = None,
-    damping_time: Annotated[
-        float | None, typer.Option("--damping-time", metavar="S", help="c_i = damping time * k_i.")
-    ] = None,
-    gap: Annotated[float | None, typer.Option("--gap", metavar="M", help="Clearance at both stops.")] = None,
+    model: LawOption = None,
+    damping_time: DampingTime = None,
+    gap: Gap = None,
     duration: Annotated[
         str, typer.Option("--duration", metavar="S|auto", help="Length of each run, or until it settles.")
     ] = "30",

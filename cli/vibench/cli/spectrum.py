@@ -22,7 +22,7 @@ from .interruption import told_to_stop
 from .output import bold, console, print_json
 from .paths import AsJson, room_for_folder
 from .range_option import Range, range_of
-from .specimen_option import DampingTime, Gap, ModelWord, asked_of_specimen
+from .specimen_option import DampingTime, Gap, LawOption, SpecimenOption, asked_of_specimen
 from .study import STOPPED_EXIT_CODE
 
 FILE = "spectrum.h5"
@@ -37,9 +37,10 @@ def spectrum(
     frequency: Annotated[
         str, typer.Option("--frequency", metavar="F|START:STOP:STEP", help="One frequency or a range [Hz].")
     ],
-    model: ModelWord = "hertz",
-    damping_time: DampingTime = 2e-5,
-    gap: Gap = 45e-6,
+    specimen: SpecimenOption = None,
+    model: LawOption = None,
+    damping_time: DampingTime = None,
+    gap: Gap = None,
     duration: Annotated[
         float, typer.Option("--duration", metavar="S", help="Over which exponents are averaged.")
     ] = 25.0,
@@ -57,6 +58,7 @@ def spectrum(
     a, f = range_of(amplitude, Parameter.AMPLITUDE, (1, 3)), range_of(frequency, Parameter.FREQUENCY, (1, 3))
     asked = asked_of_specimen(
         SpectrumRequest,
+        specimen,
         model,
         damping_time,
         gap,

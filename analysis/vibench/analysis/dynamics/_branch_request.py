@@ -78,13 +78,13 @@ class BranchRequest(SpecimenChoice):
         return self
 
     def _refuse_other_laws(self) -> None:
-        law = self.specimen.contact
+        law = self.shaken.contact
         match self.method, law:
             case BranchMethod.FIRST_ORDER, PowerLaw():
                 pass
             case BranchMethod.FIRST_ORDER, _:
                 raise ValueError(
-                    f"one harmonic cannot describe {self.model}: take a power law such as power:5, or the "
+                    f"one harmonic cannot describe {self.law}: take a power law such as power:5, or the "
                     "method balance or shooting"
                 )
             case BranchMethod.BALANCE, RigidStops():
@@ -115,7 +115,7 @@ class BranchRequest(SpecimenChoice):
     @property
     def balance_options(self) -> BalanceOptions:
         """Harmonics, for the two methods that balance them."""
-        lower, upper = self.specimen.gaps_m
+        lower, upper = self.shaken.gaps_m
         kept = HarmonicSet.ODD if lower == upper else HarmonicSet.ALL
         if self.method is BranchMethod.FIRST_ORDER:
             return BalanceOptions(kept, fewest=1, most=1, tolerance=EXACT_ENOUGH)
@@ -131,13 +131,13 @@ class BranchRequest(SpecimenChoice):
             where = f"{self.frequency_hz:g} Hz"
         elif self.recorded_level:
             where = "recorded level"
-        return f"{self.model}, {where}, {self.method.value}"
+        return f"{self.law}, {where}, {self.method.value}"
 
     @property
     def sentence(self) -> str:
         """Say the options under a figure."""
         return (
-            f"{self.title}; c = {self.damping_time_s:.3g} s · k, gap {1e6 * self.gap_m:g} µm; motions looked "
-            f"for at {self.places} places from {self.starts} random states each, seed {self.seed}, up to "
+            f"{self.title}; {self.specimen_text}; motions looked for "
+            f"at {self.places} places from {self.starts} random states each, seed {self.seed}, up to "
             f"{self.most_periods} drive periods long."
         )

@@ -17,7 +17,7 @@ def branch_lines(request: BranchRequest) -> Iterator[BranchLine]:
 
 
 def _found(request: BranchRequest) -> Iterator[FoundBranch]:
-    where = request.specimen, request.path, request.start, request.stop
+    where = request.shaken, request.path, request.start, request.stop
     if request.method is BranchMethod.SHOOTING:
         return shot_branches(*where, request.search)
     return balanced_branches(*where, request.balance_options, request.search)
@@ -32,7 +32,7 @@ def diagram_of(request: BranchRequest) -> BranchDiagram:
 
 def spectrum_points(request: SpectrumRequest) -> Iterator[SpectrumPoint]:
     """Give each point as soon as it has been computed."""
-    specimen = request.specimen
+    specimen = request.shaken
     for value in request.values:
         began = time.perf_counter()
         drive = Harmonic(*request.drive(value))

@@ -1,37 +1,65 @@
 """Which specimen a question is about: the one place where its options become one."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import Self
 
-from pydantic import Field, PositiveFloat, model_validator
+from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from vibench.acquisition import FrozenModel
-from vibench.sim import Specimen, gong2025
+from vibench.sim import USUAL_SPECIMEN, Specimen, SpecimenTable, load_specimen
 
 
 class SpecimenChoice(FrozenModel):
-    """The paper's specimen with another contact, damping or gap."""
+    """A described specimen, with another contact, damping or gap where one is given."""
 
-    model: str = "hertz"
-    """Contact: hertz, linear, linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, power:3+5+7, ..."""
-    damping_time_s: Annotated[float, Field(ge=0.0)] = 2e-5
-    """Damping over stiffness of every link: c = damping time times k."""
-    gap_m: PositiveFloat = 45e-6
-    """Clearance at both stops."""
+    specimen: str = USUAL_SPECIMEN
+    """gong2025, heavy, asymmetric, hardening, rigid_stops, linear_gap, or the path of a specimen's file."""
+    model: str = ""
+    """Contact: hertz, linear, linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, power:3+5+7, ...; empty for
+    the specimen's own."""
+    damping_time_s: NonNegativeFloat | None = None
+    """Damping over stiffness of every link: c = damping time times k; empty for the specimen's own."""
+    gap_m: PositiveFloat | None = None
+    """Clearance at both stops; empty for the specimen's own."""
+    described: SpecimenTable | None = None
+    """What the specimen is, number by number: read from its file when absent, so that an answer holds it."""
 
     @model_validator(mode="after")
-    def _is_a_specimen(self) -> "SpecimenChoice":
-        """Refuse here, in its own words, a model that nobody knows."""
-        self.specimen  # noqa: B018 - making it is the check
+    def _is_a_specimen(self) -> Self:
+        """Read the description, and refuse here, in its own words, what cannot be built of it."""
+        if self.described is None:
+            found = SpecimenTable.model_validate(load_specimen(self.specimen).model_dump())
+            object.__setattr__(self, "described", found)
+        else:
+            object.__setattr__(self, "specimen", self.described.name)
+        self.shaken  # noqa: B018 - making it is the check
         return self
 
     @property
-    def specimen(self) -> Specimen:
+    def shaken(self) -> Specimen:
         """What is shaken."""
-        return gong2025(self.damping_time_s, self.gap_m, self.model)
+        assert self.described is not None, "validation fills it"
+        return self.described.specimen(self.law, self.damping_time_s, self.gap_m)
+
+    @property
+    def law(self) -> str:
+        """Word of the contact."""
+        assert self.described is not None, "validation fills it"
+        return self.model.strip() or self.described.contact
+
+    @property
+    def specimen_text(self) -> str:
+        """The specimen and what of it is replaced, for a caption."""
+        said = [f"specimen {Path(self.specimen).stem}, contact {self.law}"]
+        if self.gap_m is not None:
+            said.append(f"gap {1e6 * self.gap_m:g} µm")
+        if self.damping_time_s is not None:
+            said.append(f"damping time {self.damping_time_s:g} s")
+        return ", ".join(said)
 
     @property
     def damping_sum_per_s(self) -> float:
         """Rate at which the dampers alone shrink volumes of states: -tr(M^-1 C)."""
-        found = self.specimen
+        found = self.shaken
         damping, mass = found.damping_matrix.diagonal(), found.mass_matrix.diagonal()
         return -float((damping / mass).sum())

@@ -73,7 +73,7 @@ class SpectrumRequest(SpecimenChoice):
     @property
     def is_elastic(self) -> bool:
         """The contact takes no energy, whatever it does."""
-        match self.specimen.contact:
+        match self.shaken.contact:
             case PowerLaw():
                 return True
             case law:
@@ -85,7 +85,7 @@ class SpectrumRequest(SpecimenChoice):
         held = f"{1e6 * self.amplitude_m:g} µm"
         if self.along is Parameter.AMPLITUDE:
             held = f"{self.frequency_hz:g} Hz"
-        return f"{self.model}, {held}"
+        return f"{self.law}, {held}"
 
 
 @dataclass(frozen=True)

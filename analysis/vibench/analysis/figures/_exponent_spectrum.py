@@ -33,7 +33,7 @@ def exponent_spectrum_figure(found: ExponentSpectrum) -> DrawnFigure:
         caption=(
             f"Lyapunov exponents of the motion that a run from rest ends in; bars: {request.confidence:.0%} "
             f"intervals. Below: Kaplan and Yorke's dimension. {found.cost_sentence} "
-            f"c = {request.damping_time_s:.3g} s · k, gap {1e6 * request.gap_m:g} µm, "
+            f"{request.specimen_text}, "
             f"{request.accuracy.value} accuracy, {request.duration_s:g} s after {request.settle_s:g} s."
         ),
         figure=figure,

@@ -15,8 +15,8 @@ on speed and accuracy is docs/accuracy.md. Results are taken as they are: nothin
 from ..figures import (
     DrawnFigure,
     ImageKind,
-    contact_forces_figure,
     branches_figure,
+    contact_forces_figure,
     exponent_spectrum_figure,
     tradeoff_figure,
 )
@@ -52,8 +52,8 @@ __all__ = [
     "FrequencyGrid",
     "ImageKind",
     "accuracy_document",
-    "contact_forces_figure",
     "branches_figure",
+    "contact_forces_figure",
     "exponent_spectrum_figure",
     "levels_figure",
     "recording_figures",

@@ -1,4 +1,4 @@
-"""The tabs Branches and Exponents of the Simulate page: ask, draw, say error and cost, lay over recordings."""
+"""The tabs Branches and Exponents of the Simulate page ask, draw, say error and cost, lay over recordings."""
 
 import numpy as np
 import pytest

@@ -34,7 +34,7 @@ def _no_curves(_answer: ExponentSpectrum) -> tuple[Curve, ...]:
 BRANCHES = DynamicsKind(
     name="branches",
     request=BranchRequest,
-    hidden=frozenset({"recorded_level"}),
+    hidden=frozenset({"recorded_level", "described"}),
     answer=_diagram,
     cost=lambda answer: answer.cost_sentence,
     curves=lambda answer: answer.curves(),
@@ -46,7 +46,7 @@ BRANCHES = DynamicsKind(
 SPECTRUM = DynamicsKind(
     name="exponents",
     request=SpectrumRequest,
-    hidden=frozenset(),
+    hidden=frozenset({"described"}),
     answer=_spectrum,
     cost=lambda answer: answer.cost_sentence,
     curves=_no_curves,
