@@ -10,7 +10,7 @@ nobody asks for is not computed. A motion on no branch that was known is the sta
 >>> from vibench.sim.branches import MotionSearch, shot_branches
 >>> search = MotionSearch(places=2, starts=2)
 >>> (found,) = islice(shot_branches(gong2025(), FrequencyPath((5e-6,)), 60.0, 62.0, search), 1)
->>> found.periods, found.branch.is_stable.all(), found.branch.frequencies_hz[[0, -1]].tolist()
+>>> found.periods, bool(found.branch.is_stable.all()), found.branch.frequencies_hz[[0, -1]].tolist()
 (1, True, [60.0, 62.0])
 """
 

@@ -1,0 +1,99 @@
+"""Branches over recordings: the level that was recorded, the figure of a report, the command's `--like`."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from vibench.analysis import (
+    FrequencyResponseRequest,
+    NotEnoughData,
+    Simulation,
+    analyse_files,
+    compare_recording,
+    level_of_drive,
+)
+from vibench.analysis.dynamics import BranchDiagram, BranchRequest, diagram_of, write_diagram
+from vibench.analysis.report import write_report
+from vibench.analysis.report._laid_branches import laid_branches
+from vibench.cli.__main__ import app
+
+
+def compared(path):
+    return compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
+
+
+@pytest.fixture(scope="module")
+def level(stepped_file):
+    """Base amplitude over frequency of the recorded steps."""
+    return level_of_drive(compared(stepped_file))
+
+
+@pytest.fixture(scope="module")
+def diagram(level):
+    """Branches under that level."""
+    low, high = level[0][0], level[-1][0]
+    return diagram_of(BranchRequest(recorded_level=level, start=low, stop=high, places=2, starts=0))
+
+
+def test_the_level_is_that_of_every_step(level, stepped_file):
+    (result,) = analyse_files((stepped_file,), "steps", Simulation.LEFT_OUT).results
+    found = result.analysis.response
+    assert [each[0] for each in level] == sorted(each[0] for each in level)
+    for frequency, amplitude in level:
+        near = np.abs(found.frequency_hz - frequency) < 0.5
+        assert found.drive_amplitude_m[near].min() <= amplitude <= found.drive_amplitude_m[near].max()
+
+
+def test_a_dwell_has_no_level_over_frequency(dwell_file):
+    with pytest.raises(NotEnoughData, match="take a stepped sine or a sweep"):
+        level_of_drive(compared(dwell_file))
+
+
+def test_a_report_lays_branches_over_the_steps_and_says_how_their_levels_differ(
+    diagram, stepped_file, tmp_path
+):
+    results = analyse_files((stepped_file,), "steps", Simulation.LEFT_OUT)
+    (drawn,) = laid_branches(results, [diagram])
+    measured = [each for each in drawn.figure.axes[0].get_lines() if "measured" in str(each.get_label())]
+    assert sum(len(each.get_xdata()) for each in measured) == len(
+        results.results[0].analysis.response.frequency_hz
+    )
+    assert "moved 1 to 1 times as far" in drawn.caption
+    half = BranchRequest(amplitude_m=1.0, start=diagram.request.start, stop=diagram.request.stop)
+    (other,) = laid_branches(results, [BranchDiagram(half, diagram.lines, 1.0)])
+    assert "moved 1 to 1 times" not in other.caption
+    page = write_report(results, tmp_path / "report.html", diagrams=[diagram]).read_text("utf-8")
+    assert "Branches: hertz, recorded level, shooting" in page
+
+
+def test_like_a_recording_takes_its_range_and_level(stepped_file, level, tmp_path):
+    options = ("--places", "2", "--starts", "0", "--json", "--out", str(tmp_path / "like"))
+    result = CliRunner().invoke(app, ["branches", "--like", str(stepped_file), *options])
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    asked = found["options"]
+    assert [tuple(each) for each in asked["recorded_level"]] == list(level)
+    points = [point for branch in found["branches"] for point in branch["points"]]
+    path = BranchRequest.model_validate(asked).path
+    for point in points:
+        assert point["amplitude_m"] == pytest.approx(path.drive(point["frequency_hz"])[1], rel=1e-9)
+    refused = CliRunner().invoke(app, ["branches", "--like", str(stepped_file), "--amplitude", "1e-6"])
+    assert "the recording has its own level" in str(refused.exception)
+
+
+def test_an_analysis_takes_branches_that_were_kept(diagram, stepped_file, tmp_path):
+    kept = write_diagram(diagram, tmp_path / "b.h5")
+    arguments = [
+        "analyse",
+        str(stepped_file),
+        "--no-simulate",
+        "--out",
+        str(tmp_path),
+        "--branches",
+        str(kept),
+    ]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "figures" / "branches_1.png").is_file()

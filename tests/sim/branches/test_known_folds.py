@@ -1,0 +1,51 @@
+"""Folds against numbers that other programs found: harmonic balance and Runge-Kutta shooting of other hands."""
+
+from dataclasses import replace
+
+import pytest
+
+from vibench.sim import AmplitudePath, BifurcationKind, FrequencyPath, PowerLaw, gong2025
+from vibench.sim.branches import MotionSearch, shot_branches
+
+FEW = MotionSearch(places=2, starts=1)
+
+
+def hardening():
+    """The paper's specimen with k3 p^3 in the place of stops, a tenth of k1 p at 100 um."""
+    specimen = gong2025()
+    force = 0.1 * specimen.stiffnesses[1] * 100e-6
+    return replace(specimen, contact=PowerLaw(100e-6, ((3, force),)))
+
+
+def folds(specimen, path, low, high):
+    found = next(shot_branches(specimen, path, low, high, FEW))
+    return [each for each in found.branch.events if each.kind is BifurcationKind.FOLD]
+
+
+def test_over_frequency_the_hardening_specimen_folds_at_98_296_and_116_296_hz():
+    found = folds(hardening(), FrequencyPath((3e-6,)), 95.0, 125.0)
+    assert sorted(each.frequency_hz for each in found) == pytest.approx([98.296, 116.296], abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("frequency", "lower_um", "upper_um"),
+    [(103.0, 1.80, 9.35), (106.0, 2.10, 14.1), (112.0, 2.63, 24.5), (285.0, 9.32, 17.3)],
+)
+def test_over_level_it_folds_at_both_ends_of_its_unstable_stretch(frequency, lower_um, upper_um):
+    found = folds(hardening(), AmplitudePath(frequency), 0.3e-6 * lower_um, 1.3e-6 * upper_um)
+    levels = sorted(1e6 * each.amplitude_m for each in found)
+    assert levels[0] == pytest.approx(lower_um, abs=0.006)
+    assert levels[-1] == pytest.approx(upper_um, rel=0.005)
+
+
+def test_with_stops_the_motion_with_contacts_begins_at_0_818_um_at_97_95_hz():
+    specimen, path = gong2025(), AmplitudePath(97.95)
+    found = list(shot_branches(specimen, path, 0.4e-6, 1.9e-6, MotionSearch(places=3, starts=4)))
+    levels = [
+        1e6 * each.amplitude_m
+        for one in found
+        if one.periods == 1
+        for each in one.branch.events
+        if each.kind is BifurcationKind.FOLD
+    ]
+    assert min(abs(level - 0.818) for level in levels) < 0.002
