@@ -1,4 +1,4 @@
-"""Folds against numbers that other programs found: harmonic balance and Runge-Kutta shooting of other hands."""
+"""Folds against numbers of other programs: harmonic balance and Runge-Kutta shooting of other hands."""
 
 from dataclasses import replace
 

@@ -69,6 +69,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
     ) -> None:
         super().__init__()
         self.context, self.kind, self.picture = context, kind, picture
+        self.setAccessibleName(kind.name.capitalize())
         self.form: JudgedForm[Request] = JudgedForm(kind.request, kind.name, kind.hidden)
         self.simulator = Simulator(self)
         self.answer: Answer | None = None
@@ -170,9 +171,9 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         before = QLabel(self.kind.before)
         before.setWordWrap(True)
         before.setProperty("rank", "second")
-        self._begin = push_button("&Find", "Compute what the form says, in another process", self.begin)
+        self._begin = push_button("Find", "Compute what the form says, in another process", self.begin)
         self._begin.setProperty("rank", "first")
-        self._cancel = push_button("&Cancel", "Want no more; what has been found stays", self.cancel)
+        self._cancel = push_button("Cancel", "Want no more; what has been found stays", self.cancel)
         self._cancel.setEnabled(False)
         row = QHBoxLayout()
         row.addWidget(self._begin, 1)
@@ -191,7 +192,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         self._state.setWordWrap(True)
         self._state.setAccessibleName(f"State, cost and error of the {self.kind.name}")
         self._compare = push_button(
-            "&Lay over recordings", "Put these curves on the Compare page", self._hand_to_compare
+            "Lay over recordings", "Put these curves on the Compare page", self._hand_to_compare
         )
         self._compare.setEnabled(False)
         row = QHBoxLayout()

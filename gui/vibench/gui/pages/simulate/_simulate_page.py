@@ -163,6 +163,7 @@ class SimulatePage(Page):
         layout = QVBoxLayout(self)
         self.tabs = QTabWidget()
         self.tabs.setAccessibleName("What is simulated")
+        self._parts.setAccessibleName("Responses")
         self.tabs.addTab(self._parts, "Responses")
         self.tabs.addTab(self.branches, "Branches")
         self.tabs.addTab(self.spectrum, "Exponents")
