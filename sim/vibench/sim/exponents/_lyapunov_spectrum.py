@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from ..kernels import Floats
 from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, Specimen, chosen, state_matrix
@@ -75,7 +75,7 @@ class LyapunovSpectrum:
         if not 0.0 < confidence < 1.0:
             msg = f"A confidence of {confidence} is not allowed: it must lie between 0 and 1."
             raise ValueError(msg)
-        return np.asarray(student.ppf(0.5 + 0.5 * confidence, np.maximum(self.blocks - 1, 1)))
+        return np.asarray(stdtrit(np.maximum(self.blocks - 1, 1), 0.5 + 0.5 * confidence))
 
 
 def lyapunov_spectrum(

@@ -102,7 +102,7 @@ def test_exponents_are_drawn_with_their_intervals(page):
         )  # fmt: skip
     page.refresh()
     upper, lower = view.picture.plots(Parameter.FREQUENCY)
-    assert [each.name() for each in lines(upper) if each.name()] == [f"λ{k}" for k in range(1, 7)]
+    assert len(lines(upper)) == 12  # six exponents, each with the band of its interval
     assert lines(lower)[-1].getOriginalDataset()[1].tolist() == [4.4, 4.4]
     assert "2 chaotic; sums differ from the dampers'" in view.said
     assert not view._compare.isEnabled()
