@@ -29,7 +29,7 @@ def test_branches_are_printed_as_json_and_written_with_figure_and_tables(tmp_pat
     assert all(point["is_stable"] for point in branch["points"])
     names = {each.name for each in (tmp_path / "out").iterdir()}
     assert names >= {"branches.h5", "branches.png", "branches.svg", "branches.csv"}
-    assert "never overwritten" in refused("branches", *options, "--out", tmp_path / "out")
+    assert "ever overwritten" in refused("branches", *options, "--out", tmp_path / "out")
 
 
 def test_branches_along_the_level_are_told_in_sentences():

@@ -108,7 +108,7 @@ def test_a_file_holds_everything_and_nothing_is_overwritten(computed, tmp_path):
         assert file["branch_000/frequency_hz"].attrs["units"] == "Hz"
         assert json.loads(file.attrs["request"])["amplitude_m"] == 5e-6
     before = path.read_bytes()
-    with pytest.raises(InvalidRequest, match="never overwritten"):
+    with pytest.raises(InvalidRequest, match="ever overwritten"):
         write_diagram(computed, path)
     assert path.read_bytes() == before
 
