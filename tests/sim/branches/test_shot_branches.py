@@ -195,6 +195,7 @@ def test_a_grazing_point_is_where_the_linear_motion_reaches_the_gap():
     assert grazing.amplitude_m == pytest.approx(at_gap, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_on_rigid_stops_a_branch_is_exact_and_where_it_is_lost_a_contact_grazes():
     specimen = gong2025(contact="rigid:0.8")
     found = list(shot_branches(specimen, FrequencyPath((20e-6,)), 110.0, 150.0, FEW))
