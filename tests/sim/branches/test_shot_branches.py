@@ -159,6 +159,7 @@ def test_every_point_comes_back_within_its_error_whatever_its_stability(near_the
         assert np.median(branch.left_out) < 1e-6
 
 
+@pytest.mark.slow
 def test_an_isolated_branch_of_period_three_is_found_from_random_states(near_the_first_resonance):
     (isolated,) = (each for each in near_the_first_resonance if each.is_isolated)
     assert isolated.periods == 3

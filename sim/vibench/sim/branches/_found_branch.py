@@ -46,7 +46,7 @@ class FoundBranch:
     @property
     def is_isolated(self) -> bool:
         """It closes on itself: no sweep leads there from outside."""
-        return self.branch.begin is ArcEnd.CLOSED
+        return self.branch.begin is self.branch.end is ArcEnd.CLOSED
 
 
 def lies_on(found: FoundBranch, specimen: Specimen, path: DrivePath, drive: Harmonic, states: Floats) -> bool:
