@@ -16,6 +16,7 @@ from vibench.sim import Accuracy
 from vibench.sim.accuracy_benchmark import (
     LOTTERIES,
     MOTIONS,
+    TRANSIENTS,
     AccuracyBenchmark,
     LotteryFigures,
     MotionBenchmark,
@@ -28,6 +29,7 @@ from .paths import AsJson, room_for_folder
 
 _SHORTEST_S = 0.05
 _LONGEST_S = 60.0
+_STEPS = len(MOTIONS) + len(LOTTERIES) + len(TRANSIENTS)
 
 
 def tradeoff(
@@ -51,13 +53,13 @@ def tradeoff(
         room_for_folder(folder)
     columns = (TextColumn("{task.description:<28}"), BarColumn(bar_width=30), MofNCompleteColumn())
     with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True)) as bars:
-        bar = bars.add_task("", total=len(MOTIONS) + len(LOTTERIES))
+        bar = bars.add_task("", total=_STEPS)
 
         def step(name: str) -> None:
             bars.update(bar, description=name, advance=0 if bars.tasks[0].description == "" else 1)
 
         benchmark = measure_accuracy(Thoroughness(span_s=span), step)
-        bars.update(bar, completed=len(MOTIONS) + len(LOTTERIES))
+        bars.update(bar, completed=_STEPS)
     if as_json:
         print_json(_document(benchmark))
     else:
@@ -134,6 +136,10 @@ def _document(benchmark: AccuracyBenchmark) -> dict[str, object]:
                 "cost": each.cost,
             }
             for each in benchmark.lotteries
+        ],
+        "transients": [
+            {**asdict(each), "name": each.motion.name, "promise": each.promise}
+            for each in benchmark.transients
         ],
         "promises": [
             {"level": level.value, "promised": level.promise, "worst": worst_error(benchmark, level)}

@@ -7,7 +7,7 @@ import pytest
 
 from vibench.analysis.report import accuracy_document, tradeoff_figure, worst_error
 from vibench.sim import Accuracy
-from vibench.sim.accuracy_benchmark import LOTTERIES, MOTIONS, Thoroughness, measure_accuracy
+from vibench.sim.accuracy_benchmark import LOTTERIES, MOTIONS, TRANSIENTS, Thoroughness, measure_accuracy
 
 PAGE = Path(__file__).parents[3] / "docs" / "accuracy.md"
 
@@ -18,6 +18,7 @@ def benchmark():
         Thoroughness(span_s=0.03, solver_span_s=0.01, starts=8),
         motions=(MOTIONS[1], MOTIONS[-1]),
         lotteries=(LOTTERIES[1],),
+        transients=TRANSIENTS[2:3],
     )
 
 
@@ -47,6 +48,15 @@ def test_the_page_has_the_shares_of_scenes_whose_start_is_forgotten(benchmark):
 def test_the_page_says_when_a_promise_is_not_kept(benchmark):
     assert worst_error(benchmark, Accuracy.QUICK) <= Accuracy.QUICK.promise
     assert "**no**" not in accuracy_document(replace(benchmark, lotteries=()), "x.png")
+
+
+def test_a_transient_errs_by_no_more_than_the_promise_times_its_growth_and_than_its_answer_says(benchmark):
+    page = accuracy_document(benchmark, "x.png")
+    assert [each.accuracy for each in benchmark.transients] == list(Accuracy)
+    for each in benchmark.transients:
+        assert each.state_error <= each.promise
+        assert each.response_error <= each.stated_error
+        assert f"| {each.motion.name} | {each.growth:.0f} | {each.accuracy.value} |" in page
 
 
 def test_the_page_names_the_motions_on_which_a_level_buys_nothing(benchmark):

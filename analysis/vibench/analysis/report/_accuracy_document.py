@@ -11,6 +11,7 @@ from vibench.sim.accuracy_benchmark import (
     MotionBenchmark,
     SolverFigures,
     StatedShare,
+    TransientFigures,
 )
 
 _HEAD = (
@@ -55,6 +56,7 @@ def _lines(benchmark: AccuracyBenchmark, picture: str) -> Iterator[str]:
     for each in benchmark.motions:
         yield from _motion(each)
     yield from _lotteries(benchmark.lotteries)
+    yield from _transients(benchmark.transients)
     yield from _promises(benchmark)
 
 
@@ -96,6 +98,29 @@ def _share(found: LotteryFigures, stated: StatedShare) -> str:
         f"{found.cost:.1f}",
     )
     return f"| {' | '.join(cells)} |"
+
+
+def _transients(transients: tuple[TransientFigures, ...]) -> Iterator[str]:
+    """Say what the levels are worth where nothing has been forgotten yet."""
+    if not transients:
+        return
+    yield from (
+        "",
+        "## Transients, from rest",
+        "",
+        "A motion that has settled forgets the errors of its steps; a transient carries them along, and a",
+        "small change of it may grow a thousandfold. A level promises here what it promises above, times the",
+        "largest growth of a small change on the way. What an answer states of its responses holds either",
+        "way: it is measured, by a stricter run from the start. State compared with the independent solution",
+        "after 0.1 s, responses of its second half with the reference level.",
+        "",
+        "| motion | growth | level | error of the state | promised | of the responses | stated |",
+        "|---|---|---|---|---|---|---|",
+    )
+    for each in transients:
+        numbers = (each.state_error, each.promise, each.response_error, each.stated_error)
+        cells = " | ".join(f"{number:.1e}" for number in numbers)
+        yield f"| {each.motion.name} | {each.growth:.0f} | {each.accuracy.value} | {cells} |"
 
 
 def _motion(found: MotionBenchmark) -> Iterator[str]:

@@ -1,10 +1,12 @@
 from ._figures import (
     LEAST_GAIN as LEAST_GAIN,
     MOTIONS as MOTIONS,
+    TRANSIENTS as TRANSIENTS,
     AccuracyBenchmark as AccuracyBenchmark,
     LevelFigures as LevelFigures,
     MotionBenchmark as MotionBenchmark,
     SolverFigures as SolverFigures,
+    TransientFigures as TransientFigures,
 )
 from ._lotteries import (
     LOTTERIES as LOTTERIES,

@@ -17,6 +17,7 @@ class Regime(StrEnum):
     FREE = "no contact"
     PERIODIC = "periodic"
     CHAOTIC = "chaos"
+    TRANSIENT = "from rest"
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,11 @@ MOTIONS = (
     Motion(Regime.CHAOTIC, "hertz", 260.0, 5e-6),
 )
 """Kinds were found by scanning; `vibench.sim.accuracy_benchmark` refuses a periodic motion that is none."""
+TRANSIENTS = tuple(
+    Motion(Regime.TRANSIENT, model, 130.0, 20e-6)
+    for model in ("hertz", "linear_gap", "power:7", "power:47", "power:201")
+)
+"""Followed from rest, while a small change grows a thousandfold."""
 LEAST_GAIN = 2.0
 """A level whose error is not smaller than the one before it by this factor buys nothing."""
 
@@ -107,7 +113,7 @@ class MotionBenchmark:
         match self.motion.regime:
             case Regime.FREE:
                 return "Flight is exact: all levels are the same."
-            case Regime.PERIODIC:
+            case Regime.PERIODIC | Regime.TRANSIENT:
                 return self._periodic_advice()
             case Regime.CHAOTIC:
                 return (
@@ -147,6 +153,27 @@ def _is_better(level: LevelFigures, before: LevelFigures) -> bool:
 
 
 @dataclass(frozen=True)
+class TransientFigures:
+    """One level of accuracy on a motion that has forgotten nothing yet."""
+
+    motion: Motion
+    accuracy: Accuracy
+    growth: float
+    """Largest factor by which a small change of the state grows on the way, up to the end."""
+    state_error: float
+    """At the end, as `state_error` measures it."""
+    response_error: float
+    """Relative, the largest of the four responses, against the reference level."""
+    stated_error: float
+    """What the answer says of them."""
+
+    @property
+    def promise(self) -> float:
+        """What the level promises here: its error of a settled motion, as often as a small change grows."""
+        return self.accuracy.promise * max(1.0, self.growth)
+
+
+@dataclass(frozen=True)
 class AccuracyBenchmark:
     """Everything that was measured in one run."""
 
@@ -155,6 +182,7 @@ class AccuracyBenchmark:
     """Processor and cores."""
     software: str
     lotteries: tuple[LotteryFigures, ...] = ()
+    transients: tuple[TransientFigures, ...] = ()
 
     def solver_ratio(self, name: str, accuracy: Accuracy) -> dict[str, float]:
         """Cost of a general solver over that of a level, by motion."""

@@ -15,10 +15,28 @@ from scipy.integrate import solve_ivp
 from ..exponents import lyapunov_exponent
 from ..kernels import Floats
 from ..model import Accuracy
-from ..motion import integrate, smallest_period, state_scales, steady_response, stroboscopic_section
+from ..motion import (
+    flow_derivative,
+    integrate,
+    smallest_period,
+    state_scales,
+    steady_response,
+    stroboscopic_section,
+)
+from ..scene import FixedDuration, Scene, solve_scene
 from ..study import software
-from ._figures import MOTIONS, AccuracyBenchmark, LevelFigures, Motion, MotionBenchmark, Regime, SolverFigures
-from ._independent_solution import independent_state, state_error
+from ._figures import (
+    MOTIONS,
+    TRANSIENTS,
+    AccuracyBenchmark,
+    LevelFigures,
+    Motion,
+    MotionBenchmark,
+    Regime,
+    SolverFigures,
+    TransientFigures,
+)
+from ._independent_solution import STATE_UNITS, independent_state, state_error
 from ._lotteries import LOTTERIES, Lottery, measured_lottery
 from ._plain_equations import Place, law_of, numbers_of, rates_at
 
@@ -34,6 +52,10 @@ TIMED_S = 10.0
 RESPONSE_S, WINDOW_S = 3.0, 2.0
 STARTS = 8
 EXPONENT_S = 10.0
+TRANSIENT_S = 0.1
+LOOKS = 20
+"""Instants up to which, and from which on, the growth of a small change is taken."""
+RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
 START_SPREAD_M = 1e-6
 
 Step = Callable[[str], None]
@@ -57,6 +79,7 @@ def measure_accuracy(
     step: Step = lambda _: None,
     motions: tuple[Motion, ...] = MOTIONS,
     lotteries: tuple[Lottery, ...] = LOTTERIES,
+    transients: tuple[Motion, ...] = TRANSIENTS,
 ) -> AccuracyBenchmark:
     """Measure cost and error on every motion.
 
@@ -66,7 +89,7 @@ def measure_accuracy(
         When a motion is not of the kind it is called, or the independent solution gives up.
 
     """
-    found = []
+    found: list[MotionBenchmark] = []
     for motion in motions:
         step(motion.name)
         found.append(measured_motion(motion, thoroughness))
@@ -74,7 +97,11 @@ def measure_accuracy(
     for lottery in lotteries:
         step(lottery.name)
         drawn.append(measured_lottery(lottery, thoroughness.starts))
-    return AccuracyBenchmark(tuple(found), _machine(), software(), tuple(drawn))
+    from_rest: list[TransientFigures] = []
+    for motion in transients:
+        step(f"from rest: {motion.name}")
+        from_rest += measured_transient(motion)
+    return AccuracyBenchmark(tuple(found), _machine(), software(), tuple(drawn), tuple(from_rest))
 
 
 def measured_motion(motion: Motion, thoroughness: Thoroughness) -> MotionBenchmark:
@@ -91,6 +118,41 @@ def measured_motion(motion: Motion, thoroughness: Thoroughness) -> MotionBenchma
     )
     solvers = tuple(_solver(name, motion, start, solver_span_s, truths[1]) for name in SOLVERS)
     return MotionBenchmark(motion, span_s, solver_span_s, levels, solvers)
+
+
+def measured_transient(motion: Motion) -> tuple[TransientFigures, ...]:
+    """Measure what every level errs by from rest, and what its answers say of it."""
+    rest = np.zeros(6)
+    truth = independent_state(motion.specimen, motion.drive, TRANSIENT_S, rest)
+    duration = FixedDuration(TRANSIENT_S, 0.5 * TRANSIENT_S)
+    found = {
+        level: solve_scene(Scene(motion.specimen, motion.drive, accuracy=level, duration=duration))
+        for level in LEVELS
+    }
+    seen = {level: np.array([getattr(each, name) for name in RESPONSES]) for level, each in found.items()}
+    growth = _growth(motion)
+    return tuple(
+        TransientFigures(
+            motion,
+            level,
+            growth,
+            state_error(_follow(motion, level, rest, TRANSIENT_S), truth),
+            float(np.max(np.abs(seen[level] / seen[Accuracy.REFERENCE] - 1.0))),
+            found[level].error_estimate or math.nan,
+        )
+        for level in LEVELS
+    )
+
+
+def _growth(motion: Motion) -> float:
+    """Largest factor by which a change of the state, in its units, grows from some instant on."""
+    ends = TRANSIENT_S * np.arange(1.0, LOOKS + 1.0) / LOOKS
+    derivatives = [np.eye(6)] + [
+        flow_derivative(motion.specimen, motion.drive, np.zeros(6), float(end_s))[1] for end_s in ends
+    ]
+    scale = STATE_UNITS / STATE_UNITS[:, None]
+    onto_end = [derivatives[-1] @ np.linalg.inv(each) for each in derivatives[:-1]]
+    return max(float(np.linalg.norm(each * scale, 2)) for each in (*derivatives, *onto_end))
 
 
 def settled_state(motion: Motion) -> Floats:

@@ -81,7 +81,7 @@ def solve_scene(scene: Scene) -> ScenePrediction:
 
     Each response has an error: how far, relatively, that of another run of the same scene at a far stricter
     accuracy may lie; ``error_estimate`` is the largest of the four. It is measured (docs/accuracy.md): where
-    the motion has settled, twice the difference to a run with a hundredth of the tolerance that is taken on
+    the motion has settled, twice the difference to a run with a far smaller tolerance that is taken on
     from the end until it has forgotten it; where it has not, twice the difference to such a run from the
     start. Where the two part, the start is forgotten and another run is another draw: the error is then what
     two draws differ by in 19 cases of 20.

@@ -1,9 +1,9 @@
 """How far each response of an answer may be off: measured, by the kind of question that was asked. SI units.
 
 A motion that has settled forgets the errors of its steps as they come: it is taken on from its end with a
-hundredth of the tolerance until that has been forgotten too, and what was answered is compared with that. A
-motion that has not settled carries its errors along: it is followed once more from its start with a hundredth
-of the tolerance, and observed in the same window. Where the two part on the way, growth has forgotten
+far smaller tolerance until that has been forgotten too, and what was answered is compared with that. A
+motion that has not settled carries its errors along: it is followed once more from its start with that
+tolerance, and observed in the same window. Where the two part on the way, growth has forgotten
 the start, and another run is another draw: what two draws differ by is found from the parts of the window if
 the motion has become stationary by then, else from a few starts that nobody can tell apart.
 """
@@ -23,10 +23,8 @@ from ._scatter import draws_apart, draws_of_starts
 from ._scene import Scene
 from ._several_starts import SEED, pushes
 
-STRICTER = 1e-2
-"""Tolerance of the comparison over that of the run."""
-STRICTEST = 1e-12
-"""Smaller tolerances are rounding."""
+STRICTER = {Accuracy.QUICK: 1e-10, Accuracy.STANDARD: 1e-10, Accuracy.REFERENCE: 1e-12}
+"""Tolerance of the comparison. A hundredth of quick's would not do: a collision in one is better."""
 FORGETTING = 4.0
 """Forgetting times that a motion which repeats is followed before it is compared."""
 LOOKS = 8
@@ -128,7 +126,7 @@ def off_settled(
     """
     cycle_s = period / run.drive.frequency_hz
     wait_s = cycle_s * np.ceil(FORGETTING * forgetting_s / cycle_s)
-    strict = run.apart(_strict(accuracy))
+    strict = run.apart(STRICTER[accuracy])
     looks = []
     for _ in range(2):
         strict.follow(strict.time_s + wait_s)
@@ -149,7 +147,7 @@ def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
     on = run.apart(accuracy.tolerance)
     seen, missed = [], []
     for _ in range(LOOKS):
-        twin = on.apart(_strict(accuracy))
+        twin = on.apart(STRICTER[accuracy])
         seen.append(_responses(on, cycle_s))
         missed.append(np.abs(seen[-1] - _responses(twin, cycle_s)))
     return float(np.max(np.max(missed, axis=0) / np.max(np.abs(seen), axis=0)))
@@ -157,7 +155,7 @@ def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
 
 def _strict_answer(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedRun) -> Floats | None:
     """Responses of the same window by a stricter run from the start; None where it came another way."""
-    loose, strict = begin.apart(scene.accuracy.tolerance), begin.apart(_strict(scene.accuracy))
+    loose, strict = begin.apart(scene.accuracy.tolerance), begin.apart(STRICTER[scene.accuracy])
     begin_s, frequency = seen.window.begins.time_s, begin.drive.frequency_hz
     while strict.time_s < begin_s:
         until_s = min(begin_s, max(2.0 * strict.time_s, FIRST_LOOK / frequency))
@@ -176,10 +174,6 @@ def _are_together(scene: Scene, one: FollowedRun, other: FollowedRun) -> bool:
         return False
     apart = np.abs(one.state - other.state) / np.repeat([1.0, 2.0 * np.pi * scene.drive.frequency_hz], 3)
     return bool(np.max(apart) < PARTED * min(scene.specimen.gaps_m))
-
-
-def _strict(accuracy: Accuracy) -> float:
-    return max(STRICTER * accuracy.tolerance, STRICTEST)
 
 
 def _responses(run: FollowedRun, length_s: float) -> Floats:

@@ -1,0 +1,130 @@
+"""Extremes through the real command: every one is answered in finite numbers, or refused in a sentence.
+
+``python benchmarks/extremes.py --seed S --cases 150 [--shard 1/4]``. Each case draws a specimen and a drive
+from the ranges below, writes the specimen as a file, and calls ``vibench predict`` in this process. An
+answer is good when the exit code is 0 and all four responses and their errors are finite numbers; a refusal,
+when the exit code is 1 and standard error holds one sentence and no traceback. Whatever else happens is
+listed, and ends the script with exit code 1; a case that takes too long ends it at once.
+"""
+
+import argparse
+import faulthandler
+import json
+import math
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+
+from vibench.cli import main as vibench
+
+AMPLITUDES_M = (1e-300, 1e-120, 1e-100, 1e-30, 1e-12, 1e-9, 1e-6, 1e-5, 1e-4, 1e-2, 1.0)
+FREQUENCIES_HZ = (1e-3, 1.0, 94.6, 130.0, 266.0, 1e3, 1e4, 1e6)
+MASS_FACTORS = (1e-6, 1e-3, 1.0, 1.0, 1.0, 1e3, 1e6)
+STIFFNESSES = (1e3, 1e6, 1e9, 1e12, 1e15)
+GAPS_M = (0.0, 1e-12, 1e-9, 5e-6, 45e-6, 45e-6, 1e-2, 1.0, math.inf)
+DAMPING_TIMES_S = (0.0, 0.0, 1e-9, 2e-5, 1e-2)
+LAWS = ("hertz", "linear", "linear_gap:{:g}", "rigid:0", "rigid:0.5", "rigid:1", "power:3", "power:47")
+MOST_PERIODS = 40
+MASSES_KG = (5.8e-3, 2.1e-3, 2.0e-3)
+SHOWN = 70
+"""Letters of a refusal."""
+LIMIT_S = 600
+"""Of one case."""
+NUMBERS = ("response_i", "response_ii", "relative_i", "relative_ii", "error_estimate")
+
+
+def drawn(rng, folder):
+    """Draw a case: write its specimen, give the words of its command."""
+    masses = [mass * float(rng.choice(MASS_FACTORS)) for mass in MASSES_KG]
+    stiffness, frequency_hz = float(rng.choice(STIFFNESSES)), float(rng.choice(FREQUENCIES_HZ))
+    # At a thousandth of a hertz one period is a hundred thousand cycles of the specimen.
+    periods = int(rng.integers(2, MOST_PERIODS)) if frequency_hz >= 1.0 else 1
+    specimen = folder / "specimen.toml"
+    specimen.write_text(
+        f'model = "gong2025"\nmasses_kg = {masses}\nhertz_stiffness = {stiffness}\n', encoding="utf-8"
+    )
+    return (
+        *("predict", "--json", "--specimen", str(specimen)),
+        *("--model", str(rng.choice(LAWS)).format(stiffness)),
+        *("--amplitude", str(rng.choice(AMPLITUDES_M)), "--frequency", f"{frequency_hz:.6g}"),
+        *("--gap", str(rng.choice(GAPS_M)), "--damping-time", str(rng.choice(DAMPING_TIMES_S))),
+        *("--duration", repr(periods / frequency_hz), "--window", repr(max(1, periods // 2) / frequency_hz)),
+        *("--accuracy", str(rng.choice(("quick", "standard", "reference")))),
+    )
+
+
+def called(words):
+    """Call the command; gives exit code, standard output and standard error."""
+    out, err = StringIO(), StringIO()
+    before = sys.argv
+    sys.argv = ["vibench", *words]
+    try:
+        with redirect_stdout(out), redirect_stderr(err):
+            vibench()
+            code = 0
+    except SystemExit as end:
+        code = end.code or 0
+    except Exception:  # noqa: BLE001 - whatever a user would see as a traceback is what is looked for
+        code = traceback.format_exc()
+    finally:
+        sys.argv = before
+    return code, out.getvalue(), err.getvalue()
+
+
+def complaint(code, out, err):
+    """Say what is wrong with what a command did; None where nothing is."""
+    said = [line for line in err.splitlines() if line.startswith("error:")]
+    if "Traceback" in err or isinstance(code, str):
+        return f"a traceback: {code} {err[-300:]}"
+    if code == 0:
+        (point,) = json.loads(out, parse_constant=lambda word: word)["points"]
+        wrong = [name for name in NUMBERS if not isinstance(point[name], float) or point[name] < 0.0]
+        return f"exit code 0 with {', '.join(f'{name} {point[name]}' for name in wrong)}" if wrong else None
+    if code != 1 or len(said) != 1:
+        return f"exit code {code} and {len(said)} sentences: {err[-300:]}"
+    return None
+
+
+def main():
+    """Draw, call, judge."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seed", type=int, default=2025)
+    parser.add_argument("--cases", type=int, default=150)
+    parser.add_argument("--shard", default="1/1", help="i/n: every nth case, from the ith")
+    parser.add_argument("--only", type=int, help="one case")
+    arguments = parser.parse_args()
+    shard, shards = (int(part) for part in arguments.shard.split("/"))
+    cases = range(shard - 1, arguments.cases, shards) if arguments.only is None else [arguments.only]
+    answered, refused, wrong, longest_s = 0, Counter[str](), 0, 0.0
+    for case in cases:
+        with tempfile.TemporaryDirectory() as folder:
+            words = drawn(np.random.default_rng([arguments.seed, case]), Path(folder))
+            # Whatever does not come back is the last that is named.
+            print(f"case {case}: {' '.join(words)}", file=sys.stderr, flush=True)
+            faulthandler.dump_traceback_later(LIMIT_S, exit=True)
+            began = time.process_time()
+            code, out, err = called(words)
+            longest_s = max(longest_s, time.process_time() - began)
+            faulthandler.cancel_dump_traceback_later()
+        answered += code == 0
+        refused.update([err.partition("error: ")[2][:SHOWN].strip()] if code == 1 else [])
+        found = complaint(code, out, err)
+        if found is not None or arguments.only is not None:
+            wrong += found is not None
+            print(f"case {case}: {' '.join(words)}\n    {found or (code, err[-400:])}", flush=True)
+    for sentence, count in refused.most_common():
+        print(f"{count:4} refused: {sentence} ...")
+    print(f"{answered} answered, {refused.total()} refused in a sentence, {wrong} wrong")
+    print(f"longest {longest_s:.1f} s")
+    sys.exit(wrong > 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,85 @@
+"""What an answer states of its error holds: in transients, over several periods, without damping."""
+
+import numpy as np
+import pytest
+
+from vibench.sim import Accuracy, Harmonic, Scene, gong2025, solve_scene
+from vibench.sim.scene import FixedDuration, Given, MotionKind
+from vibench.sim.scene._observed_window import Block
+from vibench.sim.scene._scatter import draws_apart
+
+RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
+FROM_REST = FixedDuration(0.1, 0.05)
+
+
+def responses(found):
+    return np.array([getattr(found, name) for name in RESPONSES])
+
+
+def errors(found):
+    return np.array([getattr(found, f"{name}_error") for name in RESPONSES])
+
+
+def scene_of(contact, frequency_hz, amplitude_m, damping_time_s=2e-5, **options):
+    return Scene(gong2025(damping_time_s, contact=contact), Harmonic(frequency_hz, amplitude_m), **options)
+
+
+@pytest.mark.parametrize("accuracy", [Accuracy.QUICK, Accuracy.STANDARD])
+@pytest.mark.parametrize("contact", ["power:7", "power:47", "power:201", "linear_gap", "hertz"])
+def test_the_responses_of_a_transient_are_off_by_no_more_than_is_stated(contact, accuracy):
+    found, truth = (
+        solve_scene(scene_of(contact, 130.0, 20e-6, accuracy=level, duration=FROM_REST))
+        for level in (accuracy, Accuracy.REFERENCE)
+    )
+    off = np.abs(responses(found) / responses(truth) - 1.0)
+    assert np.all(off <= errors(found) + errors(truth))
+    assert np.all(errors(found) < 1e-2)
+    assert found.error_estimate == errors(found).max()
+
+
+def test_a_transient_without_contact_is_exact_and_says_so():
+    found = solve_scene(scene_of("hertz", 100.0, 1e-30, duration=FixedDuration(3.0, 1.0)))
+    assert found.motion is MotionKind.UNDECIDED
+    assert np.all(errors(found) < 1e-10)
+
+
+@pytest.mark.parametrize("window_s", [0.5, 0.51])
+def test_lines_of_a_motion_of_several_periods_are_taken_over_whole_multiples_of_them(window_s):
+    found, longer = (
+        solve_scene(scene_of("power:7", 278.6, 3e-6, duration=FixedDuration(8.0, length_s)))
+        for length_s in (window_s, 2.0)
+    )
+    assert found.period == longer.period == 5
+    # Not a multiple of its five periods: their other lines would leak in by 1e-4.
+    assert int(window_s * 278.6) % 5 != 0
+    off = np.abs(responses(found) / responses(longer) - 1.0)
+    assert np.all(off <= errors(found) + errors(longer))
+    assert errors(found)[1] < 1e-6
+
+
+def test_what_wanders_without_damping_differs_between_starts_by_no_more_than_is_stated():
+    """Of 4 responses of 6 other starts, 19 in 20 should lie within; fewer than 16 are one chance in 10^4."""
+    scene = scene_of("hunt_crossley:1", 64.4, 20e-6, 0.0, duration=FixedDuration(3.0, 1.0))
+    found = solve_scene(scene)
+    scale = 1e-9 * np.repeat([1.0, 400.0], 3)
+    starts = np.random.default_rng(3).uniform(-1.0, 1.0, (6, 6)) * scale
+    others = [
+        solve_scene(
+            Scene(
+                scene.specimen, scene.drive, duration=scene.duration, start=Given(tuple(start)), budget_s=0.0
+            )
+        )
+        for start in starts.tolist()
+    ]
+    inside = [np.abs(responses(other) / responses(found) - 1.0) <= errors(found) for other in others]
+    assert np.count_nonzero(inside) >= 16
+
+
+def test_lines_of_two_windows_differ_by_no_more_than_is_said_in_19_cases_of_20():
+    random, inside = np.random.default_rng(7), 0
+    for _ in range(1000):
+        one, another = (5.0 + 0.4 * (random.normal(size=10) + 1j * random.normal(size=10)) for _ in range(2))
+        blocks = [Block(1.0 + 0.1 * random.random(), 1.0 + 0.1 * random.random(), line, line) for line in one]
+        apart = abs(abs(another.mean()) / abs(one.mean()) - 1.0)
+        inside += apart <= draws_apart(blocks, 10)[1]
+    assert inside / 1000 > 0.93
