@@ -87,8 +87,9 @@ def numbers_of(path: Path) -> str:
 
 
 def judged(path: Path) -> tuple[str, float, int]:
-    """Say in a process of its own what a file's numbers are; what processor time it took, and memory."""
+    """Say in a process of its own what a file's numbers are, and what processor time and memory it took."""
     reading, writing = os.pipe()
+    before_bytes = resident_bytes()
     number = os.fork()
     if number == 0:
         os.close(reading)
@@ -108,7 +109,14 @@ def judged(path: Path) -> tuple[str, float, int]:
     _, status, usage = os.wait4(number, 0)
     if os.WIFSIGNALED(status):
         said = f"died: signal {os.WTERMSIG(status)}"
-    return said, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024
+    # A forked process begins with all that its parent holds, a whole test run for example.
+    return said, usage.ru_utime + usage.ru_stime, max(0, usage.ru_maxrss * 1024 - before_bytes)
+
+
+def resident_bytes() -> int:
+    """Memory that this process holds now."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * resource.getpagesize()
 
 
 def faults(said: str, expected: str, took_s: float, peak_bytes: int) -> tuple[str, ...]:

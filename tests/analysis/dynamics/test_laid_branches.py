@@ -48,7 +48,7 @@ def test_the_level_is_that_of_every_step(level, stepped_file):
 
 def test_a_dwell_has_no_level_over_frequency(dwell_file):
     with pytest.raises(NotEnoughData, match="take a stepped sine or a sweep"):
-        level_of_drive(compared(dwell_file))
+        level_of_drive(compared(dwell_file()))
 
 
 def test_a_report_lays_branches_over_the_steps_and_says_how_their_levels_differ(

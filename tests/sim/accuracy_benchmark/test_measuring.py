@@ -68,9 +68,9 @@ def test_every_level_keeps_its_promise_over_two_seconds(motion):
 
 
 def test_a_periodic_motion_buys_digits_and_chaos_buys_none():
-    periodic = measured_motion(MOTIONS[2], SHORT)
+    periodic = measured_motion(MOTIONS[1], SHORT)
     quick, _, reference = periodic.levels
-    assert reference.state_error < 1e-2 * quick.state_error
+    assert reference.state_error < 5e-2 * quick.state_error
     assert quick.response_i_error > reference.response_i_error == 0.0
     assert [each.name for each in periodic.solvers] == list(SOLVERS)
     assert all(each.cost > 20 * reference.cost for each in periodic.solvers)

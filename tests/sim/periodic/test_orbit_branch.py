@@ -32,6 +32,14 @@ def test_a_branch_ends_where_it_is_asked_to(upward):
     assert upward.response_ii.shape == (len(upward.frequencies_hz), 4)
 
 
+def test_a_symmetric_motion_followed_as_any_other_does_not_end_at_its_own_mirror_image():
+    """What lies between it and its mirror image is rounding, whose sign says nothing."""
+    orbit = periodic_orbit(SPECIMEN, Harmonic(130.0, 20e-6))
+    branch = periodic_branch(orbit, Parameter.FREQUENCY, 130.2)
+    assert branch.end is ArcEnd.REACHED_BOUND
+    assert branch.events == ()
+
+
 def test_at_a_neimark_sacker_point_a_complex_pair_lies_on_the_unit_circle(upward):
     points = [event for event in upward.events if event.kind is BifurcationKind.NEIMARK_SACKER]
     assert points

@@ -84,6 +84,8 @@ def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[Bifurcat
 
 NEAR_SIMPLER = 0.5
 """A motion this close to a simpler one, over the gap, may pass through it within a step."""
+IS_SIMPLER = 1e-7
+"""A motion this close to a simpler one, over the gap, is that one: what is between them is rounding."""
 
 
 def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
@@ -91,8 +93,8 @@ def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
     if before.joins is None or before.apart.size == 0:
         return False
     turned = float(before.apart @ after.apart) <= 0.0
-    furthest = max(float(np.linalg.norm(each.apart)) for each in (before, after))
-    return turned and furthest < NEAR_SIMPLER
+    apart = [float(np.linalg.norm(each.apart)) for each in (before, after)]
+    return turned and apart[0] > IS_SIMPLER and max(apart) < NEAR_SIMPLER
 
 
 def sign_of(kind: BifurcationKind, here: OrbitSigns, before: OrbitSigns) -> float:
