@@ -85,6 +85,10 @@ class Trial:
             raise ConnectionError("a request in a whole frame was not answered")
         return taken
 
+    def close(self) -> None:
+        """Leave."""
+        self.hang_up()
+
     def hang_up(self) -> None:
         """Close the viewer's connection; the next message opens another."""
         if self._viewer is not None:
@@ -164,8 +168,7 @@ def attack(shard: Shard) -> Tally:
     """Send broken messages to an engine without a bench, or with a virtual one as it comes."""
     tally = Tally(NAME)
     words = ("vibench.acquisition.engine", "--attendance", "unattended", "--forgotten-s", "36000")
-    with ServedProcess(*words) as process:
-        trial = Trial(process)
+    with ServedProcess(*words) as process, closing(Trial(process)) as trial:
         known = ""
         for number, chance in shard.chances():
             began_s = time.monotonic()

@@ -9,7 +9,7 @@ import socket
 import struct
 import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing, suppress
 from typing import Any
 
 import grpc
@@ -211,6 +211,11 @@ class Trial:
             case _:
                 return "daqmx: " + self._call(*broken_call(chance), chance)
 
+    def close(self) -> None:
+        """Leave."""
+        self._line.close()
+        self._channel.close()
+
     def require_answers(self) -> None:
         """Ask the generator for a setting on a new connection, and the driver for its version."""
         with socket.create_connection(self._scpi, LONGEST_S) as line:
@@ -229,6 +234,7 @@ class Trial:
         try:
             self._line.sendall(broken_scpi(chance))
         except ConnectionError:
+            self._line.close()
             self._line = socket.create_connection(self._scpi, LONGEST_S)
             return "hung up"
         self._line.settimeout(0.002)
@@ -276,8 +282,10 @@ LOOK_EVERY = 50
 def attack(shard: Shard) -> Tally:
     """Send broken messages to the virtual rig's instruments."""
     tally = Tally(NAME)
-    with ServedProcess("vibench.cli", "serve-rig", "--address", "127.0.0.1:0") as process:
-        trial = Trial(process)
+    with (
+        ServedProcess("vibench.cli", "serve-rig", "--address", "127.0.0.1:0") as process,
+        closing(Trial(process)) as trial,
+    ):
         before, known = process.descriptors, ""
         for number, chance in shard.chances():
             began_s, found = time.monotonic(), ()

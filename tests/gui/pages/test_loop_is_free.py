@@ -25,6 +25,7 @@ from vibench.analysis.simulation._request import SimulatedPoint, SimulatedSignal
 from vibench.gui.engine_link._live_run import warm_up
 from vibench.gui.pages.queue._draft import with_sweep
 from vibench.gui.widgets import COMPARE, DARK, FILES, LIGHT, QUEUE, RUN, SIMULATE, TEST
+from vibench.gui.window._open_window import load_ahead
 from vibench.gui.window._screenshots import SHOWN, SHOWN_TOO
 
 RATE_HZ, LONG_S, STEPS = 51_200.0, 20.0, 200
@@ -233,6 +234,7 @@ def test_nothing_that_is_done_on_a_page_keeps_the_loop_over_the_bound(
     window, record, long_recording, tmp_path, qtbot, held_up
 ):
     window.context.folder.mkdir()
+    load_ahead()  # a thread does it as soon as the window has been painted
     recording = record(window.context.folder, "whole")
     qtbot.waitUntil(lambda: window.pages[TEST].is_done, timeout=120_000)
     slow = {}

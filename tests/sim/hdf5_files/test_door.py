@@ -76,6 +76,16 @@ def test_sizes_that_cannot_be_are_refused_before_anything_is_read(make, fill, sa
         open_hdf5(make(fill))
 
 
+def test_a_type_of_numbers_that_nobody_has_is_refused(make):
+    def odd(file):
+        kind = h5py.h5t.IEEE_F64LE.copy()
+        kind.set_ebias(20_000)
+        h5py.h5a.create(file.id, b"x", kind, h5py.h5s.create(h5py.h5s.SCALAR))
+
+    with pytest.raises(UnsafeHdf5, match="its inside cannot be read"):
+        open_hdf5(make(odd))
+
+
 def test_a_file_that_was_cut_short_is_refused(make):
     path = make(lambda file: file.create_dataset("x", data=np.arange(10_000)))
     content = path.read_bytes()

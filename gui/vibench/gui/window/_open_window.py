@@ -51,11 +51,11 @@ def open_window(bench: Path | None, settings: Path | None) -> int:
     gc.freeze()
     window.show()
     QTimer.singleShot(0, window.context.background.prepare)
-    QTimer.singleShot(0, Thread(target=_load_ahead).start)
+    QTimer.singleShot(0, Thread(target=load_ahead).start)
     return app.exec()
 
 
-def _load_ahead() -> None:
+def load_ahead() -> None:
     """Load what the first prediction and the first curves are made of; the window has been painted by now."""
     import_module("scipy.signal")
     getattr(import_module("vibench.analysis"), "MeasurementPrediction")  # noqa: B009

@@ -31,6 +31,9 @@ OWN_FILTERS = frozenset(
 )
 """Any other filter is a plug-in: a library that HDF5 would look for on this machine and run."""
 
+UNREADABLE = (RuntimeError, KeyError, TypeError, OverflowError, ValueError)
+"""What h5py raises where the description of an object, or a type of numbers, cannot be read."""
+
 _allowances: list[None] = []
 """One for each `external_data_allowed` that is on in this process, whichever thread asks."""
 
@@ -74,12 +77,10 @@ def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
             _require_attributes(item)
             if isinstance(item, h5py.Dataset):
                 _require_dataset(item, size_bytes)
-    except (RuntimeError, KeyError, TypeError, OverflowError) as error:
-        # What h5py raises where the description of an object cannot be read.
+    except BaseException as error:
         file.close()
-        raise UnsafeHdf5(f"its inside cannot be read ({error})") from error
-    except BaseException:
-        file.close()
+        if isinstance(error, UNREADABLE) and not isinstance(error, UnsafeHdf5):
+            raise UnsafeHdf5(f"its inside cannot be read ({error})") from error
         raise
     return file
 
