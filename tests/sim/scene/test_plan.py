@@ -47,12 +47,12 @@ def test_only_what_is_observed_is_carried_along(observable, said):
     asked = plan_scene(Scene(gong2025(), LOUD, observe=(Observable.RESPONSE, observable)))
     assert said not in plain.explain()
     assert said in asked.explain()
-    assert asked.cost_s >= plain.cost_s
+    assert asked.planned_s >= plain.planned_s
 
 
 def test_contacts_and_long_runs_cost_more():
     def cost(amplitude_m, duration_s):
         drive = Harmonic(260.0, amplitude_m)
-        return plan_scene(Scene(gong2025(), drive, duration=FixedDuration(duration_s, 5.0))).cost_s
+        return plan_scene(Scene(gong2025(), drive, duration=FixedDuration(duration_s, 5.0))).planned_s
 
     assert cost(1e-9, 30.0) < cost(5e-6, 30.0) < cost(50e-6, 30.0) < cost(50e-6, 300.0)
