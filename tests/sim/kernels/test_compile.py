@@ -41,6 +41,38 @@ def test_a_kernel_is_recompiled_when_a_kernel_that_it_calls_changes_in_another_f
     assert answers == [2.0, 3.0]
 
 
+def test_a_kernel_is_kept_when_a_room_changes_that_its_own_does_not_import(tmp_path):
+    sim = tmp_path / "vibench" / "sim"
+    (sim / "kernels").mkdir(parents=True)
+    shutil.copy(KERNELS / "_compile.py", sim / "kernels" / "_compile.py")
+    (sim / "__init__.py").write_text("")
+    decorated = "from ..kernels._compile import kernel\n"
+    rooms = {
+        "low": f"{decorated}\n@kernel\ndef low(x):\n    return {{factor}} * x\n",
+        "middle": f"{decorated}from ..low._of import low\n\n@kernel\ndef middle(x):\n    return low(x)\n",
+        "high": f"{decorated}"
+        "from ..middle._of import middle\n\n@kernel\ndef high(x):\n    return middle(x)\n",
+        "aside": f"{decorated}\n@kernel\ndef aside(x):\n    return {{factor}} * x\n",
+    }
+    program = (
+        "from vibench.sim.high._of import high; from vibench.sim.aside._of import aside\n"
+        "print(high(1.0), sum(high.stats.cache_misses.values()), aside(1.0))"
+    )
+
+    def answer(**factors):
+        for room, text in rooms.items():
+            (sim / room).mkdir(exist_ok=True)
+            (sim / room / "_of.py").write_text(text.format(factor=factors.get(room, 0)))
+        run = subprocess.run(
+            [sys.executable, "-c", program], cwd=tmp_path, stdout=subprocess.PIPE, text=True, check=True
+        )
+        return tuple(float(each) for each in run.stdout.split())
+
+    assert answer(low=2.0, aside=5.0) == (2.0, 1, 5.0)
+    assert answer(low=2.0, aside=7.0) == (2.0, 0, 7.0)
+    assert answer(low=3.0, aside=7.0) == (3.0, 1, 7.0)
+
+
 def test_importing_vibench_leaves_the_cache_of_other_peoples_kernels_alone():
     program = (
         "from numba import config; before = config.CACHE_DIR\n"
