@@ -65,9 +65,10 @@ def test_a_broken_recording_is_answered_by_a_sentence(count):
 @pytest.mark.timeout(1800)
 def test_fifty_kills_lose_nothing_and_make_no_point_twice():
     tally = Tally("kills")
-    for number in range(20):
+    number = kills = 0
+    # Whether a campaign ends before the moment of its kill depends on the machine: so its number varies.
+    while kills < 50:
         tally.add(recordings_kills.attack(Shard(seed=3, count=number + 1, part=number)))
-        if tally.tried - sum(count for code, count in tally.codes.items() if code.startswith("not")) >= 50:
-            break
+        kills = sum(tally.codes.get(kind, 0) for kind in recordings_kills.KINDS)
+        number += 1
     assert tally.findings == []
-    assert sum(tally.codes.get(kind, 0) for kind in recordings_kills.KINDS) >= 50
