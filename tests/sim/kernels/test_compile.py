@@ -31,7 +31,7 @@ def test_a_kernel_is_recompiled_when_a_kernel_that_it_calls_changes_in_another_f
     for factor in (2.0, 3.0):
         inner.write_text(INNER.format(factor=factor))
         run = subprocess.run(
-            [sys.executable, "-c", "import vibench.sim.outer"],
+            [sys.executable, "-B", "-c", "import vibench.sim.outer"],
             cwd=tmp_path,
             capture_output=True,
             text=True,
@@ -64,7 +64,7 @@ def test_a_kernel_is_kept_when_a_room_changes_that_its_own_does_not_import(tmp_p
             (sim / room).mkdir(exist_ok=True)
             (sim / room / "_of.py").write_text(text.format(factor=factors.get(room, 0)))
         run = subprocess.run(
-            [sys.executable, "-c", program], cwd=tmp_path, stdout=subprocess.PIPE, text=True, check=True
+            [sys.executable, "-B", "-c", program], cwd=tmp_path, stdout=subprocess.PIPE, text=True, check=True
         )
         return tuple(float(each) for each in run.stdout.split())
 
