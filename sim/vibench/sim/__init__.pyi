@@ -33,6 +33,7 @@ from .model import (
     SpecimenDescription as SpecimenDescription,
     SpecimenTable as SpecimenTable,
     UnknownSpecimenError as UnknownSpecimenError,
+    UnreadableTomlError as UnreadableTomlError,
     base_response as base_response,
     base_transmissibility as base_transmissibility,
     bound_matrices as bound_matrices,
@@ -40,6 +41,7 @@ from .model import (
     hertz_stiffness as hertz_stiffness,
     load_specimen as load_specimen,
     shipped_specimens as shipped_specimens,
+    toml_table as toml_table,
     usual_specimen as usual_specimen,
 )
 from .motion import (

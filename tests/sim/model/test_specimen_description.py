@@ -96,7 +96,17 @@ def test_a_description_comes_back_from_its_own_text(tmp_path):
         (("hertz_stiffness = 4.9e9", ""), "hertz_stiffness is missing"),
         (("name =", "damping_time_s = 1e-5\nname ="), "both are given"),
         (("dampings_ns_per_m", "# "), "neither is given"),
-        (("hertz_stiffness", "[sources]\nmass = 'mine'\n[hertz"), "cannot be read as TOML"),
+        (("[30e-6, inf]", "[1e-5, 2e-5, 3e-5]"), r"neither a number above 0 \[m\] nor \[lower, upper\]"),
+        (("6e-3,", "1e-320,"), "too small, or too large"),
+        (("2e4,", "1e308,"), "too small, or too large"),
+        (("4.9e9", "1" + 400 * "0"), "hertz_stiffness = 1000"),
+        (
+            ("hertz_stiffness", "about = " + 3000 * "[" + 3000 * "]" + "\nhertz_stiffness"),
+            "within each other",
+        ),
+        (("hertz_stiffness", "model = 'gong2025'\nsources = 5\nhertz_stiffness"), "sources = 5"),
+        (("stiffnesses_n_per_m = [2e4,", "single_frequencies_hz = [1e200,"), "too small, or too large"),
+        (("hertz_stiffness", "[sources]\nmass = 'mine'\n[hertz"), "is not valid TOML"),
         (
             ("hertz_stiffness = 4.9e9", "hertz_stiffness = 4.9e9\nsources = { mass = 'x' }"),
             "'mass', which is no key",

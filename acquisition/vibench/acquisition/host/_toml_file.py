@@ -2,12 +2,13 @@
 
 import json
 import reprlib
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+
+from vibench.sim import UnreadableTomlError, toml_table
 
 from ..errors import ConfigurationError
 
@@ -33,21 +34,9 @@ def load_toml(path: Path, model: type[Model]) -> Model:
 
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ConfigurationError(
-            f"{path}: cannot be read ({error.strerror}); give the path of a TOML file"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise ConfigurationError(f"{path}: is not UTF-8 text; save it as UTF-8") from error
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigurationError(f"{path}: is not valid TOML: {error}; correct that line") from error
-    except RecursionError as error:
-        raise ConfigurationError(
-            f"{path}: holds lists or tables within each other, too many to be read; write them side by side"
-        ) from error
+        content = toml_table(path)
+    except UnreadableTomlError as error:
+        raise ConfigurationError(str(error)) from error
     return validated(content, model, str(path), path.absolute().parent)
 
 

@@ -90,6 +90,10 @@ from ._state import (
     Y as Y,
     Z as Z,
 )
+from ._toml_table import (
+    UnreadableTomlError as UnreadableTomlError,
+    toml_table as toml_table,
+)
 from ._word import (
     chosen as chosen,
 )

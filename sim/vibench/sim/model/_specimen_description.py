@@ -5,6 +5,7 @@ A description says everything of a specimen; nothing in it is assumed. It may st
 """
 
 import math
+import reprlib
 import tomllib
 from collections.abc import Mapping
 from functools import cache
@@ -13,6 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Self
 
+import numpy as np
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -28,6 +30,7 @@ from pydantic import (
 from ._contact_law import model_named
 from ._elasticity import Elasticity, hertz_stiffness
 from ._specimen import Gaps, Specimen, Triple
+from ._toml_table import toml_table
 
 BASE = "model"
 """Key of the described specimen that a table starts from."""
@@ -159,7 +162,13 @@ class SpecimenDescription(_Described):
         unknown = sorted(self.sources.keys() - type(self).model_fields.keys())
         if unknown:
             raise ValueError(f"sources names {unknown[0]!r}, which is no key of a specimen")
-        self.specimen()
+        try:
+            with np.errstate(all="ignore"):
+                moves = self.specimen().natural_frequencies_hz
+        except ArithmeticError:
+            moves = np.array([math.nan])
+        if not bool(np.all(np.isfinite(moves))):
+            raise ValueError("its masses and springs are too small, or too large, to be computed with")
         return self
 
     def specimen(
@@ -275,16 +284,12 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
     if folder is None:
         raise ValueError(f"no specimen that comes with vibench is called {specimen!r}; there are {names}")
     path = folder / specimen
-    try:
-        base = tomllib.loads(path.read_text("utf-8"))
-    except FileNotFoundError:
+    if not path.exists():
         raise ValueError(
             f"no specimen is called {specimen!r}, and there is no such file; give the path of a TOML file, "
             f"or one of {names}"
-        ) from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ValueError(f"{path} cannot be read as TOML ({error}); give the path of a TOML file") from error
-    return _laid_over(_complete(base, path.parent, depth + 1), table)
+        )
+    return _laid_over(_complete(toml_table(path), path.parent, depth + 1), table)
 
 
 @cache
@@ -301,8 +306,10 @@ def _laid_over(base: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, An
     """Replace what is said anew; the other of two keys that say the same goes, and so do its sources."""
     replaced = {key for pair in ALTERNATIVES if said.keys() & pair for key in pair} | said.keys()
     kept = {key: value for key, value in base.items() if key not in replaced}
-    sources = {key: source for key, source in base.get(SOURCES, {}).items() if key not in replaced}
-    return {**kept, **said, SOURCES: {**sources, **said.get(SOURCES, {})}}
+    old, new = base.get(SOURCES, {}), said.get(SOURCES, {})
+    if not (isinstance(old, Mapping) and isinstance(new, Mapping)):
+        return {**kept, **said}
+    return {**kept, **said, SOURCES: {**{key: old[key] for key in old.keys() - replaced}, **new}}
 
 
 def _complaint(specimen: str, error: ValidationError) -> str:
@@ -315,8 +322,11 @@ def _complaint(specimen: str, error: ValidationError) -> str:
             fault = f"{key} is missing"
         case "extra_forbidden":
             fault = f"{first['loc'][-1]} is no key of a specimen; there are {', '.join(sorted(_KEYS))}"
+        case _ if key == "gap_m":
+            given = reprlib.repr(first["input"])
+            fault = f"gap_m = {given} is neither a number above 0 [m] nor [lower, upper]"
         case _ if key:
-            fault = f"{key} = {first['input']!r}: {said}"
+            fault = f"{key} = {reprlib.repr(first['input'])}: {said}"
         case _:
             return said if specimen in said else f"{specimen}: {said}"
     return f"{specimen} describes no specimen: {fault}"
