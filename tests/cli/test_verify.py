@@ -1,5 +1,6 @@
 """`vibench verify`, and what other commands say of recordings that are damaged or made to harm."""
 
+import contextlib
 import json
 import shutil
 
@@ -15,15 +16,22 @@ SECRET = b"root:x:0:0:root:/root:/bin/bash\n" * 200
 
 @pytest.fixture
 def folder(tmp_path):
+    for name in ("one", "two", "three"):
+        with growing(tmp_path / f"{name}.h5"):
+            pass
+    return tmp_path
+
+
+@contextlib.contextmanager
+def growing(path):
+    """Write half a second of three channels; the recording is finished when the block ends."""
     channels = tuple(
         ChannelHeader(role, "ai0", "voltage", "V", 1.0, 5.0)
         for role in ("drive_voltage", "base_acceleration", "m0_velocity")
     )
-    for name in ("one", "two", "three"):
-        header = RecordingHeader(channels, 1000.0, 500, Origin.SIMULATED)
-        with create_recording(tmp_path / f"{name}.h5", header) as writer:
-            writer.append(Block(0, np.sin(0.1 * np.arange(1500)).reshape(3, 500)))
-    return tmp_path
+    with create_recording(path, RecordingHeader(channels, 1000.0, 500, Origin.SIMULATED)) as writer:
+        writer.append(Block(0, np.sin(0.1 * np.arange(1500)).reshape(3, 500)))
+        yield
 
 
 def damage(path):
@@ -114,6 +122,29 @@ def test_it_is_read_when_the_user_says_so(vibench_here, folder):
     found = vibench_here("export", "two.h5", "--to", "csv", "--allow-external", cwd=folder)
     assert found.returncode == 0, found.stderr
     assert (folder / "two.csv").exists()
+
+
+def test_what_was_left_of_a_recording_is_read_when_the_user_says_so(vibench_here, folder):
+    with growing(folder / "four.h5"):
+        shutil.copy(folder / "four.h5.part", folder / "five.h5.part")
+    with h5py.File(folder / "five.h5.part", "r+") as file:
+        file["elsewhere"] = h5py.ExternalLink("one.h5", "/")
+    refused = vibench_here("recover", "five.h5.part", cwd=folder)
+    assert refused.returncode == 1
+    assert "points into another file" in refused.stderr
+    assert "--allow-external" in refused.stderr
+    found = vibench_here("recover", "five.h5.part", "--allow-external", cwd=folder)
+    assert found.returncode == 0, found.stderr
+    assert vibench_here("verify", "five.h5", cwd=folder).returncode == 0
+
+
+def test_a_finished_recording_under_the_name_of_a_growing_one_is_not_recovered(vibench_here, folder):
+    (folder / "two.h5").rename(folder / "four.h5.part")
+    before = (folder / "four.h5.part").read_bytes()
+    found = vibench_here("recover", "four.h5.part", cwd=folder)
+    assert found.returncode == 1
+    assert found.stderr == "error: four.h5.part is a finished recording; rename it to four.h5\n"
+    assert (folder / "four.h5.part").read_bytes() == before
 
 
 def test_one_bad_recording_does_not_spoil_a_folder(vibench_here, folder):

@@ -7,11 +7,14 @@ import typer
 
 from vibench.acquisition.recording import recover
 
+from .external_data import AllowExternal, external_data
 from .output import console
 
 
 def recover_recording(
     recording: Annotated[Path, typer.Argument(metavar="NAME.h5.part", help="What was left of it.")],
+    allow_external: AllowExternal = False,
 ) -> None:
     """Finish a recording that was cut off: all that was committed becomes NAME.h5."""
-    console.print(f"recovered {recover(recording)}")
+    with external_data(allow_external):
+        console.print(f"recovered {recover(recording)}")

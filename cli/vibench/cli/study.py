@@ -16,6 +16,7 @@ from vibench.sim.study import (
     solve_study,
 )
 
+from .external_data import AllowExternal, external_data
 from .interruption import told_to_stop
 from .output import console, print_json, print_warnings
 from .paths import AsJson
@@ -47,6 +48,7 @@ def study(
     only_estimate: Annotated[
         bool, typer.Option("--estimate", help="Say how many points and how much work; compute nothing.")
     ] = False,
+    allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
     """Predict responses over every combination of what a file lists, longest first."""
@@ -56,7 +58,11 @@ def study(
         tell_work(asked, as_json)
         return
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
-    with told_to_stop() as is_stopped, study_bar(asked.grid.size) as observer:
+    with (
+        external_data(allow_external),
+        told_to_stop() as is_stopped,
+        study_bar(asked.grid.size) as observer,
+    ):
         results = solve_study(asked, out, existing, workers, cluster, observer, is_stopped)
     if as_json:
         print_json(document(results, out))

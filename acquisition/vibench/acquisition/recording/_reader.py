@@ -101,6 +101,11 @@ class Recording:
     _open: _OpenFile
 
     @property
+    def is_growing(self) -> bool:
+        """Whether it is a ``.part``: being recorded, or what a program left that died."""
+        return layout.N_VALID in self._open.file
+
+    @property
     def duration_s(self) -> float:
         """Length of what was recorded [s]."""
         return self.samples / self.sample_rate_hz

@@ -45,6 +45,8 @@ def recover(path: Path | str) -> Path:
 def _finish(part: Path, final: Path, key: SealKey | None) -> None:
     with sole_use(part):
         with open_recording(part) as source:
+            if not source.is_growing:
+                raise RecordingError(f"{part} is a finished recording; rename it to {final.name}")
             is_done = final.exists() and _holds(final, source.recording_id, part)
         if not is_done:
             # Left by a crash while the copy was made; everything in it is in the .part.
