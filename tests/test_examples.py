@@ -43,6 +43,19 @@ def test_branches_break_their_symmetry_and_the_exponents_add_up():
     assert 4.0 < float(re.search(r"dimension ([\d.]+)", lines[-1])[1]) < 5.0
 
 
+def test_impacts_fill_the_gap_of_a_swept_chain():
+    gap, weak, strong = lines_of("chain_and_its_gap.py")
+    assert gap == "gap of the endless chain: 373.4 to 462.0 Hz"
+    within, above = (
+        [float(each) for each in re.search(r"base (\S+) at 410 Hz, (\S+) at 540 Hz", line).groups()]
+        for line in (weak, strong)
+    )
+    assert "; 0 impacts;" in weak
+    assert within[0] < 1e-4
+    assert within[1] > 0.1
+    assert above[0] > 100.0 * within[0]
+
+
 def test_a_recording_is_read_without_vibench(tmp_path):
     channel = ChannelHeader(
         "m0_velocity", "Dev1/ai0", "velocity", "m s-1", physical_per_volt=0.125, range_v=5.0

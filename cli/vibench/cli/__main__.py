@@ -115,6 +115,11 @@ COMMANDS = {
         "spectrum",
         "Compute all Lyapunov exponents over frequency or level, their sum, and the Kaplan-Yorke dimension.",
     ),
+    "chain": Place(
+        "chain",
+        "chain",
+        "Follow cells in a row: bands and gaps, transmission, energy, impacts and exponents, cell by cell.",
+    ),
     "study": Place(
         "study", "study", "Predict responses over every combination of what a file lists, longest first."
     ),

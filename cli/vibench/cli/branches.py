@@ -1,6 +1,5 @@
 """`vibench branches`: periodic motions over frequency or level, stable and unstable."""
 
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -24,16 +23,14 @@ from vibench.analysis.dynamics import (
     branch_lines,
     write_diagram,
 )
-from vibench.analysis.report import ImageKind, branches_figure
+from vibench.analysis.report import branches_figure
 from vibench.sim import Parameter
-from vibench.sim.study import software
 
-from .interruption import told_to_stop
-from .output import bold, console, print_json
-from .paths import AsJson, room_for_folder
+from .dynamics_answer import computed, keep, leave, print_answer, room_for
+from .output import console
+from .paths import AsJson
 from .range_option import Range, range_of
 from .specimen_option import DampingTime, Gap, LawOption, SpecimenOption, asked_of_specimen
-from .study import STOPPED_EXIT_CODE
 
 FILE = "branches.h5"
 
@@ -101,25 +98,27 @@ def branches(
         seed=seed,
         **drive,
     )
-    if out is not None:
-        room_for_folder(out)
-        if (out / FILE).exists():
-            raise InvalidRequest(
-                f"{out / FILE} exists, and nothing is ever overwritten; choose another folder"
-            )
-    diagram, is_complete = _computed(asked, is_told=not as_json)
+    room_for(FILE, out)
+    if not as_json:
+        console.print("Looking for motions; each branch is told as it is found.")
+
+    def tell(number: int, line: BranchLine) -> None:
+        if not as_json:
+            console.print(_told(number, line, asked.along))
+
+    lines, elapsed_s, is_complete = computed(branch_lines(asked), tell)
+    diagram = BranchDiagram(asked, lines, elapsed_s)
     if as_json:
-        print_json({**diagram.to_dict(), "is_complete": is_complete, "software": software()})
+        print_answer(diagram.to_dict(), is_complete=is_complete)
     else:
         console.print(diagram.cost_sentence)
-    if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        write_diagram(diagram, out / FILE)
-        drawn = branches_figure(diagram, measured).save(out, (ImageKind.PNG, ImageKind.SVG))
-        if not as_json:
-            console.print("The figure:", bold(drawn[0].resolve()))
-    if not is_complete:
-        raise typer.Exit(STOPPED_EXIT_CODE)
+    keep(
+        out,
+        lambda folder: write_diagram(diagram, folder / FILE),
+        lambda: branches_figure(diagram, measured),
+        is_told=not as_json,
+    )
+    leave(is_complete=is_complete)
 
 
 def _drive(
@@ -167,24 +166,6 @@ def _along(amplitude: Range, frequency: Range) -> dict[str, object]:
 def _recorded(path: Path) -> tuple[Sequence[Curve], tuple[tuple[float, float], ...]]:
     found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
     return [each for each in found.curves if each.origin is CurveOrigin.MEASURED], level_of_drive(found)
-
-
-def _computed(asked: BranchRequest, *, is_told: bool) -> tuple[BranchDiagram, bool]:
-    """Compute branch by branch, telling each; Ctrl-C ends after the one under way, and keeps them."""
-    lines: list[BranchLine] = []
-    began = time.perf_counter()
-    is_complete = True
-    if is_told:
-        console.print("Looking for motions; each branch is told as it is found.")
-    with told_to_stop() as is_stopped:
-        for line in branch_lines(asked):
-            lines.append(line)
-            if is_told:
-                console.print(_told(len(lines), line, asked.along))
-            if is_stopped():
-                is_complete = False
-                break
-    return BranchDiagram(asked, tuple(lines), time.perf_counter() - began), is_complete
 
 
 def _told(number: int, line: BranchLine, along: Parameter) -> str:

@@ -1,6 +1,5 @@
 """`vibench spectrum`: all Lyapunov exponents over frequency or level, with intervals, sum and dimension."""
 
-import time
 from pathlib import Path
 from typing import Annotated
 
@@ -9,24 +8,20 @@ import typer
 from vibench.analysis import InvalidRequest
 from vibench.analysis.dynamics import (
     ExponentSpectrum,
-    SpectrumPoint,
     SpectrumRequest,
     spectrum_points,
     write_spectrum,
 )
-from vibench.analysis.report import ImageKind, exponent_spectrum_figure
+from vibench.analysis.report import exponent_spectrum_figure
 from vibench.sim import Accuracy, Parameter
-from vibench.sim.study import software
 
-from .interruption import told_to_stop
-from .output import bold, console, print_json
-from .paths import AsJson, room_for_folder
+from .dynamics_answer import SHOWN, computed, keep, leave, print_answer, room_for
+from .output import console
+from .paths import AsJson
 from .range_option import Range, range_of
 from .specimen_option import DampingTime, Gap, LawOption, SpecimenOption, asked_of_specimen
-from .study import STOPPED_EXIT_CODE
 
 FILE = "spectrum.h5"
-_SHOWN = 24
 
 
 def spectrum(
@@ -68,25 +63,22 @@ def spectrum(
         settle_s=settle,
         confidence=confidence,
     )
-    if out is not None:
-        room_for_folder(out)
-        if (out / FILE).exists():
-            raise InvalidRequest(
-                f"{out / FILE} exists, and nothing is ever overwritten; choose another folder"
-            )
-    found, is_complete = _computed(asked)
+    room_for(FILE, out)
+    points, elapsed_s, _ = computed(spectrum_points(asked), lambda _number, _point: None)
+    is_complete = len(points) == len(asked.values)
+    found = ExponentSpectrum(asked, points, elapsed_s)
     if as_json:
-        print_json({**found.to_dict(), "is_complete": is_complete, "software": software()})
+        print_answer(found.to_dict(), is_complete=is_complete)
     else:
         _tell(found)
-    if out is not None and found.points:
-        out.mkdir(parents=True, exist_ok=True)
-        write_spectrum(found, out / FILE)
-        drawn = exponent_spectrum_figure(found).save(out, (ImageKind.PNG, ImageKind.SVG))
-        if not as_json:
-            console.print("The figure:", bold(drawn[0].resolve()))
-    if not is_complete:
-        raise typer.Exit(STOPPED_EXIT_CODE)
+    if points:
+        keep(
+            out,
+            lambda folder: write_spectrum(found, folder / FILE),
+            lambda: exponent_spectrum_figure(found),
+            is_told=not as_json,
+        )
+    leave(is_complete=is_complete)
 
 
 def _drive(amplitude: Range, frequency: Range) -> dict[str, object]:
@@ -103,25 +95,10 @@ def _drive(amplitude: Range, frequency: Range) -> dict[str, object]:
     return {**along, "start": frequency.start, "stop": stop, "step": step}
 
 
-def _computed(asked: SpectrumRequest) -> tuple[ExponentSpectrum, bool]:
-    points: list[SpectrumPoint] = []
-    began = time.perf_counter()
-    try:
-        with told_to_stop() as is_stopped:
-            for point in spectrum_points(asked):
-                points.append(point)
-                if is_stopped():
-                    break
-    except ValueError as error:
-        raise InvalidRequest(str(error)) from error
-    found = ExponentSpectrum(asked, tuple(points), time.perf_counter() - began)
-    return found, len(points) == len(asked.values)
-
-
 def _tell(found: ExponentSpectrum) -> None:
     along = found.request.along
     console.print(f"All exponents [1/s] with {found.request.confidence:.0%} intervals: {found.request.title}")
-    step = max(1, -(-len(found.points) // _SHOWN))
+    step = max(1, -(-len(found.points) // SHOWN))
     for each in found.points[::step]:
         place = (
             f"{each.frequency_hz:g} Hz" if along is Parameter.FREQUENCY else f"{1e6 * each.amplitude_m:g} µm"

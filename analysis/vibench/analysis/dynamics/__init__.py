@@ -1,4 +1,4 @@
-"""Branches of periodic motions and spectra of exponents of the model, as a person asks for them.
+"""Branches of periodic motions, spectra of exponents and chains of the model, as a person asks for them.
 
 What is asked is a value that a file keeps; answers come one by one, as columns of numbers with their errors
 and costs, are kept as HDF5 and read back, and are turned into curves that are laid over recordings.

@@ -7,6 +7,18 @@ from ._branch_request import (
     BranchMethod as BranchMethod,
     BranchRequest as BranchRequest,
 )
+from ._chain_answer import (
+    ChainAnswer as ChainAnswer,
+    ChainRun as ChainRun,
+)
+from ._chain_computing import (
+    chain_answer as chain_answer,
+    chain_runs as chain_runs,
+)
+from ._chain_request import (
+    ChainDrive as ChainDrive,
+    ChainRequest as ChainRequest,
+)
 from ._computing import (
     branch_lines as branch_lines,
     diagram_of as diagram_of,
@@ -16,6 +28,7 @@ from ._computing import (
 from ._dynamics_file import (
     branch_curves as branch_curves,
     read_diagram as read_diagram,
+    write_chain as write_chain,
     write_diagram as write_diagram,
     write_spectrum as write_spectrum,
 )

@@ -1,4 +1,4 @@
-"""Branches and spectra as HDF5 files that other programs read: columns with units, and what was asked."""
+"""Branches, spectra and chains as HDF5 files: columns with units, and what was asked."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,9 +16,11 @@ from ..errors import InvalidRequest
 from ..exchange import new_file
 from ._branch_lines import BranchDiagram, BranchLine, LineEvent
 from ._branch_request import BranchRequest
+from ._chain_answer import ChainAnswer
 from ._spectrum_request import ExponentSpectrum
 
 BRANCHES_FORMAT, SPECTRUM_FORMAT = "vibench branches", "vibench spectrum"
+CHAIN_FORMAT = "vibench chain"
 FORMAT_VERSION = 1
 _UNITS = {
     "frequency_hz": "Hz",
@@ -51,6 +53,30 @@ _SPECTRUM_UNITS = {
     "elapsed_s": "s",
 }
 _SPECTRUM_WORDS = ("verdict", "motion", "source", "outcome")
+_CHAIN_UNITS = {
+    "over_hz": "Hz",
+    "transmission": "1",
+    "largest_m": "m",
+    "impacts": "1",
+    "energy_j": "J",
+    "energy_error_j": "J",
+    "time_s": "s",
+    "motion_m": "m",
+    "impact_time_s": "s",
+    "impact_cell": "1",
+}
+"""Of a run of a chain, a dataset each."""
+_RUN_WORDS = (
+    "cells", "frequency_hz", "observed_s", "exponent_per_s", "exponent_error_per_s", "outcome", "elapsed_s",
+)  # fmt: skip
+_LINEAR_UNITS = {
+    "wave_numbers": "rad",
+    "bands_hz": "Hz",
+    "gaps": "Hz",
+    "linear_hz": "Hz",
+    "attenuation_db": "dB",
+}
+"""Of the endless chain without contact."""
 
 
 def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
@@ -146,6 +172,27 @@ def write_spectrum(found: ExponentSpectrum, path: Path) -> Path:
         for name in _SPECTRUM_WORDS:
             words = [getattr(each, name) for each in found.points]
             file.create_dataset(name, data=words, dtype=h5py.string_dtype("utf-8"))
+    return path
+
+
+def write_chain(found: ChainAnswer, path: Path) -> Path:
+    """Write the endless chain and every run, a group each; a file that exists is refused.
+
+    Raises
+    ------
+    InvalidRequest
+        When the name is taken, or nothing can be written there.
+
+    """
+    with _created(path, CHAIN_FORMAT, found.request.model_dump_json(), found.elapsed_s) as file:
+        for name, units in _LINEAR_UNITS.items():
+            file.create_dataset(name, data=np.asarray(getattr(found, name))).attrs["units"] = units
+        for number, run in enumerate(found.runs):
+            group = file.create_group(f"run_{number:05d}")
+            for name in _RUN_WORDS:
+                group.attrs[name] = getattr(run, name)
+            for name, units in _CHAIN_UNITS.items():
+                group.create_dataset(name, data=getattr(run, name)).attrs["units"] = units
     return path
 
 

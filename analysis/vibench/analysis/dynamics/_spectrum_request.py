@@ -1,7 +1,6 @@
 """What is asked of exponents, and the answer at one drive."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Self
 
@@ -11,6 +10,7 @@ from pydantic import Field, PositiveFloat, model_validator
 from vibench.sim import Accuracy, LyapunovSpectrum, Parameter, PowerLaw
 
 from ..signals import Reals
+from ._json_numbers import number, numbers
 from ._specimen_choice import SpecimenChoice
 
 MOST_POINTS = 20_000
@@ -125,15 +125,15 @@ class SpectrumPoint:
         return {
             "frequency_hz": self.frequency_hz,
             "amplitude_m": self.amplitude_m,
-            "exponents_per_s": _known(self.exponents_per_s),
-            "low_per_s": _known(self.low_per_s),
-            "high_per_s": _known(self.high_per_s),
-            "sum_per_s": _known([self.sum_per_s])[0],
+            "exponents_per_s": numbers(self.exponents_per_s),
+            "low_per_s": numbers(self.low_per_s),
+            "high_per_s": numbers(self.high_per_s),
+            "sum_per_s": number(self.sum_per_s),
             "dampers_per_s": self.dampers_per_s,
-            "sum_difference": _known([self.sum_difference])[0],
-            "dimension": _known([self.dimension])[0],
-            "dimension_low": _known([self.dimension_low])[0],
-            "dimension_high": _known([self.dimension_high])[0],
+            "sum_difference": number(self.sum_difference),
+            "dimension": number(self.dimension),
+            "dimension_low": number(self.dimension_low),
+            "dimension_high": number(self.dimension_high),
             "verdict": self.verdict,
             "motion": self.motion,
             "source": self.source,
@@ -210,10 +210,6 @@ class ExponentSpectrum:
         return {
             "options": self.request.model_dump(mode="json"),
             "points": [each.to_dict() for each in self.points],
-            "largest_sum_difference": _known([self.largest_sum_difference])[0],
+            "largest_sum_difference": number(self.largest_sum_difference),
             "elapsed_s": self.elapsed_s,
         }
-
-
-def _known(values: Sequence[float]) -> list[float | None]:
-    return [float(each) if math.isfinite(each) else None for each in values]

@@ -8,6 +8,9 @@ from ._branches import (
     branches_figure as branches_figure,
     draw_line as draw_line,
 )
+from ._chain import (
+    chain_figure as chain_figure,
+)
 from ._comparison import (
     comparison_figure as comparison_figure,
 )

@@ -40,5 +40,6 @@ from ._simulated_channels import (
     SimulatedChannels as SimulatedChannels,
     SimulatedSpecimen as SimulatedSpecimen,
     played_impacts as played_impacts,
+    recorded_base_motion as recorded_base_motion,
     simulated_specimen as simulated_specimen,
 )

@@ -1,11 +1,18 @@
 from ._chain import (
+    MOST_CELLS as MOST_CELLS,
     Chain as Chain,
     chain_of as chain_of,
 )
 from ._dispersion import (
     BandGap as BandGap,
+    band_frequencies_hz as band_frequencies_hz,
     band_gaps as band_gaps,
     bloch_factor as bloch_factor,
+)
+from ._energy import (
+    MeanEnergies as MeanEnergies,
+    chain_energies as chain_energies,
+    mean_energies as mean_energies,
 )
 from ._integrate import (
     ChainImpacts as ChainImpacts,

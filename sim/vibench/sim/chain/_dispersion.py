@@ -1,11 +1,13 @@
-"""Waves in an endless chain of equal cells without contact: bands, gaps, decay from cell to cell. SI units.
+"""Waves in an endless chain without contact: bands, gaps, decay from unit to unit. SI units.
 
-Seen from its m0, the inner pair of a cell is one dynamic stiffness S(w). A wave x_n ~ exp(i mu n) then obeys
+A unit is one cell or several, which then come again and again. Seen from its m0, the inner pair of a cell is
+one dynamic stiffness S(w); with the link K = k0 + i w c0 to the cell before, displacement x of m0 and force f
+in the link pass from cell to cell by
 
-    2 (k0 + i w c0) (1 - cos mu) = w^2 m0 - S(w)
+    x' = x + f / K,    f' = f + (S - w^2 m0) x'
 
-(Brillouin, Wave Propagation in Periodic Structures, 2nd ed. 1953, chapters IV and V, for the diatomic chain;
-here the second mass is a resonator with one of its own.)
+A wave gains exp(i mu) in a unit where that is an eigenvalue of the product of its cells' matrices, whose
+determinant is 1 (Brillouin, Wave Propagation in Periodic Structures, 2nd ed. 1953, chapters IV, V and X).
 """
 
 from typing import NamedTuple
@@ -15,15 +17,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..kernels import Complex
 from ..model import Specimen
+from ._chain import MASSES_PER_CELL, Chain
+
+TOUCHING = 1e-9
+"""Part of a frequency below which a gap is rounding: a unit of equal cells folds its bands there."""
 
 
-def bloch_factor(specimen: Specimen, frequency_hz: ArrayLike) -> Complex:
-    """Ratio of the motion of a cell to that of the cell before, for the wave that goes (or decays) outwards.
+def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
+    """Ratio of the motion of a unit to that of the unit before, for the wave that goes (or decays) outwards.
 
     Parameters
     ----------
-    specimen
-        One cell; its contact law and gap play no part.
+    unit
+        The cells that come again; their contact laws and gaps play no part.
     frequency_hz
         Shape (n,) [Hz]; positive.
 
@@ -36,32 +42,42 @@ def bloch_factor(specimen: Specimen, frequency_hz: ArrayLike) -> Complex:
     if not bool(np.all(np.isfinite(omega) & (omega > 0.0))):
         msg = "Frequencies must be finite and positive, in Hz."
         raise ValueError(msg)
-    m0, m1, m2 = specimen.masses
-    outer, inner, middle = (
-        stiffness + 1j * omega * damping
-        for stiffness, damping in zip(specimen.stiffnesses, specimen.dampings, strict=True)
-    )
-    hung = -(omega**2) * m2 - omega**2 * m1 * inner / (inner - omega**2 * m1)
-    pair = middle * hung / (middle + hung)
-    cosine = 1.0 + (pair - omega**2 * m0) / (2.0 * outer)
+    across = np.tile(np.eye(2, dtype=np.complex128), (len(omega), 1, 1))
+    for cell in unit.cells:
+        across = _across(cell, omega) @ across
+    cosine = 0.5 * (across[:, 0, 0] + across[:, 1, 1])
     # The roots of q^2 - 2 cosine q + 1 multiply to 1: the larger is free of cancellation.
     root = np.sqrt(cosine**2 - 1.0 + 0j)
     larger = np.where(np.abs(cosine + root) >= np.abs(cosine - root), cosine + root, cosine - root)
     return np.asarray(1.0 / larger, dtype=np.complex128)
 
 
-def band_frequencies_hz(specimen: Specimen, wave_number: ArrayLike) -> NDArray[np.float64]:
-    """Frequencies at which a wave of phase ``wave_number`` from cell to cell travels without damping [Hz].
+def _across(cell: Specimen, omega: NDArray[np.float64]) -> Complex:
+    """Give what a cell makes of displacement and force, shape (n, 2, 2)."""
+    m0, m1, m2 = cell.masses
+    outer, inner, middle = (
+        stiffness + 1j * omega * damping
+        for stiffness, damping in zip(cell.stiffnesses, cell.dampings, strict=True)
+    )
+    hung = -(omega**2) * m2 - omega**2 * m1 * inner / (inner - omega**2 * m1)
+    pushed = middle * hung / (middle + hung) - omega**2 * m0
+    one = np.ones_like(outer)
+    return np.moveaxis(np.array([[one, 1.0 / outer], [pushed, one + pushed / outer]]), -1, 0)
 
-    Shape (n, 3), ascending; ``wave_number`` in radians per cell, shape (n,).
+
+def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float64]:
+    """Frequencies at which a wave of phase ``wave_number`` from unit to unit travels without damping [Hz].
+
+    Shape (n, 3 cells), ascending; ``wave_number`` in radians per unit, shape (n,).
     """
     phase = np.atleast_1d(np.asarray(wave_number, dtype=np.float64))
-    _, k1, k2 = specimen.stiffnesses
-    root = np.sqrt(np.asarray(specimen.masses))
-    # The neighbours hold a mass in step or against step: their springs act like one to the ground.
-    held = 2.0 * specimen.stiffnesses[0] * (1.0 - np.cos(phase))
-    stiffness = np.tile(np.array([[k2, 0.0, -k2], [0.0, k1, -k1], [-k2, -k1, k1 + k2]]), (len(phase), 1, 1))
-    stiffness[:, 0, 0] += held
+    root = np.sqrt(unit.masses)
+    first, last, link = 0, MASSES_PER_CELL * (unit.size - 1), unit.cells[0].stiffnesses[0]
+    # The first cell's link leads to the last of the unit before, whose phase lags.
+    stiffness = np.tile(unit.stiffness_matrix.astype(np.complex128), (len(phase), 1, 1))
+    stiffness[:, last, last] += link
+    stiffness[:, first, last] -= link * np.exp(-1j * phase)
+    stiffness[:, last, first] -= link * np.exp(1j * phase)
     squares = np.linalg.eigvalsh(stiffness / np.outer(root, root))
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi), dtype=np.float64)
 
@@ -73,13 +89,16 @@ class BandGap(NamedTuple):
     upper_hz: float
 
 
-def band_gaps(specimen: Specimen) -> tuple[BandGap, ...]:
+def band_gaps(unit: Chain) -> tuple[BandGap, ...]:
     """Find the gaps of the endless chain without damping and contact.
 
-    A frequency of a band rises with k0 (1 - cos mu), so that each band lies between mu = 0 and mu = pi.
+    Cells touch one another in one displacement only, so that a frequency of a band rises or falls all the way
+    from mu = 0 to mu = pi: its ends are there.
     """
-    starts, ends = band_frequencies_hz(specimen, [0.0, np.pi])
-    above = [*starts[1:].tolist(), float("inf")]
+    ends = band_frequencies_hz(unit, [0.0, np.pi])
+    lowest, highest = ends.min(axis=0).tolist(), ends.max(axis=0).tolist()
     return tuple(
-        BandGap(lower, upper) for lower, upper in zip(ends.tolist(), above, strict=True) if lower < upper
+        BandGap(below, above)
+        for below, above in zip(highest, [*lowest[1:], float("inf")], strict=True)
+        if below < above * (1.0 - TOUCHING) or above == float("inf")
     )

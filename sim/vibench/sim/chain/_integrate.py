@@ -1,6 +1,7 @@
-"""The motion of a chain under a harmonic drive, from a state to a later time. SI units."""
+"""The motion of a chain under a drive, from a state to a later time. SI units."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,8 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..flight import SERIES_TERMS
 from ..kernels import Complex, Floats, Table, clock_at
-from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, chosen
-from ..motion import MAX_IMPACT_RATE_HZ, ROUNDING, SPARE_IMPACTS, check_times
+from ..model import Accuracy, AccuracyWord, Drive, Harmonic, Outcome, chosen
+from ..motion import MAX_IMPACT_RATE_HZ, ROUNDING, SPARE_IMPACTS, check_times, check_within
+from ._base_force import PIECE_TERMS, with_pieces
 from ._cell_contact import begin_pressing
 from ._cell_flow import CURVATURE_TERMS, POWER, SIDE, fill_curvature
 from ._chain import MASSES_PER_CELL, Chain
@@ -58,7 +60,7 @@ class ChainTrajectory:
 
 def integrate_chain(
     chain: Chain,
-    drive: Harmonic,
+    drive: Drive,
     duration_s: float,
     accuracy: Accuracy | AccuracyWord = Accuracy.STANDARD,
     initial_state: ArrayLike | None = None,
@@ -67,18 +69,18 @@ def integrate_chain(
     start_time_s: float = 0.0,
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
 ) -> ChainTrajectory:
-    """Follow a chain of cells under a harmonic drive.
+    """Follow a chain of cells under a drive.
 
-    Flight is exact; contacts are proved or excluded by bounds and resolved with the tolerance of
-    ``accuracy``, however many cells press at once. Sampling changes no step. One cell moves as in
-    `vibench.sim.motion`, to within the tolerance.
+    Flight is exact (a harmonic drive in closed form, others as polynomials on pieces); contacts are proved or
+    excluded by bounds and resolved with the tolerance of ``accuracy``, however many cells press at once.
+    Sampling changes no step. One cell moves as in `vibench.sim.motion`, to within the tolerance.
 
     Parameters
     ----------
     chain, drive
         What moves, and what moves its base.
     duration_s
-        [s].
+        [s]; within the drive, if that is a sweep or samples.
     accuracy
         Relative error allowed in a step of a contact.
     initial_state
@@ -94,19 +96,34 @@ def integrate_chain(
     Raises
     ------
     ValueError
-        When an argument is not allowed.
+        When an argument is not allowed, or the drive is over before the run is.
 
     """
     accuracy = chosen(Accuracy, accuracy)
     check_times(duration_s, start_time_s, sample_rate_hz, max_impact_rate_hz)
-    tables = chain_tables(chain, drive, accuracy)
+    harmonic = drive if isinstance(drive, Harmonic) else Harmonic(1.0, 0.0)
+    tables = chain_tables(chain, harmonic, accuracy)
     cells, phasors = start_chain(chain, initial_state, start_time_s, tables, accuracy)
     clock, end = clock_at(start_time_s), start_time_s + duration_s
     record = new_chain_record(chain, start_time_s, duration_s, sample_rate_hz, max_impact_rate_hz)
-    code = advance_chain(
-        cells, phasors, clock, end, tables, accuracy.tolerance, record, new_observations(chain, NOTHING)
-    )
+    observations, code = new_observations(chain, NOTHING), int(Outcome.REACHED_END)
+    for batch, until in _batches(chain, drive, tables, start_time_s, end):
+        code = advance_chain(cells, phasors, clock, until, batch, accuracy.tolerance, record, observations)
+        if code != Outcome.REACHED_END:
+            break
     return _trajectory(chain, phasors, float(clock[0]), tables, record, Outcome(code), accuracy)
+
+
+def _batches(
+    chain: Chain, drive: Drive, tables: ChainTables, start_s: float, end_s: float
+) -> Iterable[tuple[ChainTables, float]]:
+    """Give what the kernels need to know of the drive, and until when that is all."""
+    match drive:
+        case Harmonic():
+            return [(tables, end_s)]
+        case _:
+            check_within(drive.duration_s, end_s)
+            return with_pieces(tables, chain.cells[0], drive, start_s, end_s)
 
 
 def start_chain(
@@ -138,7 +155,7 @@ def start_chain(
         if law.kind == POWER:
             cells[place, SIDE] = 1.0
         elif not -law.lower < p < law.upper:
-            fill_observed(series, phasors, place, 1, terms, tables)
+            fill_observed(series, phasors, place, 1, terms, np.zeros(PIECE_TERMS), tables)
             fill_curvature(curvature, series[PATH])
             begin_pressing(
                 cells[place], math.copysign(1.0, p), p, rate, float(curvature[0]), markov, law,

@@ -63,7 +63,7 @@ def observe_idle(
         ):
             continue
         if not is_filled:
-            fill_observed(series, phasors, place, OBSERVED, workspace.terms, tables)
+            fill_observed(series, phasors, place, OBSERVED, workspace.terms, workspace.force, tables)
             is_filled = True
         observations.peaks[what, place] = series_peak(
             observations.peaks[what, place], series[what], 0.0, length

@@ -1,4 +1,4 @@
-"""A run of a chain under a harmonic drive, window by window. SI units.
+"""A run of a chain, window by window. SI units.
 
 In a window every cell moves as if the others were free: its own force acts on it with nothing left out,
 another's only from the window's end on. What this leaves out is bounded when the windows are chosen
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..kernels import Complex, Table, Vector, advance_clock, kernel, kernel_without_refcount, time_until
 from ..model import Outcome
+from ._base_force import deposit_base, place_force
 from ._cell_contact import begin_power
 from ._cell_flow import CELL_SIZE, MEMORY, POWER, SIDE
 from ._cell_window import COUNT, cross_window
@@ -77,19 +78,24 @@ def advance_chain(  # noqa: C901 - the kinds of window and their ends are one lo
     count, drive = len(cells), len(phasors) - 1
     phasors[drive] = drive_term(clock, 0.0, tables)
     while True:
-        longest = time_until(clock, until)
-        if longest <= 0.0:
+        left = longest = time_until(clock, until)
+        if left <= 0.0:
             return REACHED_END
-        if count > 0:
+        if len(tables.pieces) > 0:
+            longest = min(left, place_force(workspace.force, clock, tables))
+        if count > 0 or len(tables.pieces) > 0:
             # A force has acted: what was known of the paths to come is void.
             place_observed(workspace.motion, phasors, observed, tables)
             weigh(workspace, phasors, observed, tables)
             if is_bounded(workspace) == 0:
                 return LOST
-            if is_quiet(workspace, cells, tables) == 1:
+            if len(tables.pieces) == 0 and is_quiet(workspace, cells, tables) == 1:
                 _go_quietly(workspace, phasors, cells, clock, until, tables, tolerance, record, observations)
                 return REACHED_END
-        if _march_on(workspace, phasors, cells, clock, longest, observations, record, tables) > 0:
+        if (
+            len(tables.pieces) == 0
+            and _march_on(workspace, phasors, cells, clock, longest, observations, record, tables) > 0
+        ):
             count = 0
             continue
         length, count = _choose_window(workspace, cells, phasors, clock, longest, observed, tables)
@@ -102,7 +108,7 @@ def advance_chain(  # noqa: C901 - the kinds of window and their ends are one lo
             deposit(workspace.turned, cells[workspace.busy[k]], workspace.busy[k], tables)
         copy_terms(phasors, workspace.turned)
         copy_motion(workspace.motion, workspace.motion_end, observed)
-        if length >= longest:
+        if length >= left:
             clock[0], clock[1] = until, 0.0
         else:
             advance_clock(clock, length)
@@ -244,7 +250,7 @@ def _cross(
         busy += 1
         cell, series, markov = cells[i], workspace.series[i], tables.markov[i, PATH]
         law = law_of(tables.laws[i])
-        fill_observed(series, phasors, i, observed, workspace.terms, tables)
+        fill_observed(series, phasors, i, observed, workspace.terms, workspace.force, tables)
         for k in range(MEMORY, CELL_SIZE):
             cell[k] = 0.0
         if law.kind == POWER:
@@ -299,6 +305,7 @@ def _sample(
         for j in range(drive):
             now[j] = phasors[j] * np.exp(tables.rates[j] * later)
         now[drive] = drive_term(clock, later, tables)
+        deposit_base(now, workspace.force, later, tables)
         for k in range(count):
             i = workspace.busy[k]
             workspace.touches[COUNT] = 0.0

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..flight import SERIES_TERMS
 from ..kernels import Complex, Table, Vector
 from ..model import MOST_TERMS, Accuracy, Harmonic, Specimen
 from ..slots import parameters, power_terms
@@ -62,6 +63,16 @@ class ChainTables(NamedTuple):
     """exp(l_j window), shape (2, n+1)."""
     clash: NDArray[np.int64]
     """In such a window, cells at most so far apart may not both be busy; shape (2,)."""
+    base_push: Complex
+    """Shape (n,): what a unit impulse on the first m0 adds to the phasors."""
+    base_markov: Table
+    """Taylor coefficients of p, x, y, z of every cell after it, shape (cells, 4, SERIES_TERMS)."""
+    pieces: Table
+    """Of a drive that is not harmonic: the force on the first m0, cut into polynomials; else none."""
+    piece_start: float
+    """When the first of them begins [s]."""
+    piece_s: float
+    """Length of each [s]."""
 
 
 def chain_tables(chain: Chain, drive: Harmonic, accuracy: Accuracy) -> ChainTables:
@@ -97,6 +108,11 @@ def chain_tables(chain: Chain, drive: Harmonic, accuracy: Accuracy) -> ChainTabl
         windows=windows,
         factors=np.exp(windows[:, None] * rates[None, :]),
         clash=clash,
+        base_push=modes.rows @ chain_state_matrix(chain)[1],
+        base_markov=_base_markov(chain),
+        pieces=np.zeros((0, 0)),
+        piece_start=0.0,
+        piece_s=0.0,
     )
 
 
@@ -105,15 +121,24 @@ def markov_between(chain: Chain) -> Table:
 
     Shape (MARKOV_TERMS, 4, answering cells, struck cells).
     """
+    return _answers(chain, chain_impulses(chain), MARKOV_TERMS)
+
+
+def _answers(chain: Chain, impulses: Table, terms: int) -> Table:
+    """Taylor coefficients after impulses, shape (terms, 4, cells, impulses)."""
     system, _ = chain_state_matrix(chain)
-    answer = chain_impulses(chain)
-    between = np.zeros((MARKOV_TERMS, OBSERVED, chain.size, chain.size))
-    for k in range(MARKOV_TERMS):
-        moved = answer[: MASSES_PER_CELL * chain.size].reshape(chain.size, MASSES_PER_CELL, chain.size)
-        between[k, ACROSS:] = moved.transpose(1, 0, 2)
-        between[k, PATH] = moved[:, 1] - moved[:, 2]
+    answer, moved_by = impulses, np.zeros((terms, OBSERVED, chain.size, impulses.shape[1]))
+    for k in range(terms):
+        moved = answer[: MASSES_PER_CELL * chain.size].reshape(chain.size, MASSES_PER_CELL, -1)
+        moved_by[k, ACROSS:] = moved.transpose(1, 0, 2)
+        moved_by[k, PATH] = moved[:, 1] - moved[:, 2]
         answer = system @ answer
-    return between
+    return moved_by
+
+
+def _base_markov(chain: Chain) -> Table:
+    _, entry = chain_state_matrix(chain)
+    return np.ascontiguousarray(_answers(chain, entry[:, None], SERIES_TERMS)[..., 0].transpose(2, 1, 0))
 
 
 def _own_markov(between: Table) -> Table:

@@ -19,6 +19,7 @@ from ..kernels import (
 )
 from ..model import MOST_TERMS
 from ..slots import PowerTerms
+from ._base_force import PIECE_TERMS, add_base_series, base_curvature, deposit_base
 from ._cell_contact import cell_workspace
 from ._cell_flow import CELL_SIZE, MEMORY, MOMENTS, POWER, SIDE, WIDTH, CellLaw
 from ._cell_window import LOG_ROWS, MOST_TOUCHES
@@ -73,6 +74,8 @@ class Workspace(NamedTuple):
     touches: Vector
     log: Table
     no_log: Table
+    force: Vector
+    """Of the base on the first m0, in powers of the time since the window began, shape (PIECE_TERMS,)."""
 
 
 @kernel
@@ -99,6 +102,7 @@ def workspace_for(tables: ChainTables) -> Workspace:
         np.zeros(MOST_TOUCHES + 1),
         np.zeros((LOG_ROWS, WIDTH)),
         np.zeros((0, WIDTH)),
+        np.zeros(PIECE_TERMS),
     )
 
 
@@ -190,6 +194,7 @@ def propagate_window(
         for j in range(modes):
             workspace.turned[j] = phasors[j] * cmath.exp(tables.rates[j] * length)
     workspace.turned[modes] = drive_term(clock, length, tables)
+    deposit_base(workspace.turned, workspace.force, length, tables)
 
 
 @inlined
@@ -245,7 +250,10 @@ def find_busy(workspace: Workspace, cells: Table, length: float, tables: ChainTa
     count = 0
     for i in range(len(cells)):
         law = tables.laws[i]
-        margin = workspace.curvature[PATH, i] * length * length / 8.0
+        bound = workspace.curvature[PATH, i]
+        if len(tables.pieces) > 0:
+            bound += base_curvature(workspace.force, i, length, tables)
+        margin = bound * length * length / 8.0
         low, high = margin - law[LOWER], law[UPPER] - margin
         is_clear = low < workspace.motion[PATH, i] < high and low < workspace.motion_end[PATH, i] < high
         if cells[i, SIDE] != 0.0 or law[KIND] == POWER or not is_clear:
@@ -266,13 +274,20 @@ def neighbours_clash(busy: NDArray[np.int64], count: int, distance: int) -> int:
 
 @inlined
 def fill_observed(
-    series: Table, phasors: Complex, cell: int, observed: int, terms: Complex, tables: ChainTables
+    series: Table,
+    phasors: Complex,
+    cell: int,
+    observed: int,
+    terms: Complex,
+    force: Vector,
+    tables: ChainTables,
 ) -> None:
     """Write p (and x, y, z) of a cell as polynomials in the time since the window began."""
     for what in range(observed):
         for j in range(len(phasors)):
             terms[j] = phasors[j] * tables.observed[cell, what, j]
         _fill_series(series[what], terms, tables.rates)
+        add_base_series(series[what], force, cell, what, tables)
 
 
 @inlined

@@ -1,3 +1,6 @@
+from ._base_motion import (
+    sampled_motion as sampled_motion,
+)
 from ._flow_derivative import (
     flow_derivative as flow_derivative,
 )
@@ -8,6 +11,7 @@ from ._integrate import (
     Impacts as Impacts,
     Trajectory as Trajectory,
     check_times as check_times,
+    check_within as check_within,
     integrate as integrate,
     new_record as new_record,
     start_motion as start_motion,

@@ -123,10 +123,10 @@ def integrate(
                 state, clock, end, harmonic_tables(specimen, drive), accuracy.tolerance, record
             )
         case Sampled():
-            _check_within(drive.duration_s, end)
+            check_within(drive.duration_s, end)
             code = _run_motion(state, clock, end, sampled_motion(drive), specimen, accuracy, record)
         case LinearSweep() | LogarithmicSweep():
-            _check_within(drive.duration_s, end)
+            check_within(drive.duration_s, end)
             code = _run_sweep(state, clock, end, drive, specimen, accuracy, record)
     return _trajectory(state, clock, end, record, Outcome(code), accuracy)
 
@@ -270,7 +270,8 @@ def check_times(
         raise ValueError(msg)
 
 
-def _check_within(available_s: float, end_s: float) -> None:
+def check_within(available_s: float, end_s: float) -> None:
+    """Refuse a run that outlasts its drive."""
     if end_s > available_s * (1.0 + ROUNDING):
         msg = f"The run ends at {end_s} s, the drive at {available_s} s: shorten the run or extend the drive."
         raise ValueError(msg)

@@ -1,0 +1,227 @@
+"""Runs of chains, one by one as they are computed."""
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from vibench.acquisition import open_recording
+from vibench.sim import Harmonic, LinearSweep, Outcome, Sampled
+from vibench.sim.chain import (
+    Chain,
+    ChainTrajectory,
+    chain_lyapunov_exponent,
+    chain_response,
+    integrate_chain,
+    mean_energies,
+)
+
+from ..errors import InvalidRequest
+from ..frequency_response import transmissibility
+from ..model import recorded_base_motion
+from ..recordings import plan_of
+from ..signals import Reals
+from ._chain_answer import ChainAnswer, ChainRun
+from ._chain_request import ChainDrive, ChainRequest
+
+SAMPLES_PER_PERIOD = 8
+"""Of the highest frequency that matters; means of energies need no more."""
+MOST_NUMBERS = 3e7
+"""In the samples of a run: a quarter of a gigabyte."""
+SHOWN_PERIODS = 16
+STRETCHES = 400
+"""Of a picture that shows a whole run."""
+ENERGY_S = 0.5
+"""Under a steady sine energies are averaged over this long, after the responses were observed."""
+SWEEP_PARTS = 120
+"""Frequencies at which a swept transmission is read, but each over `FEWEST_PERIODS` or more."""
+FEWEST_PERIODS = 12
+SEGMENTS = 8
+"""Of a recorded motion, in the average that gives the transmission."""
+X, VX = 0, 3
+
+
+def chain_runs(request: ChainRequest) -> Iterator[ChainRun]:
+    """Give each run as soon as it has been computed; stop asking, and no more is computed.
+
+    Raises
+    ------
+    InvalidRequest
+        When the recording cannot be read, or a run is not possible.
+
+    """
+    for cells in request.lengths:
+        chain = request.chain(cells)
+        match request.drive:
+            case ChainDrive.NONE:
+                pass
+            case ChainDrive.STEADY:
+                for frequency_hz in request.frequencies_hz:
+                    yield _timed(_steady, chain, request, Harmonic(frequency_hz, request.amplitude_m))
+            case ChainDrive.SWEPT:
+                sweep = LinearSweep(
+                    request.start_hz, request.stop_hz, request.duration_s, request.amplitude_m
+                )
+                yield _timed(_swept, chain, request, sweep)
+            case ChainDrive.RECORDED:
+                yield _timed(_recorded, chain, request, _base_of(request))
+
+
+def chain_answer(request: ChainRequest) -> ChainAnswer:
+    """Compute everything."""
+    began = time.perf_counter()
+    runs = tuple(chain_runs(request))
+    return ChainAnswer(request, runs, time.perf_counter() - began)
+
+
+Driven = TypeVar("Driven", Harmonic, LinearSweep, Sampled)
+
+
+def _timed(
+    run: Callable[[Chain, ChainRequest, Driven], ChainRun], chain: Chain, request: ChainRequest, drive: Driven
+) -> ChainRun:
+    began = time.perf_counter()
+    try:
+        found = run(chain, request, drive)
+    except ValueError as error:
+        raise InvalidRequest(str(error)) from error
+    return replace(found, elapsed_s=time.perf_counter() - began)
+
+
+def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
+    """Responses are observed in a run from rest; energies and the picture over some time after it."""
+    whole_s = request.settle_s + request.duration_s
+    found = chain_response(chain, drive, request.accuracy, whole_s, request.duration_s)
+    after_s = min(request.duration_s, ENERGY_S)
+    after_s = max(1.0, math.floor(after_s * drive.frequency_hz)) / drive.frequency_hz
+    run = integrate_chain(
+        chain, drive, after_s, request.accuracy, found.final_state,
+        _rate_hz(chain, drive.frequency_hz, after_s), start_time_s=whole_s,
+    )  # fmt: skip
+    exponent = error = math.nan
+    if request.exponent_s > 0.0 and found.outcome is Outcome.REACHED_END:
+        growth = chain_lyapunov_exponent(
+            chain, drive, duration_s=request.exponent_s, settle_s=request.settle_s
+        )
+        exponent, error = growth.exponent_per_s, growth.standard_error_per_s
+    base = drive.amplitude_m * np.sin(2.0 * np.pi * drive.frequency_hz * run.time_s + drive.phase_rad)
+    shown = run.time_s >= run.end_time_s - SHOWN_PERIODS / drive.frequency_hz
+    energy, energy_error = mean_energies(chain, run.states, base)
+    struck = run.impacts.times_s >= run.time_s[shown][0] if shown.any() else np.zeros(0, np.bool_)
+    return ChainRun(
+        cells=chain.size,
+        frequency_hz=drive.frequency_hz,
+        over_hz=np.array([drive.frequency_hz]),
+        transmission=found.response_ii[None, :, X],
+        largest_m=found.largest_m[:, -1],
+        impacts=found.impacts,
+        observed_s=request.duration_s,
+        energy_j=energy,
+        energy_error_j=energy_error,
+        exponent_per_s=exponent,
+        exponent_error_per_s=error,
+        time_s=run.time_s[shown],
+        motion_m=run.states[shown, :, X],
+        impact_time_s=run.impacts.times_s[struck],
+        impact_cell=run.impacts.cells[struck],
+        outcome=max(found.outcome, run.outcome).text,
+        elapsed_s=0.0,
+    )
+
+
+def _swept(chain: Chain, request: ChainRequest, drive: LinearSweep) -> ChainRun:
+    run = integrate_chain(
+        chain, drive, drive.duration_s, request.accuracy,
+        sample_rate_hz=_rate_hz(chain, drive.highest_hz, drive.duration_s),
+    )  # fmt: skip
+    base = drive.amplitude_m * np.sin(2.0 * np.pi * drive.turns(run.time_s))
+    over_hz, ratio = _demodulated(run, drive)
+    return _whole_run(chain, run, base, over_hz, ratio)
+
+
+def _recorded(chain: Chain, request: ChainRequest, drive: Sampled) -> ChainRun:
+    rate, duration_s = drive.sample_rate_hz, min(drive.duration_s, request.duration_s)
+    # A sample of the response beside each of the base, so that one estimator takes both.
+    run = integrate_chain(
+        chain, drive, duration_s, request.accuracy, sample_rate_hz=_bounded(rate, chain, duration_s)
+    )
+    base = drive.displacement_m[: len(run.time_s)]
+    segment = max(16, len(run.time_s) // SEGMENTS)
+    found = [
+        transmissibility(base, run.states[:, cell, X], rate, segment_samples=segment)
+        for cell in range(chain.size)
+    ]
+    is_shown = found[0].frequency_hz <= 2.0 * chain.natural_frequencies_hz[-1]
+    known = [np.where(each.is_significant, np.abs(each.value), np.nan) for each in found]
+    ratio = np.stack(known, axis=-1)
+    return _whole_run(chain, run, base, found[0].frequency_hz[is_shown], ratio[is_shown])
+
+
+def _whole_run(chain: Chain, run: ChainTrajectory, base: Reals, over_hz: Reals, ratio: Reals) -> ChainRun:
+    """Describe a run that is shown from end to end."""
+    energy, error = mean_energies(chain, run.states, base)
+    stretches = np.array_split(np.arange(len(run.time_s)), min(STRETCHES, max(1, len(run.time_s))))
+    sizes = [np.sqrt(np.mean(run.states[each, :, X] ** 2, axis=0)) for each in stretches]
+    p = run.states[..., 1] - run.states[..., 2]
+    return ChainRun(
+        cells=chain.size,
+        frequency_hz=math.nan,
+        over_hz=over_hz,
+        transmission=ratio,
+        largest_m=np.max(np.abs(p), axis=0),
+        impacts=run.impacts.per_cell,
+        observed_s=run.end_time_s,
+        energy_j=energy,
+        energy_error_j=error,
+        exponent_per_s=math.nan,
+        exponent_error_per_s=math.nan,
+        time_s=np.array([run.time_s[each].mean() for each in stretches]),
+        motion_m=np.array(sizes),
+        impact_time_s=run.impacts.times_s,
+        impact_cell=run.impacts.cells,
+        outcome=run.outcome.text,
+        elapsed_s=0.0,
+    )
+
+
+def _demodulated(run: ChainTrajectory, drive: LinearSweep) -> tuple[Reals, Reals]:
+    """Component at the momentary frequency, by Hann-weighted means over equal stretches of time."""
+    lowest_hz = min(drive.start_hz, drive.stop_hz)
+    parts = int(min(SWEEP_PARTS, max(1.0, drive.duration_s * lowest_hz / FEWEST_PERIODS)))
+    turning = np.exp(-2j * np.pi * drive.turns(run.time_s))
+    over_hz, ratio = [], []
+    for each in np.array_split(np.arange(len(run.time_s)), parts):
+        taper = np.hanning(len(each) + 2)[1:-1]
+        line = 2.0 * (taper * turning[each]) @ run.states[each, :, X] / taper.sum()
+        over_hz.append(float(drive.frequency_hz(run.time_s[each]).mean()))
+        ratio.append(np.abs(line) / drive.amplitude_m)
+    order = np.argsort(over_hz)
+    return np.array(over_hz)[order], np.array(ratio)[order]
+
+
+def _base_of(request: ChainRequest) -> Sampled:
+    """Take the base's motion from a recording."""
+    path = Path(request.recording)
+    with open_recording(path) as recording:
+        base = recorded_base_motion(recording, plan_of(recording))
+    return Sampled(base.displacement_m, base.sample_rate_hz)
+
+
+def _rate_hz(chain: Chain, highest_hz: float, duration_s: float) -> float:
+    """Choose samples per second that show the fastest motion, and fit into memory."""
+    highest_hz = max(highest_hz, float(chain.natural_frequencies_hz[-1]))
+    return _bounded(SAMPLES_PER_PERIOD * highest_hz, chain, duration_s)
+
+
+def _bounded(rate_hz: float, chain: Chain, duration_s: float) -> float:
+    wanted = rate_hz * duration_s * chain.size * 2.0 * VX
+    if wanted > MOST_NUMBERS:
+        raise ValueError(
+            f"{chain.size} cells for {duration_s:g} s make {wanted:.2g} numbers, more than the "
+            f"{MOST_NUMBERS:.0g} that are held at once; take fewer cells or a shorter run"
+        )
+    return rate_hz

@@ -1,0 +1,128 @@
+"""What is asked of a chain: its cells, how many of them, and what drives it."""
+
+from collections.abc import Sequence
+from enum import StrEnum
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Self
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+
+from vibench.sim import Accuracy, SpecimenTable
+from vibench.sim.chain import MOST_CELLS, Chain
+from vibench.sim.study import frequency_range
+
+from ._specimen_choice import SpecimenChoice
+
+MOST_RUNS = 20_000
+
+
+class ChainDrive(StrEnum):
+    """How the base of a chain moves."""
+
+    NONE = "none"
+    """Not at all: bands, gaps and transmissibility without contact."""
+    STEADY = "steady"
+    """A sine, at one frequency after another, each from rest."""
+    SWEPT = "swept"
+    """A sine whose frequency moves by equal hertz in every second, up or down."""
+    RECORDED = "recorded"
+    """The base motion of a recording, sample by sample."""
+
+
+class ChainRequest(SpecimenChoice):
+    """Cells in a row under one kind of drive; the unit of the chain is the specimen, and others after it."""
+
+    others: tuple[SpecimenTable, ...] = ()
+    """Specimens that follow the first before it comes again."""
+    lengths: Annotated[tuple[Annotated[int, Field(ge=1, le=MOST_CELLS)], ...], Field(min_length=1)] = (8,)
+    """How many cells the chain has; several for a study over the number of cells."""
+    drive: ChainDrive = ChainDrive.STEADY
+    """What moves the base: nothing, a steady sine, a swept one, or what was recorded."""
+    amplitude_m: PositiveFloat = 20e-6
+    """Of the base displacement under a sine."""
+    start_hz: PositiveFloat = 220.0
+    """First frequency of a sine."""
+    stop_hz: PositiveFloat = 220.0
+    """Last frequency of a sine; below the first for a sweep downwards."""
+    step_hz: PositiveFloat = 10.0
+    """Between neighbouring frequencies of a steady sine."""
+    recording: str = ""
+    """Path of the recording whose base motion drives the chain."""
+    duration_s: PositiveFloat = 2.0
+    """Observed under a steady sine; length of a sweep; of a recording at most so much is taken."""
+    settle_s: NonNegativeFloat = 2.0
+    """Left out before under a steady sine, from rest."""
+    exponent_s: NonNegativeFloat = 0.0
+    """Over which the largest Lyapunov exponent is averaged under a steady sine; 0 for none."""
+    accuracy: Accuracy = Accuracy.STANDARD
+    """Of contacts; flight is exact at every level."""
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Self:
+        self.chain(max(self.lengths))
+        match self.drive:
+            case ChainDrive.STEADY:
+                if self.start_hz > self.stop_hz:
+                    raise ValueError(
+                        f"the range {self.start_hz:g} to {self.stop_hz:g} Hz does not ascend; give the lower "
+                        "first, or take a swept drive"
+                    )
+                if len(self.frequencies_hz) * len(self.lengths) > MOST_RUNS:
+                    raise ValueError(f"more than {MOST_RUNS} runs are asked for; take a larger step")
+            case ChainDrive.SWEPT if self.start_hz == self.stop_hz:
+                raise ValueError(
+                    f"a sweep from {self.start_hz:g} to {self.stop_hz:g} Hz goes nowhere; give two different "
+                    "frequencies, or take a steady drive"
+                )
+            case ChainDrive.RECORDED if not self.recording:
+                raise ValueError("no recording was given whose base motion drives the chain; give its path")
+            case _:
+                pass
+        return self
+
+    @cached_property
+    def unit(self) -> Chain:
+        """The cells that come again."""
+        tables = [
+            each.specimen(self.model.strip() or None, self.damping_time_s, self.gap_m) for each in self.others
+        ]
+        return Chain((self.shaken, *tables))
+
+    def chain(self, cells: int) -> Chain:
+        """Build a chain of so many cells."""
+        unit = self.unit.cells
+        return Chain(tuple(unit[place % len(unit)] for place in range(cells)))
+
+    @property
+    def frequencies_hz(self) -> Sequence[float]:
+        """Of a steady sine, ascending."""
+        if self.start_hz == self.stop_hz:
+            return (self.start_hz,)
+        return frequency_range(self.start_hz, self.stop_hz, self.step_hz)
+
+    @property
+    def title(self) -> str:
+        """Name figures by it."""
+        cells = ", ".join(str(each) for each in self.lengths)
+        match self.drive:
+            case ChainDrive.NONE:
+                return f"{cells} cells without contact"
+            case ChainDrive.RECORDED:
+                return f"{cells} cells, base of {Path(self.recording).name}"
+            case _:
+                many = self.start_hz != self.stop_hz
+                where = f"{self.start_hz:g} to {self.stop_hz:g} Hz" if many else f"{self.start_hz:g} Hz"
+                return f"{cells} cells, {where}, {1e6 * self.amplitude_m:g} µm, {self.drive.value}"
+
+    @property
+    def sentence(self) -> str:
+        """Say the options under a figure."""
+        names = ", ".join([self.specimen_text, *(each.name for each in self.others)])
+        times = {
+            ChainDrive.NONE: "",
+            ChainDrive.STEADY: f", {self.duration_s:g} s after {self.settle_s:g} s",
+            ChainDrive.SWEPT: f", {self.duration_s:g} s long",
+            ChainDrive.RECORDED: f", {self.duration_s:g} s at most",
+        }[self.drive]
+        return f"{self.title}; {names}, {self.accuracy.value} accuracy{times}."

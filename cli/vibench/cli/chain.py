@@ -1,0 +1,174 @@
+"""`vibench chain`: cells in a row: waves, gaps, transmission, energy, impacts and exponents."""
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.analysis import InvalidRequest
+from vibench.analysis.dynamics import (
+    ChainAnswer,
+    ChainDrive,
+    ChainRequest,
+    ChainRun,
+    chain_runs,
+    write_chain,
+)
+from vibench.analysis.report import chain_figure
+from vibench.sim import USUAL_SPECIMEN, Accuracy, Parameter
+
+from .dynamics_answer import computed, keep, leave, print_answer, room_for
+from .output import console
+from .paths import AsJson
+from .range_option import range_of
+from .specimen_option import SPECIMENS_HELP, DampingTime, Gap, LawOption, asked_of_specimen, described
+
+FILE = "chain.h5"
+_SWEEP_ENDS = 2
+
+
+def chain(
+    cells: Annotated[
+        str, typer.Option("--cells", metavar="N|N,N,...", help="How many; several for a study over them.")
+    ] = "8",
+    amplitude: Annotated[
+        str | None, typer.Option("--amplitude", metavar="M", help="Of the base displacement.")
+    ] = None,
+    frequency: Annotated[
+        str | None,
+        typer.Option(
+            "--frequency",
+            metavar="F|START:STOP:STEP|START:STOP",
+            help="Steady at one or several [Hz]; START:STOP is a sweep, up or down.",
+        ),
+    ] = None,
+    recording: Annotated[
+        Path | None,
+        typer.Option("--recording", metavar="RECORDING.h5", help="Drive the chain by its base motion."),
+    ] = None,
+    specimen: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--specimen",
+            metavar="NAME|FILE.toml",
+            help=f"Given again, cells take turns. {SPECIMENS_HELP}",
+        ),
+    ] = None,
+    model: LawOption = None,
+    damping_time: DampingTime = None,
+    gap: Gap = None,
+    duration: Annotated[
+        float, typer.Option("--duration", metavar="S", help="Observed if steady; of a sweep; of a recording.")
+    ] = 2.0,
+    settle: Annotated[
+        float, typer.Option("--settle", metavar="S", help="Left out before if steady, from rest.")
+    ] = 2.0,
+    exponent: Annotated[
+        float,
+        typer.Option("--exponent", metavar="S", help="Average the largest exponent so long; steady only."),
+    ] = 0.0,
+    accuracy: Annotated[
+        Accuracy, typer.Option("--accuracy", help="Of contacts; flight is exact.")
+    ] = Accuracy.STANDARD,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for chain.h5, figure and tables.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Follow cells in a row: bands and gaps, transmission, energy, impacts and exponents, cell by cell."""
+    first, *others = specimen or (USUAL_SPECIMEN,)
+    asked = asked_of_specimen(
+        ChainRequest,
+        first,
+        model,
+        damping_time,
+        gap,
+        others=tuple(described(each) for each in others),
+        lengths=_lengths(cells),
+        **_drive(amplitude, frequency, recording),
+        duration_s=duration,
+        settle_s=settle,
+        exponent_s=exponent,
+        accuracy=accuracy,
+    )
+    room_for(FILE, out)
+
+    def tell(_number: int, run: ChainRun) -> None:
+        if not as_json:
+            console.print(_told(run))
+
+    runs, elapsed_s, is_complete = computed(chain_runs(asked), tell)
+    found = ChainAnswer(asked, runs, elapsed_s)
+    if as_json:
+        print_answer(found.to_dict(), is_complete=is_complete)
+    else:
+        console.print(found.cost_sentence)
+    keep(
+        out,
+        lambda folder: write_chain(found, folder / FILE),
+        lambda: chain_figure(found),
+        is_told=not as_json,
+    )
+    leave(is_complete=is_complete)
+
+
+def _lengths(text: str) -> tuple[int, ...]:
+    try:
+        return tuple(int(part) for part in text.split(","))
+    except ValueError as error:
+        raise InvalidRequest(
+            f"--cells was given as {text!r}; give a whole number, or several such as 1,2,4,8"
+        ) from error
+
+
+def _drive(amplitude: str | None, frequency: str | None, recording: Path | None) -> dict[str, object]:
+    """Read what moves the base; without a frequency or a recording nothing does."""
+    if recording is not None:
+        if amplitude is not None or frequency is not None:
+            raise InvalidRequest(
+                "--recording was given beside --amplitude or --frequency; a recording has its own base motion"
+            )
+        return {"drive": ChainDrive.RECORDED, "recording": str(recording)}
+    if frequency is None and amplitude is None:
+        return {"drive": ChainDrive.NONE}
+    if frequency is None or amplitude is None:
+        raise InvalidRequest(
+            "one of --amplitude and --frequency is missing; give both, or neither for a chain without contact"
+        )
+    level = {"amplitude_m": range_of(amplitude, Parameter.AMPLITUDE, (1,)).start}
+    ends = frequency.split(":")
+    if len(ends) == _SWEEP_ENDS:
+        is_downwards = _is_above(*ends)
+        swept = range_of(":".join(reversed(ends)) if is_downwards else frequency, Parameter.FREQUENCY, (2,))
+        low, high = swept.start, swept.stop or swept.start
+        start, stop = (high, low) if is_downwards else (low, high)
+        return {**level, "drive": ChainDrive.SWEPT, "start_hz": start, "stop_hz": stop}
+    steady = range_of(frequency, Parameter.FREQUENCY, (1, 3))
+    step = {} if steady.step is None else {"step_hz": steady.step}
+    return {**level, "start_hz": steady.start, "stop_hz": steady.stop or steady.start, **step}
+
+
+def _is_above(first: str, second: str) -> bool:
+    try:
+        return float(first) > float(second)
+    except ValueError:
+        return False
+
+
+def _told(run: ChainRun) -> str:
+    """Say a run in a line: the first and the last cell stand for all."""
+    where = "" if math.isnan(run.frequency_hz) else f" at {run.frequency_hz:g} Hz"
+    first, last = run.transmission[0, 0], run.transmission[0, -1]
+    across = "" if len(run.over_hz) > 1 else f"|x/U| {first:.4g} in the first cell, {last:.4g} in the last; "
+    exponent = (
+        ""
+        if math.isnan(run.exponent_per_s)
+        else f"; exponent {run.exponent_per_s:.4g} ± {run.exponent_error_per_s:.2g} 1/s"
+    )
+    rates = run.impacts / run.observed_s
+    return (
+        f"{run.cells} cells{where}: {across}impacts a second {rates[0]:.4g} to {rates[-1]:.4g}, mean energy "
+        f"{1e6 * run.energy_j[0]:.4g} to {1e6 * run.energy_j[-1]:.4g} µJ{exponent}; {run.outcome}, "
+        f"{run.elapsed_s:.1f} s"
+    )

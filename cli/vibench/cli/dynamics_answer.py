@@ -1,0 +1,84 @@
+"""What commands about branches, exponents and chains do alike: compute piece by piece, tell, and keep."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import TypeVar
+
+import typer
+
+from vibench.analysis import InvalidRequest
+from vibench.analysis.report import DrawnFigure, ImageKind
+from vibench.sim.study import software
+
+from .interruption import told_to_stop
+from .output import bold, console, print_json
+from .paths import room_for_folder
+from .study import STOPPED_EXIT_CODE
+
+Part = TypeVar("Part")
+SHOWN = 24
+"""Rows on the terminal; all of them are in the JSON and in the file."""
+
+
+def room_for(file: str, out: Path | None) -> None:
+    """Refuse, before anything is computed, a folder that cannot be written to or holds an answer.
+
+    Raises
+    ------
+    InvalidRequest
+        When the file is there.
+
+    """
+    if out is None:
+        return
+    room_for_folder(out)
+    if (out / file).exists():
+        raise InvalidRequest(f"{out / file} exists, and nothing is ever overwritten; choose another folder")
+
+
+def computed(
+    parts: Iterator[Part], tell: Callable[[int, Part], None]
+) -> tuple[tuple[Part, ...], float, bool]:
+    """Compute part by part, telling each with its number; Ctrl-C ends after the one under way.
+
+    Gives the parts, the seconds they took, and whether they are all.
+    """
+    found: list[Part] = []
+    began = time.perf_counter()
+    is_complete = True
+    try:
+        with told_to_stop() as is_stopped:
+            for part in parts:
+                found.append(part)
+                tell(len(found), part)
+                if is_stopped():
+                    is_complete = False
+                    break
+    except ValueError as error:
+        raise InvalidRequest(str(error)) from error
+    return tuple(found), time.perf_counter() - began, is_complete
+
+
+def keep(
+    out: Path | None, write: Callable[[Path], object], draw: Callable[[], DrawnFigure], *, is_told: bool
+) -> None:
+    """Write the file, its figure and its tables into a folder, if one was asked for."""
+    if out is None:
+        return
+    out.mkdir(parents=True, exist_ok=True)
+    write(out)
+    drawn = draw().save(out, (ImageKind.PNG, ImageKind.SVG))
+    if is_told:
+        console.print("The figure:", bold(drawn[0].resolve()))
+
+
+def print_answer(document: Mapping[str, object], *, is_complete: bool) -> None:
+    """Print an answer as JSON, with what made it."""
+    print_json({**document, "is_complete": is_complete, "software": software()})
+
+
+def leave(*, is_complete: bool) -> None:
+    """End with the exit code that says whether an answer is whole."""
+    if not is_complete:
+        raise typer.Exit(STOPPED_EXIT_CODE)

@@ -1,0 +1,108 @@
+"""`vibench chain`, as it is typed."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from vibench.cli.__main__ import app
+from vibench.sim import Harmonic, gong2025, steady_response
+from vibench.sim.chain import chain_of, chain_response, chain_transmissibility
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["chain", *(str(each) for each in arguments)])
+
+
+def answer(*arguments):
+    result = run(*arguments, "--json")
+    assert result.exit_code == 0, result.exception
+    return json.loads(result.stdout)
+
+
+def test_without_a_drive_bands_gaps_and_transmission_are_told():
+    found = answer("--cells", 3)
+    assert found["runs"] == []
+    assert [round(low, 1) for low, _ in found["gaps_hz"]] == [96.1, 373.4, 701.3]
+    assert found["gaps_hz"][-1][1] is None
+    expected = np.abs(chain_transmissibility(chain_of(gong2025(), 3), found["linear_hz"])[:, :, 0]).T
+    np.testing.assert_allclose(found["linear_transmission"]["3"], expected)
+
+
+def test_a_steady_chain_is_answered_cell_by_cell_and_written(tmp_path):
+    options = ("--cells", 2, "--amplitude", 20e-6, "--frequency", 220, "--duration", 0.2, "--settle", 0.1)
+    found = answer(*options, "--out", tmp_path / "out")
+    (point,) = found["runs"]
+    expected = chain_response(chain_of(gong2025(), 2), Harmonic(220.0, 20e-6), "standard", 0.1 + 0.2, 0.2)
+    np.testing.assert_allclose(point["transmission"][0], expected.response_ii[:, 0])
+    assert point["impacts"] == expected.impacts.tolist()
+    assert min(point["energy_j"]) > 0.0
+    names = {each.name for each in (tmp_path / "out").iterdir()}
+    assert names >= {"chain.h5", "chain.png", "chain.svg", "chain_waves.csv", "chain_cells.csv"}
+    with h5py.File(tmp_path / "out" / "chain.h5") as file:
+        assert file.attrs["format"] == "vibench chain"
+        np.testing.assert_array_equal(file["run_00000/impacts"], point["impacts"])
+        assert file["run_00000/motion_m"].shape[1] == 2
+    assert "ever overwritten" in str(run(*options, "--out", tmp_path / "out").exception)
+
+
+def test_a_swept_chain_shows_its_gap_and_follows_the_transmission_without_contact():
+    swept = ("--amplitude", 1e-7, "--duration", 4)
+    for ends in ("300:600", "600:300"):
+        (point,) = answer("--cells", 4, *swept, "--frequency", ends)["runs"]
+        over_hz, last = np.array(point["over_hz"]), np.array(point["transmission"])[:, -1]
+        assert np.all(np.diff(over_hz) > 0.0)
+        linear = np.abs(chain_transmissibility(chain_of(gong2025(), 4), over_hz)[:, -1, 0])
+        is_broad = np.abs(over_hz - 480.0) > 110.0
+        np.testing.assert_allclose(last[is_broad][1:-1], linear[is_broad][1:-1], rtol=0.3)
+        assert last[np.argmin(np.abs(over_hz - 405.0))] < 1e-3 * last[np.argmin(np.abs(over_hz - 520.0))]
+
+
+def test_studies_over_the_number_of_cells_and_cells_that_take_turns():
+    options = ("--amplitude", 20e-6, "--frequency", 220, "--duration", 0.1, "--settle", 0, "--gap", 20e-6)
+    found = answer("--cells", "1,2,3", "--specimen", "gong2025", "--specimen", "heavy", *options)
+    assert [each["cells"] for each in found["runs"]] == [1, 2, 3]
+    assert len(found["bands_hz"]) == 6
+    alone = steady_response(gong2025(gap_m=20e-6), Harmonic(220.0, 20e-6), "standard", 0.1, 0.1)
+    # Chaos: another code of the same motion is another draw.
+    assert found["runs"][0]["transmission"][0][0] == pytest.approx(alone.response_ii, rel=0.2)
+    assert found["options"]["others"][0]["name"] == "heavy"
+
+
+def test_an_exponent_is_told_with_its_error():
+    result = run(
+        "--cells", 2, "--amplitude", 20e-6, "--frequency", 220, "--duration", 0.05, "--settle", 0.05,
+        "--exponent", 0.4,
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    assert "2 cells at 220 Hz: |x/U|" in result.output
+    assert "exponent" in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--cells", "x"), "--cells was given as 'x'"),
+        (("--cells", "0"), "lengths.0 was given as 0"),
+        (("--cells", "1001"), "less than or equal to 1000"),
+        (("--amplitude", "1e-6"), "one of --amplitude and --frequency is missing"),
+        (("--amplitude", "1e-6", "--frequency", "200:200"), "200 does not lie below 200"),
+        (("--amplitude", "1e-6", "--frequency", "a:b"), "'a' is no number"),
+        (("--amplitude", "1e-6:2e-6", "--frequency", "200"), "2 numbers are not allowed here"),
+        (("--recording", "a.h5", "--frequency", "200"), "a recording has its own base motion"),
+        (("--recording", "nowhere.h5"), "nowhere.h5"),
+        (("--specimen", "rigid_stops"), "Cell 1 has rigid stops"),
+        (("--specimen", "nothing"), "no specimen is called 'nothing'"),
+        (("--cells", "1000", "--amplitude", "1e-6", "--frequency", "200:300", "--duration", "60"), "numbers"),
+        (
+            ("--cells", "2", "--amplitude", "1e-6", "--frequency", "200", "--exponent", "0.01"),
+            "hold 32 intervals",
+        ),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_in_one_sentence(arguments, said):
+    result = run(*arguments)
+    assert result.exit_code != 0
+    assert said in str(result.exception)

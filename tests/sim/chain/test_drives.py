@@ -1,0 +1,190 @@
+"""Chains under sweeps and sampled drives, and the energy of their cells."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    HuntCrossley,
+    LinearGap,
+    LinearSweep,
+    LogarithmicSweep,
+    Outcome,
+    Sampled,
+    gong2025,
+    integrate,
+)
+from vibench.sim.chain import (
+    Chain,
+    band_frequencies_hz,
+    band_gaps,
+    bloch_factor,
+    chain_energies,
+    chain_of,
+    integrate_chain,
+)
+
+pytestmark = pytest.mark.timeout(300)
+UNITS = np.repeat([1e-4, 0.1], 3)
+"""Errors are in units of 100 um and 0.1 m/s."""
+
+
+def distance(first, second):
+    return np.max(np.abs(first - second) / UNITS)
+
+
+def noise(seed, count, rate_hz, rms_m):
+    """Band-limited noise, its slow drift left out."""
+    spectrum = np.fft.rfft(np.random.default_rng(seed).normal(size=count))
+    frequency = np.fft.rfftfreq(count, 1.0 / rate_hz)
+    spectrum[(frequency < 40.0) | (frequency > 600.0)] = 0.0
+    samples = np.fft.irfft(spectrum, count)
+    return Sampled(rms_m * samples / samples.std(), rate_hz)
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        LinearSweep(80.0, 300.0, 0.2, 5e-6),
+        LogarithmicSweep(400.0, 60.0, 0.2, 5e-6),
+        noise(1, 4001, 20e3, 4e-6),
+        noise(2, 401, 2e3, 4e-6),
+    ],
+)
+def test_a_light_neighbour_does_not_feel_and_does_not_disturb_a_cell_under_any_drive(drive):
+    """The heavy cell moves as the specimen does, whose intervals and contacts are another code."""
+    heavy, lightness = gong2025(), 1e-12
+    light = replace(
+        heavy,
+        masses=tuple(lightness * m for m in heavy.masses),
+        stiffnesses=tuple(lightness * k for k in heavy.stiffnesses),
+        dampings=tuple(lightness * c for c in heavy.dampings),
+        contact=replace(heavy.contact, stiffness=lightness * heavy.contact.stiffness),
+    )
+    ours = integrate_chain(Chain((heavy, light)), drive, 0.1, Accuracy.REFERENCE, sample_rate_hz=5e3)
+    theirs = integrate(heavy, drive, 0.1, Accuracy.REFERENCE, sample_rate_hz=5e3)
+    assert ours.outcome is Outcome.REACHED_END
+    struck = theirs.impacts.times_s
+    # Every impact makes four of a difference.
+    near = theirs.time_s < (struck[8] if len(struck) > 8 else 0.1)
+    assert near.sum() > 100
+    assert distance(ours.states[near, 0], theirs.states[near]) < 1e-5
+
+
+@given(
+    frequency_hz=st.floats(20.0, 700.0), cells=st.integers(2, 9), rate_hz=st.sampled_from([7e3, 30e3, 200e3])
+)
+@settings(max_examples=12, deadline=None)
+def test_a_sampled_sine_moves_a_chain_as_the_sine_itself(frequency_hz, cells, rate_hz):
+    chain = chain_of(gong2025(contact="linear"), cells)
+    time_s = np.arange(int(0.05 * rate_hz) + 2) / rate_hz
+    sampled = Sampled(1e-6 * np.sin(2.0 * np.pi * frequency_hz * time_s), rate_hz)
+    ours = integrate_chain(chain, sampled, 0.05)
+    theirs = integrate_chain(chain, Harmonic(frequency_hz, 1e-6), 0.05)
+    turn = 2.0 * np.pi * frequency_hz / rate_hz
+    assert distance(ours.final_state, theirs.final_state) < 1e-11 + 0.05 * turn**4
+
+
+def test_a_sweep_that_hardly_moves_is_the_sine_to_twelve_digits():
+    chain = chain_of(gong2025(contact="linear"), 3)
+    swept = integrate_chain(chain, LinearSweep(200.0, 200.0 * (1.0 + 1e-13), 0.2, 1e-5), 0.2)
+    still = integrate_chain(chain, Harmonic(200.0, 1e-5), 0.2)
+    assert distance(swept.final_state, still.final_state) < 1e-11
+
+
+@pytest.mark.parametrize("drive", [LinearSweep(80.0, 300.0, 0.1, 20e-6), noise(3, 2001, 20e3, 20e-6)])
+def test_a_driven_run_goes_on_from_where_it_was_cut_and_samples_change_nothing(drive):
+    chain = chain_of(gong2025(), 2)
+    whole = integrate_chain(chain, drive, 0.06, Accuracy.REFERENCE)
+    sampled = integrate_chain(chain, drive, 0.06, Accuracy.REFERENCE, sample_rate_hz=7e3)
+    assert whole.impacts.count > 10
+    np.testing.assert_array_equal(sampled.final_state, whole.final_state)
+    cut_s = float(whole.impacts.times_s[-3]) - 1e-4
+    first = integrate_chain(chain, drive, cut_s, Accuracy.REFERENCE)
+    rest = integrate_chain(
+        chain, drive, 0.06 - cut_s, Accuracy.REFERENCE, first.final_state, start_time_s=cut_s
+    )
+    assert distance(rest.final_state, whole.final_state) < 1e-4
+
+
+def test_a_run_longer_than_its_drive_is_refused():
+    for drive in (LinearSweep(80.0, 300.0, 0.1, 1e-6), noise(1, 400, 2e3, 1e-6)):
+        with pytest.raises(ValueError, match=r"shorten the run or extend the drive\.$"):
+            integrate_chain(chain_of(gong2025(), 2), drive, 1.0)
+
+
+@pytest.mark.parametrize("contact", ["hertz", "linear_gap:2e5", "power:5", "power:3+7", "linear"])
+def test_energies_of_the_cells_add_up_to_what_springs_and_masses_hold(contact):
+    """Their sum is kept without damping, and a cell's is what its forces are the slope of."""
+    chain = chain_of(gong2025(damping_time_s=0.0, contact=contact), 3)
+    state = np.random.default_rng(5).uniform(-1.0, 1.0, (3, 6)) * np.repeat([4e-5, 0.15], 3)
+    run = integrate_chain(chain, Harmonic(100.0, 0.0), 0.02, Accuracy.REFERENCE, state, sample_rate_hz=2e4)
+    held = chain_energies(chain, run.states)
+    assert held.shape == (len(run.time_s), 3)
+    np.testing.assert_allclose(held.sum(axis=1), held[0].sum(), rtol=1e-7)
+    assert np.ptp(held[:, 0]) > 0.1 * held[0].sum()
+
+
+def test_the_base_stretches_the_first_link_alone():
+    chain = chain_of(gong2025(), 2)
+    moved = chain_energies(chain, np.zeros((4, 2, 6)), np.full(4, 1e-5))
+    np.testing.assert_allclose(moved[:, 0], 0.5 * chain.cells[0].stiffnesses[0] * 1e-10)
+    np.testing.assert_array_equal(moved[:, 1], 0.0)
+
+
+def test_stops_hold_energy_only_where_they_are_pressed():
+    cell = gong2025(gap_m=(30e-6, 60e-6))
+    for contact in (cell.contact, HuntCrossley(cell.contact.stiffness, 0.3), LinearGap(2e5)):
+        chain = chain_of(replace(cell, contact=contact), 1)
+        p = np.array([-40e-6, -25e-6, 50e-6, 61e-6])
+        states = np.zeros((4, 1, 6))
+        states[:, 0, 1] = p
+        stops = chain_energies(chain, states)[:, 0] - 0.5 * cell.stiffnesses[1] * p**2
+        depth = np.array([10e-6, 0.0, 0.0, 1e-6])
+        exponent, stiffness = contact.stops.term[::-1]
+        np.testing.assert_allclose(stops, stiffness * depth ** (exponent + 1) / (exponent + 1), atol=1e-15)
+
+
+UNEQUAL = Chain((gong2025(damping_time_s=0.0), gong2025(damping_time_s=0.0)))
+
+
+def test_a_unit_of_equal_cells_has_the_bands_of_one_cell_folded_and_no_new_gap():
+    one, two = chain_of(UNEQUAL.cells[0], 1), UNEQUAL
+    np.testing.assert_allclose(np.array(band_gaps(two))[:-1], np.array(band_gaps(one))[:-1], rtol=1e-9)
+    half = band_frequencies_hz(one, [0.35, np.pi - 0.35])
+    np.testing.assert_allclose(band_frequencies_hz(two, [0.7])[0], np.sort(half.ravel()), rtol=1e-9)
+    np.testing.assert_allclose(
+        bloch_factor(two, [150.0, 400.0]), bloch_factor(one, [150.0, 400.0]) ** 2, rtol=1e-9
+    )
+
+
+@given(seed=st.integers(0, 10_000), cells=st.integers(1, 4))
+@settings(max_examples=25, deadline=None)
+def test_waves_of_unequal_cells_turn_by_their_wave_number_within_bands_and_decay_in_gaps(seed, cells):
+    random = np.random.default_rng(seed)
+    unit = Chain(
+        tuple(
+            replace(
+                gong2025(damping_time_s=0.0),
+                masses=tuple(random.uniform(1e-3, 9e-3, 3)),
+                stiffnesses=tuple(random.uniform(1e3, 3e4, 3)),
+            )
+            for _ in range(cells)
+        )
+    )
+    phase = random.uniform(0.3, 2.8)
+    for frequency_hz in band_frequencies_hz(unit, [phase])[0]:
+        factor = bloch_factor(unit, [frequency_hz])[0]
+        assert abs(factor) == pytest.approx(1.0, abs=1e-5)
+        assert abs(np.angle(factor)) == pytest.approx(phase, abs=1e-5)
+    natural = Chain(unit.cells * 12).natural_frequencies_hz
+    for gap in band_gaps(unit):
+        middle = 0.5 * (gap.lower_hz + min(gap.upper_hz, 2.0 * gap.lower_hz))
+        assert abs(bloch_factor(unit, [middle])[0]) < 1.0
+        # A free end may hold one mode of its own in a gap of a unit that is not its own mirror image.
+        inside = (natural > gap.lower_hz * (1 + 1e-9)) & (natural < gap.upper_hz * (1 - 1e-9))
+        assert np.count_nonzero(inside) <= 2
