@@ -55,6 +55,16 @@ class LoopbackWorld:
     base_factor: float = 1.0
     background_m_per_s2: float = 0.0
     overloads: tuple = ()
+    latency_s: float = 0.0
+    """What each command to the generator takes, while samples are converted."""
+    convert: Callable[[int], None] | None = None
+    """Lets so many samples be converted, which then wait."""
+
+    def command(self, name: str, argument: object = None) -> None:
+        """Note a call to the generator, which takes its time before it is in force."""
+        self.call(name, argument)
+        if self.is_sampling and self.latency_s > 0:
+            self.convert(round(self.latency_s * SAMPLE_RATE_HZ))
 
     def call(self, name: str, argument: object = None) -> None:
         self.calls.append((name, argument, self.samples))
@@ -103,25 +113,25 @@ class LoopbackGenerator:
         self._world = world
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
-        self._world.call("load_sine", frequency_hz)
+        self._world.command("load_sine", frequency_hz)
         self._world.period = None
         self._world.frequency_hz = frequency_hz
         self._set(amplitude_vpp)
 
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
-        self._world.call("load_waveform", waveform)
+        self._world.command("load_waveform", waveform)
         assert np.max(np.abs(waveform)) <= 1.0
         self._world.period = waveform
         self._world.frequency_hz = repetition_hz
         self._set(amplitude_vpp)
 
     def set_frequency(self, frequency_hz: float) -> None:
-        self._world.call("set_frequency", frequency_hz)
+        self._world.command("set_frequency", frequency_hz)
         assert self._world.period is None
         self._world.frequency_hz = frequency_hz
 
     def set_amplitude(self, amplitude_vpp: float) -> None:
-        self._world.call("set_amplitude", amplitude_vpp)
+        self._world.command("set_amplitude", amplitude_vpp)
         self._set(amplitude_vpp)
 
     def arm_burst(self, cycles: int) -> None:
@@ -133,12 +143,15 @@ class LoopbackGenerator:
     def end_burst(self) -> None:
         self._world.call("end_burst")
 
+    def measured_latency_s(self) -> float:
+        return self._world.latency_s
+
     def start(self) -> None:
-        self._world.call("start")
+        self._world.command("start")
         self._world.is_on = True
 
     def stop(self) -> None:
-        self._world.call("stop")
+        self._world.command("stop")
         self._world.is_on = self._world.stays_on
 
     def close(self) -> None:
@@ -196,6 +209,8 @@ class LoopbackDigitizer:
         self._first = 0
         self._velocity = np.zeros(1)
         self._accelerance = abs(complex(RigModel(world.rig).transfer(BaseQuantity.ACCELERATION, 160.0)))
+        self._waiting = np.zeros((len(channels), 0))
+        world.convert = self._convert
 
     @property
     def roles(self) -> tuple[str, ...]:
@@ -205,9 +220,14 @@ class LoopbackDigitizer:
     def volts_per_count(self) -> tuple[float | None, ...]:
         return (None,) * len(self._channels)
 
+    @property
+    def waiting_samples(self) -> int:
+        return self._waiting.shape[1]
+
     def start(self) -> None:
         self._world.call("digitizer.start")
         self._world.samples = 0
+        self._waiting = self._waiting[:, :0]
         self._world.is_sampling = True
 
     def read(self, samples: int) -> Block:
@@ -215,8 +235,19 @@ class LoopbackDigitizer:
         world.call("digitizer.read", samples)
         assert world.is_sampling
         assert samples > 0
+        self._convert(max(0, samples - self.waiting_samples))
+        volts, self._waiting = np.split(self._waiting, [samples], axis=1)
+        block = Block(world.samples, volts, world.overloads)
+        world.samples += samples
+        return block
+
+    def _convert(self, samples: int) -> None:
+        world = self._world
+        if not samples:
+            return
         drive = world.terminal(samples)
-        angle = 2 * np.pi * 160.0 * (world.samples + np.arange(samples)) / SAMPLE_RATE_HZ
+        first = world.samples + self.waiting_samples
+        angle = 2 * np.pi * 160.0 * (first + np.arange(samples)) / SAMPLE_RATE_HZ
         base = drive * self._accelerance * world.base_factor + world.background_m_per_s2 * np.sin(angle)
         physical = {
             Role.DRIVE_VOLTAGE: drive * world.drive_factor + world.hum_v * np.sin(angle * 50 / 160),
@@ -225,9 +256,7 @@ class LoopbackDigitizer:
             Role.M0_VELOCITY: self._integrated(base),
         }
         volts = np.stack([physical[channel.role] / channel.units_per_volt for channel in self._channels])
-        block = Block(world.samples, volts, world.overloads)
-        world.samples += samples
-        return block
+        self._waiting = np.concatenate((self._waiting, volts), axis=1)
 
     def _integrated(self, acceleration: Samples) -> Samples:
         """Velocity of what moves with that acceleration; what lies seconds back is forgotten."""

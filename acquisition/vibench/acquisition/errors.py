@@ -34,6 +34,10 @@ class SettingRefused(InstrumentError):
     """A setting read back differs from what was sent: the instrument silently took another value."""
 
 
+class DriveLate(AcquisitionError):
+    """The generator takes longer for a setting than the plan leaves it: what it plays lags behind."""
+
+
 class DataLost(AcquisitionError):
     """Samples were overwritten before they were read: the record has a hole and ends here."""
 

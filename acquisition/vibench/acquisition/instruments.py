@@ -89,6 +89,9 @@ class FunctionGenerator(Protocol):
     def end_burst(self) -> None:
         """Play on without a trigger."""
 
+    def measured_latency_s(self) -> float:
+        """How long one verified change of amplitude takes: the floor of any step, ramp and stop [s]."""
+
     def start(self) -> None:
         """Turn the output on."""
 
@@ -128,6 +131,10 @@ class Digitizer(Protocol):
             When the device or its server is gone.
 
         """
+
+    @property
+    def waiting_samples(self) -> int:
+        """How many samples of every channel are converted and not read yet; it takes no time to read them."""
 
     def stop(self) -> None:
         """End sampling. Legal at any time."""

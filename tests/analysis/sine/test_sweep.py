@@ -1,15 +1,18 @@
 """Sweeps: the recorded drive is the clock, orders come apart, envelopes and responses are what was put in."""
 
+import re
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from scipy import signal
 
+from vibench.acquisition.plan import SineSweep
 from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
+from vibench.analysis.recordings import Verdict
 from vibench.analysis.signals import Decimator
-from vibench.analysis.sine import SweepSums
+from vibench.analysis.sine import SweepSums, played_check
 from vibench.analysis.sine._sweep import drive_phase, sweep_response
 from vibench.analysis.tones import tracked_orders
 
@@ -173,3 +176,18 @@ def test_a_meaningless_sweep_is_refused():
     noise = np.random.default_rng(3).standard_normal(8192)
     with pytest.raises(UnusableData, match="no sine"):
         drive_phase(noise, RATE, low_hz=150, high_hz=350)
+
+
+@pytest.mark.parametrize(
+    ("played_to_hz", "verdict"), [(350.0, Verdict.PASSED), (349.5, Verdict.PASSED), (334.0, Verdict.WARNING)]
+)
+@pytest.mark.parametrize("is_downward", [False, True])
+def test_a_sweep_whose_end_was_not_played_is_told(played_to_hz, verdict, is_downward):
+    ends = (150.0, 350.0, played_to_hz) if not is_downward else (350.0, 150.0, 500.0 - played_to_hz)
+    _, phase = sweep(6.0, ends[0], ends[2])
+    response = sweep_response(np.cos(phase), np.cos(phase), np.cos(phase), RATE, low_hz=150.0, high_hz=350.0)
+    plan = SineSweep(amplitude_vpp=1.0, start_hz=ends[0], stop_hz=ends[1], duration_s=6.0, step_s=0.05)
+    found = played_check(response, plan)
+    assert found.verdict is verdict
+    if verdict is Verdict.WARNING:
+        assert re.search(r"at [\d.]+ Hz where [\d.]+ Hz were planned, 0\.[45]\d* s behind", found.text)

@@ -15,9 +15,6 @@ class VerifiedGenerator(FunctionGenerator, Protocol):
     def unconfirmed(self) -> tuple[Knob, ...]:
         """Settings that could be neither made nor read remotely: the operator must confirm them."""
 
-    def measured_latency_s(self) -> float:
-        """How long one verified change of amplitude takes: the floor of any emergency stop [s]."""
-
 
 class CountingDigitizer(Digitizer, Protocol):
     """A digitizer that knows the step of its converter."""

@@ -10,6 +10,7 @@ from ..errors import (
     CheckFailed,
     ConfigurationError,
     DataLost,
+    DriveLate,
     InstrumentError,
     InstrumentLost,
     LimitExceeded,
@@ -59,6 +60,7 @@ _CODE_BY_ERROR: tuple[tuple[type[AcquisitionError], ReasonCode], ...] = (
     (LimitExceeded, ReasonCode.LIMIT),
     (RecordingError, ReasonCode.DISK),
     (ConfigurationError, ReasonCode.PLAN),
+    (DriveLate, ReasonCode.PLAN),
 )
 
 

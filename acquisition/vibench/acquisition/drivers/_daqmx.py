@@ -187,6 +187,14 @@ class DaqmxDigitizer:
         self._next_sample += samples
         return Block(first_sample, volts, self._overloads(volts, first_sample, told))
 
+    @property
+    def waiting_samples(self) -> int:
+        """How many samples of every channel are converted and not read yet."""
+        if not self._is_running:
+            return 0
+        with daqmx_call(f"asking {self._config.device} how many samples wait"):
+            return int(self._open_task().in_stream.avail_samp_per_chan)
+
     def stop(self) -> None:
         """End sampling. Legal at any time."""
         self._is_running = False

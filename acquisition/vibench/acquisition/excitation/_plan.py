@@ -98,6 +98,11 @@ class AbstractExcitation(FrozenModel, ABC):
         return Approach.REST
 
     @property
+    def glide_step_s(self) -> float | None:
+        """Time at one frequency, where the drive moves on without a pause [s]; None where it does not."""
+        return None
+
+    @property
     def lead_in_s(self) -> float:
         """Time on the way to what is to be measured, along a branch [s]."""
         return 0.0

@@ -95,6 +95,11 @@ class MovingSine(AbstractExcitation):
         return min(self.start_hz, self.stop_hz), max(self.start_hz, self.stop_hz)
 
     @property
+    def glide_step_s(self) -> float:
+        """The step of the sweep [s]."""
+        return self.step_s
+
+    @property
     def approach(self) -> Approach:
         """From the side on which the sweep starts."""
         return Approach.UP if self.start_hz < self.stop_hz else Approach.DOWN

@@ -59,18 +59,33 @@ class AcquisitionLoop:
         """Time recorded so far [s]."""
         return self._samples / self._digitizer.sample_rate_hz
 
-    def read_for(self, duration_s: float) -> Iterator[Block]:
-        """Read, keep and hand on blocks until ``duration_s`` more have passed.
+    def read_for(self, duration_s: float, lead_s: float = 0.0) -> Iterator[Block]:
+        """Read, keep and hand on blocks until ``duration_s`` more have passed, less a lead.
 
         The end is the sample nearest to the sum of all durations asked for so far: many short
-        stretches that are no whole number of samples do not drift.
+        stretches that are no whole number of samples do not drift. A lead [s] is read with the next stretch.
         """
         rate_hz = self._digitizer.sample_rate_hz
         self._due_s += duration_s
         longest = max(1, round(BLOCK_S * rate_hz))
         # The goal moves when whoever takes the blocks lingers.
-        while self._samples < (goal := round(self._due_s * rate_hz)):
+        while self._samples < (goal := round((self._due_s - lead_s) * rate_hz)):
             yield self._next(min(longest, goal - self._samples))
+
+    @property
+    def waiting_s(self) -> float:
+        """How long ago the last sample that was read was converted [s]."""
+        return self._digitizer.waiting_samples / self._digitizer.sample_rate_hz
+
+    def catch_up(self) -> Iterator[Block]:
+        """Read what waits, and let everything after it come that much later."""
+        # Once: while it is read more comes, and how much is no sign of lateness.
+        waiting = self._digitizer.waiting_samples
+        self._due_s += waiting / self._digitizer.sample_rate_hz
+        longest = max(1, round(BLOCK_S * self._digitizer.sample_rate_hz))
+        while waiting > 0:
+            yield self._next(min(longest, waiting))
+            waiting -= min(longest, waiting)
 
     def linger(self, duration_s: float) -> Block:
         """Read and keep one block more than was asked for; everything after it comes that much later."""

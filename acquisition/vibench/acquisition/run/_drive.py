@@ -27,6 +27,10 @@ class Drive(Protocol):
         """Silence between saying what comes after all that was told, and hearing it [s]."""
 
     @property
+    def is_commanded(self) -> bool:
+        """Whether each change is a command that takes its time while samples are converted."""
+
+    @property
     def setting_vpp(self) -> float:
         """What is played now, as an amplitude setting, peak to peak [V]; 0 in silence."""
 

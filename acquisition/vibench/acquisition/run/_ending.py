@@ -4,7 +4,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import AcquisitionError, DataLost, InstrumentError, LimitExceeded, RecordingError
+from ..errors import AcquisitionError, DataLost, DriveLate, InstrumentError, LimitExceeded, RecordingError
 from ..excitation import Segment
 from ..instruments import Block, Digitizer
 from ..plan import RunState
@@ -112,7 +112,7 @@ def _cause_of(error: Exception) -> Cause:
     match error:
         case LimitExceeded():
             return Cause.LIMIT
-        case InstrumentError() | DataLost():
+        case InstrumentError() | DataLost() | DriveLate():
             return Cause.INSTRUMENT
         case RecordingError():
             return Cause.DISK

@@ -18,6 +18,8 @@ the smallest setting that the generator takes."""
 GUARD_S = 0.02
 """A burst is triggered so long after the last one must have ended: what a trigger does to one that still
 plays is not documented for every firmware, and the times of reading vary by some milliseconds [s]."""
+LITTLE = 0.98
+"""A level is not lowered before the frequency changes where it is lowered by less than this."""
 MOST_CYCLES = 50_000
 _ROUNDING_S = 1e-9
 
@@ -60,6 +62,7 @@ class GeneratorDrive:
     """A `Drive` whose commands take effect when they are given: each phase is commanded as it begins."""
 
     drive_source = DriveSource.GENERATOR
+    is_commanded = True
     pause_s = 0.0
     """A generator need not know what is coming."""
 
@@ -183,12 +186,15 @@ class GeneratorDrive:
         self._setting_vpp = self._due_vpp
 
     def _change_tone(self, old: Tone, new: Tone) -> None:
-        """Lower the amplitude before the frequency changes, or raise it after: never too loud on the way."""
-        if new.level < old.level:
+        """Lower the amplitude before the frequency changes, or raise it after: never too loud on the way.
+
+        Where it changes by little, as from step to step of a sweep, the frequency comes first: in its time.
+        """
+        if new.level < LITTLE * old.level:
             self._generator.set_amplitude(self._due_vpp)
         if new.frequency_hz != old.frequency_hz:
             self._generator.set_frequency(new.frequency_hz)
-        if new.level > old.level:
+        if new.level > old.level or LITTLE * old.level <= new.level < old.level:
             self._generator.set_amplitude(self._due_vpp)
 
     def _ramp(self, target: float, ramp_s: float) -> Iterator[float]:

@@ -1,7 +1,9 @@
 """Playing phases while every block is read, kept and held to the limits."""
 
 from collections.abc import Callable, Iterator
+from enum import Enum, auto
 
+from ..errors import DriveLate
 from ..excitation import Play, Tone
 from ..instruments import Block
 from ..plan import Phase, RunState
@@ -15,6 +17,31 @@ from ._silence_watch import LISTEN_S, LONGEST_S, SilenceWatch
 
 HOLD_LONGEST_S = HOLD_ROOM_S
 """How long a run may be held in all [s]: its recording has room for that."""
+
+
+LATEST = 0.5
+"""How late a glide from step to step may be, in steps."""
+LATE_STEPS = 4
+"""So many in a row are no moment in which the computer was busy: a part of the end would not be played."""
+LEARNT = 0.05
+"""Least share of a lateness by which the commands of a glide are given earlier from then on; of the first
+ones it is more, so that the mean is learnt."""
+LONGEST_LEAD = 0.25
+"""Of a step."""
+_RAMPS = frozenset({RunState.RAMPING_UP, RunState.RAMPING_DOWN})
+
+
+class _Pace(Enum):
+    """What decides when a phase and its pieces begin."""
+
+    AFTER_THE_COMMAND = auto()
+    """The end of its first command: what settles, settles from then on."""
+    OF_THE_COMMANDS = auto()
+    """The plan, or the end of the last command where that is later: ramps."""
+    OF_THE_PLAN = auto()
+    """The plan, to which a glide must keep."""
+    OF_ITSELF = auto()
+    """Nothing: no command is due, or none takes time."""
 
 
 class Stopped(Exception):
@@ -51,14 +78,78 @@ class PhaseRunner:
         self._look: Callable[[Block], None] = self._go_on
         self._held_s = 0.0
         self._play: Play | None = None
+        self._lead_s = 0.0
+        self._glides = 0
+        self._late_steps = 0
 
     def run_phase(self, phase: Phase, into: list[Block] | None = None) -> Iterator[Progress]:
-        """Play a phase; its samples go ``into`` a list as well, if one is given."""
+        """Play a phase; its samples go ``into`` a list as well, if one is given.
+
+        A phase begins when its command has been carried out, however long that takes. A drive that glides
+        from step to step of one segment keeps to the time of its plan instead, and fails when it cannot.
+        """
         self._enter(phase.state)
+        pace = self._pace_of(phase)
+        if pace is _Pace.OF_THE_PLAN:
+            self._require_pace(phase)
+        else:
+            yield from self._read(0.0)
+        if phase.segment != self.loop.segment:
+            self.loop.enter(None)  # a segment holds nothing of the time in which its successor is commanded
+        waits = self._drive.perform(phase)
+        wait_s = next(waits, None)
+        if pace is _Pace.AFTER_THE_COMMAND:
+            yield from self._catch_up()
         self.loop.enter(phase.segment)
         self._play = phase.play
-        for wait_s in self._drive.perform(phase):
-            yield from self._read(wait_s, into)
+        while wait_s is not None:
+            yield from self._read(wait_s, into, self._lead_s if phase.state is RunState.RECORDING else 0.0)
+            if pace is _Pace.OF_THE_COMMANDS:
+                yield from self._catch_up(into)
+            wait_s = next(waits, None)
+
+    def _pace_of(self, phase: Phase) -> "_Pace":
+        if not self._drive.is_commanded:
+            return _Pace.OF_ITSELF
+        if phase.state in _RAMPS:
+            return _Pace.OF_THE_COMMANDS
+        if phase.play == self._play:
+            return _Pace.OF_ITSELF
+        if phase.state is RunState.RECORDING and phase.segment == self.loop.segment:
+            return _Pace.OF_THE_PLAN
+        return _Pace.AFTER_THE_COMMAND
+
+    def _require_pace(self, phase: Phase) -> None:
+        """Learn how late commands are given; note what is beyond half of a step, raise DriveLate in a row.
+
+        Samples are handed over some milliseconds after they are converted, so that a command that waits for
+        them is late; over a sweep of 200 Hz that would be a cycle or two. The next ones are given earlier.
+        """
+        late_s = self.loop.waiting_s - self._lead_s
+        self._glides += 1
+        learnt_s = self._lead_s + max(1 / self._glides, LEARNT) * late_s
+        self._lead_s = min(max(0.0, learnt_s), LONGEST_LEAD * phase.duration_s)
+        if late_s <= LATEST * phase.duration_s:
+            self._late_steps = 0
+            return
+        self._late_steps += 1
+        at = f"{phase.play.frequency_hz:.6g} Hz" if isinstance(phase.play, Tone) else "one of its steps"
+        text = (
+            f"the drive was {late_s:.3g} s behind its plan at {at}, where a step lasts {phase.duration_s:g} s"
+        )
+        self.loop.log(EventKind.LATE, text)
+        if self._late_steps == LATE_STEPS:
+            raise DriveLate(
+                f"{text}, {LATE_STEPS} times in a row. The run was ended, and what was played is kept; "
+                "give a longer step_s, or shorten generator.settle_s if the instrument allows it"
+            )
+
+    def _catch_up(self, into: list[Block] | None = None) -> Iterator[Progress]:
+        for block in self.loop.catch_up():
+            if into is not None:
+                into.append(block)
+            yield self._told(block)
+            self._look(block)
 
     def ramp_down_early(
         self, reason: str, level: StopLevel, ramp_s: Callable[[StopLevel], float]
@@ -77,6 +168,8 @@ class PhaseRunner:
         while level is not StopLevel.OFF and self._drive.is_playing:
             for wait_s in self._drive.ramp_down(ramp_s(level)):
                 yield from self._read(wait_s)
+                if self._drive.is_commanded:
+                    yield from self._catch_up()
                 if (harder := self._switch.harder_than(level)) is not None:
                     level = harder.level
                     self.loop.log(EventKind.END, harder.reason)
@@ -93,8 +186,10 @@ class PhaseRunner:
         while not self._silence.is_silent and self.loop.elapsed_s < give_up_s:
             yield from self._read(LISTEN_S)
 
-    def _read(self, duration_s: float, into: list[Block] | None = None) -> Iterator[Progress]:
-        for block in self.loop.read_for(duration_s):
+    def _read(
+        self, duration_s: float, into: list[Block] | None = None, lead_s: float = 0.0
+    ) -> Iterator[Progress]:
+        for block in self.loop.read_for(duration_s, lead_s):
             if into is not None:
                 into.append(block)
             yield self._told(block)

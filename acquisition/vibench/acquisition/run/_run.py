@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..bench import RunBench
 from ..control import CONTROLLERS, Controller, feedback_controller, phase_samples
-from ..errors import AcquisitionError, ConfigurationError, LimitExceeded
+from ..errors import AcquisitionError, ConfigurationError, DriveLate, LimitExceeded
 from ..host import ClosedOnLeaving
 from ..instruments import Block
 from ..plan import (
@@ -28,6 +28,7 @@ from ..recording import ChannelHeader, EventKind, Origin, RecordingHeader, creat
 from ..rig import Channel, KnobSheet
 from ..stopping import LEVELS, Cause, StopLevel, StopRequest, StopSwitch
 from ._acquisition_loop import AcquisitionLoop, SampleSink
+from ._command_time import require_time_for_commands
 from ._drive import Drive, drive_for
 from ._ending import Ending, Outcome, Progress
 from ._limit_monitor import LimitMonitor
@@ -186,7 +187,7 @@ class Run(ClosedOnLeaving):
         )
         try:
             yield from self._played_or_stopped(self._runner)
-        except (GeneratorExit, LimitExceeded):
+        except (GeneratorExit, DriveLate, LimitExceeded):
             raise
         except KeyboardInterrupt:
             self._ending.is_stopped("interrupted from the keyboard", Cause.KEYBOARD)
@@ -208,9 +209,10 @@ class Run(ClosedOnLeaving):
         except Stopped as stop:
             self._ending.is_stopped(str(stop), stop.request.cause)
             yield from self._ramped_down_early(runner, stop.request.level)
-        except LimitExceeded as error:
+        except (DriveLate, LimitExceeded) as error:
             self._ending.is_failed(error, str(error))
-            runner.loop.log_limit_trip(error)
+            if isinstance(error, LimitExceeded):
+                runner.loop.log_limit_trip(error)
             yield from self._ramped_down_early(runner, LEVELS[Cause.LIMIT])
             raise
         except GeneratorExit:
@@ -227,6 +229,8 @@ class Run(ClosedOnLeaving):
             self._drive = drive_for(self._bench, self._measurement)
             self._controller = controller_for(self._bench, self._measurement)
             self._total_s += self._before_s()
+            if self._drive.is_commanded:
+                self._total_s += require_time_for_commands(self._measurement, self._bench.generator)
             return self._create(self._path, run_header(self._bench, self._measurement, self._total_s))
         except AcquisitionError as error:
             self._ending.is_failed(error, str(error))

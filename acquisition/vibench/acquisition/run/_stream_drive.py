@@ -152,6 +152,7 @@ class StreamDrive:
     """
 
     drive_source = DriveSource.OUTPUT
+    is_commanded = False
     can_hold = False
 
     def __init__(self, output: AnalogOutput, measurement: Measurement, terminal_factor: float) -> None:

@@ -15,6 +15,7 @@ from ..sine import (
     SweepAnalysis,
     collisions,
     measured_sweep,
+    played_check,
     smooth_jumps,
 )
 from ._analysis_kind import AnalysisKind, Json
@@ -26,7 +27,8 @@ def _analyse(
     response, picture = measured_sweep(channels, plan)
     colliding = collisions(response)
     jumps = smooth_jumps(response, colliding)
-    return SweepAnalysis(facts, measurement_checks(facts), plan, response, colliding, jumps, picture)
+    checks = (*measurement_checks(facts), played_check(response, plan))
+    return SweepAnalysis(facts, checks, plan, response, colliding, jumps, picture)
 
 
 def _measured(analysis: SweepAnalysis) -> Json:

@@ -61,6 +61,7 @@ def measurement_checks(facts: RecordingFacts) -> tuple[Check, ...]:
         _overloads(facts),
         _lost(facts),
         *_drive(facts),
+        *_late(facts),
         *_ranges(facts),
         _rates(facts),
         _calibrations(facts),
@@ -114,6 +115,12 @@ def _drive(facts: RecordingFacts) -> Iterator[Check]:
     is_high = reached_v > setting_v * (1 + _LEVEL_TOLERANCE)
     text = f"peak {reached_v:.4g} V recorded for a setting of {2 * setting_v:g} V peak to peak"
     yield Check("Drive level", Verdict.NOTE if is_high else Verdict.PASSED, text)
+
+
+def _late(facts: RecordingFacts) -> Iterator[Check]:
+    if facts.late:
+        text = f"{facts.late[0]}; {len(facts.late)} such {'moment' if len(facts.late) == 1 else 'moments'}"
+        yield Check("Drive in time", Verdict.WARNING, text)
 
 
 def _ranges(facts: RecordingFacts) -> Iterator[Check]:

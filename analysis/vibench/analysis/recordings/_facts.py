@@ -10,6 +10,7 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, Val
 from vibench.acquisition import Identity
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import (
+    EventKind,
     FeedbackNote,
     Origin,
     Recording,
@@ -50,6 +51,8 @@ class RecordingFacts:
     lost_samples: int
     planned_stretches: int
     whole_stretches: int
+    late: tuple[str, ...]
+    """When the drive fell behind its plan, a sentence each."""
     check: str
     """What the check of the bench found before the run; empty when it was left out."""
     seal: SealCheck
@@ -115,6 +118,7 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
         lost_samples=sum(each.last_sample - each.first_sample + 1 for each in recording.gaps),
         planned_stretches=len(steps),
         whole_stretches=sum(each.is_complete for each in played),
+        late=tuple(each.text for each in recording.events if each.kind == EventKind.LATE),
         check=recording.check_text,
         seal=seal,
         bench_check=recording.bench_check,

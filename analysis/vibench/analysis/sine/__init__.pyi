@@ -46,6 +46,7 @@ from ._sweep_analysis import (
     Sweep as Sweep,
     SweepAnalysis as SweepAnalysis,
     measured_sweep as measured_sweep,
+    played_check as played_check,
     smooth_jumps as smooth_jumps,
 )
 from ._terminal_level import (

@@ -11,6 +11,8 @@ from ..errors import NotEnoughData
 from ..recordings import (
     AbstractAnalysis,
     Channels,
+    Check,
+    Verdict,
     only_stretch,
 )
 from ..spectra import Spectrogram, SpectrogramSums
@@ -39,6 +41,28 @@ class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
 def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, ...]:
     """Find the jumps of Response II that have a smooth motion on one side."""
     return jumps(response.time_s, response.frequency_hz, response.response_ii, ~colliding.is_colliding)
+
+
+_BEHIND_STEPS = 1.5
+"""A sweep in steps is behind its ideal course by half a step at most, and measured to within as much."""
+_LAST = 5
+"""Intervals at the end that are looked at."""
+
+
+def played_check(response: SweepResponse, sweep: Sweep) -> Check:
+    """Compare the end of a sweep, as its drive was recorded, with the plan at that time."""
+    last = slice(-_LAST, None)
+    found_hz, time_s = float(np.median(response.frequency_hz[last])), float(np.median(response.time_s[last]))
+    half_s = 0.5 * sweep.step_s
+    planned_hz = (sweep.cycles(time_s + half_s) - sweep.cycles(time_s - half_s)) / sweep.step_s
+    behind_s = (planned_hz - found_hz) / response.sweep_rate_hz_per_s
+    if abs(behind_s) <= _BEHIND_STEPS * sweep.step_s + response.interval_s:
+        return Check("Sweep as planned", Verdict.PASSED, "the drive kept to the course of the plan")
+    text = (
+        f"the drive was at {found_hz:.4g} Hz where {planned_hz:.4g} Hz were planned, {abs(behind_s):.2g} s "
+        f"{'behind' if behind_s > 0 else 'ahead'}; frequencies below are those that were played"
+    )
+    return Check("Sweep as planned", Verdict.WARNING, text)
 
 
 def measured_sweep(channels: Channels, sweep: Sweep) -> tuple[SweepResponse, Spectrogram]:

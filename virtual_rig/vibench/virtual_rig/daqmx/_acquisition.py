@@ -35,6 +35,8 @@ class Acquisition:
         self.total = total
         self.acquired = 0
         self.position = 0
+        self.asked_at = -1
+        """Read position at which somebody has asked last how many samples wait."""
         self.failure: DaqmxRefusal | None = None
         self.overloaded: NDArray[np.bool_] = np.zeros(channels, dtype=np.bool_)
         self._sampler = sampler

@@ -81,12 +81,21 @@ def default_samples(task: Task) -> int:
 
 
 def available(task: Task) -> int:
-    """Unread samples per channel, as of now."""
+    """Unread samples per channel, as of now; a rig at its own pace lets some come where there are none."""
     if task.acquisition is None:
         return 0
     if task.acquisition.available == 0 and not task.acquisition.is_done:
         task.rig.pace.answer_progress(task.rig)
     return min(task.acquisition.available, task.acquisition.buffer_size)
+
+
+def asked_available(task: Task) -> int:
+    """Answer how many wait: who asks again without reading polls, and only then a rig lets some come."""
+    acquisition = task.acquisition
+    if acquisition is None or acquisition.asked_at == acquisition.position:
+        return available(task)
+    acquisition.asked_at = acquisition.position
+    return min(acquisition.available, acquisition.buffer_size)
 
 
 def _read_on_demand(task: Task, samples: int) -> Reading:

@@ -17,7 +17,7 @@ from ._attributes import Attribute, AttributeGroup, not_supported
 from ._devices import AnalogInputs, Overloads
 from ._errors import DaqmxRefusal, member, unsupported_value
 from ._names import expand, join
-from ._reading import available, default_samples
+from ._reading import asked_available, available, default_samples
 from ._tasks import Task, TaskState
 from ._timing import check_samples
 
@@ -208,7 +208,7 @@ READ = AttributeGroup[Task](
         "NUM_CHANS": Attribute(lambda task: len(task.channels_to_read)),
         "CURR_READ_POS": Attribute(lambda task: task.acquisition.position if task.acquisition else 0),
         "TOTAL_SAMP_PER_CHAN_ACQUIRED": Attribute(_total_acquired),
-        "AVAIL_SAMP_PER_CHAN": Attribute(available),
+        "AVAIL_SAMP_PER_CHAN": Attribute(asked_available),
         _DEFAULT_SAMPLES_TO_READ: Attribute(default_samples),
         "RAW_DATA_WIDTH": Attribute(lambda task: _raw_width(task) * len(task.channels_to_read)),
         "OVERLOADED_CHANS_EXIST": Attribute(_overloads_exist),

@@ -1,0 +1,88 @@
+"""Sweeps on a generator that takes its time for a setting: what is played, refused, or ended.
+
+    python benchmarks/command_time.py
+    python benchmarks/command_time.py --settle 0 0.1 --step 0.1 0.5
+
+On the virtual rig at the wall's pace, where commands take time while samples are converted. Told for each
+`generator.settle_s` and `step_s`: how many cycles of the drive the recorded sweep has more than its plan,
+and between them what the run said where it refused or ended the sweep. The check of the bench and a ramp
+are part of every run.
+"""
+
+import argparse
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from scipy.signal import hilbert
+
+from vibench.acquisition import AcquisitionError, open_bench, open_recording
+from vibench.acquisition.plan import Measurement, SineSweep
+from vibench.acquisition.rig import Rig, load_rig
+from vibench.acquisition.run import run_measurement
+
+RIG = Path(__file__).parent.parent / "hardware_configs" / "virtual_rig.toml"
+SETTLES_S = (0.0, 0.02, 0.05, 0.1, 0.2)
+STEPS_S = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+LONGEST_SENTENCE = 60
+MARGIN_S = 0.15
+
+
+def bench(settle_s: float) -> Rig:
+    """Give the virtual rig at the wall's pace, with a generator that wants a pause after each command."""
+    rig = load_rig(RIG)
+    return rig.model_copy(
+        update={
+            "generator": rig.generator.model_copy(update={"settle_s": settle_s}),
+            "virtual": rig.virtual.model_copy(update={"pace": "wall"}),
+        }
+    )
+
+
+def sweep(step_s: float) -> Measurement:
+    """150 to 310 Hz in 6 s."""
+    excitation = SineSweep(
+        amplitude_vpp=0.2, start_hz=150.0, stop_hz=310.0, duration_s=6.0, step_s=step_s, settle_s=0.5
+    )
+    return Measurement(name="sweep", excitation=excitation, ramp_s=0.4, ramp_step_s=0.1)
+
+
+def excess_cycles(path: Path, excitation: SineSweep) -> float:
+    """Cycles of the recorded drive beyond the plan's."""
+    with open_recording(path) as recording:
+        found = next(each for each in recording.segments if each.label == "sweep")
+        # The sine goes on to both sides: there the transform's own ends lie.
+        margin = round(MARGIN_S * recording.sample_rate_hz)
+        drive = recording.read("drive_voltage", found.first_sample - margin, found.last_sample + 1 + margin)
+    phase = np.unwrap(np.angle(hilbert(drive - np.mean(drive))))
+    played = float(phase[-1 - margin] - phase[margin]) / (2 * np.pi)
+    return played - excitation.cycles(excitation.duration_s)
+
+
+def told(settle_s: float, step_s: float) -> str:
+    """Say what came of one sweep."""
+    plan = sweep(step_s)
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            with open_bench(bench(settle_s)) as opened:
+                path = run_measurement(opened, plan, Path(folder) / "sweep.h5").path
+        except AcquisitionError as error:
+            return str(error)[:LONGEST_SENTENCE]
+        return f"{excess_cycles(path, plan.excitation):+.2f}"
+
+
+def main() -> None:
+    """Print a table."""
+    asked = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    asked.add_argument("--settle", type=float, nargs="+", default=SETTLES_S)
+    asked.add_argument("--step", type=float, nargs="+", default=STEPS_S)
+    given = asked.parse_args()
+    print("| settle_s \\ step_s | " + " | ".join(f"{step_s:g} s" for step_s in given.step) + " |")
+    print("|" + "---|" * (len(given.step) + 1))
+    for settle_s in given.settle:
+        cells = [told(settle_s, step_s) for step_s in given.step]
+        print(f"| {settle_s:g} s | " + " | ".join(cells) + " |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,132 @@
+"""A generator that takes its time for a setting, while samples are converted."""
+
+import numpy as np
+import pytest
+
+from vibench.acquisition.errors import ConfigurationError, DriveLate
+from vibench.acquisition.plan import Dwell, Measurement, SineSweep, SteppedSine
+from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.run._low_level_check import LowLevelCheck
+from vibench.acquisition.run._run import Run
+
+RATE = 5120.0
+DRIVE = 0
+RAMP = {"ramp_s": 0.4, "ramp_step_s": 0.1}
+
+
+def dwell():
+    excitation = Dwell(amplitude_vpp=1.0, frequency_hz=260.0, settle_s=0.3, duration_s=0.5)
+    return Measurement(name="dwell", excitation=excitation, **RAMP)
+
+
+def sweep(step_s, **changes):
+    excitation = SineSweep(
+        amplitude_vpp=1.0,
+        start_hz=150.0,
+        stop_hz=250.0,
+        duration_s=4.0,
+        step_s=step_s,
+        settle_s=0.3,
+        **changes,
+    )
+    return Measurement(name="sweep", excitation=excitation, **RAMP)
+
+
+def stretch(bench, label):
+    """Drive voltage of a segment."""
+    found = next(each for each in bench.recorder.segments if each["label"] == label)
+    return bench.recorder.channel(DRIVE)[found["first"] : found["last"] + 1]
+
+
+def carried_out(bench, plan, tmp_path, check=LowLevelCheck.AT_LOW_LEVEL):
+    with Run(bench, plan, tmp_path / "run.h5", check, bench.recorder.create) as run:
+        for _ in run:
+            pass
+    return bench.recorder
+
+
+def cycles(drive):
+    """Rising zero crossings, and the parts of a period at both ends, of a sine of one amplitude."""
+    up = np.flatnonzero((drive[:-1] < 0) & (drive[1:] >= 0))
+    exact = up + drive[up] / (drive[up] - drive[up + 1])
+    first, last = exact[1] - exact[0], exact[-1] - exact[-2]
+    return len(exact) - 1 + exact[0] / first + (drive.size - exact[-1]) / last
+
+
+@pytest.mark.parametrize("latency_s", [0.02, 0.1, 0.2, 0.35])
+def test_the_check_listens_to_a_tone_whose_commands_have_been_carried_out(bench, tmp_path, latency_s):
+    bench.world.latency_s = latency_s
+    recorder = carried_out(bench, dwell(), tmp_path)
+    assert recorder.ending[0] is RecordingState.COMPLETE
+    # What is recorded as a dwell is the dwell's tone from its first sample to its last.
+    drive = stretch(bench, "dwell")
+    assert drive.size == pytest.approx(0.5 * RATE, abs=1)
+    assert cycles(drive) == pytest.approx(130.0, abs=0.05)
+
+
+@pytest.mark.parametrize("latency_s", [0.0, 0.05, 0.3])
+def test_a_tone_settles_from_the_moment_on_at_which_it_plays(bench, tmp_path, latency_s):
+    bench.world.latency_s = latency_s
+    grid = {"start_hz": 200.0, "stop_hz": 260.0, "step_hz": 20.0}
+    excitation = SteppedSine(amplitude_vpp=1.0, grid=grid, settle_s=0.2, record_s=0.3)
+    recorder = carried_out(bench, Measurement(name="steps", excitation=excitation, **RAMP), tmp_path)
+    steps = [each for each in recorder.segments if each["label"] == "step"]
+    assert len(steps) == 4
+    for each in steps:
+        drive = recorder.channel(DRIVE)[each["first"] : each["last"] + 1]
+        assert cycles(drive) == pytest.approx(0.3 * each["numbers"]["frequency_hz"], abs=0.1)
+
+
+@pytest.mark.parametrize("latency_s", [0.0, 0.02, 0.05, 0.1])
+@pytest.mark.parametrize("step_s", [0.02, 0.05, 0.1, 0.2, 0.5])
+def test_a_sweep_is_right_or_refused(bench, tmp_path, latency_s, step_s):
+    bench.world.latency_s = latency_s
+    plan = sweep(step_s)
+    if step_s < 1.25 * latency_s:
+        with pytest.raises(ConfigurationError, match=f"step_s = {step_s:g} s is too short.*for a setting"):
+            carried_out(bench, plan, tmp_path)
+        assert not bench.world.calls
+        return
+    carried_out(bench, plan, tmp_path)
+    # Here a command is in force when it has ended, so the sweep is late by as much, and so is its end.
+    late = latency_s * (plan.excitation.stop_hz - plan.excitation.start_hz) * (1 - step_s / 4.0)
+    assert cycles(stretch(bench, "sweep")) == pytest.approx(plan.excitation.cycles(4.0) - late, abs=0.1)
+
+
+def test_a_ramp_takes_as_long_as_its_commands_and_the_recorder_stays_with_it(bench, tmp_path):
+    bench.world.latency_s = 0.25
+    most = []
+    with Run(bench, dwell(), tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run:
+        most = [bench.digitizer.waiting_samples / RATE for _ in run]
+    assert max(most) <= 3 * 0.25
+    up = stretch(bench, "ramp_up")
+    # The tone, its output and four stairs.
+    assert up.size / RATE == pytest.approx(6 * 0.25, abs=0.01)
+
+
+def test_a_drive_that_falls_behind_ends_the_run_and_says_where(bench, tmp_path):
+    plan = sweep(0.05)
+    bench.world.latency_s = 0.02
+    with Run(bench, plan, tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run:
+        next(each for each in run if each.frequency_hz is not None and each.frequency_hz > 180.0)
+        bench.world.latency_s = 0.2
+        with pytest.raises(DriveLate, match=r"s behind its plan at 18.* Hz, where a step lasts 0.05 s"):
+            for _ in run:
+                pass
+    assert bench.recorder.ending[0] is RecordingState.FAILED
+    assert not bench.world.is_on
+    late = [text for _, kind, text in bench.recorder.events if kind == "late"]
+    assert len(late) == 4
+
+
+def test_one_late_moment_is_noted_and_the_run_goes_on(bench, tmp_path):
+    bench.world.latency_s = 0.02
+    with Run(
+        bench, sweep(0.1), tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create
+    ) as run:
+        next(each for each in run if each.frequency_hz is not None and each.frequency_hz > 180.0)
+        bench.world.convert(round(0.2 * RATE))
+        for _ in run:
+            pass
+    assert bench.recorder.ending[0] is RecordingState.COMPLETE
+    assert [kind for _, kind, _ in bench.recorder.events].count("late") in (1, 2)
