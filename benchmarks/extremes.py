@@ -35,7 +35,7 @@ MOST_PERIODS = 40
 MASSES_KG = (5.8e-3, 2.1e-3, 2.0e-3)
 SHOWN = 70
 """Letters of a refusal."""
-LIMIT_S = 600
+LIMIT_S = 300
 """Of one case."""
 NUMBERS = ("response_i", "response_ii", "relative_i", "relative_ii", "error_estimate")
 

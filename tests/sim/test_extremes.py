@@ -301,6 +301,17 @@ def test_numbers_beyond_all_digits_end_with_an_outcome(contact, size):
         assert run.outcome.text
 
 
+@pytest.mark.parametrize("contact", [*LAWS, "linear"])
+def test_a_run_ends_in_a_sentence_when_its_steps_are_used_up(contact, monkeypatch):
+    monkeypatch.setattr("vibench.sim.motion._integrate.MOST_STEPS", 1_000_000)
+    specimen = paper(contact)
+    assert integrate(specimen, DRIVE, 1.0).outcome is Outcome.REACHED_END
+    run = integrate(specimen, DRIVE, 1000.0)
+    assert run.outcome is Outcome.TOO_LONG
+    assert "cut its duration" in run.outcome.text
+    assert 1.0 < run.end_time_s < 1000.0
+
+
 REFUSED = [
     (lambda: gong2025(gap_m=0.0), "Gap 0.0 m is not allowed"),
     (lambda: gong2025(gap_m=math.nan), "Gap nan m is not allowed"),

@@ -16,7 +16,7 @@ from vibench.sim import (
     steady_response,
 )
 from vibench.sim.model import modal_form
-from vibench.sim.scene import AutomaticDuration, FixedDuration, Given, Method, MotionKind
+from vibench.sim.scene import AutomaticDuration, FixedDuration, Given, Method, MotionKind, StartMemory
 from vibench.sim.scene._followed_run import FollowedRun
 
 RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
@@ -203,6 +203,31 @@ def test_a_motion_that_escapes_has_an_outcome_and_no_numbers():
     assert found.outcome is not Outcome.REACHED_END
     assert found.response_i is None
     assert found.error_estimate is None
+
+
+def heavy_on_light():
+    """A specimen without damping or stops whose fastest mode is far faster than a slow drive."""
+    masses = (0.0058, 2.1, 2000.0)
+    stiffnesses = tuple(
+        k * mass / own for k, mass, own in zip(gong2025().stiffnesses, masses, gong2025().masses, strict=True)
+    )
+    return replace(gong2025(0.0, contact="linear"), masses=masses, stiffnesses=stiffnesses)
+
+
+def test_what_turns_from_displacement_to_velocity_has_not_grown():
+    slow = Scene(heavy_on_light(), Harmonic(0.02, 1e-5), duration=FixedDuration(100.0, 50.0))
+    found = solve_scene(slow)
+    assert found.memory is StartMemory.KEPT
+    assert found.motion is MotionKind.QUASI_PERIODIC
+
+
+def test_a_scene_that_would_take_too_many_steps_ends_in_a_sentence_and_has_no_other_starts(monkeypatch):
+    monkeypatch.setattr("vibench.sim.scene._followed_run.MOST_STEPS", 10_000_000)
+    found = solve_scene(Scene(heavy_on_light(), Harmonic(0.02, 1e-5), duration=FixedDuration(100.0, 50.0)))
+    assert found.outcome is Outcome.TOO_LONG
+    assert "cut its duration" in found.ended
+    assert found.response_i is None
+    assert found.ensemble is None
 
 
 def test_rest_is_named_in_the_answer():

@@ -12,3 +12,4 @@ from ._lyapunov_spectrum import (
     LyapunovSpectrum as LyapunovSpectrum,
     lyapunov_spectrum as lyapunov_spectrum,
 )
+from ._tangent_run import energy_metric as energy_metric

@@ -20,7 +20,7 @@ from ..model import (
     Sweep,
     chosen,
 )
-from ..slots import IMPACTS, NEXT_SAMPLE, OBSERVATIONS_SIZE, Record
+from ..slots import IMPACTS, MOST_STEPS, NEXT_SAMPLE, OBSERVATIONS_SIZE, Record
 from ..stepping import advance_harmonic, advance_intervals, harmonic_tables, interval_tables, new_state
 from ._base_motion import BaseMotion, sampled_motion, sweep_interval_s, sweep_motion
 
@@ -219,7 +219,7 @@ def new_record(
         sample_rate=1.0 if sample_rate_hz is None else float(sample_rate_hz),
         samples=np.zeros((count, 6)),
         impact_times=np.zeros(min(math.ceil(impact_rate_hz * duration_s) + SPARE_IMPACTS, MOST_IMPACTS)),
-        counts=np.zeros(2, np.int64),
+        counts=np.array([0, 0, MOST_STEPS]),
         observations=np.zeros(OBSERVATIONS_SIZE),
         tangent=None,
     )

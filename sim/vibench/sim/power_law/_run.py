@@ -5,7 +5,20 @@ import math
 from ..flight import FlightTables
 from ..kernels import Table, Vector, advance_clock, inlined, kernel, kernel_without_refcount, time_until
 from ..model import X, Y, Z
-from ..slots import LEVEL, LOST, MODE, NEXT_SAMPLE, NOTHING, REACHED_END, STUCK, PowerTerms, Record
+from ..slots import (
+    LEVEL,
+    LOST,
+    MODE,
+    NEXT_SAMPLE,
+    NOTHING,
+    REACHED_END,
+    RESOLVED_STEP,
+    STEPS_LEFT,
+    STUCK,
+    TOO_LONG,
+    PowerTerms,
+    Record,
+)
 from ._numbers import fill_ends, fill_inner
 from ._observer import PowerObserver, new_power_observer, observe_step, sample_step
 from ._step import (
@@ -64,6 +77,10 @@ def _advance(
     set_drive(step.motion, clock, tables)
     code, left = REACHED_END, time_until(clock, until)
     while left > 0.0:
+        if record.counts[STEPS_LEFT] <= 0:
+            code = TOO_LONG
+            break
+        record.counts[STEPS_LEFT] -= RESOLVED_STEP
         level = level_that_sees(level, step.motion, tables.par, power, steps)
         if level >= LEVELS:
             code = STUCK if math.isfinite(state[X] + state[Y] + state[Z]) else LOST

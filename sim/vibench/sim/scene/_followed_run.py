@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..exponents import energy_metric
 from ..kernels import Floats, advance_clock, clock_at
 from ..model import Accuracy, Harmonic, Outcome, Specimen
 from ..motion import MAX_IMPACT_RATE_HZ, new_record, start_motion, state_scales
@@ -20,12 +21,14 @@ from ..slots import (
     LINE_X_IM,
     LINE_X_RE,
     MODE,
+    MOST_STEPS,
     NEXT_SAMPLE,
     NOTHING,
     PEAK_P,
     PEAK_X,
     PEAKS,
     PEAKS_AND_LINES,
+    STEPS_LEFT,
     TANGENT_SIZE,
     no_tangent,
 )
@@ -98,8 +101,10 @@ class FollowedRun:
         self._clock = clock_at(time_s)
         self._tables = harmonic_tables(specimen, drive)
         self._scales = state_scales(specimen, drive)
+        self._metric = energy_metric(specimen)
         self._tangent = no_tangent()
         self._cost_s = 0.0
+        self._steps_left = MOST_STEPS
 
     @property
     def cost_s(self) -> float:
@@ -162,6 +167,7 @@ class FollowedRun:
             samples=np.zeros((kept.count, GROWTH)),
             tangent=self._tangent,
         )
+        record.counts[STEPS_LEFT] = self._steps_left
         observations = record.observations
         observations[MODE] = observe.value
         if self.outcome is Outcome.REACHED_END:
@@ -170,12 +176,15 @@ class FollowedRun:
         if self.outcome is Outcome.REACHED_END:
             # Samples that rounding puts a hair beyond the end.
             record.samples[record.counts[NEXT_SAMPLE] :] = self._state[:GROWTH]
+        made = self._steps_left - int(record.counts[STEPS_LEFT])
+        self._steps_left -= made
         self._cost_s += nominal_cost_s(
             self.specimen.contact,
             self._tolerance,
             self.time_s - start_s,
             int(record.counts[IMPACTS]),
             len(self._tangent),
+            made,
         )
         return Stretch(
             start_s=start_s,
@@ -192,8 +201,12 @@ class FollowedRun:
         )
 
     def _size(self) -> float:
-        """Natural logarithm of the size of the small change; NaN where there is none."""
+        """Natural logarithm of the small change, by its energy without stops; NaN where there is none.
+
+        Only a stop can add to it: however fast a mode is over the drive, a change that it turns from
+        displacement to velocity has not grown.
+        """
         if len(self._tangent) == 0:
             return math.nan
-        change = self._tangent[0]
-        return float(np.log(np.linalg.norm(change[:GROWTH] / self._scales)) + change[GROWTH])
+        change = self._tangent[0, :GROWTH]
+        return 0.5 * math.log(change @ self._metric @ change) + float(self._tangent[0, GROWTH])

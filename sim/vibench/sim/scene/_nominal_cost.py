@@ -13,12 +13,14 @@ HERTZ_TANGENT, TANGENT = 4.0, 1.6
 """With a small change carried along; a collision is then resolved step by step."""
 STRICT_TOLERANCE, STRICT = 1e-8, 5.0
 """Below this tolerance contacts cost so many times more."""
+STEP = 1e-9
+"""Seconds for a step of flight, at least: what counts where a mode is far faster than those of the paper."""
 
 
 def nominal_cost_s(
-    contact: ContactLaw, tolerance: float, length_s: float, impacts: int, changes: int
+    contact: ContactLaw, tolerance: float, length_s: float, impacts: int, changes: int, steps: int
 ) -> float:
-    """Give the processor time for a stretch of motion with so many impacts and small changes."""
+    """Give the processor time for a stretch of motion with so many impacts, small changes and steps."""
     strict = STRICT if tolerance < STRICT_TOLERANCE else 1.0
     match contact:
         case PowerLaw():
@@ -27,4 +29,5 @@ def nominal_cost_s(
             contacts_s, tangent = LINEAR_IMPACT * impacts, TANGENT
         case _:
             contacts_s, tangent = HERTZ_IMPACT * impacts, HERTZ_TANGENT
-    return FLIGHT * length_s + contacts_s * strict * (tangent if changes else 1.0)
+    by_motion_s = FLIGHT * length_s + contacts_s * strict * (tangent if changes else 1.0)
+    return max(by_motion_s, STEP * steps)

@@ -31,10 +31,10 @@ def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMo
         It without stops.
 
     """
-    if seen.grew:
-        return StartMemory.LOST
     if never_touches(scene.specimen, motion):
         return StartMemory.KEPT
+    if seen.grew:
+        return StartMemory.LOST
     if scene.budget_s == 0.0 or seen.path[-1].outcome is not Outcome.REACHED_END:
         return StartMemory.UNKNOWN
     return StartMemory.LOST if forgets_its_start(begin, seen.path) else StartMemory.KEPT

@@ -32,9 +32,13 @@ from ._parameters import (
 from ._record import (
     IMPACTS as IMPACTS,
     LOST as LOST,
+    MOST_STEPS as MOST_STEPS,
     NEXT_SAMPLE as NEXT_SAMPLE,
     REACHED_END as REACHED_END,
+    RESOLVED_STEP as RESOLVED_STEP,
+    STEPS_LEFT as STEPS_LEFT,
     STUCK as STUCK,
+    TOO_LONG as TOO_LONG,
     TOO_MANY_IMPACTS as TOO_MANY_IMPACTS,
     Record as Record,
 )

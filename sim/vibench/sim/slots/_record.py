@@ -12,9 +12,15 @@ REACHED_END = int(Outcome.REACHED_END)
 TOO_MANY_IMPACTS = int(Outcome.TOO_MANY_IMPACTS)
 LOST = int(Outcome.NOT_FINITE)
 STUCK = int(Outcome.STALLED)
+TOO_LONG = int(Outcome.TOO_LONG)
 
-NEXT_SAMPLE, IMPACTS = 0, 1
+NEXT_SAMPLE, IMPACTS, STEPS_LEFT = range(3)
 """Places of `Record.counts`."""
+MOST_STEPS = 2_000_000_000
+"""Steps of flight in a run: a quarter of a minute at most, and two days of the paper's specimen. A specimen whose
+fastest mode is a million times faster than its drive would be followed for weeks."""
+RESOLVED_STEP = 50
+"""Steps of flight that a step through a force counts as: it takes as long."""
 
 
 class Record(NamedTuple):
@@ -28,7 +34,7 @@ class Record(NamedTuple):
     impact_times: Vector
     """Shape (most impacts,) [s]; a run ends when it is full."""
     counts: NDArray[np.int64]
-    """Samples and impacts so far."""
+    """Samples and impacts so far, and steps that may still be made, shape (3,)."""
     observations: Vector
     tangent: Table | None
     """Small changes of the state that are carried along, as `vibench.sim.slots` says, shape (m,

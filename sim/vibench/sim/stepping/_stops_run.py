@@ -12,6 +12,7 @@ from ..contact import (
     HELD,
     LEFT,
     LOG_COLUMNS,
+    LOGGED,
     NOT_FINITE,
     advance_contact,
     gap_of,
@@ -22,6 +23,7 @@ from ..flight import (
     CLEAR,
     LIFTS_OFF,
     OUT_OF_RANGE,
+    TOUCHES,
     FlightTables,
     drive_phasor,
     fill_base_force,
@@ -54,8 +56,11 @@ from ..slots import (
     NOTHING,
     PEAK_P,
     REACHED_END,
+    RESOLVED_STEP,
     SIDE,
+    STEPS_LEFT,
     STUCK,
+    TOO_LONG,
     TOO_MANY_IMPACTS,
     Parameters,
     Record,
@@ -148,10 +153,14 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
             return REACHED_END
         if not math.isfinite(state[X] + state[Y] + state[Z]):
             return LOST
+        left = counts[STEPS_LEFT]
+        if left <= 0:
+            return TOO_LONG
         if state[SIDE] == 0.0:
             start_flight(phasors, state, clock, tables)
+            most = min(longest, left * tables.grid)
             ends, length = _fly_on(
-                phasors, now, scratch, series, clock, longest, tables, held, tables.par.restitution
+                phasors, now, scratch, series, clock, most, tables, held, tables.par.restitution
             )
             if ends == OUT_OF_RANGE:
                 return LOST
@@ -165,12 +174,13 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
             if counts[NEXT_SAMPLE] < len(record.samples):
                 sample_flight(phasors, now, clock, length, tables, record)
             place_on_phasors(state, landed, tables)
-            if ends == CLEAR:
+            counts[STEPS_LEFT] -= 1 + int(length / tables.grid)
+            if ends == CLEAR and length >= longest:
                 clock[0], clock[1] = until, 0.0
                 continue
             advance_clock(clock, length)
             strikes = landed[len(landed) - 1]
-            if ends == LIFTS_OFF:
+            if ends != TOUCHES:
                 continue
             if counts[IMPACTS] == len(record.impact_times):
                 return TOO_MANY_IMPACTS
@@ -184,16 +194,20 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
                 _propagate_tangent_impact(tangent, shadow, state, tables.par, tables.par.restitution)
         elif held is not None:
             gap = gap_of(state[SIDE], tables.par.lower, tables.par.upper)
-            ends, length = _stay_held(state, gap, clock, longest, record, held, tangent, workspace)
+            most = min(longest, left * held.flight.grid)
+            ends, length = _stay_held(state, gap, clock, most, record, held, tangent, workspace)
             if ends == OUT_OF_RANGE:
                 return LOST
-            if ends == CLEAR:
+            counts[STEPS_LEFT] -= 1 + int(length / held.flight.grid)
+            if ends != CLEAR:
+                state[SIDE] = 0.0
+            if ends == CLEAR and length >= longest:
                 clock[0], clock[1] = until, 0.0
             else:
                 advance_clock(clock, length)
-                state[SIDE] = 0.0
         else:
             copy_row(shadow, state)
+            counts[STEPS_LEFT] -= RESOLVED_STEP
             if collisions is not None:
                 drive = drive_phasor(clock, 0.0, tables) if strikes == 0.0 else strikes
                 length = collide(state, drive, longest, tolerance, tables, collisions, workspace.collision)
@@ -208,6 +222,8 @@ def advance_between_stops(  # noqa: C901, PLR0911, PLR0912, PLR0915 - the phases
             limit = min(longest, 2.0 * middle)
             fill_base_force(force, clock, middle, tables)
             code, length = advance_contact(state, 0.0, limit, force, middle, tables.par, tolerance, work, log)
+            if len(log) > 0:
+                counts[STEPS_LEFT] -= RESOLVED_STEP * int(log[0, LOGGED])
             if code == NOT_FINITE:
                 return LOST
             if code not in (LEFT, HELD):
