@@ -30,6 +30,16 @@ class Kink:
         return np.array([parameter + abs(u)]), np.array([[1.0 if u >= 0.0 else -1.0, 1.0]])
 
 
+class LoopBesideALine:
+    """A flat ellipse, whose ends turn sharply, and a straight branch next to it."""
+
+    def linearised(self, point):
+        u, parameter = point
+        loop, line = (u / 0.02) ** 2 + parameter**2 - 1.0, (u - 0.03) / 0.02
+        slopes = [2.0 * u / 0.02**2 * line + loop / 0.02, 2.0 * parameter * line]
+        return np.array([loop * line]), np.array([slopes])
+
+
 class Edge:
     """lambda = u, defined up to u = 1/2 only."""
 
@@ -66,6 +76,15 @@ def test_a_branch_that_turns_back_in_a_kink_is_followed_across_it():
     assert points[-1].point == pytest.approx([1.0, -1.0], abs=1e-12)
     (fold,) = (p for p in points if p.is_fold)
     assert fold.point[-1] == pytest.approx(0.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("longest", [0.02, 0.05, 0.1, 0.3])
+def test_a_step_beyond_a_sharp_fold_does_not_land_on_another_branch(longest):
+    steps = ArcSteps(longest=longest)
+    points = list(trace(LoopBesideALine(), np.array([0.02, 0.0]), 1.0, (-3.0, 3.0), steps))
+    assert points[-1].end is ArcEnd.CLOSED
+    assert max(p.point[0] for p in points) < 0.0201
+    assert [p.point[-1] for p in points if p.is_fold] == pytest.approx([1.0, -1.0], abs=1e-8)
 
 
 def test_equations_that_cease_to_exist_end_the_branch_with_a_reason():

@@ -3,6 +3,7 @@ import pytest
 
 from vibench.sim import (
     Accuracy,
+    FrequencyPath,
     Harmonic,
     base_transmissibility,
     gong2025,
@@ -11,6 +12,7 @@ from vibench.sim import (
     periodic_orbit,
 )
 from vibench.sim.motion import state_scales
+from vibench.sim.periodic import periodic_branch_within
 from vibench.sim.periodic._branch import BifurcationKind, Parameter
 from vibench.sim.periodic._continuation import ArcEnd, ArcSteps
 from vibench.sim.periodic._period_map import OrbitShape
@@ -78,6 +80,16 @@ def test_a_branch_that_leaves_the_stops_does_so_at_the_grazing_of_the_linear_res
     assert branch.events[0].amplitude_m == pytest.approx(gap_amplitude, rel=1e-6)
     linear = base_transmissibility(SPECIMEN, 60.0)[0]
     assert branch.response_ii[0] == pytest.approx(np.abs(linear), rel=1e-8)
+
+
+def test_an_isolated_branch_closes_though_another_lies_beside_its_fold():
+    """At 94.188 Hz, where it turns back, the motion of one period lies beside it along the same tangent."""
+    start = [9.918125e-07, -1.045327e-05, -2.993997e-06, 7.055605e-03, 2.760657e-02, 1.403336e-02]
+    orbit = periodic_orbit(gong2025(), Harmonic(96.0, 5e-6), OrbitShape.MIRRORED, 3, start)
+    branch = periodic_branch_within(orbit, FrequencyPath((5e-6,)), 88.0, 100.0)
+    assert branch.begin is branch.end is ArcEnd.CLOSED
+    folds = [each.frequency_hz for each in branch.events if each.kind is BifurcationKind.FOLD]
+    assert sorted(folds) == pytest.approx([94.1881, 98.8147], abs=2e-4)
 
 
 def test_a_branch_to_where_it_is_goes_nowhere():

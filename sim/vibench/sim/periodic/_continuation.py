@@ -75,6 +75,9 @@ class ArcPoint:
 NEWTON_ITERATIONS = 12
 TARGET_ITERATIONS = 4
 """A step corrected in fewer iterations is followed by a longer one."""
+FARTHEST_ASIDE = 0.5
+"""A step corrected by more than this part of its length found another branch: the most that the tangent may
+turn moves the curve aside by a third of that."""
 LEAP_GROWTH = 10.0
 """Factor between the lengths tried at a kink."""
 LONGEST_LEAP = 5.0
@@ -187,7 +190,8 @@ def _advance(curve: Curve, here: ArcPoint, step: float, steps: ArcSteps) -> tupl
     while step >= steps.shortest:
         guess = here.point + step * here.tangent
         point, iterations = correct(curve, guess, here.tangent, steps.tolerance)
-        if iterations > 0:
+        aside = float(np.linalg.norm(point - guess))
+        if iterations > 0 and aside < FARTHEST_ASIDE * step + SAME_POINT:
             tangent = tangent_at(curve, point, here.tangent)
             turn = math.acos(min(1.0, float(tangent @ here.tangent)))
             if turn <= steps.most_turn_rad:
