@@ -17,8 +17,8 @@ TOO_LONG = int(Outcome.TOO_LONG)
 NEXT_SAMPLE, IMPACTS, STEPS_LEFT = range(3)
 """Places of `Record.counts`."""
 MOST_STEPS = 2_000_000_000
-"""Steps of flight in a run: a quarter of a minute at most, and two days of the paper's specimen. A specimen whose
-fastest mode is a million times faster than its drive would be followed for weeks."""
+"""Steps of flight in a run: seconds of work, and two days of the paper's specimen. One whose fastest mode is
+a million times faster than its drive would be followed for weeks."""
 RESOLVED_STEP = 50
 """Steps of flight that a step through a force counts as: it takes as long."""
 
