@@ -33,6 +33,7 @@ FOR_OUR_PROGRAMS = (
     "vibench.sim.kernels",
     "vibench.sim.shaker",
     "vibench.sim.hdf5_files",
+    "vibench.sim.operating_system",
     "vibench.sim.accuracy_benchmark",
     "vibench.analysis.simulation",
     "vibench.analysis.reproduction",

@@ -1,6 +1,3 @@
-from .costs import (
-    state_folder as state_folder,
-)
 from .exponents import (
     ExponentVerdict as ExponentVerdict,
     LyapunovEstimate as LyapunovEstimate,
@@ -54,6 +51,9 @@ from .motion import (
     integrate as integrate,
     response_curve as response_curve,
     steady_response as steady_response,
+)
+from .operating_system import (
+    state_folder as state_folder,
 )
 from .periodic import (
     AmplitudePath as AmplitudePath,

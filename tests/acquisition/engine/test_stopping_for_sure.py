@@ -35,8 +35,8 @@ from vibench.acquisition.engine._kept_stops import engines_folder, put_down
 from vibench.acquisition.engine._server import VIEWERS_MOST
 from vibench.acquisition.engine._state import ConnectionRole
 from vibench.acquisition.engine._wire import HEAD, MAGIC
-from vibench.acquisition.host import process_start
 from vibench.acquisition.rig import load_rig
+from vibench.sim.operating_system import process_start
 
 from .conftest import ROOT, campaign, until, until_state, until_there
 

@@ -21,7 +21,7 @@ from vibench.sim.study import (
     solve_study,
 )
 from vibench.sim.study._columns import COLUMNS, IDENTITY, NUMBERS, SESSION
-from vibench.sim.study._disk import SoleWriter
+from vibench.sim.study._disk import sole_writer
 from vibench.sim.study._expansion import scene_identity
 from vibench.sim.study._layout import STATE
 from vibench.sim.study._results import results_of
@@ -258,7 +258,7 @@ class LoggingDisk:
     """Writes, and remembers what was written since the last sync, and before."""
 
     def __init__(self, path):
-        self._inner = SoleWriter(path)
+        self._inner = sole_writer(path)
         self.log = []
 
     def write(self, offset, data):

@@ -16,7 +16,7 @@ from typing import assert_never
 
 from pydantic import ValidationError
 
-from vibench.sim import state_folder
+from vibench.sim.operating_system import state_folder
 
 from ..bench import (
     Bench,

@@ -10,7 +10,9 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from ..host import FrozenModel, is_process, process_start
+from vibench.sim.operating_system import is_process, process_start
+
+from ..host import FrozenModel
 from ._address import EngineAddress
 from ._errors import EngineError
 from ._kept_stops import engines_folder

@@ -11,9 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 from threading import get_ident
 
-from vibench.sim import state_folder
+from vibench.sim.operating_system import process_start, state_folder
 
-from ..host import process_start
 from ..stopping import StopLevel
 
 LONGEST_REASON = 500

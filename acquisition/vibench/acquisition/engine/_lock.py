@@ -2,18 +2,12 @@
 
 import hashlib
 import os
-import sys
 from pathlib import Path
 
-from vibench.sim import state_folder
+from vibench.sim.operating_system import is_locked_alone, state_folder, write_at
 
 from ..errors import InstrumentBusy
 from ..rig import Rig
-
-if sys.platform == "win32":
-    import msvcrt
-else:
-    import fcntl
 
 
 class BenchLock:
@@ -36,7 +30,7 @@ class BenchLock:
             return cls(None)
         path = state_folder() / f"bench-{_key(rig)}.lock"
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
-        if not _taken(descriptor):
+        if not is_locked_alone(descriptor):
             holder = _holder(path)
             os.close(descriptor)
             raise InstrumentBusy(
@@ -44,7 +38,7 @@ class BenchLock:
                 "or let it finish"
             )
         os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, str(os.getpid()).encode(), 0)
+        write_at(descriptor, str(os.getpid()).encode(), 0)
         return cls(descriptor)
 
     def close(self) -> None:
@@ -65,24 +59,3 @@ def _holder(path: Path) -> str:
         return path.read_text(encoding="ascii", errors="replace") or "unknown"
     except OSError:
         return "unknown"
-
-
-if sys.platform == "win32":
-
-    def _taken(descriptor: int) -> bool:
-        try:
-            # One byte behind the process number, which others may read.
-            os.lseek(descriptor, 1 << 20, os.SEEK_SET)
-            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
-        return True
-
-else:
-
-    def _taken(descriptor: int) -> bool:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
-        return True

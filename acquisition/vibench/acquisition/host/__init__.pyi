@@ -7,10 +7,6 @@ from ._closed_on_leaving import (
 from ._follow_parent import (
     follow_parent as follow_parent,
 )
-from ._process_start import (
-    is_process as is_process,
-    process_start as process_start,
-)
 from ._shipped import (
     all_shipped as all_shipped,
     shipped as shipped,

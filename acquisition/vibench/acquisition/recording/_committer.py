@@ -11,8 +11,10 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 
+from vibench.sim.operating_system import Buffer
+
 from ..errors import RecordingError
-from ._disk import Buffer, Disk
+from ._disk import Disk
 
 COMMIT_INTERVAL_S = 0.5
 """Half of the promised second; the other half is for a slow disk."""

@@ -7,7 +7,8 @@ HDF5 must never meet a full disk: closing a file that cannot be flushed crashes 
 import os
 from pathlib import Path
 
-from ._disk import allocate, opened_to_write
+from vibench.sim.operating_system import allocate, open_to_write
+
 from ._disk_trouble import meet_trouble
 
 FILE_MODE = 0o666
@@ -42,7 +43,7 @@ def claim_room(path: Path, allocated: int, length: int) -> None:
 
 def extend_room(path: Path, allocated: int) -> None:
     """Give an existing file at least ``allocated`` bytes on the disk."""
-    descriptor = opened_to_write(path)
+    descriptor = open_to_write(path)
     try:
         allocate(descriptor, 0, allocated)
     finally:

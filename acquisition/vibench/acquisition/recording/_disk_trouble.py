@@ -8,7 +8,9 @@ from contextlib import contextmanager
 from math import inf
 from pathlib import Path
 
-from ._disk import Buffer, Disk, PositionedFile
+from vibench.sim.operating_system import Buffer
+
+from ._disk import Disk, PositionedFile
 
 Heal = Callable[[], None]
 

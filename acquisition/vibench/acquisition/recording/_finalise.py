@@ -17,11 +17,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from vibench.sim.operating_system import sync_file, sync_folder
+
 from ..errors import RecordingError
 from . import _layout as layout, _tables as tables
 from ._attributes import decoded, encoded, read_attributes, write_attributes
 from ._counts import Counts
-from ._disk import sync_file, sync_folder
 from ._disk_room import claim_room, extend_room, release_room
 from ._layout import COUNT_DTYPE, DEFLATE_LEVEL, RecordingState, Table
 from ._overview import BIN_BYTES, OverviewSums, bins_of, write_overview

@@ -13,10 +13,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from vibench.sim.operating_system import sync_folder
+
 from ..errors import RecordingError
 from . import _layout as layout
 from ._attributes import write_attributes, write_text_dataset
-from ._disk import PositionedFile, sync_folder
+from ._disk import PositionedFile
 from ._disk_room import claim_room
 from ._header import RecordingHeader
 from ._layout import Table

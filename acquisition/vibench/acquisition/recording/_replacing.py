@@ -10,9 +10,10 @@ from typing import TypeVar
 
 import h5py
 
+from vibench.sim.operating_system import sync_file, sync_folder
+
 from ..errors import RecordingError
 from . import _layout as layout
-from ._disk import sync_file, sync_folder
 from ._disk_room import extend_room, release_room
 
 Answer = TypeVar("Answer")

@@ -16,6 +16,8 @@ from typing import Self
 
 import numpy as np
 
+from vibench.sim.operating_system import Buffer
+
 from ..errors import RecordingError
 from ..instruments import Block, Samples
 from . import _layout as layout
@@ -23,7 +25,7 @@ from ._attributes import encoded
 from ._committer import COMMIT_INTERVAL_S, Batch, Committer
 from ._counts import Counts, CountScale
 from ._descriptor_reserve import DescriptorReserve
-from ._disk import Buffer, Disk
+from ._disk import Disk
 from ._disk_trouble import open_disk
 from ._finalise import discard, finalise
 from ._header import RecordingHeader

@@ -3,7 +3,6 @@
 A simulation that tells its answers as they come, and stops when it is told to.
 """
 
-import os
 import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -13,6 +12,7 @@ from multiprocessing.connection import Connection
 import numpy as np
 
 from vibench.sim import Harmonic, Outcome, ScenePrediction, integrate
+from vibench.sim.operating_system import lower_priority
 from vibench.sim.study import (
     MESSAGE,
     MemoryStore,
@@ -187,7 +187,7 @@ def serve(connection: "Connection[Grown | Ended, Order]") -> None:
     # Ctrl-C belongs to whoever began this process, and ends it by closing the connection.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(OSError):
-        os.nice(5)  # A window, and a measurement, come first.
+        lower_priority(5)  # A window, and a measurement, come first.
     waiting: Begin | None = None
     with suppress(EOFError, BrokenPipeError):
         while True:

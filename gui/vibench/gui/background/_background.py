@@ -12,6 +12,7 @@ from typing import Any, Generic, ParamSpec, TypeVar
 from PySide6.QtCore import QObject, QTimer
 
 from vibench.acquisition import follow_parent
+from vibench.sim.operating_system import lower_priority
 
 POLL_MS = 50
 NICE = 10
@@ -46,8 +47,7 @@ class Job:
 def give_way() -> None:
     """Let a measurement, and the window, have the processor first; end with the window, however it ends."""
     follow_parent()
-    if hasattr(os, "nice"):
-        os.nice(NICE)
+    lower_priority(NICE)
 
 
 class Background(QObject):

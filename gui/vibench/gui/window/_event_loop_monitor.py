@@ -9,6 +9,8 @@ from time import monotonic, thread_time
 
 from PySide6.QtCore import QObject, Qt, QTimer
 
+from vibench.sim.operating_system import read_at
+
 EVERY_MS = 20
 BOUND_S = 0.1
 """A wait of this length is felt: longer ones are noted with their moment."""
@@ -126,7 +128,7 @@ class _Delays:
         """Since the thread began [s]."""
         if self._file < 0:
             return 0.0
-        return 1e-9 * int(os.pread(self._file, 100, 0).split()[1])
+        return 1e-9 * int(read_at(self._file, 100, 0).split()[1])
 
     def close(self) -> None:
         """Let the file go."""

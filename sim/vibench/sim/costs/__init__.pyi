@@ -4,7 +4,3 @@ from ._ledger import (
     Expected as Expected,
     cost_ledger as cost_ledger,
 )
-from ._state_folder import (
-    VARIABLE as VARIABLE,
-    state_folder as state_folder,
-)

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Self
 
 from ..kernels import SOURCES
-from ._state_folder import state_folder
+from ..operating_system import state_folder
 
 MEMORY = 30
 """So many runs later a run counts for a third of a new one."""

@@ -20,6 +20,7 @@ from typing import Protocol, Self
 import h5py
 import numpy as np
 
+from ..operating_system import sync_file, sync_folder
 from . import _layout as layout
 from ._arrays import Arrays, PointAnswer, empty_arrays, put
 from ._axes import StudyAxis
@@ -32,7 +33,7 @@ from ._columns import (
     SESSION,
     Column,
 )
-from ._disk import Disk, SoleWriter, sync_file, sync_folder
+from ._disk import Disk, sole_writer
 from ._errors import StudyError
 from ._file_reading import places_of, read_arrays, read_study
 from ._software import software
@@ -223,7 +224,7 @@ class FileStore:
 
     """
 
-    def __init__(self, path: Path, study: Study, opened: Callable[[Path], Disk] = SoleWriter) -> None:
+    def __init__(self, path: Path, study: Study, opened: Callable[[Path], Disk] = sole_writer) -> None:
         self._path = path
         self._disk = opened(path)
         try:

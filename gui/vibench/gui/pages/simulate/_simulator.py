@@ -1,12 +1,17 @@
 """The window's end of the process that simulates: asks, receives, and drops what nobody wants any more."""
 
+import sys
 from multiprocessing import get_context
-from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from vibench.analysis.simulation import Asked, Begin, Cancel, Ended, Grown, Order, serve
+
+if sys.platform == "win32":
+    from multiprocessing.connection import PipeConnection as Connection
+else:
+    from multiprocessing.connection import Connection
 
 POLL_MS = 50
 MOST_AT_ONCE = 200

@@ -1,11 +1,12 @@
-"""Where state is kept on each platform, and how to have it elsewhere."""
+"""Where state is kept on each system, and how to have it elsewhere."""
 
 import sys
 from pathlib import Path
 
 import pytest
 
-from vibench.sim.costs import state_folder
+from tests.windows_here import windows
+from vibench.sim.operating_system import _state_folder, state_folder
 
 
 def test_the_variable_comes_before_everything(monkeypatch, tmp_path):
@@ -23,9 +24,11 @@ def test_the_variable_comes_before_everything(monkeypatch, tmp_path):
         ("win32", "", "home/AppData/Local/vibench"),
     ],
 )
-def test_each_platform_keeps_state_where_it_keeps_such_things(
+def test_each_system_keeps_state_where_it_keeps_such_things(
     monkeypatch, tmp_path, platform, variable, expected
 ):
+    if platform == "win32":
+        monkeypatch.setattr(_state_folder, "usual_state_folder", windows().usual_state_folder)
     monkeypatch.setattr(sys, "platform", platform)
     for each in ("VIBENCH_STATE_DIR", "XDG_STATE_HOME", "LOCALAPPDATA"):
         monkeypatch.delenv(each, raising=False)

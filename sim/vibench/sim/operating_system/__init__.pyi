@@ -1,0 +1,22 @@
+from ._open_file import (
+    Buffer as Buffer,
+    OpenFile as OpenFile,
+    sync_file as sync_file,
+)
+from ._processes import (
+    is_process as is_process,
+)
+from ._state_folder import (
+    VARIABLE as VARIABLE,
+    state_folder as state_folder,
+)
+from ._this import (
+    allocate as allocate,
+    is_locked_alone as is_locked_alone,
+    lower_priority as lower_priority,
+    open_to_write as open_to_write,
+    process_start as process_start,
+    read_at as read_at,
+    sync_folder as sync_folder,
+    write_at as write_at,
+)

@@ -1,0 +1,83 @@
+"""The Windows implementation run here, in a Python from which everything was taken that Windows lacks.
+
+    python -m tests.windows_here measure campaign.toml --out recordings
+
+runs a command of vibench so. Left of the true system are its libraries (numba, HDF5, Qt) and Python's own.
+"""
+
+import errno
+import fcntl
+import importlib.util
+import os
+import signal
+import struct
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import vibench.sim
+
+POSIX_ONLY = (
+    "pwrite", "pread", "pwritev", "preadv", "nice", "fdatasync", "posix_fallocate", "posix_fadvise", "sync",
+    "getuid", "geteuid", "getgid", "getegid", "setsid", "setpgid", "getpgid", "getpriority", "setpriority",
+    "sched_getaffinity", "sched_setaffinity", "mkfifo", "mknod", "chown", "lchown", "fchown", "wait", "wait3",
+    "killpg", "ctermid", "forkpty", "openpty", "fork",
+)  # fmt: skip
+POSIX_MODULES = ("resource", "pwd", "grp", "termios", "tty", "pty", "syslog", "readline")
+POSIX_SIGNALS = ("SIGHUP", "SIGALRM", "SIGUSR1", "SIGUSR2", "SIGQUIT", "setitimer", "alarm", "pause")
+
+
+def locking(descriptor: int, mode: int, count: int) -> None:
+    """Lock bytes from the place of the file on, for this descriptor and no other, as Windows does."""
+    place = os.lseek(descriptor, 0, os.SEEK_CUR)
+    is_readable_only = fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY
+    kind = fcntl.F_RDLCK if is_readable_only else fcntl.F_WRLCK
+    try:
+        fcntl.fcntl(descriptor, fcntl.F_OFD_SETLK, struct.pack("hhqqi4x", kind, os.SEEK_SET, place, count, 0))
+    except OSError as error:
+        raise PermissionError(errno.EACCES, "Permission denied") from error
+
+
+def windows() -> ModuleType:
+    """Give the Windows implementation."""
+    runtime = ModuleType("msvcrt")
+    runtime.locking, runtime.LK_NBLCK = locking, 2
+    sys.modules["msvcrt"] = runtime
+    os.O_BINARY = 0
+    place = Path(vibench.sim.__file__).parent / "operating_system" / "_windows.py"
+    spec = importlib.util.spec_from_file_location("vibench.sim.operating_system._windows", place)
+    module = importlib.util.module_from_spec(spec)
+    here, sys.platform = sys.platform, "win32"
+    spec.loader.exec_module(module)
+    sys.platform = here
+    del sys.modules["msvcrt"]  # by which Python's own modules would know Windows
+    module.LOCK_BYTE = 2**40  # Linux has no place further away
+    # The two that ask the kernel of Windows itself have no counterpart here.
+    module.process_start = lambda pid: "1" if Path(f"/proc/{pid}").exists() else None
+    module.lower_priority = lambda by: None
+    return module
+
+
+def become_windows() -> None:
+    """Put the Windows implementation in the other's place, and take away what Windows lacks."""
+    sys.modules["vibench.sim.operating_system._posix"] = windows()
+    for name in POSIX_ONLY:
+        if hasattr(os, name):
+            delattr(os, name)
+    for name in POSIX_MODULES:
+        sys.modules[name] = None
+    for name in POSIX_SIGNALS:
+        if hasattr(signal, name):
+            delattr(signal, name)
+
+
+def main() -> None:
+    """Run a command of vibench."""
+    become_windows()
+    from vibench.cli.__main__ import main as run
+
+    run()
+
+
+if __name__ == "__main__":
+    main()
