@@ -7,12 +7,12 @@ never repeats is known only by its growth and its statistics.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..kernels import Floats
-from ..model import Accuracy, Outcome, PowerLaw, Specimen
+from ..model import Accuracy, ContactLaw, Outcome, PowerLaw, Specimen
 from ._followed_run import FollowedRun, Stretch
 from ._observed_window import (
     Block,
@@ -52,6 +52,8 @@ class Pace:
     forgetting_s: float
     """Time in which the slowest mode without contact fades by e."""
     sharpness: Sharpness
+    nearly: Sharpness
+    """That of the least accurate level."""
 
     @property
     def forgetting_periods(self) -> float:
@@ -72,6 +74,14 @@ class Pace:
         """Say whether the motion of these stretches, one after the other, repeats at their end."""
         return self.repeats_in(states_of(stretches))
 
+    def cycle(self, stretches: Sequence[Stretch]) -> int:
+        """Give the drive periods over which lines are taken: the motion's own, if it has nearly settled.
+
+        What counts as nearly is the same at every level, so that a line is the same question at each.
+        """
+        found = self.repeats(stretches) or replace(self, sharpness=self.nearly).repeats(stretches)
+        return 1 if found is None else found.period
+
     def repeats_in(self, section: Floats) -> Repetition | None:
         """Say whether a motion with these states once a drive period, shape (n, 6), repeats at their end."""
         omega = 2.0 * np.pi * self.frequency_hz
@@ -84,12 +94,17 @@ def pace_of(
     """Choose the pace for a specimen whose slowest mode has ``slowest_rate`` [1/s], zero or negative."""
     slowest_s = longest_s / FEWEST_TIMES
     forgetting_s = min(slowest_s, -1.0 / slowest_rate) if slowest_rate < 0.0 else slowest_s
-    match specimen.contact:
+    own, nearly = (_sharpness(specimen.contact, each) for each in (accuracy, Accuracy.QUICK))
+    return Pace(frequency_hz, forgetting_s, own, nearly)
+
+
+def _sharpness(contact: ContactLaw, accuracy: Accuracy) -> Sharpness:
+    match contact:
         case PowerLaw():
             noise = STEPPING * accuracy.tolerance
         case _:
             noise = ROUNDING
-    return Pace(frequency_hz, forgetting_s, Sharpness(max(SETTLED[accuracy], 2.0 * noise), noise))
+    return Sharpness(max(SETTLED[accuracy], 2.0 * noise), noise)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +128,9 @@ class SceneRun:
     """A small change that was carried along has surely grown without end."""
     wandered_until_s: float
     """When it was last seen to change from period to period."""
+    leaked: Floats = field(default_factory=lambda: np.zeros(4))
+    """What the responses, relatively, would be off by if the lines were taken over all of the window, shape
+    (4,); zero unless the motion was found to repeat in the window only."""
 
 
 def run_for(run: FollowedRun, duration_s: float, window_s: float, pace: Pace) -> SceneRun:
@@ -122,11 +140,14 @@ def run_for(run: FollowedRun, duration_s: float, window_s: float, pace: Pace) ->
     before = pace.repeats([last])
     if before is None:
         run.follow_tangent()
-    window = observe_window(run, window_s, 1 if before is None else before.period)
+    window = observe_window(run, window_s, pace.cycle([last]))
     seen = judged(run, window, [last], pace, f"the {duration_s:g} s asked for are over")
-    if seen.repeats is not None and window.line_periods % seen.repeats.period != 0:
+    cycle = pace.cycle([last, *window.stretches])
+    if window.line_periods % cycle != 0:
         # Its period was found only now: the window is gone through once more, for lines that do not leak.
-        seen = replace(seen, window=observe_window(window.begins.apart(), window_s, seen.repeats.period))
+        whole = observe_window(window.begins.apart(), window_s, cycle)
+        leaked = np.abs(window.responses_m / whole.responses_m - 1.0)
+        seen = replace(seen, window=whole, leaked=leaked)
     path = lead if is_settled else (*lead, last, *window.stretches)
     # Since when it repeats was not looked for.
     return replace(seen, was_settled=before is not None, path=path, wandered_until_s=0.0)

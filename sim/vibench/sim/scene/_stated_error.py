@@ -77,6 +77,8 @@ def stated_errors(
 
     """
     answer = seen.window.responses_m
+    # Who looks more closely may find that it does not repeat yet, and take the lines over another length.
+    sure = _rounding(answer) + seen.leaked
     if seen.repeats is not None and seen.was_settled:
         off = off_settled(run, answer, scene.accuracy, seen.repeats.period, pace.forgetting_s)
         return StatedErrors(SAFETY * off + seen.repeats.distance + _rounding(answer), float(np.max(off)))
@@ -84,9 +86,9 @@ def stated_errors(
     if strict is not None:
         off = np.abs(answer - strict) / np.abs(answer)
         if float(np.max(off)) < PARTED:
-            return StatedErrors(SAFETY * off + _rounding(answer), float(np.max(off)))
+            return StatedErrors(SAFETY * off + sure, float(np.max(off)))
     added = error_per_period(run, scene.accuracy)
-    return StatedErrors(_drawn(begin, seen, slowest_rate) + SAFETY * added, added)
+    return StatedErrors(_drawn(begin, seen, slowest_rate) + SAFETY * added + seen.leaked, added)
 
 
 def _rounding(answer: Floats) -> Floats:
@@ -163,8 +165,8 @@ def _strict_answer(scene: Scene, begin: FollowedRun, seen: SceneRun, run: Follow
             each.follow(until_s)
         if not _are_together(scene, loose, strict):
             return None
-    cycle = 1 if seen.repeats is None else seen.repeats.period
-    found = observe_window(strict, seen.window.length_s, cycle).responses_m
+    # Lines over as many periods.
+    found = observe_window(strict, seen.window.length_s, max(seen.window.line_periods, 1)).responses_m
     return found if _are_together(scene, run, strict) else None
 
 
