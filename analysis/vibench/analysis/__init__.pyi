@@ -27,6 +27,8 @@ from .frequency_response import (
     transmissibility as transmissibility,
 )
 from .model import (
+    DRAWS as DRAWS,
+    FEWEST_DRAWS as FEWEST_DRAWS,
     SIMILARITY_THRESHOLD as SIMILARITY_THRESHOLD,
     CurveDifference as CurveDifference,
     MeasurementPrediction as MeasurementPrediction,

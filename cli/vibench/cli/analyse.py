@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +10,8 @@ import typer
 
 from vibench.acquisition import save_toml
 from vibench.analysis import (
+    DRAWS,
+    FEWEST_DRAWS,
     AnalysisFailure,
     CampaignResults,
     Estimator,
@@ -35,6 +38,19 @@ from .paths import AsJson, room_for_folder, unused
 from .reading_bar import reading_bar
 from .specimen_option import SpecimenOption, described
 
+
+class DrivenBy(StrEnum):
+    """What moves the simulation that is laid over a measurement."""
+
+    VOLTAGE = "voltage"
+    BASE = "base"
+
+    @property
+    def simulation(self) -> Simulation:
+        """The same for the analysis."""
+        return {DrivenBy.VOLTAGE: Simulation.UNDER_VOLTAGE, DrivenBy.BASE: Simulation.UNDER_BASE}[self]
+
+
 NOISE = "Transmission of noise"
 """Heading of the options that no other excitation takes notice of."""
 
@@ -48,8 +64,19 @@ def analyse(
         typer.Option("--out", metavar="DIR", help="Folder for the report; beside the recording if absent."),
     ] = None,
     simulate: Annotated[
-        bool, typer.Option(help="Lay the simulation over the measurement; takes some seconds more.")
+        bool, typer.Option(help="Lay the simulation over the measurement; takes seconds to minutes more.")
     ] = True,
+    driven_by: Annotated[
+        DrivenBy,
+        typer.Option(
+            help="voltage: rig and specimen together, as an ensemble that holds in chaos; base: the specimen "
+            "alone under the recorded base motion."
+        ),
+    ] = DrivenBy.VOLTAGE,
+    draws: Annotated[
+        int,
+        typer.Option(metavar="N", min=FEWEST_DRAWS, help="Runs of a colliding motion under the voltage."),
+    ] = DRAWS,
     fit: Annotated[
         bool,
         typer.Option(
@@ -141,9 +168,17 @@ def analyse(
             "--fit and --specimen were given; one of the two says which specimen is laid over"
         )
     diagrams = [read_diagram(each) for each in branches or ()]
+    simulation = driven_by.simulation if simulate else Simulation.LEFT_OUT
     with external_data(allow_external):
         _analyse(
-            recording, out, request, diagrams, simulate=simulate, fit=fit, specimen=specimen, as_json=as_json
+            recording,
+            out,
+            request,
+            diagrams,
+            (simulation, draws),
+            fit=fit,
+            specimen=specimen,
+            as_json=as_json,
         )
 
 
@@ -152,8 +187,8 @@ def _analyse(
     out: Path | None,
     request: FrequencyResponseRequest,
     diagrams: Sequence[BranchDiagram],
+    simulated: tuple[Simulation, int],
     *,
-    simulate: bool,
     fit: bool,
     specimen: str | None,
     as_json: bool,
@@ -167,12 +202,12 @@ def _analyse(
     if has_report:
         room_for_folder(folder)
     with reading_bar() as observer:
-        simulation = Simulation.LAID_OVER if simulate else Simulation.LEFT_OUT
+        simulation, draws = simulated
         updated = fitted_to(paths, name, observer) if fit else None
         laid = None if updated is None else updated.specimen
         if specimen is not None:
             laid = described(specimen).specimen()
-        results = analyse_files(paths, name, simulation, request, observer, laid)
+        results = analyse_files(paths, name, simulation, request, observer, laid, draws)
     if updated is not None:
         results = replace(results, model_said=updated.sentences)
     if as_json:

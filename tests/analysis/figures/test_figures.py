@@ -35,7 +35,7 @@ from vibench.analysis.results import result_of
 PNG_HEAD = b"\x89PNG\r\n\x1a\n"
 
 
-def result(path, simulation=Simulation.LAID_OVER):
+def result(path, simulation=Simulation.UNDER_VOLTAGE):
     with open_recording(path) as recording:
         return result_of(recording, simulation)[0]
 
@@ -116,7 +116,7 @@ def test_a_sweep_figure_shades_the_measured_collision_region(sweep_file):
     np.testing.assert_array_equal(measured.get_ydata(), found.analysis.response.response_i)
     assert drawn.figure.axes[0].get_xlabel() == "time of the sweep [s]"
     assert f"{region.start.frequency_hz:.1f} ±" in drawn.caption
-    assert f"{found.laid.run.impacts} impacts" in drawn.caption
+    assert f"{found.laid.run.impact_rate_hz:.0f} impacts per second" in drawn.caption
 
 
 def test_dwells_stand_in_rows_weak_to_strong_with_their_responses_in_the_caption(dwell_file):

@@ -1,8 +1,10 @@
 from ._period import (
     Points as Points,
+    shortest_period as shortest_period,
 )
 from ._verdict import (
     MotionKind as MotionKind,
     MotionVerdict as MotionVerdict,
+    begin_of_last_motion as begin_of_last_motion,
     motion_verdict as motion_verdict,
 )

@@ -21,7 +21,8 @@ class CurveOrigin(StrEnum):
 
     MEASURED = "measured"
     SIMULATED = "simulated"
-    """The specimen under the recorded base motion, through the same estimator."""
+    """Rig and specimen under the recorded voltage, or the specimen under the recorded base motion, through
+    the same estimator."""
     PREDICTED = "predicted"
     """The specimen under sines."""
     STABLE = "stable branches"

@@ -16,14 +16,25 @@ class Model(StrEnum):
     """Whether the model is laid over measurements."""
 
     LEFT_OUT = "left out"
-    LAID_OVER = "laid over"
+    UNDER_VOLTAGE = "under the recorded voltage"
+    """Rig and specimen together, as an ensemble: holds in chaos too."""
+    UNDER_BASE = "under the recorded base motion"
+    """The specimen alone, once: for linear and coherent motion."""
+
+
+_SIMULATIONS = {
+    Model.LEFT_OUT: Simulation.LEFT_OUT,
+    Model.UNDER_VOLTAGE: Simulation.UNDER_VOLTAGE,
+    Model.UNDER_BASE: Simulation.UNDER_BASE,
+}
 
 
 class AnalysisOptions(FrozenModel):
     """What an analyst may choose; estimator to confidence concern noise only."""
 
     model: Model = Model.LEFT_OUT
-    """The simulated specimen under the recorded base motion; it takes seconds to a minute a recording."""
+    """The simulated specimen, with its rig under the recorded voltage (the twin) or alone under the recorded
+    base motion; it takes seconds to minutes a recording."""
     estimator: Estimator = Estimator.DRIVE
     """drive is unbiased by noise on both channels; h1 by noise on the response, h2 on the base."""
     noise_ratio: float | None = Field(default=None, ge=0.0)
@@ -60,5 +71,5 @@ class AnalysisOptions(FrozenModel):
 
     @property
     def simulation(self) -> Simulation:
-        """Whether the model is asked."""
-        return Simulation.LAID_OVER if self.model is Model.LAID_OVER else Simulation.LEFT_OUT
+        """What the model is moved by, if it is asked."""
+        return _SIMULATIONS[self.model]

@@ -27,6 +27,9 @@ from ._drawn import (
 from ._dwells import (
     dwells_figure as dwells_figure,
 )
+from ._ensemble_band import (
+    agreement_text as agreement_text,
+)
 from ._excitation import (
     excitation_figure as excitation_figure,
 )

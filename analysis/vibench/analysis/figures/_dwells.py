@@ -6,22 +6,19 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..chaos import MotionKind
-from ..model import DwellOverlay
+from ..model import SPECTRUM, DwellOverlay
 from ..recordings import specimen_of
 from ..signals import Reals
-from ..sine import DwellAnalysis, DwellResponse
+from ..sine import COLUMN_HZ, DwellAnalysis, DwellResponse, spectrum_columns
 from ..tables import Table, table
 from ._drawn import DrawnFigure
+from ._ensemble_band import band_columns, draw_band, run_text, simulated_label
 from ._marked_resonances import ModelResonances, label_resonances, mark_resonances, model_resonances
 from ._style import COLLIDING, MEASURED, SIMULATED, legend_above, magnitude_axis, new_figure, prefixed, styled
 
 _ROW_IN = 1.75
 _FRAME_IN = 1.1
 _ZOOM_PERIODS = 12.0
-_HIGHEST_ORDER = 2.4
-"""The spectrum is shown up to this multiple of the drive frequency."""
-_COLUMN_HZ = 1.0
-"""A spectrum is drawn as its largest line in each column of this width: a figure has no more pixels."""
 _RANGE_DECADES = 5.0
 
 Pair = tuple[DwellAnalysis, DwellOverlay | None]
@@ -84,22 +81,10 @@ def _zoom(axes: Axes, response: DwellResponse, laid: DwellOverlay | None) -> Non
             color=SIMULATED,
             linewidth=0.8,
             linestyle=(0, (4, 2)),
-            label="simulated under the recorded base",
+            label=simulated_label(laid.run),
         )
     axes.set_xlim(1e3 * float(time_s[0]), 0)
     axes.set_ylabel(f"x [{unit}]")
-
-
-def spectrum_columns(response: DwellResponse) -> tuple[Reals, Reals]:
-    """Middle [Hz] and largest amplitude over A0 of each column of the spectrum."""
-    spectrum = response.spectrum
-    width = max(1, round(_COLUMN_HZ / spectrum.spacing_hz))
-    first = max(1, round(5.0 / spectrum.spacing_hz))
-    last = round(_HIGHEST_ORDER * response.drive.frequency_hz / spectrum.spacing_hz)
-    starts = np.arange(first, last, width)
-    largest = np.maximum.reduceat(spectrum.amplitude[:last], starts)
-    middle: Reals = np.asarray((starts + 0.5 * (width - 1)) * spectrum.spacing_hz, dtype=np.float64)
-    return middle, largest / response.drive.amplitude_m
 
 
 def _spectrum(axes: Axes, response: DwellResponse, laid: DwellOverlay | None, at: ModelResonances) -> None:
@@ -107,7 +92,9 @@ def _spectrum(axes: Axes, response: DwellResponse, laid: DwellOverlay | None, at
     frequency_hz, size = spectrum_columns(response)
     axes.plot(frequency_hz, size, color=MEASURED, linewidth=1.0)
     if laid is not None:
-        axes.plot(*spectrum_columns(laid.response), color=SIMULATED, linewidth=0.6, zorder=3)
+        middle = draw_band(axes, frequency_hz, laid, SPECTRUM)
+        curve = spectrum_columns(laid.response) if middle is None else (frequency_hz, middle)
+        axes.plot(*curve, color=SIMULATED, linewidth=0.6, zorder=3)
     magnitude_axis(axes)
     top = float(np.max(size))
     axes.set_ylim(top * 10**-_RANGE_DECADES, 3 * top)
@@ -126,25 +113,21 @@ def dwells_caption(rising: Sequence[Pair]) -> str:
             f"{2 * found.sd_response_ii:.2g}"
         )
         if laid is not None:
-            text += (
-                f" (simulated {laid.response.response_i:.3g} and {laid.response.response_ii:.3g}, "
-                f"{laid.run.impact_rate_hz:.0f} impacts per second)"
-            )
+            text += f". {run_text(laid)}"
         bands = ", ".join(
             f"{each.decibel:.1f} dB around {each.towards_hz:.0f} Hz" for each in analysis.terminal
         )
-        said.append(f"{text}; {bands} re the drive's line" if bands else text)
+        said.append(f"{text} Measured bands: {bands} re the drive's line." if bands else text)
     window_s = rising[0][0].response.window_s
     text = (
         f"Displacement of m0 and its spectrum over the last {window_s:.3g} s (largest line in each "
-        f"{_COLUMN_HZ:g} Hz). {'. '.join(said)}."
+        f"{COLUMN_HZ:g} Hz). {' '.join(said)}"
     )
     if all(analysis.motion.verdict.kind is MotionKind.PERIODIC for analysis, _ in rising):
         return text
     return (
         f"{text} Where the motion is chaotic, measured and simulated signals agree in their statistics, not "
-        "instant by instant; the simulated one is somewhat larger, since the recorded base does not yield to "
-        "its blows."
+        "instant by instant; the signal shown is that of one draw."
     )
 
 
@@ -156,6 +139,7 @@ def _tables(pair: Pair) -> tuple[Table, ...]:
     spectrum = {"frequency_hz": frequency_hz, "amplitude_over_a0": size}
     signal = {"time_s": time_s, "displacement_m": motion}
     if laid is not None:
+        spectrum |= band_columns(laid, SPECTRUM, "amplitude_over_a0")
         spectrum["amplitude_over_a0_simulated"] = spectrum_columns(laid.response)[1]
         signal["displacement_simulated_m"] = last_periods(laid.response)[1]
     whole = analysis.displacement

@@ -15,8 +15,8 @@ from vibench.acquisition.plan import (
     SteppedSine,
 )
 
-from ..model import SteppedSineOverlay
-from ..signals import Reals
+from ..model import RESPONSE_I, RESPONSE_II, SteppedSineOverlay
+from ..signals import Flags, Reals
 from ..sine import (
     SteppedResponse,
     SteppedSineAnalysis,
@@ -27,9 +27,11 @@ from ..sine import (
 )
 from ..tables import table
 from ._drawn import DrawnFigure
+from ._ensemble_band import band_columns, run_text, simulated_label
 from ._style import LINEAR, MEASURED, PREDICTED, SIMULATED, legend_above, magnitude_axis, new_figure, styled
 
 _HEIGHT_IN = 4.6
+_ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}
 _MARKERS = {"up": "^", "down": "v"}
 
 
@@ -55,8 +57,8 @@ def stepped_sine_figure(
     with styled():
         figure = new_figure(_HEIGHT_IN)
         first, second = figure.subplots(2, 1, sharex=True)
-        _responses(first, along, analysis, laid, "response_i")
-        _responses(second, along, analysis, laid, "response_ii")
+        _responses(first, along, analysis, laid, RESPONSE_I)
+        _responses(second, along, analysis, laid, RESPONSE_II)
         first.set_ylabel("Response I\nmax |x| / A0")
         second.set_ylabel("Response II\n|x at f| / A0")
         second.set_xlabel(look.axis)
@@ -75,6 +77,8 @@ def stepped_sine_figure(
     if laid is not None:
         columns["response_i_simulated"] = laid.response.response_i
         columns["response_ii_simulated"] = laid.response.response_ii
+        columns |= band_columns(laid, RESPONSE_I, "response_i")
+        columns |= band_columns(laid, RESPONSE_II, "response_ii")
     name = f"stepped_sine_{analysis.facts.name}"
     return DrawnFigure(
         name=name,
@@ -88,7 +92,7 @@ def stepped_sine_figure(
 def _responses(
     axes: Axes, along: Reals, analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, what: str
 ) -> None:
-    found = analysis.response
+    found, attribute = analysis.response, _ATTRIBUTES[what]
     rising = np.argsort(along)
     if laid is not None:
         sines = laid.prediction
@@ -101,7 +105,7 @@ def _responses(
         )
         axes.plot(
             along,
-            getattr(sines, what),
+            getattr(sines, attribute),
             color=PREDICTED,
             linestyle="none",
             marker=".",
@@ -113,7 +117,7 @@ def _responses(
         marker = _MARKERS.get(direction, "o")
         axes.plot(
             along[chosen],
-            getattr(found, what)[chosen],
+            getattr(found, attribute)[chosen],
             color=MEASURED,
             label=f"measured, {direction}",
             linestyle="none",
@@ -121,19 +125,35 @@ def _responses(
             markersize=4,
         )
         if laid is not None:
-            axes.plot(
-                along[chosen],
-                getattr(laid.response, what)[chosen],
-                color=SIMULATED,
-                markerfacecolor="none",
-                label=f"simulated under the recorded base, {direction}",
-                linestyle="none",
-                marker=marker,
-                markersize=4,
-            )
+            _simulated(axes, along, chosen, laid, what, (marker, direction))
     for jump in noted_jumps(analysis.facts.feedback):
         axes.axvspan(jump.low_hz, jump.high_hz, color=MEASURED, alpha=0.3, linewidth=0)
     magnitude_axis(axes)
+
+
+def _simulated(
+    axes: Axes, along: Reals, chosen: Flags, laid: SteppedSineOverlay, what: str, look: tuple[str, str]
+) -> None:
+    """Mark the middle of the draws at every step of one direction, with the band of 95 % as a bar."""
+    values, reach = getattr(laid.response, _ATTRIBUTES[what])[chosen], None
+    found = laid.quantity(what)
+    if found is not None and laid.run.draws > 1:
+        values = found.median[chosen]
+        reach = np.clip([values - found.lower[chosen], found.upper[chosen] - values], 0.0, None)
+    marker, direction = look
+    axes.errorbar(
+        along[chosen],
+        values,
+        yerr=reach,
+        color=SIMULATED,
+        markerfacecolor="none",
+        label=f"{simulated_label(laid.run)}, {direction}",
+        linestyle="none",
+        marker=marker,
+        markersize=4,
+        elinewidth=0.8,
+        capsize=1.5,
+    )
 
 
 def _caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, look: SteppedLook[Any]) -> str:
@@ -142,11 +162,7 @@ def _caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, loo
     text = " ".join([text, *feedback_sentences(analysis.facts.feedback)])
     if laid is None:
         return text
-    return (
-        f"{text} Simulated under the recorded base motion: median difference "
-        f"{laid.difference.median_abs_db:.2g} dB, {100 * laid.difference.share_within_two:.0f} % of the "
-        f"steps within two standard errors, {laid.run.impacts} impacts within the steps."
-    )
+    return f"{text} {run_text(laid)}"
 
 
 def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse) -> str:

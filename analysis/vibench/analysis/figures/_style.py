@@ -14,7 +14,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogFormatter, NullLoc
 
 MEASURED = "#1b1b1b"
 SIMULATED = "#d55e00"
-"""Under the recorded base motion (vermillion of Okabe & Ito's palette)."""
+"""Under the recorded voltage or base motion (vermillion of Okabe & Ito's palette)."""
 PREDICTED = "#0072b2"
 """Under sines (blue)."""
 LINEAR = "#56b4e9"

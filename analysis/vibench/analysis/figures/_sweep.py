@@ -4,11 +4,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
-from ..model import SweepOverlay
+from ..model import RESPONSE_I, RESPONSE_II, SweepOverlay
 from ..signals import Reals
 from ..sine import Collisions, SweepAnalysis, SweepResponse
 from ..tables import Table, table
 from ._drawn import DrawnFigure
+from ._ensemble_band import band_columns, draw_band, run_text, simulated_label
 from ._hysteresis import jumps_text
 from ._style import (
     COLLIDING,
@@ -25,6 +26,7 @@ from ._style import (
 )
 
 _HEIGHT_IN = 6.4
+_ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}
 
 
 def sweep_figure(analysis: SweepAnalysis, laid: SweepOverlay | None = None) -> DrawnFigure:
@@ -33,8 +35,8 @@ def sweep_figure(analysis: SweepAnalysis, laid: SweepOverlay | None = None) -> D
         figure = new_figure(_HEIGHT_IN)
         envelope, first, second = figure.subplots(3, 1, height_ratios=(1.25, 1.0, 1.0))
         _envelope(envelope, analysis, laid)
-        _responses(first, analysis, laid, "response_i", "Response I\nmax |x| / A0")
-        _responses(second, analysis, laid, "response_ii", "Response II\n|x at f| / A0")
+        _responses(first, analysis, laid, RESPONSE_I, "Response I\nmax |x| / A0")
+        _responses(second, analysis, laid, RESPONSE_II, "Response II\n|x at f| / A0")
         second.set_xlabel("drive frequency [Hz]")
         first.tick_params(labelbottom=False)
         legend_above(figure, [envelope, first], columns=3)
@@ -66,7 +68,7 @@ def _envelope(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None) ->
     )
     if laid is not None:
         for number, outline in enumerate((laid.response.upper, laid.response.lower)):
-            label = "simulated under the recorded base" if number == 0 else None
+            label = simulated_label(laid.run) if number == 0 else None
             axes.plot(laid.response.time_s, factor * outline, color=SIMULATED, linewidth=0.7, label=label)
     axes.set_xlim(float(found.time_s[0]), float(found.time_s[-1]))
     axes.set_ylabel(f"m0 velocity\n[{unit}]")
@@ -89,7 +91,7 @@ def _frequency_on_top(axes: Axes, found: SweepResponse) -> None:
 
 
 def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, what: str, label: str) -> None:
-    measured = analysis.response
+    measured, attribute = analysis.response, _ATTRIBUTES[what]
     for region in analysis.collisions.regions:
         axes.axvspan(region.low_hz, region.high_hz, color=COLLIDING, zorder=0)
     if laid is not None:
@@ -104,7 +106,7 @@ def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, w
         )
         axes.plot(
             sines.frequency_hz,
-            getattr(sines, what),
+            getattr(sines, attribute),
             color=PREDICTED,
             linestyle="none",
             marker=".",
@@ -113,15 +115,16 @@ def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, w
         )
     axes.plot(
         measured.frequency_hz,
-        getattr(measured, what),
+        getattr(measured, attribute),
         color=MEASURED,
         linewidth=1.3,
         label="measured response",
     )
     if laid is not None:
+        middle = draw_band(axes, measured.frequency_hz, laid, what)
         axes.plot(
             laid.response.frequency_hz,
-            getattr(laid.response, what),
+            getattr(laid.response, attribute) if middle is None else middle,
             color=SIMULATED,
             linewidth=0.7,
             linestyle=(0, (4, 2)),
@@ -153,16 +156,16 @@ def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
         outside = ~analysis.collisions.is_colliding
         apart = laid.difference.where(outside)
         smooth = (
-            f"; outside of it {apart.median_abs_db:.2g} dB median difference, "
-            f"{100 * apart.share_within_two:.0f} % of the intervals within two standard errors"
+            f" Outside of the measured collisions {apart.median_abs_db:.2g} dB median difference, "
+            f"{100 * apart.share_within_two:.0f} % of the intervals within two standard errors."
             if outside.any()
             else ""
         )
-        said.append(
-            f"Simulated under the recorded base motion: {regions_text(laid.collisions)}, "
-            f"{laid.run.impacts} impacts{smooth}. Blue dots: steady sines from rest, which know "
-            "nothing of the sweep's history."
-        )
+        said += [
+            run_text(laid),
+            f"In the first of these runs {regions_text(laid.collisions)}.{smooth}",
+            "Blue dots: steady sines from rest, which know nothing of the sweep's history.",
+        ]
     return " ".join(said)
 
 
@@ -204,6 +207,7 @@ def _tables(analysis: SweepAnalysis, laid: SweepOverlay | None) -> tuple[Table, 
     columns["velocity_lower_simulated_m_per_s"] = laid.response.lower
     columns["response_i_simulated"] = laid.response.response_i
     columns["response_ii_simulated"] = laid.response.response_ii
+    columns |= band_columns(laid, RESPONSE_I, "response_i") | band_columns(laid, RESPONSE_II, "response_ii")
     sines = laid.prediction
     return (
         table(name, **columns),

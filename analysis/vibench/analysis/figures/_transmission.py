@@ -4,11 +4,12 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..frequency_response import MagnitudeScale, NoiseAnalysis, NoiseResponse
-from ..model import NoiseOverlay, linear_transmissibility
+from ..model import TRANSMISSION, NoiseOverlay, linear_transmissibility
 from ..recordings import specimen_of
 from ..signals import Reals
 from ..tables import Table, table
 from ._drawn import DrawnFigure
+from ._ensemble_band import band_columns, draw_band, run_text, simulated_label
 from ._marked_resonances import ModelResonances, label_resonances, mark_resonances, model_resonances
 from ._style import (
     BOUNDS,
@@ -93,14 +94,18 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, 
             linewidth=0.9,
             label=f"Response I, sines of A0 = {micrometres:.3g} µm",
         )
+        factor = view.factor(simulated.frequency_hz)
+        middle = draw_band(
+            axes, simulated.frequency_hz, laid, TRANSMISSION, lambda values: view.drawn(values * factor)
+        )
         axes.plot(
             simulated.frequency_hz,
-            view.drawn(simulated.magnitude),
+            view.drawn(simulated.magnitude) if middle is None else middle,
             color=SIMULATED,
             linewidth=0.8,
             linestyle=(0, (4, 2)),
             zorder=3.5,
-            label="simulated under the recorded base",
+            label=simulated_label(laid.run),
         )
     axes.plot(
         measured.frequency_hz, view.drawn(size), color=MEASURED, linewidth=1.5, label="measured", zorder=3
@@ -199,9 +204,7 @@ def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> 
     ]
     if laid is not None:
         said.append(
-            f"Simulated under the recorded base motion ({laid.run.impact_rate_hz:.0f} impacts per second): "
-            f"median difference {laid.difference.median_abs_db:.2g} dB, "
-            f"{100 * laid.difference.share_within_two:.0f} % of the lines within two standard errors. "
+            f"{run_text(laid)} Median difference {laid.difference.median_abs_db:.2g} dB. "
             f"The blue curve is Response I under sines, {laid.amplitude_basis}; "
             f"it is a different excitation and no fit."
         )
@@ -249,6 +252,7 @@ def _tables(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> tuple[Table, 
     }
     if laid is None:
         return (table(name, **columns),)
+    columns |= band_columns(laid, TRANSMISSION, "transmission")
     columns["magnitude_simulated"] = view.shown(laid.response.frequency_response).magnitude
     columns["difference_db"] = laid.difference.decibel
     columns["difference_standard_errors"] = laid.difference.standard_errors

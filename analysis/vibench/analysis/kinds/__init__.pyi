@@ -11,3 +11,6 @@ from ._analysis_kind import (
     SteppedSineResult as SteppedSineResult,
     SweepResult as SweepResult,
 )
+from ._noise import (
+    NOISE_FAMILY as NOISE_FAMILY,
+)

@@ -8,8 +8,11 @@ from ..comparison import Curve, CurveOrigin
 from ..frequency_response import FrequencyResponseRequest, NoiseAnalysis
 from ..model import (
     AbstractOverlay,
+    Draw,
+    Drawn,
     DwellOverlay,
     NoiseOverlay,
+    Quantity,
     SimulatedChannels,
     SteppedSineOverlay,
     SweepOverlay,
@@ -50,8 +53,12 @@ class AnalysisKind(Generic[P, A, L]):
     family: str
     """What JSON calls the results; kinds with equal results share it."""
     analyse: Callable[[RecordingFacts, Channels, P, FrequencyResponseRequest], A]
-    simulate: Callable[[A, SimulatedChannels], L]
+    draw: Callable[[A, SimulatedChannels], Draw[Any]]
     """Estimate from simulated channels what was estimated from the recorded ones."""
+    compared: Callable[[A], tuple[Quantity, ...]]
+    """What of the measurement is set into the draws."""
+    lay: Callable[[A, Drawn[Any]], L]
+    """Compare with all draws."""
     curves: Callable[[str, CurveOrigin, Any], Iterator[Curve]]
     """Of the response, measured or simulated, of the recording with that name."""
     measured: Callable[[A], Json]

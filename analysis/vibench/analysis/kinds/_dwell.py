@@ -1,16 +1,30 @@
 """Dwells: both responses, the lines of the spectrum, how the motion repeats, and what JSON says of them."""
 
+from vibench.acquisition.recording import SegmentLabel
+
 from ..chaos import MotionVerdict
 from ..comparison import dwell_traces
 from ..frequency_response import FrequencyResponseRequest
-from ..model import DwellOverlay, dwell_overlay
+from ..model import (
+    Draw,
+    Drawn,
+    DwellOverlay,
+    Ending,
+    Quantity,
+    SimulatedChannels,
+    dwell_overlay,
+    dwell_quantities,
+)
 from ..recordings import Channels, RecordingFacts, measurement_checks
 from ..sine import (
     DwellAnalysis,
     DwellPlan,
+    DwellResponse,
+    IrregularMotion,
     TerminalLevel,
     bound_frequencies_hz,
     dwell_motion,
+    irregular_motion,
     measured_dwell,
     settled_envelope,
     terminal_levels,
@@ -31,7 +45,31 @@ def _analyse(
         displacement=settled_envelope(found),
         terminal=terminal_levels(found, towards_hz),
         motion=dwell_motion(channels, found),
+        irregular=irregular_motion(channels, found),
     )
+
+
+def _endings(found: IrregularMotion | None) -> tuple[Ending, ...]:
+    if found is None:
+        return ()
+    return (Ending("irregular motion", found.start_s, found.stop_s, found.ended),)
+
+
+def _draw(analysis: DwellAnalysis, channels: SimulatedChannels) -> Draw[DwellResponse]:
+    towards_hz = bound_frequencies_hz(analysis.facts)
+    found = measured_dwell(channels, analysis.excitation, towards_hz)
+    endings = _endings(irregular_motion(channels, found))
+    impacts = channels.played_impacts(SegmentLabel.DWELL)
+    return Draw(found, dwell_quantities(found, towards_hz, endings), endings, *impacts)
+
+
+def _compared(analysis: DwellAnalysis) -> tuple[Quantity, ...]:
+    towards_hz = bound_frequencies_hz(analysis.facts)
+    return dwell_quantities(analysis.response, towards_hz, _endings(analysis.irregular))
+
+
+def _lay(analysis: DwellAnalysis, drawn: Drawn[DwellResponse]) -> DwellOverlay:
+    return dwell_overlay(analysis, drawn, _endings(analysis.irregular))
 
 
 def _measured(analysis: DwellAnalysis) -> Json:
@@ -100,7 +138,6 @@ def _simulated(laid: DwellOverlay) -> Json:
         "response_i": laid.response.response_i,
         "response_ii": laid.response.response_ii,
         "sd_response_ii": laid.response.sd_response_ii,
-        "response_i_measured_over_simulated_db": laid.response_i_db,
         "terminal_bands": [_band(each) for each in laid.terminal],
     }
 
@@ -108,7 +145,9 @@ def _simulated(laid: DwellOverlay) -> Json:
 DWELL = AnalysisKind(
     family="dwell",
     analyse=_analyse,
-    simulate=dwell_overlay,
+    draw=_draw,
+    compared=_compared,
+    lay=_lay,
     curves=dwell_traces,
     measured=_measured,
     simulated=_simulated,

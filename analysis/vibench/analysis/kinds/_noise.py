@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from vibench.acquisition.recording import SegmentLabel
+
 from ..comparison import noise_traces
 from ..frequency_response import (
     FrequencyResponseRequest,
@@ -17,10 +19,11 @@ from ..frequency_response import (
     repeated_response,
     streamed_response,
 )
-from ..model import NoiseOverlay, SimulatedChannels, noise_overlay
+from ..model import Draw, NoiseOverlay, SimulatedChannels, noise_overlay, noise_quantities
 from ..recordings import Channels, RecordingFacts, measurement_checks
 from ._analysis_kind import AnalysisKind, Json
 
+NOISE_FAMILY = "noise"
 Estimate = Callable[[Channels, Any, FrequencyResponseRequest], NoiseResponse]
 
 
@@ -107,14 +110,17 @@ def _noise(estimate: Estimate) -> AnalysisKind[Noise, NoiseAnalysis, NoiseOverla
         response = estimate(channels, plan, request)
         return NoiseAnalysis(facts, measurement_checks(facts), plan, response, request)
 
-    def simulate(analysis: NoiseAnalysis, channels: SimulatedChannels) -> NoiseOverlay:
+    def draw(analysis: NoiseAnalysis, channels: SimulatedChannels) -> Draw[NoiseResponse]:
         response = estimate(channels, analysis.excitation, analysis.request)
-        return noise_overlay(analysis, channels, response)
+        label = SegmentLabel.NOISE if response.periodic is None else SegmentLabel.REALISATION
+        return Draw(response, noise_quantities(response), (), *channels.played_impacts(label))
 
     return AnalysisKind(
-        family="noise",
+        family=NOISE_FAMILY,
         analyse=analyse,
-        simulate=simulate,
+        draw=draw,
+        compared=lambda analysis: noise_quantities(analysis.response),
+        lay=noise_overlay,
         curves=noise_traces,
         measured=_measured,
         simulated=_simulated,

@@ -7,9 +7,9 @@ from vibench.acquisition.recording import SegmentLabel
 
 from ..comparison import stepped_traces
 from ..frequency_response import FrequencyResponseRequest
-from ..model import SimulatedChannels, SteppedSineOverlay, stepped_overlay
+from ..model import Draw, Quantity, SimulatedChannels, SteppedSineOverlay, stepped_overlay, stepped_quantities
 from ..recordings import Channels, RecordingFacts, Stretch, measurement_checks
-from ..sine import SteppedSineAnalysis, Steps, level_summary, stepped_response
+from ..sine import SteppedResponse, SteppedSineAnalysis, Steps, level_summary, stepped_response
 from ._analysis_kind import AnalysisKind, Json
 
 Setting = Callable[[Steps, Stretch], float]
@@ -37,6 +37,10 @@ def _simulated(laid: SteppedSineOverlay) -> Json:
     return {"response_i": laid.response.response_i, "response_ii": laid.response.response_ii}
 
 
+def _compared(analysis: SteppedSineAnalysis) -> tuple[Quantity, ...]:
+    return stepped_quantities(analysis.response)
+
+
 def _stepped(
     setting_vpp: Setting,
     label: SegmentLabel = SegmentLabel.STEP,
@@ -48,11 +52,13 @@ def _stepped(
         response = stepped_response(channels, plan, label, setting_vpp)
         return SteppedSineAnalysis(facts, measurement_checks(facts), plan, response)
 
-    def simulate(analysis: SteppedSineAnalysis, channels: SimulatedChannels) -> SteppedSineOverlay:
+    def draw(analysis: SteppedSineAnalysis, channels: SimulatedChannels) -> Draw[SteppedResponse]:
         response = stepped_response(channels, analysis.excitation, label, setting_vpp)
-        return stepped_overlay(analysis, channels, response, label)
+        return Draw(response, stepped_quantities(response), (), *channels.played_impacts(label))
 
-    return AnalysisKind("stepped_sine", analyse, simulate, stepped_traces, measured, _simulated)
+    return AnalysisKind(
+        "stepped_sine", analyse, draw, _compared, stepped_overlay, stepped_traces, measured, _simulated
+    )
 
 
 STEPPED_SINE = _stepped(lambda plan, _: plan.amplitude_vpp)

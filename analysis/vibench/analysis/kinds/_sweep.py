@@ -4,15 +4,18 @@ from dataclasses import asdict
 
 import numpy as np
 
+from vibench.acquisition.recording import SegmentLabel
+
 from ..comparison import sweep_traces
 from ..frequency_response import FrequencyResponseRequest
-from ..model import SweepOverlay, sweep_overlay
+from ..model import Draw, SimulatedChannels, SweepOverlay, sweep_endings, sweep_overlay, sweep_quantities
 from ..recordings import Channels, RecordingFacts, measurement_checks
 from ..sine import (
     CollisionRegion,
     Collisions,
     Sweep,
     SweepAnalysis,
+    SweepResponse,
     collisions,
     measured_sweep,
     played_check,
@@ -29,6 +32,13 @@ def _analyse(
     jumps = smooth_jumps(response, colliding)
     checks = (*measurement_checks(facts), played_check(response, plan))
     return SweepAnalysis(facts, checks, plan, response, colliding, jumps, picture)
+
+
+def _draw(analysis: SweepAnalysis, channels: SimulatedChannels) -> Draw[SweepResponse]:
+    found, _ = measured_sweep(channels, analysis.excitation)
+    colliding = collisions(found)
+    impacts = channels.played_impacts(SegmentLabel.SWEEP)
+    return Draw(found, sweep_quantities(found, colliding), sweep_endings(colliding), *impacts)
 
 
 def _measured(analysis: SweepAnalysis) -> Json:
@@ -79,7 +89,9 @@ def _simulated(laid: SweepOverlay) -> Json:
 SWEEP = AnalysisKind(
     family="sweep",
     analyse=_analyse,
-    simulate=sweep_overlay,
+    draw=_draw,
+    compared=lambda analysis: sweep_quantities(analysis.response, analysis.collisions),
+    lay=sweep_overlay,
     curves=sweep_traces,
     measured=_measured,
     simulated=_simulated,

@@ -1,12 +1,12 @@
-"""The simulation laid over a measurement: same base motion, same estimator, and how far they differ."""
+"""The simulation laid over a measurement: draws of the same recording, same estimator, and agreement."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum, auto
+from enum import StrEnum
 from typing import Generic, TypeVar
 
 import numpy as np
 
-from vibench.acquisition.recording import SegmentLabel
 from vibench.sim import Accuracy, Specimen
 
 from ..frequency_response import NoiseAnalysis, NoiseResponse
@@ -22,39 +22,20 @@ from ..sine import (
     TerminalLevel,
     bound_frequencies_hz,
     collisions,
-    measured_dwell,
-    measured_sweep,
     settled_envelope,
+    spectrum_columns,
     terminal_levels,
 )
 from ._difference import CurveDifference, logarithmic_difference
+from ._draws import Drawn, SimulatedRun
+from ._ensemble import EnsembleCurve, Quantity, ensemble_curves
+from ._escape import Ending, EscapeRate, escape_rate
 from ._prediction import ResponsePrediction, paper_amplitude_m, predicted
-from ._simulated_channels import SimulatedChannels, SimulatedSpecimen, played_impacts
 
 PREDICTION_STEP_HZ = 2.0
 _FINE_STEP_HZ = 0.25
 _HIGHEST_PREDICTED_HZ = 700.0
 """Above the highest mode (500 Hz) the curves fall smoothly; predicting there shows nothing."""
-
-
-@dataclass(frozen=True, eq=False)
-class SimulatedRun:
-    """The specimen under the recorded base motion, in numbers."""
-
-    specimen: Specimen
-    accuracy: Accuracy
-    base_low_hz: float
-    base_high_hz: float
-    """Band of the base displacement that drove it."""
-    impacts: int
-    """Contacts that began inside the parts that were analysed."""
-    played_s: float
-
-    @property
-    def impact_rate_hz(self) -> float:
-        """Impacts per second."""
-        return self.impacts / self.played_s
-
 
 R = TypeVar("R")
 
@@ -65,11 +46,24 @@ class AbstractOverlay(Generic[R]):
 
     run: SimulatedRun
     response: R
-    """Of the simulated specimen under the recorded base motion."""
+    """Of the first draw: under a voltage, one run as good as any other."""
+    ensemble: tuple[EnsembleCurve, ...]
+    """Every compared quantity, measured and in all draws; bands only where there are draws enough."""
+    escape: EscapeRate | None
+    """How often the motion ends, where that is chance."""
     difference: CurveDifference
-    """Measured over simulated transmission, or Response II."""
+    """Measured over simulated transmission, or Response II: over the median of all draws."""
     prediction: ResponsePrediction
     """Under sines of the measured A0."""
+
+    @property
+    def shown(self) -> tuple[EnsembleCurve, ...]:
+        """What has draws and is not compared."""
+        return ()
+
+    def quantity(self, name: str) -> EnsembleCurve | None:
+        """Give one quantity that has draws; None where it has none."""
+        return next((each for each in (*self.ensemble, *self.shown) if each.name == name), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +79,7 @@ class SweepOverlay(AbstractOverlay[SweepResponse]):
     """A sweep, and what the model says of it."""
 
     collisions: Collisions
+    """Of the first draw."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +88,14 @@ class DwellOverlay(AbstractOverlay[DwellResponse]):
 
     displacement: Envelope
     terminal: tuple[TerminalLevel, ...]
-    response_i_db: float
-    """Measured over simulated Response I [dB]."""
+    """Both of the first draw."""
+    spectrum: EnsembleCurve
+    """Of the displacement over A0; not compared: its floor is noise that the model does not know."""
+
+    @property
+    def shown(self) -> tuple[EnsembleCurve, ...]:
+        """The spectrum."""
+        return (self.spectrum,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,37 +103,46 @@ class SteppedSineOverlay(AbstractOverlay[SteppedResponse]):
     """A stepped sine, and what the model says of it."""
 
 
-def _run(channels: SimulatedChannels, label: SegmentLabel) -> SimulatedRun:
-    simulated: SimulatedSpecimen = channels.simulated
-    impacts, played_s = played_impacts(channels, simulated, label)
-    return SimulatedRun(
-        specimen=simulated.specimen,
-        accuracy=simulated.accuracy,
-        base_low_hz=simulated.base.low_hz,
-        base_high_hz=simulated.base.high_hz,
-        impacts=impacts,
-        played_s=played_s,
-    )
+TRANSMISSION, RESPONSE_I, RESPONSE_II, SPECTRUM = "transmission", "Response I", "Response II", "spectrum"
+"""Names of quantities."""
 
 
-def noise_overlay(
-    analysis: NoiseAnalysis, channels: SimulatedChannels, response: NoiseResponse
-) -> NoiseOverlay:
-    """Compare with ``response``, which was estimated from simulated channels as from the recorded ones."""
+def _difference(
+    drawn: Drawn[R], measured: Quantity, sd: Reals, simulated: tuple[Reals, Reals]
+) -> CurveDifference:
+    """Compare with the median of the draws, or with the one there is, and its own standard deviation."""
+    (found,) = ensemble_curves([measured], drawn.quantities)
+    if drawn.run.draws > 1:
+        simulated = found.median, found.relative_sd
+    return logarithmic_difference(measured.frequency_hz, (measured.value, sd), simulated)
+
+
+def noise_quantities(response: NoiseResponse) -> tuple[Quantity, ...]:
+    """Give what a draw of noise is compared by."""
+    found = response.frequency_response
+    return (Quantity(TRANSMISSION, found.frequency_hz, found.magnitude),)
+
+
+def noise_overlay(analysis: NoiseAnalysis, drawn: Drawn[NoiseResponse]) -> NoiseOverlay:
+    """Compare a transmission with those of the draws."""
     noise = analysis.excitation
-    measured, simulated = analysis.response.frequency_response, response.frequency_response
+    measured, simulated = analysis.response.frequency_response, drawn.response.frequency_response
     amplitude_m, basis = equivalent_amplitude(analysis)
     stop_hz = min(noise.band_stop_hz, _HIGHEST_PREDICTED_HZ)
-    grid = prediction_grid(channels.simulated.specimen, noise.band_start_hz, stop_hz)
+    specimen = drawn.run.specimen
+    compared = noise_quantities(analysis.response)
     return NoiseOverlay(
-        run=_run(channels, SegmentLabel.NOISE if response.periodic is None else SegmentLabel.REALISATION),
-        response=response,
-        difference=logarithmic_difference(
-            measured.frequency_hz,
-            (measured.magnitude, measured.relative_sd_magnitude),
+        run=drawn.run,
+        response=drawn.response,
+        ensemble=ensemble_curves(compared, drawn.quantities),
+        escape=None,
+        difference=_difference(
+            drawn,
+            compared[0],
+            measured.relative_sd_magnitude,
             (simulated.magnitude, simulated.relative_sd_magnitude),
         ),
-        prediction=predicted(channels.simulated.specimen, grid, amplitude_m),
+        prediction=predicted(specimen, prediction_grid(specimen, noise.band_start_hz, stop_hz), amplitude_m),
         amplitude_basis=basis,
     )
 
@@ -156,50 +166,104 @@ def equivalent_amplitude(analysis: NoiseAnalysis) -> tuple[float, str]:
     return float(np.sqrt(2) * rms), "a sine of the same rms base displacement"
 
 
-def _difference(
-    frequency_hz: Reals,
+def _sine_difference(
+    drawn: Drawn[R],
+    compared: Sequence[Quantity],
     measured: SweepResponse | DwellResponse | SteppedResponse,
     simulated: SweepResponse | DwellResponse | SteppedResponse,
 ) -> CurveDifference:
-    """Compare Responses II, with their relative standard deviations."""
-    first, second = (
-        (np.atleast_1d(each.response_ii), np.atleast_1d(each.sd_response_ii / each.response_ii))
-        for each in (measured, simulated)
+    """Compare Responses II."""
+    (quantity,) = (each for each in compared if each.name == RESPONSE_II)
+    sd, sd_simulated = (
+        np.atleast_1d(each.sd_response_ii / each.response_ii) for each in (measured, simulated)
     )
-    return logarithmic_difference(frequency_hz, first, second)
+    return _difference(drawn, quantity, sd, (np.atleast_1d(simulated.response_ii), sd_simulated))
 
 
-def sweep_overlay(analysis: SweepAnalysis, channels: SimulatedChannels) -> SweepOverlay:
-    """Follow the sweep through simulated channels as through the recorded ones."""
-    response, _ = measured_sweep(channels, analysis.excitation)
+def sweep_quantities(response: SweepResponse, found: Collisions) -> tuple[Quantity, ...]:
+    """Give what a draw of a sweep is compared by: where one collides and another does not, nothing."""
+    state = found.is_colliding.astype(np.int64)
+    return (
+        Quantity(RESPONSE_I, response.frequency_hz, response.response_i, state),
+        Quantity(RESPONSE_II, response.frequency_hz, response.response_ii, state),
+    )
+
+
+def sweep_endings(found: Collisions) -> tuple[Ending, ...]:
+    """Say when the longest stretch of collisions ended, in seconds of the sweep."""
+    if not found.regions:
+        return ()
+    longest = max(found.regions, key=lambda each: each.stop.time_s - each.start.time_s)
+    return (Ending("collisions", longest.start.time_s, longest.stop.time_s, not longest.reaches_stop),)
+
+
+def sweep_overlay(analysis: SweepAnalysis, drawn: Drawn[SweepResponse]) -> SweepOverlay:
+    """Compare a sweep with those of the draws."""
     measured = analysis.response
     rising = np.argsort(measured.frequency_hz)
     low, high = sorted((float(measured.frequency_hz[0]), float(measured.frequency_hz[-1])))
-    grid = prediction_grid(channels.simulated.specimen, low, high)
+    specimen = drawn.run.specimen
+    grid = prediction_grid(specimen, low, high)
     amplitude_m = np.interp(grid, measured.frequency_hz[rising], measured.drive_amplitude_m[rising])
+    compared = sweep_quantities(measured, analysis.collisions)
     return SweepOverlay(
-        run=_run(channels, SegmentLabel.SWEEP),
-        response=response,
-        collisions=collisions(response),
-        difference=_difference(measured.frequency_hz, measured, response),
-        prediction=predicted(channels.simulated.specimen, grid, amplitude_m),
+        run=drawn.run,
+        response=drawn.response,
+        ensemble=ensemble_curves(compared, drawn.quantities),
+        escape=escape_rate(sweep_endings(analysis.collisions), drawn.endings),
+        collisions=collisions(drawn.response),
+        difference=_sine_difference(drawn, compared, measured, drawn.response),
+        prediction=predicted(specimen, grid, amplitude_m),
     )
 
 
-def dwell_overlay(analysis: DwellAnalysis, channels: SimulatedChannels) -> DwellOverlay:
-    """Measure the dwell in simulated channels as in the recorded ones."""
+_LEAST_BAND = 1e-3
+"""Rms of a band re the drive's line below which it holds noise of generator and amplifier alone."""
+
+
+def dwell_quantities(
+    response: DwellResponse, towards_hz: tuple[float, ...], endings: Sequence[Ending]
+) -> tuple[Quantity, ...]:
+    """Give what a draw of a dwell is compared by: both responses, and the bands that hold motion."""
+    at = np.array([response.drive.frequency_hz])
+    state = np.array([sum(each.ended for each in endings)], dtype=np.int64)
+    columns_hz, size = spectrum_columns(response)
+    bands = (
+        Quantity(
+            f"band around {each.towards_hz:.0f} Hz, re the drive's line",
+            np.array([each.towards_hz]),
+            np.array([ratio if (ratio := 10 ** (each.decibel / 20)) > _LEAST_BAND else np.nan]),
+            state,
+        )
+        for each in terminal_levels(response, towards_hz)
+    )
+    return (
+        Quantity(RESPONSE_I, at, np.array([response.response_i]), state),
+        Quantity(RESPONSE_II, at, np.array([response.response_ii]), state),
+        *bands,
+        Quantity(SPECTRUM, columns_hz, size, np.repeat(state, size.size)),
+    )
+
+
+def dwell_overlay(
+    analysis: DwellAnalysis, drawn: Drawn[DwellResponse], endings: Sequence[Ending]
+) -> DwellOverlay:
+    """Compare a dwell with those of the draws; ``endings`` are the measured ones."""
     towards_hz = bound_frequencies_hz(analysis.facts)
-    response = measured_dwell(channels, analysis.excitation, towards_hz)
     measured = analysis.response
+    compared = dwell_quantities(measured, towards_hz, endings)
+    *ensemble, spectrum = ensemble_curves(compared, drawn.quantities)
     return DwellOverlay(
-        run=_run(channels, SegmentLabel.DWELL),
-        response=response,
-        displacement=settled_envelope(response),
-        terminal=terminal_levels(response, towards_hz),
-        response_i_db=float(20 * np.log10(measured.response_i / response.response_i)),
-        difference=_difference(np.array([measured.drive.frequency_hz]), measured, response),
+        run=drawn.run,
+        response=drawn.response,
+        ensemble=tuple(ensemble),
+        spectrum=spectrum,
+        escape=escape_rate(endings, drawn.endings),
+        displacement=settled_envelope(drawn.response),
+        terminal=terminal_levels(drawn.response, towards_hz),
+        difference=_sine_difference(drawn, compared, measured, drawn.response),
         prediction=predicted(
-            channels.simulated.specimen,
+            drawn.run.specimen,
             np.array([measured.drive.frequency_hz]),
             measured.drive.amplitude_m,
             Accuracy.STANDARD,
@@ -207,21 +271,34 @@ def dwell_overlay(analysis: DwellAnalysis, channels: SimulatedChannels) -> Dwell
     )
 
 
-def stepped_overlay(
-    analysis: SteppedSineAnalysis, channels: SimulatedChannels, response: SteppedResponse, label: SegmentLabel
-) -> SteppedSineOverlay:
-    """Compare with ``response``, measured at every step in simulated channels as in the recorded ones."""
-    measured = analysis.response
-    return SteppedSineOverlay(
-        run=_run(channels, label),
-        response=response,
-        difference=_difference(measured.frequency_hz, measured, response),
-        prediction=predicted(channels.simulated.specimen, measured.frequency_hz, measured.drive_amplitude_m),
+def stepped_quantities(response: SteppedResponse) -> tuple[Quantity, ...]:
+    """Give what a draw of a stepped sine is compared by."""
+    return (
+        Quantity(RESPONSE_I, response.frequency_hz, response.response_i),
+        Quantity(RESPONSE_II, response.frequency_hz, response.response_ii),
     )
 
 
-class Simulation(Enum):
-    """Whether measurements are compared with the model."""
+def stepped_overlay(analysis: SteppedSineAnalysis, drawn: Drawn[SteppedResponse]) -> SteppedSineOverlay:
+    """Compare the responses of all steps with those of the draws."""
+    measured = analysis.response
+    compared = stepped_quantities(measured)
+    return SteppedSineOverlay(
+        run=drawn.run,
+        response=drawn.response,
+        ensemble=ensemble_curves(compared, drawn.quantities),
+        escape=None,
+        difference=_sine_difference(drawn, compared, measured, drawn.response),
+        prediction=predicted(drawn.run.specimen, measured.frequency_hz, measured.drive_amplitude_m),
+    )
 
-    LAID_OVER = auto()
-    LEFT_OUT = auto()
+
+class Simulation(StrEnum):
+    """Whether measurements are compared with the model, and what moves it."""
+
+    UNDER_VOLTAGE = "rig and specimen under the recorded voltage"
+    """Rig and specimen together under the recorded voltage; the specimen under the recorded base motion where
+    nothing is known of the shaker."""
+    UNDER_BASE = "the specimen under the recorded base motion"
+    """The specimen alone under the recorded base motion: for linear and coherent motion."""
+    LEFT_OUT = "nothing"

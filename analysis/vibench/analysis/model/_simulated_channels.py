@@ -12,7 +12,7 @@ from vibench.acquisition.recording import Recording
 from vibench.sim import Accuracy, Sampled, Specimen, follow_samples
 
 from ..errors import UnusableData
-from ..recordings import BASE, Channels, RecordedChannels, Stretch
+from ..recordings import BASE, RecordedChannels, Stretch
 from ..signals import Flags, Integers, Quantity, Reals, converted_signal
 
 LOWEST_PART = 0.25
@@ -96,28 +96,61 @@ _STATE = 6
 
 
 @dataclass(frozen=True, eq=False)
-class SimulatedSpecimen:
-    """What the specimen did under a recorded base motion."""
+class SimulatedChannels:
+    """A draw of what was recorded, in the shape of the recording: the same estimator takes both."""
 
-    specimen: Specimen
-    accuracy: Accuracy
-    base: RecordedBaseMotion
+    recorded: RecordedChannels
     velocity: Reals
-    """Of m0 on the recording's sample grid, without sensor delay or noise, shape (samples,) [m/s]."""
-    impacts: Integers
-    """Contacts that began up to each sample, shape (samples,)."""
+    """Of m0, shape (samples,) [m/s]."""
+    impacts_at_s: tuple[Reals, Reals]
+    """Times since the first sample [s], and contacts begun up to them."""
+    response_delay_s: float
+    """By how much the response channel lags the base channel."""
+    base_acceleration: Reals | None = None
+    """Where the table was simulated too, shape (samples,) [m/s2]; None where the recorded base drove."""
 
-    def impacts_between(self, start: int, stop: int) -> int:
-        """Count the contacts that began between two samples."""
-        return int(self.impacts[stop - 1] - self.impacts[start])
+    @property
+    def sample_rate_hz(self) -> float:
+        """Of all channels."""
+        return self.recorded.sample_rate_hz
+
+    @property
+    def samples(self) -> int:
+        """Samples per channel."""
+        return self.recorded.samples
+
+    def stretches(self, label: str) -> tuple[Stretch, ...]:
+        """Give the named parts of the record."""
+        return self.recorded.stretches(label)
+
+    def read(self, start: int, stop: int) -> Reals:
+        """Give the recorded drive, base acceleration and simulated velocity, shape (3, samples)."""
+        data = self.recorded.read(start, stop)
+        if self.base_acceleration is not None:
+            data[1] = self.base_acceleration[start:stop]
+        data[2] = self.velocity[start:stop]
+        return data
+
+    def overloaded(self, start: int, stop: int) -> Flags:
+        """Where the recording was overloaded: what is compared must rest on the same samples."""
+        return self.recorded.overloaded(start, stop)
+
+    def played_impacts(self, label: str) -> tuple[float, float]:
+        """Count impacts inside the stretches of one label, and give the time those took [s]."""
+        rate = self.sample_rate_hz
+        ends = np.array([(each.start / rate, each.stop / rate) for each in self.stretches(label)])
+        if not ends.size:
+            return 0.0, 0.0
+        counted = np.interp(ends, *self.impacts_at_s)
+        return float(np.sum(np.diff(counted))), float(np.sum(np.diff(ends)))
 
 
-def simulated_specimen(
+def under_base_motion(
     recording: Recording,
     measurement: Measurement,
     specimen: Specimen,
     accuracy: Accuracy = Accuracy.STANDARD,
-) -> SimulatedSpecimen:
+) -> SimulatedChannels:
     """Shake a specimen, from rest, by the base motion of a whole recording, at its full sample rate.
 
     Nothing is decimated: an interval between samples costs a fraction of a microsecond.
@@ -130,7 +163,9 @@ def simulated_specimen(
     """
     base = recorded_base_motion(recording, measurement)
     velocity, impacts = shaken(specimen, base.displacement_m, base.sample_rate_hz, accuracy)
-    return SimulatedSpecimen(specimen, accuracy, base, velocity, impacts)
+    counted = np.arange(impacts.size) / base.sample_rate_hz, impacts.astype(np.float64)
+    # The simulated response has no delay; the recorded base may have one.
+    return SimulatedChannels(RecordedChannels(recording), velocity, counted, -base.delay_s)
 
 
 def shaken(
@@ -156,48 +191,3 @@ def shaken(
         impacts[first + 1 : last + 1] = path.impacts
         state = path.states[-1]
     return velocity, np.cumsum(impacts)
-
-
-@dataclass(frozen=True, eq=False)
-class SimulatedChannels:
-    """Drive and base as they were recorded, the response as simulated: the same estimator takes both."""
-
-    recorded: RecordedChannels
-    simulated: SimulatedSpecimen
-
-    @property
-    def sample_rate_hz(self) -> float:
-        """Of all channels."""
-        return self.recorded.sample_rate_hz
-
-    @property
-    def samples(self) -> int:
-        """Samples per channel."""
-        return self.recorded.samples
-
-    @property
-    def response_delay_s(self) -> float:
-        """The simulated response has no delay; the recorded base may have one."""
-        return -self.recorded.recording.channel(BASE).delay_s
-
-    def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Give the named parts of the record."""
-        return self.recorded.stretches(label)
-
-    def read(self, start: int, stop: int) -> Reals:
-        """Give drive, base acceleration and simulated velocity, shape (3, samples)."""
-        data = self.recorded.read(start, stop)
-        data[2] = self.simulated.velocity[start:stop]
-        return data
-
-    def overloaded(self, start: int, stop: int) -> Flags:
-        """Where the recording was overloaded: what is compared must rest on the same samples."""
-        return self.recorded.overloaded(start, stop)
-
-
-def played_impacts(channels: Channels, simulated: SimulatedSpecimen, label: str) -> tuple[int, float]:
-    """Count impacts inside the stretches of one label, and give the time those took [s]."""
-    rate = channels.sample_rate_hz
-    stretches = channels.stretches(label)
-    count = sum(simulated.impacts_between(each.start, each.stop) for each in stretches)
-    return count, sum(each.samples for each in stretches) / rate

@@ -31,3 +31,7 @@ from ._facts import (
 from ._intact import (
     require_intact as require_intact,
 )
+from ._sensor_gain import (
+    coupling_cut_hz as coupling_cut_hz,
+    sensor_gain as sensor_gain,
+)

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 from vibench.acquisition.plan import EXCITATION_KINDS
 
-from ..figures import regions_text, stepped_level_caption, verdict_text
+from ..figures import agreement_text, regions_text, stepped_level_caption, verdict_text
 from ..kinds import DwellResult, NoiseResult, SteppedSineResult, SweepResult
-from ..model import PREDICTION_S, WINDOW_S
+from ..model import CLOCK_TOLERANCE, PREDICTION_S, WINDOW_S
 from ..results import CampaignResults
 from ..sine import feedback_sentences
 
@@ -21,9 +21,9 @@ def noise_findings(result: NoiseResult) -> Iterator[str]:
     text = f"Noise at {result.analysis.excitation.amplitude_vpp:g} Vpp: {where}"
     if result.laid is not None:
         text += (
-            f"; the simulation under the same base motion lies "
+            f"; the simulation under the {result.laid.run.driven.value} lies "
             f"{result.laid.difference.median_abs_db:.2g} dB away (median) and strikes "
-            f"{result.laid.run.impact_rate_hz:.0f} times per second"
+            f"{result.laid.run.impact_rate_hz:.0f} times per second{agreement_text(result.laid)}"
         )
     yield f"{text}."
 
@@ -35,8 +35,9 @@ def sweep_findings(result: SweepResult) -> Iterator[str]:
         f"Sweep at {plan.amplitude_vpp:g} Vpp from {plan.start_hz:g} to {plan.stop_hz:g} Hz: "
         f"{regions_text(result.analysis.collisions)}"
     )
-    simulated = "" if result.laid is None else f"; simulated: {regions_text(result.laid.collisions)}"
-    yield f"{text}{simulated}."
+    if result.laid is not None:
+        text += f"; simulated: {regions_text(result.laid.collisions)}{agreement_text(result.laid)}"
+    yield f"{text}."
 
 
 def stepped_findings(result: SteppedSineResult) -> Iterator[str]:
@@ -68,8 +69,11 @@ def dwell_findings(result: DwellResult) -> Iterator[str]:
         f"{found.response_ii:.3g}, {verdict_text(result.analysis.motion.verdict)}"
     )
     if result.laid is not None:
-        simulated = result.laid.response
-        text += f"; simulated {simulated.response_i:.3g} and {simulated.response_ii:.3g}"
+        if result.laid.run.driven.by_voltage:
+            text += agreement_text(result.laid)
+        else:
+            simulated = result.laid.response
+            text += f"; simulated {simulated.response_i:.3g} and {simulated.response_ii:.3g}"
     yield f"{text}."
 
 
@@ -85,16 +89,27 @@ def limits(results: CampaignResults) -> Iterator[str]:
         specimen = laid[0].specimen
         damping = specimen.dampings[0] / specimen.stiffnesses[0]
         gaps = " and ".join(f"{1e6 * each:.3g}" for each in dict.fromkeys(specimen.gaps_m))
-        lowest_hz = min(each.base_low_hz for each in laid)
+        lows_hz = [each.base_band_hz[0] for each in laid if each.base_band_hz is not None]
         yield (
             f"The simulation takes the damping as c = {damping:.3g} s · k and a gap of "
             f"{gaps} µm. The paper leaves the damping open; other readings of it give "
             "other collision regions."
         )
-        yield (
-            f"The recorded base acceleration was integrated above {lowest_hz:.3g} Hz (a quarter of the "
-            "lowest frequency played); slower motion of the base is in no simulated curve."
-        )
+        if lows_hz:
+            yield (
+                f"The recorded base acceleration was integrated above {min(lows_hz):.3g} Hz (a quarter of "
+                "the lowest frequency played); slower motion of the base is in no curve simulated "
+                "under it, and the recorded base does not yield to the blows of a specimen that moves "
+                "otherwise."
+            )
+        if any(each.driven.by_voltage for each in laid):
+            yield (
+                "Draws under the recorded voltage differ by their starts, the channels' noise and the "
+                f"tolerance of the converter's clock ({1e6 * CLOCK_TOLERANCE:.0f} ppm), and by the "
+                "uncertainty of a shaker that was fitted; calibrations and the specimen's numbers are "
+                "taken as exact. A limit on |z| is exceeded by chance in one of a hundred agreeing "
+                "quantities."
+            )
         yield (
             f"Curves under sines start from rest and run for {PREDICTION_S:g} s, the last {WINDOW_S:g} s "
             "observed. Where two states are stable, a sweep or noise may be in the other one."

@@ -10,18 +10,30 @@ from vibench.acquisition import RecordingError, open_recording
 from vibench.acquisition.recording import Recording
 from vibench.sim import Accuracy, Specimen
 
-from ..errors import AnalysisError, NotEnoughData
+from ..errors import AnalysisError, NotEnoughData, UnusableData
 from ..frequency_response import DEFAULT_REQUEST, FrequencyResponseRequest, NoiseAnalysis
 from ..kinds import (
     ANALYSES,
+    NOISE_FAMILY,
     AnyResult,
     DwellResult,
     NoiseResult,
     Result,
     SweepResult,
 )
-from ..model import AbstractOverlay, SimulatedChannels, Simulation, simulated_specimen
-from ..recordings import AbstractAnalysis, ProgressObserver, RecordedChannels, RecordingFacts, specimen_of
+from ..model import (
+    DRAWS,
+    AbstractOverlay,
+    DrawSource,
+    FittedShaker,
+    Simulation,
+    base_source,
+    drawn,
+    fitted_shaker,
+    says_shaker,
+    voltage_source,
+)
+from ..recordings import AbstractAnalysis, ProgressObserver, RecordingFacts, specimen_of
 from ..sine import DwellAnalysis, SweepAnalysis
 from ._measurement_analysis import UNOBSERVED, analyse
 
@@ -39,6 +51,9 @@ def overlay(
     *,
     specimen: Specimen | None = None,
     accuracy: Accuracy = Accuracy.STANDARD,
+    simulation: Simulation = Simulation.UNDER_VOLTAGE,
+    shaker: FittedShaker | None = None,
+    draws: int = DRAWS,
     stage: Stage = ignore_stage,
 ) -> AbstractOverlay[Any]:
     """Simulate what was measured and compare.
@@ -51,23 +66,52 @@ def overlay(
         The model; by default what the recording's bench configuration says is on the shaker.
     accuracy
         Of the contacts in the simulation under the recorded base motion.
+    simulation
+        What moves the model: rig and specimen together under the recorded voltage, or the specimen alone
+        under the recorded base motion. Where nothing is known of the shaker, one is fitted
+        to weak noise, and the base drives where that is not possible either: ``run.driven`` and ``run.why``
+        of the result say so.
+    shaker
+        As `fitted_shaker` found it in another recording; taken where the bench configuration describes none.
+    draws
+        How many runs of a colliding motion are made from slightly different starts under the voltage.
     stage
         Told what is being computed.
 
     Raises
     ------
     UnusableData
-        When the base motion has holes, or the simulation did not reach its end.
+        When the samples have holes, or the simulation did not reach its end.
 
     """
-    facts = analysis.facts
-    model = specimen_of(facts.bench) if specimen is None else specimen
-    stage("simulating the specimen under the recorded base motion")
-    simulated = simulated_specimen(recording, facts.measurement, model, accuracy)
-    channels = SimulatedChannels(RecordedChannels(recording), simulated)
+    model = specimen_of(analysis.facts.bench) if specimen is None else specimen
+    stage(f"simulating {simulation.value}")
+    source = _source(recording, analysis, model, accuracy, simulation, shaker, draws)
+    row = ANALYSES[analysis.excitation.kind]
+    found = drawn(source, lambda channels: row.draw(analysis, channels), row.compared(analysis))
     stage("predicting the response to sines")
-    laid: AbstractOverlay[Any] = ANALYSES[analysis.excitation.kind].simulate(analysis, channels)
+    laid: AbstractOverlay[Any] = row.lay(analysis, found)
     return laid
+
+
+def _source(
+    recording: Recording,
+    analysis: AbstractAnalysis[Any, Any],
+    model: Specimen,
+    accuracy: Accuracy,
+    simulation: Simulation,
+    shaker: FittedShaker | None,
+    draws: int,
+) -> DrawSource:
+    measurement, why = analysis.facts.measurement, ""
+    if simulation is Simulation.UNDER_VOLTAGE:
+        try:
+            if shaker is None and isinstance(analysis, NoiseAnalysis) and not says_shaker(recording):
+                shaker = fitted_shaker(recording, analysis, model)
+            return voltage_source(recording, model, None if says_shaker(recording) else shaker, draws)
+        except UnusableData as error:
+            why = str(error)
+    return base_source(recording, measurement, model, accuracy, why)
 
 
 class FailedStep(StrEnum):
@@ -134,14 +178,16 @@ class CampaignResults:
 def analyse_files(
     paths: Sequence[Path],
     name: str,
-    simulation: Simulation = Simulation.LAID_OVER,
+    simulation: Simulation = Simulation.UNDER_VOLTAGE,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
     observer: ProgressObserver = UNOBSERVED,
     specimen: Specimen | None = None,
+    draws: int = DRAWS,
 ) -> CampaignResults:
     """Analyse recordings one after the other, each with the model laid over it, as `analyse` does.
 
-    The model is the ``specimen`` given; by default what each recording's bench configuration says.
+    The model is the ``specimen`` given; by default what each recording's bench configuration says. Where one
+    describes no shaker, the shaker fitted to the weakest noise among the recordings takes its place.
 
     Raises
     ------
@@ -151,18 +197,46 @@ def analyse_files(
     """
     if not paths:
         raise NotEnoughData(f"no recording was given for {name!r}; give the paths of one or more .h5 files")
+    shaker = _shared_shaker(paths, specimen) if simulation is Simulation.UNDER_VOLTAGE else None
     results: list[AnyResult] = []
     failures: list[AnalysisFailure] = []
     for path in paths:
         try:
             with open_recording(path) as recording:
-                result, failed = result_of(recording, simulation, request, observer, specimen)
+                result, failed = result_of(
+                    recording, simulation, request, observer, specimen, shaker=shaker, draws=draws
+                )
         except (AnalysisError, RecordingError) as error:
             failures.append(AnalysisFailure(path.name, FailedStep.ANALYSIS, str(error)))
             continue
         results.append(result)
         failures.extend(failed)
     return CampaignResults(name, tuple(results), tuple(failures))
+
+
+def _shared_shaker(paths: Sequence[Path], specimen: Specimen | None) -> FittedShaker | None:
+    """Fit a shaker to the weakest noise that allows it, if any recording needs one; else None."""
+    unknown: list[tuple[float, Path]] = []
+    needed = False
+    for path in paths:
+        try:
+            with open_recording(path) as recording:
+                if says_shaker(recording):
+                    continue
+                needed = True
+                plan = recording.plan.get("excitation") or {}
+                if ANALYSES[plan["kind"]].family == NOISE_FAMILY:
+                    unknown.append((float(plan["amplitude_vpp"]), path))
+        except (RecordingError, LookupError, TypeError, ValueError, AttributeError):
+            continue  # its own analysis says what is wrong with it
+    for _, path in sorted(unknown) if needed and len(paths) > 1 else ():
+        try:
+            with open_recording(path) as recording:
+                analysis: NoiseAnalysis = analyse(recording)  # type: ignore[assignment]
+                return fitted_shaker(recording, analysis, specimen or specimen_of(recording.bench))
+        except (AnalysisError, RecordingError):
+            continue
+    return None
 
 
 def merged_results(name: str, parts: Sequence[CampaignResults]) -> CampaignResults:
@@ -176,10 +250,13 @@ def merged_results(name: str, parts: Sequence[CampaignResults]) -> CampaignResul
 
 def result_of(
     recording: Recording,
-    simulation: Simulation = Simulation.LAID_OVER,
+    simulation: Simulation = Simulation.UNDER_VOLTAGE,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
     observer: ProgressObserver = UNOBSERVED,
     specimen: Specimen | None = None,
+    *,
+    shaker: FittedShaker | None = None,
+    draws: int = DRAWS,
 ) -> tuple[AnyResult, tuple[AnalysisFailure, ...]]:
     """Analyse one recording; a simulation that fails leaves the measured result standing.
 
@@ -195,7 +272,13 @@ def result_of(
         return Result(analysis, None), ()
     try:
         laid = overlay(
-            recording, analysis, specimen=specimen, stage=lambda stage: observer.begin(name, stage)
+            recording,
+            analysis,
+            specimen=specimen,
+            simulation=simulation,
+            shaker=shaker,
+            draws=draws,
+            stage=lambda stage: observer.begin(name, stage),
         )
     except AnalysisError as error:
         return Result(analysis, None), (AnalysisFailure(name, FailedStep.SIMULATION, str(error)),)

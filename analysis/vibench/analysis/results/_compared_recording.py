@@ -2,8 +2,11 @@
 
 import pickle
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from vibench.acquisition import open_recording
 
@@ -12,7 +15,7 @@ from ..dynamics import recorded_level
 from ..errors import NotEnoughData
 from ..frequency_response import FrequencyResponseRequest
 from ..kinds import ANALYSES, AnyResult
-from ..model import Simulation
+from ..model import AbstractOverlay, Simulation
 from ..recordings import Verdict
 from ..sine import SteppedResponse, SweepResponse
 from ._campaign_results import AnalysisFailure, result_of
@@ -93,11 +96,31 @@ def drive_level(result: AnyResult) -> tuple[tuple[float, float], ...]:
             return ()
 
 
+def _of_draws(curve: Curve, laid: AbstractOverlay[Any]) -> Curve:
+    """Put the middle and the scatter of all draws in the place of the first one's values."""
+    note = f"{curve.note}; under the {laid.run.driven.value}"
+    found = laid.quantity(curve.response.value)
+    if found is None or laid.run.draws == 1:
+        return replace(curve, note=note)
+    order = np.argsort(found.frequency_hz)
+    at = np.searchsorted(found.frequency_hz[order], curve.frequency_hz)
+    place = order[np.minimum(at, order.size - 1)]
+    if not np.array_equal(found.frequency_hz[place], curve.frequency_hz):
+        return replace(curve, note=note)
+    return replace(
+        curve,
+        magnitude=found.median[place],
+        relative_sd=found.relative_sd[place],
+        note=f"median of {laid.run.draws} draws under the {laid.run.driven.value}",
+    )
+
+
 def _curves(result: AnyResult, name: str) -> Iterator[Curve]:
     curves = ANALYSES[result.kind].curves
     yield from curves(name, CurveOrigin.MEASURED, result.analysis.response)
     if result.laid is None:
         return
-    yield from curves(name, CurveOrigin.SIMULATED, result.laid.response)
+    for each in curves(name, CurveOrigin.SIMULATED, result.laid.response):
+        yield _of_draws(each, result.laid)
     if result.laid.prediction.frequency_hz.size > 1:
         yield from predicted_curves(name, result.laid.prediction)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..kinds import ANALYSES, AnyResult, Json
-from ..model import CurveDifference, SimulatedRun
+from ..model import CurveDifference, EnsembleCurve, EscapeRate, SimulatedRun
 from ..recordings import RecordingFacts
 from ._campaign_results import CampaignResults
 
@@ -25,7 +25,13 @@ def result_summary(result: AnyResult) -> Json:
         "measured": row.measured(result.analysis),
         "simulated": None
         if laid is None
-        else {**_run(laid.run), "difference": _difference(laid.difference), **row.simulated(laid)},
+        else {
+            **_run(laid.run),
+            "difference": _difference(laid.difference),
+            "ensemble": [_ensemble(each) for each in laid.ensemble],
+            "escape": None if laid.escape is None else _escape(laid.escape),
+            **row.simulated(laid),
+        },
     }
     plain: Json = _plain(document)
     return plain
@@ -65,8 +71,10 @@ def _facts(facts: RecordingFacts) -> Json:
 
 def _run(run: SimulatedRun) -> Json:
     return {
-        "drive": "recorded base motion",
-        "base_band_hz": [run.base_low_hz, run.base_high_hz],
+        "drive": run.driven.value,
+        "why": run.why,
+        "draws": run.draws,
+        "base_band_hz": run.base_band_hz,
         "accuracy": run.accuracy.value,
         "masses_kg": run.specimen.masses,
         "stiffnesses_n_per_m": run.specimen.stiffnesses,
@@ -75,6 +83,43 @@ def _run(run: SimulatedRun) -> Json:
         "gaps_m": run.specimen.gaps_m,
         "impacts": run.impacts,
         "impact_rate_hz": run.impact_rate_hz,
+    }
+
+
+def _ensemble(found: EnsembleCurve) -> Json:
+    return {
+        "quantity": found.name,
+        "agrees": found.agrees if found.compared else None,
+        "compared": found.compared,
+        "outside": found.outside,
+        "largest_z": found.largest_z,
+        "limit_z": found.limit,
+        "share_in_band": found.share_in_band,
+        "frequency_hz": found.frequency_hz,
+        "measured": found.measured,
+        "median": found.median,
+        "lower": found.lower,
+        "upper": found.upper,
+        "z": found.z,
+        "rank": found.rank,
+        "draws": found.count,
+    }
+
+
+def _escape(found: EscapeRate) -> Json:
+    low, high = found.bounds_per_s
+    return {
+        "what": found.what,
+        "runs": found.runs,
+        "ends": found.ends,
+        "measured_ended": found.measured.ended,
+        "measured_end_s": found.measured.stop_s,
+        "counted_from_s": found.from_s,
+        "events": found.events,
+        "exposure_s": found.exposure_s,
+        "per_s": found.per_s,
+        "per_s_lower": low,
+        "per_s_upper": high,
     }
 
 

@@ -9,15 +9,19 @@ from ._dwell import (
     dwell_response as dwell_response,
 )
 from ._dwell_analysis import (
+    COLUMN_HZ as COLUMN_HZ,
     DwellAnalysis as DwellAnalysis,
     DwellPlan as DwellPlan,
     bound_frequencies_hz as bound_frequencies_hz,
     measured_dwell as measured_dwell,
     settled_envelope as settled_envelope,
+    spectrum_columns as spectrum_columns,
 )
 from ._dwell_motion import (
     DwellMotion as DwellMotion,
+    IrregularMotion as IrregularMotion,
     dwell_motion as dwell_motion,
+    irregular_motion as irregular_motion,
 )
 from ._hysteresis import (
     Hysteresis as Hysteresis,

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from vibench.acquisition.plan import Dwell, HeldDwell
 from vibench.acquisition.recording import SegmentLabel
 
@@ -14,9 +16,9 @@ from ..recordings import (
     read_whole,
     specimen_of,
 )
-from ..signals import Envelope, envelope
+from ..signals import Envelope, Reals, envelope
 from ._dwell import DwellResponse, dwell_response
-from ._dwell_motion import DwellMotion
+from ._dwell_motion import DwellMotion, IrregularMotion
 from ._terminal_level import TerminalLevel
 
 DwellPlan = Dwell | HeldDwell
@@ -38,6 +40,8 @@ class DwellAnalysis(AbstractAnalysis[DwellPlan, DwellResponse]):
     """How much of the motion went to the bands of the bound modes."""
     motion: DwellMotion
     """How it repeats."""
+    irregular: IrregularMotion | None
+    """How long it did not repeat; None where all of it does."""
 
 
 def bound_frequencies_hz(facts: RecordingFacts) -> tuple[float, ...]:
@@ -73,3 +77,21 @@ def settled_envelope(response: DwellResponse) -> Envelope:
     motion = response.displacement
     start_s = motion.edge_samples / motion.sample_rate_hz
     return envelope(motion.settled, motion.sample_rate_hz, bins=_TIME_BINS, start_s=start_s)
+
+
+_HIGHEST_ORDER = 2.4
+"""A spectrum is shown up to this multiple of the drive frequency."""
+COLUMN_HZ = 1.0
+"""A spectrum is drawn as its largest line in each column of this width: a figure has no more pixels."""
+
+
+def spectrum_columns(response: DwellResponse) -> tuple[Reals, Reals]:
+    """Middle [Hz] and largest amplitude over A0 of each column of the spectrum."""
+    spectrum = response.spectrum
+    width = max(1, round(COLUMN_HZ / spectrum.spacing_hz))
+    first = max(1, round(5.0 / spectrum.spacing_hz))
+    last = round(_HIGHEST_ORDER * response.drive.frequency_hz / spectrum.spacing_hz)
+    starts = np.arange(first, last, width)
+    largest = np.maximum.reduceat(spectrum.amplitude[:last], starts)
+    middle: Reals = np.asarray((starts + 0.5 * (width - 1)) * spectrum.spacing_hz, dtype=np.float64)
+    return middle, largest / response.drive.amplitude_m

@@ -9,7 +9,7 @@ import numpy as np
 
 from vibench.acquisition.recording import SegmentLabel
 
-from ..chaos import MotionVerdict, Points, motion_verdict
+from ..chaos import MotionVerdict, Points, begin_of_last_motion, motion_verdict, shortest_period
 from ..errors import InvalidRequest, NotEnoughData
 from ..recordings import Channels, only_stretch, read_whole
 from ..signals import REACH, Quantity, Reals, converted_signal, interpolated
@@ -121,17 +121,45 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
         When samples were lost inside the dwell.
 
     """
+    section = _section(channels, response)
+    verdict = motion_verdict(_points(section, response, channels.sample_rate_hz), section.drive_hz)
+    return DwellMotion(section, verdict)
+
+
+@dataclass(frozen=True)
+class IrregularMotion:
+    """Motion of a dwell that does not repeat, from the dwell's first clear period on."""
+
+    start_s: float
+    stop_s: float
+    """From the dwell's first sample."""
+    ended: bool
+    """Whether a motion that repeats followed it."""
+
+
+def irregular_motion(channels: Channels, response: DwellResponse) -> IrregularMotion | None:
+    """Say how long the motion of a dwell did not repeat; None where all of it does."""
+    section = _section(channels, response)
+    points = _points(section, response, channels.sample_rate_hz)
+    begin = begin_of_last_motion(points)
+    last = Points(points.value[begin:], points.noise)
+    repeats = shortest_period(last) is not None
+    if repeats and begin == 0:
+        return None
+    start_s, stop_s = float(section.time_s[0]), float(section.time_s[begin if repeats else -1])
+    return IrregularMotion(start_s, stop_s, repeats)
+
+
+def _section(channels: Channels, response: DwellResponse) -> Section:
     stretch = only_stretch(channels, SegmentLabel.DWELL)
     drive, _, velocity = read_whole(channels, stretch)
-    section = stroboscope(
+    return stroboscope(
         drive,
         velocity,
         channels.sample_rate_hz,
         near_hz=response.drive.frequency_hz,
         delay_s=channels.response_delay_s,
     )
-    verdict = motion_verdict(_points(section, response, channels.sample_rate_hz), section.drive_hz)
-    return DwellMotion(section, verdict)
 
 
 def _points(section: Section, response: DwellResponse, sample_rate_hz: float) -> Points:

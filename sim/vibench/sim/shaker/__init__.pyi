@@ -8,3 +8,8 @@ from ._parts import (
     Amplifier as Amplifier,
     Shaker as Shaker,
 )
+from ._sampled_voltage import (
+    DrivenTable as DrivenTable,
+    SampledMotion as SampledMotion,
+    follow_voltage as follow_voltage,
+)

@@ -1,0 +1,244 @@
+"""Draws of a recording: rig and specimen under its voltage, from slightly different starts."""
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import islice
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from vibench.acquisition.plan import Measurement
+from vibench.acquisition.recording import Recording
+from vibench.sim import Accuracy, Specimen
+from vibench.sim.shaker import MotionFailed, follow_voltage
+
+from ..errors import UnusableData
+from ..recordings import BASE, RESPONSE, RecordedChannels
+from ..signals import Reals
+from ._channel_noise import ChannelNoise, channel_noise
+from ._driven_rig import Driven, DrivenRig, driven_rig, recorded_voltage
+from ._ensemble import FEWEST_DRAWS, Quantity, ensemble_curves
+from ._escape import Ending
+from ._shaker_fit import FittedShaker
+from ._simulated_channels import (
+    HIGHEST_PART,
+    LOWEST_PART,
+    SimulatedChannels,
+    lowest_frequency_hz,
+    under_base_motion,
+)
+
+DRAWS = 16
+"""Of a colliding motion: its band of 95 % is then known to a fifth of its width."""
+DRAWS_WITHOUT_IMPACTS = 8
+"""Of one that never collides, whose draws differ by noise and clocks alone."""
+START_M = 5e-9
+"""Standard deviation of each mass' place at the start."""
+CLOCK_TOLERANCE = 50e-6
+"""Of the converter's clock, relative: what NI 9234 and its kind promise. It shifts resonances."""
+_MORE = 3
+_SEED = 17
+_MOST_BYTES = 2e9
+"""That the draws under way at a time may take."""
+_BYTES_PER_SAMPLE = 80
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedRun:
+    """What was simulated beside a recording, in numbers."""
+
+    specimen: Specimen
+    driven: Driven
+    accuracy: Accuracy
+    """Of the contacts under a recorded base motion; under a voltage they are resolved as standard."""
+    base_band_hz: tuple[float, float] | None
+    """Band of the base displacement that drove; None under a voltage."""
+    draws: int
+    impacts: float
+    """Contacts that began inside the parts that were analysed, mean over the draws."""
+    played_s: float
+    why: str = ""
+    """Why the recorded voltage did not drive, where it could not; else what is to be known of the rig."""
+
+    @property
+    def impact_rate_hz(self) -> float:
+        """Impacts per second."""
+        return self.impacts / self.played_s if self.played_s else 0.0
+
+
+R = TypeVar("R")
+
+
+@dataclass(frozen=True, eq=False)
+class Draw(Generic[R]):
+    """One draw, through the estimator of the recording."""
+
+    response: R
+    quantities: tuple[Quantity, ...]
+    endings: tuple[Ending, ...]
+    impacts: float
+    played_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn(Generic[R]):
+    """All draws; of the first its whole estimate, of the others what is compared."""
+
+    run: SimulatedRun
+    response: R
+    quantities: tuple[tuple[Quantity, ...], ...]
+    endings: tuple[tuple[Ending, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class DrawSource:
+    """Where draws come from: each number gives the same one every time."""
+
+    specimen: Specimen
+    driven: Driven
+    accuracy: Accuracy
+    base_band_hz: tuple[float, float] | None
+    most: int
+    why: str
+    channels: Callable[[int], SimulatedChannels]
+
+
+def voltage_source(
+    recording: Recording,
+    specimen: Specimen,
+    fitted: FittedShaker | None = None,
+    draws: int = DRAWS,
+) -> DrawSource:
+    """Let the recorded voltage move rig and specimen together.
+
+    Parameters
+    ----------
+    recording
+        Whose bench configuration describes the rig.
+    fitted
+        A shaker to take instead of the described one; each draw takes another of its uncertainty.
+    draws
+        How many, at most.
+
+    Raises
+    ------
+    UnusableData
+        When samples were lost, or nothing is known of the shaker.
+
+    """
+    rig = driven_rig(recording, specimen, None if fitted is None else fitted.shaker)
+    volts = recorded_voltage(recording, rig)
+    noise = channel_noise(recording, (rig.role, BASE, RESPONSE))
+    return DrawSource(
+        specimen=specimen,
+        driven=rig.driven,
+        accuracy=Accuracy.STANDARD,
+        base_band_hz=None,
+        most=draws,
+        why="" if fitted is None else fitted.sentence,
+        channels=partial(_drawn_channels, RecordedChannels(recording), rig, fitted, volts, noise),
+    )
+
+
+def base_source(
+    recording: Recording, measurement: Measurement, specimen: Specimen, accuracy: Accuracy, why: str = ""
+) -> DrawSource:
+    """Let the recorded base motion shake the specimen: one draw, for linear and coherent motion."""
+    channels = under_base_motion(recording, measurement, specimen, accuracy)
+    rate = recording.sample_rate_hz
+    band = LOWEST_PART * lowest_frequency_hz(measurement), HIGHEST_PART * rate
+    return DrawSource(specimen, Driven.BASE, accuracy, band, 1, why, lambda _: channels)
+
+
+def drawn(
+    source: DrawSource, estimate: Callable[[SimulatedChannels], Draw[R]], measured: Sequence[Quantity]
+) -> Drawn[R]:
+    """Estimate from every draw what was estimated from the recording.
+
+    Where most of what was ``measured`` is of a kind of motion that few draws come to, up to three times as
+    many are made.
+
+    Raises
+    ------
+    UnusableData
+        When a simulation did not reach its end.
+
+    """
+    channels = source.channels(0)
+    first = estimate(channels)
+    samples = channels.samples
+    del channels
+    workers = max(1, min(os.cpu_count() or 1, int(_MOST_BYTES / (_BYTES_PER_SAMPLE * samples))))
+    others = source.most if first.impacts else min(source.most, DRAWS_WITHOUT_IMPACTS)
+    found = [_without_response(first)]
+    with ThreadPoolExecutor(workers) as pool:
+        # No more than are computed at a time wait with their whole estimates.
+        numbers = _numbers(others, others if source.most == 1 else _MORE * others, found, measured)
+        while batch := list(islice(numbers, workers)):
+            found += pool.map(lambda number: _without_response(estimate(source.channels(number))), batch)
+    run = SimulatedRun(
+        specimen=source.specimen,
+        driven=source.driven,
+        accuracy=source.accuracy,
+        base_band_hz=source.base_band_hz,
+        draws=len(found),
+        impacts=float(np.mean([each.impacts for each in found])),
+        played_s=first.played_s,
+        why=source.why,
+    )
+    return Drawn(
+        run, first.response, tuple(each.quantities for each in found), tuple(each.endings for each in found)
+    )
+
+
+def _numbers(usual: int, most: int, found: list[Draw[None]], measured: Sequence[Quantity]) -> Iterator[int]:
+    """Yield the numbers of the draws that are still to be made."""
+    for number in range(1, most):
+        if number >= usual:
+            curves = ensemble_curves(measured, [each.quantities for each in found])
+            count = np.concatenate([each.count for each in curves])
+            if np.median(count) >= FEWEST_DRAWS:
+                return
+        yield number
+
+
+def _without_response(draw: Draw[R]) -> Draw[None]:
+    return Draw(None, draw.quantities, draw.endings, draw.impacts, draw.played_s)
+
+
+def _drawn_channels(
+    recorded: RecordedChannels,
+    rig: DrivenRig,
+    fitted: FittedShaker | None,
+    volts: Reals,
+    noise: ChannelNoise,
+    number: int,
+) -> SimulatedChannels:
+    rng = np.random.default_rng([_SEED, number])
+    recording, rate = recorded.recording, recorded.sample_rate_hz
+    table = rig.table if fitted is None else replace(rig.table, shaker=fitted.drawn(rng))
+    try:
+        motion = follow_voltage(
+            table,
+            volts,
+            rate * (1 + CLOCK_TOLERANCE * rng.uniform(-1.0, 1.0)),
+            start=np.concatenate([START_M * rng.standard_normal(3), np.zeros(3)]),
+            noise_rms_v=noise.converter_v * abs(recording.channel(rig.role).physical_per_volt),
+            seed=int(rng.integers(2**32)),
+        )
+    except MotionFailed as error:
+        raise UnusableData(f"the simulation under the {rig.driven.value} ended: {error}") from error
+    base, velocity = (
+        seen + noise.rms[role] * rng.standard_normal(seen.size)
+        for role, seen in ((BASE, motion.base_acceleration), (RESPONSE, motion.m0_velocity))
+    )
+    return SimulatedChannels(
+        recorded,
+        velocity,
+        (motion.impact_times_s, motion.impacts.astype(np.float64)),
+        recorded.response_delay_s,
+        base,
+    )

@@ -1,0 +1,80 @@
+"""Agreement has a meaning: limits are passed as often as they say, bands hold, ranks are even."""
+
+import numpy as np
+import pytest
+from scipy.stats import chisquare
+
+from vibench.analysis.model import Ending, EnsembleCurve, Quantity, escape_rate, z_limit
+from vibench.analysis.model._ensemble import ensemble_curves
+
+FREQUENCY_HZ = np.arange(40.0) + 100.0
+
+
+def curve(rng, draws, points, shift=0.0, scatter=0.1):
+    values = np.exp(scatter * rng.standard_normal((draws + 1, points)))
+    return EnsembleCurve("q", FREQUENCY_HZ[:points], values[0] * np.exp(shift), values[1:])
+
+
+@pytest.mark.parametrize(("draws", "points"), [(5, 1), (16, 1), (16, 40), (8, 40)])
+def test_an_agreeing_twin_passes_its_limit_in_one_case_of_a_hundred(draws, points):
+    rng = np.random.default_rng(1)
+    trials = 3000
+    outside = sum(not curve(rng, draws, points).agrees for _ in range(trials))
+    # 30 expected, sd 5.5; shared draws make lines a little dependent.
+    assert 12 <= outside <= 50
+
+
+def test_the_band_holds_a_further_draw_as_often_as_it_says():
+    rng = np.random.default_rng(2)
+    held = np.mean([curve(rng, 16, 40).share_in_band for _ in range(400)])
+    assert held == pytest.approx(0.95, abs=0.006)
+
+
+def test_ranks_of_a_further_draw_are_even():
+    rng = np.random.default_rng(3)
+    ranks = [int(curve(rng, 9, 1).rank[0]) for _ in range(4000)]
+    assert chisquare(np.bincount(ranks, minlength=10)).pvalue > 0.001
+
+
+def test_a_displaced_measurement_lies_outside():
+    found = curve(np.random.default_rng(4), 16, 40, shift=1.0)
+    assert not found.agrees
+    assert found.largest_z > z_limit(40) > z_limit(1) == pytest.approx(2.576, abs=1e-3)
+    assert "outside" in found.sentence
+
+
+def test_only_motions_of_one_kind_are_compared():
+    rng = np.random.default_rng(5)
+    kinds = np.array([[1, 0]] * 4 + [[0, 0]] * 12)
+    draws = [(Quantity("q", FREQUENCY_HZ[:2], np.exp(0.1 * rng.standard_normal(2)), kind),) for kind in kinds]
+    measured = Quantity("q", FREQUENCY_HZ[:2], np.ones(2), np.array([1, 0]))
+    (found,) = ensemble_curves([measured], draws)
+    assert found.count.tolist() == [4, 16]
+    assert found.compared == 1
+    assert np.isnan(found.z[0])
+    assert np.isfinite(found.z[1])
+
+
+def test_a_rate_of_escape_covers_the_true_one():
+    rng = np.random.default_rng(6)
+    per_s, record_s, trials = 0.2, 12.0, 1500
+    covered = told = 0
+    for _ in range(trials):
+        lives = rng.exponential(1 / per_s, 17)
+        runs = [Ending("collisions", 0.0, min(life, record_s), life < record_s) for life in lives]
+        found = escape_rate(runs[:1], [(each,) for each in runs[1:]])
+        if found is None:
+            continue
+        told += 1
+        low, high = found.bounds_per_s
+        covered += low <= per_s <= high
+    assert told > 0.99 * trials
+    # Exact bounds of a count are wide where it is small.
+    assert 0.94 <= covered / told <= 0.99
+
+
+def test_an_end_that_all_runs_share_is_an_edge_and_no_chance():
+    runs = [Ending("collisions", 0.0, 60.0 + 0.05 * k, ended=True) for k in range(17)]
+    assert escape_rate(runs[:1], [(each,) for each in runs[1:]]) is None
+    lasting = [Ending("collisions", 0.0, 90.0, ended=False)] * 17
+    assert escape_rate(lasting[:1], [(each,) for each in lasting[1:]]) is None

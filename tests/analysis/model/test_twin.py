@@ -1,0 +1,133 @@
+"""Rig and specimen under the recorded voltage, over recordings of the virtual rig."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import open_bench, open_recording, run_measurement
+from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise
+from vibench.acquisition.rig import load_rig
+from vibench.analysis import Simulation, analyse, result_summary
+from vibench.analysis.figures import dwells_figure
+from vibench.analysis.kinds import Result
+from vibench.analysis.model import Driven, fitted_shaker
+from vibench.analysis.results import overlay
+from vibench.sim import gong2025
+
+RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
+NOISE = MultisineNoise(
+    amplitude_vpp=0.05,
+    band_start_hz=50,
+    band_stop_hz=600,
+    repetition_hz=2,
+    realisations=3,
+    periods=2,
+    settle_s=1.5,
+)
+DWELL = Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=1.0, duration_s=2.5)
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory):
+    """Weak noise and a chaotic dwell at 25.6 kS/s."""
+    folder = tmp_path_factory.mktemp("twin")
+    rig = RIG.model_copy(update={"daq": RIG.daq.model_copy(update={"sample_rate_hz": 25_600.0})})
+    with open_bench(rig) as bench:
+        for name, excitation in (("noise", NOISE), ("dwell", DWELL)):
+            plan = Measurement(name=name, excitation=excitation, ramp_s=0.3)
+            run_measurement(bench, plan, folder / f"{name}.h5")
+    return folder
+
+
+def laid(path, **how):
+    with open_recording(path) as recording:
+        analysis = analyse(recording)
+        return Result(analysis, overlay(recording, analysis, **how))
+
+
+@pytest.fixture(scope="module")
+def chaotic(recordings):
+    return laid(recordings / "dwell.h5")
+
+
+def test_a_chaotic_dwell_is_one_of_its_draws(chaotic):
+    run = chaotic.laid.run
+    assert (run.driven, run.draws) == (Driven.AMPLIFIER, 16)
+    assert run.impact_rate_hz > 300
+    assert all(each.compared == 1 and each.agrees for each in chaotic.laid.ensemble)
+
+
+def test_under_the_base_motion_the_same_dwell_is_told_as_one_run_without_a_place(recordings, chaotic):
+    base = laid(recordings / "dwell.h5", simulation=Simulation.UNDER_BASE).laid
+    assert (base.run.driven, base.run.draws) == (Driven.BASE, 1)
+    assert all(not each.compared for each in base.ensemble)
+    # The recorded base does not yield: the response at the drive is far below the measured one.
+    assert base.response.response_ii < chaotic.laid.quantity("Response II").lower[0]
+
+
+def test_another_gap_lies_outside_the_draws(recordings):
+    found = laid(recordings / "dwell.h5", specimen=gong2025(gap_m=60e-6)).laid
+    assert not found.quantity("Response II").agrees
+
+
+def test_weak_noise_agrees_on_every_line(recordings):
+    found = laid(recordings / "noise.h5").laid
+    assert found.run.draws == 8
+    assert found.quantity("transmission").agrees
+    assert found.difference.rms_db < 0.05
+
+
+def test_json_and_figures_hold_the_draws(chaotic):
+    said = json.loads(json.dumps(result_summary(chaotic)))["simulated"]
+    assert said["drive"] == "recorded amplifier voltage"
+    assert [each["quantity"] for each in said["ensemble"][:2]] == ["Response I", "Response II"]
+    assert all(abs(each["z"][0]) <= each["limit_z"] for each in said["ensemble"])
+    drawn = dwells_figure([(chaotic.analysis, chaotic.laid)])
+    assert "16 draws" in drawn.caption
+    assert "95 % of 16 draws" in [each.get_label() for each in drawn.figure.axes[2].collections]
+
+
+def test_a_shaker_is_found_from_weak_noise_within_its_bounds(recordings):
+    with open_recording(recordings / "noise.h5") as recording:
+        found = fitted_shaker(recording, analyse(recording), gong2025())
+    assert found.chi2 < 2
+    for name, true in (
+        ("moving_mass_kg", 0.127),
+        ("suspension_stiffness_n_per_m", 9932),
+        ("suspension_damping_ns_per_m", 21.51),
+        ("force_constant_n_per_a", 6.78),
+        ("coil_resistance_ohm", 2.6),
+    ):
+        ratio = np.log(getattr(found.shaker, name) / true)
+        assert abs(ratio) < 4 * found.relative_sd[name]
+
+
+def unsaid(recording):
+    """The same recording of a bench that says nothing of its shaker."""
+    bench = {key: value for key, value in recording.bench.items() if key != "shaker"}
+    return replace(recording, bench=bench)
+
+
+def test_noise_of_an_unknown_shaker_is_laid_under_the_fitted_one(recordings):
+    with open_recording(recordings / "noise.h5") as recording:
+        analysis = analyse(unsaid(recording))
+        found = overlay(unsaid(recording), analysis)
+    assert found.run.driven is Driven.AMPLIFIER
+    assert "fitted to" in found.run.why
+    assert found.quantity("transmission").agrees
+
+
+def test_a_dwell_of_an_unknown_shaker_says_why_the_base_drives_it(recordings):
+    with open_recording(recordings / "dwell.h5") as recording:
+        analysis = analyse(unsaid(recording))
+        found = overlay(unsaid(recording), analysis)
+        with open_recording(recordings / "noise.h5") as noise:
+            shaker = fitted_shaker(noise, analyse(noise), gong2025())
+        driven = overlay(unsaid(recording), analysis, shaker=shaker)
+    assert found.run.driven is Driven.BASE
+    assert "describes no shaker" in found.run.why
+    assert driven.run.driven is Driven.AMPLIFIER
+    assert driven.quantity("Response II").agrees

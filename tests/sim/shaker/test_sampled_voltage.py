@@ -1,0 +1,100 @@
+"""Rig and specimen under a sampled voltage: closed forms at any rate, no seams, sensors, chance."""
+
+import numpy as np
+import pytest
+
+from vibench.sim import base_transmissibility, gong2025
+from vibench.sim.shaker import Amplifier, DrivenTable, Shaker, follow_voltage
+
+SHAKER = Shaker(
+    moving_mass_kg=0.127,
+    suspension_stiffness_n_per_m=9932.0,
+    suspension_damping_ns_per_m=21.51,
+    force_constant_n_per_a=6.78,
+    coil_resistance_ohm=2.6,
+    coil_inductance_h=1e-4,
+)
+SPECIMEN = gong2025()
+TABLE = DrivenTable(Amplifier(), SHAKER, SPECIMEN)
+
+
+def base_per_volt(frequency_hz):
+    """Base acceleration per volt with the specimen's mass on the table: Beranek's coupled equations."""
+    s = 2j * np.pi * frequency_hz
+    moved = base_transmissibility(SPECIMEN, frequency_hz)[:, :3] @ np.array(SPECIMEN.masses)
+    dynamic = (
+        SHAKER.suspension_stiffness_n_per_m
+        + SHAKER.suspension_damping_ns_per_m * s
+        + (SHAKER.moving_mass_kg + moved) * s**2
+    )
+    impedance = SHAKER.coil_resistance_ohm + SHAKER.coil_inductance_h * s
+    force_constant = SHAKER.force_constant_n_per_a
+    return s**2 * force_constant / (impedance * dynamic + s * force_constant**2)
+
+
+def complex_tones(samples, rate_hz, frequencies_hz):
+    """Least-squares amplitudes of the last second; time goes as exp(+i w t) from the first sample."""
+    count = round(rate_hz)
+    time_s = (np.arange(samples.size) / rate_hz)[-count:]
+    waves = np.exp(2j * np.pi * np.outer(time_s, frequencies_hz))
+    weights, *_ = np.linalg.lstsq(np.hstack([waves.real, -waves.imag]), samples[-count:])
+    return weights[: len(frequencies_hz)] + 1j * weights[len(frequencies_hz) :]
+
+
+@pytest.mark.parametrize("rate_hz", [5120.0, 44_100.0])
+def test_weak_tones_come_out_as_the_closed_form_says_in_size_and_phase(rate_hz):
+    tones_hz = np.array([60.0, 94.0, 201.0, 310.0, 520.0])
+    time_s = np.arange(round(7 * rate_hz)) / rate_hz
+    volts = 1e-3 * np.sum(np.cos(2 * np.pi * np.outer(tones_hz, time_s)), axis=0)
+    motion = follow_voltage(TABLE, volts, rate_hz)
+    base = complex_tones(motion.base_acceleration[: -round(rate_hz)], rate_hz, tones_hz)
+    m0 = complex_tones(motion.m0_velocity[: -round(rate_hz)], rate_hz, tones_hz)
+    expected = 1e-3 * base_per_volt(tones_hz)
+    np.testing.assert_allclose(base, expected, rtol=2e-4)
+    through = base_transmissibility(SPECIMEN, tones_hz)[:, 0] / (2j * np.pi * tones_hz)
+    np.testing.assert_allclose(m0, expected * through, rtol=2e-4)
+    assert motion.impacts[-1] == 0
+
+
+def test_a_long_recording_is_followed_in_pieces_without_a_seam():
+    rate_hz = 44_100.0
+    time_s = np.arange(300_000) / rate_hz
+    volts = 1e-2 * np.cos(2 * np.pi * 150.0 * time_s) * (1 - np.exp(-(time_s**3)))
+    motion = follow_voltage(TABLE, volts, rate_hz)
+    # What a slow sine leaves at its sixth difference is nothing; a seam of 1e-7 of it would stand out.
+    rough = np.abs(np.diff(motion.base_acceleration[5000:-5000], 6))
+    assert rough.max() < 1e-5 * np.abs(motion.base_acceleration).max()
+
+
+def test_sensors_are_seen_through():
+    rate_hz, tone_hz = 12_800.0, np.array([150.0])
+    time_s = np.arange(round(5 * rate_hz)) / rate_hz
+    volts = 1e-3 * np.cos(2 * np.pi * tone_hz[0] * time_s)
+    late = DrivenTable(
+        Amplifier(),
+        SHAKER,
+        SPECIMEN,
+        m0_sensor=lambda f: np.exp(-2j * np.pi * f * 1e-4),
+        base_low_cut_hz=20.0,
+    )
+    plain, seen = (follow_voltage(each, volts, rate_hz) for each in (TABLE, late))
+    m0 = [complex_tones(each.m0_velocity[:-6400], rate_hz, tone_hz)[0] for each in (plain, seen)]
+    base = [complex_tones(each.base_acceleration[:-6400], rate_hz, tone_hz)[0] for each in (plain, seen)]
+    assert np.angle(m0[1] / m0[0]) == pytest.approx(-2 * np.pi * 150 * 1e-4, abs=1e-4)
+    assert base[1] / base[0] == pytest.approx(150j / (150j + 20), rel=1e-3)
+
+
+def test_impacts_are_counted_where_they_happen_and_a_nanometre_leads_elsewhere():
+    rate_hz = 51_200.0
+    time_s = np.arange(round(2 * rate_hz)) / rate_hz
+    volts = 2.5 * np.cos(2 * np.pi * 260 * time_s) * (time_s > 1.0)
+    one, same, other = (
+        follow_voltage(TABLE, volts, rate_hz, start=(start, 0, 0, 0, 0, 0), noise_rms_v=1e-6, seed=3)
+        for start in (0.0, 0.0, 1e-9)
+    )
+    assert one.impacts_between(0.0, 1.0) == 0
+    assert one.impacts_between(1.0, 2.0) == one.impacts[-1] > 200
+    np.testing.assert_array_equal(one.m0_velocity, same.m0_velocity)
+    apart = np.abs(one.m0_velocity - other.m0_velocity)
+    assert apart[: round(rate_hz)].max() < 1e-5
+    assert apart[-round(0.3 * rate_hz) :].max() > 1e-2
