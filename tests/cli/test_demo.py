@@ -28,7 +28,7 @@ pytestmark = pytest.mark.timeout(400)
 @pytest.fixture(scope="module")
 def demo(vibench, tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo")
-    result = vibench("demo", "--out", "demo", cwd=folder, timeout_s=390)
+    result = vibench("demo", "--draws", "5", "--out", "demo", cwd=folder, timeout_s=390)
     assert result.returncode == 0, result.stderr
     assert str(folder / "demo" / "report.html") in result.stdout.replace("\n", "")
     return folder / "demo"
@@ -73,7 +73,15 @@ def test_the_linear_transmission_is_the_exact_one_within_tight_bounds_of_its_own
     assert np.max(measured.half_width) < 0.03
 
 
-def test_the_collision_region_is_where_the_simulation_of_the_recorded_base_motion_has_it(results):
+def test_every_measurement_is_one_of_the_draws_of_its_twin(results):
+    for name, found in results.items():
+        said = found["simulated"]
+        assert said["drive"] == "recorded amplifier voltage", name
+        assert [each["quantity"] for each in said["ensemble"] if each["agrees"] is False] == [], name
+    assert results["sweep_moderate"]["simulated"]["escape"]["what"] == "collisions"
+
+
+def test_the_collision_region_begins_where_its_twin_has_it(results):
     sweep = results["sweep_moderate"]
     (measured,) = sweep["measured"]["collision_regions"]
     (simulated,) = sweep["simulated"]["collision_regions"]

@@ -11,20 +11,22 @@ import numpy as np
 
 from vibench.acquisition import follow_parent
 from vibench.analysis import CampaignResults, analyse_files, merged_results
-from vibench.sim import Accuracy, Harmonic, Sampled, follow_samples, gong2025, steady_response
+from vibench.sim import Accuracy, Harmonic, gong2025, steady_response
+from vibench.sim.shaker import Amplifier, DrivenTable, Shaker, follow_voltage
 
 
 class Analyst:
     """Takes recordings as they are finished, and gives their results in the same order."""
 
-    def __init__(self, pool: ProcessPoolExecutor, name: str) -> None:
+    def __init__(self, pool: ProcessPoolExecutor, name: str, draws: int) -> None:
         self._pool = pool
+        self._draws = draws
         self._name = name
         self._parts: list[Future[CampaignResults]] = []
 
     def take(self, recording: Path) -> None:
         """Analyse this one next."""
-        self._parts.append(self._pool.submit(analyse_files, [recording], self._name))
+        self._parts.append(self._pool.submit(analyse_files, [recording], self._name, draws=self._draws))
 
     @property
     def asked(self) -> int:
@@ -42,13 +44,13 @@ class Analyst:
 
 
 @contextmanager
-def second_process(name: str) -> Iterator[Analyst]:
+def second_process(name: str, draws: int) -> Iterator[Analyst]:
     """Keep an analyst at work while inside; what it has not begun when an error leaves is dropped."""
     # A fresh interpreter: a fork would copy the threads' locks of the instrument libraries.
     pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_follow)
     pool.submit(_compile)
     try:
-        yield Analyst(pool, name)
+        yield Analyst(pool, name, draws)
     finally:
         pool.shutdown(cancel_futures=True)
 
@@ -57,7 +59,8 @@ def _compile() -> None:
     """Have the simulation compiled while the first measurement runs."""
     specimen = gong2025()
     steady_response(specimen, Harmonic(260.0, 5e-6), Accuracy.QUICK, duration_s=0.2, window_s=0.1)
-    follow_samples(specimen, Sampled(np.zeros(100), 51_200.0))
+    table = Shaker(0.1, 1e4, 20.0, 5.0, 2.0, 1e-4)
+    follow_voltage(DrivenTable(Amplifier(), table, specimen), np.zeros(100), 51_200.0)
 
 
 def _follow() -> None:

@@ -9,7 +9,7 @@ from vibench.acquisition import load_campaign, shipped
 from vibench.acquisition.campaign import PointOutcome, PointResult
 from vibench.acquisition.engine import CampaignRequest
 from vibench.acquisition.rig import load_rig
-from vibench.analysis import campaign_summary
+from vibench.analysis import DRAWS, FEWEST_DRAWS, campaign_summary
 from vibench.analysis.report import write_report
 
 from .analyse import complain_about
@@ -25,6 +25,10 @@ def demo(
         Path | None,
         typer.Option("--out", metavar="DIR", help="New folder for everything; vibench_demo if absent."),
     ] = None,
+    draws: Annotated[
+        int,
+        typer.Option(metavar="N", min=FEWEST_DRAWS, help="Runs of each test's simulation, from near starts."),
+    ] = DRAWS,
 ) -> None:
     """Run the paper's experiment on the virtual rig: measure, analyse, simulate, and write a report."""
     folder = unused(Path("vibench_demo")) if out is None else out
@@ -33,7 +37,7 @@ def demo(
         "The experiment of Gong et al. (2025), section 5, on a virtual rig. The first time, the simulation\n"
         "is compiled: it starts slowly and then runs many times faster than real time.\n"
     )
-    with second_process(campaign.name) as analyst:
+    with second_process(campaign.name, draws) as analyst:
 
         def recorded(point_result: PointResult) -> None:
             if point_result.outcome is PointOutcome.RECORDED:

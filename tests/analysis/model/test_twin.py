@@ -25,7 +25,7 @@ NOISE = MultisineNoise(
     repetition_hz=2,
     realisations=3,
     periods=2,
-    settle_s=1.5,
+    settle_s=1.0,
 )
 DWELL = Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=1.0, duration_s=2.5)
 
@@ -69,7 +69,7 @@ def test_under_the_base_motion_the_same_dwell_is_told_as_one_run_without_a_place
 
 
 def test_another_gap_lies_outside_the_draws(recordings):
-    found = laid(recordings / "dwell.h5", specimen=gong2025(gap_m=60e-6)).laid
+    found = laid(recordings / "dwell.h5", specimen=gong2025(gap_m=60e-6), draws=6).laid
     assert not found.quantity("Response II").agrees
 
 
@@ -114,7 +114,7 @@ def unsaid(recording):
 def test_noise_of_an_unknown_shaker_is_laid_under_the_fitted_one(recordings):
     with open_recording(recordings / "noise.h5") as recording:
         analysis = analyse(unsaid(recording))
-        found = overlay(unsaid(recording), analysis)
+        found = overlay(unsaid(recording), analysis, draws=5)
     assert found.run.driven is Driven.AMPLIFIER
     assert "fitted to" in found.run.why
     assert found.quantity("transmission").agrees
@@ -126,7 +126,7 @@ def test_a_dwell_of_an_unknown_shaker_says_why_the_base_drives_it(recordings):
         found = overlay(unsaid(recording), analysis)
         with open_recording(recordings / "noise.h5") as noise:
             shaker = fitted_shaker(noise, analyse(noise), gong2025())
-        driven = overlay(unsaid(recording), analysis, shaker=shaker)
+        driven = overlay(unsaid(recording), analysis, shaker=shaker, draws=6)
     assert found.run.driven is Driven.BASE
     assert "describes no shaker" in found.run.why
     assert driven.run.driven is Driven.AMPLIFIER

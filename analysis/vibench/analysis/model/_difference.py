@@ -35,7 +35,8 @@ class CurveDifference:
     @property
     def share_within_two(self) -> float:
         """Part of the points within two standard errors; 0.95 when nothing but the stated scatter differs."""
-        return float(np.mean(np.abs(self.standard_errors) <= 2))
+        known = self.standard_errors[~np.isnan(self.standard_errors)]
+        return float(np.mean(np.abs(known) <= 2)) if known.size else np.nan
 
 
 def logarithmic_difference(

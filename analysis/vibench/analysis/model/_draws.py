@@ -16,7 +16,7 @@ from vibench.sim import Accuracy, Specimen
 from vibench.sim.shaker import MotionFailed, follow_voltage
 
 from ..errors import UnusableData
-from ..recordings import BASE, RESPONSE, RecordedChannels
+from ..recordings import BASE, DRIVE, RESPONSE, RecordedChannels
 from ..signals import Reals
 from ._channel_noise import ChannelNoise, channel_noise
 from ._driven_rig import Driven, DrivenRig, driven_rig, recorded_voltage
@@ -131,6 +131,7 @@ def voltage_source(
     """
     rig = driven_rig(recording, specimen, None if fitted is None else fitted.shaker)
     volts = recorded_voltage(recording, rig)
+    drive_v = volts if rig.role == DRIVE else recording.read(DRIVE)
     noise = channel_noise(recording, (rig.role, BASE, RESPONSE))
     return DrawSource(
         specimen=specimen,
@@ -139,7 +140,7 @@ def voltage_source(
         base_band_hz=None,
         most=draws,
         why="" if fitted is None else fitted.sentence,
-        channels=partial(_drawn_channels, RecordedChannels(recording), rig, fitted, volts, noise),
+        channels=partial(_drawn_channels, RecordedChannels(recording), rig, fitted, volts, drive_v, noise),
     )
 
 
@@ -214,6 +215,7 @@ def _drawn_channels(
     rig: DrivenRig,
     fitted: FittedShaker | None,
     volts: Reals,
+    drive_v: Reals,
     noise: ChannelNoise,
     number: int,
 ) -> SimulatedChannels:
@@ -241,4 +243,5 @@ def _drawn_channels(
         (motion.impact_times_s, motion.impacts.astype(np.float64)),
         recorded.response_delay_s,
         base,
+        drive_v,
     )

@@ -9,13 +9,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.stats import norm, t
+import scipy
 
 from ..signals import Integers, Reals
 
 AGREEMENT = 0.99
 """Share of agreeing twins that the limit lets pass, whatever the number of values compared."""
 BAND = 0.95
+MIXED = -1
+"""State of a value that holds some of either motion: it is not compared."""
 FEWEST_DRAWS = 5
 """Of one kind of motion, below which a value is not compared: two draws more than a mean and a scatter."""
 
@@ -89,9 +91,9 @@ class EnsembleCurve:
             deviate = (np.log(self.measured) - self._mean) / (
                 self.relative_sd * np.sqrt(1 + 1 / np.maximum(self.count, 1))
             )
-            tail = t.logsf(np.abs(deviate), np.maximum(self.count - 1, 1))
+            tail = scipy.stats.t.logsf(np.abs(deviate), np.maximum(self.count - 1, 1))
         # Beyond 1e-300 nothing is told apart.
-        found = np.sign(deviate) * norm.isf(np.exp(np.maximum(tail, -690.0)))
+        found = np.sign(deviate) * scipy.stats.norm.isf(np.exp(np.maximum(tail, -690.0)))
         return np.where(self._is_compared, found, np.nan)
 
     @property
@@ -161,7 +163,7 @@ class EnsembleCurve:
     @cached_property
     def _reach(self) -> Reals:
         count = np.maximum(self.count, 2)
-        reach = t.ppf(0.5 + 0.5 * BAND, count - 1) * self.relative_sd * np.sqrt(1 + 1 / count)
+        reach = scipy.stats.t.ppf(0.5 + 0.5 * BAND, count - 1) * self.relative_sd * np.sqrt(1 + 1 / count)
         return np.where(self.count >= FEWEST_DRAWS, reach, np.nan)
 
     @cached_property
@@ -173,7 +175,7 @@ class EnsembleCurve:
 
 def z_limit(values: int) -> float:
     """Largest |z| in 99 % of all cases among so many independent normal deviates."""
-    return float(norm.isf(0.5 * (1 - AGREEMENT ** (1 / max(values, 1)))))
+    return float(scipy.stats.norm.isf(0.5 * (1 - AGREEMENT ** (1 / max(values, 1)))))
 
 
 def ensemble_curves(
@@ -194,7 +196,8 @@ def _alike(measured: Quantity, drawn: Quantity) -> Reals:
         return np.full(measured.value.shape, np.nan)
     if measured.state is None or drawn.state is None:
         return drawn.value
-    return np.where(measured.state == drawn.state, drawn.value, np.nan)
+    alike = (measured.state == drawn.state) & (measured.state != MIXED)
+    return np.where(alike, drawn.value, np.nan)
 
 
 def _over_draws(values: Reals, reduce: object) -> Reals:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 _ONE_EDGE_S = 2.0
 """Ends that all lie within this are one edge, as near as an end can be told."""
@@ -50,8 +50,8 @@ class EscapeRate:
     @property
     def bounds_per_s(self) -> tuple[float, float]:
         """Exact 95 % bounds of a Poisson rate (Garwood 1936)."""
-        low = float(chi2.ppf(0.025, 2 * self.events)) if self.events else 0.0
-        high = float(chi2.ppf(0.975, 2 * self.events + 2))
+        low = float(scipy.stats.chi2.ppf(0.025, 2 * self.events)) if self.events else 0.0
+        high = float(scipy.stats.chi2.ppf(0.975, 2 * self.events + 2))
         return low / (2 * self.exposure_s), high / (2 * self.exposure_s)
 
     @property

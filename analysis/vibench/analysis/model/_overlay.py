@@ -28,7 +28,7 @@ from ..sine import (
 )
 from ._difference import CurveDifference, logarithmic_difference
 from ._draws import Drawn, SimulatedRun
-from ._ensemble import EnsembleCurve, Quantity, ensemble_curves
+from ._ensemble import MIXED, EnsembleCurve, Quantity, ensemble_curves
 from ._escape import Ending, EscapeRate, escape_rate
 from ._prediction import ResponsePrediction, paper_amplitude_m, predicted
 
@@ -180,9 +180,19 @@ def _sine_difference(
     return _difference(drawn, quantity, sd, (np.atleast_1d(simulated.response_ii), sd_simulated))
 
 
+_EDGE_S = 1.0
+"""How near the edge of a stretch of collisions a sweep's intervals are not compared."""
+
+
 def sweep_quantities(response: SweepResponse, found: Collisions) -> tuple[Quantity, ...]:
-    """Give what a draw of a sweep is compared by: where one collides and another does not, nothing."""
+    """Give what a draw of a sweep is compared by: where one collides and another does not, nothing.
+
+    Nor within a second of an edge, where an interval holds some of either motion.
+    """
     state = found.is_colliding.astype(np.int64)
+    reach = max(1, round(_EDGE_S / response.interval_s))
+    for edge in np.flatnonzero(np.diff(found.is_colliding)):
+        state[max(0, edge + 1 - reach) : edge + 1 + reach] = MIXED
     return (
         Quantity(RESPONSE_I, response.frequency_hz, response.response_i, state),
         Quantity(RESPONSE_II, response.frequency_hz, response.response_ii, state),

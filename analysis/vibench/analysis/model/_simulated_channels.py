@@ -12,7 +12,7 @@ from vibench.acquisition.recording import Recording
 from vibench.sim import Accuracy, Sampled, Specimen, follow_samples
 
 from ..errors import UnusableData
-from ..recordings import BASE, RecordedChannels, Stretch
+from ..recordings import BASE, DRIVE, RecordedChannels, Stretch
 from ..signals import Flags, Integers, Quantity, Reals, converted_signal
 
 LOWEST_PART = 0.25
@@ -106,8 +106,10 @@ class SimulatedChannels:
     """Times since the first sample [s], and contacts begun up to them."""
     response_delay_s: float
     """By how much the response channel lags the base channel."""
-    base_acceleration: Reals | None = None
-    """Where the table was simulated too, shape (samples,) [m/s2]; None where the recorded base drove."""
+    base_acceleration: Reals
+    """Of the simulated table, or as it was recorded where that drove, shape (samples,) [m/s2]."""
+    drive_v: Reals
+    """As it was recorded, shape (samples,) [V]."""
 
     @property
     def sample_rate_hz(self) -> float:
@@ -124,12 +126,8 @@ class SimulatedChannels:
         return self.recorded.stretches(label)
 
     def read(self, start: int, stop: int) -> Reals:
-        """Give the recorded drive, base acceleration and simulated velocity, shape (3, samples)."""
-        data = self.recorded.read(start, stop)
-        if self.base_acceleration is not None:
-            data[1] = self.base_acceleration[start:stop]
-        data[2] = self.velocity[start:stop]
-        return data
+        """Give drive, base acceleration and simulated velocity, shape (3, samples)."""
+        return np.stack([each[start:stop] for each in (self.drive_v, self.base_acceleration, self.velocity)])
 
     def overloaded(self, start: int, stop: int) -> Flags:
         """Where the recording was overloaded: what is compared must rest on the same samples."""
@@ -165,7 +163,14 @@ def under_base_motion(
     velocity, impacts = shaken(specimen, base.displacement_m, base.sample_rate_hz, accuracy)
     counted = np.arange(impacts.size) / base.sample_rate_hz, impacts.astype(np.float64)
     # The simulated response has no delay; the recorded base may have one.
-    return SimulatedChannels(RecordedChannels(recording), velocity, counted, -base.delay_s)
+    return SimulatedChannels(
+        RecordedChannels(recording),
+        velocity,
+        counted,
+        -base.delay_s,
+        recording.read(BASE),
+        recording.read(DRIVE),
+    )
 
 
 def shaken(

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import lfilter
 
 from ..model import Specimen
 from ._loaded_shaker import LoadedShaker
@@ -181,7 +181,7 @@ def _coupled(values: FloatArray, cut: float) -> FloatArray:
         return values
     half_turn = np.tan(np.pi * cut)
     weights = np.array([1.0, -1.0]) / (1 + half_turn)
-    return np.asarray(lfilter(weights, [1.0, -(1 - half_turn) / (1 + half_turn)], values))
+    return np.asarray(scipy.signal.lfilter(weights, [1.0, -(1 - half_turn) / (1 + half_turn)], values))
 
 
 def _frequencies(samples: int, sample_rate_hz: float) -> FloatArray:
