@@ -1,15 +1,24 @@
 """The virtual rig alone, for programs that know nothing of vibench."""
 
 import os
+import re
 import signal
+import socket
 import subprocess
 import sys
+import time
+from contextlib import closing
 from pathlib import Path
 
 import grpc
 import nidaqmx
 import pytest
+import pyvisa
 from nidaqmx import GrpcSessionOptions
+from nidaqmx.constants import AcquisitionType
+
+from vibench.acquisition.drivers import AFG1022X
+from vibench.acquisition.rig import load_rig
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """
@@ -29,13 +38,20 @@ manager.close()
 """
 
 
+def free_port():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        return taken.getsockname()[1]
+
+
 @pytest.fixture
 def served():
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    arguments = [sys.executable, "-u", "-m", "vibench.cli", "serve-rig", "--address", "127.0.0.1:0"]
+    options = ("--address", "127.0.0.1:0", "--scpi-port", str(free_port()))
+    arguments = [sys.executable, "-u", "-m", "vibench.cli", "serve-rig", *options]
     with subprocess.Popen(arguments, env=environment, stdout=subprocess.PIPE, text=True) as server:
         said = ""
-        while "SOCKET" not in said:
+        while "write_termination" not in said:
             line = server.stdout.readline()
             assert line, f"the server ended after saying {said!r}"
             said += line
@@ -62,3 +78,37 @@ def test_other_programs_set_its_generator_and_read_its_converter(served):
         volts = task.read(5120)
     # 0.2 Vpp at the generator, behind a divider by 2.
     assert max(volts) == pytest.approx(0.05, rel=0.01)
+
+
+def test_the_hint_for_a_socket_works_when_it_is_pasted(served):
+    (hint,) = re.findall(r"ResourceManager.*SOCKET.*", served)
+    with closing(eval(hint, {"ResourceManager": pyvisa.ResourceManager})) as generator:
+        assert generator.query("*IDN?").startswith("TEKTRONIX,AFG1022")
+        # A block without a length ends with its line on a stream.
+        generator.write_raw(b"DATA:DATA EMEM,#0abcd\n")
+        assert generator.query("*IDN?").startswith("TEKTRONIX,AFG1022")
+
+
+def test_our_own_driver_speaks_to_the_socket(served):
+    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    (resource,) = set(re.findall(r"TCPIP0::[\w.:]+::SOCKET", served))
+    config = rig.generator.model_copy(update={"resource": resource})
+    generator = AFG1022X.open(config)
+    generator.load_sine(200.0, 0.1)
+    generator.start()
+    generator.stop()
+    generator.close()
+
+
+def test_time_passes_when_nobody_looks(served):
+    address = served.split('insecure_channel("')[1].split('"')[0]
+    with (
+        grpc.insecure_channel(address) as channel,
+        nidaqmx.Task(grpc_options=GrpcSessionOptions(channel, "")) as task,
+    ):
+        task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0", min_val=-5, max_val=5)
+        task.timing.cfg_samp_clk_timing(51200, sample_mode=AcquisitionType.CONTINUOUS)
+        task.start()
+        begun_s = time.monotonic()
+        task.read(25600, timeout=20.0)
+        assert time.monotonic() - begun_s > 0.4

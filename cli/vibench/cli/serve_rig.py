@@ -2,6 +2,7 @@
 
 import signal
 import threading
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -14,6 +15,13 @@ from .output import bold, console
 from .paths import FaultsPath, rig_at
 
 
+class ServedPace(StrEnum):
+    """How fast a served rig's time passes."""
+
+    WALL = "wall"
+    FREE = "free"
+
+
 def serve_rig(
     bench: Annotated[
         Path | None, typer.Option("--bench", metavar="BENCH.toml", help="A rig with a table 'virtual'.")
@@ -24,13 +32,24 @@ def serve_rig(
             "--address", metavar="HOST:PORT", help="Where to listen; beyond this computer, with a token."
         ),
     ] = "127.0.0.1:31763",
+    scpi_port: Annotated[
+        int,
+        typer.Option("--scpi-port", metavar="N", help="Of the generator as a socket; 0 takes a free one."),
+    ] = 0,
+    pace: Annotated[
+        ServedPace,
+        typer.Option("--pace", help="Rig time by the clock, or as fast as somebody samples."),
+    ] = ServedPace.WALL,
     faults: FaultsPath = None,
 ) -> None:
     """Serve the virtual rig to any pyvisa and nidaqmx program until Ctrl-C."""
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    with VirtualRig(rig_at(bench, faults), address, disk=DiskFaults.REFUSED) as rig:
+    served = rig_at(bench, faults)
+    if served.virtual is not None:
+        served = served.model_copy(update={"virtual": served.virtual.model_copy(update={"pace": pace.value})})
+    with VirtualRig(served, address, scpi_port=scpi_port, disk=DiskFaults.REFUSED) as rig:
         console.print(bold(rig.rig.name), "is on. Stop it with Ctrl-C.\n")
         console.print("The converter, for nidaqmx:")
         console.print(f'  grpc.insecure_channel("{rig.daq_address}")  # GrpcSessionOptions(channel, "")')
@@ -40,7 +59,12 @@ def serve_rig(
         )
         console.print(f'  ResourceManager("@py").open_resource("{rig.visa_resource}")')
         console.print("The generator, for any other VISA program:")
-        console.print(f"  {rig.socket_resource}")
+        console.print(f"  {rig.socket_resource}, every line ended by a newline; in Python:")
+        console.print(
+            f'  ResourceManager("@py").open_resource("{rig.socket_resource}", '
+            'read_termination="\\n", write_termination="\\n")',
+            soft_wrap=True,
+        )
         if rig.token is not None:
             console.print("\nOther computers can reach it; it lets in whoever has the token:")
             console.print(

@@ -532,3 +532,46 @@ def test_a_spoiled_file_is_read_or_refused_but_never_crashes(known, tmp_path, su
         except AnalysisError:
             refused += 1
     assert 0 < refused < 80
+
+
+@pytest.mark.parametrize(("said", "found"), [("", "simulated"), ('origin = "simulated"\n', "simulated")])
+def test_simulated_samples_stay_simulated_on_their_way_through_a_universal_file(known, tmp_path, said, found):
+    path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
+    head = said + DWELL.replace("sample_rate_hz = 8000.0\n", "").replace("settle_s = 1,", "settle_s = 0,")
+    recording, _ = imported(path, mapping(tmp_path, ("1", "m0_velocity", ""), head=head))
+    assert recording.origin.value == found
+
+
+def test_a_mapping_that_calls_simulated_samples_real_is_refused(known, tmp_path):
+    path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
+    head = 'origin = "real"\n' + DWELL.replace("sample_rate_hz = 8000.0\n", "").replace("= 1,", "= 0,")
+    with pytest.raises(InvalidRequest, match=r"says origin = 'real', and a\.uff that it is simulated"):
+        import_recording(path, mapping(tmp_path, ("1", "m0_velocity", ""), head=head), tmp_path / "b.h5")
+
+
+def test_a_text_that_announces_more_numbers_than_it_holds_is_refused_at_once(known, tmp_path):
+    path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=0.01), Format.UFF, tmp_path / "a.uff")
+    lines = path.read_bytes().split(b"\n")
+    place = next(n for n, line in enumerate(lines) if line.startswith(b"    58b"))
+    lines[place] = b"    58"
+    lines[place + 7] = lines[place + 7][:10] + b"   2508876" + lines[place + 7][20:]
+    numbers = b"\n".join(b"%20.11E" % each for each in range(42))
+    path.write_bytes(b"\n".join(lines[: place + 12]) + b"\n" + numbers + b"\n    -1\n")
+    with pytest.raises(UnusableData, match=r"announces 2508876 numbers, and has room for \d+"):
+        with opened_source(path):
+            pass
+
+
+def test_a_frequency_response_in_text_is_no_channel_and_no_damage(known, tmp_path):
+    path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=0.01), Format.UFF, tmp_path / "a.uff")
+    before = path.read_bytes()
+    lines = before.split(b"\n")
+    place = next(n for n, line in enumerate(lines) if line.startswith(b"    58b"))
+    response = [b"    58", *lines[place + 1 : place + 12]]
+    response[6] = b"%5d" % 4 + response[6][5:]
+    response[7] = b"%10d%10d" % (6, 3) + response[7][20:]
+    response[8] = b"%10d" % 18 + response[8][10:]
+    numbers = [b"".join(b"%20.11E" % each for each in row) for row in ((1, 0, 2, 0), (3, 0))]
+    path.write_bytes(before + b"\n".join([b"    -1", *response, *numbers, b"    -1", b""]))
+    with opened_source(path) as source:
+        assert [each.name for each in source.channels] == ["1"]

@@ -8,6 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from vibench.acquisition.recording import Origin
 from vibench.sim.hdf5_files import UnsafeHdf5, open_hdf5, walk
 
 from ..errors import UnusableData
@@ -111,13 +112,20 @@ def _channel(dataset: h5py.Dataset, name: str, samples: int) -> SourceChannel:
         label=name.rsplit("/", 1)[-1],
         unit=unit,
         step=scale if is_exact else None,
+        origin=_origin(dataset.file),
     )
+
+
+def _origin(file: h5py.File) -> Origin | None:
+    """Read what a recording, or a file made of one, says of itself."""
+    said = _text(file, "origin") if "origin" in file.attrs else ""
+    return Origin(said) if said in set(Origin) else None
 
 
 def _number(dataset: h5py.Dataset, name: str, otherwise: float) -> float:
     return float(np.ravel(dataset.attrs[name])[0]) if name in dataset.attrs else otherwise
 
 
-def _text(dataset: h5py.Dataset, name: str) -> str:
-    value = np.ravel(dataset.attrs[name])[0]
+def _text(item: h5py.HLObject, name: str) -> str:
+    value = np.ravel(item.attrs[name])[0]
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)

@@ -19,6 +19,7 @@ from vibench.acquisition import Block, Overload
 from vibench.acquisition.plan import AbstractExcitation, Segment, Step
 from vibench.acquisition.recording import (
     ChannelHeader,
+    Origin,
     RecordingHeader,
     RecordingState,
     RecordingWriter,
@@ -157,7 +158,7 @@ def import_recording(
             channels=tuple(_header(source, each, samples) for each in wanted),
             sample_rate_hz=rate,
             expected_samples=samples,
-            origin=mapping.origin,
+            origin=_origin(wanted, mapping, path),
             plan_json=mapping.measurement.model_dump_json(),
             bench_json=json.dumps(_bench(path, mapping, wanted)),
             confirmations=mapping.confirmations,
@@ -175,6 +176,17 @@ def import_recording(
             out.unlink(missing_ok=True)
             raise
         return writer.finish(RecordingState.COMPLETE, f"imported from {path.name}")
+
+
+def _origin(wanted: tuple[_Wanted, ...], mapping: ImportMapping, path: Path) -> Origin:
+    """One simulated channel makes a recording that nobody has measured."""
+    told = {each.source.origin for each in wanted if each.source.origin is not None}
+    if mapping.origin is not None and told - {mapping.origin}:
+        raise InvalidRequest(
+            f"the mapping says origin = {mapping.origin.value!r}, and {path.name} that it is "
+            f"{' and '.join(sorted(told))}; leave origin out of the mapping, or import another file"
+        )
+    return Origin.SIMULATED if Origin.SIMULATED in {*told, mapping.origin} else Origin.REAL
 
 
 def _common_length(wanted: Sequence[_Wanted], path: Path) -> int:

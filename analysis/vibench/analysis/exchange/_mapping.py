@@ -95,7 +95,8 @@ class ImportMapping(FrozenModel):
     """When it was measured, with its time zone: ``2026-03-01T12:00:00Z``."""
     sample_rate_hz: PositiveFloat | None = None
     """Needed where the file does not say it exactly: HDF5, universal files."""
-    origin: Origin = Origin.REAL
+    origin: Origin | None = None
+    """``"real"`` or ``"simulated"``; as the file says where it is left out, and real if that is silent."""
     measurement: Measurement
     """What was played, as in a campaign; a name, an excitation, notes."""
     begins_s: NonNegativeFloat = 0.0

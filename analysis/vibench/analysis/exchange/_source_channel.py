@@ -6,6 +6,8 @@ A table held in memory as a source: what formats give that cannot be read in str
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from vibench.acquisition.recording import Origin
+
 from ..signals import Reals
 
 
@@ -23,6 +25,8 @@ class SourceChannel:
     unit: str = ""
     step: float | None = None
     """Distance of neighbouring values when they come from integers, so that they are kept exactly."""
+    origin: Origin | None = None
+    """Whether it was measured or simulated; None when the file does not say."""
     full_scale: float | None = None
     """Largest value the file can hold, where that is the converter's range."""
 

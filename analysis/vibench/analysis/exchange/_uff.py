@@ -24,7 +24,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.acquisition.recording import ChannelHeader
+from vibench.acquisition.recording import ChannelHeader, Origin
 
 from ..errors import UnusableData
 from ..signals import Reals
@@ -48,6 +48,7 @@ QUANTITIES = {
 MONTHS = ("JAN", "FEB", "MAR", "APR", "MAY", "JUN", "JUL", "AUG", "SEP", "OCT", "NOV", "DEC")
 ID_WIDTH = 80
 RATE = re.compile(r"\bsample_rate_hz=(\S+)")
+ORIGIN = re.compile(rf"\borigin=({'|'.join(Origin)})\b")
 
 
 def id_line(text: str) -> str:
@@ -55,15 +56,21 @@ def id_line(text: str) -> str:
     return f"{text.strip() or 'NONE':<{ID_WIDTH}.{ID_WIDTH}}"
 
 
-def rate_line(sample_rate_hz: float, first_sample: int) -> str:
-    """Write what the increment of time cannot hold: every digit of the sample rate."""
-    return f"sample_rate_hz={sample_rate_hz!r} first_sample={first_sample}"
+def rate_line(sample_rate_hz: float, first_sample: int, origin: Origin) -> str:
+    """Write what the increment of time cannot hold, every digit of the sample rate, and the origin."""
+    return f"sample_rate_hz={sample_rate_hz!r} first_sample={first_sample} origin={origin.value}"
 
 
 def exact_rate_hz(line: str) -> float | None:
     """Read back what :func:`rate_line` wrote; None when somebody else wrote the line."""
     found = RATE.search(line)
     return None if found is None else float(found[1])
+
+
+def told_origin(line: str) -> Origin | None:
+    """Read back the origin that :func:`rate_line` wrote; None when somebody else wrote the line."""
+    found = ORIGIN.search(line)
+    return None if found is None else Origin(found[1])
 
 
 SI_UNITS = (
@@ -101,7 +108,7 @@ def _header(excerpt: Excerpt, channel: ChannelHeader, number: int) -> Iterator[s
     yield id_line(f"{excerpt.name} {recording.recording_id}")
     yield id_line(_date(recording.started_utc))
     yield id_line(str(recording.plan.get("name", "")))
-    yield id_line(rate_line(rate, excerpt.start))
+    yield id_line(rate_line(rate, excerpt.start, recording.origin))
     point = f" {'NONE':<10}{number:10d}{SCALAR:4d} {'NONE':<10}{0:10d}{0:4d}"
     yield f"{TIME_RESPONSE:5d}{number:10d}{0:5d}{0:10d}{point}"
     times = f"{excerpt.start / rate:13.5E}{1 / rate:13.5E}{0:13.5E}"
@@ -122,6 +129,8 @@ def _date(started_utc: str) -> str:
 
 
 HEADER_LINES = 11
+LEAST_TEXT = 2
+"""Characters of a number in free text: a digit and what divides it from the next."""
 IEEE = 2
 BYTE_ORDERS = {1: "<", 2: ">"}
 WIDTHS = {REAL_SINGLE: 13, REAL_DOUBLE: 20}
@@ -211,6 +220,8 @@ def _body(file: BinaryIO, kind: str, header: list[str]) -> _Body | None:
     else:
         order = 0
         _skip_text(file)
+        if (most := (file.tell() - offset) // LEAST_TEXT) < count:
+            raise ValueError(f"it announces {count} numbers, and has room for {most}; export it again")
     is_time = int(header[5][:5]) in TIME_FUNCTIONS and int(header[7][:10]) in {0, TIME_AXIS}
     if not is_time or ordinate not in SIZES or spacing != EVENLY_SPACED or count < 2:
         return None
@@ -242,6 +253,7 @@ def _channel(number: int, header: list[str]) -> SourceChannel:
         samples=int(header[6][10:20]),
         label="" if label == "NONE" else label,
         sample_rate_hz=rates[0] if rates else None,
+        origin=next(filter(None, map(told_origin, header[:5])), None),
         unit=header[8][46:66].strip().removesuffix("NONE"),
     )
 

@@ -47,10 +47,11 @@ def block_length(data: bytes, start: int) -> int | None:
     return 2 + digits + int(number)
 
 
-def _marks(data: bytes) -> Iterator[tuple[int, int]]:
+def _marks(data: bytes, ends_blocks: int | None = None) -> Iterator[tuple[int, int]]:
     """Yield (position, byte) of every separator, comma and newline outside quotes and blocks.
 
-    Stops early, without a mark, at a block or string whose end has not arrived yet.
+    Stops early, without a mark, at a block or string whose end has not arrived yet. A block of indefinite
+    length goes on to the end, or to a byte: a stream has no other sign for the end of its message.
     """
     position = 0
     while position < len(data):
@@ -62,6 +63,9 @@ def _marks(data: bytes) -> Iterator[tuple[int, int]]:
             position = end + 1
         elif byte == BLOCK:
             length = block_length(data, position)
+            if ends_blocks is not None and data[position + 1 : position + 2] == b"0":
+                found = data.find(ends_blocks, position)
+                length = None if found < 0 else found - position
             if length is None or position + length > len(data):
                 return
             position += length
@@ -74,10 +78,10 @@ def _marks(data: bytes) -> Iterator[tuple[int, int]]:
 def message_end(data: bytes) -> int | None:
     """Return where the first complete message in a byte stream ends (after its newline), or None.
 
-    A newline inside a quoted string or a binary block does not end a message: an uploaded
-    waveform may well contain the byte 0x0A.
+    A newline inside a quoted string or a binary block does not end a message: an uploaded waveform may
+    well contain the byte 0x0A. One of indefinite length ends at the first newline: nothing else ends it here.
     """
-    for position, byte in _marks(data):
+    for position, byte in _marks(data, ends_blocks=NEWLINE):
         if byte == NEWLINE:
             return position + 1
     return None

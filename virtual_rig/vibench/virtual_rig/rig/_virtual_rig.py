@@ -48,6 +48,8 @@ class VirtualRig:
     quirks, panel
         Habits of the generator's firmware, and what only its front panel can set: a load that is told
         to be 50 ohm there, and cannot be set remotely, doubles the voltage at the amplifier.
+    scpi_port
+        Of `socket_resource`; 0 takes a free one.
     disk
         Whether a script of faults may trouble the recordings that this process makes.
 
@@ -60,12 +62,14 @@ class VirtualRig:
         *,
         quirks: Quirks = Quirks(),  # noqa: B008 - frozen
         panel: Panel = Panel(),  # noqa: B008 - frozen
+        scpi_port: int = 0,
         disk: DiskFaults = DiskFaults.PLAYED,
     ) -> None:
         virtual = virtual_section(rig)
         self._script = _script(virtual, disk)
         self.rig = rig
         self._address = address
+        self._scpi_port = scpi_port
         self.token = token_for(address)
         """What calls from other computers must carry; None on loopback."""
         self._pace = _pace(virtual)
@@ -121,7 +125,7 @@ class VirtualRig:
             plug_in(self._usb)
             starting.callback(unplug, self._usb)
             daq = starting.enter_context(self._serve())
-            socket = starting.enter_context(ScpiSocket(self.generator))
+            socket = starting.enter_context(self._socket())
             disk = DiskTrouble(lambda: self.let_pass(REFUSED_S))
             starting.enter_context(troubled_disks(disk))
             play = FaultPlay(self.world, RigFaults(self.world, self.generator, self._usb, daq, disk))
@@ -136,6 +140,14 @@ class VirtualRig:
         running, self._running = self._running, None
         if running is not None:
             running.closing.close()
+
+    def _socket(self) -> ScpiSocket:
+        try:
+            return ScpiSocket(self.generator, self._scpi_port)
+        except (OSError, OverflowError) as error:
+            raise ConfigurationError(
+                f"port {self._scpi_port} cannot be listened on ({error}); give another, or 0 for a free one"
+            ) from error
 
     def _serve(self) -> DaqServer:
         return serve(
