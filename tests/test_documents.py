@@ -42,6 +42,7 @@ FACES_WITH_AN_EXAMPLE = [
     "vibench.analysis.live",
     "vibench.analysis.report",
     "vibench.analysis.dynamics",
+    "vibench.analysis.hidden_motion",
     "vibench.analysis.exchange",
     "vibench.analysis.simulation",
     "vibench.analysis.reproduction",

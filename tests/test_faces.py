@@ -27,6 +27,7 @@ FOR_PEOPLE = (
     "vibench.analysis.live",
     "vibench.analysis.report",
     "vibench.analysis.dynamics",
+    "vibench.analysis.hidden_motion",
     "vibench.analysis.exchange",
 )
 FOR_OUR_PROGRAMS = (

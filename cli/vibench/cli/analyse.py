@@ -1,6 +1,6 @@
 """`vibench analyse`: a recording, or a folder of them, becomes figures, tables and a report."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -8,10 +8,11 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition import save_toml
+from vibench.acquisition import open_recording, save_toml
 from vibench.analysis import (
     DRAWS,
     FEWEST_DRAWS,
+    AnalysisError,
     AnalysisFailure,
     CampaignResults,
     Estimator,
@@ -30,7 +31,9 @@ from vibench.analysis import (
     update_model,
 )
 from vibench.analysis.dynamics import BranchDiagram, read_diagram
+from vibench.analysis.hidden_motion import HiddenMotion, hidden_motion
 from vibench.analysis.report import write_report
+from vibench.sim import Specimen
 
 from .external_data import AllowExternal, external_data
 from .output import bold, console, print_json
@@ -82,6 +85,13 @@ def analyse(
         typer.Option(
             "--fit",
             help="Fit damping, frequencies and gap to the recordings first, and lay that specimen over them.",
+        ),
+    ] = False,
+    hidden: Annotated[
+        bool,
+        typer.Option(
+            "--hidden",
+            help="Tell the hidden motion of m1 too: p between its stops, impacts, gaps, m1 and contact law.",
         ),
     ] = False,
     specimen: SpecimenOption = None,
@@ -177,6 +187,7 @@ def analyse(
             diagrams,
             (simulation, draws),
             fit=fit,
+            hidden=hidden,
             specimen=specimen,
             as_json=as_json,
         )
@@ -190,6 +201,7 @@ def _analyse(
     simulated: tuple[Simulation, int],
     *,
     fit: bool,
+    hidden: bool,
     specimen: str | None,
     as_json: bool,
 ) -> None:
@@ -208,20 +220,36 @@ def _analyse(
         if specimen is not None:
             laid = described(specimen).specimen()
         results = analyse_files(paths, name, simulation, request, observer, laid, draws)
+        motions = list(hidden_motions(results, laid, observer)) if hidden else []
     if updated is not None:
         results = replace(results, model_said=updated.sentences)
     if as_json:
         fitted = {} if updated is None else {"specimen_fit": updated.to_dict()}
-        print_json({**campaign_summary(results), **fitted})
-    for sentence in () if as_json else results.model_said:
+        told = {"hidden_motion": {each.name: each.to_dict() for each in motions}} if hidden else {}
+        print_json({**campaign_summary(results), **fitted, **told})
+    for sentence in (
+        () if as_json else (*results.model_said, *(s for each in motions for s in each.sentences))
+    ):
         console.print(sentence)
     if results.results and has_report:
-        report = write_report(results, unused(folder / "report.html"), folder / "figures", diagrams)
+        report = write_report(results, unused(folder / "report.html"), folder / "figures", diagrams, motions)
         if updated is not None:
             save_toml(updated.description, unused(folder / "specimen.toml"))
         if not as_json:
             console.print("The report:", bold(report.resolve()))
     complain_about(results)
+
+
+def hidden_motions(
+    results: CampaignResults, specimen: Specimen | None, observer: ProgressObserver
+) -> Iterator[HiddenMotion]:
+    """Tell the hidden motion of each recording with a result; says on standard error where there is none."""
+    for facts in results.facts:
+        with open_recording(facts.path) as recording:
+            try:
+                yield hidden_motion(recording, specimen, observer=observer)
+            except AnalysisError as error:
+                typer.echo(f"error: {facts.name}: no hidden motion: {error}", err=True)
 
 
 def fitted_to(paths: Sequence[Path], name: str, observer: ProgressObserver) -> UpdatedSpecimen:

@@ -1,7 +1,7 @@
 """Writing the report of a campaign, or of one recording, as one self-contained HTML file."""
 
 import base64
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -13,7 +13,8 @@ from vibench.acquisition.plan import excitation_text
 
 from ..dynamics import BranchDiagram
 from ..errors import NotEnoughData
-from ..figures import DrawnFigure
+from ..figures import DrawnFigure, hidden_impacts_figure, hidden_motion_figure
+from ..hidden_motion import HiddenMotion
 from ..kinds import AnyResult
 from ..recordings import Verdict
 from ..results import AnalysisFailure, CampaignResults
@@ -71,6 +72,7 @@ def write_report(
     path: Path,
     figures_folder: Path | None = None,
     diagrams: Sequence[BranchDiagram] = (),
+    hidden: Sequence[HiddenMotion] = (),
 ) -> Path:
     """Write one HTML file with all figures inside; an older report of that name is replaced.
 
@@ -84,6 +86,8 @@ def write_report(
         Where PNG, SVG and CSV of each figure go beside it; None writes none.
     diagrams
         Branches that are laid over the stepped sines and sweeps.
+    hidden
+        Hidden motions; each stands with the recording whose name it has.
 
     Raises
     ------
@@ -96,7 +100,8 @@ def write_report(
     numbers = iter(range(1, 1000))
     found = [_embedded(next(numbers), each, figures_folder) for each in result_figures(results)]
     found += [_embedded(next(numbers), each, figures_folder) for each in laid_branches(results, diagrams)]
-    sections = [_section(each, numbers, figures_folder) for each in results.results]
+    motions = {each.name: each for each in hidden}
+    sections = [_section(each, motions, numbers, figures_folder) for each in results.results]
     page = _environment().get_template("report.html.j2")
     text = page.render(
         name=results.name,
@@ -139,13 +144,18 @@ def _embedded(number: int, drawn: DrawnFigure, folder: Path | None) -> EmbeddedF
     return EmbeddedFigure(number, drawn.title, drawn.caption, source)
 
 
-def _section(result: AnyResult, numbers: Iterator[int], folder: Path | None) -> RecordingSection:
+def _section(
+    result: AnyResult, motions: Mapping[str, HiddenMotion], numbers: Iterator[int], folder: Path | None
+) -> RecordingSection:
     facts = result.analysis.facts
+    drawn = list(recording_figures(result))
+    if facts.name in motions:
+        drawn += [draw(motions[facts.name]) for draw in (hidden_motion_figure, hidden_impacts_figure)]
     return RecordingSection(
         name=facts.name,
         measured=measured_rows(facts),
         checks=check_rows(result.analysis.checks),
-        figures=tuple(_embedded(next(numbers), each, folder) for each in recording_figures(result)),
+        figures=tuple(_embedded(next(numbers), each, folder) for each in drawn),
     )
 
 

@@ -1,0 +1,33 @@
+from ._collisions import (
+    Collisions as Collisions,
+)
+from ._contact_free import (
+    FreeGap as FreeGap,
+    FreeImpacts as FreeImpacts,
+    FreeMotion as FreeMotion,
+    measured_gaps as measured_gaps,
+)
+from ._found_parameters import (
+    FoundParameter as FoundParameter,
+    FoundSpecimen as FoundSpecimen,
+)
+from ._hidden_motion import (
+    HiddenMotion as HiddenMotion,
+    Numbers as Numbers,
+    TrackedMotion as TrackedMotion,
+    hidden_motion as hidden_motion,
+    hidden_motion_in_samples as hidden_motion_in_samples,
+    parameter_rows as parameter_rows,
+)
+from ._parameters import (
+    Hidden as Hidden,
+)
+from ._prepared_motion import (
+    ChannelNoise as ChannelNoise,
+)
+from ._tracking import (
+    NotFollowed as NotFollowed,
+)
+from ._tracking_model import (
+    TrackedSpecimen as TrackedSpecimen,
+)

@@ -1,0 +1,323 @@
+"""Motion, impacts, gaps, m1 and c1 without a contact model: what holds whatever the stops are."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import NotEnoughData
+from ..signals import Flags, Reals
+from ._filtering import MotionModel, motion_model, run_filter
+from ._latent_force import LatentMotion, latent_motion, latent_start
+from ._parameters import PRIOR_SD, Hidden, value_of, with_values
+from ._prepared_motion import PreparedMotion
+from ._tracking_model import TrackedSpecimen
+
+_BLOCK_S, _OVERLAP_S = 0.12, 0.02
+_MISFIT = 3.0
+"""Mean squared innovation beyond which a block is not believed."""
+_INERTIAL = (Hidden.M1, Hidden.C1)
+_SHARES = (0.1, 0.03, 0.01, 0.004)
+"""Closed shares, one after the other, while m1 and c1 are fitted: the first bear an m1 that is 5 % off."""
+_FIT_STRETCH_S = 0.12
+_FIT_STRETCHES = 4
+_LARGEST_RESIDUAL = 5.0
+_RESIDUAL_START_S = 4e-3
+_STEPS = {Hidden.M1: 1e-4, Hidden.C1: 1e-2}
+_LEAST_OF_MEDIAN = 0.07
+"""An impulse below this part of the usual one is not told from what is left of its neighbours."""
+_LEAST_P_OF_MEDIAN = 0.9
+"""A force this much nearer to the middle than the usual impact of its side comes from no stop."""
+_DEPTH_POWER = 0.8
+"""Depth of a Hertz collision over its impulse: d ~ v^(4/5), and J ~ v."""
+_LAW_UNKNOWN = 0.15
+"""Of the mean depth: what another law would change in a gap."""
+_FEWEST_IMPACTS = 8
+_HUBER, _HUBER_ROUNDS, _LEAST_SCATTER_M = 2.0, 20, 1e-12
+_WORST_SCATTER_OF_GAP = 0.1
+"""Scatter of |p| at the impacts of a block, of the gap, beyond which its p is not believed."""
+
+
+@dataclass(frozen=True, eq=False)
+class FreeImpacts:
+    """Impacts told by the force that the channels need, one row each."""
+
+    samples: Reals
+    """Middle of the contact, in samples of the motion."""
+    sides: Reals
+    """-1 at the lower stop, +1 at the upper one."""
+    impulses: Reals
+    """On m1, as a magnitude [N s]."""
+    p: Reals
+    """Relative displacement in the middle of the contact [m]."""
+    p_sd: Reals
+    rate_before: Reals
+    rate_after: Reals
+    """Of p, carried from the flights on either side to the middle of the contact, as speeds towards and away
+    from the stop [m/s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class FreeMotion:
+    """A whole motion without a contact model."""
+
+    p: Reals
+    """[m], NaN where it could not be told; shape (samples,)."""
+    p_sd: Reals
+    impacts: FreeImpacts
+    share_told: float
+
+
+def free_motion(
+    model: MotionModel, motion: PreparedMotion, on_sample: Callable[[int], None] = lambda _sample: None
+) -> FreeMotion:
+    """Tell the motion of m1 against m2 from the channels and the specimen's linear numbers alone."""
+    p, sd = np.full(motion.samples, np.nan), np.full(motion.samples, np.nan)
+    found: list[Reals] = []
+    for first, begin, end in _blocks(motion):
+        latent = latent_motion(model, motion, first, end - first - 1)
+        if latent.misfit < _MISFIT:
+            offset = latent.smoothed.first
+            stop = min(end, begin + round(_BLOCK_S * motion.sample_rate_hz))
+            place = slice(max(begin, offset) - offset, stop - offset)
+            p[max(begin, offset) : stop] = latent.smoothed.p[place]
+            sd[max(begin, offset) : stop] = np.sqrt(latent.smoothed.variances[place, 0])
+            rows = _impacts(latent, motion.sample_rate_hz)
+            inside = (rows[:, 0] >= begin) & (rows[:, 0] < stop)
+            found.append(rows[inside])
+        on_sample(end)
+    rows = np.concatenate(found) if found else np.empty((0, 7))
+    impacts = FreeImpacts(*rows[_at_stops(rows)].T)
+    line = _gap_line(impacts)
+    for _, begin, stop in _blocks(motion):
+        end = min(stop, begin + round(_BLOCK_S * motion.sample_rate_hz))
+        here = (impacts.samples >= begin) & (impacts.samples < end) & ~np.isnan(line.residuals)
+        # p at an impact is known to lie at a stop: what is found there tells the error of the whole block.
+        scatter = float(np.sqrt(np.mean(line.residuals[here] ** 2))) if here.any() else 0.0
+        sd[begin:end] = np.hypot(sd[begin:end], scatter)
+        if scatter > _WORST_SCATTER_OF_GAP * min(model.gaps_m):
+            p[begin:end] = np.nan
+    return FreeMotion(p, sd, impacts, float(np.mean(~np.isnan(p))))
+
+
+def _at_stops(rows: Reals) -> Flags:
+    """Tell impacts from windows that held none."""
+    kept = np.zeros(len(rows), dtype=np.bool_)
+    if not len(rows):
+        return kept
+    strong = rows[:, 2] > _LEAST_OF_MEDIAN * np.median(rows[rows[:, 2] > np.max(rows[:, 2]) * 0.01, 2])
+    reach = rows[:, 1] * rows[:, 3]
+    for side in (-1.0, 1.0):
+        here = strong & (rows[:, 1] == side)
+        if here.any():
+            kept |= here & (reach > _LEAST_P_OF_MEDIAN * np.median(reach[here]))
+    return kept
+
+
+def _blocks(motion: PreparedMotion) -> Iterator[tuple[int, int, int]]:
+    """First sample to filter, first and last to keep, of blocks that overlap."""
+    block, overlap = (round(each * motion.sample_rate_hz) for each in (_BLOCK_S, _OVERLAP_S))
+    for begin in range(0, motion.samples, block):
+        end = min(begin + block + overlap, motion.samples)
+        if end - begin > overlap:
+            yield max(begin - overlap, 0), begin, end
+
+
+def _runs(marks: Flags) -> Iterator[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], marks.astype(np.int8), [0]))))
+    yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+
+
+def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
+    """Give an impact for every window whose impulse is told from nothing, shape (impacts, 7)."""
+    smoothed, rows = latent.smoothed, []
+    force = smoothed.forces[:, 0]
+    # Held over the step that ends at a sample: its middle lies half a sample earlier.
+    place = np.arange(force.size) - 0.5
+    for begin, end in _runs(latent.is_open):
+        if begin < 2 or end > force.size - 2:
+            continue
+        part = slice(begin, end)
+        impulse = float(force[part].sum()) / sample_rate_hz
+        if impulse == 0.0:
+            continue
+        weight = np.clip(force[part] * np.sign(impulse), 0.0, None)
+        middle = float(np.sum(weight * place[part]) / weight.sum())
+        sample = int(np.clip(np.floor(middle), 0, force.size - 2))
+        p = _between(smoothed.p, smoothed.rate / sample_rate_hz, sample, middle - sample)
+        side = -np.sign(impulse)
+        rows.append(
+            (
+                smoothed.first + middle,
+                side,
+                abs(impulse),
+                p,
+                float(np.sqrt(smoothed.variances[sample, 0])),
+                side * _extrapolated(smoothed.rate, begin - 2, begin - 1, middle),
+                -side * _extrapolated(smoothed.rate, end + 1, end, middle),
+            )
+        )
+    return np.array(rows).reshape(-1, 7)
+
+
+def _extrapolated(values: Reals, far: int, near: int, place: float) -> float:
+    """Carry a line through two samples of a flight on to the middle of the contact beside it."""
+    return float(values[near] + (values[near] - values[far]) * (place - near) / (near - far))
+
+
+def _between(values: Reals, slopes: Reals, sample: int, part: float) -> float:
+    """Interpolate between two samples by the cubic with their slopes (per sample)."""
+    a, b = values[sample], values[sample + 1]
+    da, db = slopes[sample], slopes[sample + 1]
+    t = part
+    return float(
+        a * (1 + 2 * t) * (1 - t) ** 2 + da * t * (1 - t) ** 2 + b * t**2 * (3 - 2 * t) + db * t**2 * (t - 1)
+    )
+
+
+@dataclass(frozen=True)
+class FreeGap:
+    """A gap without a contact model."""
+
+    value_m: float
+    sd_m: float
+    """Scatter of the impacts, and what another contact law than Hertz's would change."""
+    impacts: int
+
+
+@dataclass(frozen=True, eq=False)
+class _GapLine:
+    """|p| in the middle of contacts against the impulse."""
+
+    gaps: tuple[FreeGap | None, FreeGap | None]
+    residuals: Reals
+    """Of every impact, NaN on a side with too few [m]."""
+
+
+def free_gaps(impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
+    """Give both gaps from |p| in the middle of contacts against the impulse; None where too few were met.
+
+    A stop is pressed in more the harder it is struck. The straight line of |p| over J^0.8, robustly fitted
+    with one slope for both sides, begins at the gap.
+    """
+    return _gap_line(impacts).gaps
+
+
+def measured_gaps(impacts: FreeImpacts) -> Reals:
+    """Give the gap as each impact measured it: |p| less the depth that belongs to its impulse [m]."""
+    line = _gap_line(impacts)
+    lower, upper = (np.nan if each is None else each.value_m for each in line.gaps)
+    return np.asarray(np.where(impacts.sides < 0, lower, upper) + line.residuals)
+
+
+def _gap_line(impacts: FreeImpacts) -> _GapLine:
+    sides = [impacts.sides < 0, impacts.sides > 0]
+    told = [each for each in sides if each.sum() >= _FEWEST_IMPACTS]
+    residuals = np.full(impacts.samples.size, np.nan)
+    if not told:
+        return _GapLine((None, None), residuals)
+    used = np.logical_or.reduce(told)
+    depth = impacts.impulses**_DEPTH_POWER
+    matrix = np.column_stack([*(each.astype(float) for each in told), depth / depth.mean()])[used]
+    target = np.abs(impacts.p[used])
+    solution, covariance = _robust_line(matrix, target)
+    residuals[used] = target - matrix @ solution
+    unknown = _LAW_UNKNOWN * abs(float(solution[-1]))
+    places = iter(range(len(told)))
+    gaps = [
+        _gap(float(solution[n := next(places)]), covariance[n, n], unknown, each)
+        if each.sum() >= _FEWEST_IMPACTS
+        else None
+        for each in sides
+    ]
+    return _GapLine((gaps[0], gaps[1]), residuals)
+
+
+def _robust_line(matrix: Reals, target: Reals) -> tuple[Reals, Reals]:
+    """Fit with Huber's weights; gives the solution and its covariance."""
+    weight = np.ones(target.size)
+    for _ in range(_HUBER_ROUNDS):
+        solution, *_ = np.linalg.lstsq(matrix * weight[:, None], target * weight)
+        left = target - matrix @ solution
+        scale = 1.4826 * float(np.median(np.abs(left))) + _LEAST_SCATTER_M
+        weight = np.sqrt(np.minimum(1.0, _HUBER * scale / np.maximum(np.abs(left), _LEAST_SCATTER_M)))
+    normal = (matrix * weight[:, None] ** 2).T @ matrix
+    return np.asarray(solution), np.asarray(scale**2 * np.linalg.pinv(normal))
+
+
+def _gap(value: float, variance: float, unknown: float, side: Flags) -> FreeGap:
+    return FreeGap(value, float(np.hypot(np.sqrt(variance), unknown)), int(side.sum()))
+
+
+@dataclass(frozen=True)
+class FreeInertia:
+    """m1 and c1 without a contact model."""
+
+    tracked: TrackedSpecimen
+    """The specimen with both."""
+    sd: Reals
+    """Of m1 and c1, relative, shape (2,)."""
+    misfit: float
+
+
+def free_inertia(described: TrackedSpecimen, motion: PreparedMotion, firsts: Sequence[int]) -> FreeInertia:
+    """Fit m1 and c1 so that the flights between impacts fit best, Gauss and Newton on the innovations.
+
+    Raises
+    ------
+    NotEnoughData
+        When no stretch is long enough.
+
+    """
+    count = round(_FIT_STRETCH_S * motion.sample_rate_hz)
+    places = [each for each in firsts if each + count < motion.samples]
+    if not places:
+        raise NotEnoughData(f"{_FIT_STRETCH_S} s of colliding motion are needed to find m1 in")
+    current = described
+    prior = np.array([PRIOR_SD[each] for each in _INERTIAL])
+    for share in _SHARES:
+        latent = [latent_motion(motion_model(current, motion), motion, each, count, share) for each in places]
+        residual = _residuals(current, motion, latent)
+        slopes = np.stack(
+            [
+                (
+                    _residuals(
+                        with_values(current, {each: value_of(current, each) * (1 + _STEPS[each])}),
+                        motion,
+                        latent,
+                    )
+                    - residual
+                )
+                / _STEPS[each]
+                for each in _INERTIAL
+            ],
+            axis=1,
+        )
+        from_described = np.array(
+            [value_of(current, each) / value_of(described, each) - 1 for each in _INERTIAL]
+        )
+        curvature = slopes.T @ slopes + np.diag(prior**-2)
+        step = -np.linalg.solve(curvature, slopes.T @ residual + from_described / prior**2)
+        step = np.clip(step, -prior, prior)
+        current = with_values(
+            current,
+            {
+                each: value_of(current, each) * (1 + float(part))
+                for each, part in zip(_INERTIAL, step, strict=True)
+            },
+        )
+    variance = np.diag(np.linalg.inv(curvature)) * max(1.0, float(np.mean(residual**2)))
+    return FreeInertia(current, np.sqrt(variance), float(np.mean([each.misfit for each in latent])))
+
+
+def _residuals(tracked: TrackedSpecimen, motion: PreparedMotion, latent: Sequence[LatentMotion]) -> Reals:
+    """Give the normalised innovations of stretches whose windows stay as they are."""
+    model = motion_model(tracked, motion).without_stops
+    begin = round(_RESIDUAL_START_S * motion.sample_rate_hz)
+    parts = []
+    for each in latent:
+        start = latent_start(each.run.first - 1)
+        run = run_filter(model, motion, start, each.force_variance.size, force_variance=each.force_variance)
+        value, variance = run.innovations[begin:].T
+        parts.append(value / np.sqrt(variance))
+    return np.asarray(np.clip(np.concatenate(parts), -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL))

@@ -1,0 +1,203 @@
+"""Gaps, m1, c1 and the contact law, found while the motion is tracked: a filter with parameters.
+
+The parameters are states that do not change. The filter begins with the channels' noise taken as many times
+larger, so that a wrong parameter costs the track little, and the noise is brought down while they are found.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..signals import Reals
+from ._filter_kernels import STATES, forward
+from ._filtering import IMPULSE_SHARE, LOSS_LIMIT, SMOOTHING_S, FilterState, MotionModel, motion_model
+from ._parameters import Hidden, value_of, with_values
+from ._prepared_motion import PreparedMotion
+from ._tracking import acquire
+from ._tracking_model import StepTables, TrackedSpecimen, step_tables
+
+_DEVIATION = {
+    Hidden.LOWER_GAP: 1e-5,
+    Hidden.UPPER_GAP: 1e-5,
+    Hidden.M1: 1e-4,
+    Hidden.C1: 1e-2,
+    Hidden.FORCE: 1e-3,
+    Hidden.EXPONENT: 1e-4,
+}
+"""Relative step of the derivatives by a parameter."""
+_WANDER = 0.02
+"""Of the prior standard deviation, in every block: a parameter that is sure of itself too early moves on."""
+REBUILT_S = 0.05
+"""After so much motion the tables are those of the parameters found so far."""
+_SCHEDULE = ((0.1, 3.0), (math.inf, 1.0))
+"""Until so much motion was tracked the variance of the velocity is taken as so many times larger."""
+_LEAST_OF_START = 0.05
+"""No parameter falls below this part of what it began with: none of them can be negative."""
+_FURTHEST = 8.0
+"""Prior standard deviations from the description at which the search is given up."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Parameters at the end of a stretch of motion."""
+
+    tracked: TrackedSpecimen
+    wanted: tuple[Hidden, ...]
+    values: Reals
+    """Shape (parameters,), SI."""
+    covariance: Reals
+    """As the filter claims it, shape (parameters, parameters)."""
+    followed_s: float
+    losses: int
+    innovation_level: float
+    """Mean squared normalised innovation of the last part, at the channels' own noise; 1 for a good model."""
+
+
+def estimate(
+    start: TrackedSpecimen,
+    motion: PreparedMotion,
+    relative_sd: Mapping[Hidden, float],
+    first: int,
+    stop: int,
+) -> Estimate | str:
+    """Find parameters between two samples of a motion; a sentence where they are not told.
+
+    ``relative_sd`` names them, and says how far from ``start`` they may be.
+    """
+    return _Search(start, motion, relative_sd).over(first, stop)
+
+
+class _Search:
+    """Parameters on their way."""
+
+    def __init__(
+        self, start: TrackedSpecimen, motion: PreparedMotion, relative_sd: Mapping[Hidden, float]
+    ) -> None:
+        self._described, self._motion, self._wanted = start, motion, tuple(relative_sd)
+        wanted = self._wanted
+        self._nominal = np.array([value_of(start, each) for each in wanted])
+        self._prior_sd = np.array(list(relative_sd.values())) * self._nominal
+        self._deviation = np.array([_DEVIATION[each] for each in wanted]) * self._nominal
+        # In units of the prior standard deviations: forces and gaps differ by six powers of ten.
+        self._values, self._covariance = self._nominal.copy(), np.eye(len(wanted))
+        self._followed, self._losses, self._level = 0, 0, math.nan
+
+    def over(self, first: int, stop: int) -> Estimate | str:
+        """Track from one sample to another, and begin again after every loss."""
+        rate = self._motion.sample_rate_hz
+        block = round(REBUILT_S * rate)
+        at: FilterState | None = None
+        looked, refused = first, ""
+        while looked + block < stop:
+            model = motion_model(self._current(), self._motion)
+            if at is None:
+                begun = acquire(self._inflated(model), self._motion, looked)
+                match begun:
+                    case str():
+                        refused, looked = begun, looked + block
+                        continue
+                    case FilterState():
+                        at = self._with_parameters(begun)
+            before = at.sample
+            is_kept = self._block(model, at, min(block, stop - 1 - at.sample))
+            if is_kept:
+                self._values = np.maximum(
+                    self._values + at.state[STATES:] * self._prior_sd, _LEAST_OF_START * self._nominal
+                )
+                self._covariance = at.covariance[STATES:, STATES:].copy()
+                self._followed += at.sample - before
+                at.state[STATES:] = 0.0
+                looked = at.sample
+                if np.any(np.abs(self._values - self._nominal) > _FURTHEST * self._prior_sd):
+                    return self._ran_away()
+            else:
+                self._losses += 1
+                self._covariance = np.diag(np.minimum(4.0 * np.diag(self._covariance), 1.0))
+                looked, at = at.sample, None
+        if not self._followed:
+            return refused or "the motion was too short to begin a track in"
+        return Estimate(
+            self._current(),
+            self._wanted,
+            self._values,
+            self._covariance * np.outer(self._prior_sd, self._prior_sd),
+            self._followed / rate,
+            self._losses,
+            self._level,
+        )
+
+    def _current(self) -> TrackedSpecimen:
+        return with_values(self._described, dict(zip(self._wanted, map(float, self._values), strict=True)))
+
+    def _inflation(self) -> float:
+        followed_s = self._followed / self._motion.sample_rate_hz
+        return next(factor for until_s, factor in _SCHEDULE if followed_s < until_s)
+
+    def _inflated(self, model: MotionModel) -> MotionModel:
+        return replace(model, velocity_variance=self._inflation() * model.velocity_variance)
+
+    def _with_parameters(self, begun: FilterState) -> FilterState:
+        size = STATES + len(self._wanted)
+        covariance = np.zeros((size, size))
+        covariance[:STATES, :STATES] = begun.covariance
+        covariance[STATES:, STATES:] = self._covariance
+        return FilterState(
+            begun.sample, np.concatenate([begun.state, np.zeros(len(self._wanted))]), covariance
+        )
+
+    def _variants(self) -> list[StepTables]:
+        current = self._current()
+        raised = [
+            with_values(current, {each: float(self._values[n] + self._deviation[n])})
+            for n, each in enumerate(self._wanted)
+        ]
+        rate, coupling = self._motion.sample_rate_hz, self._motion.coupling_rad_per_s
+        return [step_tables(each, rate, coupling) for each in (current, *raised)]
+
+    def _block(self, model: MotionModel, at: FilterState, count: int) -> bool:
+        """Filter some samples; says whether the track held."""
+        tables = self._variants()
+        size = STATES + len(self._wanted)
+        noise = np.zeros((size, size))
+        noise[:STATES, :STATES] = model.step_noise
+        at.covariance[STATES:, STATES:] += _WANDER**2 * np.eye(len(self._wanted))
+        inflation = self._inflation()
+        level = np.array([1.0, tables[0].step_s / SMOOTHING_S])
+        done = forward(
+            self._motion.acceleration[at.sample : at.sample + count + 1],
+            self._motion.velocity[at.sample + 1 : at.sample + count + 1],
+            np.stack([each.flow for each in tables]),
+            np.stack([each.small_flow for each in tables]),
+            np.stack([each.stop for each in tables]),
+            self._deviation / self._prior_sd,
+            tables[0].step_s,
+            tables[0].small_steps,
+            noise,
+            inflation * model.velocity_variance,
+            IMPULSE_SHARE,
+            np.zeros(count),
+            tables[0].force_input,
+            LOSS_LIMIT,
+            level,
+            at.state,
+            at.covariance,
+            np.empty((0, STATES)),
+            np.empty((0, STATES, STATES)),
+            np.empty((0, 2)),
+            np.empty(0),
+            np.empty((0, STATES, STATES)),
+            np.empty(0),
+        )
+        at.sample += done
+        self._level = float(level[0]) if inflation == 1.0 else self._level
+        return bool(done == count)
+
+    def _ran_away(self) -> str:
+        worst = int(np.argmax(np.abs(self._values - self._nominal) / self._prior_sd))
+        what = self._wanted[worst].value
+        return (
+            f"{what} ran to {self._values[worst]:.3g}, far from the {self._nominal[worst]:.3g} described, so "
+            "the specimen's other numbers do not fit this recording"
+        )

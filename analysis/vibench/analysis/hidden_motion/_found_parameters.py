@@ -1,0 +1,201 @@
+"""What collisions tell of a specimen: gaps, m1, c1 and the contact law, with uncertainties that cover.
+
+A description that the motion can be tracked with is only refined. One that it cannot is searched: m1 and c1
+from flights, the gaps from where impacts happen, both without a contact model, then everything by tracking.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from ..signals import Reals
+from ._contact_free import FreeGap, free_gaps, free_inertia, free_motion
+from ._estimation import Estimate, estimate
+from ._filtering import LOSS_LIMIT, FilterState, motion_model, run_filter
+from ._parameters import Hidden, value_of, with_values
+from ._prepared_motion import PreparedMotion
+from ._tracking import acquire
+from ._tracking_model import TrackedSpecimen
+
+_STRETCH_S = 1.2
+"""Of each restart."""
+_MOST_RESTARTS = 4
+_TRIAL_S = 0.25
+_TRIALS = 3
+_FITTING_LEVEL = 1.6
+"""Mean squared innovation of a description that is not searched but refined."""
+_NEAR = {
+    Hidden.LOWER_GAP: 0.004,
+    Hidden.UPPER_GAP: 0.004,
+    Hidden.M1: 1e-3,
+    Hidden.C1: 0.05,
+    Hidden.FORCE: 0.1,
+    Hidden.EXPONENT: 0.03,
+}
+"""How far from a description that can be tracked its parameters are looked for, relative."""
+_LEAST_SD = {Hidden.M1: 1e-3, Hidden.C1: 0.03}
+_FREE_S = 1.0
+_TOLD = 0.5
+"""Posterior over prior standard deviation above which the data say nothing that was not assumed."""
+_CONFIDENCE = 0.95
+_STARTS_APART = 0.5
+"""Prior standard deviations by which restarts begin elsewhere: what is not forgotten shows as scatter."""
+
+
+@dataclass(frozen=True)
+class FoundParameter:
+    """One parameter as collisions tell it."""
+
+    what: Hidden
+    value: float
+    low: float
+    high: float
+    """Bounds of 95 %: restarts over parts of the motion, and what each of them claims."""
+    described: float
+    not_determined: str = ""
+    """Why there is no value, in a sentence; empty where there is one."""
+
+    @property
+    def is_determined(self) -> bool:
+        """Whether value and bounds mean something."""
+        return not self.not_determined
+
+
+@dataclass(frozen=True, eq=False)
+class FoundSpecimen:
+    """What was found, and the specimen that the motion is tracked with."""
+
+    tracked: TrackedSpecimen
+    parameters: tuple[FoundParameter, ...]
+    restarts: int
+    searched: bool
+    """Whether the description could not be tracked with."""
+
+
+def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundSpecimen:
+    """Find the parameters that collisions tell."""
+    if described.steepness == 0.0:
+        return _nothing(described, "the specimen is described without stops")
+    stretches = _stretches(motion)
+    searched = not _can_be_tracked(described, motion)
+    start, near = (
+        (described, _NEAR) if not searched else _search(described, motion, [a for a, _ in stretches])
+    )
+    if isinstance(near, str):
+        return _nothing(described, near, searched=True)
+    found: list[Estimate] = []
+    refused = ""
+    for number, (first, stop) in enumerate(stretches):
+        answer = estimate(_apart(start, near, number), motion, near, first, stop)
+        match answer:
+            case str():
+                refused = answer
+            case Estimate():
+                found.append(answer)
+    good = [
+        each
+        for each in found
+        if each.followed_s > 0.5 * min(_STRETCH_S, motion.samples / motion.sample_rate_hz)
+    ]
+    if 2 * len(good) <= len(stretches) and len(stretches) > 1:
+        held = f"only {len(good)} of {len(stretches)} restarts over parts of the motion held their track"
+        return _nothing(start, refused or held, searched=searched)
+    if not good:
+        why = refused or "the track was lost again and again while the parameters were looked for"
+        return _nothing(start, why, searched=searched)
+    values, sd = combined(good)
+    prior = np.array([near[each] * value_of(start, each) for each in good[0].wanted])
+    factor = float(student.ppf(0.5 + 0.5 * _CONFIDENCE, max(2, 2 * len(good) - 1)))
+    parameters = tuple(
+        _judged(what, values[n], factor * sd[n], value_of(described, what), sd[n] / prior[n])
+        for n, what in enumerate(good[0].wanted)
+    )
+    told = {each.what: each.value for each in parameters if each.is_determined}
+    return FoundSpecimen(with_values(start, told), parameters, len(good), searched)
+
+
+def combined(found: list[Estimate]) -> tuple[Reals, Reals]:
+    """Give the mean of restarts, and its standard deviation: the larger of scatter and claims."""
+    values = np.array([each.values for each in found])
+    claimed = np.array([np.maximum(np.diag(each.covariance), 0.0) for each in found])
+    mean = values.mean(axis=0)
+    variance = claimed.mean(axis=0)
+    if len(found) > 1:
+        variance = np.maximum(variance, values.var(axis=0, ddof=1))
+    return mean, np.sqrt(variance / len(found))
+
+
+def _judged(what: Hidden, value: float, half: float, described: float, told: float) -> FoundParameter:
+    why = ""
+    if told > _TOLD:
+        why = f"{what.value} is not told by this motion better than it was assumed"
+    return FoundParameter(what, float(value), float(value - half), float(value + half), described, why)
+
+
+def _nothing(tracked: TrackedSpecimen, why: str, *, searched: bool = False) -> FoundSpecimen:
+    nan = float("nan")
+    parameters = tuple(FoundParameter(each, nan, nan, nan, value_of(tracked, each), why) for each in Hidden)
+    return FoundSpecimen(tracked, parameters, 0, searched)
+
+
+def _stretches(motion: PreparedMotion) -> list[tuple[int, int]]:
+    """Spread the restarts evenly over the motion."""
+    length = min(round(_STRETCH_S * motion.sample_rate_hz), motion.samples)
+    number = min(_MOST_RESTARTS, max(1, motion.samples // length))
+    firsts = np.linspace(0, motion.samples - length, number).astype(int)
+    return [(int(each), int(each) + length) for each in firsts]
+
+
+def _apart(start: TrackedSpecimen, near: Mapping[Hidden, float], number: int) -> TrackedSpecimen:
+    """Begin each restart elsewhere, in a fixed pattern of signs."""
+    sign = {each: 1.0 if (number >> (place % 2)) % 2 else -1.0 for place, each in enumerate(near)}
+    return with_values(
+        start,
+        {each: value_of(start, each) * (1 + _STARTS_APART * sd * sign[each]) for each, sd in near.items()},
+    )
+
+
+def _can_be_tracked(tracked: TrackedSpecimen, motion: PreparedMotion) -> bool:
+    """Try short stretches with the numbers as they are."""
+    model = motion_model(tracked, motion)
+    count = round(_TRIAL_S * motion.sample_rate_hz)
+    firsts = np.linspace(0, max(0, motion.samples - 2 * count), _TRIALS).astype(int)
+    good = 0
+    for first in firsts:
+        begun = acquire(model, motion, int(first))
+        match begun:
+            case FilterState():
+                left = min(count, motion.samples - 1 - begun.sample)
+                run = run_filter(model, motion, begun, left, loss_limit=LOSS_LIMIT)
+                good += run.states.shape[0] == left and float(np.nanmean(run.squared)) < _FITTING_LEVEL
+            case str():
+                pass
+    return 2 * good > len(firsts)
+
+
+def _search(
+    described: TrackedSpecimen, motion: PreparedMotion, firsts: list[int]
+) -> tuple[TrackedSpecimen, Mapping[Hidden, float] | str]:
+    """Find a start without a contact model, and how far from it to look; a sentence where there is none."""
+    rate = motion.sample_rate_hz
+    inertia = free_inertia(described, motion, firsts)
+    count = min(round(_FREE_S * rate), motion.samples)
+    first = (motion.samples - count) // 2
+    told = free_motion(motion_model(inertia.tracked, motion), motion.part(first, first + count))
+    gaps = free_gaps(told.impacts)
+    if not any(gaps):
+        return inertia.tracked, (
+            "no impacts were found, so m1 did not reach its stops in this motion or the specimen's linear "
+            "numbers are wrong; fit them to weak noise first"
+        )
+    sides = dict(zip((Hidden.LOWER_GAP, Hidden.UPPER_GAP), gaps, strict=True))
+    known: dict[Hidden, FreeGap] = {side: gap for side, gap in sides.items() if gap is not None}
+    start = with_values(inertia.tracked, {side: gap.value_m for side, gap in known.items()})
+    near = {**_NEAR, Hidden.FORCE: 0.25, Hidden.EXPONENT: 0.05}
+    near |= {side: gap.sd_m / gap.value_m for side, gap in known.items()}
+    near |= {
+        each: max(_LEAST_SD[each], 3.0 * float(sd)) for each, sd in zip(_LEAST_SD, inertia.sd, strict=True)
+    }
+    return start, near

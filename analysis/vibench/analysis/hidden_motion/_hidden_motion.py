@@ -1,0 +1,367 @@
+"""The hidden motion of one recording: tracked, and without a contact model, side by side."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import Enum, auto
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vibench.acquisition.recording import Recording
+from vibench.sim import Specimen
+
+from ..errors import InvalidRequest
+from ..recordings import ProgressObserver, Unobserved, specimen_of
+from ..signals import Reals
+from ._collisions import Collisions, collisions_of, joined_collisions
+from ._contact_free import FreeGap, FreeMotion, free_gaps, free_motion
+from ._filtering import motion_model
+from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen
+from ._parameters import Hidden
+from ._prepared_motion import ChannelNoise, PreparedMotion, motion_in_samples, prepared_motion
+from ._tracking import NotFollowed, TrackedPiece, follow
+from ._tracking_model import TrackedSpecimen, tracked_specimen
+
+MICRO = 1e6
+
+
+class Numbers(Enum):
+    """Which gaps, m1, c1 and contact law the motion is tracked with."""
+
+    FOUND = auto()
+    """Those that the collisions tell, where they tell them."""
+    AS_DESCRIBED = auto()
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedMotion:
+    """p as the extended Kalman filter followed and smoothed it; NaN where it was not followed."""
+
+    p: Reals
+    """Relative displacement y - z, shape (samples,) [m]."""
+    rate: Reals
+    """Its rate [m/s]."""
+    p_sd: Reals
+    """Standard deviation of p [m]."""
+    collisions: Collisions
+    not_followed: tuple[NotFollowed, ...]
+    innovation_level: float
+    """Mean squared normalised innovation in flight: 1 for a model that leaves nothing but noise."""
+
+    @property
+    def share_followed(self) -> float:
+        """Part of the samples with a track."""
+        return float(np.mean(~np.isnan(self.p)))
+
+
+@dataclass(frozen=True, eq=False)
+class HiddenMotion:
+    """What base acceleration and m0's velocity tell of the motion that nobody measured."""
+
+    name: str
+    sample_rate_hz: float
+    first_sample: int
+    """Number in the recording of the first sample here."""
+    noise: ChannelNoise
+    specimen: TrackedSpecimen
+    """The numbers that the motion was tracked with."""
+    found: FoundSpecimen | None
+    """What collisions told; None when the description was taken as it is."""
+    tracked: TrackedMotion
+    free: FreeMotion
+    free_gaps: tuple[FreeGap | None, FreeGap | None]
+    """Lower and upper gap without a contact model."""
+
+    @property
+    def time_s(self) -> Reals:
+        """Since the beginning of the recording, shape (samples,) [s]."""
+        return (self.first_sample + np.arange(self.tracked.p.size)) / self.sample_rate_hz
+
+    @property
+    def gaps_m(self) -> tuple[float, float]:
+        """Lower and upper gap that the motion was tracked with."""
+        return self.specimen.specimen.gaps_m
+
+    @property
+    def parameters(self) -> tuple[FoundParameter, ...]:
+        """What collisions told of the specimen; empty when nobody asked."""
+        return () if self.found is None else self.found.parameters
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values for JSON: what was found and how well, without the motion itself."""
+        return {
+            "share_followed": self.tracked.share_followed,
+            "impacts": self.tracked.collisions.count,
+            "innovation_level": finite(self.tracked.innovation_level),
+            "p_sd_m": finite(float(np.nanmedian(self.tracked.p_sd))) if self.tracked.share_followed else None,
+            "not_followed": [
+                {
+                    "start_s": (self.first_sample + each.first) / self.sample_rate_hz,
+                    "stop_s": (self.first_sample + each.stop) / self.sample_rate_hz,
+                    "reason": each.reason,
+                }
+                for each in self.tracked.not_followed
+            ],
+            "parameters": {
+                each.what.value: {
+                    "value": finite(each.value) if each.is_determined else None,
+                    "low": finite(each.low) if each.is_determined else None,
+                    "high": finite(each.high) if each.is_determined else None,
+                    "described": each.described,
+                    "not_determined": each.not_determined or None,
+                }
+                for each in self.parameters
+            },
+            "without_contact_model": {
+                "share_told": self.free.share_told,
+                "impacts": int(self.free.impacts.samples.size),
+                "gaps_m": [gap and gap.value_m for gap in self.free_gaps],
+                "gaps_sd_m": [gap and gap.sd_m for gap in self.free_gaps],
+            },
+        }
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Say what was followed, what was not, and what was found."""
+        return tuple(_sentences(self))
+
+
+def finite(value: float) -> float | None:
+    """Give None for what JSON cannot hold."""
+    return value if np.isfinite(value) else None
+
+
+def hidden_motion(
+    recording: Recording,
+    specimen: Specimen | None = None,
+    start_s: float = 0.0,
+    stop_s: float | None = None,
+    numbers: Numbers = Numbers.FOUND,
+    observer: ProgressObserver | None = None,
+) -> HiddenMotion:
+    """Tell the relative motion of m1 and its collisions from base acceleration and m0's velocity.
+
+    Two ways, side by side. Without a contact model: the force on m1 is an unknown, and follows from the
+    specimen's linear numbers. Tracked: an extended Kalman filter on the seven relative states and the error
+    of the accelerometer, with exact flight, and a smoother back over it. docs/hidden-motion.md has the
+    equations.
+
+    Parameters
+    ----------
+    recording
+        Any, with base acceleration and m0's velocity; sampled at 10 kHz or more, 51.2 kHz for its law.
+    specimen
+        With the masses, stiffnesses and dampings of the linear specimen, which must be right (fit them to
+        weak noise first: `update_model`); as the recording describes it when left out.
+    start_s, stop_s
+        Stretch of the recording [s]; all of it when left out.
+    numbers
+        Whether gaps, m1, c1 and contact law are found first.
+    observer
+        Told how far it is.
+
+    Raises
+    ------
+    InvalidRequest
+        When the stretch is none, or the contact law has no stops that yield.
+    UnusableData
+        When samples were lost, a channel is missing, or the rate is too low.
+    NotEnoughData
+        When the stretch is too short.
+
+    """
+    watcher = Unobserved() if observer is None else observer
+    described = tracked_specimen(specimen_of(recording.bench) if specimen is None else specimen)
+    motion = prepared_motion(recording, *_stretch(recording, start_s, stop_s))
+    name = recording.path.name.removesuffix(".part").removesuffix(".h5")
+    found = None
+    if numbers is Numbers.FOUND:
+        watcher.begin(name, "finding gaps and m1")
+        found = found_specimen(described, motion)
+    return hidden_motion_of(motion, described if found is None else found.tracked, found, name, watcher)
+
+
+def hidden_motion_in_samples(
+    base_acceleration: ArrayLike,
+    m0_velocity: ArrayLike,
+    sample_rate_hz: float,
+    specimen: Specimen,
+    numbers: Numbers = Numbers.FOUND,
+) -> HiddenMotion:
+    """Tell the hidden motion from samples whose sensors are taken out already; as `hidden_motion`.
+
+    Parameters
+    ----------
+    base_acceleration
+        Of the base, DC included, shape (n,) [m/s2].
+    m0_velocity
+        Of m0 at the same instants, absolute, shape (n,) [m/s].
+    sample_rate_hz
+        Of both.
+    specimen
+        What was shaken, its linear numbers right.
+    numbers
+        Whether gaps, m1, c1 and contact law are found first.
+
+    Raises
+    ------
+    InvalidRequest
+        When the arrays differ in length, or the contact law has no stops that yield.
+    UnusableData
+        When samples are not finite, or the rate is too low.
+    NotEnoughData
+        When there are too few.
+
+    """
+    acceleration, velocity = (np.asarray(each, dtype=np.float64) for each in (base_acceleration, m0_velocity))
+    if acceleration.shape != velocity.shape or acceleration.ndim != 1:
+        raise InvalidRequest(
+            f"{acceleration.shape} samples of the base and {velocity.shape} of m0 were given; give as many "
+            "of each, in one dimension"
+        )
+    motion = motion_in_samples(acceleration, velocity, sample_rate_hz)
+    described = tracked_specimen(specimen)
+    found = found_specimen(described, motion) if numbers is Numbers.FOUND else None
+    return hidden_motion_of(
+        motion, described if found is None else found.tracked, found, "samples", Unobserved()
+    )
+
+
+def hidden_motion_of(
+    motion: PreparedMotion,
+    tracked: TrackedSpecimen,
+    found: FoundSpecimen | None,
+    name: str,
+    watcher: ProgressObserver,
+) -> HiddenMotion:
+    """Go through a prepared motion both ways."""
+    model = motion_model(tracked, motion)
+
+    def told(sample: int) -> None:
+        watcher.read(sample, motion.samples)
+
+    watcher.begin(name, "tracking the hidden motion")
+    followed = _tracked(motion, tracked, found, told)
+    watcher.begin(name, "hidden motion without a contact model")
+    free = free_motion(model, motion, told)
+    return HiddenMotion(
+        name,
+        motion.sample_rate_hz,
+        motion.first_sample,
+        motion.noise,
+        tracked,
+        found,
+        followed,
+        free,
+        free_gaps(free.impacts),
+    )
+
+
+def _stretch(recording: Recording, start_s: float, stop_s: float | None) -> tuple[int, int]:
+    rate, end_s = recording.sample_rate_hz, recording.samples / recording.sample_rate_hz
+    last_s = end_s if stop_s is None else stop_s
+    if not 0.0 <= start_s < last_s:
+        raise InvalidRequest(
+            f"a stretch from {start_s:g} s to {last_s:g} s is none; the recording lasts {end_s:.3g} s"
+        )
+    return round(start_s * rate), min(round(last_s * rate), recording.samples)
+
+
+def _tracked(
+    motion: PreparedMotion, tracked: TrackedSpecimen, found: FoundSpecimen | None, told: Callable[[int], None]
+) -> TrackedMotion:
+    model = motion_model(tracked, motion)
+    p, rate, sd = (np.full(motion.samples, np.nan, dtype=np.float64) for _ in range(3))
+    collisions: list[Collisions] = []
+    lost: list[NotFollowed] = []
+    squared, used = 0.0, 0
+    for part in follow(model, motion, told):
+        match part:
+            case TrackedPiece():
+                place = slice(part.first, part.stop)
+                p[place], rate[place] = part.smoothed.p, part.smoothed.rate
+                sd[place] = np.sqrt(part.smoothed.variances[:, 0])
+                collisions.append(collisions_of(model, motion, part))
+                here = part.run.squared
+                squared += float(np.nansum(here))
+                used += int(np.count_nonzero(~np.isnan(here)))
+            case NotFollowed():
+                lost.append(part)
+    level = squared / used if used else float("nan")
+    gap_sd = _gap_sd(found)
+    return TrackedMotion(
+        p,
+        rate,
+        np.sqrt(sd**2 * max(1.0, level if used else 1.0) + gap_sd**2),
+        joined_collisions(collisions),
+        tuple(lost),
+        level,
+    )
+
+
+def _gap_sd(found: FoundSpecimen | None) -> float:
+    """Give what the gaps' uncertainty, a quarter of the width of their bounds, adds to that of p."""
+    if found is None:
+        return 0.0
+    gaps = (Hidden.LOWER_GAP, Hidden.UPPER_GAP)
+    widths = [each.high - each.low for each in found.parameters if each.what in gaps and each.is_determined]
+    return max(widths, default=0.0) / 4.0
+
+
+_SHOWN = {
+    Hidden.LOWER_GAP: ("lower gap", MICRO, "µm"),
+    Hidden.UPPER_GAP: ("upper gap", MICRO, "µm"),
+    Hidden.M1: ("m1", 1e3, "g"),
+    Hidden.C1: ("c1", 1e3, "mN s/m"),
+    Hidden.FORCE: ("contact force at 1 µm", 1.0, "N"),
+    Hidden.EXPONENT: ("contact exponent", 1.0, ""),
+}
+
+
+def with_bounds(value: float, half: float, unit: str) -> str:
+    """Write a value with two digits of its uncertainty, and as many places."""
+    if not half > 0.0:
+        return f"{value:.6g} {unit}".strip()
+    places = max(0, 1 - int(np.floor(np.log10(half))))
+    return f"({value:.{places}f} ± {half:.{places}f}) {unit}".strip()
+
+
+def parameter_rows(motion: HiddenMotion) -> tuple[tuple[str, str, str], ...]:
+    """Give what was found as rows: name, value with bounds of 95 % or why there is none, as described."""
+    rows = []
+    for each in motion.parameters:
+        label, factor, unit = _SHOWN[each.what]
+        said = each.not_determined and f"not determined: {each.not_determined}"
+        value = with_bounds(factor * each.value, factor * 0.5 * (each.high - each.low), unit)
+        rows.append((label, said or value, f"{factor * each.described:.6g} {unit}".strip()))
+    return tuple(rows)
+
+
+def _sentences(motion: HiddenMotion) -> Iterator[str]:
+    tracked, rate = motion.tracked, motion.sample_rate_hz
+    yield (
+        f"{motion.name}: p was tracked in {100 * tracked.share_followed:.4g} % of "
+        f"{tracked.p.size / rate:.3g} s, with {tracked.collisions.count} impacts"
+        + (
+            f"; standard deviation of p {MICRO * float(np.nanmedian(tracked.p_sd)):.2g} µm"
+            if tracked.share_followed
+            else ""
+        )
+        + "."
+    )
+    for reason in dict.fromkeys(each.reason for each in tracked.not_followed):
+        total = sum(each.stop - each.first for each in tracked.not_followed if each.reason == reason)
+        yield f"Not followed for {1e3 * total / rate:.3g} ms: {reason}."
+    told = [each for each in motion.free_gaps if each is not None]
+    yield (
+        f"Without a contact model: {motion.free.impacts.samples.size} impacts"
+        + "".join(
+            f", {side} gap {with_bounds(MICRO * gap.value_m, 2 * MICRO * gap.sd_m, 'µm')}"
+            for side, gap in zip(("lower", "upper"), motion.free_gaps, strict=True)
+            if gap is not None
+        )
+        + ("" if told else "; too few to tell a gap")
+        + "."
+    )
+    for label, said, described in parameter_rows(motion):
+        yield f"{label[0].upper()}{label[1:]}: {said} (described as {described})."

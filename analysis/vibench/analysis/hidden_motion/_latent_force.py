@@ -1,0 +1,135 @@
+"""The contact force as an unknown, told by the two channels alone: motion and impacts without a contact law.
+
+Two relations hold whatever the law: z follows from m0's motion through a stable first-order filter, and
+the sum of m1 y'' and m2 z'' contains no contact force. A Kalman smoother weighs both by their noise, with
+a force that is white and held over each sample. Where m1 flies the force is known to be nothing: windows
+around its peaks are found first, then all but they are closed (a switched variance, as Rogers and Friis,
+arXiv 2303.03858), and the double integral of the second relation no longer drifts.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from ..signals import Flags, Reals
+from ._filter_kernels import STATES
+from ._filtering import Filtered, FilterState, MotionModel, Smoothed, run_filter, smooth
+from ._prepared_motion import PreparedMotion
+
+_PEAK_BAND_HZ = 4500.0
+"""The force is looked at in this band: wide enough for a collision, narrow enough for its noise."""
+_WINDOW_S = 6e-5
+"""To each side of a peak."""
+_PEAK_OVER_MEDIAN = 6.0
+_LEAST_PEAK = 0.1
+"""Of the first guess of the force."""
+CLOSED_SHARE = 3e-4
+"""Standard deviation of the force between impacts, of the first guess of the force."""
+_LEAST_GUESS_N = 1e-3
+_SURPRISE = 25.0
+"""Squared normalised innovation that tells an impact that was overlooked."""
+_RERUNS = 3
+_START_UP_S = 4e-3
+"""Innovations of a filter that has just begun are not judged."""
+_START_SD = (1e-4, 0.3, 1.0, 0.5)
+"""Of displacements, velocities, W and B, when nothing is known yet."""
+
+
+@dataclass(frozen=True, eq=False)
+class LatentMotion:
+    """A stretch smoothed without a contact law."""
+
+    run: Filtered
+    smoothed: Smoothed
+    is_open: Flags
+    """Samples at whose step a contact force was allowed."""
+    force_variance: Reals
+    misfit: float
+    """Mean squared normalised innovation, its largest thousandth left out; 1 when all fits."""
+
+
+def latent_motion(
+    model: MotionModel, motion: PreparedMotion, first: int, count: int, closed_share: float = CLOSED_SHARE
+) -> LatentMotion:
+    """Smooth ``count`` samples behind sample ``first`` without a contact law.
+
+    A larger ``closed_share`` lets the force between impacts stand for wrong numbers of the specimen.
+    """
+    free = model.without_stops
+    guess_n = _force_guess(model, motion, first, count)
+    variance = np.full(count, guess_n**2)
+    run, smoothed = _smoothed(free, motion, first, variance)
+    windows = _peaks(smoothed.forces[:, 0], guess_n, motion.sample_rate_hz)
+    closed = (closed_share * guess_n) ** 2
+    variance = np.where(windows, (6.0 * guess_n) ** 2, closed)
+    for _ in range(_RERUNS):
+        run, smoothed = _smoothed(free, motion, first, variance)
+        windows, surprised = _with_surprises(windows, run, motion.sample_rate_hz)
+        following = _learnt(windows, smoothed.forces, guess_n, closed)
+        settled = not surprised and np.allclose(following, variance, rtol=0.5)
+        if settled:
+            break
+        variance = following
+    squared = np.sort(run.squared[_start_up(motion.sample_rate_hz, count) :])
+    misfit = float(np.mean(squared[: max(1, int(0.999 * squared.size))]))
+    return LatentMotion(run, smoothed, windows, variance, misfit)
+
+
+def _force_guess(model: MotionModel, motion: PreparedMotion, first: int, count: int) -> float:
+    """Guess the size of the force: m1 times the rms acceleration of m0."""
+    velocity = motion.velocity[first : first + count + 1]
+    smooth_v = gaussian_filter1d(velocity, motion.sample_rate_hz / (2 * np.pi * _PEAK_BAND_HZ))
+    rms = float(np.std(np.diff(smooth_v))) * motion.sample_rate_hz
+    return max(model.specimen.masses[1] * 3.0 * rms, _LEAST_GUESS_N)
+
+
+def latent_start(first: int) -> FilterState:
+    """Begin behind a sample of which nothing is known."""
+    place, rate, base, error = _START_SD
+    return FilterState(first, np.zeros(STATES), np.diag([place**2] * 3 + [rate**2] * 3 + [base**2, error**2]))
+
+
+def _smoothed(
+    model: MotionModel, motion: PreparedMotion, first: int, variance: Reals
+) -> tuple[Filtered, Smoothed]:
+    run = run_filter(model, motion, latent_start(first), variance.size, force_variance=variance)
+    return run, smooth(model, run, variance)
+
+
+def _widened(marks: Flags, sample_rate_hz: float) -> Flags:
+    width = 2 * max(1, round(_WINDOW_S * sample_rate_hz)) + 1
+    return np.asarray(np.convolve(marks, np.ones(width), "same") > 0.5)
+
+
+def _peaks(force: Reals, guess_n: float, sample_rate_hz: float) -> Flags:
+    size = np.abs(gaussian_filter1d(force, sample_rate_hz / (2.0 * np.pi * _PEAK_BAND_HZ)))
+    threshold = max(_PEAK_OVER_MEDIAN * float(np.median(size)), _LEAST_PEAK * guess_n)
+    marks = np.zeros(size.size, dtype=np.bool_)
+    inner = size[1:-1]
+    marks[1:-1] = (inner > threshold) & (inner >= size[:-2]) & (inner > size[2:])
+    return _widened(marks, sample_rate_hz)
+
+
+def _start_up(sample_rate_hz: float, count: int) -> int:
+    return min(round(_START_UP_S * sample_rate_hz), count // 4)
+
+
+def _with_surprises(windows: Flags, run: Filtered, sample_rate_hz: float) -> tuple[Flags, bool]:
+    """Open a window where an innovation tells a force that came just before."""
+    surprise = run.squared > _SURPRISE
+    surprise[: _start_up(sample_rate_hz, surprise.size)] = False
+    onsets = surprise & ~np.concatenate(([False], surprise[:-1]))
+    earlier = np.concatenate((onsets[1:], [False]))
+    added = _widened(earlier, sample_rate_hz) & ~windows
+    return np.asarray(windows | added), bool(added.any())
+
+
+def _learnt(windows: Flags, forces: Reals, guess_n: float, closed: float) -> Reals:
+    """Give each window the mean square of the force found in it, as expectation maximisation does."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], windows.astype(np.int8), [0]))))
+    variance = np.full(windows.size, closed)
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        found = float(np.mean(forces[begin:end, 0] ** 2 + forces[begin:end, 1]))
+        variance[begin:end] = max(found, guess_n**2)
+    return variance

@@ -1,0 +1,168 @@
+"""The two channels as base and m0 moved, and how noisy they are: what every way starts from."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vibench.acquisition.recording import Recording
+
+from ..errors import NotEnoughData, UnusableData
+from ..recordings import BASE, RESPONSE
+from ..signals import Reals
+from ._sensor_correction import HALF_LENGTH, SensorCorrection, ideal_sensors, sensor_correction
+
+_QUIET_BANDS = ((0.36, 0.40), (0.40, 0.44))
+"""Parts of the sample rate where specimen and shaker hardly move and the converter still passes."""
+_SEGMENT = 1024
+_LEAST_NOISE = 1e-6
+"""Of the signal: a channel without noise has rounding, and a filter needs a variance."""
+_MEDIAN_OF_SQUARE = float(np.log(2.0))
+"""Median over mean of a periodogram's line of white noise, exponentially distributed."""
+LOWEST_RATE_HZ = 10_000.0
+"""A collision of a twentieth of a millisecond leaves nothing to see at a lower rate."""
+
+
+@dataclass(frozen=True)
+class ChannelNoise:
+    """White noise of the two channels, rms per sample."""
+
+    acceleration: float
+    """[m/s2]"""
+    velocity: float
+    """[m/s]"""
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedMotion:
+    """A stretch of a recording without holes, sensors' dynamics and delays taken out."""
+
+    acceleration: Reals
+    """Of the base, shape (samples,) [m/s2]; its AC coupling is left to the tracker."""
+    velocity: Reals
+    """Of m0, shape (samples,) [m/s]."""
+    sample_rate_hz: float
+    coupling_rad_per_s: float
+    first_sample: int
+    """Number in the recording of the first sample here."""
+    noise: ChannelNoise
+
+    @property
+    def samples(self) -> int:
+        """How many."""
+        return self.velocity.size
+
+    def part(self, start: int, stop: int) -> "PreparedMotion":
+        """Give a stretch of it, noise as found in the whole."""
+        return replace(
+            self,
+            acceleration=self.acceleration[start:stop],
+            velocity=self.velocity[start:stop],
+            first_sample=self.first_sample + start,
+        )
+
+
+def prepared_motion(recording: Recording, start: int, stop: int) -> PreparedMotion:
+    """Read both channels between two samples and take their sensors out.
+
+    Raises
+    ------
+    UnusableData
+        When a channel is missing, samples were lost, or the rate is too low.
+    NotEnoughData
+        When the stretch is empty.
+
+    """
+    rate = recording.sample_rate_hz
+    _require_channels(recording)
+    _require_rate(rate)
+    # A corrected sample is made of its neighbours, so the recording's first and last few have none.
+    start, stop = max(start, HALF_LENGTH), min(stop, recording.samples - HALF_LENGTH)
+    before, behind = start - HALF_LENGTH, stop + HALF_LENGTH
+    _require_length(stop - start, rate)
+    acceleration, velocity = (recording.read(role, before, behind) for role in (BASE, RESPONSE))
+    _require_finite(acceleration, velocity)
+    correction = sensor_correction(
+        recording.bench, recording.channel(BASE), recording.channel(RESPONSE), rate
+    )
+    return motion_from(acceleration, velocity, rate, correction, before, start - before, stop - before)
+
+
+def motion_from(
+    acceleration: Reals,
+    velocity: Reals,
+    sample_rate_hz: float,
+    correction: SensorCorrection,
+    first_sample: int,
+    start: int,
+    stop: int,
+) -> PreparedMotion:
+    """Correct samples as they were recorded, and keep those from ``start`` to ``stop``."""
+    corrected = [each[start:stop] for each in correction.corrected(acceleration, velocity)]
+    noise = ChannelNoise(*(_white_noise(each) for each in corrected))
+    return PreparedMotion(
+        corrected[0],
+        corrected[1],
+        sample_rate_hz,
+        correction.coupling_rad_per_s,
+        first_sample + start,
+        noise,
+    )
+
+
+def motion_in_samples(acceleration: Reals, velocity: Reals, sample_rate_hz: float) -> PreparedMotion:
+    """Take samples whose sensors are taken out already; raises as `prepared_motion` does."""
+    _require_rate(sample_rate_hz)
+    _require_length(velocity.size - 2 * HALF_LENGTH, sample_rate_hz)
+    _require_finite(acceleration, velocity)
+    stop = velocity.size - HALF_LENGTH
+    correction = ideal_sensors(sample_rate_hz)
+    return motion_from(acceleration, velocity, sample_rate_hz, correction, 0, HALF_LENGTH, stop)
+
+
+def _require_rate(sample_rate_hz: float) -> None:
+    if not sample_rate_hz >= LOWEST_RATE_HZ:
+        raise UnusableData(
+            f"the motion was sampled at {sample_rate_hz:g} Hz, and impacts show from "
+            f"{LOWEST_RATE_HZ:g} Hz on; measure at a higher rate to follow the hidden motion"
+        )
+
+
+def _require_length(samples: int, sample_rate_hz: float) -> None:
+    if samples < _SEGMENT:
+        raise NotEnoughData(
+            f"{max(samples, 0) / sample_rate_hz:.3g} s are too little to follow the hidden motion in; "
+            f"{_SEGMENT / sample_rate_hz:.2g} s are needed"
+        )
+
+
+def _require_finite(acceleration: Reals, velocity: Reals) -> None:
+    lost = int(np.count_nonzero(~np.isfinite(acceleration) | ~np.isfinite(velocity)))
+    if lost:
+        raise UnusableData(
+            f"{lost} samples were lost or are not finite, and a motion cannot be followed across a hole; "
+            "choose a stretch without one, or measure again"
+        )
+
+
+def _require_channels(recording: Recording) -> None:
+    missing = [role for role in (BASE, RESPONSE) if role not in recording.roles]
+    if missing:
+        raise UnusableData(
+            f"{recording.path.name} has no channel {' and no channel '.join(missing)}; the hidden motion is "
+            f"told from {BASE} and {RESPONSE}"
+        )
+
+
+def _white_noise(samples: Reals) -> float:
+    """Estimate the rms of white noise from the quietest band near the top; a median outvotes impacts."""
+    count = samples.size // _SEGMENT
+    pieces = samples[: count * _SEGMENT].reshape(count, _SEGMENT) * np.hanning(_SEGMENT)
+    power = np.abs(np.fft.rfft(pieces, axis=1)) ** 2 / np.sum(np.hanning(_SEGMENT) ** 2)
+    cycles = np.fft.rfftfreq(_SEGMENT)
+    levels = [
+        np.median(power[:, (cycles >= low) & (cycles < high)]) / _MEDIAN_OF_SQUARE
+        for low, high in _QUIET_BANDS
+    ]
+    return float(
+        np.sqrt(max(min(levels), _LEAST_NOISE**2 * float(np.mean(samples**2)), np.finfo(float).tiny))
+    )

@@ -1,0 +1,93 @@
+"""What sensors do to the two channels, undone by short symmetric filters."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vibench.acquisition.recording import ChannelHeader
+
+from ..signals import Complexes, Reals
+
+HALF_LENGTH = 16
+"""Samples on either side that a corrected one is made of: a third of a millisecond at 51.2 kS/s."""
+_EXACT_BAND = 0.42
+"""Part of the sample rate up to which the correction is fitted; a converter passes 0.45."""
+_FIT_POINTS = 400
+_REST_WEIGHT = 1e-3
+"""Above the band the filter is only kept from growing."""
+COUPLING_CUT_HZ = 0.5
+"""-3 dB of the coupling capacitor of NI 9234 and USB-4431, first order."""
+_ASSUMED_DAMPING_RATIO = 0.02
+"""Of an accelerometer's mounted resonance; a certificate rarely says it, and far below it does not matter."""
+
+
+@dataclass(frozen=True, eq=False)
+class SensorCorrection:
+    """Filters for the two channels, and what is left to the tracker."""
+
+    acceleration: Reals
+    """Weights, shape (2 HALF_LENGTH + 1,); corrected for linear interpolation between samples as well."""
+    velocity: Reals
+    coupling_rad_per_s: float
+    """Corner of the accelerometer's AC coupling, undone as a state of the tracker; 0 for DC."""
+
+    def corrected(self, acceleration: Reals, velocity: Reals) -> tuple[Reals, Reals]:
+        """Give both channels as the base and m0 moved; values within HALF_LENGTH of an end are wrong."""
+        return (
+            np.convolve(acceleration, self.acceleration, "same"),
+            np.convolve(velocity, self.velocity, "same"),
+        )
+
+
+def sensor_correction(
+    bench: Mapping[str, Any], base: ChannelHeader, response: ChannelHeader, sample_rate_hz: float
+) -> SensorCorrection:
+    """Design the filters from what a recording says of its sensors; what it leaves out is ideal."""
+    resonance_hz = float(bench.get("accelerometer", {}).get("resonance_hz") or math.inf)
+    bandwidth_hz = float(bench.get("vibrometer", {}).get("bandwidth_hz") or math.inf)
+    rest_s = response.delay_s - (1.0 / (2.0 * np.pi * bandwidth_hz))
+
+    def accelerometer(frequency_hz: Reals) -> Complexes:
+        ratio = frequency_hz / resonance_hz
+        seen = 1.0 / (1.0 - ratio**2 + 2j * _ASSUMED_DAMPING_RATIO * ratio)
+        interpolation = np.sinc(frequency_hz / sample_rate_hz) ** 2
+        return np.asarray(np.exp(-2j * np.pi * frequency_hz * base.delay_s) * seen * interpolation)
+
+    def vibrometer(frequency_hz: Reals) -> Complexes:
+        return np.asarray(
+            np.exp(-2j * np.pi * frequency_hz * rest_s) / (1.0 + 1j * frequency_hz / bandwidth_hz)
+        )
+
+    return SensorCorrection(
+        acceleration=_inverse(accelerometer, sample_rate_hz),
+        velocity=_inverse(vibrometer, sample_rate_hz),
+        coupling_rad_per_s=2.0 * np.pi * COUPLING_CUT_HZ if base.coupling == "AC" else 0.0,
+    )
+
+
+def ideal_sensors(sample_rate_hz: float) -> SensorCorrection:
+    """Correct for nothing but the interpolation between samples."""
+
+    def interpolation(frequency_hz: Reals) -> Complexes:
+        return np.asarray(np.sinc(frequency_hz / sample_rate_hz) ** 2, dtype=np.complex128)
+
+    only = np.zeros(2 * HALF_LENGTH + 1)
+    only[HALF_LENGTH] = 1.0
+    return SensorCorrection(_inverse(interpolation, sample_rate_hz), only, 0.0)
+
+
+def _inverse(sensor: Callable[[Reals], Complexes], sample_rate_hz: float) -> Reals:
+    """Fit weights whose response is the inverse of a sensor's, least squares over the band."""
+    cycles = np.linspace(0.0, 0.5, _FIT_POINTS)
+    inside = cycles <= _EXACT_BAND
+    target = np.where(inside, 1.0 / sensor(cycles * sample_rate_hz), 0.0)
+    lags = np.arange(-HALF_LENGTH, HALF_LENGTH + 1)
+    matrix = np.exp(-2j * np.pi * cycles[:, np.newaxis] * lags)
+    weight = np.where(inside, 1.0, _REST_WEIGHT)[:, np.newaxis]
+    rows = np.concatenate([(matrix * weight).real, (matrix * weight).imag])
+    aims = target * weight[:, 0]
+    weights, *_ = np.linalg.lstsq(rows, np.concatenate([aims.real, aims.imag]))
+    return np.asarray(weights / weights.sum())

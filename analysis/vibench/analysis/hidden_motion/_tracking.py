@@ -1,0 +1,215 @@
+"""The hidden motion followed sample by sample: acquired without a contact law, tracked with it, smoothed.
+
+What is not followed is said and never shown as motion.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..signals import Flags, Reals
+from ._filtering import (
+    LOSS_LIMIT,
+    Filtered,
+    FilterState,
+    MotionModel,
+    Smoothed,
+    run_filter,
+    smooth,
+)
+from ._latent_force import latent_motion
+from ._prepared_motion import PreparedMotion
+
+ACQUISITION_S = 0.06
+"""Of motion that a track begins with."""
+_WORST_MISFIT = 3.0
+"""Of an acquisition; a model that explains less is not begun with."""
+_ACQUIRED_EXCESS = 4.0
+"""Factor on the covariance of what was acquired: the same samples are used again by the filter."""
+_FLIGHT_MARGIN_S = 8e-5
+"""Of flight on either side of the sample that is begun with."""
+_PIECE_S = 0.25
+"""Filtered and smoothed at a time."""
+_OVERLAP_S = 0.02
+"""Filtered beyond a piece so that its end is smoothed too: several times what the past is remembered for."""
+_GOOD = 2.5
+"""Mean squared innovation over `_LOOK_S` up to which a track that was lost later is believed."""
+_LOOK_S = 4e-3
+_WORST_SD_OF_GAP = 0.1
+"""A track whose own standard deviation exceeds this part of the gap says too little to be one."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedPiece:
+    """Consecutive samples that were followed."""
+
+    smoothed: Smoothed
+    run: Filtered
+    """Of the filter, over the same samples."""
+
+    @property
+    def first(self) -> int:
+        """Number in the motion of the first sample."""
+        return self.smoothed.first
+
+    @property
+    def stop(self) -> int:
+        """One past the last."""
+        return self.first + int(self.smoothed.states.shape[0])
+
+
+@dataclass(frozen=True)
+class NotFollowed:
+    """A stretch in which no track held, and why."""
+
+    first: int
+    stop: int
+    reason: str
+
+
+def acquire(model: MotionModel, motion: PreparedMotion, first: int) -> FilterState | str:
+    """Begin a track in the middle third of the 60 ms behind a sample; a sentence where none begins."""
+    count = min(round(ACQUISITION_S * motion.sample_rate_hz), motion.samples - 1 - first)
+    if count < round(ACQUISITION_S * motion.sample_rate_hz):
+        return f"fewer than {1e3 * ACQUISITION_S:.0f} ms of motion were left to begin a track with"
+    found = latent_motion(model, motion, first, count)
+    if not found.misfit < _WORST_MISFIT:
+        return (
+            f"the specimen's equations leave {found.misfit:.3g} times what the channels' noise explains, "
+            "even with an unknown contact force"
+        )
+    begin = _calmest(model, found.smoothed, found.is_open, motion.sample_rate_hz)
+    if begin is None:
+        return "no flight between two impacts was told well enough to begin a track"
+    rest = replace(
+        found.run,
+        first=found.run.first + begin,
+        states=found.run.states[begin:],
+        covariances=found.run.covariances[begin:],
+        innovations=found.run.innovations[begin:],
+        kinds=found.run.kinds[begin:],
+        jacobians=found.run.jacobians[begin:],
+    )
+    ahead = smooth(model.without_stops, rest, found.force_variance[begin:])
+    return FilterState(ahead.first, ahead.states[0].copy(), _ACQUIRED_EXCESS * ahead.first_covariance)
+
+
+def _calmest(model: MotionModel, smoothed: Smoothed, is_open: Flags, sample_rate_hz: float) -> int | None:
+    """Choose the flight sample of the middle third whose p is told best."""
+    count = is_open.size
+    margin = max(1, round(_FLIGHT_MARGIN_S * sample_rate_hz))
+    near = np.convolve(is_open, np.ones(2 * margin + 1), "same") > 0.5
+    lower, upper = model.gaps_m
+    allowed = ~near & (smoothed.p < upper) & (smoothed.p > -lower)
+    allowed[: count // 3] = allowed[2 * count // 3 :] = False
+    if not allowed.any():
+        return None
+    variance = np.where(allowed, smoothed.variances[:, 0], np.inf)
+    best = int(np.argmin(variance))
+    if variance[best] > (_WORST_SD_OF_GAP * min(lower, upper)) ** 2:
+        return None
+    return best
+
+
+def follow(
+    model: MotionModel,
+    motion: PreparedMotion,
+    on_sample: Callable[[int], None] = lambda _sample: None,
+) -> Iterator[TrackedPiece | NotFollowed]:
+    """Go once through a motion; pieces and what lies between them, in the order of time."""
+    window = round(ACQUISITION_S * motion.sample_rate_hz)
+    last = motion.samples - 1 - window
+    looked, done = 0, 0
+    while looked <= last and done < motion.samples - 1:
+        start = acquire(model, motion, looked)
+        match start:
+            case str():
+                stop = min(looked + 2 * (window // 3), motion.samples)
+                yield NotFollowed(done, stop, start)
+                done = stop
+            case FilterState():
+                begun = _caught_up(model, motion, start, done)
+                if start.sample > done:
+                    yield NotFollowed(done, start.sample, "a track was being begun")
+                    done = start.sample
+                for piece in _pieces(model, motion, start) if begun else ():
+                    yield piece
+                    done = piece.stop
+                    on_sample(done)
+        # The next 60 ms are chosen so that their middle third begins where the track ended.
+        following = max(done - window // 3, looked + window // 3)
+        looked = last if looked < last < following else following
+        on_sample(done)
+    if done < motion.samples:
+        yield NotFollowed(done, motion.samples, "too little was left to begin a track with")
+
+
+def _caught_up(model: MotionModel, motion: PreparedMotion, at: FilterState, sample: int) -> bool:
+    """Move a state on to a sample that it lies before; says whether it held."""
+    count = sample - at.sample
+    if count <= 0:
+        return True
+    run_filter(model, motion, at, count, loss_limit=LOSS_LIMIT)
+    return at.sample == sample
+
+
+def _pieces(model: MotionModel, motion: PreparedMotion, at: FilterState) -> Iterator[TrackedPiece]:
+    """Follow from a state until the motion ends or the track is lost."""
+    length = round(_PIECE_S * motion.sample_rate_hz)
+    overlap = round(_OVERLAP_S * motion.sample_rate_hz)
+    while at.sample < motion.samples - 1:
+        left = motion.samples - 1 - at.sample
+        count = left if left <= length + overlap else length
+        ahead = min(overlap, left - count)
+        run = run_filter(model, motion, at, count, loss_limit=LOSS_LIMIT)
+        is_lost = run.states.shape[0] < count
+        kept = _believed(run, motion.sample_rate_hz) if is_lost else count
+        whole = run
+        if ahead and not is_lost:
+            beyond = run_filter(model, motion, at.copy(), ahead)
+            whole = _joined(run, beyond)
+        if kept:
+            seen = whole.cut(kept) if is_lost else whole
+            yield _piece(smooth(model, seen), run, kept)
+        if is_lost:
+            return
+
+
+def _piece(smoothed: Smoothed, run: Filtered, kept: int) -> TrackedPiece:
+    return TrackedPiece(
+        replace(
+            smoothed,
+            states=smoothed.states[:kept],
+            variances=smoothed.variances[:kept],
+            touched=smoothed.touched[:kept],
+        ),
+        run.cut(kept),
+    )
+
+
+def _joined(one: Filtered, other: Filtered) -> Filtered:
+    def both(name: str) -> Reals:
+        return np.concatenate([getattr(one, name), getattr(other, name)])
+
+    return Filtered(
+        one.first,
+        both("states"),
+        both("covariances"),
+        both("innovations"),
+        both("kinds"),
+        both("jacobians"),
+        both("impulses"),
+    )
+
+
+def _believed(run: Filtered, sample_rate_hz: float) -> int:
+    """Count the samples before a loss: up to where innovations over some milliseconds were good last."""
+    squared = run.squared
+    used = ~np.isnan(squared)
+    width = max(1, round(_LOOK_S * sample_rate_hz))
+    total = np.convolve(np.where(used, squared, 0.0), np.ones(width))[: squared.size]
+    number = np.convolve(used, np.ones(width))[: squared.size]
+    good = total <= _GOOD * np.maximum(number, 1.0)
+    last = np.flatnonzero(good)
+    return max(0, int(last[-1]) + 1 - width) if last.size else 0

@@ -1,0 +1,150 @@
+"""The equations of the relative motion as tables for the filter, of one specimen at one sample rate."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+
+from vibench.sim import PowerLaw, RigidStops, Specimen
+
+from ..errors import InvalidRequest
+from ..signals import Reals
+from ._filter_kernels import STATES, VX, VY, VZ, B, W, X, Y, Z
+
+_SMALL_STEPS_A_CONTACT = 36
+"""Kick and flow alternate so often during the shortest collision; a force at 1 um then errs by under 1e-3."""
+_FASTEST_APPROACH_M_PER_S = 0.5
+_FEWEST_SMALL_STEPS = 4
+HERTZ_EXPONENT = 1.5
+_MICROMETRE = 1e-6
+
+
+@dataclass(frozen=True)
+class TrackedSpecimen:
+    """A specimen whose contact law is F = f (d / 1 um)^n at the indentation d, both free."""
+
+    specimen: Specimen
+    force_at_1um_n: float
+    """f, without the spring that a law may have beside it."""
+    exponent: float
+
+    @property
+    def steepness(self) -> float:
+        """K of F = K d^n [N/m^n]."""
+        return float(self.force_at_1um_n / _MICROMETRE**self.exponent)
+
+
+def tracked_specimen(specimen: Specimen) -> TrackedSpecimen:
+    """Take a specimen as described.
+
+    Raises
+    ------
+    InvalidRequest
+        When its contact law has no stops that yield.
+
+    """
+    match specimen.contact:
+        case RigidStops() | PowerLaw():
+            raise InvalidRequest(
+                f"stops of the kind {specimen.contact.kind!r} cannot be tracked: the filter needs a "
+                "force that depends on how far a stop is pressed in; describe the contact as hertz, "
+                "hunt_crossley:LOSS, linear_gap or linear"
+            )
+        case _:
+            stiffness, exponent = specimen.contact.stops.term
+            return TrackedSpecimen(specimen, stiffness * _MICROMETRE**exponent, exponent)
+
+
+@dataclass(frozen=True, eq=False)
+class StepTables:
+    """What `_filter_kernels.forward` needs of a specimen."""
+
+    flow: Reals
+    """Shape (8, 10): state, acceleration and its rise -> state one sample later, without stops."""
+    small_flow: Reals
+    """The same for a small step."""
+    small_steps: int
+    stop: Reals
+    """Shape (8,)."""
+    force_input: Reals
+    """Shape (8,): state after a force of 1 N on m1 against m2, held over a sample."""
+    acceleration_input: Reals
+    """Shape (8,): state after 1 m/s2 held over a sample."""
+    step_s: float
+
+
+def equations(specimen: Specimen, coupling_rad_per_s: float) -> tuple[Reals, Reals, Reals]:
+    """Give A (8, 8), the input of the recorded acceleration (8,), and of a force on m1 against m2 (8,)."""
+    m0, m1, m2 = specimen.masses
+    k0, k1, k2 = specimen.stiffnesses
+    c0, c1, c2 = specimen.dampings
+    a = np.zeros((STATES, STATES))
+    for place, rate in ((X, VX), (Y, VY), (Z, VZ)):
+        a[place, rate] = 1.0
+    a[VX, [X, Z, VX, VZ]] = -(k0 + k2) / m0, k2 / m0, -(c0 + c2) / m0, c2 / m0
+    a[VY, [Y, Z, VY, VZ]] = -k1 / m1, k1 / m1, -c1 / m1, c1 / m1
+    a[VZ, [X, Y, Z]] = k2 / m2, k1 / m2, -(k1 + k2) / m2
+    a[VZ, [VX, VY, VZ]] = c2 / m2, c1 / m2, -(c1 + c2) / m2
+    a[[VX, VY, VZ], B] = -1.0
+    a[W, B] = 1.0
+    base, force = np.zeros(STATES), np.zeros(STATES)
+    base[[VX, VY, VZ]] = -1.0
+    base[W] = 1.0
+    base[B] = coupling_rad_per_s
+    force[VY], force[VZ] = 1.0 / m1, -1.0 / m2
+    return a, base, force
+
+
+def exact_flow(a: Reals, inputs: Reals, step_s: float) -> Reals:
+    """Give the state one step later, of the state, an input and its linear rise, shape (n, n + 2)."""
+    n = len(a)
+    joint = np.zeros((n + 2, n + 2))
+    joint[:n, :n], joint[:n, n] = a * step_s, inputs * step_s
+    joint[n, n + 1] = 1.0
+    return np.ascontiguousarray(expm(joint)[:n])
+
+
+def step_tables(tracked: TrackedSpecimen, sample_rate_hz: float, coupling_rad_per_s: float) -> StepTables:
+    """Build the tables of a specimen."""
+    specimen = tracked.specimen
+    step_s = 1.0 / sample_rate_hz
+    a, base, force = equations(specimen, coupling_rad_per_s)
+    count = small_steps_of(tracked, step_s)
+    law = specimen.contact.stops
+    lower, upper = specimen.gaps_m
+    _, m1, m2 = specimen.masses
+    flow = exact_flow(a, base, step_s)
+    return StepTables(
+        flow=flow,
+        small_flow=exact_flow(a, base, step_s / count),
+        small_steps=count,
+        stop=np.array(
+            [
+                lower,
+                upper,
+                tracked.steepness,
+                tracked.exponent,
+                law.spring_beside,
+                law.loss,
+                1.0 / m1,
+                1.0 / m2,
+            ]
+        ),
+        force_input=exact_flow(a, force, step_s)[:, STATES].copy(),
+        acceleration_input=flow[:, STATES].copy(),
+        step_s=step_s,
+    )
+
+
+def small_steps_of(tracked: TrackedSpecimen, step_s: float) -> int:
+    """Count the small steps in a sample that resolve the shortest collision."""
+    _, m1, m2 = tracked.specimen.masses
+    mass, n = m1 * m2 / (m1 + m2), tracked.exponent
+    if tracked.steepness == 0.0:
+        return _FEWEST_SMALL_STEPS
+    # Depth at which all energy is in the stop, and pi / 2 of the time to get there at full speed and back.
+    energy = 0.5 * mass * _FASTEST_APPROACH_M_PER_S**2
+    deepest_m = float(((n + 1.0) * energy / tracked.steepness) ** (1.0 / (n + 1.0)))
+    duration_s = math.pi * deepest_m / _FASTEST_APPROACH_M_PER_S
+    return max(_FEWEST_SMALL_STEPS, math.ceil(step_s * _SMALL_STEPS_A_CONTACT / duration_s))

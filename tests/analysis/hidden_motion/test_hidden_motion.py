@@ -1,0 +1,177 @@
+"""The hidden motion against the virtual world's: what is followed is right, and what is not is said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import open_recording
+from vibench.analysis import InvalidRequest, NotEnoughData
+from vibench.analysis.errors import UnusableData
+from vibench.analysis.figures import hidden_impacts_figure, hidden_motion_figure
+from vibench.analysis.hidden_motion import Hidden, Numbers, hidden_motion
+from vibench.sim import LinearGap, RigidStops, gong2025
+
+SCORED_FROM_S = 0.4
+PAIRED_S = 1e-4
+"""Told and true impacts nearer than this are one."""
+
+
+def told(recorded, **how):
+    with open_recording(recorded.path) as recording:
+        return hidden_motion(recording, **how)
+
+
+def errors_of(motion, recorded, p):
+    """Give the error of p where it is told and scored, and which samples those are."""
+    first = motion.first_sample
+    difference = p - recorded.p[first : first + p.size]
+    scored = np.arange(p.size) >= SCORED_FROM_S * motion.sample_rate_hz
+    return difference, scored & ~np.isnan(p)
+
+
+def paired(found, true, reach):
+    """Pair one to one: how many of the true ones were found, how many found are none, and their errors."""
+    free = list(found)
+    near = []
+    for each in true:
+        if free and abs(best := min((other - each for other in free), key=abs)) < reach:
+            near.append(best)
+            free.remove(each + best)
+    return len(near), len(found) - len(near), np.array(near)
+
+
+def impacts_scored(motion, recorded, found, true):
+    rate = motion.sample_rate_hz
+    low, high = SCORED_FROM_S * rate, motion.first_sample + motion.tracked.p.size - 0.02 * rate
+    told_at = found + motion.first_sample
+    inner = np.sort(true[(true > low) & (true < high)])
+    return paired(told_at[(told_at > low - 5) & (told_at < high + 5)], inner, PAIRED_S * rate), inner.size
+
+
+@pytest.mark.parametrize(
+    ("kind", "level_vpp", "largest_rms_m"),
+    [(260.0, 1.5, 0.1e-6), ("sweep", 1.5, 0.1e-6), ("noise", 10.0, 0.2e-6)],
+)
+def test_tracked_p_and_its_impacts_are_those_of_the_world(world_recording, kind, level_vpp, largest_rms_m):
+    recorded = world_recording(kind, level_vpp, seed=41)
+    motion = told(recorded, numbers=Numbers.AS_DESCRIBED)
+    error, scored = errors_of(motion, recorded, motion.tracked.p)
+    assert np.mean(scored[round(SCORED_FROM_S * motion.sample_rate_hz) :]) == 1.0
+    assert np.sqrt(np.mean(error[scored] ** 2)) < largest_rms_m
+    (found, false, apart), true = impacts_scored(
+        motion, recorded, motion.tracked.collisions.samples, recorded.touches
+    )
+    assert true > 300
+    assert found > 0.99 * true
+    assert false < 0.005 * true
+    assert np.median(np.abs(apart)) / motion.sample_rate_hz < 1e-6
+    z = np.abs(error[scored]) / motion.tracked.p_sd[scored]
+    assert np.mean(z < 1.96) > 0.93
+
+
+def test_ten_times_the_noise_is_still_followed(world_recording):
+    recorded = world_recording(260.0, 1.5, seed=42, noise=10.0, duration_s=2.4)
+    motion = told(recorded, numbers=Numbers.AS_DESCRIBED)
+    error, scored = errors_of(motion, recorded, motion.tracked.p)
+    assert np.mean(scored[round(SCORED_FROM_S * motion.sample_rate_hz) :]) > 0.98
+    assert np.sqrt(np.mean(error[scored] ** 2)) < 0.3e-6
+
+
+@pytest.mark.parametrize(
+    ("kind", "level_vpp", "largest_rms_m"), [(260.0, 1.5, 1e-6), ("noise", 10.0, 1.5e-6)]
+)
+def test_without_a_contact_model_motion_impacts_and_gaps_are_told(
+    world_recording, kind, level_vpp, largest_rms_m
+):
+    recorded = world_recording(kind, level_vpp, seed=41)
+    motion = told(recorded, numbers=Numbers.AS_DESCRIBED)
+    error, scored = errors_of(motion, recorded, motion.free.p)
+    assert np.mean(scored[round(SCORED_FROM_S * motion.sample_rate_hz) :]) > 0.95
+    assert np.sqrt(np.mean(error[scored] ** 2)) < largest_rms_m
+    assert np.mean(np.abs(error[scored]) < 1.96 * motion.free.p_sd[scored]) > 0.93
+    (found, false, apart), true = impacts_scored(
+        motion, recorded, motion.free.impacts.samples, recorded.middles
+    )
+    assert found > 0.97 * true
+    assert false < 0.01 * true
+    assert np.median(np.abs(apart)) / motion.sample_rate_hz < 5e-6
+    gaps = [each.value_m for each in motion.free_gaps]
+    assert np.mean(gaps) == pytest.approx(np.mean(recorded.specimen.gaps_m), abs=0.5e-6)
+
+
+def test_wrong_gaps_and_m1_are_found_from_the_motion(world_recording, described_otherwise):
+    recorded = world_recording(260.0, 1.5, seed=41)
+    wrong = described_otherwise(recorded.specimen, m1=1.03, gaps=(0.98, 1.04))
+    motion = told(recorded, specimen=wrong)
+    found = {each.what: each for each in motion.parameters}
+    assert motion.found.searched
+    truth = dict(zip((Hidden.LOWER_GAP, Hidden.UPPER_GAP), recorded.specimen.gaps_m, strict=True))
+    truth[Hidden.M1] = recorded.specimen.masses[1]
+    for what, true in truth.items():
+        assert found[what].is_determined
+        assert found[what].low < true < found[what].high
+    for side in (Hidden.LOWER_GAP, Hidden.UPPER_GAP):
+        assert found[side].value == pytest.approx(truth[side], abs=0.05e-6)
+    assert found[Hidden.M1].value == pytest.approx(truth[Hidden.M1], rel=1e-3)
+    error, scored = errors_of(motion, recorded, motion.tracked.p)
+    assert np.sqrt(np.mean(error[scored] ** 2)) < 0.1e-6
+
+
+def test_two_gaps_and_a_linear_law_are_followed_too(world_recording):
+    specimen = replace(
+        gong2025(gap_m=(38e-6, 50e-6)), contact=LinearGap(4.9e6), masses=(6.1e-3, 1.9e-3, 2.2e-3)
+    )
+    recorded = world_recording(255.0, 2.0, seed=43, specimen=specimen)
+    motion = told(recorded, specimen=specimen)
+    error, scored = errors_of(motion, recorded, motion.tracked.p)
+    assert np.mean(scored[round(SCORED_FROM_S * motion.sample_rate_hz) :]) == 1.0
+    assert np.sqrt(np.mean(error[scored] ** 2)) < 0.1e-6
+    assert motion.gaps_m == pytest.approx((38e-6, 50e-6), abs=0.05e-6)
+    assert motion.specimen.exponent == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_track_that_does_not_hold_is_said_and_not_shown(world_recording, described_otherwise):
+    recorded = world_recording("noise", 10.0, seed=41)
+    wrong = described_otherwise(recorded.specimen, m1=1.04, dampings=(1.5, 1.5, 1.5))
+    motion = told(recorded, specimen=wrong, numbers=Numbers.AS_DESCRIBED)
+    assert motion.tracked.share_followed < 0.3
+    assert any("leave" in each.reason or "begun" in each.reason for each in motion.tracked.not_followed)
+    missing = sum(each.stop - each.first for each in motion.tracked.not_followed)
+    assert missing == np.count_nonzero(np.isnan(motion.tracked.p))
+    assert "Not followed for" in " ".join(motion.sentences)
+
+
+def test_a_motion_that_meets_no_stop_determines_no_gap(world_recording):
+    recorded = world_recording(260.0, 0.05, seed=44, duration_s=1.2)
+    motion = told(recorded)
+    gaps = [each for each in motion.parameters if each.what in {Hidden.LOWER_GAP, Hidden.UPPER_GAP}]
+    assert not any(each.is_determined for each in gaps)
+    assert all(each.not_determined for each in gaps)
+    assert motion.tracked.collisions.count == 0
+    assert motion.free_gaps == (None, None)
+
+
+def test_what_cannot_be_told_is_refused_in_a_sentence(world_recording):
+    recorded = world_recording(260.0, 1.5, seed=41)
+    rigid = replace(recorded.specimen, contact=RigidStops(0.8))
+    with pytest.raises(InvalidRequest, match=r"'rigid' cannot be tracked.*hertz"):
+        told(recorded, specimen=rigid)
+    with pytest.raises(InvalidRequest, match=r"from 1 s to 0\.5 s"):
+        told(recorded, start_s=1.0, stop_s=0.5)
+    with pytest.raises(NotEnoughData, match="too little"):
+        told(recorded, start_s=0.5, stop_s=0.501)
+    slow = world_recording(260.0, 1.5, seed=41, rate_hz=5120.0, duration_s=0.6)
+    with pytest.raises(UnusableData, match=r"5120 Hz.*higher rate"):
+        told(slow)
+
+
+def test_the_figures_hold_the_motion_and_its_impacts(world_recording):
+    recorded = world_recording(260.0, 1.5, seed=41)
+    motion = told(recorded, numbers=Numbers.AS_DESCRIBED)
+    zoom = hidden_motion_figure(motion).tables[0]
+    assert max(np.abs(zoom.column("p_m"))) == pytest.approx(46e-6, abs=3e-6)
+    tables = {each.name: each for each in hidden_impacts_figure(motion).tables}
+    assert len(tables["hidden_impacts_shaken"].column("impulse_ns")) == motion.tracked.collisions.count
+    free = tables["hidden_impacts_without_contact_model_shaken"]
+    assert np.nanmedian(free.column("gap_m")) == pytest.approx(45e-6, abs=0.5e-6)

@@ -1,0 +1,58 @@
+"""`vibench analyse --hidden`: the hidden motion in numbers, figures and report, or a sentence why not."""
+
+import csv
+import importlib.util
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+PLACE = Path(__file__).parents[1] / "analysis" / "hidden_motion" / "shaken_world.py"
+GAP_M = 45e-6
+
+
+@pytest.fixture(scope="module")
+def shaken(tmp_path_factory):
+    """A colliding dwell of the virtual world, recorded."""
+    spec = importlib.util.spec_from_file_location("shaken_world", PLACE)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules.setdefault(spec.name, module)
+    spec.loader.exec_module(module)
+    return module.shaken(tmp_path_factory.mktemp("shaken"), 260.0, 1.5, seed=51)
+
+
+def test_the_hidden_motion_is_told_in_numbers_figures_and_the_report(vibench_here, shaken, tmp_path):
+    done = vibench_here("analyse", shaken.path, "--hidden", "--no-simulate", "--out", "told", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "shaken: p was tracked in" in done.stdout
+    assert "Upper gap: (45.0" in done.stdout
+    page = (tmp_path / "told" / "report.html").read_text()
+    assert "Hidden motion of shaken" in page
+    assert "Collisions of shaken" in page
+    with (tmp_path / "told" / "figures" / "hidden_impacts_shaken.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    true = [each for each in shaken.touches if each > 0.1 * 51_200]
+    assert len(rows) == pytest.approx(len(true), rel=0.01)
+
+
+def test_json_has_bounds_and_says_what_is_not_determined(vibench_here, shaken, tmp_path):
+    done = vibench_here("analyse", shaken.path, "--hidden", "--no-simulate", "--json", cwd=tmp_path)
+    told = json.loads(done.stdout)["hidden_motion"]["shaken"]
+    gap = told["parameters"]["upper_gap_m"]
+    assert gap["low"] < GAP_M < gap["high"]
+    assert gap["not_determined"] is None
+    assert told["share_followed"] > 0.95
+    assert told["without_contact_model"]["gaps_m"] == pytest.approx([GAP_M, GAP_M], abs=0.5e-6)
+
+
+def test_a_specimen_that_cannot_be_tracked_gets_a_sentence_and_the_rest_its_report(
+    vibench_here, shaken, tmp_path
+):
+    (tmp_path / "rigid.toml").write_text('model = "gong2025"\nname = "rigid"\ncontact = "rigid:0.8"\n')
+    done = vibench_here(
+        *("analyse", shaken.path, "--hidden", "--no-simulate", "--specimen", "rigid.toml", "--out", "told"),
+        cwd=tmp_path,
+    )
+    assert "shaken: no hidden motion: stops of the kind 'rigid' cannot be tracked" in done.stderr
+    assert (tmp_path / "told" / "report.html").exists()
