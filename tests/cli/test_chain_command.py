@@ -95,7 +95,7 @@ def test_an_exponent_is_told_with_its_error():
         (("--recording", "nowhere.h5"), "nowhere.h5"),
         (("--specimen", "rigid_stops"), "Cell 1 has rigid stops"),
         (("--specimen", "nothing"), "no specimen is called 'nothing'"),
-        (("--cells", "1000", "--amplitude", "1e-6", "--frequency", "200:300", "--duration", "60"), "numbers"),
+        (("--cells", "200", "--amplitude", "1e-6", "--frequency", "200:300", "--duration", "99"), "numbers"),
         (
             ("--cells", "2", "--amplitude", "1e-6", "--frequency", "200", "--exponent", "0.01"),
             "hold 32 intervals",

@@ -1,7 +1,6 @@
 """A cell while its force acts: from touching a stop to leaving it, with controlled error. SI units.
 
-Steps, landings and errors are those of `vibench.sim.contact`, for the unknowns of a cell. A power law acts at
-every p: there w and r are p and dp/dt, and s is time itself.
+Steps, landings and errors are those of `vibench.sim.contact`, for the unknowns of a cell.
 """
 
 import math
@@ -37,13 +36,11 @@ from ..contact import (
 )
 from ..flight import polynomial_at
 from ..kernels import Table, Vector, copy_row, kernel, kernel_without_refcount
-from ..power_law import power_force, short_of_the_wall
 from ._cell_flow import (
     CURVATURE,
     MEMORY,
     MOMENT,
     MOMENTS,
-    POWER,
     RATE,
     RATE_SCALE,
     ROOT,
@@ -57,10 +54,10 @@ from ._cell_flow import (
     cell_rates,
 )
 
-FIRST_PART = 0.05
-"""First step under a power law, as a part of the window."""
-FADING = 0.999
-"""How much of a past size is left after a window."""
+CARE = 0.03
+"""Part of the tolerance that a step may use. Errors of steps take energy and do not give it, so that they add
+up from contact to contact; those of whole collisions do not."""
+FINEST = 1e-11
 FIRST_STEP_TOLERANCE = 1e-6
 """The tolerance for which a contact's first step is tuned; it scales with the eighth root."""
 
@@ -112,19 +109,6 @@ def begin_pressing(
 
 
 @kernel_without_refcount
-def begin_power(cell: Vector, series: Vector, markov: Vector, law: CellLaw, length: float) -> None:
-    """Take p and dp/dt of a cell under a power law from the chain, and the sizes that errors are held to."""
-    p, rate = series[0], series[1]
-    secant = power_force(p, law.power) / p if p != 0.0 else 0.0
-    turn = math.sqrt(max(secant * markov[1], 1.0 / (length * length)))
-    cell[SIDE], cell[ROOT], cell[RATE] = 1.0, p, rate
-    cell[ROOT_SCALE] = max(abs(p) + abs(rate) / turn, FADING * cell[ROOT_SCALE])
-    cell[RATE_SCALE] = max(abs(rate) + abs(p) * turn, FADING * cell[RATE_SCALE])
-    if cell[STEP] == 0.0:
-        cell[STEP] = FIRST_PART * length
-
-
-@kernel_without_refcount
 def log_moment(log: Table, at: Vector) -> None:
     """Add a point of the motion as the log's next row, if there is room."""
     row = int(log[0, LOGGED]) + 1
@@ -136,7 +120,7 @@ def log_moment(log: Table, at: Vector) -> None:
 @kernel_without_refcount
 def _far(w: float, side: float, law: CellLaw) -> float:
     """abs(p) of a pressed cell [m]."""
-    return abs(w) if law.kind == POWER else gap_of(side, law.lower, law.upper) + w * w
+    return gap_of(side, law.lower, law.upper) + w * w
 
 
 @kernel_without_refcount
@@ -179,8 +163,6 @@ def _scatter(work: Table, cell: Vector, series: Vector, markov: Vector, law: Cel
     cell[ROOT], cell[RATE] = at[W], at[R]
     for k in range(MOMENTS):
         cell[MEMORY + k] = at[MOMENT + k]
-    if law.kind == POWER:
-        return
     p, rate = motion_in_series(cell[MEMORY:], series, markov, at[T])
     cell[MEMORY + 1] += (p - side * (gap_of(side, law.lower, law.upper) + at[W] * at[W])) / markov[1]
     p, rate = motion_in_series(cell[MEMORY:], series, markov, at[T])
@@ -188,7 +170,7 @@ def _scatter(work: Table, cell: Vector, series: Vector, markov: Vector, law: Cel
 
 
 @kernel
-def press_cell(  # noqa: C901, PLR0912 - a step control and its three ends are one loop
+def press_cell(  # noqa: C901 - a step control and its three ends are one loop
     cell: Vector,
     tau: float,
     limit: float,
@@ -230,12 +212,11 @@ def press_cell(  # noqa: C901, PLR0912 - a step control and its three ends are o
         return HELD, tau
     _gather(work, cell, tau)
     point, trial, system = work[POINT], work[TRIAL], CellSystem(markov, law)
+    tolerance = min(tolerance, max(CARE * tolerance, FINEST))
     near = NEAR * math.sqrt(tolerance)
     cell_rates(point, work[0], side, curvature, 0.0, system)
     for _ in range(MOST_STEPS):
-        wish, left = step, limit - point[T]
-        if law.kind == POWER:
-            step = min(short_of_the_wall(step, point, 0.0, markov[1], law.power), left)
+        wish = step
         trial_step(work, step, side, curvature, 0.0, system)
         error = step_error(work, step, root_scale, rate_scale, tolerance)
         factor = step_factor(error)
@@ -245,13 +226,11 @@ def press_cell(  # noqa: C901, PLR0912 - a step control and its three ends are o
                 return NOT_FINITE, point[T]
             continue
         taken, code = step, -1
-        if law.kind != POWER and trial[W] <= 0.0:
+        if trial[W] <= 0.0:
             close = LANDING * root_scale
             taken = step_to_exit(work, step, side, curvature, 0.0, system, close, near * point[W])
             code = LEFT
-        if law.kind == POWER and taken == left:
-            trial[T], code = limit, HELD
-        elif trial[T] >= limit:
+        if trial[T] >= limit:
             taken = step_to_time(work, taken, T, limit, side, curvature, 0.0, system)
             code = HELD
         if trial[T] < point[T]:

@@ -15,7 +15,6 @@ from typing import NamedTuple
 from ..contact import WORK_ROWS, R, W, rates_of
 from ..flight import SERIES_TERMS
 from ..kernels import Vector, inlined, kernel_without_refcount
-from ..power_law import power_force
 from ..slots import PowerTerms
 
 T = 2
@@ -98,20 +97,38 @@ class CellSystem(NamedTuple):
 def cell_rates(
     at: Vector, rates: Vector, side: float, curvature: Vector, middle: float, system: CellSystem
 ) -> None:
-    """Write d/ds of the unknowns at ``at`` into ``rates``, for a power law d/dt.
+    """Write d/ds of the unknowns at ``at`` into ``rates``.
 
     ``curvature`` is d2p/dt2 without the force, in powers of (t - middle).
     """
     law, w, r = system.law, at[W], at[R]
     free = acceleration_at(curvature, at[T] - middle) - memory_force(system.markov, at[MOMENT:])
-    if law.kind == POWER:
-        pace, force = 1.0, power_force(w, law.power)
-        rates[W], rates[R] = r, free - system.markov[1] * force
-    else:
-        pace = w
-        force = side * w * w * (law.linear_stiffness + law.contact_stiffness * w) * (1.0 + law.loss * r)
-        rates[W], rates[R] = 0.5 * r, w * side * (free - system.markov[1] * force)
-    rates[T] = pace
-    rates[MOMENT] = pace * force
+    force = side * w * w * (law.linear_stiffness + law.contact_stiffness * w) * (1.0 + law.loss * r)
+    rates[W], rates[R] = 0.5 * r, w * side * (free - system.markov[1] * force)
+    rates[T] = w
+    rates[MOMENT] = w * force
     for k in range(MOMENT + 1, WIDTH):
-        rates[k] = pace * at[k - 1]
+        rates[k] = w * at[k - 1]
+
+
+@kernel_without_refcount
+def age_moments(cell: Vector, by: float) -> None:
+    """Let time pass without a force: I_k+1 grows by the integral of I_k, exactly."""
+    for k in range(MOMENTS - 1, 0, -1):
+        share, added = 1.0, 0.0
+        for back in range(1, k + 1):
+            share *= by / back
+            added += share * cell[MEMORY + k - back]
+        cell[MEMORY + k] += added
+
+
+@kernel_without_refcount
+def write_aged(node: Vector, cell: Vector, tau: float, by: float) -> None:
+    """Write a log's row of what a cell's moments would be ``by`` after ``tau`` without a force in between."""
+    node[W], node[R], node[T] = 0.0, 0.0, tau + by
+    for k in range(MOMENTS):
+        share = 1.0
+        node[MOMENT + k] = cell[MEMORY + k]
+        for back in range(1, k + 1):
+            share *= by / back
+            node[MOMENT + k] += share * cell[MEMORY + k - back]

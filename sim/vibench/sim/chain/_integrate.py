@@ -10,7 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 from ..flight import SERIES_TERMS
 from ..kernels import Complex, Floats, Table, clock_at
 from ..model import Accuracy, AccuracyWord, Drive, Harmonic, Outcome, chosen
-from ..motion import MAX_IMPACT_RATE_HZ, ROUNDING, SPARE_IMPACTS, check_times, check_within
+from ..motion import (
+    MAX_IMPACT_RATE_HZ,
+    ROUNDING,
+    SPARE_IMPACTS,
+    Trajectory,
+    check_times,
+    check_within,
+    integrate,
+)
 from ._base_force import PIECE_TERMS, with_pieces
 from ._cell_contact import begin_pressing
 from ._cell_flow import CURVATURE_TERMS, POWER, SIDE, fill_curvature
@@ -73,7 +81,7 @@ def integrate_chain(
 
     Flight is exact (a harmonic drive in closed form, others as polynomials on pieces); contacts are proved or
     excluded by bounds and resolved with the tolerance of ``accuracy``, however many cells press at once.
-    Sampling changes no step. One cell moves as in `vibench.sim.motion`, to within the tolerance.
+    Sampling changes no step. One cell is the specimen, and is followed as `vibench.sim.motion` does.
 
     Parameters
     ----------
@@ -101,6 +109,13 @@ def integrate_chain(
     """
     accuracy = chosen(Accuracy, accuracy)
     check_times(duration_s, start_time_s, sample_rate_hz, max_impact_rate_hz)
+    if chain.size == 1:
+        start = None if initial_state is None else _start_motion(chain, initial_state)[0]
+        run = integrate(
+            chain.cells[0], drive, duration_s, accuracy, start, sample_rate_hz,
+            start_time_s=start_time_s, max_impact_rate_hz=max_impact_rate_hz,
+        )  # fmt: skip
+        return _of_one(run)
     harmonic = drive if isinstance(drive, Harmonic) else Harmonic(1.0, 0.0)
     tables = chain_tables(chain, harmonic, accuracy)
     cells, phasors = start_chain(chain, initial_state, start_time_s, tables, accuracy)
@@ -133,14 +148,7 @@ def start_chain(
 
     Raises ValueError when the state has not the shape (cells, 6), or is not finite.
     """
-    shape = (chain.size, STATES_PER_CELL)
-    motion = np.zeros(shape) if initial_state is None else np.asarray(initial_state, dtype=np.float64)
-    if motion.shape != shape or not bool(np.all(np.isfinite(motion))):
-        msg = (
-            f"An initial state of shape {motion.shape} is not allowed: give finite numbers "
-            f"x, y, z, vx, vy, vz for each of the {chain.size} cells, shape {shape}."
-        )
-        raise ValueError(msg)
+    motion = _start_motion(chain, initial_state)
     flat = np.concatenate([motion[:, :MASSES_PER_CELL].ravel(), motion[:, MASSES_PER_CELL:].ravel()])
     clock = clock_at(time_s)
     drive = drive_term(clock, 0.0, tables)
@@ -162,6 +170,34 @@ def start_chain(
                 accuracy.tolerance,
             )  # fmt: skip
     return cells, phasors
+
+
+def _start_motion(chain: Chain, initial_state: ArrayLike | None) -> Floats:
+    shape = (chain.size, STATES_PER_CELL)
+    motion = np.zeros(shape) if initial_state is None else np.asarray(initial_state, dtype=np.float64)
+    if motion.shape != shape or not bool(np.all(np.isfinite(motion))):
+        msg = (
+            f"An initial state of shape {motion.shape} is not allowed: give finite numbers "
+            f"x, y, z, vx, vy, vz for each of the {chain.size} cells, shape {shape}."
+        )
+        raise ValueError(msg)
+    return motion
+
+
+def _of_one(run: Trajectory) -> ChainTrajectory:
+    """Give the motion of one cell, which is that of the specimen, as that of a chain."""
+    impacts = run.impacts
+    return ChainTrajectory(
+        time_s=run.time_s,
+        states=run.states[:, None, :],
+        final_state=run.final_state[None, :],
+        end_time_s=run.end_time_s,
+        impacts=ChainImpacts(
+            impacts.times_s, np.zeros(impacts.count, np.int64), np.array([impacts.count], np.int64)
+        ),
+        outcome=run.outcome,
+        accuracy=run.accuracy,
+    )
 
 
 def new_observations(chain: Chain, mode: int) -> ChainObservations:

@@ -10,12 +10,22 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels import Complex, Table, Vector, advance_clock, kernel, kernel_without_refcount, time_until
+from ..kernels import (
+    Complex,
+    Table,
+    Vector,
+    advance_clock,
+    copy_row,
+    inlined,
+    kernel,
+    kernel_without_refcount,
+    time_until,
+)
 from ..model import Outcome
 from ._base_force import deposit_base, place_force
-from ._cell_contact import begin_power
 from ._cell_flow import CELL_SIZE, MEMORY, POWER, SIDE
-from ._cell_window import COUNT, cross_window
+from ._cell_power import begin_power
+from ._cell_window import COUNT, CUT, cross_window
 from ._observer import NOTHING, PEAKS_AND_LINES, ChainObservations, observe_busy, observe_forces, observe_idle
 from ._tables import KIND, LOWER, OBSERVED, PATH, UPPER, ChainTables
 from ._windows import (
@@ -62,7 +72,7 @@ class ChainRecord(NamedTuple):
 
 
 @kernel
-def advance_chain(  # noqa: C901 - the kinds of window and their ends are one loop
+def advance_chain(
     cells: Table,
     phasors: Complex,
     clock: Vector,
@@ -73,7 +83,23 @@ def advance_chain(  # noqa: C901 - the kinds of window and their ends are one lo
     observations: ChainObservations,
 ) -> int:
     """Advance cells, phasors and clock in place to the instant ``until`` [s]; returns an `Outcome` code."""
-    workspace = workspace_for(tables)
+    return _advance(
+        workspace_for(tables), cells, phasors, clock, until, tables, tolerance, record, observations
+    )
+
+
+@kernel_without_refcount
+def _advance(  # noqa: C901, PLR0912 - the kinds of window and their ends are one loop
+    workspace: Workspace,
+    cells: Table,
+    phasors: Complex,
+    clock: Vector,
+    until: float,
+    tables: ChainTables,
+    tolerance: float,
+    record: ChainRecord,
+    observations: ChainObservations,
+) -> int:
     observed = 1 if observations.mode == NOTHING else OBSERVED
     count, drive = len(cells), len(phasors) - 1
     phasors[drive] = drive_term(clock, 0.0, tables)
@@ -99,9 +125,17 @@ def advance_chain(  # noqa: C901 - the kinds of window and their ends are one lo
             count = 0
             continue
         length, count = _choose_window(workspace, cells, phasors, clock, longest, observed, tables)
-        code = _cross(
-            workspace, cells, phasors, count, length, clock, tables, tolerance, record, observations
-        )
+        _prepare_busy(workspace, cells, phasors, count, length, observed, tables)
+        code, impacts = CUT, record.counts[IMPACTS]
+        while code == CUT:
+            record.counts[IMPACTS] = impacts
+            code = _cross(workspace, cells, count, length, clock, tables, tolerance, record, observations)
+            if code == CUT:
+                length = workspace.touches[COUNT]
+                propagate_window(workspace, phasors, clock, length, 0, tables)
+                place_observed(workspace.motion_end, workspace.turned, observed, tables)
+        if observations.mode != NOTHING:
+            _observe_rest(workspace, cells, phasors, count, length, tables, observations)
         if record.counts[NEXT_SAMPLE] < len(record.samples):
             _sample(workspace, phasors, clock, length, tables, tolerance, record)
         for k in range(count):
@@ -116,7 +150,7 @@ def advance_chain(  # noqa: C901 - the kinds of window and their ends are one lo
             return code
 
 
-@kernel
+@kernel_without_refcount
 def _go_quietly(
     workspace: Workspace,
     phasors: Complex,
@@ -135,7 +169,7 @@ def _go_quietly(
     if record.counts[NEXT_SAMPLE] < len(record.samples):
         _sample(workspace, phasors, clock, longest, tables, tolerance, record)
     if observations.mode != NOTHING:
-        then = np.zeros(2)
+        then = workspace.then
         then[0], then[1] = clock[0], clock[1]
         left = longest
         while left > 0.0:
@@ -155,7 +189,7 @@ def _go_quietly(
     phasors[drive] = drive_term(clock, 0.0, tables)
 
 
-@kernel_without_refcount
+@inlined
 def _march_on(
     workspace: Workspace,
     phasors: Complex,
@@ -186,7 +220,7 @@ def _march_on(
     return march(workspace, phasors, clock, observed, steps, tables)
 
 
-@kernel_without_refcount
+@inlined
 def _choose_window(
     workspace: Workspace,
     cells: Table,
@@ -211,7 +245,24 @@ def _choose_window(
     return length, count
 
 
-@kernel_without_refcount
+@inlined
+def _prepare_busy(
+    workspace: Workspace, cells: Table, phasors: Complex, count: int, length: float, observed: int,
+    tables: ChainTables,
+) -> None:  # fmt: skip
+    """Write the motion of busy cells as series, and their rows as the window begins."""
+    for k in range(count):
+        i = workspace.busy[k]
+        cell, series, law = cells[i], workspace.series[i], law_of(tables.laws[i])
+        fill_observed(series, phasors, i, observed, workspace.terms, workspace.force, tables)
+        for m in range(MEMORY, CELL_SIZE):
+            cell[m] = 0.0
+        if law.kind == POWER:
+            begin_power(cell, series[PATH], length)
+        copy_row(workspace.before[i], cell)
+
+
+@inlined
 def is_quiet(workspace: Workspace, cells: Table, tables: ChainTables) -> int:
     """Say (1 or 0) whether no cell can ever touch: free phasors only shrink."""
     for i in range(len(cells)):
@@ -225,11 +276,10 @@ def is_quiet(workspace: Workspace, cells: Table, tables: ChainTables) -> int:
     return 1
 
 
-@kernel_without_refcount
+@inlined
 def _cross(
     workspace: Workspace,
     cells: Table,
-    phasors: Complex,
     count: int,
     length: float,
     clock: Vector,
@@ -238,38 +288,49 @@ def _cross(
     record: ChainRecord,
     observations: ChainObservations,
 ) -> int:
-    """Take every cell through the window and observe it."""
-    observed = 1 if observations.mode == NOTHING else OBSERVED
+    """Take every busy cell through the window; CUT where it is to be shorter, as ``touches`` then says."""
     log = workspace.no_log if observations.mode == NOTHING else workspace.log
-    worst, busy = REACHED_END, 0
-    for i in range(len(cells)):
-        if busy == count or workspace.busy[busy] != i:
-            if observations.mode != NOTHING:
-                observe_idle(observations, i, workspace, phasors, length, tables)
-            continue
-        busy += 1
+    worst = REACHED_END
+    for k in range(count):
+        i = workspace.busy[k]
         cell, series, markov = cells[i], workspace.series[i], tables.markov[i, PATH]
-        law = law_of(tables.laws[i])
-        fill_observed(series, phasors, i, observed, workspace.terms, workspace.force, tables)
-        for k in range(MEMORY, CELL_SIZE):
-            cell[k] = 0.0
-        if law.kind == POWER:
-            begin_power(cell, series[PATH], markov, law, length)
-        for k in range(CELL_SIZE):
-            workspace.before[i, k] = cell[k]
+        copy_row(cell, workspace.before[i])
         workspace.touches[COUNT] = 0.0
         code = cross_window(
-            cell, 0.0, length, series[PATH], markov, workspace.reach[PATH, i], law, tolerance,
-            workspace.later, workspace.work, workspace.touches, log,
+            cell, 0.0, length, series[PATH], markov, workspace.reach[PATH, i], law_of(tables.laws[i]),
+            tolerance, workspace.later, workspace.work, workspace.touches, log, tables.collision,
+            tables.collisions, tables.struck[i], workspace.power, tables.cuts,
         )  # fmt: skip
+        if code == CUT:
+            worst = CUT
+            break
         if code == REACHED_END:
             code = _record_touches(workspace.touches, i, clock, record)
         if observations.mode != NOTHING:
             observe_busy(observations, i, series, log, tables)
-        if observations.mode == PEAKS_AND_LINES:
-            observe_forces(observations, cell, i, workspace.turned[len(phasors) - 1], tables.omega)
         worst = max(worst, code)
     return worst
+
+
+@kernel_without_refcount
+def _observe_rest(
+    workspace: Workspace,
+    cells: Table,
+    phasors: Complex,
+    count: int,
+    length: float,
+    tables: ChainTables,
+    observations: ChainObservations,
+) -> None:
+    """Observe the cells without a force in the window, and add the forces of the others."""
+    busy = 0
+    for i in range(len(cells)):
+        if busy == count or workspace.busy[busy] != i:
+            observe_idle(observations, i, workspace, phasors, length, tables)
+            continue
+        busy += 1
+        if observations.mode == PEAKS_AND_LINES:
+            observe_forces(observations, cells[i], i, workspace.turned[len(phasors) - 1], tables.omega)
 
 
 @kernel_without_refcount
@@ -284,7 +345,7 @@ def _record_touches(touches: Vector, place: int, clock: Vector, record: ChainRec
     return REACHED_END
 
 
-@kernel
+@kernel_without_refcount
 def _sample(
     workspace: Workspace,
     phasors: Complex,
@@ -314,6 +375,7 @@ def _sample(
                     workspace.before[i], reached, later, workspace.series[i, PATH], tables.markov[i, PATH],
                     workspace.reach[PATH, i], law_of(tables.laws[i]), tolerance,
                     workspace.later, workspace.work, workspace.touches, workspace.no_log,
+                    tables.collision, tables.collisions, tables.struck[i], workspace.power, 0,
                 )  # fmt: skip
             deposit(now, workspace.before[i], i, tables)
         reached = max(reached, later)

@@ -7,7 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..flight import SERIES_TERMS
+from ..collision import (
+    LEAST_TOLERANCE,
+    TERMS,
+    Collision,
+    CollisionTables,
+    collisions_in_a_course,
+    new_collision,
+)
+from ..flight import SERIES_TERMS, P
 from ..kernels import Complex, Table, Vector
 from ..model import MOST_TERMS, Accuracy, Harmonic, Specimen
 from ..slots import parameters, power_terms
@@ -23,9 +31,15 @@ KIND, LOWER, UPPER, LINEAR, CONTACT, LOSS, INVERSE_REFERENCE, HALVES = range(8)
 """Places of a cell's law; from HALVES on the power terms' halves, then their forces."""
 LAW_SIZE = HALVES + 2 * MOST_TERMS
 
-CROSS_SHARE = 0.05
+CROSS_SHARE = 1.0
 """Part of the tolerance that one cell's force may change another's rate within a window, unseen."""
 MOST_HALVINGS = 20
+KEPT = 2
+"""Windows that are tried before the shortest."""
+COLLISION_TURN = 0.4
+"""Longest window where collisions are whole: nine moments then hold a force to 7e-10."""
+MOST_CUT = 16
+"""Cells of a chain whose windows end at touches: beyond, a window costs more than steps."""
 
 
 class ChainTables(NamedTuple):
@@ -58,11 +72,19 @@ class ChainTables(NamedTuple):
     laws: Table
     """Shape (cells, LAW_SIZE)."""
     windows: Vector
-    """Lengths of the long and the short window [s]."""
+    """Lengths of windows, long to short [s]."""
     factors: Complex
-    """exp(l_j window), shape (2, n+1)."""
+    """exp(l_j window), shape (windows, n+1)."""
     clash: NDArray[np.int64]
-    """In such a window, cells at most so far apart may not both be busy; shape (2,)."""
+    """In such a window, cells at most so far apart may not both be busy; shape (windows,)."""
+    collision: Collision
+    """Memory of a run's collisions."""
+    collisions: CollisionTables
+    """Of Hertz's stops; what is struck, cell by cell:"""
+    struck: Table
+    """Shape (cells, TERMS, P + 1)."""
+    cuts: int
+    """1 where windows end at touches, so that collisions are whole; 0 where windows cost more than that."""
     base_push: Complex
     """Shape (n,): what a unit impulse on the first m0 adds to the phasors."""
     base_markov: Table
@@ -88,8 +110,10 @@ def chain_tables(chain: Chain, drive: Harmonic, accuracy: Accuracy) -> ChainTabl
     observed = np.concatenate([path[:, :, None], displacement], axis=2)
     reaches = np.ascontiguousarray(np.abs(observed).transpose(0, 2, 1))
     between = markov_between(chain)
-    longest = WINDOW_TURN / float(np.max(np.abs(rates)))
-    windows, clash = _windows(between, longest, CROSS_SHARE * accuracy.tolerance)
+    fastest = float(np.max(np.abs(rates)))
+    turns = (COLLISION_TURN, WINDOW_TURN) if accuracy.tolerance >= LEAST_TOLERANCE else (WINDOW_TURN,)
+    windows, clash = _windows(between, [turn / fastest for turn in turns], CROSS_SHARE * accuracy.tolerance)
+    markov = _own_markov(between)
     return ChainTables(
         frequency=drive.frequency_hz,
         omega=omega,
@@ -103,11 +127,15 @@ def chain_tables(chain: Chain, drive: Harmonic, accuracy: Accuracy) -> ChainTabl
         curvatures=reaches * (np.abs(rates) ** 2)[:, None, None],
         rows=modes.rows,
         push=np.ascontiguousarray((modes.rows @ chain_impulses(chain)).T),
-        markov=_own_markov(between),
+        markov=markov,
         laws=np.vstack([_law_row(cell) for cell in chain.cells]),
         windows=windows,
         factors=np.exp(windows[:, None] * rates[None, :]),
         clash=clash,
+        collision=new_collision(),
+        collisions=collisions_in_a_course(fastest),
+        struck=_struck(markov[:, PATH], fastest),
+        cuts=int(chain.size <= MOST_CUT),
         base_push=modes.rows @ chain_state_matrix(chain)[1],
         base_markov=_base_markov(chain),
         pieces=np.zeros((0, 0)),
@@ -159,18 +187,28 @@ def cross_answers(between: Table, window: float) -> Vector:
     return np.asarray([np.max(relative[distance == d]) for d in range(cells)])
 
 
-def _windows(between: Table, longest: float, allowed: float) -> tuple[Vector, NDArray[np.int64]]:
-    """Choose the long and the short window and who may not be busy together in them.
+def _windows(between: Table, lengths: list[float], allowed: float) -> tuple[Vector, NDArray[np.int64]]:
+    """Choose the windows and who may not be busy together in them.
 
-    A short window is one in which even neighbours may.
+    In the last even neighbours may.
     """
-    clash = _clash(cross_answers(between, longest), allowed)
-    short = longest
+    lengths = list(lengths)
+    clash = [_clash(cross_answers(between, length), allowed) for length in lengths]
     for _ in range(MOST_HALVINGS):
-        if _clash(cross_answers(between, short), allowed) == 0:
+        if clash[-1] == 0:
             break
-        short *= 0.5
-    return np.array([longest, short]), np.array([clash, 0], dtype=np.int64)
+        lengths.append(0.5 * lengths[-1])
+        clash.append(_clash(cross_answers(between, lengths[-1]), allowed))
+    kept = [k for k in range(len(lengths)) if k + 1 == len(lengths) or k < KEPT]
+    return np.array([lengths[k] for k in kept]), np.array([clash[k] for k in kept], dtype=np.int64)
+
+
+def _struck(markov: Table, fastest: float) -> Table:
+    """Give what an impulse on p in a cell makes of its p, by powers of fastest * t."""
+    struck = np.zeros((len(markov), TERMS, P + 1))
+    for m in range(TERMS):
+        struck[:, m, P] = -markov[:, m] / (math.factorial(m) * fastest**m)
+    return struck
 
 
 def _clash(answers: Vector, allowed: float) -> int:

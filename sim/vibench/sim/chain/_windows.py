@@ -22,6 +22,7 @@ from ..slots import PowerTerms
 from ._base_force import PIECE_TERMS, add_base_series, base_curvature, deposit_base
 from ._cell_contact import cell_workspace
 from ._cell_flow import CELL_SIZE, MEMORY, MOMENTS, POWER, SIDE, WIDTH, CellLaw
+from ._cell_power import POINTS, ROWS
 from ._cell_window import LOG_ROWS, MOST_TOUCHES
 from ._tables import (
     CONTACT,
@@ -74,6 +75,10 @@ class Workspace(NamedTuple):
     touches: Vector
     log: Table
     no_log: Table
+    power: Table
+    """Memory of steps under a power law."""
+    then: Vector
+    """A clock that runs ahead."""
     force: Vector
     """Of the base on the first m0, in powers of the time since the window began, shape (PIECE_TERMS,)."""
 
@@ -102,6 +107,8 @@ def workspace_for(tables: ChainTables) -> Workspace:
         np.zeros(MOST_TOUCHES + 1),
         np.zeros((LOG_ROWS, WIDTH)),
         np.zeros((0, WIDTH)),
+        np.zeros((ROWS, POINTS)),
+        np.zeros(2),
         np.zeros(PIECE_TERMS),
     )
 

@@ -117,28 +117,57 @@ def collide(
     ``drive`` is exp(i (omega t + phase)) now.
     """
     speed, par = state[RATE], tables.par
-    if tolerance < LEAST_TOLERANCE or state[ROOT] > FRESH * state[ROOT_SCALE] or not speed > 0.0:
-        return 0.0
-    deepest = (state[ROOT_SCALE] - ROOT_FLOOR) ** 2
-    if LONGEST * deepest >= speed * min(longest, LONGEST_TURN / collisions.fastest):
+    deepest = depth_of_fresh(state[ROOT], state[ROOT_SCALE], speed, longest, tolerance, collisions)
+    if deepest == 0.0:
         return 0.0
     _see_from_its_side(collision.motion, state, drive)
     store(collision.course, 0, eight_of_eight(collisions.onto_p, 0, collision.motion))
-    duration = _duration(
-        collision,
-        speed,
-        deepest,
-        tolerance * CLOSE,
-        par,
-        gap_of(state[SIDE], par.lower, par.upper),
-        collisions,
+    gap = gap_of(state[SIDE], par.lower, par.upper)
+    duration = find_collision(
+        collision, speed, deepest, longest, tolerance, par.contact_stiffness, gap, collisions
     )
-    if not 0.0 < duration < min(longest, LONGEST_TURN / collisions.fastest):
+    if duration == 0.0:
         return 0.0
     move_on(collision.after, collision.motion, collision.moments, duration, collisions)
     if not collision.after[P_RATE] < 0.0:
         return 0.0
     _leave(state, collision.after, par)
+    return duration
+
+
+@inlined
+def depth_of_fresh(
+    root: float,
+    root_scale: float,
+    speed: float,
+    longest: float,
+    tolerance: float,
+    collisions: CollisionTables,
+) -> float:
+    """Depth that a contact just begun will reach [m]; zero where it is not fresh, or takes too long."""
+    deepest = (root_scale - ROOT_FLOOR) ** 2
+    if tolerance < LEAST_TOLERANCE or root > FRESH * root_scale or not speed > 0.0:
+        return 0.0
+    if LONGEST * deepest >= speed * min(longest, LONGEST_TURN / collisions.fastest):
+        return 0.0
+    return deepest
+
+
+@inlined
+def find_collision(
+    collision: Collision,
+    speed: float,
+    deepest: float,
+    longest: float,
+    tolerance: float,
+    stiffness: float,
+    gap: float,
+    collisions: CollisionTables,
+) -> float:
+    """Find the depths and the duration of a collision whose course without force is written; zero if not."""
+    duration = _duration(collision, speed, deepest, tolerance * CLOSE, stiffness, gap, collisions)
+    if not 0.0 < duration < min(longest, LONGEST_TURN / collisions.fastest):
+        return 0.0
     return duration
 
 
@@ -213,7 +242,7 @@ def _duration(
     speed: float,
     deepest: float,
     close: float,
-    par: Parameters,
+    stiffness: float,
     gap: float,
     collisions: CollisionTables,
 ) -> float:
@@ -222,7 +251,7 @@ def _duration(
     press = 2.0 * collision.course[2] * fastest * fastest * unit / speed
     if not SOFTEST <= press <= HARDEST:
         return 0.0
-    stiff = par.contact_stiffness * deepest * math.sqrt(deepest)
+    stiff = stiffness * deepest * math.sqrt(deepest)
     duration = _begin(collision, unit, deepest, press, stiff, collisions)
     place = int((press - SOFTEST) / SPACING + 0.5)
     shape, end_onto_duration = collisions.shapes[place], collisions.durations[place, END_ONTO_DURATION]

@@ -44,11 +44,18 @@ def observe_collision(
         observations[PEAK_X] = _turning_peak(observations[PEAK_X], collision, duration, collisions)
     if observations[MODE] == PEAKS_AND_LINES:
         _add_lines(observations, collision, duration, gap, omega, collisions)
+    # The course of x is needed no more.
+    observations[PEAK_P] = deepest_of(observations[PEAK_P], collision, gap, collisions)
+
+
+@inlined
+def deepest_of(best: float, collision: Collision, gap: float, collisions: CollisionTables) -> float:
+    """Largest abs(p) of a collision, or ``best`` if that is larger; the course of p or x is written over."""
     unit, depths = collision.deepest[UNIT] * collision.deepest[DEEPER_BY], collision.workspace[DEPTHS]
-    if gap + unit * ABOVE_POINTS * largest(sixteen(depths, 0)) > observations[PEAK_P]:
-        # The course of x is needed no more.
+    if gap + unit * ABOVE_POINTS * largest(sixteen(depths, 0)) > best:
         store(collision.course, 0, eight_of_sixteen(collisions.about_middle, 0, depths))
-        observations[PEAK_P] = max(observations[PEAK_P], gap + unit * top_of(collision.course))
+        best = max(best, gap + unit * top_of(collision.course))
+    return best
 
 
 @inlined

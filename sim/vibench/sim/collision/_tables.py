@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..flight import AT_X, P, linear_series
+from ..flight import AT_X, WIDE, P, linear_series
 from ..kernels import Table, Vector, kernel_without_refcount
 from ..model import Hertz, Specimen
 
@@ -194,13 +194,26 @@ def collision_tables(
     if not isinstance(specimen.contact, Hertz):
         return None
     linear = linear_series(specimen, omega, force, rates, TERMS)
+    return _with_shapes(linear.fastest, linear.powers, linear.struck)
+
+
+def collisions_in_a_course(fastest: float) -> CollisionTables:
+    """Make the numbers of collisions whose course without force is known as a series of p, as in a chain.
+
+    ``struck`` is left to fill in: what a unit impulse adds to the m-th term of p in fastest * t, column P.
+    """
+    nothing = np.zeros((TERMS, WIDE, WIDE))
+    return _with_shapes(fastest, nothing, nothing[0])
+
+
+def _with_shapes(fastest: float, powers: Table, struck: Table) -> CollisionTables:
     shapes, durations = _shapes()
     return CollisionTables(
-        fastest=linear.fastest,
-        onto_x=np.ascontiguousarray(linear.powers[:, :, AT_X].T),
-        onto_p=np.ascontiguousarray(linear.powers[:, :, P].T),
-        powers=linear.powers,
-        struck=linear.struck,
+        fastest=fastest,
+        onto_x=np.ascontiguousarray(powers[:, :, AT_X].T),
+        onto_p=np.ascontiguousarray(powers[:, :, P].T),
+        powers=powers,
+        struck=struck,
         shares=np.ascontiguousarray(SHARES[:, :, :POINTS]),
         ends=np.ascontiguousarray(SHARES[:, :, POINTS].T),
         weights=np.ascontiguousarray(SHARES[0, :, POINTS]),

@@ -1,0 +1,48 @@
+"""Energy of undamped chains at standard accuracy, and what one cell is."""
+
+import numpy as np
+import pytest
+
+from vibench.sim import Harmonic, LinearSweep, gong2025, integrate
+from vibench.sim.chain import chain_energies, chain_of, integrate_chain
+
+pytestmark = pytest.mark.timeout(300)
+STILL = Harmonic(100.0, 0.0)
+SEEDS = range(8)
+
+
+def drifts(contact, cells, duration_s):
+    """What undamped chains in motion gain or lose, over their energy."""
+    chain = chain_of(gong2025(damping_time_s=0.0, contact=contact), cells)
+    found = []
+    for seed in SEEDS:
+        start = np.random.default_rng(seed).normal(size=(cells, 6)) * np.repeat([3e-5, 0.15], 3)
+        run = integrate_chain(chain, STILL, duration_s, "standard", start)
+        found.append(chain_energies(chain, run.final_state).sum() / chain_energies(chain, start).sum() - 1.0)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("cells", [2, 4])
+def test_undamped_chains_on_hertz_s_stops_gain_energy_as_often_as_they_lose_it_and_little(cells):
+    found = drifts("hertz", cells, 0.5)
+    assert np.abs(found).max() < 2e-5
+    assert found.min() < 0.0 < found.max()
+
+
+@pytest.mark.parametrize(
+    ("contact", "bound"), [("power:5", 3e-4), ("power:3", 3e-5), ("linear_gap:2e5", 3e-5)]
+)
+def test_undamped_chains_under_other_laws_keep_their_energy(contact, bound):
+    assert np.abs(drifts(contact, 3, 0.5)).max() < bound
+
+
+@pytest.mark.parametrize("drive", [Harmonic(220.0, 40e-6), LinearSweep(100.0, 300.0, 0.2, 20e-6)])
+def test_one_cell_is_the_specimen_to_the_last_bit(drive):
+    start = np.array([1e-5, 0.0, 2e-5, 0.1, -0.05, 0.0])
+    chain = chain_of(gong2025(), 1)
+    ours = integrate_chain(chain, drive, 0.2, "standard", start[None, :], sample_rate_hz=1e3)
+    theirs = integrate(gong2025(), drive, 0.2, "standard", start, sample_rate_hz=1e3)
+    np.testing.assert_array_equal(ours.states[:, 0], theirs.states)
+    np.testing.assert_array_equal(ours.final_state[0], theirs.final_state)
+    assert ours.impacts.per_cell.tolist() == [theirs.impacts.count]
+    assert ours.impacts.count > 10
