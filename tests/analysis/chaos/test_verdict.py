@@ -90,11 +90,18 @@ def test_a_periodic_motion_that_is_lost_for_good_is_judged_by_the_chaos_after_it
     assert found.evidence.periods == 2100, "the block in which it was lost is not judged"
 
 
-def test_a_motion_that_changes_late_is_undecided(chaos):
+def test_a_settled_end_is_judged_by_itself_though_the_transient_was_longer(chaos):
     points = np.vstack((chaos[:2100], np.full((900, 2), 0.2)))
     found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
+    assert (found.kind, found.period, found.evidence.periods) == (MotionKind.PERIODIC, 1, 900)
+    assert "900 drive periods, otherwise before" in found.why
+
+
+def test_a_motion_that_is_lost_late_is_undecided(chaos):
+    points = np.vstack((np.full((2100, 2), 0.2), chaos[:900]))
+    found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
     assert found.kind is MotionKind.UNDECIDED
-    assert "changed 900 drive periods before the end" in found.why
+    assert "drive periods before the end" in found.why
 
 
 def test_chaos_with_calm_stretches_is_one_motion(chaos):
@@ -141,3 +148,21 @@ def test_a_period_is_the_shortest_and_needs_several_repeats():
     points = section(np.random.default_rng(6), 5)
     assert shortest_period(Points(points, QUIET)) == 5
     assert shortest_period(Points(points[:18], QUIET)) is None
+
+
+def test_noise_without_motion_is_not_periodic():
+    rng = np.random.default_rng(11)
+    # The size of the orbit is that of the noise itself: 1 / sqrt(2) of sqrt(2) its root mean square.
+    noise = np.full(2, np.sqrt(0.5))
+    found = motion_verdict(Points(noise * rng.standard_normal((1500, 2)), noise), DRIVE_HZ)
+    assert found.kind is MotionKind.UNDECIDED
+    assert "noise" in found.why
+
+
+def test_a_motion_that_noise_could_hide_is_not_called_periodic():
+    rng = np.random.default_rng(12)
+    circle = rng.uniform(0, 2 * np.pi, 1500)
+    hidden = 0.3 * np.column_stack((np.cos(circle), np.sin(circle)))
+    noise = np.full(2, 0.25)
+    found = motion_verdict(Points(hidden + noise * rng.standard_normal((1500, 2)), noise), DRIVE_HZ)
+    assert found.kind is MotionKind.UNDECIDED

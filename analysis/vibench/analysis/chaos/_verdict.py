@@ -50,6 +50,8 @@ MOST_POINTS = 3000
 """The last so many drive periods are judged: more would only cost time."""
 ABOVE_NOISE = 5.0
 """Scatter of the points over their noise below which its shape says nothing."""
+LARGEST_NOISE = 0.1
+"""Noise over the size of the orbit, beyond which points that repeat within it may hide any other motion."""
 SMALL = 0.05
 """Scatter, as part of the orbit, up to which linear noise about a fixed point leaves a motion periodic."""
 CHAOTIC_K = 0.9
@@ -110,7 +112,8 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     a closed curve, and *chaotic* only when all witnesses agree: settled, far above the noise, on no curve,
     the 0-1 test near one on points that are not oversampled, and more than linear noise by surrogates. Each
     of these alone passes noise for chaos; anything less is undecided. Of a motion that changes once, as when
-    a chaotic transient ends, the last part is judged if it is the longer one.
+    a chaotic transient ends, the last part is judged: an end that repeats by itself, any other if it is the
+    longer part. Where the noise is more than a tenth of the orbit, nothing can be said to repeat.
 
     Parameters
     ----------
@@ -134,7 +137,9 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
         return _of_one_motion(last, drive_hz, seed)
     rest = Points(last.value[before:], last.noise)
     found = _of_one_motion(rest, drive_hz, seed)
-    if len(rest.value) < max(before, FEWEST):
+    # A settled end is seen to repeat, however long the transient; an irregular one may be a transient.
+    fewest = FEWEST if found.kind is MotionKind.PERIODIC else max(before, FEWEST)
+    if len(rest.value) < fewest:
         return _undecided(
             f"the motion changed {len(rest.value)} drive periods before the end, too late to judge what it "
             "became; dwell longer",
@@ -148,6 +153,12 @@ def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
     if not evidence.is_settled:
         return _undecided(
             "the motion still changes: its mean or its scatter drifts; let it settle for longer",
+            evidence,
+        )
+    if last.noise_level > LARGEST_NOISE:
+        return _undecided(
+            f"the vibrometer's noise is {100 * last.noise_level:.0f} % of the orbit, which may hide whether "
+            "it repeats, or that there is any motion at all; raise the level or use a finer range",
             evidence,
         )
     period = shortest_period(last)
