@@ -8,6 +8,7 @@ import pytest
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import RecordingState
 from vibench.analysis import analyse
+from vibench.analysis.signals import phase_half_width
 from vibench.sim import base_transmissibility, gong2025
 
 LINEAR_HZ = (95.0, 266.0, 500.0)
@@ -65,10 +66,14 @@ def test_strong_noise_shows_the_two_terminal_resonances_within_two_percent_and_n
 def test_the_linear_transmission_is_the_exact_one_within_tight_bounds_of_its_own(demo):
     with open_recording(demo / "recordings" / "noise_weak.h5") as recording:
         measured = analyse(recording).response.frequency_response
-    exact = np.abs(base_transmissibility(gong2025(), measured.frequency_hz)[:, 0])
+    truth = base_transmissibility(gong2025(), measured.frequency_hz)[:, 0]
+    exact = np.abs(truth)
     inside = (measured.magnitude_lower <= exact) & (exact <= measured.magnitude_upper)
     # 95 % of the lines, within twice the standard error of a share of 551 independent lines.
     assert np.mean(inside) == pytest.approx(0.95, abs=2 * np.sqrt(0.95 * 0.05 / inside.size))
+    # The phase too: coupling, resonance and delay of the sensors are taken out of it.
+    turned = np.abs(np.angle(truth / measured.value)) <= phase_half_width(measured.half_width)
+    assert np.mean(turned) == pytest.approx(0.95, abs=2 * np.sqrt(0.95 * 0.05 / inside.size))
     assert np.median(measured.half_width) < 0.002
     assert np.max(measured.half_width) < 0.03
 

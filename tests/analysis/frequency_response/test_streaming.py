@@ -24,6 +24,9 @@ class Endless:
         self.samples = round(duration_s * RATE)
         self.longest_read = 0
 
+    def response_gain(self, frequency_hz):
+        return np.ones(frequency_hz.size)
+
     def stretches(self, label):
         return (Stretch(0, self.samples, {}, True),)
 

@@ -99,12 +99,14 @@ def repeated_response(
     order = np.rint(periodic.frequency_response.frequency_hz / noise.repetition_hz).astype(int)
     motion = np.stack([each[:, order] for each in means])
 
+    sensors = channels.response_gain(periodic.frequency_response.frequency_hz)
+
     def by(estimator: Estimator) -> FrequencyResponse:
         if estimator is Estimator.DRIVE:
-            return as_displacements(periodic.frequency_response)
+            return as_displacements(periodic.frequency_response).without_gain(sensors)
         return _least_squares(
             periodic.frequency_response, motion, estimator, channels.response_delay_s, request.noise_ratio
-        )
+        ).without_gain(sensors)
 
     chosen = by(request.estimator)
     return NoiseResponse(
@@ -232,7 +234,8 @@ def streamed_response(
     def by(estimator: Estimator) -> FrequencyResponse:
         noise_ratio = request.noise_ratio if estimator is Estimator.HV else None
         found = sums.by(estimator, noise_ratio).without_delay(channels.response_delay_s)
-        return as_displacements(found.between(*band))
+        inside = found.between(*band)
+        return as_displacements(inside).without_gain(channels.response_gain(inside.frequency_hz))
 
     chosen = by(request.estimator)
     return NoiseResponse(

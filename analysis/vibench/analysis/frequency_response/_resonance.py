@@ -106,7 +106,7 @@ def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
     """Lines of peaks, and their half-power widths in lines."""
     spread = np.maximum(np.nan_to_num(band.relative_sd_magnitude, posinf=1e9), _SMALLEST_RELATIVE_SD)
     size = _smoothed(np.nan_to_num(np.log(np.maximum(band.magnitude, 1e-300)), nan=-700.0), spread)
-    significant = np.nan_to_num(band.coherence) > band.coherence_significance
+    significant = band.is_significant & (np.nan_to_num(band.coherence) > band.coherence_significance)
     # A rise of ln(magnitude) by less than this is noise, whatever the line.
     lines, about = scipy.signal.find_peaks(size, prominence=0.0)
     result = []

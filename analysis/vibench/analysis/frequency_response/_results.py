@@ -8,6 +8,9 @@ import numpy as np
 from ..errors import InvalidRequest
 from ..signals import Complexes, Flags, Quantity, Reals, derivative_factor, magnitude_bounds, phase_half_width
 
+LEAST_COHERENCE = 0.1
+"""Below it no line is significant."""
+
 
 class Estimator(StrEnum):
     """How response over drive is formed from averaged spectra."""
@@ -105,15 +108,23 @@ class FrequencyResponse:
 
     @property
     def is_significant(self) -> Flags:
-        """Lines where drive and response have something to do with each other."""
+        """Lines where drive and response have something to do with each other, and their bounds hold.
+
+        Where the drive explains less than a tenth of the response, bounds that rest on a linear error hold
+        the truth in 3 to 75 % of all cases, however many averages make the coherence itself significant.
+        """
         decisive = self.coherence if self.reference_coherence is None else self.reference_coherence
-        return np.asarray(decisive > self.coherence_significance)
+        return np.asarray(decisive > max(self.coherence_significance, LEAST_COHERENCE))
 
     def without_delay(self, delay_s: float) -> "FrequencyResponse":
         """Turn the phase back by a delay of the response channel behind the drive channel [s]."""
         turned = self.value * np.exp(2j * np.pi * self.frequency_hz * delay_s)
         settings = replace(self.settings, delay_s=self.settings.delay_s + delay_s)
         return replace(self, value=turned, settings=settings)
+
+    def without_gain(self, gain: Complexes) -> "FrequencyResponse":
+        """Divide by what the sensors did to the response over what they did to the drive, shape (lines,)."""
+        return replace(self, value=self.value / gain)
 
     def between(self, low_hz: float, high_hz: float) -> "FrequencyResponse":
         """Keep the lines from ``low_hz`` to ``high_hz``, both included."""

@@ -71,6 +71,7 @@ def _frequency_response(analysis: NoiseAnalysis) -> Json:
         "phase_lower_rad": found.phase_lower,
         "phase_upper_rad": found.phase_upper,
         "coherence": found.coherence,
+        "is_significant": found.is_significant,
     }
 
 

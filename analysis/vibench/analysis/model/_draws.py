@@ -244,4 +244,5 @@ def _drawn_channels(
         recorded.response_delay_s,
         base,
         drive_v,
+        recorded.response_gain,
     )

@@ -13,7 +13,7 @@ from vibench.sim.shaker import Shaker
 
 from ..errors import UnusableData
 from ..frequency_response import FrequencyResponse, NoiseAnalysis, repeated_response, streamed_response
-from ..recordings import BASE, DRIVE, RecordedChannels, Stretch, coupling_cut_hz, sensor_gain
+from ..recordings import BASE, DRIVE, RecordedChannels, Stretch, coupled_gain
 from ..signals import Complexes, Flags, Reals
 from ._driven_rig import AMPLIFIER
 
@@ -86,7 +86,7 @@ def fitted_shaker(recording: Recording, analysis: NoiseAnalysis, specimen: Speci
         )
     frequency_hz = found.frequency_hz[known]
     s: Complexes = np.asarray(2j * np.pi * frequency_hz, dtype=np.complex128)
-    measured = found.value[known] / s / _base_gain(recording, frequency_hz)
+    measured = found.value[known] / s
     carried = _carried_mass(specimen, frequency_hz)
     # A line's scatter is the same for both parts of ln(measured / modelled).
     sd = np.maximum(found.relative_sd_magnitude[known], 1e-6)
@@ -140,13 +140,6 @@ def _carried_mass(specimen: Specimen, frequency_hz: Reals) -> Complexes:
     return np.asarray(moved @ np.asarray(specimen.masses, dtype=np.float64))
 
 
-def _base_gain(recording: Recording, frequency_hz: Reals) -> Complexes:
-    channel = recording.channel(BASE)
-    cut_hz = coupling_cut_hz(channel)
-    coupling = 1j * frequency_hz / (1j * frequency_hz + cut_hz)
-    return np.asarray(sensor_gain(recording.bench, channel, frequency_hz) * coupling)
-
-
 @dataclass(frozen=True, eq=False)
 class _VoltageAndBase:
     """The voltage in the base's place and the base in m0's, as the estimators of noise take them."""
@@ -162,6 +155,11 @@ class _VoltageAndBase:
     @property
     def samples(self) -> int:
         return self.recorded.samples
+
+    def response_gain(self, frequency_hz: Reals) -> Complexes:
+        return coupled_gain(
+            self.recorded.recording.bench, self.recorded.recording.channel(BASE), frequency_hz
+        )
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
         return self.recorded.stretches(label)

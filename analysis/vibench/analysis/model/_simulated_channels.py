@@ -3,6 +3,7 @@
 The base's displacement from its recorded acceleration: what the simulated specimen is shaken by.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from vibench.sim import Accuracy, Sampled, Specimen, follow_samples
 
 from ..errors import UnusableData
 from ..recordings import BASE, DRIVE, RecordedChannels, Stretch
-from ..signals import Flags, Integers, Quantity, Reals, converted_signal
+from ..signals import Complexes, Flags, Integers, Quantity, Reals, converted_signal
 
 LOWEST_PART = 0.25
 """The displacement is kept down to this part of the lowest frequency played: below it there is no drive,
@@ -110,6 +111,8 @@ class SimulatedChannels:
     """Of the simulated table, or as it was recorded where that drove, shape (samples,) [m/s2]."""
     drive_v: Reals
     """As it was recorded, shape (samples,) [V]."""
+    sensors: Callable[[Reals], Complexes]
+    """Gain of the response's sensor over that of the base's, without their delays."""
 
     @property
     def sample_rate_hz(self) -> float:
@@ -120,6 +123,10 @@ class SimulatedChannels:
     def samples(self) -> int:
         """Samples per channel."""
         return self.recorded.samples
+
+    def response_gain(self, frequency_hz: Reals) -> Complexes:
+        """Gain of the response's sensor over that of the base's, without their delays."""
+        return self.sensors(frequency_hz)
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
         """Give the named parts of the record."""
@@ -170,6 +177,8 @@ def under_base_motion(
         -base.delay_s,
         recording.read(BASE),
         recording.read(DRIVE),
+        # What the base's sensor did is taken for the base's motion, and the response has no sensor.
+        lambda frequency_hz: np.ones(frequency_hz.size, dtype=np.complex128),
     )
 
 

@@ -32,6 +32,7 @@ from ._intact import (
     require_intact as require_intact,
 )
 from ._sensor_gain import (
+    coupled_gain as coupled_gain,
     coupling_cut_hz as coupling_cut_hz,
     sensor_gain as sensor_gain,
 )

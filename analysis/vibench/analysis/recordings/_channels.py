@@ -11,7 +11,8 @@ import numpy as np
 from vibench.acquisition.recording import Recording
 
 from ..errors import NotEnoughData, UnusableData
-from ..signals import Flags, Reals
+from ..signals import Complexes, Flags, Reals
+from ._sensor_gain import coupled_gain
 
 DRIVE, BASE, RESPONSE = "drive_voltage", "base_acceleration", "m0_velocity"
 
@@ -47,6 +48,9 @@ class Channels(Protocol):
     @property
     def response_delay_s(self) -> float:
         """By how much the response channel lags the base channel."""
+
+    def response_gain(self, frequency_hz: Reals) -> Complexes:
+        """Gain of the response's sensor over that of the base's, without their delays; shape (lines,)."""
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
         """Give the named parts of the record, in the order of time."""
@@ -86,6 +90,15 @@ class RecordedChannels:
     def response_delay_s(self) -> float:
         """By how much the response channel lags the base channel."""
         return self.recording.channel(RESPONSE).delay_s - self.recording.channel(BASE).delay_s
+
+    def response_gain(self, frequency_hz: Reals) -> Complexes:
+        """Gain of the response's sensor over that of the base's, couplings included and delays left out."""
+        response, base = (
+            coupled_gain(self.recording.bench, self.recording.channel(role), frequency_hz)
+            for role in (RESPONSE, BASE)
+        )
+        delay = np.exp(2j * np.pi * frequency_hz * self.response_delay_s)
+        return np.asarray(response / base * delay)
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
         """Give the named parts of the record that hold samples."""
@@ -171,6 +184,10 @@ class ObservedChannels:
     def response_delay_s(self) -> float:
         """By how much the response channel lags the base channel."""
         return self.channels.response_delay_s
+
+    def response_gain(self, frequency_hz: Reals) -> Complexes:
+        """Gain of the response's sensor over that of the base's, without their delays."""
+        return self.channels.response_gain(frequency_hz)
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
         """Give the named parts of the record."""

@@ -34,6 +34,12 @@ def sensor_gain(bench: Mapping[str, Any], channel: ChannelHeader, frequency_hz: 
     return np.asarray(gain * np.exp(-s * delay_s))
 
 
+def coupled_gain(bench: Mapping[str, Any], channel: ChannelHeader, frequency_hz: Reals) -> Complexes:
+    """Give the same with the channel's coupling, above 0 Hz."""
+    coupling = 1j * frequency_hz / (1j * frequency_hz + coupling_cut_hz(channel))
+    return np.asarray(sensor_gain(bench, channel, frequency_hz) * coupling)
+
+
 def coupling_cut_hz(channel: ChannelHeader) -> float:
     """-3 dB of the channel's coupling [Hz]; 0 where direct voltage passes."""
     return AC_CUT_HZ if channel.coupling == "AC" else 0.0

@@ -87,6 +87,7 @@ def dwell_response(
     towards_hz: tuple[float, ...] = (),
     orders: tuple[float, ...] = ALL_ORDERS,
     delay_s: float = 0.0,
+    sensors: complex = 1.0,
 ) -> DwellResponse:
     """Analyse the last seconds of a dwell.
 
@@ -103,6 +104,8 @@ def dwell_response(
         Frequencies, such as those of the bound modes, near which (10 %) the largest peak is listed.
     delay_s
         By how much the response channel lags the base channel [s].
+    sensors
+        Gain of the response's sensor over that of the base's at the drive frequency, without their delays.
 
     Raises
     ------
@@ -127,7 +130,7 @@ def dwell_response(
     whole, parts = _whole_and_parts(response[window], phase, orders)
     base_whole, base_parts = _whole_and_parts(base[window], phase, orders)
     omega = 2 * np.pi * level.frequency_hz
-    turn = 1j * omega * np.exp(1j * omega * delay_s)
+    turn = 1j * omega * np.exp(1j * omega * delay_s) / sensors
     ratio = complex(turn * whole.order(1.0)[0] / base_whole.order(1.0)[0])
     each = turn * parts.order(1.0) / base_parts.order(1.0) / ratio
     scatter = float(np.std(each, ddof=1)) / np.sqrt(2 * each.size)

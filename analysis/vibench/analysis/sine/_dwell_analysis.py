@@ -69,6 +69,7 @@ def measured_dwell(channels: Channels, dwell: DwellPlan, towards_hz: tuple[float
         window_s=min(WINDOW_S, clear_s),
         towards_hz=towards_hz,
         delay_s=channels.response_delay_s,
+        sensors=complex(channels.response_gain(np.array([dwell.frequency_hz]))[0]),
     )
 
 

@@ -102,6 +102,7 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
         near_hz=near_hz,
         window_s=min(plan.record_s, longest_s),
         delay_s=channels.response_delay_s,
+        sensors=complex(channels.response_gain(np.array([near_hz]))[0]),
     )
 
 

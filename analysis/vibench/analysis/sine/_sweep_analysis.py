@@ -1,6 +1,6 @@
 """From a recorded sweep to its responses and a picture of its velocity."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -84,4 +84,12 @@ def measured_sweep(channels: Channels, sweep: Sweep) -> tuple[SweepResponse, Spe
             )
         sums.add(block)
         picture.add(block[_RESPONSE])
-    return sums.response(delay_s=channels.response_delay_s), picture.spectrogram()
+    found = sums.response(delay_s=channels.response_delay_s)
+    sensors = channels.response_gain(found.frequency_hz)
+    corrected = replace(
+        found,
+        response_ii=found.response_ii / np.abs(sensors),
+        sd_response_ii=found.sd_response_ii / np.abs(sensors),
+        phase_rad=np.angle(np.exp(1j * found.phase_rad) / sensors),
+    )
+    return corrected, picture.spectrogram()
