@@ -557,9 +557,9 @@ def test_a_text_that_announces_more_numbers_than_it_holds_is_refused_at_once(kno
     lines[place + 7] = lines[place + 7][:10] + b"   2508876" + lines[place + 7][20:]
     numbers = b"\n".join(b"%20.11E" % each for each in range(42))
     path.write_bytes(b"\n".join(lines[: place + 12]) + b"\n" + numbers + b"\n    -1\n")
-    with pytest.raises(UnusableData, match=r"announces 2508876 numbers, and has room for \d+"):
-        with opened_source(path):
-            pass
+    refused = pytest.raises(UnusableData, match=r"announces 2508876 numbers, and has room for \d+")
+    with refused, opened_source(path):
+        pass
 
 
 def test_a_frequency_response_in_text_is_no_channel_and_no_damage(known, tmp_path):

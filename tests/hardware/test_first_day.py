@@ -1,0 +1,109 @@
+"""The first day at a bench, as tests: `pytest -m hardware`, with the bench of VIBENCH_BENCH.
+
+Without one the virtual rig stands in, at the wall's pace and with the laboratory's pause after each setting.
+VIBENCH_CONFIRMED_BY names the person who has compared the knobs with the file; without a name a real bench is
+left alone. Everything that is played is at most two per cent of the bench's amplitude limit.
+"""
+
+import os
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import open_bench, open_recording, run_measurement
+from vibench.acquisition.bench import Verdict
+from vibench.acquisition.check import check_bench
+from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep
+from vibench.acquisition.rig import KnobSheet, load_rig
+from vibench.analysis import analyse
+
+pytestmark = [pytest.mark.hardware, pytest.mark.timeout(600)]
+
+ROOT = Path(__file__).resolve().parents[2]
+LABORATORY_SETTLE_S = 0.1
+SHARE = 0.02
+
+
+def rig():
+    """Read the configured bench, or make the virtual one behave in time as a real one does."""
+    given = os.environ.get("VIBENCH_BENCH")
+    if given is not None:
+        return load_rig(Path(given))
+    found = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    return found.model_copy(
+        update={
+            "generator": found.generator.model_copy(update={"settle_s": LABORATORY_SETTLE_S}),
+            "virtual": found.virtual.model_copy(update={"pace": "wall"}),
+        }
+    )
+
+
+def confirmed(knobs):
+    """Take the name of whoever has looked at the knobs."""
+    name = os.environ.get("VIBENCH_CONFIRMED_BY")
+    assert name, "name in VIBENCH_CONFIRMED_BY who has compared the knobs of this bench with its file"
+    return KnobSheet(operator=name, confirmed=datetime.now(UTC), knobs=knobs)
+
+
+@pytest.fixture(scope="module")
+def bench():
+    configured = rig()
+    with open_bench(configured, confirmed if configured.virtual is None else None) as opened:
+        yield opened
+
+
+def measured(bench, excitation, tmp_path):
+    plan = Measurement(name="first_day", excitation=excitation, ramp_s=0.5, ramp_step_s=0.1)
+    path = run_measurement(bench, plan, tmp_path / "first_day.h5").path
+    with open_recording(path) as recording:
+        assert recording.state.value == "complete"
+        assert not recording.gaps
+        assert not [each for each in recording.events if each.kind == "late"]
+    return path
+
+
+def level(bench):
+    return SHARE * bench.rig.generator.amplitude_limit_vpp
+
+
+def test_the_bench_passes_its_check(bench, tmp_path):
+    # Noise floor, offsets, polarity, gain against the knob, clocks, latency, and whether silence is silent.
+    result = check_bench(bench, tmp_path)
+    failed = [f"{each.name}: {each.value}" for each in result.findings if each.verdict is Verdict.FAIL]
+    assert not failed
+
+
+def test_a_stop_is_silence(bench, tmp_path):
+    excitation = Dwell(amplitude_vpp=level(bench), frequency_hz=160, settle_s=0.5, duration_s=1.0)
+    path = measured(bench, excitation, tmp_path)
+    with open_recording(path) as recording:
+        drive = recording.read("drive_voltage")
+        quiet = drive[: round(0.05 * recording.sample_rate_hz)]
+        played = np.ptp(drive)
+    assert np.ptp(quiet) < 0.25 * played
+
+
+def test_a_dwell_is_recorded_at_its_frequency(bench, tmp_path):
+    excitation = Dwell(amplitude_vpp=level(bench), frequency_hz=260, settle_s=1.0, duration_s=4.0)
+    found = analyse(measured(bench, excitation, tmp_path))
+    assert found.response.drive.frequency_hz == pytest.approx(260.0, rel=300e-6)
+
+
+def test_a_sweep_keeps_to_its_plan(bench, tmp_path):
+    excitation = SineSweep(
+        amplitude_vpp=level(bench), start_hz=200, stop_hz=300, duration_s=8, step_s=0.25, settle_s=0.5
+    )
+    found = analyse(measured(bench, excitation, tmp_path))
+    assert {each.what: each.verdict.value for each in found.checks}["Sweep as planned"] == "passed"
+
+
+def test_noise_is_recorded_whole(bench, tmp_path):
+    excitation = MultisineNoise(
+        amplitude_vpp=level(bench), band_start_hz=50, band_stop_hz=600, repetition_hz=2, periods=4,
+        realisations=2, settle_s=1.0,
+    )  # fmt: skip
+    found = analyse(measured(bench, excitation, tmp_path))
+    assert found.response.left_out == 0
+    assert found.response.used_s == pytest.approx(4.0, rel=1e-3)
