@@ -71,7 +71,9 @@ def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
 
 
 def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, float]:
-    means = np.mean([each.responses_m for each in group], axis=0) / amplitude_m
+    """Give those of the start that shows a motion that repeats best; of others, the mean."""
+    shown = group[:1] if group[0].period is not None else group
+    means = np.mean([each.responses_m for each in shown], axis=0) / amplitude_m
     return dict(
         zip(("response_i", "response_ii", "relative_i", "relative_ii"), map(float, means), strict=True)
     )

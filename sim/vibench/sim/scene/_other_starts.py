@@ -1,7 +1,5 @@
 """Whether the start of a scene decides what it comes to, and what other starts come to where it does not."""
 
-import math
-
 from ..model import Outcome
 from ._ensemble import ErrorOf, ensemble_of
 from ._fixed_run import Pace, SceneRun
@@ -10,7 +8,7 @@ from ._linear_motion import LinearMotion, never_touches
 from ._prediction import Ensemble, StartMemory
 from ._repetition import FEWEST_NEUTRAL
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
-from ._several_starts import Draw, Horizon, ReachedMotion, SeveralStarts, forgets_its_start
+from ._several_starts import FEWEST, Draw, Horizon, ReachedMotion, SeveralStarts, forgets_its_start
 
 ALONE = 0.5
 """Share of a budget that is spent on following chaos on; other starts have the rest."""
@@ -60,7 +58,7 @@ def ensemble_beside(
 def _draw(scene: Scene, asked: ReachedMotion) -> Draw:
     """Say how many starts are followed at what cost: enough of them, where their scatter was asked for."""
     if Observable.SCATTER in scene.observe:
-        return Draw(budget_s=math.inf)
+        return Draw(clear=FEWEST)
     return Draw(budget_s=max(scene.budget_s - asked.run.cost_s, ALONE * scene.budget_s))
 
 

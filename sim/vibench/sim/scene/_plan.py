@@ -8,7 +8,7 @@ from ..model import PowerLaw, Specimen
 from ._linear_motion import LinearMotion, linear_motion, never_touches
 from ._prediction import Method
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
-from ._several_starts import FEWEST, MOST
+from ._several_starts import CLEAR, FEWEST, MOST
 
 DECAYED_SHARE = 1e-9
 """Share of the response that the start may still have where the steady motion stands for it."""
@@ -150,7 +150,7 @@ def _other_starts(budget_s: float) -> str:
         return "Whether the start decides which motion is reached is not looked for: there is no budget."
     return (
         "Another start, a millionth of the gap away, is followed beside it. If they part, or the motion is "
-        f"chaotic, the start is forgotten, and which motion is reached is chance: then {FEWEST} to {MOST} "
+        f"chaotic, the start is forgotten, and which motion is reached is chance: then {CLEAR} to {MOST} "
         f"starts are followed, and chaos is followed on, for {budget_s:g} s of processor time at most."
     )
 

@@ -53,7 +53,8 @@ class FoundMotion:
     period: int | None
     """Of a periodic motion, in drive periods."""
     response_i: float | None
-    """Largest abs(x) over the drive amplitude; the mean over its starts, as the next three."""
+    """Largest abs(x) over the drive amplitude; of the first start that repeats, or the mean over its starts
+    if none does; as the next three."""
     response_ii: float | None
     relative_i: float | None
     relative_ii: float | None

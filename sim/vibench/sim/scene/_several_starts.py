@@ -30,9 +30,9 @@ PARTED = 0.01
 began: that is ten thousand times as far as they were."""
 LEAST_SIZE = 1e-3
 """Of a gap: what a motion counts for at least, when starts are said to have parted."""
-FEWEST, MOST = 16, 64
-"""Starts that are followed, that which was asked for among them: more than the fewest where they came to more
-than one motion, and the budget allows."""
+CLEAR, FEWEST, MOST = 8, 16, 64
+"""Starts that are followed, that which was asked for among them: the first where all of them settled on one
+motion, or chaos surely lasts; the last where they came to more than one motion, and the budget allows."""
 LEAST_S = 1e-3
 """Following and observing a start costs this at least."""
 TOO_FEW = 4
@@ -104,13 +104,19 @@ class Horizon:
 class Draw:
     """How many starts are followed, and at what cost."""
 
+    clear: int = CLEAR
+    """That which was asked for among them; enough where they leave no doubt."""
     fewest: int = FEWEST
-    """That which was asked for among them."""
+    """Elsewhere."""
     most: int = MOST
-    """Where the fewest came to more than one motion."""
+    """Where those came to more than one motion."""
     seed: int = SEED
     budget_s: float = math.inf
     """Nominal cost of all of them."""
+
+
+MORE_S = 1.0
+"""Starts that are followed on are followed for longer than they need, by this together."""
 
 
 class SeveralStarts:
@@ -157,15 +163,23 @@ class SeveralStarts:
         each_s = asked.cost_s * min(1.0, self._horizon.first_s / asked.time_s)
         if budget_s < (TOO_FEW - 1) * each_s:
             return
-        spent_s = self._follow_some(_as_many(self._draw.fewest - 1, budget_s, each_s), budget_s)
+        spent_s = self._follow_some(self._draw.clear - 1, budget_s, each_s)
+        if not self._is_clear:
+            spent_s += self._follow_some(self._draw.fewest - self._draw.clear, budget_s - spent_s, each_s)
         if any(each.period is not None for each in self.reached) and len(motions_among(self.reached)) > 1:
             # What a start took tells how many more the budget allows.
             each_s = spent_s / (len(self.reached) - 1)
-            more = self._draw.most - self._draw.fewest
-            self._follow_some(_as_many(more, budget_s - spent_s, each_s), budget_s - spent_s)
+            self._follow_some(self._draw.most - self._draw.fewest, budget_s - spent_s, each_s)
 
-    def _follow_some(self, count: int, budget_s: float) -> float:
-        """Follow so many more starts and observe them; gives what it cost."""
+    @property
+    def _is_clear(self) -> bool:
+        """All starts came to one motion, for good."""
+        settled = all(each.period is not None for each in self._reached)
+        return len(motions_among(self._reached)) == 1 and (settled or self._is_lasting)
+
+    def _follow_some(self, wanted: int, budget_s: float, each_s: float) -> float:
+        """Follow more starts, as many as a budget allows, and observe them; gives what it cost."""
+        count = _as_many(wanted, budget_s, each_s)
         self._under_way = [StatesAlone(run, self._pace) for run in self._waiting[:count]]
         self._waiting = self._waiting[count:]
         self._follow_rounds(budget_s)
@@ -182,9 +196,13 @@ class SeveralStarts:
     def _is_lasting(self) -> bool:
         """No start has settled, in so long a time that chaos surely lasts."""
         escape = self.escape
-        settled = any(each.period is not None for each in self._reached)
-        settled = settled or any(each.repeats is not None for each in self._under_way)
-        return not settled and escape is not None and escape.lifetime_above_s > LASTING_S
+        return not self._has_settled and escape is not None and escape.lifetime_above_s > LASTING_S
+
+    @property
+    def _has_settled(self) -> bool:
+        """Some start has come to a motion that repeats."""
+        reached = any(each.period is not None for each in self._reached)
+        return reached or any(each.repeats is not None for each in self._under_way)
 
     def _follow_rounds(self, budget_s: float) -> None:
         reach_s = min(self._horizon.first_s, self._horizon.last_s)
@@ -193,9 +211,19 @@ class SeveralStarts:
             for place, each in enumerate(left):
                 allowed_s = max(0.0, budget_s - self._cost_s) / (len(left) - place)
                 each.follow(reach_s, each.run.cost_s + allowed_s)
-            if reach_s >= self._horizon.last_s or self._cost_s >= budget_s or self._is_lasting:
+            left = [each for each in left if not each.is_over]
+            if not left or reach_s >= self._horizon.last_s or self._cost_s >= budget_s or self._is_lasting:
                 return
-            reach_s = min(2.0 * reach_s, self._horizon.last_s)
+            lasting_s = reach_s + self._lasting_after_s / len(left)
+            reach_s = min(2.0 * reach_s, lasting_s, self._horizon.last_s)
+
+    @property
+    def _lasting_after_s(self) -> float:
+        """How much longer all starts together are followed until chaos surely lasts, if none settles."""
+        escape = self.escape
+        if escape is None or self._has_settled:
+            return math.inf
+        return max(0.0, escape.chaotic_s * (LASTING_S / escape.lifetime_above_s - 1.0)) + MORE_S
 
     def _observed(self, other: StatesAlone) -> ReachedMotion:
         run = other.run

@@ -142,7 +142,8 @@ def solve_ensemble(
     asked = _asked(run, seen, _between_windows(seen))
     errors = stated_errors(scene, begin, run, seen, pace, motion.slowest_rate)
     error_of = _error_of(scene.accuracy, asked, errors, pace)
-    return ensemble_beside(scene, begin, asked, pace, error_of, Draw(starts, starts, seed, budget_s))
+    draw = Draw(starts, starts, starts, seed, budget_s)
+    return ensemble_beside(scene, begin, asked, pace, error_of, draw)
 
 
 def _in_closed_form(scene: Scene, motion: LinearMotion) -> ScenePrediction:

@@ -11,7 +11,7 @@ from ._followed_run import FollowedRun
 from ._observed_window import follow_strobed
 from ._repetition import Growth, Repetition, section_needed, wandered_until
 
-SLICE_S = 1.0
+SLICE_S = 0.5
 """Time between two looks, at least."""
 PARTS = 4
 """Of a stretch over which growth is seen: whether it goes on growing."""
@@ -29,6 +29,7 @@ class StatesAlone:
         """Found; it is followed no further then."""
         self.recent = np.empty((0, 6)) if recent is None else recent
         """States once a drive period, up to now."""
+        self._settled_s: float | None = None
         self._pace = pace
         self._kept = section_needed(pace.forgetting_periods) + math.ceil(REMEMBERED * pace.forgetting_periods)
 
@@ -40,11 +41,7 @@ class StatesAlone:
     @property
     def wandered_until_s(self) -> float:
         """When it was last seen to change from period to period; now, if it does not repeat."""
-        if self.repeats is None:
-            return self.run.time_s
-        frequency_hz = self._pace.frequency_hz
-        since = wandered_until(self.recent, 2.0 * math.pi * frequency_hz, self.repeats.period)
-        return self.run.time_s - (len(self.recent) - since) / frequency_hz
+        return self.run.time_s if self._settled_s is None else self._settled_s
 
     def follow(self, until_s: float, cost_s: float = math.inf) -> None:
         """Follow it until it repeats, an instant is reached, or its cost from its beginning is."""
@@ -57,6 +54,9 @@ class StatesAlone:
             stretch = follow_strobed(self.run, end_s)
             self.recent = np.concatenate([self.recent, stretch.states])[-self._kept :]
             self.repeats = self._pace.repeats_in(self.recent)
+            if self.repeats is not None:
+                since = wandered_until(self.recent, 2.0 * math.pi * frequency_hz, self.repeats.period)
+                self._settled_s = self.run.time_s - (len(self.recent) - since) / frequency_hz
 
     def growth_over(self, length_s: float) -> Growth:
         """Follow it on, and see how a small change grows meanwhile; nothing, over no time."""
