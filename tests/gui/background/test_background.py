@@ -1,14 +1,16 @@
 """Work in another process: its answer and its error come back, and what is dropped stays away."""
 
 import os
+import re
 import signal
 import sys
 from concurrent.futures.process import BrokenProcessPool
 from math import factorial
+from pathlib import Path
 
 import pytest
 
-from vibench.gui.background import Background
+from vibench.gui.background import Background, LatestRequest
 
 
 def test_an_answer_comes_from_another_process(context, qtbot):
@@ -64,3 +66,48 @@ def test_closing_ends_a_process_that_does_not_answer(background, qtbot):
     background.close()
     with pytest.raises(ProcessLookupError):
         os.kill(pids[0], 0)
+
+
+def for_ever(path):
+    """Say who works, and do not end."""
+    Path(path).write_text(str(os.getpid()))
+    while True:
+        pass
+
+
+def hungry(_number):
+    return bytearray(8 << 30)
+
+
+def test_a_question_after_a_dropped_one_is_answered(background, qtbot, qapp):
+    answers, errors = [], []
+    latest = LatestRequest(background, factorial, answers.append, errors.append, 1, qapp)
+    for number in (3, 4):
+        latest.ask(number)
+        qtbot.waitUntil(lambda: latest._job is not None, timeout=20_000)
+        latest.drop()
+        assert not latest.is_busy
+    latest.ask(5)
+    qtbot.waitUntil(lambda: bool(answers or errors), timeout=20_000)
+    assert (answers, errors) == ([120], [])
+    assert not latest.is_busy
+
+
+def test_a_process_that_works_in_vain_is_ended_and_what_waits_is_done(background, qtbot, qapp, tmp_path):
+    answers, errors = [], []
+    latest = LatestRequest(background, for_ever, answers.append, errors.append, 1, qapp)
+    latest.ask(str(tmp_path / "pid"))
+    qtbot.waitUntil((tmp_path / "pid").exists, timeout=20_000)
+    background.ask(factorial, answers.append, errors.append, 5)
+    latest.drop()
+    qtbot.waitUntil(lambda: answers == [120], timeout=20_000)
+    assert errors == []
+    pid = int((tmp_path / "pid").read_text())
+    qtbot.waitUntil(lambda: not Path(f"/proc/{pid}").exists(), timeout=5000)
+
+
+def test_a_process_has_a_bound_on_its_memory(background, qtbot):
+    answers, errors = [], []
+    background.ask(hungry, answers.append, errors.append, 0)
+    qtbot.waitUntil(lambda: bool(answers or errors), timeout=20_000)
+    assert re.search(r"needs more than 6 GB of memory", str(errors[0]))

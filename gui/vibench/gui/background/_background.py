@@ -7,17 +7,24 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
+from time import monotonic
 from typing import Any, Generic, ParamSpec, TypeVar
 
 from PySide6.QtCore import QObject, QTimer
 
 from vibench.acquisition import follow_parent
-from vibench.sim.operating_system import lower_priority
+from vibench.sim.operating_system import bound_memory, lower_priority
 
 POLL_MS = 50
 NICE = 10
 BEGUN_EACH = 2
 """Jobs handed to each process: the one that it does, and the next, so that it need not wait for a poll."""
+GRACE_S = 2.0
+"""A process that works so long on what nobody wants any more is ended, and another takes its place."""
+LONGEST_S = 900.0
+"""Nothing that a page asks for takes so long; what does is given up."""
+MOST_BYTES = 6 << 30
+"""Of memory for a process, where the system can bound it."""
 
 Asked = ParamSpec("Asked")
 Answer = TypeVar("Answer")
@@ -32,6 +39,8 @@ class Job:
     on_error: Callable[[BaseException], None]
     is_wanted: bool = True
     future: Future[Any] | None = None
+    begun_s: float = 0.0
+    """When a process was seen to work on it."""
     """None until it is begun; never cancelled, since a process that dies chokes on that."""
 
     @property
@@ -48,6 +57,7 @@ def give_way() -> None:
     """Let a measurement, and the window, have the processor first; end with the window, however it ends."""
     follow_parent()
     lower_priority(NICE)
+    bound_memory(MOST_BYTES)
 
 
 class Background(QObject):
@@ -118,6 +128,9 @@ class Background(QObject):
         self._is_closed = True
         self._timer.stop()
         self._jobs.clear()
+        self._end_processes()
+
+    def _end_processes(self) -> None:
         pool, self._pool = self._pool, None
         if pool is not None:
             # It offers no kill; and its thread, left alone, would outlive the pool that it works for.
@@ -129,7 +142,26 @@ class Background(QObject):
             if thread is not None:
                 thread.join()
 
+    def _give_up(self) -> None:
+        """End processes that work in vain or for ever; what they had still to do is begun again elsewhere."""
+        now_s = monotonic()
+        working = [job for job in self._jobs if job.future is not None and job.future.running()]
+        for job in working:
+            job.begun_s = job.begun_s or now_s
+        vain = [job for job in working if not job.is_wanted and now_s - job.begun_s > GRACE_S]
+        late = [job for job in working if job.is_wanted and now_s - job.begun_s > LONGEST_S]
+        if not vain and not late:
+            return
+        self._jobs = [job for job in self._jobs if job not in vain and job not in late]
+        unfinished = [job for job in self._jobs if job.future is not None and not job.future.done()]
+        self._end_processes()
+        for job in unfinished:
+            job.future, job.begun_s = None, 0.0
+        for job in late:
+            job.on_error(TimeoutError(f"it took more than {LONGEST_S / 60:.0f} minutes and was given up"))
+
     def _poll(self) -> None:
+        self._give_up()
         over = [job for job in self._jobs if job.is_over]
         # Not asked again: one may have ended since.
         self._jobs = [job for job in self._jobs if job not in over]
@@ -139,11 +171,14 @@ class Background(QObject):
         for job in over:
             if job.future is None or not job.is_wanted:
                 continue
-            error = job.future.exception()
-            if error is None:
-                job.on_answer(job.future.result())
-            else:
-                job.on_error(error)
+            match job.future.exception():
+                case None:
+                    job.on_answer(job.future.result())
+                case MemoryError():
+                    most = f"{MOST_BYTES / (1 << 30):.0f} GB"
+                    job.on_error(MemoryError(f"it needs more than {most} of memory; ask for less"))
+                case error:
+                    job.on_error(error)
 
 
 Question = TypeVar("Question")
@@ -184,7 +219,8 @@ class LatestRequest(QObject, Generic[Question, Answer]):
         self._wanted = None
         self._timer.stop()
         if self._job is not None:
-            self._job.is_wanted = False
+            self._job.drop()
+            self._job = None
 
     def _ask(self) -> None:
         if self._wanted is None or self._job is not None:

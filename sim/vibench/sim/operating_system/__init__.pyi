@@ -12,6 +12,7 @@ from ._state_folder import (
 )
 from ._this import (
     allocate as allocate,
+    bound_memory as bound_memory,
     is_locked_alone as is_locked_alone,
     lower_priority as lower_priority,
     open_to_write as open_to_write,

@@ -3,6 +3,7 @@
 import errno
 import fcntl
 import os
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -76,6 +77,13 @@ def is_locked_alone(descriptor: int) -> bool:
 def lower_priority(by: int) -> None:
     """Let other processes have the processor first."""
     os.nice(by)
+
+
+def bound_memory(most_bytes: int) -> None:
+    """Let this process have no more memory than that, where the system counts it."""
+    _, most = resource.getrlimit(resource.RLIMIT_DATA)
+    bound = most_bytes if most == resource.RLIM_INFINITY else min(most, most_bytes)
+    resource.setrlimit(resource.RLIMIT_DATA, (bound, most))
 
 
 def usual_state_folder() -> Path:

@@ -5,6 +5,7 @@ import sys
 if sys.platform == "win32":
     from ._windows import (
         allocate,
+        bound_memory,
         is_locked_alone,
         lock_in_use,
         lock_sole_writer,
@@ -20,6 +21,7 @@ if sys.platform == "win32":
 else:
     from ._posix import (
         allocate,
+        bound_memory,
         is_locked_alone,
         lock_in_use,
         lock_sole_writer,
@@ -35,6 +37,7 @@ else:
 
 __all__ = [
     "allocate",
+    "bound_memory",
     "is_locked_alone",
     "lock_in_use",
     "lock_sole_writer",

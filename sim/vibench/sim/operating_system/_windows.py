@@ -72,6 +72,10 @@ def lower_priority(by: int) -> None:  # noqa: ARG001 - there are classes of prio
     kernel.SetPriorityClass(kernel.GetCurrentProcess(), _BELOW_NORMAL)
 
 
+def bound_memory(most_bytes: int) -> None:
+    """Do nothing: only a job object could, and a process cannot leave one."""
+
+
 def usual_state_folder() -> Path:
     """Give the place for what a user's programs leave behind."""
     return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "vibench"

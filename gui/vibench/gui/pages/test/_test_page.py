@@ -128,6 +128,9 @@ class TestPage(Page):
         measurement, rig = self.form.measurement, self.context.selection.rig
         self.context.selection.choose_measurement(measurement)
         self._preview = None
+        # What stands there belongs to another test until its own has come.
+        self.limits.setEnabled(False)
+        self.plots.setEnabled(False)
         if measurement is None or rig is None:
             self._looking.drop()
             self._predicting.drop()
@@ -145,6 +148,8 @@ class TestPage(Page):
     def _looked(self, seen: MeasurementPreview) -> None:
         self._preview = seen
         self.summary.setText(summary_text(seen))
+        self.limits.setEnabled(True)
+        self.plots.setEnabled(True)
         self.plots.show_preview(seen)
         self.limits.show_checks(seen.checks)
 
