@@ -107,3 +107,13 @@ def test_the_grid_lies_at_the_ticks_at_once(plot, qapp):
         for tick in ticks:
             place = box.left() + box.width() * tick / top
             assert min(abs(place - x) for x in seen) < 3
+
+
+def test_the_axes_follow_a_curve_and_not_how_little_is_known_of_it(plot, qapp):
+    curve, band = plot.curve(curve_style(0)), plot.band(curve_style(0))
+    curve.setData([0.0, 1.0, 2.0], [0.8, 1.0, 0.9])
+    band.set_data([0.0, 1.0, 2.0], [1e-15, 0.9, 1e-15], [1e10, 1.1, 1e10])
+    plot.show()
+    qapp.processEvents()
+    low, high = plot.getViewBox().viewRange()[1]
+    assert 0.5 < low < high < 1.5

@@ -136,9 +136,9 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         return item
 
     def band(self, line_style: LineStyle) -> Band:
-        """Add an area between two lines, for uncertainties and envelopes."""
+        """Add an area between the bounds of a curve; the axes follow the curve alone."""
         band = Band()
-        self.addItem(band.item)
+        self.addItem(band.item, ignoreBounds=True)
         self._line_style(line_style, lambda theme: band.paint(shade_of(line_style, theme)))
         return band
 
