@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition.plan import MultisineNoise
-from vibench.sim import gong2025
+from vibench.sim import base_transmissibility, gong2025, load_specimen
 
 PLACE = Path(__file__).parents[1] / "analysis" / "synthetic_recordings.py"
 DAMPING_S = 3.3e-5
@@ -69,3 +69,15 @@ def test_the_fit_is_said_in_words(vibench_here, folder, tmp_path):
     assert result.returncode == 0, result.stderr
     assert "Fitted c / k = 3" in result.stdout
     assert "the bench says 20.0" in result.stdout
+    written = tmp_path / "report" / "specimen.toml"
+    # A terminal of this width may break the path anywhere.
+    assert str(written) in result.stdout.replace("\n", "")
+    fitted = load_specimen(written).specimen()
+    assert fitted.dampings[0] / fitted.stiffnesses[0] == pytest.approx(DAMPING_S, rel=0.03)
+    assert fitted.masses == gong2025().masses
+    predicted = vibench_here(
+        *("predict", "--specimen", written, "--amplitude", "1e-7", "--frequency", "130", "--json"), cwd=folder
+    )
+    assert predicted.returncode == 0, predicted.stderr
+    (point,) = json.loads(predicted.stdout)["points"]
+    assert point["response_i"] == pytest.approx(abs(base_transmissibility(fitted, 130.0)[0, 0]), rel=1e-6)

@@ -233,10 +233,13 @@ def _analyse(
         console.print(sentence)
     if results.results and has_report:
         report = write_report(results, unused(folder / "report.html"), folder / "figures", diagrams, motions)
-        if updated is not None:
-            save_toml(updated.description, unused(folder / "specimen.toml"))
         if not as_json:
             console.print("The report:", bold(report.resolve()))
+        if updated is not None:
+            specimen_file = unused(folder / "specimen.toml")
+            save_toml(updated.description, specimen_file)
+            if not as_json:
+                console.print("The specimen:", bold(specimen_file.resolve()))
     complain_about(results)
 
 

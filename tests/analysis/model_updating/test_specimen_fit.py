@@ -63,6 +63,26 @@ def test_parameters_are_read_back_as_they_were_given(true):
     assert with_values(true, {Parameter.GAP: 50e-6}).gap_m == 50e-6
 
 
+def test_a_wider_gap_and_more_damping_keep_the_proportions_of_a_specimen_of_ones_own():
+    """Two gaps keep their ratio, and dampings theirs, be one of them zero."""
+    own = replace(gong2025(gap_m=(60e-6, 30e-6)), dampings=(0.3, 0.0, 0.02))
+    read = {name: parameter_value(own, name) for name in Parameter}
+    assert with_values(own, {}) == with_values(own, read)
+    assert with_values(own, {}).dampings == pytest.approx(own.dampings, rel=1e-12)
+    assert read[Parameter.GAP] == 30e-6
+    wider = with_values(own, {Parameter.GAP: 45e-6})
+    assert wider.gaps_m == pytest.approx((90e-6, 45e-6), rel=1e-12)
+    assert wider.dampings == pytest.approx(own.dampings, rel=1e-12)
+    duller = with_values(own, {Parameter.DAMPING_TIME: 3.0 * read[Parameter.DAMPING_TIME]})
+    assert duller.dampings == pytest.approx((0.9, 0.0, 0.06), rel=1e-12)
+    assert duller.gaps_m == own.gaps_m
+    stiffer = with_values(own, {Parameter.F2: 2.0 * read[Parameter.F2]})
+    assert stiffer.stiffnesses == pytest.approx(
+        (own.stiffnesses[0], own.stiffnesses[1], 4.0 * own.stiffnesses[2]), rel=1e-12
+    )
+    assert stiffer.dampings == pytest.approx((0.3, 0.0, 0.08), rel=1e-12)
+
+
 def test_a_transmission_without_noise_gives_the_specimen_back(true):
     clean = measured(true, np.random.default_rng(0), sd=1e-9)
     fit = fit_specimen(clean, NOMINAL)

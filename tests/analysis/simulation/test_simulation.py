@@ -21,7 +21,7 @@ from vibench.analysis.simulation import (
 from vibench.analysis.simulation._accuracy_cost import MEASURED
 from vibench.analysis.simulation._request import SimulatedPoint, Trouble
 from vibench.analysis.simulation._worker import simulate
-from vibench.sim import Accuracy, base_transmissibility, gong2025
+from vibench.sim import Accuracy, base_transmissibility, gong2025, load_specimen
 
 LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "step_hz": 50.0, "start_hz": 50.0}
 
@@ -59,6 +59,24 @@ def test_the_answer_grows_to_the_linear_transmission():
     trace = progress.curves()[1]
     assert np.array_equal(trace.magnitude, found)
     assert trace.name == "model linear, Response II, predicted"
+
+
+def test_the_answer_is_that_of_the_specimen_that_is_named(tmp_path):
+    """A shipped one by its name, one of one's own by its file."""
+    file = tmp_path / "own.toml"
+    file.write_text('model = "gong2025"\nmasses_kg = [0.0061, 0.0019, 0.0025]\n', encoding="utf-8")
+    answers = []
+    for named in ("gong2025", str(file)):
+        request = SimulationRequest(specimen=named, **LINEAR)
+        progress = SimulationProgress(request.amplitude_m, request.points, "n")
+        simulate(request, progress.add, lambda: False, 2)
+        frequency_hz, found = progress.column("linear", "response_ii")
+        own = load_specimen(named).specimen(contact="linear")
+        assert np.allclose(found, np.abs(base_transmissibility(own, frequency_hz)[:, 0]), rtol=1e-6)
+        answers.append(found)
+    assert not np.allclose(answers[0], answers[1], rtol=0.01)
+    with pytest.raises(ValidationError, match="nowhere"):
+        SimulationRequest(specimen="nowhere.toml", **LINEAR)
 
 
 def test_nothing_is_computed_after_a_cancellation():
