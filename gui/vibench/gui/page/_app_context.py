@@ -19,6 +19,8 @@ WORKERS = 2
 class AppContext(QObject):
     """Handed to every page; pages know each other by name only."""
 
+    folder_chosen = Signal(object)
+    """Recordings go to another folder."""
     noticed = Signal(object)
     """A `Notice` for the message strip."""
     page_wanted = Signal(str)
@@ -39,6 +41,8 @@ class AppContext(QObject):
     ) -> None:
         super().__init__(parent)
         self.settings = settings
+        self.first_bench: Path | None = None
+        """Named on the command line; remembered only when it can be used."""
         self.selection = Selection(self)
         self.bridge = Bridge(start, self)
         self.bridge.noticed.connect(self.noticed)
@@ -65,6 +69,7 @@ class AppContext(QObject):
     def choose_folder(self, folder: Path) -> None:
         """Put recordings elsewhere from now on."""
         self.settings.keep_text(Remembered.FOLDER, str(folder))
+        self.folder_chosen.emit(folder)
 
     def say(self, notice: Notice) -> None:
         """Put a message on the strip."""

@@ -11,7 +11,7 @@ from PySide6.QtCore import QCoreApplication, Qt, QTimer
 from PySide6.QtGui import QFont, QFontDatabase
 from PySide6.QtWidgets import QApplication, QStyleFactory
 
-from ..page import AppContext, Remembered, Settings, default_settings_path
+from ..page import AppContext, Settings, default_settings_path
 from ._page_catalogue import PAGES
 from ._window import Window
 
@@ -44,9 +44,9 @@ def open_window(bench: Path | None, settings: Path | None) -> int:
     """Show the window until it is closed; gives the exit code of the process."""
     app = application(sys.argv[:1])
     kept = Settings(settings or default_settings_path())
-    if bench is not None:
-        kept.keep_text(Remembered.BENCH, str(bench.resolve()))
-    window = Window(AppContext(kept), PAGES)
+    context = AppContext(kept)
+    context.first_bench = None if bench is None else bench.resolve()
+    window = Window(context, PAGES)
     # None of all this ever is garbage: a collector that looked through it would hold the window up.
     gc.freeze()
     window.show()

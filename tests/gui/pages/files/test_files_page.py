@@ -69,9 +69,8 @@ def shown(shared_context, folder, waited):
 
 @pytest.fixture
 def page(shown, folder, waited):
-    if shown.context.folder != folder:
+    if (shown.context.folder, shown._folder) != (folder, folder):
         shown.context.choose_folder(folder)
-        shown.list_folder()
     waited(lambda: not shown.context.background.is_busy)
     shown.table.search("")
     return shown
@@ -268,3 +267,19 @@ def test_a_list_that_comes_late_keeps_what_was_chosen_meanwhile(page, shared_con
     page.list_folder()
     waited(lambda: not shared_context.background.is_busy)
     assert page.table.chosen_paths() == chosen
+
+
+def test_to_look_into_a_folder_does_not_redirect_recordings(page, folder, tmp_path, waited):
+    shown = page.table.recordings
+    assert shown.entries
+    page._folder_line.setText(str(tmp_path))
+    page._typed_folder()
+    # The list of before does not stand under the name of another folder.
+    assert not shown.entries
+    waited(lambda: page._count.text() == "0 recordings")
+    assert page.context.folder == folder
+    assert page._goes_to.text() == f"new recordings go to {folder}"
+    page._folder_line.setText(str(folder))
+    page._typed_folder()
+    waited(lambda: len(shown.entries) >= 4)
+    assert page._goes_to.text() == ""

@@ -40,10 +40,12 @@ class FilesPage(Page):
         self._listing: Job | None = None
         self._making: Job | None = None
         self._wanted: Path | None = None
+        self._folder = context.folder
         self._build()
         self.table.selectionModel().selectionChanged.connect(lambda *_: self._open_chosen())
         context.recording_wanted.connect(self.open_path)
         context.recording_made.connect(lambda _path: self.list_folder())
+        context.folder_chosen.connect(self._go_to)
 
     @property
     def is_done(self) -> bool:
@@ -66,8 +68,10 @@ class FilesPage(Page):
 
     def list_folder(self) -> None:
         """Look at the files of the folder, elsewhere."""
-        folder = self.context.folder
+        folder = self._folder
         self._folder_line.setText(str(folder))
+        elsewhere = folder != self.context.folder
+        self._goes_to.setText(f"new recordings go to {self.context.folder}" if elsewhere else "")
         if self._listing is not None:
             self._listing.drop()
         self._listing = self.context.background.ask(listed, self._listed, self._failed, folder)
@@ -76,7 +80,7 @@ class FilesPage(Page):
         """Show a recording, whatever folder it lies in."""
         self.context.page_wanted.emit(FILES)
         self._wanted = path
-        if path.parent != self.context.folder and self.context.folder not in path.parents:
+        if path.parent != self._folder and self._folder not in path.parents:
             self._go_to(path.parent)
         self.table.choose(path)
         self._open(path)
@@ -177,13 +181,13 @@ class FilesPage(Page):
         self._view.setText(text)
 
     def _choose_folder(self) -> None:
-        chosen = QFileDialog.getExistingDirectory(self, "Folder with recordings", str(self.context.folder))
+        chosen = QFileDialog.getExistingDirectory(self, "Folder with recordings", str(self._folder))
         if chosen:
             self._go_to(Path(chosen))
 
     def _typed_folder(self) -> None:
         folder = Path(self._folder_line.text()).expanduser()
-        if folder == self.context.folder:
+        if folder == self._folder:
             return
         if folder.is_dir():
             self._go_to(folder)
@@ -196,10 +200,13 @@ class FilesPage(Page):
                     "Type another one, or choose it.",
                 )
             )
-            self._folder_line.setText(str(self.context.folder))
+            self._folder_line.setText(str(self._folder))
 
     def _go_to(self, folder: Path) -> None:
-        self.context.choose_folder(folder)
+        """Look into a folder; where recordings go is the menu's business."""
+        self._folder = folder
+        self.table.recordings.show_entries(())
+        self._count.setText("◌ reading…")
         self.list_folder()
 
     def _hand_to_compare(self) -> None:
@@ -229,7 +236,7 @@ class FilesPage(Page):
         browser.setAccessibleName("Browser")
         bar = QHBoxLayout()
         label = QLabel("F&older")
-        self._folder_line = LineField(str(self.context.folder))
+        self._folder_line = LineField(str(self._folder))
         self._folder_line.setAccessibleName("Folder of the recordings")
         self._folder_line.editingFinished.connect(self._typed_folder)
         label.setBuddy(self._folder_line)
@@ -246,6 +253,8 @@ class FilesPage(Page):
         bar.addWidget(self.campaigns, 1)
         bar.addWidget(search_label)
         bar.addWidget(search, 1)
+        self._goes_to = QLabel("")
+        self._goes_to.setProperty("rank", "second")
         self._count = QLabel("")
         self._count.setProperty("rank", "second")
         bar.addWidget(self._count)
@@ -257,6 +266,7 @@ class FilesPage(Page):
         layout = QVBoxLayout(browser)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addLayout(bar)
+        layout.addWidget(self._goes_to)
         layout.addWidget(self.table)
         return browser
 

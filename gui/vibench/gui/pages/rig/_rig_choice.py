@@ -25,6 +25,7 @@ class RigChoice(QWidget):
         super().__init__(parent)
         self._paths: list[Path] = []
         self._rig: Rig | None = None
+        self._complaint = ""
         self._box = Choice()
         self._box.setAccessibleName("Hardware configuration")
         self._box.setToolTip("What hangs on this computer; a simulated rig runs anywhere")
@@ -60,6 +61,11 @@ class RigChoice(QWidget):
         return self._paths[row] if 0 <= row < len(self._paths) else None
 
     @property
+    def complaint(self) -> str:
+        """Why the chosen file cannot be used; empty where it can."""
+        return self._complaint
+
+    @property
     def rig(self) -> Rig | None:
         """The chosen rig, at the chosen pace."""
         if self._rig is None or self._rig.virtual is None:
@@ -89,11 +95,12 @@ class RigChoice(QWidget):
 
     def _load(self) -> None:
         path = self.path
-        self._rig = None
+        self._rig, self._complaint = None, ""
         if path is not None:
             try:
                 self._rig = load_rig(path)
             except ConfigurationError as error:
+                self._complaint = str(error)
                 self.refused.emit(error)
         is_simulated = self._rig is not None and self._rig.virtual is not None
         self._form.setRowVisible(1, is_simulated)

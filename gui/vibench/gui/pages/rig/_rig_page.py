@@ -163,7 +163,7 @@ class RigPage(Page):
         rig = self.choice.rig
         self.knobs.show_rig(rig)
         if rig is None:
-            self.about.setText("This file cannot be used; see the message above.")
+            self.about.setText(f"✖ {self.choice.complaint}. Choose another configuration.")
         else:
             chain = (rig.generator.resource, rig.amplifier.model, rig.shaker.model, rig.vibrometer.model)
             kind = "Every instrument is simulated." if rig.virtual is not None else "Real instruments."
@@ -173,7 +173,8 @@ class RigPage(Page):
 
     def _choose_first(self) -> None:
         otherwise = str(shipped("hardware_configs/virtual_rig.toml"))
-        self.choice.choose(Path(self.context.settings.text(Remembered.BENCH, otherwise)))
+        remembered = Path(self.context.settings.text(Remembered.BENCH, otherwise))
+        self.choice.choose(self.context.first_bench or remembered)
 
     def _find(self) -> None:
         rig = self.choice.rig

@@ -1,0 +1,48 @@
+"""The bench of the command line: one that cannot be used says why, and is not remembered."""
+
+import pytest
+
+from vibench.acquisition import shipped
+from vibench.gui.page import AppContext, Remembered, Settings
+from vibench.gui.pages.rig import RigPage
+
+
+@pytest.fixture
+def opened(qapp, tmp_path):
+    made = []
+
+    def opened(bench):
+        context = AppContext(Settings(tmp_path / "window.ini"))
+        context.first_bench = bench
+        page = RigPage(context)
+        made.append((context, page))
+        return page
+
+    yield opened
+    for context, page in made:
+        page.close()
+        context.background.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [(None, "cannot be read"), ("name = 3 4", "is not valid TOML"), ("name = 'a'", "generator")],
+)
+def test_a_bench_that_cannot_be_used_says_why_and_is_not_remembered(opened, tmp_path, text, why):
+    bench = tmp_path / "bench.toml"
+    if text is not None:
+        bench.write_text(text, encoding="utf-8")
+    page = opened(bench)
+    assert why in page.about.text()
+    assert page.choice.rig is None
+    page.refresh()
+    assert not page.open_button.isEnabled()
+    assert opened(None).choice.rig.name == "virtual rig"
+
+
+def test_a_bench_that_can_be_used_is_remembered(opened):
+    lab = shipped("hardware_configs/lab_rig.toml")
+    assert opened(lab).choice.rig.name == "laboratory rig"
+    again = opened(None)
+    assert again.choice.rig.name == "laboratory rig"
+    assert again.context.settings.text(Remembered.BENCH) == str(lab)
