@@ -24,6 +24,8 @@ WAVES = 61
 """Wave numbers at which bands are drawn, from 0 to pi."""
 LINES = 800
 """Frequencies at which a transmissibility without contact is drawn."""
+MOST_SHOWN = 4
+"""Cells of one chain whose transmission is drawn."""
 ABOVE_BANDS = 1.15
 """... up to this many times the highest band."""
 REACHED = Outcome.REACHED_END.text
@@ -120,6 +122,24 @@ class ChainAnswer:
     def attenuation_db(self) -> Reals:
         """By how much a wave of the endless damped chain decays from unit to unit, at `linear_hz` [dB]."""
         return np.asarray(-DECIBELS * np.log(np.abs(bloch_factor(self.request.unit, self.linear_hz))))
+
+    @property
+    def shown_cells(self) -> tuple[tuple[int, int, str], ...]:
+        """Length, place and name of cells to draw: the last of every chain, or a few of the only one."""
+        lengths = self.request.lengths
+        if len(lengths) > 1:
+            return tuple((cells, cells - 1, f"{cells} cells: last") for cells in lengths)
+        (cells,) = lengths
+        places = np.unique(np.linspace(0, cells - 1, min(cells, MOST_SHOWN)).round().astype(int))
+        return tuple((cells, int(place), f"cell {place + 1}") for place in places)
+
+    def driven_transmission(self, cells: int, place: int) -> tuple[Reals, Reals]:
+        """Frequencies and transmissions of all runs of a chain at one cell, in the order of the runs."""
+        runs = [run for run in self.runs if run.cells == cells]
+        if not runs:
+            return np.zeros(0), np.zeros(0)
+        over_hz = np.concatenate([run.over_hz for run in runs])
+        return over_hz, np.concatenate([run.transmission[:, place] for run in runs])
 
     @property
     def cost_sentence(self) -> str:

@@ -33,8 +33,6 @@ _DECADES = 4.0
 """Of a map of motion below its largest."""
 _NOTHING = 1e-300
 """Stands for a motion of zero where a logarithm is taken."""
-_MOST_LINES = 4
-"""Cells of one chain whose transmission is drawn."""
 
 
 def chain_figure(found: ChainAnswer) -> DrawnFigure:
@@ -99,31 +97,17 @@ def _waves(axes: Axes, found: ChainAnswer) -> None:
 
 def _across(axes: Axes, found: ChainAnswer) -> None:
     _shade(axes, found)
-    lengths = found.request.lengths
-    for number, (cells, place) in enumerate(_shown_cells(lengths)):
+    for number, (cells, place, name) in enumerate(found.shown_cells):
         colour = LEVELS[number % len(LEVELS)]
-        name = f"{cells} cells: last" if len(lengths) > 1 else f"cell {place + 1}"
         linear = np.maximum(found.linear_transmission(cells)[:, place], _SMALLEST)
         axes.plot(found.linear_hz, linear, "--", color=colour, linewidth=0.8, label=name)
-        runs = [run for run in found.runs if run.cells == cells]
-        if runs:
-            over_hz = np.concatenate([run.over_hz for run in runs])
-            driven = np.concatenate([run.transmission[:, place] for run in runs])
-            marker = "o" if len(runs[0].over_hz) == 1 else ""
-            axes.plot(over_hz, np.maximum(driven, _SMALLEST), color=colour, marker=marker, markersize=3)
+        over_hz, driven = found.driven_transmission(cells, place)
+        marker = "o" if found.request.drive is ChainDrive.STEADY else ""
+        axes.plot(over_hz, np.maximum(driven, _SMALLEST), color=colour, marker=marker, markersize=3)
     axes.plot([], "--", color=BOUNDS, linewidth=0.8, label="without contact")
     magnitude_axis(axes)
     axes.set_ylabel("|x / U|")
     axes.set_xlabel("frequency [Hz]")
-
-
-def _shown_cells(lengths: tuple[int, ...]) -> list[tuple[int, int]]:
-    """Chains and places: the last cell of every chain, or a few cells of the only one."""
-    if len(lengths) > 1:
-        return [(cells, cells - 1) for cells in lengths]
-    (cells,) = lengths
-    places = np.unique(np.linspace(0, cells - 1, min(cells, _MOST_LINES)).round().astype(int))
-    return [(cells, int(place)) for place in places]
 
 
 def _map(figure: Figure, axes: Axes, found: ChainAnswer, run: ChainRun) -> None:

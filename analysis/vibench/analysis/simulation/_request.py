@@ -24,7 +24,7 @@ from vibench.sim import (
 )
 from vibench.sim.study import Study, frequency_range
 
-from ..dynamics import BranchLine, SpectrumPoint
+from ..dynamics import BranchLine, ChainRun, SpectrumPoint
 from ..signals import Reals
 
 
@@ -67,7 +67,7 @@ class Trouble:
     sentence: str
 
 
-PartialResult = SimulatedPoint | SimulatedSignal | BranchLine | SpectrumPoint | Trouble
+PartialResult = SimulatedPoint | SimulatedSignal | BranchLine | SpectrumPoint | ChainRun | Trouble
 MOST_POINTS = 20_000
 """Of both models together: a picture shows no more, and an afternoon computes no more."""
 

@@ -11,6 +11,7 @@ from multiprocessing.connection import Connection
 
 import numpy as np
 
+from vibench.acquisition import AcquisitionError
 from vibench.sim import Harmonic, Outcome, ScenePrediction, integrate
 from vibench.sim.operating_system import lower_priority
 from vibench.sim.study import (
@@ -25,7 +26,14 @@ from vibench.sim.study import (
     run_study,
 )
 
-from ..dynamics import BranchRequest, SpectrumRequest, branch_lines, spectrum_points
+from ..dynamics import (
+    BranchRequest,
+    ChainRequest,
+    SpectrumRequest,
+    branch_lines,
+    chain_runs,
+    spectrum_points,
+)
 from ._request import PartialResult, SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
 
 Tell = Callable[[tuple[PartialResult, ...]], None]
@@ -129,7 +137,7 @@ def simulated_point(model: str, found: ScenePrediction) -> SimulatedPoint:
     )
 
 
-Asked = SimulationRequest | BranchRequest | SpectrumRequest
+Asked = SimulationRequest | BranchRequest | SpectrumRequest | ChainRequest
 """What the process answers."""
 
 
@@ -142,6 +150,8 @@ def answer(request: Asked, tell: Tell, cancelled: Cancelled) -> None:
             _tell_each(branch_lines(request), tell, cancelled)
         case SpectrumRequest():
             _tell_each(spectrum_points(request), tell, cancelled)
+        case ChainRequest():
+            _tell_each(chain_runs(request), tell, cancelled)
 
 
 def _tell_each(parts: Iterable[PartialResult], tell: Tell, cancelled: Cancelled) -> None:
@@ -216,7 +226,7 @@ def _computed(connection: "Connection[Grown | Ended, Order]", begin: Begin) -> B
 
     try:
         answer(begin.request, tell, is_cancelled)
-    except ValueError as error:
+    except (ValueError, AcquisitionError) as error:
         tell((Trouble(str(error)),))
     connection.send(Ended(begin.number))
     return following

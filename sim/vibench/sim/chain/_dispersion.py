@@ -54,15 +54,37 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
 
 def _across(cell: Specimen, omega: NDArray[np.float64]) -> Complex:
     """Give what a cell makes of displacement and force, shape (n, 2, 2)."""
+    outer, pushed, _, _ = seen_from_outside(cell, omega)
+    one = np.ones_like(outer)
+    return np.moveaxis(np.array([[one, 1.0 / outer], [pushed, one + pushed / outer]]), -1, 0)
+
+
+class SeenFromOutside(NamedTuple):
+    """A cell under harmonic motion of its m0; each of shape (n,)."""
+
+    link: Complex
+    """K = k0 + i w c0 [N/m]."""
+    stiffness: Complex
+    """S(w) - w^2 m0: force on m0 over its displacement, the link apart [N/m]."""
+    inner: Complex
+    """y over x."""
+    middle: Complex
+    """z over x."""
+
+
+def seen_from_outside(cell: Specimen, omega: NDArray[np.float64]) -> SeenFromOutside:
+    """Reduce a cell without contact to its m0; finite where m1 alone resonates, too."""
     m0, m1, m2 = cell.masses
     outer, inner, middle = (
         stiffness + 1j * omega * damping
         for stiffness, damping in zip(cell.stiffnesses, cell.dampings, strict=True)
     )
-    hung = -(omega**2) * m2 - omega**2 * m1 * inner / (inner - omega**2 * m1)
-    pushed = middle * hung / (middle + hung) - omega**2 * m0
-    one = np.ones_like(outer)
-    return np.moveaxis(np.array([[one, 1.0 / outer], [pushed, one + pushed / outer]]), -1, 0)
+    square = omega**2
+    held = inner - square * m1
+    hung = -square * (m2 * held + m1 * inner)
+    whole = middle * held + hung
+    seen = outer, middle * hung / whole - square * m0, middle * inner / whole, middle * held / whole
+    return SeenFromOutside(*(np.asarray(each, dtype=np.complex128) for each in seen))
 
 
 def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..kernels import Complex, Table, Vector
 from ..model import COINCIDENT, ModalForm
 from ._chain import MASSES_PER_CELL, Chain
+from ._dispersion import seen_from_outside
 
 PROPORTIONAL = 1e-12
 """Modal damping off the diagonal below this part of the largest is rounding: the undamped modes are modes."""
@@ -142,13 +143,15 @@ def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
     if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):
         msg = "Frequencies must be one row of finite numbers, zero or positive, in Hz."
         raise ValueError(msg)
-    mass, damping, stiffness = chain.mass_matrix, chain.damping_matrix, chain.stiffness_matrix
-    first = chain.cells[0]
+    cells = [seen_from_outside(cell, 2.0 * np.pi * frequency) for cell in chain.cells]
+    # From the free end: what a cell is, and what hangs on it, as one stiffness at its m0.
+    seen = [cells[-1].stiffness]
+    for cell, after in zip(reversed(cells[:-1]), reversed(cells[1:]), strict=True):
+        seen.append(cell.stiffness + after.link * seen[-1] / (after.link + seen[-1]))
     moved = np.zeros((len(frequency), chain.size, 4), dtype=np.complex128)
-    for row, omega in enumerate(2.0 * np.pi * frequency):
-        forcing = np.zeros(len(mass), dtype=np.complex128)
-        forcing[0] = first.stiffnesses[0] + 1j * omega * first.dampings[0]
-        dynamic = stiffness - omega**2 * mass + 1j * omega * damping
-        moved[row, :, :MASSES_PER_CELL] = np.linalg.solve(dynamic, forcing).reshape(chain.size, -1)
+    x = np.ones(len(frequency), dtype=np.complex128)
+    for place, (cell, stiffness) in enumerate(zip(cells, reversed(seen), strict=True)):
+        x = x * cell.link / (cell.link + stiffness)
+        moved[:, place, :MASSES_PER_CELL] = np.column_stack([x, x * cell.inner, x * cell.middle])
     moved[:, :, MASSES_PER_CELL] = moved[:, :, 1] - moved[:, :, 2]
     return moved

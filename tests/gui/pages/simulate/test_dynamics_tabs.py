@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from vibench.analysis import CurveOrigin
-from vibench.analysis.dynamics import BranchLine, BranchRequest, LineEvent, SpectrumPoint, SpectrumRequest
+from vibench.analysis.dynamics import (
+    BranchLine,
+    BranchRequest,
+    ChainRequest,
+    LineEvent,
+    SpectrumPoint,
+    SpectrumRequest,
+)
 from vibench.gui.pages.simulate import SimulatePage
 from vibench.gui.plots import Dash
 from vibench.gui.widgets import COMPARE, DARK
@@ -18,7 +25,7 @@ def page(shared_context):
     page.resize(1300, 800)
     page.show()
     yield page
-    for view in (page, page.branches, page.spectrum):
+    for view in (page, page.branches, page.spectrum, page.chain):
         view.simulator.close()
     page.close()
 
@@ -106,6 +113,41 @@ def test_exponents_are_drawn_with_their_intervals(page):
     assert lines(lower)[-1].getOriginalDataset()[1].tolist() == [4.4, 4.4]
     assert "2 chaotic; sums differ from the dampers'" in view.said
     assert not view._compare.isEnabled()
+
+
+@pytest.mark.timeout(300)  # The first run compiles the kernels of chains.
+def test_a_chain_is_followed_and_drawn_over_frequency_place_and_time(page, waited):
+    view = page.chain
+    asked(view, ChainRequest(lengths=(3,), amplitude_m=30e-6, duration_s=0.2, settle_s=0.1))
+    waited(lambda: not view.simulator.is_busy, 280.0)
+    page.refresh()
+    assert view.said.startswith("Complete. Gaps of the endless chain: 96.07 to 110.4 Hz")
+    assert "1 runs in" in view.said
+    (run,) = view.answer.runs
+    across, motion, energies = view.picture.plots
+    assert len(lines(across)) == 9  # three cells: without contact, driven, and a dot at the frequency
+    traces = [item.getOriginalDataset()[1] for item in lines(motion)[:3]]
+    for place, trace in enumerate(traces, start=1):
+        np.testing.assert_allclose(np.round(trace), place)
+    assert lines(energies)[0].getOriginalDataset()[0].tolist() == [1.0, 2.0, 3.0]
+    ((_, _, said),) = energies._legend_entries
+    assert said == f"3 cells at 220 Hz, {run.impacts.sum() / run.observed_s:.4g} impacts a second in all"
+    assert not view._compare.isEnabled()
+
+
+def test_waves_alone_are_drawn_without_a_run_and_what_cannot_be_driven_is_said(page, waited, tmp_path):
+    view = page.chain
+    asked(view, ChainRequest(lengths=(2, 5), drive="none"))
+    waited(lambda: not view.simulator.is_busy, 100.0)
+    page.refresh()
+    assert len(lines(view.picture.across)) == 2
+    assert not lines(view.picture.motion)
+    said = []
+    page.context.noticed.connect(said.append)
+    asked(view, ChainRequest(drive="recorded", recording=str(tmp_path / "nowhere.h5")))
+    waited(lambda: not view.simulator.is_busy, 100.0)
+    assert "nowhere.h5" in said[-1].what
+    assert view.simulator._is_alive()
 
 
 def test_what_is_not_allowed_cannot_be_asked(page):

@@ -1,4 +1,4 @@
-"""The two tabs beside the responses: what each asks, and how it tells its answer."""
+"""The tabs beside the responses: what each asks, and how it tells its answer."""
 
 from typing import cast
 
@@ -7,6 +7,9 @@ from vibench.analysis.dynamics import (
     BranchDiagram,
     BranchLine,
     BranchRequest,
+    ChainAnswer,
+    ChainRequest,
+    ChainRun,
     ExponentSpectrum,
     SpectrumPoint,
     SpectrumRequest,
@@ -26,8 +29,12 @@ def _spectrum(
     return ExponentSpectrum(request, cast("tuple[SpectrumPoint, ...]", parts), elapsed_s)
 
 
-def _no_curves(_answer: ExponentSpectrum) -> tuple[Curve, ...]:
-    """Exponents are no responses: nothing to lay over a recording."""
+def _chain(request: ChainRequest, parts: tuple[PartialResult, ...], elapsed_s: float) -> ChainAnswer:
+    return ChainAnswer(request, cast("tuple[ChainRun, ...]", parts), elapsed_s)
+
+
+def _no_curves(_answer: ExponentSpectrum | ChainAnswer) -> tuple[Curve, ...]:
+    """Exponents and chains are no responses of a specimen: nothing to lay over a recording."""
     return ()
 
 
@@ -53,5 +60,18 @@ SPECTRUM = DynamicsKind(
     before=(
         "Each point follows six small changes for its whole duration; the sum of the exponents, which the "
         "dampers fix, is its check (docs/spectrum.md)."
+    ),
+)
+CHAIN = DynamicsKind(
+    name="chain",
+    request=ChainRequest,
+    hidden=frozenset({"others", "described"}),
+    answer=_chain,
+    cost=lambda answer: answer.cost_sentence,
+    curves=_no_curves,
+    before=(
+        "Waves need no run. A simulated second of 8 cells that strike takes some hundredths of a second, of "
+        "64 cells a third; contacts err as the accuracy says, energies carry their standard error "
+        "(docs/chains.md)."
     ),
 )

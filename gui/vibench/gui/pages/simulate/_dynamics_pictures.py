@@ -62,13 +62,11 @@ class _TwoPlots(QStackedWidget):
                 plot.retheme(theme)
 
 
-class BranchPicture:
-    """Stable motions solid, unstable ones dashed; longer periods in other colours; special points marked."""
+class _PairPicture:
+    """What pictures of two plots have alike."""
 
-    def __init__(self, theme: Theme) -> None:
-        axes = RESPONSES[0][1], RESPONSES[1][1]
-        hint = "Periodic motions: stable ones solid, unstable ones dashed, as they are found."
-        self._plots = _TwoPlots(theme, ("Response I of branches", "Response II of branches"), axes, hint)
+    def __init__(self, plots: _TwoPlots) -> None:
+        self._plots = plots
 
     @property
     def widget(self) -> QWidget:
@@ -82,6 +80,16 @@ class BranchPicture:
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
         self._plots.retheme(theme)
+
+
+class BranchPicture(_PairPicture):
+    """Stable motions solid, unstable ones dashed; longer periods in other colours; special points marked."""
+
+    def __init__(self, theme: Theme) -> None:
+        axes = RESPONSES[0][1], RESPONSES[1][1]
+        hint = "Periodic motions: stable ones solid, unstable ones dashed, as they are found."
+        titles = ("Response I of branches", "Response II of branches")
+        super().__init__(_TwoPlots(theme, titles, axes, hint))
 
     def show_answer(self, answer: BranchDiagram) -> None:
         """Draw every branch."""
@@ -109,26 +117,13 @@ class BranchPicture:
                 dots.setData(np.array(place), np.array([each.response_ii for each in found]))
 
 
-class SpectrumPicture:
+class SpectrumPicture(_PairPicture):
     """Six exponents with their intervals, and the dimension with its own."""
 
     def __init__(self, theme: Theme) -> None:
         hint = "All six Lyapunov exponents with their intervals, as they are found."
         titles = ("Exponents", "Kaplan-Yorke dimension")
-        self._plots = _TwoPlots(theme, titles, (EXPONENT, DIMENSION), hint)
-
-    @property
-    def widget(self) -> QWidget:
-        """Both plots."""
-        return self._plots
-
-    def plots(self, along: Parameter) -> tuple[Plot, Plot]:
-        """Those over one parameter."""
-        return self._plots.pairs[along]
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self._plots.retheme(theme)
+        super().__init__(_TwoPlots(theme, titles, (EXPONENT, DIMENSION), hint))
 
     def show_answer(self, answer: ExponentSpectrum) -> None:
         """Draw what is there."""

@@ -25,7 +25,8 @@ from ...forms import JudgedForm
 from ...page import AppContext, Page, SideAndPicture
 from ...widgets import COMPARE, SIMULATE, Notice, NoticeKind, ReadTable, Theme, push_button
 from ._answer_plots import AnswerPlots
-from ._dynamics_kinds import BRANCHES, SPECTRUM
+from ._chain_picture import ChainPicture
+from ._dynamics_kinds import BRANCHES, CHAIN, SPECTRUM
 from ._dynamics_pictures import BranchPicture, SpectrumPicture
 from ._dynamics_view import DynamicsView
 from ._simulator import Simulator
@@ -47,6 +48,8 @@ class SimulatePage(Page):
         self._undrawn: list[Callable[[], None]] = []
         self.branches = DynamicsView(context, BRANCHES, BranchPicture(context.theme))
         self.spectrum = DynamicsView(context, SPECTRUM, SpectrumPicture(context.theme))
+        self.chain = DynamicsView(context, CHAIN, ChainPicture(context.theme))
+        self._views = (self.branches, self.spectrum, self.chain)
         self._build()
         self.form.changed.connect(self._say_cost)
         self.simulator.grown.connect(self._grow)
@@ -74,20 +77,20 @@ class SimulatePage(Page):
             self._show_motions()
         if self._undrawn:
             self._undrawn.pop(0)()
-        self.branches.refresh()
-        self.spectrum.refresh()
+        for view in self._views:
+            view.refresh()
 
     def left(self) -> None:
         """Keep how the page is divided."""
         self._parts.keep()
-        self.branches.left()
-        self.spectrum.left()
+        for view in self._views:
+            view.left()
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
         self.plots.retheme(theme)
-        self.branches.retheme(theme)
-        self.spectrum.retheme(theme)
+        for view in self._views:
+            view.retheme(theme)
 
     def begin(self) -> None:
         """Simulate what the form says."""
@@ -167,6 +170,7 @@ class SimulatePage(Page):
         self.tabs.addTab(self._parts, "Responses")
         self.tabs.addTab(self.branches, "Branches")
         self.tabs.addTab(self.spectrum, "Exponents")
+        self.tabs.addTab(self.chain, "Chain")
         layout.addWidget(self.tabs)
 
     def _side(self) -> QWidget:
