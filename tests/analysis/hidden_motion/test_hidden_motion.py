@@ -118,6 +118,24 @@ def test_wrong_gaps_and_m1_are_found_from_the_motion(world_recording, described_
     assert np.sqrt(np.mean(error[scored] ** 2)) < 0.1e-6
 
 
+def test_wrong_springs_and_dampers_are_found_too(world_recording):
+    recorded = world_recording("noise", 10.0, seed=41)
+    (k0, k1, k2), dampings = recorded.specimen.stiffnesses, recorded.specimen.dampings
+    wrong = replace(
+        recorded.specimen,
+        stiffnesses=(0.996 * k0, k1, 1.005 * k2),
+        dampings=tuple(1.3 * each for each in dampings),
+    )
+    motion = told(recorded, specimen=wrong)
+    found = {each.what: each for each in motion.parameters}
+    assert found[Hidden.K0].value == pytest.approx(k0, rel=1e-3)
+    assert found[Hidden.K2].value == pytest.approx(k2, rel=1e-3)
+    assert found[Hidden.K2].low < k2 < found[Hidden.K2].high
+    error, scored = errors_of(motion, recorded, motion.tracked.p)
+    assert np.mean(scored[round(SCORED_FROM_S * motion.sample_rate_hz) :]) == 1.0
+    assert np.sqrt(np.mean(error[scored] ** 2)) < 0.2e-6
+
+
 def test_two_gaps_and_a_linear_law_are_followed_too(world_recording):
     specimen = replace(
         gong2025(gap_m=(38e-6, 50e-6)), contact=LinearGap(4.9e6), masses=(6.1e-3, 1.9e-3, 2.2e-3)

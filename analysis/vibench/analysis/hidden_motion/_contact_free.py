@@ -1,4 +1,4 @@
-"""Motion, impacts, gaps, m1 and c1 without a contact model: what holds whatever the stops are."""
+"""Motion, impacts, gaps, m1, springs and dampers without a contact model: what any stops leave true."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -16,14 +16,21 @@ from ._tracking_model import TrackedSpecimen
 _BLOCK_S, _OVERLAP_S = 0.12, 0.02
 _MISFIT = 3.0
 """Mean squared innovation beyond which a block is not believed."""
-_INERTIAL = (Hidden.M1, Hidden.C1)
-_SHARES = (0.1, 0.03, 0.01, 0.004)
-"""Closed shares, one after the other, while m1 and c1 are fitted: the first bear an m1 that is 5 % off."""
+FITTED = (Hidden.M1, Hidden.C1, Hidden.K0, Hidden.K2, Hidden.C0, Hidden.C2)
+_SHARES = (0.1, 0.1, 0.03, 0.01, 0.004)
+"""Closed shares, one after the other, while numbers are fitted: the first bear an m1 that is 5 % off."""
 _FIT_STRETCH_S = 0.12
 _FIT_STRETCHES = 4
 _LARGEST_RESIDUAL = 5.0
 _RESIDUAL_START_S = 4e-3
-_STEPS = {Hidden.M1: 1e-4, Hidden.C1: 1e-2}
+_STEPS = {
+    Hidden.M1: 1e-4,
+    Hidden.C1: 1e-2,
+    Hidden.K0: 1e-5,
+    Hidden.K2: 1e-5,
+    Hidden.C0: 1e-2,
+    Hidden.C2: 1e-2,
+}
 _LEAST_OF_MEDIAN = 0.07
 """An impulse below this part of the usual one is not told from what is left of its neighbours."""
 _LEAST_P_OF_MEDIAN = 0.9
@@ -250,18 +257,18 @@ def _gap(value: float, variance: float, unknown: float, side: Flags) -> FreeGap:
 
 
 @dataclass(frozen=True)
-class FreeInertia:
-    """m1 and c1 without a contact model."""
+class FreeNumbers:
+    """m1, c1 and the linear numbers without a contact model."""
 
     tracked: TrackedSpecimen
     """The specimen with both."""
     sd: Reals
-    """Of m1 and c1, relative, shape (2,)."""
+    """Of each of them, relative, in the order of `FITTED`."""
     misfit: float
 
 
-def free_inertia(described: TrackedSpecimen, motion: PreparedMotion, firsts: Sequence[int]) -> FreeInertia:
-    """Fit m1 and c1 so that the flights between impacts fit best, Gauss and Newton on the innovations.
+def free_numbers(described: TrackedSpecimen, motion: PreparedMotion, firsts: Sequence[int]) -> FreeNumbers:
+    """Fit m1, c1, k0, k2, c0 and c2 so that flights fit best: Gauss and Newton on the innovations.
 
     Raises
     ------
@@ -274,10 +281,11 @@ def free_inertia(described: TrackedSpecimen, motion: PreparedMotion, firsts: Seq
     if not places:
         raise NotEnoughData(f"{_FIT_STRETCH_S} s of colliding motion are needed to find m1 in")
     current = described
-    prior = np.array([PRIOR_SD[each] for each in _INERTIAL])
+    prior = np.array([PRIOR_SD[each] for each in FITTED])
     for share in _SHARES:
         latent = [latent_motion(motion_model(current, motion), motion, each, count, share) for each in places]
         residual = _residuals(current, motion, latent)
+        scale = max(1.0, 1.4826 * float(np.median(np.abs(residual))))
         slopes = np.stack(
             [
                 (
@@ -288,26 +296,27 @@ def free_inertia(described: TrackedSpecimen, motion: PreparedMotion, firsts: Seq
                     )
                     - residual
                 )
-                / _STEPS[each]
-                for each in _INERTIAL
+                / (scale * _STEPS[each])
+                for each in FITTED
             ],
             axis=1,
         )
         from_described = np.array(
-            [value_of(current, each) / value_of(described, each) - 1 for each in _INERTIAL]
+            [value_of(current, each) / value_of(described, each) - 1 for each in FITTED]
         )
         curvature = slopes.T @ slopes + np.diag(prior**-2)
-        step = -np.linalg.solve(curvature, slopes.T @ residual + from_described / prior**2)
+        pull = np.clip(residual / scale, -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
+        step = -np.linalg.solve(curvature, slopes.T @ pull + from_described / prior**2)
         step = np.clip(step, -prior, prior)
         current = with_values(
             current,
             {
                 each: value_of(current, each) * (1 + float(part))
-                for each, part in zip(_INERTIAL, step, strict=True)
+                for each, part in zip(FITTED, step, strict=True)
             },
         )
-    variance = np.diag(np.linalg.inv(curvature)) * max(1.0, float(np.mean(residual**2)))
-    return FreeInertia(current, np.sqrt(variance), float(np.mean([each.misfit for each in latent])))
+    variance = np.diag(np.linalg.inv(curvature)) * max(1.0, float(np.mean(pull**2)))
+    return FreeNumbers(current, np.sqrt(variance), float(np.mean([each.misfit for each in latent])))
 
 
 def _residuals(tracked: TrackedSpecimen, motion: PreparedMotion, latent: Sequence[LatentMotion]) -> Reals:
@@ -320,4 +329,4 @@ def _residuals(tracked: TrackedSpecimen, motion: PreparedMotion, latent: Sequenc
         run = run_filter(model, motion, start, each.force_variance.size, force_variance=each.force_variance)
         value, variance = run.innovations[begin:].T
         parts.append(value / np.sqrt(variance))
-    return np.asarray(np.clip(np.concatenate(parts), -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL))
+    return np.concatenate(parts)

@@ -1,4 +1,4 @@
-"""Gaps, m1, c1 and the contact law, found while the motion is tracked: a filter with parameters.
+"""Gaps, m1, springs, dampers and contact law, found while the motion is tracked: a filter with parameters.
 
 The parameters are states that do not change. The filter begins with the channels' noise taken as many times
 larger, so that a wrong parameter costs the track little, and the noise is brought down while they are found.
@@ -23,6 +23,10 @@ _DEVIATION = {
     Hidden.UPPER_GAP: 1e-5,
     Hidden.M1: 1e-4,
     Hidden.C1: 1e-2,
+    Hidden.K0: 1e-5,
+    Hidden.K2: 1e-5,
+    Hidden.C0: 1e-2,
+    Hidden.C2: 1e-2,
     Hidden.FORCE: 1e-3,
     Hidden.EXPONENT: 1e-4,
 }

@@ -1,7 +1,8 @@
-"""What collisions tell of a specimen: gaps, m1, c1 and the contact law, with uncertainties that cover.
+"""What a colliding motion tells of a specimen: gaps, m1, springs, dampers, law, with bounds.
 
-A description that the motion can be tracked with is only refined. One that it cannot is searched: m1 and c1
-from flights, the gaps from where impacts happen, both without a contact model, then everything by tracking.
+A description that the motion can be tracked with is only refined. One that it cannot is searched: m1, springs
+and dampers from flights, the gaps from where impacts happen, both without a contact model, then everything
+by tracking.
 """
 
 from collections.abc import Mapping
@@ -11,7 +12,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from ..signals import Reals
-from ._contact_free import FreeGap, free_gaps, free_inertia, free_motion
+from ._contact_free import FITTED, FreeGap, free_gaps, free_motion, free_numbers
 from ._estimation import Estimate, estimate
 from ._filtering import LOSS_LIMIT, FilterState, motion_model, run_filter
 from ._parameters import Hidden, value_of, with_values
@@ -21,7 +22,8 @@ from ._tracking_model import TrackedSpecimen
 
 _STRETCH_S = 1.2
 """Of each restart."""
-_MOST_RESTARTS = 4
+_FEWEST_RESTARTS, _MOST_RESTARTS = 3, 4
+"""Of a short motion they overlap, and differ in where they begin to look."""
 _TRIAL_S = 0.25
 _TRIALS = 3
 _FITTING_LEVEL = 1.6
@@ -31,16 +33,31 @@ _NEAR = {
     Hidden.UPPER_GAP: 0.004,
     Hidden.M1: 1e-3,
     Hidden.C1: 0.05,
+    Hidden.K0: 1e-4,
+    Hidden.K2: 1e-4,
+    Hidden.C0: 0.01,
+    Hidden.C2: 0.01,
     Hidden.FORCE: 0.1,
     Hidden.EXPONENT: 0.03,
 }
 """How far from a description that can be tracked its parameters are looked for, relative."""
-_LEAST_SD = {Hidden.M1: 1e-3, Hidden.C1: 0.03}
+_LEAST_SD = {
+    Hidden.M1: 1e-3,
+    Hidden.C1: 0.03,
+    Hidden.K0: 3e-4,
+    Hidden.K2: 3e-4,
+    Hidden.C0: 0.03,
+    Hidden.C2: 0.03,
+}
 _FREE_S = 1.0
 _TOLD = 0.5
 """Posterior over prior standard deviation above which the data say nothing that was not assumed."""
 _CONFIDENCE = 0.95
-_STARTS_APART = 0.5
+_Z = 1.96
+_CLOCK_SD = {Hidden.K0: 5e-5, Hidden.K2: 5e-5, Hidden.M1: 5e-5}
+"""Relative, of what follows a frequency squared: converters' clocks keep 50 parts in a million, which no
+recording of its own can tell."""
+_STARTS_APART = 0.3
 """Prior standard deviations by which restarts begin elsewhere: what is not forgotten shows as scatter."""
 
 
@@ -85,27 +102,29 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
     )
     if isinstance(near, str):
         return _nothing(described, near, searched=True)
-    found: list[Estimate] = []
+    if searched:
+        first_look = estimate(start, motion, near, *stretches[len(stretches) // 2])
+        if isinstance(first_look, Estimate):
+            start = first_look.tracked
+    enough_s = 0.5 * min(_STRETCH_S, motion.samples / motion.sample_rate_hz)
+    good: list[Estimate] = []
     refused = ""
     for number, (first, stop) in enumerate(stretches):
-        answer = estimate(_apart(start, near, number), motion, near, first, stop)
-        match answer:
-            case str():
-                refused = answer
-            case Estimate():
-                found.append(answer)
-    good = [
-        each
-        for each in found
-        if each.followed_s > 0.5 * min(_STRETCH_S, motion.samples / motion.sample_rate_hz)
-    ]
+        # What does not hold from a start elsewhere is tried from the start itself.
+        for begin in (_apart(start, near, number), start):
+            answer = estimate(begin, motion, near, first, stop)
+            if isinstance(answer, Estimate) and answer.followed_s > enough_s:
+                good.append(answer)
+                break
+            refused = answer if isinstance(answer, str) else refused
     if 2 * len(good) <= len(stretches) and len(stretches) > 1:
         held = f"only {len(good)} of {len(stretches)} restarts over parts of the motion held their track"
         return _nothing(start, refused or held, searched=searched)
     if not good:
         why = refused or "the track was lost again and again while the parameters were looked for"
         return _nothing(start, why, searched=searched)
-    values, sd = combined(good)
+    independent = max(1.0, min(len(good), motion.samples / (_STRETCH_S * motion.sample_rate_hz)))
+    values, sd = combined(good, independent)
     prior = np.array([near[each] * value_of(start, each) for each in good[0].wanted])
     factor = float(student.ppf(0.5 + 0.5 * _CONFIDENCE, max(2, 2 * len(good) - 1)))
     parameters = tuple(
@@ -116,21 +135,25 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
     return FoundSpecimen(with_values(start, told), parameters, len(good), searched)
 
 
-def combined(found: list[Estimate]) -> tuple[Reals, Reals]:
-    """Give the mean of restarts, and its standard deviation: the larger of scatter and claims."""
+def combined(found: list[Estimate], independent: float) -> tuple[Reals, Reals]:
+    """Give the mean of restarts, and its standard deviation: the larger of scatter and claims.
+
+    Restarts over the same samples are not independent: their scatter tells what they have not forgotten.
+    """
     values = np.array([each.values for each in found])
     claimed = np.array([np.maximum(np.diag(each.covariance), 0.0) for each in found])
     mean = values.mean(axis=0)
     variance = claimed.mean(axis=0)
     if len(found) > 1:
         variance = np.maximum(variance, values.var(axis=0, ddof=1))
-    return mean, np.sqrt(variance / len(found))
+    return mean, np.sqrt(variance / independent)
 
 
 def _judged(what: Hidden, value: float, half: float, described: float, told: float) -> FoundParameter:
     why = ""
     if told > _TOLD:
         why = f"{what.value} is not told by this motion better than it was assumed"
+    half = float(np.hypot(half, _Z * _CLOCK_SD.get(what, 0.0) * value))
     return FoundParameter(what, float(value), float(value - half), float(value + half), described, why)
 
 
@@ -143,7 +166,7 @@ def _nothing(tracked: TrackedSpecimen, why: str, *, searched: bool = False) -> F
 def _stretches(motion: PreparedMotion) -> list[tuple[int, int]]:
     """Spread the restarts evenly over the motion."""
     length = min(round(_STRETCH_S * motion.sample_rate_hz), motion.samples)
-    number = min(_MOST_RESTARTS, max(1, motion.samples // length))
+    number = min(_MOST_RESTARTS, max(_FEWEST_RESTARTS, motion.samples // length))
     firsts = np.linspace(0, motion.samples - length, number).astype(int)
     return [(int(each), int(each) + length) for each in firsts]
 
@@ -180,22 +203,20 @@ def _search(
 ) -> tuple[TrackedSpecimen, Mapping[Hidden, float] | str]:
     """Find a start without a contact model, and how far from it to look; a sentence where there is none."""
     rate = motion.sample_rate_hz
-    inertia = free_inertia(described, motion, firsts)
+    numbers = free_numbers(described, motion, firsts)
     count = min(round(_FREE_S * rate), motion.samples)
     first = (motion.samples - count) // 2
-    told = free_motion(motion_model(inertia.tracked, motion), motion.part(first, first + count))
+    told = free_motion(motion_model(numbers.tracked, motion), motion.part(first, first + count))
     gaps = free_gaps(told.impacts)
     if not any(gaps):
-        return inertia.tracked, (
+        return numbers.tracked, (
             "no impacts were found, so m1 did not reach its stops in this motion or the specimen's linear "
             "numbers are wrong; fit them to weak noise first"
         )
     sides = dict(zip((Hidden.LOWER_GAP, Hidden.UPPER_GAP), gaps, strict=True))
     known: dict[Hidden, FreeGap] = {side: gap for side, gap in sides.items() if gap is not None}
-    start = with_values(inertia.tracked, {side: gap.value_m for side, gap in known.items()})
+    start = with_values(numbers.tracked, {side: gap.value_m for side, gap in known.items()})
     near = {**_NEAR, Hidden.FORCE: 0.25, Hidden.EXPONENT: 0.05}
     near |= {side: gap.sd_m / gap.value_m for side, gap in known.items()}
-    near |= {
-        each: max(_LEAST_SD[each], 3.0 * float(sd)) for each, sd in zip(_LEAST_SD, inertia.sd, strict=True)
-    }
+    near |= {each: max(_LEAST_SD[each], 3.0 * float(sd)) for each, sd in zip(FITTED, numbers.sd, strict=True)}
     return start, near

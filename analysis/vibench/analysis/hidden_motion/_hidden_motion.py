@@ -26,7 +26,7 @@ MICRO = 1e6
 
 
 class Numbers(Enum):
-    """Which gaps, m1, c1 and contact law the motion is tracked with."""
+    """Which gaps, m1, springs, dampers and contact law the motion is tracked with."""
 
     FOUND = auto()
     """Those that the collisions tell, where they tell them."""
@@ -151,12 +151,12 @@ def hidden_motion(
     recording
         Any, with base acceleration and m0's velocity; sampled at 10 kHz or more, 51.2 kHz for its law.
     specimen
-        With the masses, stiffnesses and dampings of the linear specimen, which must be right (fit them to
-        weak noise first: `update_model`); as the recording describes it when left out.
+        As it is known: m0, m2 and k1 are taken as they are, all else within some per cent; as the recording
+        describes it when left out.
     start_s, stop_s
         Stretch of the recording [s]; all of it when left out.
     numbers
-        Whether gaps, m1, c1 and contact law are found first.
+        Whether gaps, m1, springs, dampers and contact law are found first.
     observer
         Told how far it is.
 
@@ -199,9 +199,9 @@ def hidden_motion_in_samples(
     sample_rate_hz
         Of both.
     specimen
-        What was shaken, its linear numbers right.
+        What was shaken, as it is known.
     numbers
-        Whether gaps, m1, c1 and contact law are found first.
+        Whether gaps, m1, springs, dampers and contact law are found first.
 
     Raises
     ------
@@ -313,6 +313,10 @@ _SHOWN = {
     Hidden.UPPER_GAP: ("upper gap", MICRO, "µm"),
     Hidden.M1: ("m1", 1e3, "g"),
     Hidden.C1: ("c1", 1e3, "mN s/m"),
+    Hidden.K0: ("k0", 1.0, "N/m"),
+    Hidden.K2: ("k2", 1.0, "N/m"),
+    Hidden.C0: ("c0", 1e3, "mN s/m"),
+    Hidden.C2: ("c2", 1e3, "mN s/m"),
     Hidden.FORCE: ("contact force at 1 µm", 1.0, "N"),
     Hidden.EXPONENT: ("contact exponent", 1.0, ""),
 }

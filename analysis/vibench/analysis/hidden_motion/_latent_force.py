@@ -29,6 +29,8 @@ CLOSED_SHARE = 3e-4
 _LEAST_GUESS_N = 1e-3
 _SURPRISE = 25.0
 """Squared normalised innovation that tells an impact that was overlooked."""
+_MEDIAN_OF_SQUARE = 0.455
+"""Of a normal variable's square."""
 _RERUNS = 3
 _START_UP_S = 4e-3
 """Innovations of a filter that has just begun are not judged."""
@@ -117,7 +119,10 @@ def _start_up(sample_rate_hz: float, count: int) -> int:
 
 def _with_surprises(windows: Flags, run: Filtered, sample_rate_hz: float) -> tuple[Flags, bool]:
     """Open a window where an innovation tells a force that came just before."""
-    surprise = run.squared > _SURPRISE
+    squared = run.squared
+    # Wrong numbers of the specimen surprise everywhere: only what stands out from that is an impact.
+    usual = max(1.0, float(np.median(squared)) / _MEDIAN_OF_SQUARE)
+    surprise = squared > _SURPRISE * usual
     surprise[: _start_up(sample_rate_hz, surprise.size)] = False
     onsets = surprise & ~np.concatenate(([False], surprise[:-1]))
     earlier = np.concatenate((onsets[1:], [False]))

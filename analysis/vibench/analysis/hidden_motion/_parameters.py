@@ -1,4 +1,4 @@
-"""What of a specimen only its collisions tell: read from it, and given to it."""
+"""What of a specimen a colliding motion tells: read from it, and given to it."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -8,24 +8,30 @@ from ._tracking_model import TrackedSpecimen
 
 
 class Hidden(StrEnum):
-    """What of a specimen only its collisions tell."""
+    """What of a specimen a colliding motion tells; m0, m2 and k1 stay as described."""
 
     LOWER_GAP = "lower_gap_m"
     UPPER_GAP = "upper_gap_m"
     M1 = "m1_kg"
     C1 = "c1_ns_per_m"
+    K0 = "k0_n_per_m"
+    K2 = "k2_n_per_m"
+    C0 = "c0_ns_per_m"
+    C2 = "c2_ns_per_m"
     FORCE = "force_at_1um_n"
     """Of a stop pressed in by 1 um, F = FORCE (d / 1 um)^EXPONENT."""
     EXPONENT = "contact_exponent"
 
 
-GEOMETRY = (Hidden.LOWER_GAP, Hidden.UPPER_GAP, Hidden.M1, Hidden.C1)
-"""Found first, with the contact law as described."""
 PRIOR_SD = {
     Hidden.LOWER_GAP: 0.04,
     Hidden.UPPER_GAP: 0.04,
     Hidden.M1: 0.04,
     Hidden.C1: 0.4,
+    Hidden.K0: 0.02,
+    Hidden.K2: 0.02,
+    Hidden.C0: 0.3,
+    Hidden.C2: 0.3,
     Hidden.FORCE: 0.3,
     Hidden.EXPONENT: 0.1,
 }
@@ -34,30 +40,32 @@ PRIOR_SD = {
 
 def value_of(tracked: TrackedSpecimen, what: Hidden) -> float:
     """Read one parameter."""
-    match what:
-        case Hidden.LOWER_GAP:
-            return tracked.specimen.gaps_m[0]
-        case Hidden.UPPER_GAP:
-            return tracked.specimen.gaps_m[1]
-        case Hidden.M1:
-            return tracked.specimen.masses[1]
-        case Hidden.C1:
-            return tracked.specimen.dampings[1]
-        case Hidden.FORCE:
-            return tracked.force_at_1um_n
-        case Hidden.EXPONENT:
-            return tracked.exponent
+    specimen = tracked.specimen
+    lower, upper = specimen.gaps_m
+    (k0, _, k2), (c0, c1, c2) = specimen.stiffnesses, specimen.dampings
+    return {
+        Hidden.LOWER_GAP: lower,
+        Hidden.UPPER_GAP: upper,
+        Hidden.M1: specimen.masses[1],
+        Hidden.C1: c1,
+        Hidden.K0: k0,
+        Hidden.K2: k2,
+        Hidden.C0: c0,
+        Hidden.C2: c2,
+        Hidden.FORCE: tracked.force_at_1um_n,
+        Hidden.EXPONENT: tracked.exponent,
+    }[what]
 
 
 def with_values(tracked: TrackedSpecimen, values: Mapping[Hidden, float]) -> TrackedSpecimen:
     """Give others; k1 stays when m1 changes."""
     new = {each: values.get(each, value_of(tracked, each)) for each in Hidden}
     m0, _, m2 = tracked.specimen.masses
-    c0, _, c2 = tracked.specimen.dampings
     specimen = replace(
         tracked.specimen,
         masses=(m0, new[Hidden.M1], m2),
-        dampings=(c0, new[Hidden.C1], c2),
+        stiffnesses=(new[Hidden.K0], tracked.specimen.stiffnesses[1], new[Hidden.K2]),
+        dampings=(new[Hidden.C0], new[Hidden.C1], new[Hidden.C2]),
         gap_m=new[Hidden.UPPER_GAP],
         lower_gap_m=new[Hidden.LOWER_GAP],
     )
