@@ -242,7 +242,9 @@ class TestNobodyLooks:
         events = kept(tmp_path / "run.h5", r"nobody has looked for \d+\.\d s")  # asks nothing meanwhile
         assert any(kind == "silence" and text.startswith("abort: 0.0") for kind, text in events)
         messages = until_state(client, EngineState.READY).messages
-        assert any(message.what.startswith("The viewer is gone") for message in messages)
+        (told,) = [message for message in messages if message.what.startswith("The viewer is gone")]
+        assert told.kind.value == "fault"
+        assert "unattended" in told.next_step
 
     @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
     def test_an_engine_that_was_frozen_itself_does_not_blame_its_viewer(

@@ -51,6 +51,10 @@ class Messages:
         """Note something to be looked at."""
         self._add(MessageKind.WARNING, what, done, next_step, "")
 
+    def alarm(self, what: str, done: str, next_step: str) -> None:
+        """Note that something was stopped that nobody had wanted to stop."""
+        self._add(MessageKind.FAULT, what, done, next_step, "")
+
     def fault(self, error: BaseException) -> None:
         """Note an error; ours say in this order what happened, what was done, and what to do next."""
         match error:

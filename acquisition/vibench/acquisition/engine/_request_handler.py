@@ -231,7 +231,11 @@ class RequestHandler:
         elif engine.published.state in SOUNDING and engine.switch.request is None:
             engine.switch.ask(StopRequest.by(Cause.VIEWER_GONE, reason))
             kept = "; the recording is kept" if engine.published.state in DRIVING else ""
-            engine.published.messages.warn(f"The viewer is gone: {reason}.", f"Ramped down{kept}.")
+            engine.published.messages.alarm(
+                f"The viewer is gone: {reason}.",
+                f"Ramped down{kept}.",
+                "If the computer was too busy, end other programs; or measure from a terminal, unattended.",
+            )
 
     def _stop(self, request: StopRequest) -> None:
         self._engine.switch.ask(request)
