@@ -16,9 +16,9 @@ def curve(frequency_hz, value, relative=1e-4, resolution_hz=0.0, coherence=0.99)
         value=value,
         coherence=np.full(frequency_hz.size, coherence),
         n_eff=50.0,
-        relative_sd_magnitude=np.full(frequency_hz.size, relative),
-        sd_phase_rad=np.full(frequency_hz.size, relative),
-        half_width=student_half_width(np.full(frequency_hz.size, relative), 50.0, 0.95),
+        relative_sd_magnitude=np.broadcast_to(relative, frequency_hz.shape),
+        sd_phase_rad=np.broadcast_to(relative, frequency_hz.shape),
+        half_width=student_half_width(np.broadcast_to(relative, frequency_hz.shape), 50.0, 0.95),
         coherence_significance=0.06,
         resolution_hz=resolution_hz,
         segments_used=50,
@@ -130,3 +130,29 @@ def test_a_band_with_too_few_lines_is_refused():
     frequency_hz = np.arange(50, 500, 10.0)
     with pytest.raises(InvalidRequest, match="at least 8"):
         resonances(curve(frequency_hz, single(frequency_hz, 266, 0.02)), low_hz=250, high_hz=280)
+
+
+def test_frequency_and_damping_of_every_mode_are_held_by_their_bounds():
+    frequency_hz = np.arange(50.0, 601.0)
+    exact = specimen(frequency_hz)
+    # The same absolute noise on every line: the mode at 500 Hz stands on the skirts of the other two.
+    noise = 0.01 * np.median(np.abs(exact))
+    natural_hz, damping = modes()
+    rng, draws, held = np.random.default_rng(9), 60, np.zeros((3, 2))
+    for _ in range(draws):
+        value = exact + noise * (rng.standard_normal(551) + 1j * rng.standard_normal(551))
+        found = resonances(curve(frequency_hz, value, noise / np.abs(exact)), low_hz=50, high_hz=600)
+        assert len(found) == 3
+        for number, each in enumerate(found):
+            held[number, 0] += abs(each.frequency_hz - natural_hz[number]) < 1.96 * each.sd_frequency_hz
+            held[number, 1] += abs(each.damping_ratio - damping[number]) < 1.96 * each.sd_damping_ratio
+    # 0.95 less three standard deviations of 60 draws; single fits held the frequency at 500 Hz in 0.3.
+    assert np.all(held / draws > 0.865)
+
+
+def test_no_bias_of_frequency_or_damping_is_left_without_noise():
+    frequency_hz = np.arange(50.0, 601.0)
+    found = resonances(curve(frequency_hz, specimen(frequency_hz)), low_hz=50, high_hz=600)
+    natural_hz, damping = modes()
+    np.testing.assert_allclose([each.frequency_hz for each in found], natural_hz, rtol=1e-7)
+    np.testing.assert_allclose([each.damping_ratio for each in found], damping, rtol=1e-6)

@@ -3,6 +3,9 @@ from ._distortion import (
     distortion as distortion,
     is_even_line as is_even_line,
 )
+from ._mode import (
+    Resonance as Resonance,
+)
 from ._noise_response import (
     DEFAULT_REQUEST as DEFAULT_REQUEST,
     Noise as Noise,
@@ -20,7 +23,6 @@ from ._request import (
     quantities_named as quantities_named,
 )
 from ._resonance import (
-    Resonance as Resonance,
     resonances as resonances,
 )
 from ._results import (

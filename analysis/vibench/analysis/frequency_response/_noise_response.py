@@ -13,10 +13,11 @@ from ..signals import Complexes, Flags, Quantity, Reals, relative_sd, student_ha
 from ..spectra import DensitySums
 from ..tones import NoiseDriveLevel, noise_drive_level
 from ._estimators import coherence, least_squares
+from ._mode import Resonance
 from ._periodic import PeriodicFrequencyResponse, PeriodicSums
 from ._repetition import period_spectra
 from ._request import FrequencyResponseRequest
-from ._resonance import Resonance, resonances
+from ._resonance import resonances
 from ._results import Estimator, FrequencyResponse, converted_frequency_response
 from ._transmissibility import FrequencyResponseSums
 

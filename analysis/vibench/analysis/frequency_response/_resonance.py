@@ -1,12 +1,12 @@
 """Resonances of a transmission: frequency, damping and quality factor, with their uncertainties."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy
 
 from ..errors import InvalidRequest
 from ..signals import Complexes, Reals
+from ._joint_fit import jointly_fitted
+from ._mode import LARGEST_DAMPING, SMALLEST_RELATIVE_SD, WELL_FITTED, Resonance
 from ._results import FrequencyResponse
 
 _REACH_BANDWIDTHS = 2.0
@@ -15,60 +15,15 @@ _LEAST_LINES = 8
 """Two pole and at most ten linear parameters need more reals than that: eight lines are sixteen."""
 _LEAST_RISE = 3.0
 """A peak stands above the valley beside it by at least so many standard deviations of the difference."""
-_SMALLEST_RELATIVE_SD = 1e-6
-"""Keeps the weights finite where a noise-free simulation states no spread at all."""
 _RESOLVED_LINES = 4.0
 """Noise bandwidths that a half-power bandwidth must hold, else the window smears the peak by over 2 %."""
 _LARGEST_SD_UNRESOLVED = 0.1
 """A peak too narrow for the lines is believed only where they are known to a tenth: else it is one of the
 ripples on top of a broad hill."""
-_LARGEST_DAMPING = 0.5
 _BACKGROUND_DEGREES = (1, 2, 3)
 """Tried in turn: broad peaks see more of their neighbours than a straight line can follow."""
-_WELL_FITTED = 1.2
-"""Reduced chi-square at which the background is good enough: a higher degree would only widen the spreads."""
 _LARGEST_RELATIVE_SD_DAMPING = 0.5
 """Past it the damping is not significantly above zero: a ripple of noisy lines, and no resonance."""
-
-
-@dataclass(frozen=True)
-class Resonance:
-    """One resonance, from a local fit of a single mode on a smooth background."""
-
-    frequency_hz: float
-    """Undamped natural frequency of the mode."""
-    sd_frequency_hz: float
-    damping_ratio: float
-    sd_damping_ratio: float
-    peak_frequency_hz: float
-    """Where the fitted magnitude is largest."""
-    peak_magnitude: float
-    sd_peak_magnitude: float
-    reduced_chi_square: float
-    """Misfit over what the stated spreads explain; the spreads above are widened when it is above 1."""
-    lines_used: int
-    is_resolved: bool
-    """Whether the lines are fine enough for this bandwidth; if not, damping is overestimated."""
-
-    @property
-    def quality_factor(self) -> float:
-        """1 / (2 damping ratio)."""
-        return 0.5 / self.damping_ratio
-
-    @property
-    def sd_quality_factor(self) -> float:
-        """Standard deviation of the quality factor."""
-        return self.quality_factor * self.sd_damping_ratio / self.damping_ratio
-
-    @property
-    def half_power_bandwidth_hz(self) -> float:
-        """2 damping ratio times frequency."""
-        return 2 * self.damping_ratio * self.frequency_hz
-
-    @property
-    def sd_half_power_bandwidth_hz(self) -> float:
-        """Standard deviation of the half-power bandwidth."""
-        return self.half_power_bandwidth_hz * self.sd_damping_ratio / self.damping_ratio
 
 
 def resonances(
@@ -80,7 +35,8 @@ def resonances(
     H(w) = R / (w0^2 - w^2 + 2 i zeta w0 w) + b0 + b1 (w - w0) + ..., complex R, b0, b1: one mode on what
     its neighbours leave there, a straight line or, where that does not do, up to a cubic. The pole is
     found by variable projection (Golub & Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432). A peak that
-    noise explains is left out.
+    noise explains is left out. Then all modes are fitted together, and that fit stands where it explains
+    the whole band: no polynomial follows the skirt of a neighbour to the last digit of a fine measurement.
 
     Raises
     ------
@@ -99,12 +55,12 @@ def resonances(
         fit = _refitted(band, _fitted(band, line, width))
         if fit is not None and low_hz <= fit.frequency_hz <= high_hz:
             found.append(fit)
-    return tuple(_distinct(found))
+    return jointly_fitted(band, _distinct(found))
 
 
 def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
     """Lines of peaks, and their half-power widths in lines."""
-    spread = np.maximum(np.nan_to_num(band.relative_sd_magnitude, posinf=1e9), _SMALLEST_RELATIVE_SD)
+    spread = np.maximum(np.nan_to_num(band.relative_sd_magnitude, posinf=1e9), SMALLEST_RELATIVE_SD)
     size = _smoothed(np.nan_to_num(np.log(np.maximum(band.magnitude, 1e-300)), nan=-700.0), spread)
     significant = band.is_significant & (np.nan_to_num(band.coherence) > band.coherence_significance)
     # A rise of ln(magnitude) by less than this is noise, whatever the line.
@@ -136,7 +92,7 @@ def _fitted(band: FrequencyResponse, line: int, half_width: int) -> Resonance | 
     reach = max(int(np.ceil(2 * _REACH_BANDWIDTHS * half_width)), _LEAST_LINES // 2)
     part = slice(max(0, line - reach), line + reach + 1)
     frequency_hz, value = band.frequency_hz[part], band.value[part]
-    spread = np.maximum(band.relative_sd_magnitude[part], _SMALLEST_RELATIVE_SD) * np.abs(value)
+    spread = np.maximum(band.relative_sd_magnitude[part], SMALLEST_RELATIVE_SD) * np.abs(value)
     usable = np.isfinite(spread) & np.isfinite(value) & (spread > 0)
     if np.count_nonzero(usable) < _LEAST_LINES:
         return None
@@ -146,7 +102,7 @@ def _fitted(band: FrequencyResponse, line: int, half_width: int) -> Resonance | 
     found: Resonance | None = None
     for degree in _BACKGROUND_DEGREES:
         found = _fitted_on(band, data, half_width, degree) or found
-        if found is None or found.reduced_chi_square < _WELL_FITTED:
+        if found is None or found.reduced_chi_square < WELL_FITTED:
             break
     return found
 
@@ -168,7 +124,7 @@ def _fitted_on(
         left = target - basis @ coefficients
         return np.concatenate((left.real, left.imag))
 
-    bounds = ([-span, np.log(1e-6)], [span, np.log(_LARGEST_DAMPING)])
+    bounds = ([-span, np.log(1e-6)], [span, np.log(LARGEST_DAMPING)])
     start = np.clip(start, np.asarray(bounds[0]) + 1e-9, np.asarray(bounds[1]) - 1e-9)
     result = scipy.optimize.least_squares(
         misfit, start, bounds=bounds, x_scale=[0.01, 1.0], xtol=1e-12, ftol=1e-12
@@ -204,7 +160,7 @@ def _resonance(
 ) -> Resonance | None:
     frequency_hz, value, spread, centre_hz = data
     natural_hz, damping = centre_hz * float(np.exp(pole[0])), float(np.exp(pole[1]))
-    at_a_bound = damping > 0.99 * _LARGEST_DAMPING or not frequency_hz[0] <= natural_hz <= frequency_hz[-1]
+    at_a_bound = damping > 0.99 * LARGEST_DAMPING or not frequency_hz[0] <= natural_hz <= frequency_hz[-1]
     curvature = jacobian.T @ jacobian
     if at_a_bound or np.linalg.cond(curvature) > 1e14:
         return None

@@ -1,0 +1,49 @@
+"""One mode of a transmission, and what a fit of it may give."""
+
+from dataclasses import dataclass
+
+SMALLEST_RELATIVE_SD = 1e-6
+"""Keeps the weights finite where a noise-free simulation states no spread at all."""
+LARGEST_DAMPING = 0.5
+WELL_FITTED = 1.2
+"""Reduced chi-square at which the background is good enough: a higher degree would only widen the spreads."""
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """One resonance, from the fit of all modes of a band, or of this one on a smooth background."""
+
+    frequency_hz: float
+    """Undamped natural frequency of the mode."""
+    sd_frequency_hz: float
+    damping_ratio: float
+    sd_damping_ratio: float
+    peak_frequency_hz: float
+    """Where the fitted magnitude is largest."""
+    peak_magnitude: float
+    sd_peak_magnitude: float
+    reduced_chi_square: float
+    """Misfit over what the stated spreads explain; the spreads above are widened when it is above 1."""
+    lines_used: int
+    is_resolved: bool
+    """Whether the lines are fine enough for this bandwidth; if not, damping is overestimated."""
+
+    @property
+    def quality_factor(self) -> float:
+        """1 / (2 damping ratio)."""
+        return 0.5 / self.damping_ratio
+
+    @property
+    def sd_quality_factor(self) -> float:
+        """Standard deviation of the quality factor."""
+        return self.quality_factor * self.sd_damping_ratio / self.damping_ratio
+
+    @property
+    def half_power_bandwidth_hz(self) -> float:
+        """2 damping ratio times frequency."""
+        return 2 * self.damping_ratio * self.frequency_hz
+
+    @property
+    def sd_half_power_bandwidth_hz(self) -> float:
+        """Standard deviation of the half-power bandwidth."""
+        return self.half_power_bandwidth_hz * self.sd_damping_ratio / self.damping_ratio
