@@ -24,6 +24,16 @@ def test_an_agreeing_twin_passes_its_limit_in_one_case_of_a_hundred(draws, point
     assert 12 <= outside <= 50
 
 
+def test_a_magnitude_that_is_mostly_chance_passes_its_limit_no_more_often():
+    rng = np.random.default_rng(8)
+    outside = 0
+    for _ in range(2000):
+        values = np.abs(rng.standard_normal((17, 40)) + 1j * rng.standard_normal((17, 40)))
+        outside += not EnsembleCurve("q", FREQUENCY_HZ, values[0], values[1:]).agrees
+    # 20 expected, sd 4.4.
+    assert 5 <= outside <= 36
+
+
 def test_the_band_holds_a_further_draw_as_often_as_it_says():
     rng = np.random.default_rng(2)
     held = np.mean([curve(rng, 16, 40).share_in_band for _ in range(400)])

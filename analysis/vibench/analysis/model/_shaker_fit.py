@@ -15,6 +15,7 @@ from ..errors import UnusableData
 from ..frequency_response import FrequencyResponse, NoiseAnalysis, repeated_response, streamed_response
 from ..recordings import BASE, DRIVE, RecordedChannels, Stretch, coupled_gain
 from ..signals import Complexes, Flags, Reals
+from ..tables import plus_minus
 from ._driven_rig import AMPLIFIER
 
 LARGEST_CHI2 = 3.0
@@ -50,7 +51,7 @@ class FittedShaker:
     def sentence(self) -> str:
         """The numbers with two standard deviations."""
         said = ", ".join(
-            f"{name} = {getattr(self.shaker, name):.4g} ± {200 * sd:.2g} %"
+            f"{name} = {plus_minus(value := getattr(self.shaker, name), 2 * sd * value)}"
             for name, sd in self.relative_sd.items()
         )
         return (
