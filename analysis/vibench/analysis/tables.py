@@ -10,6 +10,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 _DIGITS = 10
+_PLAIN = (1e-5, 1e7)
+"""Sizes between which numbers are written without a power of ten."""
+
+
+def plus_minus(value: float, half_width: float) -> str:
+    """Write a value with two digits of its uncertainty, and to as many places: ``"94.613 ± 0.012"``.
+
+    Without an uncertainty that is finite and above zero, four digits of the value stand alone.
+    """
+    if not 0.0 < half_width < np.inf or not np.isfinite(value):
+        return f"{value:.4g}"
+    largest = max(abs(value), half_width)
+    if not _PLAIN[0] <= largest < _PLAIN[1]:
+        power = int(np.floor(np.log10(largest)))
+        return f"({plus_minus(value / 10.0**power, half_width / 10.0**power)})e{power}"
+    # The exponent of the two digits as they are written: 0.0996 is 0.10.
+    place = 1 - int(f"{half_width:.1e}".partition("e")[2])
+    shown = max(place, 0)
+    return f"{round(value, place) + 0.0:.{shown}f} ± {round(half_width, place):.{shown}f}"
 
 
 @dataclass(frozen=True, eq=False)

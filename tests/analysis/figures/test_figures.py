@@ -31,6 +31,7 @@ from vibench.analysis.figures import (
 from vibench.analysis.figures._dwells import spectrum_columns
 from vibench.analysis.figures._style import prefixed
 from vibench.analysis.results import result_of
+from vibench.analysis.tables import plus_minus
 
 PNG_HEAD = b"\x89PNG\r\n\x1a\n"
 
@@ -75,7 +76,7 @@ def test_a_transmission_caption_names_every_resonance_with_its_uncertainty(noise
     found = result(noise_file())
     caption = transmission_figure(found.analysis, found.laid).caption
     for each in found.analysis.response.resonances:
-        assert f"{each.frequency_hz:.2f} ± {2 * each.sd_frequency_hz:.2g} Hz" in caption
+        assert f"{plus_minus(each.frequency_hz, 2 * each.sd_frequency_hz)} Hz" in caption
     assert f"{found.laid.difference.median_abs_db:.2g} dB" in caption
 
 

@@ -17,6 +17,7 @@ from vibench.analysis import (
     result_summary,
 )
 from vibench.analysis.report import write_report
+from vibench.analysis.tables import plus_minus
 
 VOID = {"meta", "img", "br", "link", "hr"}
 RATE = 6400.0
@@ -76,7 +77,7 @@ def test_a_report_needs_no_other_file_and_no_network(page):
 
 def test_a_report_holds_the_results_numbers(page, campaign):
     for found in campaign.noise[0].analysis.response.resonances:
-        assert f"{found.frequency_hz:.2f} ± {2 * found.sd_frequency_hz:.2g}" in page.text
+        assert plus_minus(found.frequency_hz, 2 * found.sd_frequency_hz) in page.text
     middle = campaign.noise[0].analysis.response.resonances[0].frequency_hz
     assert f"resonances at {middle:.1f}" in page.text
     region = campaign.sweeps[0].analysis.collisions.regions[0]

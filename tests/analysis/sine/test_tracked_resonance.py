@@ -54,8 +54,8 @@ def test_a_level_at_which_the_resonance_was_lost_is_no_point_of_the_backbone():
 @pytest.mark.parametrize(
     ("strong_hz", "said"),
     [
-        (101.0, "by +1 ± 0.085 Hz: the mode hardens."),
-        (99.0, "by -1 ± 0.085 Hz: the mode softens."),
+        (101.0, "by +1.000 ± 0.085 Hz: the mode hardens."),
+        (99.0, "by -1.000 ± 0.085 Hz: the mode softens."),
         (100.05, "neither softening nor hardening is seen."),
     ],
 )

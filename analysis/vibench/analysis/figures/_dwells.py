@@ -10,7 +10,7 @@ from ..model import SPECTRUM, DwellOverlay
 from ..recordings import specimen_of
 from ..signals import Reals
 from ..sine import COLUMN_HZ, DwellAnalysis, DwellResponse, spectrum_columns
-from ..tables import Table, table
+from ..tables import Table, plus_minus, table
 from ._drawn import DrawnFigure
 from ._ensemble_band import band_columns, draw_band, run_text, simulated_label
 from ._marked_resonances import ModelResonances, label_resonances, mark_resonances, model_resonances
@@ -109,8 +109,8 @@ def dwells_caption(rising: Sequence[Pair]) -> str:
         found = analysis.response
         text = (
             f"{analysis.excitation.amplitude_vpp:g} Vpp (A0 = {1e6 * found.drive.amplitude_m:.3g} µm): "
-            f"Response I {found.response_i:.3g}, Response II {found.response_ii:.3g} ± "
-            f"{2 * found.sd_response_ii:.2g}"
+            f"Response I {found.response_i:.3g}, Response II "
+            f"{plus_minus(found.response_ii, 2 * found.sd_response_ii)}"
         )
         if laid is not None:
             text += f". {run_text(laid)}"

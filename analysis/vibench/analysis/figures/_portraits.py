@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from ..chaos import MotionKind, MotionVerdict
 from ..sine import DwellAnalysis
-from ..tables import Table, table
+from ..tables import Table, plus_minus, table
 from ._drawn import DrawnFigure
 from ._style import BOUNDS, SIMULATED, legend_above, new_figure, prefixed, styled
 
@@ -82,7 +82,7 @@ def _caption(rising: Sequence[DwellAnalysis]) -> str:
         text = f"{each.excitation.amplitude_vpp:g} Vpp: {verdict_text(verdict)} ({verdict.why})"
         exponent = verdict.evidence.exponent_per_s
         if exponent is not None:
-            text += f", largest exponent {exponent[0]:.0f} ± {2 * exponent[1]:.0f} per second"
+            text += f", largest exponent {plus_minus(exponent[0], 2 * exponent[1])} per second"
         said.append(text)
     return (
         "Velocity over displacement of m0 (grey) and one point at the same phase of every recorded drive "

@@ -25,7 +25,7 @@ from ..sine import (
     level_jumps,
     noted_jumps,
 )
-from ..tables import table
+from ..tables import plus_minus, table
 from ._drawn import DrawnFigure
 from ._ensemble_band import band_columns, run_text, simulated_label
 from ._style import LINEAR, MEASURED, PREDICTED, SIMULATED, legend_above, magnitude_axis, new_figure, styled
@@ -171,8 +171,8 @@ def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse
     return (
         f"{EXCITATION_KINDS[plan.kind].title} at {plan.amplitude_vpp:g} Vpp, {found.frequency_hz.size} "
         f"steps from {np.min(found.frequency_hz):.4g} to {np.max(found.frequency_hz):.4g} Hz. "
-        f"Response II is largest at {found.frequency_hz[top]:.4g} Hz: {found.response_ii[top]:.3g} ± "
-        f"{2 * found.sd_response_ii[top]:.2g}."
+        f"Response II is largest at {found.frequency_hz[top]:.4g} Hz: "
+        f"{plus_minus(found.response_ii[top], 2 * found.sd_response_ii[top])}."
     )
 
 

@@ -7,7 +7,7 @@ from ..frequency_response import MagnitudeScale, NoiseAnalysis, NoiseResponse
 from ..model import TRANSMISSION, NoiseOverlay, linear_transmissibility
 from ..recordings import specimen_of
 from ..signals import Reals
-from ..tables import Table, table
+from ..tables import Table, plus_minus, table
 from ._drawn import DrawnFigure
 from ._ensemble_band import band_columns, draw_band, run_text, simulated_label
 from ._marked_resonances import ModelResonances, label_resonances, mark_resonances, model_resonances
@@ -186,7 +186,7 @@ def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> 
     view = analysis.request.view
     symbol, unit = view.symbol.replace(" ", ""), f" {view.unit}" if view.unit else ""
     found = ", ".join(
-        f"{each.frequency_hz:.2f} ± {2 * each.sd_frequency_hz:.2g} Hz ({symbol} = "
+        f"{plus_minus(each.frequency_hz, 2 * each.sd_frequency_hz)} Hz ({symbol} = "
         f"{each.peak_magnitude * float(view.factor(np.array([each.peak_frequency_hz]))[0]):.3g}{unit})"
         for each in response.resonances
     )

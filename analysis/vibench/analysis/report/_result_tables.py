@@ -17,6 +17,7 @@ from ..model import (
 )
 from ..recordings import specimen_of
 from ..sine import Edge
+from ..tables import plus_minus
 
 _NEAR = 0.08
 """Two resonances are set beside each other when they lie within 8 %: the modes lie at least 9 % apart."""
@@ -73,10 +74,10 @@ def _resonance_rows(result: NoiseResult) -> Iterator[tuple[str, ...]]:
         beside = _nearest_resonance(each.frequency_hz, simulated)
         yield (
             level,
-            f"{each.frequency_hz:.2f} ± {2 * each.sd_frequency_hz:.2g}",
-            f"{100 * each.damping_ratio:.3g} ± {200 * each.sd_damping_ratio:.2g}",
-            f"{each.peak_magnitude:.3g} ± {2 * each.sd_peak_magnitude:.2g}",
-            ABSENT if beside is None else f"{beside.frequency_hz:.2f} ± {2 * beside.sd_frequency_hz:.2g}",
+            plus_minus(each.frequency_hz, 2 * each.sd_frequency_hz),
+            plus_minus(100 * each.damping_ratio, 200 * each.sd_damping_ratio),
+            plus_minus(each.peak_magnitude, 2 * each.sd_peak_magnitude),
+            ABSENT if beside is None else plus_minus(beside.frequency_hz, 2 * beside.sd_frequency_hz),
             _nearest(each.frequency_hz, [*free, *bound], ".1f"),
             _nearest(each.frequency_hz, paper, ".0f"),
         )
@@ -161,10 +162,10 @@ def _dwell_row(result: DwellResult) -> tuple[str, ...]:
     bias = f"below {_SMALLEST_BIAS:g}" if is_small else f"{found.noise_bias_i:.1g}"
     return (
         f"{plan.amplitude_vpp:g} Vpp, {plan.frequency_hz:g} Hz",
-        f"{1e6 * amplitude_m:.4g} ± {200 * found.drive.sd_amplitude_m / amplitude_m:.1g} %",
+        plus_minus(1e6 * amplitude_m, 2e6 * found.drive.sd_amplitude_m),
         f"{found.response_i:.4g}",
         bias,
-        f"{found.response_ii:.4g} ± {2 * found.sd_response_ii:.1g}",
+        plus_minus(found.response_ii, 2 * found.sd_response_ii),
         verdict_text(result.analysis.motion.verdict),
         *_simulated(laid, RESPONSE_I),
         *_simulated(laid, RESPONSE_II),
@@ -202,13 +203,13 @@ def line_table(dwells: Sequence[DwellResult]) -> ReportTable:
         name = f"{plan.amplitude_vpp:g} Vpp, {plan.frequency_hz:g} Hz"
         for line in each.analysis.response.lines:
             if line.amplitude_m > 2 * line.sd_amplitude_m:
-                size = f"{1e6 * line.amplitude_m:.3g} ± {2e6 * line.sd_amplitude_m:.1g}"
+                size = plus_minus(1e6 * line.amplitude_m, 2e6 * line.sd_amplitude_m)
                 place = f"{line.frequency_hz:.2f}"
                 rows.append((name, line.label, place, size, f"{line.decibel:.1f}", ABSENT))
         for band in each.analysis.terminal:
             what = f"band around {band.towards_hz:.0f} Hz"
             place = f"{band.low_hz:.0f} to {band.high_hz:.0f}"
-            size = f"{1e6 * band.rms_m:.3g} rms ± {200 * band.relative_sd:.1g} %"
+            size = f"{plus_minus(1e6 * band.rms_m, 2e6 * band.rms_m * band.relative_sd)} rms"
             simulated = ABSENT if each.laid is None else _simulated_band(each.laid, band.towards_hz)
             rows.append((name, what, place, size, f"{band.decibel:.1f}", simulated))
     return ReportTable(

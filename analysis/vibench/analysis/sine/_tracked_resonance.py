@@ -18,6 +18,8 @@ from vibench.acquisition.recording import (
     Steadiness,
 )
 
+from ..tables import plus_minus
+
 
 @dataclass(frozen=True)
 class NotedJump:
@@ -69,11 +71,11 @@ def _resonance(note: ResonanceNote) -> str:
     level = f"{note.asked_m_per_s2:g} m/s²"
     if note.frequency_hz is None or note.frequency_u_hz is None:
         return f"No phase resonance at {level}: {note.lock.value}."
-    text = f"Phase resonance at {note.frequency_hz:.3f} ± {2 * note.frequency_u_hz:.2g} Hz ({level})"
+    text = f"Phase resonance at {plus_minus(note.frequency_hz, 2 * note.frequency_u_hz)} Hz ({level})"
     if note.mode_hz is None or note.mode_u_hz is None:
         return f"{text}."
     return (
-        f"{text}; natural frequency {note.mode_hz:.3f} ± {2 * note.mode_u_hz:.2g} Hz, "
+        f"{text}; natural frequency {plus_minus(note.mode_hz, 2 * note.mode_u_hz)} Hz, "
         f"damping ratio {note.damping_ratio:.3g}."
     )
 
@@ -132,7 +134,7 @@ def backbone_sentence(levels: Sequence[TrackedResonance]) -> str:
     first, last = levels[0], levels[-1]
     shift_hz = last.frequency_hz - first.frequency_hz
     u_hz = 2 * math.hypot(first.u_frequency_hz, last.u_frequency_hz)
-    moved = f"by {shift_hz:+.3g} ± {u_hz:.2g} Hz"
+    moved = f"by {'+' if shift_hz > 0 else ''}{plus_minus(shift_hz, u_hz)} Hz"
     between = f"From {first.base_m_per_s2:.3g} to {last.base_m_per_s2:.3g} m/s² the phase resonance moves"
     if abs(shift_hz) <= u_hz:
         return f"{between} {moved}: neither softening nor hardening is seen."
