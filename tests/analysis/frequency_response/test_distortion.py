@@ -111,4 +111,6 @@ def test_noise_larger_than_the_transmission_is_told_in_whole_percent(analysed):
     noisy = replace(periodic, noise_variance=np.full_like(periodic.noise_variance, 1e3))
     share = 100 * distortion(noisy).noise_share
     assert share > 1000
-    assert f"standard deviation of {share:.0f} % of the transmission" in distortion_caption(noisy)
+    caption = distortion_caption(noisy)
+    assert f"standard deviation of {share:.0f} % of the transmission" in caption
+    assert "noise of the channels or chaos of the specimen" in caption, "chaos is not called noise"

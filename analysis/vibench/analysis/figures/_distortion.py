@@ -76,7 +76,7 @@ def _shares(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
         _share(periodic.noise_variance, periodic),
         color=BOUNDS,
         linewidth=0.9,
-        label="noise, one realisation",
+        label="not repeating (noise or chaos), one realisation",
     )
     varied = periodic.distortion_variance
     if varied is not None:
@@ -109,7 +109,7 @@ def _detection(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
         color=BOUNDS,
         linewidth=0.9,
         linestyle=":",
-        label="noise there",
+        label="what does not repeat there",
     )
     magnitude_axis(axes)
     axes.set_ylabel("m0 velocity [m/s]")
@@ -123,11 +123,12 @@ def _dots(axes: Axes, frequency_hz: Reals, amplitude: Reals, look: tuple[str, st
 
 
 def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
-    """Say how much of the scatter is noise and how much is distortion."""
+    """Say how much of the scatter does not repeat from period to period, and how much is distortion."""
     found = distortion(periodic)
     said = [
         (
-            f"From {periodic.realisations} realisations: noise gives one of them a standard deviation of "
+            f"From {periodic.realisations} realisations: what does not repeat from one period to the next, "
+            "noise of the channels or chaos of the specimen, gives one of them a standard deviation of "
             f"{_percent(found.noise_share)} of the transmission (median)"
         )
     ]
@@ -139,7 +140,7 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
 
 
 def _percent(share: float) -> str:
-    """Two digits, and never a power of ten: noise of more than the transmission itself is usual in chaos."""
+    """Two digits, and never a power of ten: in chaos more than the transmission itself is usual."""
     return f"{100 * share:.0f} %" if share >= 1 else f"{100 * share:.2g} %"
 
 
@@ -149,7 +150,7 @@ def _quiet_text(found: Distortion) -> str:
     if not shown or found.detection_noise_m_per_s is None:
         return ""
     return (
-        f" Lines that were not driven hold {' and '.join(shown)} (rms, noise of "
+        f" Lines that were not driven hold {' and '.join(shown)} (rms, what does not repeat, "
         f"{1e6 * found.detection_noise_m_per_s:.2g} µm/s taken off): even and odd distortion of all from "
         "the drive voltage to m0."
     )

@@ -13,7 +13,8 @@ class Distortion:
     """Noise and nonlinear distortion of a transmission, each in parts of it; medians over the lines."""
 
     noise_share: float
-    """Standard deviation that noise gives one realisation, over the transmission's magnitude."""
+    """Standard deviation that what does not repeat from period to period (noise of the channels, or chaos of
+    the specimen) gives one realisation, over the transmission's magnitude."""
     distortion_share: float | None
     """What realisations scatter beyond it; None when there was one only."""
     odd_m_per_s: float | None

@@ -79,7 +79,7 @@ def _distortion(periodic: PeriodicFrequencyResponse) -> Json:
     found = distortion(periodic)
     return {
         "realisations": periodic.realisations,
-        "median_noise_over_magnitude": found.noise_share,
+        "median_not_repeating_over_magnitude": found.noise_share,
         "median_distortion_over_magnitude": found.distortion_share,
         "odd_detection_lines_m_per_s": found.odd_m_per_s,
         "even_detection_lines_m_per_s": found.even_m_per_s,
