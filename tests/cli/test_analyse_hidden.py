@@ -6,7 +6,9 @@ import json
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.io import loadmat
 
 PLACE = Path(__file__).parents[1] / "analysis" / "hidden_motion" / "shaken_world.py"
 GAP_M = 45e-6
@@ -56,3 +58,24 @@ def test_a_specimen_that_cannot_be_tracked_gets_a_sentence_and_the_rest_its_repo
     )
     assert "shaken: no hidden motion: stops of the kind 'rigid' cannot be tracked" in done.stderr
     assert (tmp_path / "told" / "report.html").exists()
+
+
+def test_a_kept_motion_goes_out_with_the_recording(vibench_here, shaken, tmp_path):
+    path = tmp_path / "shaken.h5"
+    path.write_bytes(shaken.path.read_bytes())
+    done = vibench_here("analyse", path, "--hidden", "--keep", "--no-simulate", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    sent = vibench_here("export", path, "--to", "mat", "--results", cwd=tmp_path)
+    assert sent.returncode == 0, sent.stderr
+    kept = loadmat(tmp_path / "shaken.mat", simplify_cells=True)["results"]["hidden_motion"]
+    p, time_s = kept["p"]["values"], kept["time"]["values"]
+    true = shaken.p[round(time_s[0] * 51_200) :][: p.size]
+    followed = ~np.isnan(p) & (time_s > 0.4)
+    assert np.sqrt(np.mean((p - true)[followed] ** 2)) < 0.1e-6
+    assert kept["impact_impulse"]["values"].size == kept["impact_time"]["values"].size
+
+
+def test_keeping_without_a_hidden_motion_is_refused(vibench_here, shaken, tmp_path):
+    done = vibench_here("analyse", shaken.path, "--keep", cwd=tmp_path)
+    assert done.returncode != 0
+    assert "--keep was given without --hidden" in done.stderr

@@ -31,7 +31,7 @@ from vibench.analysis import (
     update_model,
 )
 from vibench.analysis.dynamics import BranchDiagram, read_diagram
-from vibench.analysis.hidden_motion import HiddenMotion, hidden_motion
+from vibench.analysis.hidden_motion import HiddenMotion, hidden_motion, keep_hidden_motion
 from vibench.analysis.report import write_report
 from vibench.sim import Specimen
 
@@ -56,6 +56,14 @@ class DrivenBy(StrEnum):
 
 NOISE = "Transmission of noise"
 """Heading of the options that no other excitation takes notice of."""
+
+
+class _Hidden(StrEnum):
+    """What becomes of the hidden motion."""
+
+    LEFT_OUT = "left out"
+    TOLD = "told"
+    KEPT = "kept"
 
 
 def analyse(
@@ -92,6 +100,13 @@ def analyse(
         typer.Option(
             "--hidden",
             help="Tell the hidden motion of m1 too: p between its stops, impacts, gaps, m1 and contact law.",
+        ),
+    ] = False,
+    keep: Annotated[
+        bool,
+        typer.Option(
+            "--keep",
+            help="With --hidden: save that motion in the recording, for vibench export --results.",
         ),
     ] = False,
     specimen: SpecimenOption = None,
@@ -177,6 +192,10 @@ def analyse(
         raise InvalidRequest(
             "--fit and --specimen were given; one of the two says which specimen is laid over"
         )
+    if keep and not hidden:
+        raise InvalidRequest(
+            "--keep was given without --hidden, and only a hidden motion is kept; give both or neither"
+        )
     diagrams = [read_diagram(each) for each in branches or ()]
     simulation = driven_by.simulation if simulate else Simulation.LEFT_OUT
     with external_data(allow_external):
@@ -187,7 +206,7 @@ def analyse(
             diagrams,
             (simulation, draws),
             fit=fit,
-            hidden=hidden,
+            hidden=_Hidden.KEPT if keep else _Hidden.TOLD if hidden else _Hidden.LEFT_OUT,
             specimen=specimen,
             as_json=as_json,
         )
@@ -201,7 +220,7 @@ def _analyse(
     simulated: tuple[Simulation, int],
     *,
     fit: bool,
-    hidden: bool,
+    hidden: _Hidden,
     specimen: str | None,
     as_json: bool,
 ) -> None:
@@ -220,12 +239,16 @@ def _analyse(
         if specimen is not None:
             laid = described(specimen).specimen()
         results = analyse_files(paths, name, simulation, request, observer, laid, draws)
-        motions = list(hidden_motions(results, laid, observer)) if hidden else []
+        motions = list(hidden_motions(results, laid, observer, hidden))
     if updated is not None:
         results = replace(results, model_said=updated.sentences)
     if as_json:
         fitted = {} if updated is None else {"specimen_fit": updated.to_dict()}
-        told = {"hidden_motion": {each.name: each.to_dict() for each in motions}} if hidden else {}
+        told = (
+            {"hidden_motion": {each.name: each.to_dict() for each in motions}}
+            if hidden is not _Hidden.LEFT_OUT
+            else {}
+        )
         print_json({**campaign_summary(results), **fitted, **told})
     for sentence in (
         () if as_json else (*results.model_said, *(s for each in motions for s in each.sentences))
@@ -244,13 +267,16 @@ def _analyse(
 
 
 def hidden_motions(
-    results: CampaignResults, specimen: Specimen | None, observer: ProgressObserver
+    results: CampaignResults, specimen: Specimen | None, observer: ProgressObserver, hidden: _Hidden
 ) -> Iterator[HiddenMotion]:
     """Tell the hidden motion of each recording with a result; says on standard error where there is none."""
-    for facts in results.facts:
+    for facts in results.facts if hidden is not _Hidden.LEFT_OUT else ():
         with open_recording(facts.path) as recording:
             try:
-                yield hidden_motion(recording, specimen, observer=observer)
+                motion = hidden_motion(recording, specimen, observer=observer)
+                if hidden is _Hidden.KEPT:
+                    keep_hidden_motion(recording, motion)
+                yield motion
             except AnalysisError as error:
                 typer.echo(f"error: {facts.name}: no hidden motion: {error}", err=True)
 

@@ -19,6 +19,9 @@ from ._hidden_motion import (
     hidden_motion_in_samples as hidden_motion_in_samples,
     parameter_rows as parameter_rows,
 )
+from ._kept_motion import (
+    keep_hidden_motion as keep_hidden_motion,
+)
 from ._parameters import (
     Hidden as Hidden,
 )
