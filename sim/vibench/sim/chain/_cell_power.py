@@ -57,7 +57,9 @@ _AT_END: Table = np.ascontiguousarray(SHARES[:MOMENTS, :, POINTS])
 """Integrals of (t_i - t)^m times the polynomial that is 1 at point k alone; shape (m, k, i), (m, k)."""
 FADING = 0.999
 """How much of a past size of p is left after a step."""
-CLOSE, CLOSEST = 1e-2, 1e-15
+FINER = 0.01
+"""Part of what a step of `vibench.sim.power_law` may misfit: windows are short, and steps seldom shorter."""
+CLOSE, CLOSEST = 1e-3, 1e-15
 """Substitution ends when p changes by this part of the tolerance, or of itself."""
 LONGER, SHORTER = 2.0**0.5, 0.5
 NOTHING_MOVES = 1e-150
@@ -179,7 +181,7 @@ def _try_step(
         end -= markov[m] * factor * length * total(eight(_AT_END, m) * force)
     before = total(eight(AT_START, 0) * force) - start
     after = total(eight(AT_END, 0) * force) - power_force(end, law.power)
-    misfit: float = weight * max(abs(before), abs(after)) / (FIT * tolerance * size)
+    misfit: float = weight * max(abs(before), abs(after)) / (FINER * FIT * tolerance * size)
     return misfit
 
 

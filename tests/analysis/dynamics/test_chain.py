@@ -1,0 +1,98 @@
+"""Chains as they are asked for: units, recorded drives, files, figures."""
+
+import h5py
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from vibench.analysis import InvalidRequest
+from vibench.analysis.dynamics import ChainDrive, ChainRequest, chain_answer, write_chain
+from vibench.analysis.report import chain_figure
+from vibench.sim import LinearSweep, SpecimenTable, gong2025
+from vibench.sim.chain import chain_energies, chain_of, chain_transmissibility, integrate_chain
+
+pytestmark = pytest.mark.timeout(300)
+"""The first run compiles the kernels of chains."""
+
+
+@pytest.fixture(scope="module")
+def swept():
+    """Three cells that strike."""
+    return chain_answer(
+        ChainRequest(
+            lengths=(3,), drive="swept", start_hz=150.0, stop_hz=600.0, duration_s=3.0, amplitude_m=10e-6
+        )
+    )
+
+
+def test_a_swept_run_says_what_the_chain_itself_did(swept):
+    (run,) = swept.runs
+    drive, chain = LinearSweep(150.0, 600.0, 3.0, 10e-6), chain_of(gong2025(), 3)
+    alone = integrate_chain(chain, drive, 3.0, sample_rate_hz=20e3)
+    np.testing.assert_array_equal(run.impacts, alone.impacts.per_cell)
+    assert run.impacts.sum() > 100
+    base = drive.amplitude_m * np.sin(2.0 * np.pi * drive.turns(alone.time_s))
+    mean = chain_energies(chain, alone.states, base).mean(axis=0)
+    assert np.all(np.abs(run.energy_j - mean) < 0.05 * mean)
+    assert np.all(run.energy_error_j > 0.0)
+
+
+def test_a_file_holds_everything_and_nothing_is_overwritten(swept, tmp_path):
+    path = write_chain(swept, tmp_path / "chain.h5")
+    (run,) = swept.runs
+    with h5py.File(path) as file:
+        assert ChainRequest.model_validate_json(file.attrs["request"]) == swept.request
+        np.testing.assert_allclose(file["gaps"][:2], np.array(swept.gaps)[:2])
+        for name in ("over_hz", "transmission", "energy_j", "motion_m", "time_s", "impact_cell"):
+            np.testing.assert_array_equal(file[f"run_00000/{name}"], getattr(run, name))
+            assert file[f"run_00000/{name}"].attrs["units"]
+    with pytest.raises(InvalidRequest):
+        write_chain(swept, path)
+
+
+def test_the_figure_shades_the_gaps_and_its_tables_hold_what_is_drawn(swept):
+    drawn = chain_figure(swept)
+    waves, across, cells = drawn.tables
+    assert len(across.column("transmission")) == 3 * len(swept.runs[0].over_hz)
+    assert cells.column("impacts") == tuple(swept.runs[0].impacts)
+    assert max(waves.column("wave_number_rad")) == pytest.approx(np.pi)
+    assert "96.07 to 110.4 Hz" in drawn.caption
+    assert drawn.png.startswith(b"\x89PNG")
+
+
+def test_a_recorded_base_motion_drives_a_chain_and_is_told_where_it_is_coherent(noise_file):
+    found = chain_answer(
+        ChainRequest(lengths=(2,), drive="recorded", recording=str(noise_file()), duration_s=60.0)
+    )
+    (run,) = found.runs
+    assert run.impacts.sum() == 0
+    linear = np.abs(chain_transmissibility(chain_of(gong2025(), 2), run.over_hz)[:, :, 0])
+    is_known = np.isfinite(run.transmission).all(axis=1) & (run.over_hz > 60.0) & (run.over_hz < 500.0)
+    assert is_known.sum() > 20
+    assert np.median(np.abs(run.transmission[is_known] / linear[is_known] - 1.0)) < 0.1
+    assert chain_figure(found).svg
+
+
+def test_cells_take_turns_and_what_is_replaced_is_replaced_in_all():
+    others = (SpecimenTable.model_validate("heavy"), SpecimenTable.model_validate("asymmetric"))
+    request = ChainRequest(others=others, lengths=(5,), gap_m=30e-6)
+    chain = request.chain(5)
+    assert [cell.masses[0] for cell in chain.cells] == [5.8e-3, 58e-3, 5.8e-3, 5.8e-3, 58e-3]
+    assert {cell.gaps_m for cell in chain.cells} == {(30e-6, 30e-6)}
+    assert chain_answer(request.model_copy(update={"drive": ChainDrive.NONE})).bands_hz.shape[1] == 9
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"start_hz": 300.0, "stop_hz": 200.0}, "does not ascend"),
+        ({"drive": "swept"}, "goes nowhere"),
+        ({"drive": "recorded"}, "no recording was given"),
+        ({"model": "rigid:0.8"}, "rigid stops"),
+        ({"lengths": ()}, "at least 1 item"),
+        ({"start_hz": 10.0, "stop_hz": 300.0, "step_hz": 1e-3}, "take a larger step"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_in_one_sentence(options, said):
+    with pytest.raises(ValidationError, match=said):
+        ChainRequest(**options)
