@@ -1,9 +1,7 @@
 """Branches of harmonic balances: from every first-order solution of a power law, or from exact motions."""
 
-import time
 from collections.abc import Iterator
-
-import numpy as np
+from functools import partial
 
 from ..model import Harmonic, Specimen
 from ..periodic import (
@@ -22,7 +20,8 @@ from ..periodic import (
     spring_of,
     structure_of,
 )
-from ._found_branch import BranchOrigin, FoundBranch, known_among
+from ._branch_search import BranchStart, branches_from
+from ._found_branch import BranchOrigin, FoundBranch
 from ._motion_search import MotionSearch, periodic_motions
 
 STEPS = ArcSteps(first=0.01, longest=0.03, shortest=1e-7, tolerance=1e-10, most_points=3000)
@@ -58,32 +57,19 @@ def balanced_branches(
 
     """
     structure, spring = structure_of(specimen), spring_of(specimen)
-    known: list[FoundBranch] = []
-    for value in np.linspace(low, high, search.places):
-        drive = Harmonic(*path.drive(float(value)))
-        began = time.perf_counter()
-        for start, origin in _starts(specimen, drive, options, search):
-            is_known = known_among(known, specimen, path, drive, start.state[None, :])
-            if is_known or len(known) >= search.most_branches:
-                continue
-            branch = balance_branch_within(structure, spring, start, path, low, high, options, steps)
-            is_mirrored = options.kept is HarmonicSet.ODD
-            found = FoundBranch(
-                branch=branch,
-                shape=OrbitShape.MIRRORED if is_mirrored else OrbitShape.REPEATED,
-                periods=1,
-                origin=origin,
-                has_twin=False,
-                elapsed_s=time.perf_counter() - began,
-            )
-            known.append(found)
-            yield found
-            began = time.perf_counter()
+    shape = OrbitShape.MIRRORED if options.kept is HarmonicSet.ODD else OrbitShape.REPEATED
+
+    def follow(start: BranchStart[Balance]) -> FoundBranch:
+        branch = balance_branch_within(structure, spring, start.motion, path, low, high, options, steps)
+        return FoundBranch(branch, shape, periods=1, origin=start.origin, has_twin=False)
+
+    starts = partial(_starts, specimen, options, search)
+    return branches_from(specimen, path, (low, high), search, starts, follow, lambda _: ())
 
 
 def _starts(
-    specimen: Specimen, drive: Harmonic, options: BalanceOptions, search: MotionSearch
-) -> Iterator[tuple[Balance, BranchOrigin]]:
+    specimen: Specimen, options: BalanceOptions, search: MotionSearch, drive: Harmonic
+) -> Iterator[BranchStart[Balance]]:
     structure, spring = structure_of(specimen), spring_of(specimen)
     where = drive.frequency_hz, drive.amplitude_m
     match spring:
@@ -91,11 +77,11 @@ def _starts(
             for guess in first_order_guesses(structure, spring, *where):
                 found = balance(structure, spring, *where, options, guess)
                 if found.outcome is not BalanceEnd.NO_SOLUTION:
-                    yield found, BranchOrigin.FIRST_ORDER
+                    yield BranchStart(found, BranchOrigin.FIRST_ORDER, drive, found.state[None, :])
         case _:
             for orbit in periodic_motions(specimen, drive, search):
                 if orbit.period_map.periods > 1:
                     continue
                 found = balance(structure, spring, *where, options, orbit_guess(orbit))
                 if found.outcome is not BalanceEnd.NO_SOLUTION:
-                    yield found, BranchOrigin.SEARCH
+                    yield BranchStart(found, BranchOrigin.SEARCH, drive, found.state[None, :])

@@ -40,7 +40,7 @@ class FoundBranch:
     origin: BranchOrigin
     has_twin: bool
     """Another branch holds the mirror images of these motions."""
-    elapsed_s: float
+    elapsed_s: float = 0.0
     """To find and follow it."""
 
     @property

@@ -1,6 +1,5 @@
 """Branches of exact motions: from every motion that a search finds, and from every bifurcation on them."""
 
-import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -20,7 +19,8 @@ from ..periodic import (
     periodic_branch_within,
     periodic_orbit,
 )
-from ._found_branch import BranchOrigin, FoundBranch, known_among
+from ._branch_search import BranchStart, branches_from
+from ._found_branch import BranchOrigin, FoundBranch
 from ._motion_search import MotionSearch, orbit_states, periodic_motions, simplest
 
 STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=3000)
@@ -65,42 +65,26 @@ def shot_branches(
     are none.
 
     """
-    known: list[FoundBranch] = []
-    for value in np.linspace(low, high, search.places):
-        drive = Harmonic(*path.drive(float(value)))
-        began = time.perf_counter()
+
+    def starts(drive: Harmonic) -> Iterator[BranchStart[PeriodicOrbit]]:
         for orbit in periodic_motions(specimen, drive, search):
-            fresh = [(orbit, BranchOrigin.SEARCH)]
-            while fresh and len(known) < search.most_branches:
-                motion, origin = fresh.pop()
-                if known_among(known, specimen, path, motion.drive, orbit_states(motion)):
-                    continue
-                found = _followed(motion, path, (low, high), steps, origin, began)
-                known.append(found)
-                yield found
-                fresh += _switched(found, specimen, path, (low, high), search)
-                began = time.perf_counter()
+            yield _start(orbit, BranchOrigin.SEARCH)
+
+    def leaving(found: FoundBranch) -> Iterator[BranchStart[PeriodicOrbit]]:
+        return _switched(found, specimen, path, (low, high), search)
+
+    def follow(start: BranchStart[PeriodicOrbit]) -> FoundBranch:
+        branch = periodic_branch_within(start.motion, path, low, high, steps)
+        shape, periods = start.motion.period_map.shape, start.motion.period_map.periods
+        lower, upper = specimen.gaps_m
+        has_twin = lower == upper and shape is OrbitShape.REPEATED and periods % 2 == 1
+        return FoundBranch(branch, shape, periods, start.origin, has_twin)
+
+    return branches_from(specimen, path, (low, high), search, starts, follow, leaving)
 
 
-def _followed(
-    orbit: PeriodicOrbit,
-    path: DrivePath,
-    bounds: tuple[float, float],
-    steps: ArcSteps,
-    origin: BranchOrigin,
-    began: float,
-) -> FoundBranch:
-    mapping = orbit.period_map
-    branch = periodic_branch_within(orbit, path, *bounds, steps)
-    lower, upper = mapping.specimen.gaps_m
-    return FoundBranch(
-        branch=branch,
-        shape=mapping.shape,
-        periods=mapping.periods,
-        origin=origin,
-        has_twin=lower == upper and mapping.shape is OrbitShape.REPEATED and mapping.periods % 2 == 1,
-        elapsed_s=time.perf_counter() - began,
-    )
+def _start(orbit: PeriodicOrbit, origin: BranchOrigin) -> BranchStart[PeriodicOrbit]:
+    return BranchStart(orbit, origin, orbit.drive, orbit_states(orbit))
 
 
 def _switched(
@@ -109,10 +93,9 @@ def _switched(
     path: DrivePath,
     bounds: tuple[float, float],
     search: MotionSearch,
-) -> list[tuple[PeriodicOrbit, BranchOrigin]]:
+) -> Iterator[BranchStart[PeriodicOrbit]]:
     """Find a motion on each branch that leaves this one."""
     mapping = PeriodMap(specimen, found.shape, found.periods)
-    left = []
     for event in found.branch.events:
         factor = 2 if event.kind is BifurcationKind.PERIOD_DOUBLING else 1
         leaves = event.kind in SWITCHED and mapping.periods * factor <= search.most_periods
@@ -123,8 +106,7 @@ def _switched(
         target = PeriodMap(specimen, OrbitShape.REPEATED, mapping.periods * factor)
         orbit = _leaving(event, mapping, target, path, bounds)
         if orbit is not None:
-            left.append((orbit, SWITCHED[event.kind]))
-    return left
+            yield _start(orbit, SWITCHED[event.kind])
 
 
 def _leaving(
