@@ -74,6 +74,28 @@ def test_studies_over_the_number_of_cells_and_cells_that_take_turns():
     assert found["options"]["others"][0]["name"] == "heavy"
 
 
+@pytest.mark.parametrize("frequency", ["220", "200:300"])
+def test_a_run_that_is_lost_says_how_it_ended_and_nothing_else_is_claimed(frequency, tmp_path):
+    options = (
+        "--cells",
+        2,
+        "--amplitude",
+        1e160,
+        "--frequency",
+        frequency,
+        "--duration",
+        0.2,
+        "--settle",
+        0.1,
+    )
+    found = answer(*options, "--out", tmp_path / "out")
+    (point,) = found["runs"]
+    assert point["outcome"] != "reached the end time"
+    assert point["energy_j"] == point["transmission"][0] == [None, None]
+    assert (tmp_path / "out" / "chain.png").is_file()
+    assert "1 did not reach their end" in run(*options).output
+
+
 def test_an_exponent_is_told_with_its_error():
     result = run(
         "--cells", 2, "--amplitude", 20e-6, "--frequency", 220, "--duration", 0.05, "--settle", 0.05,

@@ -166,6 +166,8 @@ def _told(run: ChainRun) -> str:
         if math.isnan(run.exponent_per_s)
         else f"; exponent {run.exponent_per_s:.4g} ± {run.exponent_error_per_s:.2g} 1/s"
     )
+    if not run.time_s.size:
+        return f"{run.cells} cells{where}: {run.outcome}, {run.elapsed_s:.1f} s"
     rates = run.impacts / run.observed_s
     return (
         f"{run.cells} cells{where}: {across}impacts a second {rates[0]:.4g} to {rates[-1]:.4g}, mean energy "

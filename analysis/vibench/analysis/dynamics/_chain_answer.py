@@ -71,7 +71,7 @@ class ChainRun:
         return {
             "cells": self.cells,
             "frequency_hz": number(self.frequency_hz),
-            "over_hz": self.over_hz.tolist(),
+            "over_hz": numbers(self.over_hz.tolist()),
             "transmission": [numbers(row) for row in self.transmission.tolist()],
             "largest_p_m": numbers(self.largest_m),
             "impacts": self.impacts.tolist(),
@@ -132,6 +132,11 @@ class ChainAnswer:
         (cells,) = lengths
         places = np.unique(np.linspace(0, cells - 1, min(cells, MOST_SHOWN)).round().astype(int))
         return tuple((cells, int(place), f"cell {place + 1}") for place in places)
+
+    @property
+    def shown_run(self) -> ChainRun | None:
+        """The last run that reached its end: its motion, energies and impacts are drawn."""
+        return next((run for run in reversed(self.runs) if run.outcome == REACHED), None)
 
     def driven_transmission(self, cells: int, place: int) -> tuple[Reals, Reals]:
         """Frequencies and transmissions of all runs of a chain at one cell, in the order of the runs."""

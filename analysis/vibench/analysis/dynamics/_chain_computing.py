@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibench.acquisition import open_recording
 from vibench.sim import Harmonic, LinearSweep, Outcome, Sampled
@@ -102,8 +103,10 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
         chain, drive, after_s, request.accuracy, found.final_state,
         _rate_hz(chain, drive.frequency_hz, after_s), start_time_s=whole_s,
     )  # fmt: skip
+    if max(found.outcome, run.outcome) is not Outcome.REACHED_END:
+        return _lost(chain, max(found.outcome, run.outcome), found.impacts, whole_s, drive.frequency_hz)
     exponent = error = math.nan
-    if request.exponent_s > 0.0 and found.outcome is Outcome.REACHED_END:
+    if request.exponent_s > 0.0:
         growth = chain_lyapunov_exponent(
             chain, drive, duration_s=request.exponent_s, settle_s=request.settle_s
         )
@@ -128,7 +131,7 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
         motion_m=run.states[shown, :, X],
         impact_time_s=run.impacts.times_s[struck],
         impact_cell=run.impacts.cells[struck],
-        outcome=max(found.outcome, run.outcome).text,
+        outcome=run.outcome.text,
         elapsed_s=0.0,
     )
 
@@ -138,6 +141,8 @@ def _swept(chain: Chain, request: ChainRequest, drive: LinearSweep) -> ChainRun:
         chain, drive, drive.duration_s, request.accuracy,
         sample_rate_hz=_rate_hz(chain, drive.highest_hz, drive.duration_s),
     )  # fmt: skip
+    if run.outcome is not Outcome.REACHED_END:
+        return _lost(chain, run.outcome, run.impacts.per_cell, run.end_time_s)
     base = drive.amplitude_m * np.sin(2.0 * np.pi * drive.turns(run.time_s))
     over_hz, ratio = _demodulated(run, drive)
     return _whole_run(chain, run, base, over_hz, ratio)
@@ -149,6 +154,8 @@ def _recorded(chain: Chain, request: ChainRequest, drive: Sampled) -> ChainRun:
     run = integrate_chain(
         chain, drive, duration_s, request.accuracy, sample_rate_hz=_bounded(rate, chain, duration_s)
     )
+    if run.outcome is not Outcome.REACHED_END:
+        return _lost(chain, run.outcome, run.impacts.per_cell, run.end_time_s)
     base = drive.displacement_m[: len(run.time_s)]
     segment = max(16, len(run.time_s) // SEGMENTS)
     found = [
@@ -159,6 +166,36 @@ def _recorded(chain: Chain, request: ChainRequest, drive: Sampled) -> ChainRun:
     known = [np.where(each.is_significant, np.abs(each.value), np.nan) for each in found]
     ratio = np.stack(known, axis=-1)
     return _whole_run(chain, run, base, found[0].frequency_hz[is_shown], ratio[is_shown])
+
+
+def _lost(
+    chain: Chain,
+    outcome: Outcome,
+    impacts: NDArray[np.int64],
+    observed_s: float,
+    frequency_hz: float = math.nan,
+) -> ChainRun:
+    """Describe a run that did not reach its end: how it ended, and what it struck until then."""
+    unknown, nothing = np.full(chain.size, math.nan), np.zeros(0)
+    return ChainRun(
+        cells=chain.size,
+        frequency_hz=frequency_hz,
+        over_hz=np.array([frequency_hz]),
+        transmission=unknown[None, :],
+        largest_m=unknown,
+        impacts=impacts,
+        observed_s=observed_s,
+        energy_j=unknown,
+        energy_error_j=unknown,
+        exponent_per_s=math.nan,
+        exponent_error_per_s=math.nan,
+        time_s=nothing,
+        motion_m=np.zeros((0, chain.size)),
+        impact_time_s=nothing,
+        impact_cell=np.zeros(0, np.int64),
+        outcome=outcome.text,
+        elapsed_s=0.0,
+    )
 
 
 def _whole_run(chain: Chain, run: ChainTrajectory, base: Reals, over_hz: Reals, ratio: Reals) -> ChainRun:

@@ -37,7 +37,7 @@ _NOTHING = 1e-300
 
 def chain_figure(found: ChainAnswer) -> DrawnFigure:
     """Draw waves and transmission; where there are runs, the last one's motion, energies and impacts."""
-    last = found.runs[-1] if found.runs else None
+    last = found.shown_run
     with styled():
         figure = new_figure(_WAVES_IN if last is None else _RUNS_IN)
         if last is None:

@@ -54,9 +54,10 @@ class ChainPicture:
         for plot in self.plots:
             plot.wipe()
         self._show_across(answer)
-        if answer.runs:
-            self._show_motion(answer.runs[-1])
-            self._show_energies(answer.runs[-1])
+        run = answer.shown_run
+        if run is not None:
+            self._show_motion(run)
+            self._show_energies(run)
 
     def _show_across(self, answer: ChainAnswer) -> None:
         top_hz = float(answer.linear_hz[-1])
