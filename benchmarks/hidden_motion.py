@@ -166,7 +166,7 @@ HEADINGS = (
     "false",
     "p without a model, rms [um]",
     "gaps within [um], m1",
-    "told of 6",
+    "told of 10",
     "s per s",
 )
 

@@ -19,6 +19,12 @@ from ._hidden_motion import (
     hidden_motion_in_samples as hidden_motion_in_samples,
     parameter_rows as parameter_rows,
 )
+from ._hidden_view import (
+    LONGEST_VIEW_S as LONGEST_VIEW_S,
+    HiddenView as HiddenView,
+    HiddenViewRequest as HiddenViewRequest,
+    hidden_view as hidden_view,
+)
 from ._kept_motion import (
     keep_hidden_motion as keep_hidden_motion,
 )

@@ -1,4 +1,4 @@
-"""The two pictures of a recording: its channels over time, and the spectrogram of what is in sight."""
+"""The pictures of a recording: its channels over time, the spectrogram and the hidden motion in sight."""
 
 from math import log10
 from pathlib import Path
@@ -24,6 +24,7 @@ from ...forms import Choice
 from ...plots import FREQUENCY, LOG_FREQUENCY, TIME, Plot
 from ...widgets import Theme
 from ._file_words import role_text, unit_text
+from ._hidden_motion_view import HiddenMotionView
 from ._time_histories import RecordingTimeHistories
 
 _WAIT_MS = 250
@@ -212,7 +213,7 @@ class _Image:
 
 
 class Pictures(QTabWidget):
-    """Both show the same stretch of the same recording."""
+    """All show the same stretch of the same recording."""
 
     def __init__(self, theme: Theme, background: Background, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -222,17 +223,23 @@ class Pictures(QTabWidget):
         self.spectrogram = SpectrogramView(theme, background)
         self.addTab(self.time_histories, "Tim&e")
         self.addTab(self.spectrogram, "&Spectrogram")
-        self.time_histories.range_changed.connect(
-            lambda: self.spectrogram.show_view(*self.time_histories.view_s)
-        )
+        self.hidden_motion = HiddenMotionView(theme, background)
+        self.addTab(self.hidden_motion, "&Hidden motion")
+        self.time_histories.range_changed.connect(self._show_view)
 
     def show_recording(self, overview: RecordingOverview | None) -> None:
         """Show another recording, or none."""
         self.spectrogram.show_recording(None if overview is None else overview.recording)
+        self.hidden_motion.show_recording(None if overview is None else overview.recording)
         self.time_histories.show_recording(overview)
-        self.spectrogram.show_view(*self.time_histories.view_s)
+        self._show_view()
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
         self.time_histories.retheme(theme)
         self.spectrogram.retheme(theme)
+        self.hidden_motion.retheme(theme)
+
+    def _show_view(self) -> None:
+        for picture in (self.spectrogram, self.hidden_motion):
+            picture.show_view(*self.time_histories.view_s)

@@ -1,0 +1,99 @@
+"""p of m1 between its stops in the stretch in sight, told from base acceleration and m0's velocity."""
+
+from pathlib import Path
+
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+
+from vibench.acquisition.recording import Recording
+from vibench.analysis.hidden_motion import LONGEST_VIEW_S, HiddenView, HiddenViewRequest, hidden_view
+
+from ...background import Background, LatestRequest
+from ...plots import LIMIT, TIME, Dash, Plot, PlotAxis, curve_style
+from ...widgets import Theme
+
+_WAIT_MS = 250
+"""How long a view stands still before it is worked out."""
+_RELATIVE = PlotAxis("p = y - z", "µm", factor=1e6, short="p")
+_CHOOSE = "Choose a recording in the list above."
+
+
+class HiddenMotionView(QWidget):
+    """Tracked, and without a contact model, between the stops."""
+
+    def __init__(self, theme: Theme, background: Background, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Hidden motion")
+        self.plot = Plot("Hidden motion", TIME, _RELATIVE, theme).with_legend()
+        self.tracked = self.plot.curve(curve_style(0), "tracked")
+        self.free = self.plot.curve(curve_style(1, Dash.DOTTED), "without a contact model")
+        self._stops = [self.plot.level(LIMIT, 0.0, "stop") for _ in range(2)]
+        self.said = QLabel("")
+        self.said.setProperty("rank", "second")
+        self.said.setWordWrap(True)
+        self._recording: Recording | None = None
+        self._view_s = (0.0, 0.0)
+        self._latest_request = LatestRequest(background, hidden_view, self._show, self._fail, _WAIT_MS, self)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 4, 0, 0)
+        layout.addWidget(self.said)
+        layout.addWidget(self.plot, 1)
+        self._clear(_CHOOSE)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a picture is still to come."""
+        return self._latest_request.is_busy
+
+    def show_recording(self, recording: Recording | None) -> None:
+        """Picture another recording from now on, or none."""
+        self._recording = recording
+        self._latest_request.drop()
+        self._clear(_CHOOSE)
+
+    def show_view(self, low_s: float, high_s: float) -> None:
+        """Picture this stretch, when the picture is in sight."""
+        self._view_s = (low_s, high_s)
+        self._ask()
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self.plot.retheme(theme)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Work out what nobody wanted while it was out of sight."""
+        super().showEvent(event)
+        self._ask()
+
+    def _ask(self) -> None:
+        low_s, high_s = self._view_s
+        if not self.isVisible() or self._recording is None or not high_s > low_s:
+            return
+        if high_s - low_s > LONGEST_VIEW_S:
+            self._latest_request.drop()
+            self._clear(f"Zoom in to {LONGEST_VIEW_S:g} s or less: p swings a thousand times a second.")
+            return
+        self.said.setText("working it out…")
+        self._latest_request.ask(HiddenViewRequest(Path(self._recording.path), low_s, high_s))
+
+    def _show(self, found: HiddenView) -> None:
+        self.plot.with_hint("")
+        self.tracked.setData(found.time_s, found.p, connect="finite")
+        self.free.setData(found.time_s, found.free_p, connect="finite")
+        for line, place in zip(self._stops, found.stops_m, strict=True):
+            line.setValue(place)
+            line.show()
+        self.said.setText(found.sentence)
+        self.plot.setXRange(found.request.low_s, found.request.high_s, padding=0.0)
+
+    def _fail(self, error: BaseException) -> None:
+        self._clear(str(error))
+
+    def _clear(self, hint: str) -> None:
+        for curve in (self.tracked, self.free):
+            curve.setData([], [])
+        for line in self._stops:
+            line.hide()
+        self.said.setText("")
+        self.plot.with_hint(hint)
+        self.plot.viewport().update()

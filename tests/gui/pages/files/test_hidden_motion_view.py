@@ -1,0 +1,45 @@
+"""The hidden motion on the Files page: p between its stops in what is in sight, or a sentence."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import open_recording
+from vibench.analysis.live import RecordingOverview, kept_levels
+from vibench.gui.pages.files._spectrogram_view import Pictures
+from vibench.gui.widgets import DARK
+
+PLACE = Path(__file__).parents[3] / "analysis" / "hidden_motion" / "shaken_world.py"
+
+
+@pytest.fixture(scope="module")
+def shaken(tmp_path_factory):
+    spec = importlib.util.spec_from_file_location("shaken_world", PLACE)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules.setdefault(spec.name, module)
+    spec.loader.exec_module(module)
+    return module.shaken(tmp_path_factory.mktemp("shaken"), 260.0, 1.5, seed=61, duration_s=2.4)
+
+
+def test_p_is_drawn_between_its_stops_where_it_is_zoomed_to(shared_context, shaken, waited):
+    pictures = Pictures(DARK, shared_context.background)
+    pictures.resize(900, 600)
+    pictures.setCurrentWidget(pictures.hidden_motion)
+    pictures.show()
+    view = pictures.hidden_motion
+    with open_recording(shaken.path) as recording:
+        levels = {role: kept_levels(recording, role) for role in recording.roles}
+        pictures.show_recording(RecordingOverview(recording, levels))
+        waited(lambda: not view.is_busy)
+        assert "Zoom in" in view.plot._hint
+        pictures.time_histories.show_range(1.0, 1.4)
+        waited(lambda: "tracked in 100 %" in view.said.text())
+        time_s, p = view.tracked.getData()
+        true = np.interp(time_s, np.arange(shaken.p.size) / 51_200, shaken.p)
+        assert np.sqrt(np.mean((p - true) ** 2)) < 0.5e-6
+        assert sorted(line.value() for line in view._stops) == pytest.approx([-45e-6, 45e-6])
+        pictures.show_recording(None)
+    pictures.close()
