@@ -38,7 +38,7 @@ KEPT = 2
 """Windows that are tried before the shortest."""
 COLLISION_TURN = 0.4
 """Longest window where collisions are whole: nine moments then hold a force to 7e-10."""
-MOST_CUT = 16
+MOST_CUT = 8
 """Cells of a chain whose windows end at touches: beyond, a window costs more than steps."""
 
 
