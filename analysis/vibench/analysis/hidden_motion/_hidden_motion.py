@@ -13,6 +13,7 @@ from vibench.sim import Specimen
 from ..errors import InvalidRequest
 from ..recordings import ProgressObserver, Unobserved, specimen_of
 from ..signals import Reals
+from ..tables import plus_minus
 from ._collisions import Collisions, collisions_of, joined_collisions
 from ._contact_free import FreeGap, FreeMotion, free_gaps, free_motion
 from ._filtering import motion_model
@@ -322,12 +323,9 @@ _SHOWN = {
 }
 
 
-def with_bounds(value: float, half: float, unit: str) -> str:
-    """Write a value with two digits of its uncertainty, and as many places."""
-    if not half > 0.0:
-        return f"{value:.6g} {unit}".strip()
-    places = max(0, 1 - int(np.floor(np.log10(half))))
-    return f"({value:.{places}f} ± {half:.{places}f}) {unit}".strip()
+def _with_unit(value: float, half: float, unit: str) -> str:
+    shown = plus_minus(value, half)
+    return f"({shown}) {unit}".strip() if unit and "±" in shown else f"{shown} {unit}".strip()
 
 
 def parameter_rows(motion: HiddenMotion) -> tuple[tuple[str, str, str], ...]:
@@ -336,7 +334,7 @@ def parameter_rows(motion: HiddenMotion) -> tuple[tuple[str, str, str], ...]:
     for each in motion.parameters:
         label, factor, unit = _SHOWN[each.what]
         said = each.not_determined and f"not determined: {each.not_determined}"
-        value = with_bounds(factor * each.value, factor * 0.5 * (each.high - each.low), unit)
+        value = _with_unit(factor * each.value, factor * 0.5 * (each.high - each.low), unit)
         rows.append((label, said or value, f"{factor * each.described:.6g} {unit}".strip()))
     return tuple(rows)
 
@@ -360,7 +358,7 @@ def _sentences(motion: HiddenMotion) -> Iterator[str]:
     yield (
         f"Without a contact model: {motion.free.impacts.samples.size} impacts"
         + "".join(
-            f", {side} gap {with_bounds(MICRO * gap.value_m, 2 * MICRO * gap.sd_m, 'µm')}"
+            f", {side} gap {_with_unit(MICRO * gap.value_m, 2 * MICRO * gap.sd_m, 'µm')}"
             for side, gap in zip(("lower", "upper"), motion.free_gaps, strict=True)
             if gap is not None
         )
