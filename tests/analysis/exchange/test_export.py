@@ -74,7 +74,8 @@ def test_a_universal_file_keeps_the_digits_of_the_rate_that_its_increment_loses(
     path, _ = export_samples(excerpt(known, from_s=1.0), Format.UFF, tmp_path / "a.uff")
     first = pyuff.UFF(str(path)).read_sets(1)
     assert first["abscissa_inc"] != 1 / RATE_HZ
-    assert first["id5"].split() == ["sample_rate_hz=51200.0", "first_sample=51200"]
+    told = ["sample_rate_hz=51200.0", "first_sample=51200", "origin=simulated"]
+    assert first["id5"].split() == told
 
 
 def test_a_matlab_file_holds_a_struct_for_each_channel(known, known_values, tmp_path):

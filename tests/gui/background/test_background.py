@@ -111,3 +111,16 @@ def test_a_process_has_a_bound_on_its_memory(background, qtbot):
     background.ask(hungry, answers.append, errors.append, 0)
     qtbot.waitUntil(lambda: bool(answers or errors), timeout=20_000)
     assert re.search(r"needs more than 6 GB of memory", str(errors[0]))
+
+
+def test_a_job_is_over_when_its_answer_was_handed_over_and_not_before(background, qtbot):
+    answers, seen = [], []
+
+    def take(answer):
+        seen.append([job.is_over for job in jobs])
+        answers.append(answer)
+
+    jobs = [background.ask(factorial, take, answers.append, number) for number in (3, 4)]
+    qtbot.waitUntil(lambda: jobs[1].future is not None and jobs[1].future.done(), timeout=20_000)
+    qtbot.waitUntil(lambda: answers == [6, 24], timeout=20_000)
+    assert seen == [[True, False], [True, True]]

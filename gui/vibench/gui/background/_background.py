@@ -43,9 +43,17 @@ class Job:
     """When a process was seen to work on it."""
     """None until it is begun; never cancelled, since a process that dies chokes on that."""
 
+    is_answered: bool = False
+    """Whether its answer, or its error, has been handed over."""
+
     @property
     def is_over(self) -> bool:
-        """Whether there is nothing to come: it was done, or dropped before it was begun."""
+        """Whether there is nothing to come: it was answered, or dropped."""
+        return self.is_answered or not self.is_wanted
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether no process works on it, or will: what is done may still have to be handed over."""
         return not self.is_wanted if self.future is None else self.future.done()
 
     def drop(self) -> None:
@@ -158,11 +166,12 @@ class Background(QObject):
         for job in unfinished:
             job.future, job.begun_s = None, 0.0
         for job in late:
+            job.is_answered = True
             job.on_error(TimeoutError(f"it took more than {LONGEST_S / 60:.0f} minutes and was given up"))
 
     def _poll(self) -> None:
         self._give_up()
-        over = [job for job in self._jobs if job.is_over]
+        over = [job for job in self._jobs if job.has_ended]
         # Not asked again: one may have ended since.
         self._jobs = [job for job in self._jobs if job not in over]
         self._begin()
@@ -171,6 +180,7 @@ class Background(QObject):
         for job in over:
             if job.future is None or not job.is_wanted:
                 continue
+            job.is_answered = True
             match job.future.exception():
                 case None:
                     job.on_answer(job.future.result())

@@ -224,7 +224,7 @@ class Pictures(QTabWidget):
         self.addTab(self.time_histories, "Tim&e")
         self.addTab(self.spectrogram, "&Spectrogram")
         self.hidden_motion = HiddenMotionView(theme, background)
-        self.addTab(self.hidden_motion, "&Hidden motion")
+        self.addTab(self.hidden_motion, "Hi&dden motion")
         self.time_histories.range_changed.connect(self._show_view)
 
     def show_recording(self, overview: RecordingOverview | None) -> None:
