@@ -1,15 +1,23 @@
 """Opening a VISA resource: the one place that makes pyvisa sessions, and says why one cannot be made."""
 
+import os
+import re
 import warnings
+from pathlib import Path
 from typing import Protocol, cast
 
 import pyvisa
 from pyvisa.resources import MessageBasedResource
 
 from ..errors import InstrumentBusy, InstrumentError, InstrumentLost
+from ..host import shipped
 
 # A reply later than this is a failure. The slowest known: the read-back of 8192 points.
 TIMEOUT_S = 3.0
+UDEV_RULES = "hardware_configs/70-vibench.rules"
+USB_DEVICES = Path("/sys/bus/usb/devices")
+USB_NODES = Path("/dev/bus/usb")
+_USB = re.compile(r"USB\d*::(0x[0-9a-f]+|\d+)::(0x[0-9a-f]+|\d+)::", re.IGNORECASE)
 _MS_PER_S = 1000.0
 
 
@@ -90,7 +98,30 @@ def _manager(visa_library: str) -> pyvisa.ResourceManager:
 
 def _absent(resource: str, error: Exception) -> InstrumentLost:
     # What else the bus shows would help, but listing scans the network for seconds: not in an emergency.
+    if _is_locked_out(resource):
+        return InstrumentLost(
+            f"{resource} is on the USB bus, and this account may not use it ({error}). Copy "
+            f"{shipped(UDEV_RULES)} to /etc/udev/rules.d, run 'udevadm control --reload' as root, and plug "
+            "it in again"
+        )
     return InstrumentLost(
         f"no instrument answers at {resource} ({error}). Check its power and cable, and generator.resource "
         "in the hardware configuration; `vibench bench list` shows what can be seen"
     )
+
+
+def _is_locked_out(resource: str) -> bool:
+    """Whether Linux shows a USB device that this account may not write to: libusb calls it absent."""
+    named = _USB.match(resource)
+    if named is None:
+        return False
+    wanted = tuple(int(each, 0) for each in named.groups())
+    for device in USB_DEVICES.glob("*"):
+        try:
+            found = tuple(int((device / each).read_text(), 16) for each in ("idVendor", "idProduct"))
+            bus, number = (int((device / each).read_text()) for each in ("busnum", "devnum"))
+        except (OSError, ValueError):  # a hub's port, or one that was just pulled out
+            continue
+        if found == wanted and not os.access(USB_NODES / f"{bus:03d}" / f"{number:03d}", os.W_OK):
+            return True
+    return False

@@ -1,0 +1,47 @@
+"""A USB instrument that this account may not use is there, and is told so."""
+
+import pytest
+
+from vibench.acquisition import shipped
+from vibench.acquisition.drivers import _visa_link
+from vibench.acquisition.errors import InstrumentLost
+
+AFG = "USB0::0x0699::0x0353::C010101::INSTR"
+
+
+@pytest.fixture
+def bus(tmp_path, monkeypatch):
+    """A USB bus with one device on it, whose node may or may not be written."""
+    monkeypatch.setattr(_visa_link, "USB_DEVICES", tmp_path / "devices")
+    monkeypatch.setattr(_visa_link, "USB_NODES", tmp_path / "nodes")
+
+    def plugged(vendor, product, may_write):
+        device = tmp_path / "devices" / "1-2"
+        device.mkdir(parents=True)
+        (tmp_path / "devices" / "1-0:1.0").mkdir()
+        for name, text in (("idVendor", vendor), ("idProduct", product), ("busnum", "1"), ("devnum", "7")):
+            (device / name).write_text(f"{text}\n")
+        node = tmp_path / "nodes" / "001" / "007"
+        if may_write:
+            node.parent.mkdir(parents=True)
+            node.touch()
+
+    return plugged
+
+
+@pytest.mark.parametrize(
+    ("resource", "vendor", "may_write", "is_told"),
+    [
+        (AFG, "0699", False, True),
+        ("USB0::1689::851::C010101::0::INSTR", "0699", False, True),
+        (AFG, "0699", True, False),
+        (AFG, "1ab1", False, False),
+        ("USB0::0x0699::0x0345::C010101::INSTR", "0699", False, False),
+    ],
+)
+def test_who_may_not_use_a_device_is_told_what_to_do(bus, resource, vendor, may_write, is_told):
+    bus(vendor, "0353", may_write)
+    with pytest.raises(InstrumentLost) as caught:
+        _visa_link.open_link(resource, "@py", 0.2)
+    assert ("may not use it" in str(caught.value)) is is_told
+    assert (str(shipped(_visa_link.UDEV_RULES)) in str(caught.value)) is is_told
