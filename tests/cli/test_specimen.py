@@ -127,3 +127,18 @@ def test_a_specimen_that_there_is_not_is_one_sentence(vibench_here, tmp_path, co
 def test_the_forces_of_all_laws_are_drawn(vibench_here, tmp_path):
     assert vibench_here("specimen", "--forces", "drawn", cwd=tmp_path).returncode == 0
     assert (tmp_path / "drawn" / "contact_forces.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("name", shipped_specimens())
+def test_every_shipped_specimen_is_told(vibench_here, tmp_path, name):
+    found = vibench_here("specimen", name, cwd=tmp_path)
+    assert found.returncode == 0, found.stderr
+    assert "contact law: " in found.stdout
+
+
+def test_people_read_units_and_a_law_in_words(vibench_here, tmp_path):
+    said = vibench_here("specimen", "gong2025", cwd=tmp_path).stdout
+    assert "masses [kg]: 0.0058, 0.0021, 0.002" in said
+    assert "stiffnesses [N/m]: 23741" in said
+    assert "dampings [N s/m]:" in said
+    assert "contact law: hertz, stiffness 4.89108e+09" in said

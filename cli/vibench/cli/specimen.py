@@ -1,5 +1,6 @@
 """`vibench specimen`: the specimens and contact laws that there are, or what one of them amounts to."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -49,7 +50,7 @@ def show_specimen(
     else:
         console.print(f"{table.name}: {table.about}", markup=False)
         for name, value in facts.items():
-            console.print(f"  {name.replace('_', ' ')}: {_shown(value)}", markup=False)
+            console.print(f"  {_heading(name)}: {_shown(value)}", markup=False)
 
 
 def figures_of(specimen: Specimen) -> dict[str, object]:
@@ -62,7 +63,7 @@ def figures_of(specimen: Specimen) -> dict[str, object]:
         "damping_ratios": specimen.damping_ratios.tolist(),
         "resonances_with_m1_held_hz": specimen.bound_frequencies_hz.tolist(),
         "gaps_m": specimen.gaps_m,
-        "contact_law": str(specimen.contact),
+        "contact_law": asdict(specimen.contact),
     }
 
 
@@ -88,9 +89,25 @@ def _list(as_json: bool) -> None:
             console.print(f"  {name:28} {about}", markup=False)
 
 
+_UNITS = {"_kg": "kg", "_ns_per_m": "N s/m", "_n_per_m": "N/m", "_hz": "Hz", "_m": "m"}
+
+
+def _heading(name: str) -> str:
+    """Write a name that carries its unit as in code for people: ``"gaps [m]"``."""
+    ending = next((each for each in _UNITS if name.endswith(each)), "")
+    words = name.removesuffix(ending).replace("_", " ")
+    return f"{words} [{_UNITS[ending]}]" if ending else words
+
+
 def _shown(value: object) -> str:
     match value:
+        case {"kind": kind, **numbers}:
+            return ", ".join([str(kind), *(f"{name} {_shown(each)}" for name, each in numbers.items())])
         case list() | tuple():
-            return ", ".join(f"{each:.6g}" for each in value)
+            return ", ".join(
+                f"({_shown(each)})" if isinstance(each, tuple) else _shown(each) for each in value
+            )
+        case float():
+            return f"{value:.6g}"
         case _:
             return str(value)
