@@ -110,8 +110,9 @@ def test_an_exponent_is_told_with_its_error():
     ("arguments", "said"),
     [
         (("--cells", "x"), "--cells was given as 'x'"),
-        (("--cells", "0"), "lengths.0 was given as 0"),
-        (("--cells", "1001"), "less than or equal to 1000"),
+        (("--cells", "0"), "--cells was given as '0'; give a whole number from 1 to 1000"),
+        (("--cells", "1001"), "--cells was given as '1001'; give a whole number from 1 to 1000"),
+        (("--cells", "2,,4"), "--cells was given as '2,,4'"),
         (("--amplitude", "1e-6"), "one of --amplitude and --frequency is missing"),
         (("--amplitude", "1e-6", "--frequency", "200:200"), "200 does not lie below 200"),
         (("--amplitude", "1e-6", "--frequency", "a:b"), "'a' is no number"),

@@ -75,7 +75,10 @@ def test_exponents_are_printed_as_json_and_written(tmp_path):
             ("branches", "--amplitude", "5e-6", "--frequency", "60:70", "--places", "1"),
             "places was given as 1",
         ),
-        (("spectrum", "--amplitude", "5e-6", "--frequency", "60:70"), "2 numbers are not allowed here"),
+        (
+            ("spectrum", "--amplitude", "5e-6", "--frequency", "60:70"),
+            "one above 0 Hz or START:STOP:STEP such as 50:600:1",
+        ),
         (
             ("spectrum", "--amplitude", "1e-6:2e-6:1e-6", "--frequency", "60:70:1"),
             "give one of them as one number",

@@ -17,6 +17,7 @@ from vibench.analysis.dynamics import (
 )
 from vibench.analysis.report import chain_figure
 from vibench.sim import USUAL_SPECIMEN, Accuracy, Parameter
+from vibench.sim.chain import MOST_CELLS
 
 from .dynamics_answer import computed, keep, leave, print_answer, room_for
 from .output import console
@@ -114,12 +115,13 @@ def chain(
 
 
 def _lengths(text: str) -> tuple[int, ...]:
-    try:
-        return tuple(int(part) for part in text.split(","))
-    except ValueError as error:
+    parts = text.split(",")
+    if not all(part.strip().isdecimal() and 1 <= int(part) <= MOST_CELLS for part in parts):
         raise InvalidRequest(
-            f"--cells was given as {text!r}; give a whole number, or several such as 1,2,4,8"
-        ) from error
+            f"--cells was given as {text!r}; give a whole number from 1 to {MOST_CELLS}, "
+            "or several such as 1,2,4,8"
+        )
+    return tuple(map(int, parts))
 
 
 def _drive(amplitude: str | None, frequency: str | None, recording: Path | None) -> dict[str, object]:

@@ -6,10 +6,19 @@ from dataclasses import dataclass
 from vibench.analysis import InvalidRequest
 from vibench.sim import Parameter
 
-_ADVICE = {
-    Parameter.FREQUENCY: "give one above 0 Hz, or START:STOP such as 50:600",
-    Parameter.AMPLITUDE: "give one above 0 m, or START:STOP such as 1e-6:50e-6",
+_EXAMPLES = {
+    Parameter.FREQUENCY: {
+        1: "one above 0 Hz",
+        2: "START:STOP such as 50:600",
+        3: "START:STOP:STEP such as 50:600:1",
+    },
+    Parameter.AMPLITUDE: {
+        1: "one above 0 m",
+        2: "START:STOP such as 1e-6:50e-6",
+        3: "START:STOP:STEP such as 1e-6:50e-6:1e-6",
+    },
 }
+"""What may be given, by the number of its parts."""
 
 
 @dataclass(frozen=True)
@@ -30,25 +39,29 @@ def range_of(text: str, parameter: Parameter, parts: tuple[int, ...]) -> Range:
         When it is none of them.
 
     """
-    numbers = [_number(text, part, parameter) for part in text.split(":")]
+    try:
+        return Range(*_rising(text, parts))
+    except ValueError as error:
+        allowed = " or ".join(_EXAMPLES[parameter][part] for part in parts)
+        raise InvalidRequest(f"--{parameter.value} was given as {text!r}: {error}; give {allowed}") from error
+
+
+def _rising(text: str, parts: tuple[int, ...]) -> list[float]:
+    numbers = [_number(part) for part in text.split(":")]
     if len(numbers) not in parts:
-        raise _refused(text, parameter, f"{len(numbers)} numbers are not allowed here")
+        raise ValueError(f"{len(numbers)} numbers are not allowed here")
     if min(numbers) <= 0.0:
-        raise _refused(text, parameter, f"{min(numbers):g} is not above 0")
+        raise ValueError(f"{min(numbers):g} is not above 0")
     if len(numbers) > 1 and numbers[0] >= numbers[1]:
-        raise _refused(text, parameter, f"{numbers[0]:g} does not lie below {numbers[1]:g}")
-    return Range(*numbers)
+        raise ValueError(f"{numbers[0]:g} does not lie below {numbers[1]:g}")
+    return numbers
 
 
-def _number(text: str, part: str, parameter: Parameter) -> float:
+def _number(part: str) -> float:
     try:
         number = float(part)
     except ValueError as error:
-        raise _refused(text, parameter, f"{part!r} is no number") from error
+        raise ValueError(f"{part!r} is no number") from error
     if not math.isfinite(number):
-        raise _refused(text, parameter, f"{part!r} is not finite")
+        raise ValueError(f"{part!r} is not finite")
     return number
-
-
-def _refused(text: str, parameter: Parameter, why: str) -> InvalidRequest:
-    return InvalidRequest(f"--{parameter.value} was given as {text!r}: {why}; {_ADVICE[parameter]}")

@@ -7,8 +7,9 @@ import numpy as np
 from vibench.sim import Specimen
 
 from ..signals import Flags, Reals
-from ._filter_kernels import FLIGHT, IN_CONTACT, STATES, VX, X, backward, forward
+from ._filter_kernels import FLIGHT, IN_CONTACT, STATES, VX, X, forward
 from ._prepared_motion import ChannelNoise, PreparedMotion
+from ._smoother_kernels import backward
 from ._tracking_model import StepTables, TrackedSpecimen, step_tables
 
 _DIFFUSION_OF_GAP = 7e-6
