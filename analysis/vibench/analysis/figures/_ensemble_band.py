@@ -40,7 +40,7 @@ def draw_band(
         alpha=0.25,
         linewidth=0,
         zorder=1.5,
-        label=f"95 % of {laid.run.draws} draws",
+        label="95 % of draws",  # how many differs from recording to recording: the caption says it
     )
     return shown(found.median)
 
