@@ -1,13 +1,22 @@
-"""Every kind of excitation can be analysed, laid over and reported; nothing else has a row."""
+"""Every kind of excitation can be analysed, laid over and reported; a row for anything else is refused."""
 
-from vibench.acquisition.plan import EXCITATION_KINDS
+import pytest
+
+from vibench.acquisition.plan import EXCITATION_KINDS, Family, rows_by_kind
 from vibench.analysis.kinds import ANALYSES
 from vibench.analysis.report import DRAWINGS
 
 
 def test_every_kind_of_excitation_has_an_analysis():
     assert set(ANALYSES) == set(EXCITATION_KINDS)
+    assert ANALYSES["held_sweep"] is ANALYSES["sine_sweep"]
+    assert ANALYSES["stepped_level"] is not ANALYSES["stepped_sine"]
 
 
 def test_every_kind_of_excitation_has_figures_and_sentences():
     assert set(DRAWINGS) == set(EXCITATION_KINDS)
+
+
+def test_a_row_for_no_kind_is_refused():
+    with pytest.raises(KeyError, match="chirp"):
+        rows_by_kind(dict.fromkeys(Family, 1), {"chirp": 2})

@@ -26,6 +26,7 @@ from ._kinds import (
     Excitation as Excitation,
     ExcitationKind as ExcitationKind,
     excitation_text as excitation_text,
+    rows_by_kind as rows_by_kind,
 )
 from ._multisine import (
     held_lines as held_lines,

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Annotated, TypeAlias, get_args
+from typing import Annotated, TypeAlias, TypeVar, get_args
 
 from pydantic import Field
 
@@ -12,7 +12,7 @@ from ._held_dwell import HeldDwell
 from ._held_sweep import HeldSweep
 from ._multisine_noise import MultisineNoise
 from ._odd_multisine import OddMultisine
-from ._plan import AbstractExcitation, AbstractFeedback
+from ._plan import AbstractExcitation, AbstractFeedback, Family
 from ._resonance_tracking import ResonanceTracking
 from ._settled_sine import SettledSine
 from ._sine_sweep import SineSweep
@@ -34,6 +34,7 @@ Excitation: TypeAlias = Annotated[
     | ResonanceTracking,
     Field(discriminator="kind"),
 ]
+Row = TypeVar("Row")
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,21 @@ EXCITATION_KINDS: Mapping[str, ExcitationKind] = MappingProxyType(
     {kind.word: kind for kind in map(ExcitationKind, get_args(get_args(Excitation)[0]))}
 )
 """A row for each plan of the union, which is written out for whoever checks types."""
+
+
+def rows_by_kind(of_family: Mapping[Family, Row], of_kind: Mapping[str, Row]) -> Mapping[str, Row]:
+    """Give every kind the row of its family, or its own where it has one.
+
+    Raises
+    ------
+    KeyError
+        When a row is given for a word that is no kind.
+
+    """
+    rows = {word: of_family[kind.plan.family] for word, kind in EXCITATION_KINDS.items()}
+    for word, row in of_kind.items():
+        rows[EXCITATION_KINDS[word].word] = row
+    return MappingProxyType(rows)
 
 
 def excitation_text(excitation: Excitation) -> str:

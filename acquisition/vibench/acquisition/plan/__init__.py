@@ -39,6 +39,7 @@ from ..excitation import (
     SteppedSine,
     StreamedNoise,
     excitation_text,
+    rows_by_kind,
 )
 from ._axis import (
     Range,
@@ -148,6 +149,7 @@ __all__ = [
     "preview_measurement",
     "ramp",
     "require_within_limits",
+    "rows_by_kind",
     "shortest_ramp_s",
     "stairs",
 ]

@@ -3,8 +3,9 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from types import MappingProxyType
 from typing import Any, Generic, TypeVar
+
+from vibench.acquisition.plan import Family, rows_by_kind
 
 from ..figures import (
     STEPPED_FREQUENCIES,
@@ -109,24 +110,17 @@ def _there_and_back(sweeps: Sequence[SweepResult]) -> Iterator[tuple[SweepResult
                 break
 
 
-_NOISE = Drawing(_noise_figures, noise_findings, (resonance_table,))
-_SWEEP = Drawing(_sweep_figures, sweep_findings, (collision_table,))
-_DWELL = Drawing(_dwell_figures, dwell_findings, (dwell_table, line_table))
-_STEPPED = Drawing(_stepped_figures(STEPPED_FREQUENCIES), stepped_findings)
-DRAWINGS: Mapping[str, Drawing[Any, Any]] = MappingProxyType(
+DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
     {
-        "multisine_noise": _NOISE,
-        "odd_multisine": _NOISE,
-        "streamed_noise": _NOISE,
-        "sine_sweep": _SWEEP,
-        "held_sweep": _SWEEP,
-        "dwell": _DWELL,
-        "held_dwell": _DWELL,
-        "stepped_sine": _STEPPED,
-        "settled_sine": _STEPPED,
+        Family.NOISE: Drawing(_noise_figures, noise_findings, (resonance_table,)),
+        Family.SWEEP: Drawing(_sweep_figures, sweep_findings, (collision_table,)),
+        Family.DWELL: Drawing(_dwell_figures, dwell_findings, (dwell_table, line_table)),
+        Family.STEPPED: Drawing(_stepped_figures(STEPPED_FREQUENCIES), stepped_findings),
+    },
+    {
         "stepped_level": Drawing(_stepped_figures(STEPPED_LEVELS), level_findings),
         "resonance_tracking": Drawing(_tracked_figures, tracked_findings),
-    }
+    },
 )
 """By the word in a plan."""
 

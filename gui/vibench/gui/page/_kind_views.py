@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
-from types import MappingProxyType
 
-from vibench.acquisition.plan import EXCITATION_KINDS, Family
+from vibench.acquisition.plan import Family, rows_by_kind
 
 
 class LivePicture(Enum):
@@ -29,13 +28,13 @@ class KindView:
 
 OF_A_BAND = KindView(LivePicture.FREQUENCY_RESPONSE, LivePicture.SPECTRUM)
 OF_A_SINE = KindView(LivePicture.HISTORY, LivePicture.PORTRAIT)
-_FAMILY_VIEWS = {
-    Family.NOISE: OF_A_BAND,
-    Family.SWEEP: OF_A_SINE,
-    Family.DWELL: OF_A_SINE,
-    Family.STEPPED: OF_A_SINE,
-}
-KIND_VIEWS: Mapping[str, KindView] = MappingProxyType(
-    {word: _FAMILY_VIEWS[kind.plan.family] for word, kind in EXCITATION_KINDS.items()}
+KIND_VIEWS: Mapping[str, KindView] = rows_by_kind(
+    {
+        Family.NOISE: OF_A_BAND,
+        Family.SWEEP: OF_A_SINE,
+        Family.DWELL: OF_A_SINE,
+        Family.STEPPED: OF_A_SINE,
+    },
+    {},
 )
-"""Kinds of a family share their pictures; a kind with its own overrides them here."""
+"""By the word in a plan; a kind with pictures of its own has them in the second table."""
