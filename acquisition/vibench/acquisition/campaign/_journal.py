@@ -58,11 +58,7 @@ class Journal(ClosedOnLeaving):
     def open(cls, path: Path) -> Self:
         """Open a journal to go on with it.
 
-        Raises
-        ------
-        RecordingError
-            When the file is no journal, or of a newer version.
-
+        Raises RecordingError when the file is no journal, or of a newer version.
         """
         connection = connected(path)
         try:

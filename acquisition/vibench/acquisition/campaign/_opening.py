@@ -47,13 +47,8 @@ def reconcile(journal: Journal, folder: Path) -> None:
 def found_recordings(points: Sequence[Point], folder: Path, depth: SealDepth) -> dict[str, KeptRecording]:
     """Find what lies in the folder already, for a campaign whose journal is lost, or older than journals.
 
-    Damaged recordings are among them.
-
-    Raises
-    ------
-    RecordingError
-        When a recording is complete, but was made by another plan.
-
+    Damaged recordings are among them. Raises RecordingError when a recording is complete, but was made by
+    another plan.
     """
     found = {each.name: complete_attempt(folder, each.name, each.measurement, depth) for each in points}
     return {name: kept for name, kept in found.items() if kept is not None}
@@ -153,14 +148,9 @@ def opened_journal(
 ) -> Journal:
     """Begin a journal, or open the one that the campaign was begun with and bring it up to date.
 
-    Raises
-    ------
-    RecordingError
-        When the folder holds recordings of the campaign and ``existing`` refuses that, or the journal
-        belongs to another plan.
-    CheckFailed
-        When the bench is another one than the campaign was begun on and ``changed`` refuses that.
-
+    Raises RecordingError when the folder holds recordings of the campaign and ``existing`` refuses that, or
+    the journal belongs to another plan, and CheckFailed when the bench is another one than the campaign was
+    begun on and ``changed`` refuses that.
     """
     path = journal_path(folder, campaign.name)
     identity = BenchIdentity.of(bench)

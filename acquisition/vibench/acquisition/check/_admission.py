@@ -59,11 +59,7 @@ def last_check(rig_name: str) -> CheckResult | None:
 def keep(result: CheckResult) -> Path:
     """Keep a result in the place of the last one; whoever reads meanwhile finds one of the two, whole.
 
-    Raises
-    ------
-    RecordingError
-        When the state folder cannot be written.
-
+    Raises RecordingError when the state folder cannot be written.
     """
     try:
         path = archive_path(result.rig)
@@ -163,6 +159,10 @@ def require_fresh(
 
     A virtual rig without a check that holds is checked at once; a real one plays nothing unasked.
 
+    Raises CheckFailed when the last check is missing, old, of another configuration, or did not pass; nothing
+    was played then. Or when the check made now does not pass, and InstrumentError when an instrument fails
+    while the bench is checked.
+
     Parameters
     ----------
     bench
@@ -171,14 +171,6 @@ def require_fresh(
         Where recordings will go.
     switch
         Lets others end a check that is made now.
-
-    Raises
-    ------
-    CheckFailed
-        When the last check is missing, old, of another configuration, or did not pass; nothing was
-        played then. Or when the check made now does not pass.
-    InstrumentError
-        When an instrument fails while the bench is checked.
 
     """
     match rule:
@@ -212,11 +204,7 @@ def _fresh(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | None) 
 def require_on_record(bench: Bench, clock: Clock = utc_now) -> None:
     """Admit a bench on its last check without playing anything; a virtual one needs none.
 
-    Raises
-    ------
-    CheckFailed
-        When a real bench has no check that holds.
-
+    Raises CheckFailed when a real bench has no check that holds.
     """
     last = last_check(bench.rig.name)
     complaint = why_not(last, bench.rig, clock())

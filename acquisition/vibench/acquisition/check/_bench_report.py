@@ -39,6 +39,9 @@ def bench_report(bench: Bench, folder: Path, switch: StopSwitch | None = None) -
     Reads all channels in silence, while two per cent of the amplitude limit play at 160 Hz for some seconds,
     and in silence again.
 
+    Raises CheckStopped when somebody ended it, and InstrumentError when an instrument fails; what is merely wrong
+    is a finding.
+
     Parameters
     ----------
     bench
@@ -47,13 +50,6 @@ def bench_report(bench: Bench, folder: Path, switch: StopSwitch | None = None) -
         Where recordings will go.
     switch
         Lets others end the check, within a block of samples.
-
-    Raises
-    ------
-    CheckStopped
-        When somebody did.
-    InstrumentError
-        When an instrument fails; what is merely wrong is a finding.
 
     """
     findings = [*_identified(bench), *_calibrated(bench), _room(bench, folder)]

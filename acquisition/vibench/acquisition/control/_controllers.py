@@ -30,11 +30,8 @@ def feedback_controller(
 ) -> Controller[None]:
     """Control a measurement with feedback, from its ramp up to its ramp down.
 
-    Raises
-    ------
-    ConfigurationError
-        When the rig lacks a channel that feedback listens to; before anything is yielded.
-
+    Raises ConfigurationError when the rig lacks a channel that feedback listens to; before anything is
+    yielded.
     """
     loop = SineLoop(feedback_channels_of(channels, sample_rate_hz), rig, measurement)
     return CONTROLLERS[measurement.excitation.kind](loop, measurement.excitation)

@@ -52,14 +52,7 @@ class FeedbackChannels:
 
 
 def feedback_channels_of(channels: tuple[Channel, ...], sample_rate_hz: float) -> FeedbackChannels:
-    """Find the channels that feedback needs.
-
-    Raises
-    ------
-    ConfigurationError
-        When one is missing.
-
-    """
+    """Find the channels that feedback needs; raises ConfigurationError when one is missing."""
     drive, base, response = (
         _row(channels, role) for role in (Role.DRIVE_VOLTAGE, Role.BASE_ACCELERATION, Role.M0_VELOCITY)
     )

@@ -33,11 +33,7 @@ ARMED_S = 60.0
 def armed_plan(bench: Bench, request: CampaignRequest) -> ArmedPlan:
     """Hold a campaign against bench and folder; nothing is played and nothing written.
 
-    Raises
-    ------
-    AcquisitionError
-        With every reason why it cannot be carried out.
-
+    Raises AcquisitionError with every reason why it cannot be carried out.
     """
     if request.check is CheckRule.FRESH:
         require_on_record(bench)

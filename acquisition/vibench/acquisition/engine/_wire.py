@@ -97,13 +97,8 @@ def send(connection: socket.socket, message: Message) -> None:
 def receive(connection: socket.socket, bounds: Bounds, within_s: float | None = None) -> Message:
     """Wait for one message, as long as the connection's timeout allows; from its first byte on ``within_s``.
 
-    Raises
-    ------
-    WireError
-        When the connection ends, or what comes is not a message.
-    TimeoutError
-        When it does not come in time.
-
+    Raises WireError when the connection ends, or what comes is not a message, and TimeoutError when it does
+    not come in time.
     """
     incoming = IncomingMessage(bounds)
     patience_s, until_s = connection.gettimeout(), None

@@ -137,11 +137,7 @@ class Sweep(FrozenModel):
     def points(self) -> tuple[Point, ...]:
         """Make the points, in order.
 
-        Raises
-        ------
-        ValueError
-            When a combination is no measurement; the text names the point and the key.
-
+        Raises ValueError when a combination is no measurement; the text names the point and the key.
         """
         return tuple(self._led()) if self.continue_from_previous else tuple(self._alone())
 

@@ -86,11 +86,8 @@ def _write_text(target: h5py.HLObject, name: str, text: str) -> None:
 def json_text(what: str, values: Mapping[str, Any]) -> str:
     """Write a mapping as JSON; numbers and arrays of numpy become plain ones.
 
-    Raises
-    ------
-    RecordingError
-        When a value is nothing that JSON can hold; ``what`` names the mapping in the sentence.
-
+    Raises RecordingError when a value is nothing that JSON can hold; ``what`` names the mapping in the
+    sentence.
     """
     try:
         return json.dumps(dict(values), allow_nan=False, default=_plain)

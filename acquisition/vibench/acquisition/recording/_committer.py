@@ -73,11 +73,7 @@ class Committer:
     def put(self, batch: Batch) -> None:
         """Queue a batch; waits only when the queue is full.
 
-        Raises
-        ------
-        RecordingError
-            When the disk failed, or is so slow that the queue stays full.
-
+        Raises RecordingError when the disk failed, or is so slow that the queue stays full.
         """
         with self._changed:
             has_room = self._changed.wait_for(self._can_take, timeout=QUEUE_PATIENCE_S)
@@ -89,11 +85,7 @@ class Committer:
     def close(self) -> None:
         """Write and commit everything queued, and end the thread. Legal at any time.
 
-        Raises
-        ------
-        RecordingError
-            When the disk does not return; nothing that touches it must be tried then.
-
+        Raises RecordingError when the disk does not return; nothing that touches it must be tried then.
         """
         with self._changed:
             self._is_closing = True

@@ -119,11 +119,7 @@ def file_facts(attributes: Mapping[str, Attribute], **found: object) -> FileFact
 def channel_header(role: str, dataset: h5py.Dataset) -> ChannelHeader:
     """Read the attributes of a channel.
 
-    Raises
-    ------
-    RecordingError
-        When one is missing, is of another type or range, or contradicts the others.
-
+    Raises RecordingError when one is missing, is of another type or range, or contradicts the others.
     """
     attributes = read_attributes(dataset)
     facts = _read(f"the channel {role!r}", ChannelFacts, attributes)

@@ -29,11 +29,8 @@ class CountScale:
     def counts(self, volts: Samples) -> Counts:
         """Turn a block into counts, shape (channels, samples); exact where the converter's step is known.
 
-        Raises
-        ------
-        RecordingError
-            When the volts are no multiples of the step, or outside what an int32 holds (NaN included).
-
+        Raises RecordingError when the volts are no multiples of the step, or outside what an int32 holds (NaN
+        included).
         """
         scaled = (np.asarray(volts, dtype=np.float64) - self._zero_v) / self._step_v
         rounded = np.rint(scaled)

@@ -23,11 +23,7 @@ END_ADDRESS = slice(40, 48)
 def claim_room(path: Path, allocated: int, length: int) -> None:
     """Create a file that the disk gives ``allocated`` bytes, and that may be ``length`` bytes long.
 
-    Raises
-    ------
-    OSError
-        When the file exists, or the disk or a limit refuses; a file made here is gone again.
-
+    Raises OSError when the file exists, or the disk or a limit refuses; a file made here is gone again.
     """
     meet_trouble()
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, FILE_MODE)

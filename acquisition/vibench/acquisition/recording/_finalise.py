@@ -91,14 +91,8 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
     """Make ``NAME.h5`` of ``NAME.h5.part``, which stays for :func:`discard`, and seal it.
 
     The caller holds the file: its writer, or a recovery. ``written`` has the checksum of each channel as it
-    was handed over; a recovery does not know them.
-
-    Raises
-    ------
-    RecordingError
-        When ``NAME.h5`` exists, the disk refuses (it may be full), or what was written does not
-        read back the same. ``NAME.h5.part`` is untouched.
-
+    was handed over; a recovery does not know them. Raises RecordingError when ``NAME.h5`` exists, the disk
+    refuses (it may be full), or what was written does not read back the same. ``NAME.h5.part`` is untouched.
     """
     final = part.with_suffix("")
     tmp = layout.tmp_of(final)

@@ -35,14 +35,7 @@ class TableWriter:
         return self._places.table.capacity - self._rows
 
     def append(self, cells: Sequence[Cell]) -> Batch:
-        """Make the writes of one more row.
-
-        Raises
-        ------
-        RecordingError
-            When the table is full.
-
-        """
+        """Make the writes of one more row; raises RecordingError when the table is full."""
         if not self.free_rows:
             raise RecordingError(
                 f"The recording's table of {self._places.table.name} is full:"

@@ -70,14 +70,9 @@ class Places:
 def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
     """Create ``part`` for the recording ``path`` and claim its room on the disk.
 
-    It is made under another name first, so that a ``.part`` can be opened from its first moment on:
-    a program that is killed here leaves a ``.tmp`` without a sample in it.
-
-    Raises
-    ------
-    RecordingError
-        When a file of that name exists, the folder does not, or the disk is too full.
-
+    It is made under another name first, so that a ``.part`` can be opened from its first moment on: a program
+    that is killed here leaves a ``.tmp`` without a sample in it. Raises RecordingError when a file of that
+    name exists, the folder does not, or the disk is too full.
     """
     capacity, reserved = _lengths(header)
     _require_room(path, reserved * ITEM_BYTES * len(header.channels))

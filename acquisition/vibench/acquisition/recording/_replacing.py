@@ -27,14 +27,9 @@ _one_at_a_time = threading.Lock()
 def replace_with_change(path: Path, room: int, change: Callable[[h5py.File], Answer]) -> Answer:
     """Apply ``change``, which adds at most ``room`` bytes, to a copy of the file, and swap the two.
 
-    A crash leaves the old file untouched (and perhaps a ``.tmp`` beside it). When another program
-    has changed the file meanwhile, the change is made again on top of that.
-
-    Raises
-    ------
-    RecordingError
-        When the disk refuses; the file is as it was.
-
+    A crash leaves the old file untouched (and perhaps a ``.tmp`` beside it). When another program has changed
+    the file meanwhile, the change is made again on top of that. Raises RecordingError when the disk refuses;
+    the file is as it was.
     """
     try:
         with _one_at_a_time:

@@ -98,11 +98,7 @@ def result_groups(file: h5py.File) -> dict[str, h5py.Group]:
 def read_results(file: h5py.File) -> dict[str, SavedResult]:
     """Every result of a recording, by name.
 
-    Raises
-    ------
-    RecordingError
-        When one is not as it was sealed, or is none.
-
+    Raises RecordingError when one is not as it was sealed, or is none.
     """
     found = {}
     for name, group in result_groups(file).items():

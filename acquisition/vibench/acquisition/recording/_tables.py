@@ -82,11 +82,7 @@ class Segment:
 def read_columns(file: h5py.File, table: Table) -> Columns:
     """Columns of a table, as many rows as are valid.
 
-    Raises
-    ------
-    RecordingError
-        When one is missing, of another type or width, or longer than a table can be.
-
+    Raises RecordingError when one is missing, of another type or width, or longer than a table can be.
     """
     group = file.get(table.name)
     if not isinstance(group, h5py.Group):

@@ -16,11 +16,7 @@ _MOST_COMMANDS = 2
 def require_time_for_commands(measurement: Measurement, generator: FunctionGenerator) -> float:
     """Refuse a glide whose steps are too short; return how much longer a plan of settled tones will take [s].
 
-    Raises
-    ------
-    ConfigurationError
-        When a step is shorter than the generator takes for a setting, measured now.
-
+    Raises ConfigurationError when a step is shorter than the generator takes for a setting, measured now.
     """
     step_s = measurement.excitation.glide_step_s
     if step_s is not None:

@@ -64,11 +64,7 @@ class Drive(Protocol):
 def drive_for(bench: RunBench, measurement: Measurement) -> Drive:
     """Choose what plays a measurement.
 
-    Raises
-    ------
-    ConfigurationError
-        When it needs an analogue output and the bench has none.
-
+    Raises ConfigurationError when it needs an analogue output and the bench has none.
     """
     match drive_source_of(measurement, bench.rig), bench.output:
         case DriveSource.GENERATOR, _:

@@ -40,11 +40,7 @@ from ._silence_watch import SilenceWatch
 def controller_for(bench: RunBench, measurement: Measurement) -> Controller[None] | None:
     """Give the feedback controller of a measurement; None for one whose course is known.
 
-    Raises
-    ------
-    ConfigurationError
-        When the bench cannot do it: before anything plays.
-
+    Raises ConfigurationError when the bench cannot do it: before anything plays.
     """
     if measurement.excitation.kind not in CONTROLLERS:
         return None

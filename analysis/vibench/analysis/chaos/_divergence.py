@@ -48,6 +48,8 @@ def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float =
     the noise and ends before they feel the size of the attractor; a slope fitted across either end is a
     property of the noise or of the size. Where nothing is left between, there is no exponent.
 
+    Raises NotEnoughData when fewer than 50 points have a neighbour.
+
     Parameters
     ----------
     points
@@ -58,11 +60,6 @@ def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float =
         Neighbours are at least so many steps apart in time.
     noise
         Standard deviation of the noise on one coordinate, in the coordinates' unit.
-
-    Raises
-    ------
-    NotEnoughData
-        When fewer than 50 points have a neighbour.
 
     """
     count, dimensions = points.shape

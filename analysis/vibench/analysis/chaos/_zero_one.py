@@ -41,17 +41,14 @@ def zero_one(series: Reals, *, seed: int = 0) -> ZeroOne:
     oscillatory term removed (eqs. 3.1 to 3.6). Noise passes for chaos in it, and an oversampled chaotic
     flow for regular motion: it is one witness, never the judge.
 
+    Raises NotEnoughData when the series is too short.
+
     Parameters
     ----------
     series
         Shape (n,), at least 200 values.
     seed
         Of the frequencies c.
-
-    Raises
-    ------
-    NotEnoughData
-        When the series is too short.
 
     """
     count = series.size

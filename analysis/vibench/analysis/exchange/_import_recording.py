@@ -55,11 +55,8 @@ class _Planned:
 def laid_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> tuple[LaidPart, ...]:
     """Lay the plan's parts over the samples; parts past their end are left out, one across it is cut by it.
 
-    Raises
-    ------
-    InvalidRequest
-        When more parts are given than are planned, they overlap, or none lies inside the file.
-
+    Raises InvalidRequest when more parts are given than are planned, they overlap, or none lies inside the
+    file.
     """
     planned = list(_planned(mapping.measurement.excitation))
     stretches = _told(mapping, planned) if mapping.parts else _in_turn(mapping.begins_s, planned)
@@ -251,11 +248,7 @@ def _peak(source: Source, channel: SourceChannel, samples: int) -> float:
 def _power_of_two_above(peak: float) -> float:
     """Give the smallest power of two that is not below a peak.
 
-    Raises
-    ------
-    UnusableData
-        When the peak is beyond what a recording's numbers can be scaled by.
-
+    Raises UnusableData when the peak is beyond what a recording's numbers can be scaled by.
     """
     if not LEAST_PEAK < peak < MOST_PEAK:
         if peak == 0:

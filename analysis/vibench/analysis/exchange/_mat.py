@@ -51,11 +51,7 @@ def write_mat(
 ) -> None:
     """Write one variable after the other, so that one channel at a time is in memory.
 
-    Raises
-    ------
-    InvalidRequest
-        When it would be larger than the format allows.
-
+    Raises InvalidRequest when it would be larger than the format allows.
     """
     require_small(excerpt)
     with path.open("xb") as file:

@@ -141,11 +141,7 @@ def _readable(path: Path) -> Iterator[None]:
 def find_channel(source: Source, wanted: str, path: Path) -> SourceChannel:
     """Give the channel of that name, or the only one of that label.
 
-    Raises
-    ------
-    InvalidRequest
-        When there is none, or more than one; the sentence lists what there is.
-
+    Raises InvalidRequest when there is none, or more than one; the sentence lists what there is.
     """
     found = [each for each in source.channels if each.name == wanted]
     found = found or [each for each in source.channels if each.label == wanted]

@@ -39,13 +39,7 @@ class TdmsSource:
 def opened_tdms(path: Path) -> Iterator[TdmsSource]:
     """Open a file.
 
-    Raises
-    ------
-    InvalidRequest
-        When npTDMS is not installed.
-    UnusableData
-        When it is not TDMS.
-
+    Raises InvalidRequest when npTDMS is not installed, and UnusableData when it is not TDMS.
     """
     try:
         import nptdms.log  # noqa: PLC0415 - an optional extra

@@ -34,19 +34,14 @@ def comparison_figure(
 ) -> DrawnFigure:
     """Draw curves with their bounds, the difference of two of them, and markers.
 
+    Raises InvalidRequest when there is no curve, and NotEnoughData when the pair has no frequency in common.
+
     Parameters
     ----------
     name
         Becomes the files' name.
     pair
         The curve and its reference, whose difference is drawn below.
-
-    Raises
-    ------
-    InvalidRequest
-        When there is no curve.
-    NotEnoughData
-        When the pair has no frequency in common.
 
     """
     if not curves:

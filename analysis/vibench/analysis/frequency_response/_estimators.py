@@ -8,14 +8,7 @@ from ._results import Estimator
 
 
 def named_estimator(estimator: Estimator | str) -> Estimator:
-    """Turn a name into an estimator.
-
-    Raises
-    ------
-    InvalidRequest
-        When no estimator has that name.
-
-    """
+    """Turn a name into an estimator; raises InvalidRequest when no estimator has that name."""
     try:
         return Estimator(estimator)
     except ValueError as unknown:
@@ -65,11 +58,8 @@ def least_squares(
 ) -> Complexes:
     """h1, h2 or hv by its name.
 
-    Raises
-    ------
-    InvalidRequest
-        For the drive-referenced estimator, which needs a third channel, and for hv without its ratio.
-
+    Raises InvalidRequest for the drive-referenced estimator, which needs a third channel, and for hv without
+    its ratio.
     """
     match estimator, noise_ratio:
         case Estimator.H1, _:

@@ -58,13 +58,8 @@ def repeated_response(
 ) -> NoiseResponse:
     """Estimate the transmission of noise that repeats from everything usable in it.
 
-    Raises
-    ------
-    NotEnoughData
-        When no realisation is left.
-    InvalidRequest
-        When segments are chosen: the periods are the segments.
-
+    Raises NotEnoughData when no realisation is left, and InvalidRequest when segments are chosen: the periods
+    are the segments.
     """
     if request.cuts_segments:
         raise InvalidRequest(
@@ -197,11 +192,7 @@ def streamed_response(
 ) -> NoiseResponse:
     """Estimate the transmission of noise that does not repeat from everything usable in it.
 
-    Raises
-    ------
-    NotEnoughData
-        When less than two segments are left.
-
+    Raises NotEnoughData when less than two segments are left.
     """
     rate = channels.sample_rate_hz
     stretch = only_stretch(channels, SegmentLabel.NOISE)

@@ -176,17 +176,14 @@ class PeriodicSums:
     def add(self, drive: Reals, base: Reals, response: Reals) -> None:
         """Take the settled samples of one realisation, each of shape (samples,).
 
+        Raises NotEnoughData for fewer than two periods.
+
         Parameters
         ----------
         drive
             The clean reference: the recorded generator voltage.
         base, response
             What stands below and above the fraction bar.
-
-        Raises
-        ------
-        NotEnoughData
-            For fewer than two periods.
 
         """
         if not drive.size == base.size == response.size:

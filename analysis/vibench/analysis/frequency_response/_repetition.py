@@ -38,15 +38,8 @@ def measured_repetition(drive: Reals, nominal_period_samples: float) -> Repetiti
 
     Weighted least squares of the phases of the driven lines over the periods, repeated on the newly cut
     periods until nothing moves. The first pass uses only the low lines, whose phase an offset of 200 ppm
-    cannot turn by more than a quarter; high ones (images of a held waveform among them) join after it.
-
-    Raises
-    ------
-    NotEnoughData
-        For fewer than two periods.
-    UnusableData
-        When the drive is silent or does not repeat.
-
+    cannot turn by more than a quarter; high ones (images of a held waveform among them) join after it. Raises
+    NotEnoughData for fewer than two periods, and UnusableData when the drive is silent or does not repeat.
     """
     period = nominal_period_samples
     highest = 0.25 / _LARGEST_OFFSET

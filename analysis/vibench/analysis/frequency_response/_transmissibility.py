@@ -73,11 +73,8 @@ class FrequencyResponseSums:
     def frequency_response(self) -> FrequencyResponse:
         """Give the transmission of everything added so far.
 
-        Raises
-        ------
-        NotEnoughData
-            When fewer than two valid segments were found: their coherence would be 1 whatever they hold.
-
+        Raises NotEnoughData when fewer than two valid segments were found: their coherence would be 1
+        whatever they hold.
         """
         return self.by(self._settings.estimator, self._settings.noise_ratio)
 

@@ -45,6 +45,8 @@ def fit_gap(
 ) -> FittedValue:
     """Give the gap that explains the sharpest onset of collisions.
 
+    Raises NotEnoughData when no sweep enters a colliding region.
+
     Parameters
     ----------
     sweeps
@@ -56,11 +58,6 @@ def fit_gap(
         Where the linear specimen comes from, for its covariance.
     confidence
         Of drive and linear specimen within the bounds.
-
-    Raises
-    ------
-    NotEnoughData
-        When no sweep enters a colliding region.
 
     """
     found = [each for sweep in sweeps for each in onsets(sweep, linear, fit, confidence)]

@@ -147,6 +147,9 @@ def fit_specimen(
     The covariance is Gauss-Newton's, made larger by the reduced chi square where the model leaves more than
     the scatter explains, and by what the converter's clock may be wrong by.
 
+    Raises InvalidRequest when nothing is free, or the gap is, which no linear transmission tells, and
+    NotEnoughData when fewer significant lines than twice what is fitted are left.
+
     Parameters
     ----------
     transmission
@@ -157,13 +160,6 @@ def fit_specimen(
         What is fitted.
     confidence
         Of the intervals.
-
-    Raises
-    ------
-    InvalidRequest
-        When nothing is free, or the gap is, which no linear transmission tells.
-    NotEnoughData
-        When fewer significant lines than twice what is fitted are left.
 
     """
     free = tuple(free)

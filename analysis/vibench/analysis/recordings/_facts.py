@@ -76,13 +76,8 @@ class RecordingFacts:
 def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> RecordingFacts:
     """Collect what a recording says about itself; ``on_read`` is told how far its samples are read.
 
-    Raises
-    ------
-    UnusableData
-        When it is not as it was sealed, or says of plan or bench what this version does not know.
-    NotEnoughData
-        When it holds no samples.
-
+    Raises UnusableData when it is not as it was sealed, or says of plan or bench what this version does not
+    know, and NotEnoughData when it holds no samples.
     """
     seal = require_intact(recording)
     measurement = plan_of(recording)

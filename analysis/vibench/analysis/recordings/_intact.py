@@ -8,13 +8,8 @@ from ..errors import UnusableData
 def require_intact(recording: Recording) -> SealCheck:
     """Hold every sample, attribute and table against the seal; gives what was found.
 
-    A recording without a seal, made before there were any or not finished yet, is let pass.
-
-    Raises
-    ------
-    UnusableData
-        When something is not as it was sealed.
-
+    A recording without a seal, made before there were any or not finished yet, is let pass. Raises
+    UnusableData when something is not as it was sealed.
     """
     found = recording.check_seal(SealDepth.WHOLE)
     if found.state is SealState.DAMAGED:

@@ -161,12 +161,7 @@ def found(claim: Claim, evidence: Evidence, case: Case) -> Finding:
     """Measure a claim under one case, from every start.
 
     From rest alone under an option that does not uphold it there: then it is not upheld by every start.
-
-    Raises
-    ------
-    InvalidRequest
-        When the measure gives another count of numbers than the claim wants.
-
+    Raises InvalidRequest when the measure gives another count of numbers than the claim wants.
     """
     draws = [_measured(claim, evidence, case)]
     if _is_met(claim, draws[0]) or case.name == AS_CHOSEN:

@@ -58,6 +58,8 @@ def overlay(
 ) -> AbstractOverlay[Any]:
     """Simulate what was measured and compare.
 
+    Raises UnusableData when the samples have holes, or the simulation did not reach its end.
+
     Parameters
     ----------
     recording, analysis
@@ -77,11 +79,6 @@ def overlay(
         How many runs of a colliding motion are made from slightly different starts under the voltage.
     stage
         Told what is being computed.
-
-    Raises
-    ------
-    UnusableData
-        When the samples have holes, or the simulation did not reach its end.
 
     """
     model = specimen_of(analysis.facts.bench) if specimen is None else specimen
@@ -260,11 +257,7 @@ def result_of(
 ) -> tuple[AnyResult, tuple[AnalysisFailure, ...]]:
     """Analyse one recording; a simulation that fails leaves the measured result standing.
 
-    Raises
-    ------
-    AnalysisError
-        When nothing in the recording is usable.
-
+    Raises AnalysisError when nothing in the recording is usable.
     """
     name = recording.path.name
     analysis = analyse(recording, request, observer)

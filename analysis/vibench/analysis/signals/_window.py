@@ -41,14 +41,7 @@ def taper(window: Window | str, samples: int) -> Reals:
 
 
 def named_window(window: Window | str) -> Window:
-    """Turn a name into a window.
-
-    Raises
-    ------
-    InvalidRequest
-        When no window has that name.
-
-    """
+    """Turn a name into a window; raises InvalidRequest when no window has that name."""
     try:
         return Window(window)
     except ValueError as unknown:

@@ -91,6 +91,9 @@ def dwell_response(
 ) -> DwellResponse:
     """Analyse the last seconds of a dwell.
 
+    Raises NotEnoughData when the record without its disturbed ends is shorter than the window, and
+    UnusableData when the drive channel holds no sine there.
+
     Parameters
     ----------
     drive, base, response
@@ -106,13 +109,6 @@ def dwell_response(
         By how much the response channel lags the base channel [s].
     sensors
         Gain of the response's sensor over that of the base's at the drive frequency, without their delays.
-
-    Raises
-    ------
-    NotEnoughData
-        When the record without its disturbed ends is shorter than the window.
-    UnusableData
-        When the drive channel holds no sine there.
 
     """
     displacement = converted_signal(

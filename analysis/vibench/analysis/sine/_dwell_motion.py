@@ -115,11 +115,7 @@ class DwellMotion:
 def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
     """Sample a dwell at the phase of its recorded drive and judge how it repeats.
 
-    Raises
-    ------
-    UnusableData
-        When samples were lost inside the dwell.
-
+    Raises UnusableData when samples were lost inside the dwell.
     """
     section = _section(channels, response)
     verdict = motion_verdict(_points(section, response, channels.sample_rate_hz), section.drive_hz)

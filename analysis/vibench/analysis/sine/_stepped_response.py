@@ -48,17 +48,14 @@ def stepped_response(
 ) -> SteppedResponse:
     """Analyse every whole step as a dwell of its own.
 
+    Raises NotEnoughData when no step was recorded whole.
+
     Parameters
     ----------
     label
         Of the segments that the steps were recorded as.
     setting_vpp
         Tells the generator's setting during a step [V].
-
-    Raises
-    ------
-    NotEnoughData
-        When no step was recorded whole.
 
     """
     stretches = channels.stretches(label)

@@ -115,13 +115,8 @@ class SegmentSpectra:
     def averages(self) -> SpectralAverages:
         """Give the averages over everything added so far.
 
-        Raises
-        ------
-        NotEnoughData
-            When no segment could be used.
-        UnusableData
-            When a sample that was not marked invalid is not finite.
-
+        Raises NotEnoughData when no segment could be used, and UnusableData when a sample that was not marked
+        invalid is not finite.
         """
         used = np.concatenate(self._used) if self._used else np.empty(0, dtype=np.bool_)
         count = int(np.count_nonzero(used))

@@ -155,6 +155,8 @@ def amplitude_spectrum(
 ) -> AmplitudeSpectrum:
     """Spectrum of a signal, or of its last seconds, in amplitudes of sines.
 
+    Raises NotEnoughData when the signal is shorter than ``last_s``.
+
     Parameters
     ----------
     samples
@@ -163,11 +165,6 @@ def amplitude_spectrum(
         How much of the end to use [s]; all of it by default.
     window
         Hann by default; between lines it reads up to 15 % low, where flat top stays within 0.1 %.
-
-    Raises
-    ------
-    NotEnoughData
-        When the signal is shorter than ``last_s``.
 
     """
     count = samples.size if last_s is None else round(last_s * sample_rate_hz)

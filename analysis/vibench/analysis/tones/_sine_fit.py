@@ -31,17 +31,14 @@ class FittedSine:
 def fitted_sine(samples: Reals, sample_rate_hz: float, near_hz: float) -> FittedSine:
     """Fit a sine and an offset by least squares, frequency included (IEEE Std 1057, four parameters).
 
+    Raises UnusableData when no line stands above the noise there.
+
     Parameters
     ----------
     samples
         Shape (samples,), some ten cycles or more.
     near_hz
         Where the sine should be, within 20 %.
-
-    Raises
-    ------
-    UnusableData
-        When no line stands above the noise there.
 
     """
     spectrum = amplitude_spectrum(samples, sample_rate_hz)

@@ -55,6 +55,8 @@ def independent_state(
 ) -> Floats:
     """Follow a motion from time zero and give its state at the end, shape (6,).
 
+    Raises ValueError for rigid stops, and ArithmeticError when the general method gives up.
+
     Parameters
     ----------
     specimen, drive
@@ -65,13 +67,6 @@ def independent_state(
         x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,).
     tolerance
         Relative error of a step. Ask with two to see the error of the answer itself.
-
-    Raises
-    ------
-    ValueError
-        For rigid stops.
-    ArithmeticError
-        When the general method gives up.
 
     """
     law, numbers = law_of(specimen), numbers_of(specimen, drive)

@@ -34,17 +34,14 @@ CONTACT_LAWS: Mapping[str, LawWord[ContactLaw]] = MappingProxyType(
 def model_named(text: str, contact_stiffness: float, gap_m: float) -> ContactLaw:
     """Turn a model's name, ``hertz`` or ``rigid:0.8`` for example, into its law.
 
+    Raises ValueError when the name is not one of the forms, or its numbers are not allowed.
+
     Parameters
     ----------
     text
         A word of `CONTACT_LAWS`, and what its form asks for behind a colon.
     contact_stiffness, gap_m
         What a fitted law is fitted to: k_contact [N/m^1.5] of the paper's stops, and the clearance [m].
-
-    Raises
-    ------
-    ValueError
-        When the name is not one of the forms, or its numbers are not allowed.
 
     """
     reference = Reference(contact_stiffness, gap_m)

@@ -74,6 +74,8 @@ def fitted_power_law(
 ) -> PowerLaw:
     """Fit a sum of powers to a Hertz contact as the paper does: equal force at p = gap + indentation.
 
+    Raises ValueError when an argument is not allowed.
+
     Parameters
     ----------
     exponents
@@ -83,11 +85,6 @@ def fitted_power_law(
     shares
         Part of that force which each power takes; they must add up to 1. The paper leaves it open; the
         default is equal parts.
-
-    Raises
-    ------
-    ValueError
-        When an argument is not allowed.
 
     """
     parts = [1.0 / len(exponents)] * len(exponents) if shares is None else list(shares)

@@ -23,11 +23,7 @@ def stroboscopic_section(
 ) -> Floats:
     """Follow a motion from time zero and keep its state after every drive period, shape (periods, 6).
 
-    Raises
-    ------
-    ValueError
-        When ``periods`` is below 1, or the run did not reach its end.
-
+    Raises ValueError when ``periods`` is below 1, or the run did not reach its end.
     """
     if periods < 1:
         msg = f"A section of {periods} periods is not allowed: ask for 1 or more."

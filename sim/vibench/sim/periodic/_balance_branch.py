@@ -169,13 +169,8 @@ def balance_branch_within(
 ) -> Branch:
     """Follow a solution both ways along a drive path to the ends of a range, ascending [Hz, or m].
 
-    As `periodic_branch_within`; harmonics are added where those left out would matter.
-
-    Raises
-    ------
-    ValueError
-        When the start did not converge, or lies outside.
-
+    As `periodic_branch_within`; harmonics are added where those left out would matter. Raises ValueError when
+    the start did not converge, or lies outside.
     """
     _refuse_no_solution(start)
     value = parameter_value(path, Harmonic(start.frequency_hz, start.amplitude_m))

@@ -91,6 +91,8 @@ class LoadedShaker:
     ) -> None:
         """Start with the table at rest.
 
+        Raises ValueError when the step is not positive and finite, or the specimen cannot start so.
+
         Parameters
         ----------
         amplifier, shaker, specimen
@@ -99,11 +101,6 @@ class LoadedShaker:
             Length of a step [s]; a hundredth of the shortest period of interest errs by 1e-3.
         start
             The specimen's x, y, z, vx, vy, vz [m, m/s], absolute, shape (6,).
-
-        Raises
-        ------
-        ValueError
-            When the step is not positive and finite, or the specimen cannot start so.
 
         """
         self.impacts = 0

@@ -23,11 +23,7 @@ class Disk(Protocol):
 def sole_writer(path: Path) -> OpenFile:
     """Open a file to write, and mark it so for as long as it is open.
 
-    Raises
-    ------
-    StudyError
-        When another process has it open to write, or it cannot be opened.
-
+    Raises StudyError when another process has it open to write, or it cannot be opened.
     """
     try:
         file = OpenFile(path)

@@ -58,11 +58,7 @@ class Executor(Protocol):
     def replies(self, timeout_s: float) -> Sequence[Reply]:
         """Give what has come back; waits for the first, at most ``timeout_s``.
 
-        Raises
-        ------
-        ClusterLost
-            When nothing can come back any more.
-
+        Raises ClusterLost when nothing can come back any more.
         """
 
     def cancel(self) -> Sequence[Reply]:

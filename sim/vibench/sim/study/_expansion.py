@@ -86,13 +86,8 @@ class Expansion:
     def scene(self, number: int, arrays: Arrays) -> Scene:
         """Make the scene of a point whose predecessor, if it has one, is done.
 
-        A point whose predecessor ended in no finite state begins at rest; its ``continues`` says so.
-
-        Raises
-        ------
-        ValueError
-            When a scene of these numbers is not allowed.
-
+        A point whose predecessor ended in no finite state begins at rest; its ``continues`` says so. Raises
+        ValueError when a scene of these numbers is not allowed.
         """
         before = self._predecessor(number, arrays)
         if before == NOBODY:

@@ -50,11 +50,7 @@ HEAD_BYTES = 2_000_000
 def make_file(path: Path, study: Study) -> None:
     """Create a study's file, all points missing, or leave nothing.
 
-    Raises
-    ------
-    StudyError
-        When the name is taken, the folder does not exist, or the disk is too full.
-
+    Raises StudyError when the name is taken, the folder does not exist, or the disk is too full.
     """
     _claim_name(path)
     making = path.with_name(path.name + MAKING_SUFFIX)
@@ -262,11 +258,7 @@ class FileStore:
     def keep(self, answers: Sequence[PointAnswer]) -> None:
         """Commit answers in an order that cannot lie.
 
-        Raises
-        ------
-        StudyError
-            When the disk refuses; what was committed before is kept.
-
+        Raises StudyError when the disk refuses; what was committed before is kept.
         """
         for answer in answers:
             cells = {**answer.cells, SESSION: self._session}
