@@ -39,7 +39,7 @@ def bench_report(bench: Bench, folder: Path, switch: StopSwitch | None = None) -
     Reads all channels in silence, while two per cent of the amplitude limit play at 160 Hz for some seconds,
     and in silence again.
 
-    Raises CheckStopped when somebody ended it, and InstrumentError when an instrument fails; what is merely wrong
+    Raises CheckStopped when somebody ended it, InstrumentError when an instrument fails; what is merely wrong
     is a finding.
 
     Parameters
