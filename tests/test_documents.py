@@ -5,7 +5,6 @@ import doctest
 import importlib
 import importlib.util
 import re
-import shutil
 import tomllib
 from functools import cache
 from pathlib import Path
@@ -119,8 +118,6 @@ def test_the_simulation_in_the_readme_runs(capsys):
 
 @pytest.mark.slow
 def test_the_measurement_in_the_readme_runs(tmp_path, monkeypatch, capsys):
-    for folder in ("campaigns", "hardware_configs"):
-        shutil.copytree(ROOT / folder, tmp_path / folder)
     monkeypatch.chdir(tmp_path)
     exec(code_of_the_readme("run_campaign"), {})
     assert "Resonance" in capsys.readouterr().out

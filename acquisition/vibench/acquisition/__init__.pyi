@@ -24,6 +24,7 @@ from .errors import (
     InstrumentError as InstrumentError,
     InstrumentLost as InstrumentLost,
     LimitExceeded as LimitExceeded,
+    MissingLibrary as MissingLibrary,
     RecordingError as RecordingError,
 )
 from .host import (
@@ -31,8 +32,12 @@ from .host import (
     all_shipped as all_shipped,
     follow_parent as follow_parent,
     load_toml as load_toml,
+    named as named,
+    naming_its_extra as naming_its_extra,
+    need_extra as need_extra,
     save_toml as save_toml,
     shipped as shipped,
+    shipped_folder as shipped_folder,
     shortened as shortened,
     toml_text as toml_text,
     validated as validated,

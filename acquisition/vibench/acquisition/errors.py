@@ -18,6 +18,10 @@ class ConfigurationError(AcquisitionError, ValueError):
     """
 
 
+class MissingLibrary(AcquisitionError, ImportError):
+    """A library is not installed, as a plain installation leaves it out; the text names its extra."""
+
+
 class InstrumentError(AcquisitionError):
     """An instrument refused a command, answered nonsense, or answered nothing in time."""
 

@@ -8,7 +8,8 @@ import importlib
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from importlib.metadata import version
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -19,6 +20,7 @@ from vibench.analysis import AnalysisError
 from vibench.sim.study import StudyError
 
 from . import blas_threads  # noqa: F401 - numpy reads its setting, so it comes first
+from .exit_code import ExitCode
 
 
 @dataclass(frozen=True)
@@ -161,6 +163,21 @@ COMMANDS = {
         "serve_rig", "serve_rig", "Serve the virtual rig to any pyvisa and nidaqmx program until Ctrl-C."
     ),
     "bench": Place("bench", "bench", "Look at the instruments."),
+    "examples": Place(
+        "examples",
+        "examples",
+        "List the campaigns, rigs, studies and scripts that come with vibench, or copy them to change them.",
+    ),
+    "warm": Place(
+        "warm",
+        "warm",
+        "Compile the simulation, and the virtual rig where it is installed, before the first use.",
+    ),
+    "doctor": Place(
+        "doctor",
+        "doctor",
+        "Say what this installation consists of, for a question to others: data only, nothing is changed.",
+    ),
 }
 
 app = typer.Typer(
@@ -168,14 +185,31 @@ app = typer.Typer(
     help="Vibro-impact shaker experiments: run them, record them, and say what they mean.",
     cls=late_commands(COMMANDS),
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     pretty_exceptions_enable=False,
 )
 
 
+def tell_version(*, asked: bool) -> None:
+    """Print the version, as ``--version`` alone asks for it."""
+    if asked:
+        typer.echo(f"vibench {version('vibench')}")
+        raise typer.Exit
+
+
 @app.callback()
-def vibench() -> None:
-    """Hold the commands; there is no option that all of them share."""
+def vibench(
+    _version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            is_eager=True,
+            callback=lambda asked: tell_version(asked=asked),
+            help="Print the version.",
+        ),
+    ] = False,
+) -> None:
+    """Hold the commands."""
 
 
 def main() -> None:
@@ -184,14 +218,14 @@ def main() -> None:
         app()
     except (AcquisitionError, AnalysisError, StudyError) as error:
         complain(error)
-        sys.exit(1)
+        sys.exit(ExitCode.FAILED)
     except OSError as error:
         if error.errno != errno.ENAMETOOLONG:
             raise
         # Whoever looks at a path first meets it: here is the one place that all paths have behind them.
         name = shortened(str(error.filename), NAME_SHOWN)
         complain(OSError(f"the name {name} is too long for this disk; nothing was done, give a shorter one"))
-        sys.exit(1)
+        sys.exit(ExitCode.FAILED)
 
 
 LONGEST_SENTENCE = 1800

@@ -35,6 +35,7 @@ from vibench.analysis.hidden_motion import HiddenMotion, hidden_motion, keep_hid
 from vibench.analysis.report import write_report
 from vibench.sim import Specimen
 
+from .exit_code import ExitCode
 from .external_data import AllowExternal, external_data
 from .output import bold, console, print_json
 from .paths import AsJson, room_for_folder, unused
@@ -291,7 +292,7 @@ def complain_about(results: CampaignResults) -> None:
     for failure in results.failures:
         typer.echo(f"error: {_named(failure)}", err=True)
     if any(failure.what is FailedStep.ANALYSIS for failure in results.failures):
-        raise typer.Exit(1)
+        raise typer.Exit(ExitCode.FAILED)
 
 
 def _named(failure: AnalysisFailure) -> str:

@@ -21,6 +21,7 @@ from vibench.acquisition import (
 from vibench.acquisition.engine import BenchLock
 from vibench.acquisition.rig import Rig, load_rig
 
+from .exit_code import ExitCode
 from .output import bold, console, print_json
 from .paths import AsJson, BenchPath, bench_path
 
@@ -32,7 +33,7 @@ def list_bench(
     bench: Annotated[
         Path | None,
         typer.Option(
-            "--bench", metavar="BENCH.toml", help="Search where this rig's are; this computer if absent."
+            "--bench", metavar="BENCH", help="Search where this rig's are; this computer if absent."
         ),
     ] = None,
     as_json: AsJson = False,
@@ -73,7 +74,7 @@ def check(
         )
         console.print(result.report.text(), markup=False, soft_wrap=True)
     if result.verdict is Verdict.FAIL:
-        raise typer.Exit(1)
+        raise typer.Exit(ExitCode.FAILED)
 
 
 def _now(path: Path, out: Path) -> CheckResult:

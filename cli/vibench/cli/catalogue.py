@@ -9,6 +9,7 @@ import typer
 
 from vibench.acquisition.campaign import CatalogueEntry, Refresh, list_recordings
 
+from .exit_code import ExitCode
 from .external_data import AllowExternal, external_data
 from .output import console, print_json
 from .paths import AsJson
@@ -35,7 +36,7 @@ def show_catalogue(
         if each.is_bad:
             typer.echo(f"error: {_named(each)}", err=True)
     if any(each.is_bad for each in entries):
-        raise typer.Exit(1)
+        raise typer.Exit(ExitCode.FAILED)
 
 
 def _named(entry: CatalogueEntry) -> str:

@@ -14,7 +14,8 @@ from vibench.analysis.report import write_report
 
 from .analyse import complain_about
 from .analyst import second_process
-from .measure import STOPPED_EXIT_CODE, the_bench
+from .exit_code import ExitCode
+from .measure import the_bench
 from .output import bold, console, write_json
 from .paths import unused
 from .progress_bars import analysis_bar
@@ -53,7 +54,7 @@ def demo(
             for point_result in point_results
             if point_result.outcome is PointOutcome.RECORDED
         } != set(campaign.recording_names()):
-            raise typer.Exit(STOPPED_EXIT_CODE)
+            raise typer.Exit(ExitCode.STOPPED)
         with analysis_bar(analyst.asked) as step:
             for _ in analyst.results():
                 step()

@@ -11,10 +11,10 @@ from vibench.analysis import InvalidRequest
 from vibench.analysis.report import DrawnFigure, ImageKind
 from vibench.sim.study import software
 
+from .exit_code import ExitCode
 from .interruption import told_to_stop
 from .output import bold, console, print_json
 from .paths import room_for_folder
-from .study import STOPPED_EXIT_CODE
 
 Part = TypeVar("Part")
 SHOWN = 24
@@ -81,4 +81,4 @@ def print_answer(document: Mapping[str, object], *, is_complete: bool) -> None:
 def leave(*, is_complete: bool) -> None:
     """End with the exit code that says whether an answer is whole."""
     if not is_complete:
-        raise typer.Exit(STOPPED_EXIT_CODE)
+        raise typer.Exit(ExitCode.STOPPED)

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from vibench.acquisition import named, need_extra
+
 from .paths import BenchPath
 
 WINDOW = "vibench.gui"
@@ -21,9 +23,10 @@ def gui(
     ] = None,
 ) -> None:
     """Open the window: connect, check, choose, preview, run, watch, compare."""
+    need_extra("gui")
     command = [sys.executable, "-m", WINDOW]
     if bench is not None:
-        command += ["--bench", str(bench)]
+        command += ["--bench", str(named(bench, "hardware_configs"))]
     if screenshots is not None:
         command += ["--screenshots", str(screenshots)]
     ended = subprocess.run(command, check=False)  # noqa: S603 - this interpreter, and our own package

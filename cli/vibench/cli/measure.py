@@ -27,6 +27,7 @@ from vibench.acquisition.engine import CampaignRequest, Engine, JobQueue, Reques
 from vibench.acquisition.rig import Rig
 
 from .engine_bars import Watching
+from .exit_code import ExitCode
 from .output import console, print_json
 from .paths import BenchPath, FaultsPath, rig_at
 
@@ -87,12 +88,11 @@ def messengers_of(notify: str | None, mail: Path | None) -> tuple[Messenger, ...
     return tuple(found)
 
 
-STOPPED_EXIT_CODE = 3
-"""Not everything was recorded, and nothing failed: somebody stopped it."""
-
-
 def measure(
-    campaign: Annotated[Path, typer.Argument(metavar="CAMPAIGN.toml", help="What to measure.")],
+    campaign: Annotated[
+        Path,
+        typer.Argument(metavar="CAMPAIGN", help="TOML file of what to measure, or a shipped name: quick."),
+    ],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the recordings.")],
     bench: BenchPath = None,
     resume: Annotated[
@@ -140,9 +140,9 @@ def measure(
     with the_bench(rig, plan.name) as engine:
         point_results = engine.measure(request, messengers=messengers)
     if engine.switch.request is not None:
-        raise typer.Exit(STOPPED_EXIT_CODE)
+        raise typer.Exit(ExitCode.STOPPED)
     if any(point_result.outcome is PointOutcome.FAILED for point_result in point_results):
-        raise typer.Exit(1)
+        raise typer.Exit(ExitCode.FAILED)
 
 
 @contextmanager

@@ -6,23 +6,31 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition import ConfigurationError, shipped
+from vibench.acquisition import ConfigurationError, named
 from vibench.acquisition.rig import Rig, load_rig, with_faults
 
 BenchPath = Annotated[
     Path | None,
-    typer.Option("--bench", metavar="BENCH.toml", help="Hardware configuration; the virtual rig if absent."),
+    typer.Option(
+        "--bench",
+        metavar="BENCH",
+        help="Hardware configuration, a file or a shipped name; virtual_rig if absent.",
+    ),
 ]
 FaultsPath = Annotated[
     Path | None,
-    typer.Option("--faults", metavar="FAULTS.toml", help="What goes wrong with a virtual rig, and when."),
+    typer.Option(
+        "--faults",
+        metavar="FAULTS",
+        help="What goes wrong with a virtual rig, and when; a file or night.",
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 
 
 def bench_path(given: Path | None) -> Path:
     """Path of the hardware configuration: what was given, or the virtual rig."""
-    return shipped("hardware_configs/virtual_rig.toml") if given is None else given
+    return named("virtual_rig" if given is None else given, "hardware_configs")
 
 
 def rig_at(bench: Path | None, faults: Path | None) -> Rig:

@@ -24,7 +24,7 @@ class ServedPace(StrEnum):
 
 def serve_rig(
     bench: Annotated[
-        Path | None, typer.Option("--bench", metavar="BENCH.toml", help="A rig with a table 'virtual'.")
+        Path | None, typer.Option("--bench", metavar="BENCH", help="A rig with a table 'virtual'.")
     ] = None,
     address: Annotated[
         str,

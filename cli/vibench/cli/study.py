@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition import load_toml
+from vibench.acquisition import load_toml, named
 from vibench.sim.study import (
     ExistingStudy,
     Study,
@@ -16,16 +16,13 @@ from vibench.sim.study import (
     solve_study,
 )
 
+from .exit_code import ExitCode
 from .external_data import AllowExternal, external_data
 from .interruption import told_to_stop
 from .output import console, print_json, print_warnings
 from .paths import AsJson
 from .progress_bars import study_bar
 
-STOPPED_EXIT_CODE = 3
-"""Not everything was computed, and nothing failed: somebody stopped it."""
-FAILED_EXIT_CODE = 1
-"""A point has no answer; all others are kept."""
 SHOWN_FAILURES = 5
 
 Workers = Annotated[
@@ -38,7 +35,10 @@ Cluster = Annotated[
 
 
 def study(
-    plan: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="What to predict.")],
+    plan: Annotated[
+        Path,
+        typer.Argument(metavar="STUDY", help="TOML file of what to predict, or a shipped name: paper."),
+    ],
     out: Annotated[Path, typer.Option("--out", metavar="FILE.h5", help="File for the answers.")],
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with what FILE.h5 does not hold yet.")
@@ -52,7 +52,7 @@ def study(
     as_json: AsJson = False,
 ) -> None:
     """Predict responses over every combination of what a file lists, longest first."""
-    asked = load_toml(plan, Study)
+    asked = load_toml(named(plan, "studies"), Study)
     print_warnings(plausibility_warnings(asked))
     if only_estimate:
         tell_work(asked, as_json)
@@ -106,9 +106,9 @@ def complain_about_points(results: StudyResults) -> None:
     Returns where every point is answered.
     """
     if say_failures(results) > 0:
-        raise typer.Exit(FAILED_EXIT_CODE)
+        raise typer.Exit(ExitCode.FAILED)
     if not results.is_complete:
-        raise typer.Exit(STOPPED_EXIT_CODE)
+        raise typer.Exit(ExitCode.STOPPED)
 
 
 def say_failures(results: StudyResults) -> int:
@@ -155,10 +155,10 @@ class KeptStudies:
                 f"stopped after {results.kept} of {study.grid.size} points; the same command goes on",
                 err=True,
             )
-            raise typer.Exit(STOPPED_EXIT_CODE)
+            raise typer.Exit(ExitCode.STOPPED)
         return results
 
     def complain(self) -> None:
         """End a command whose studies lack an answer; what it made of the others is there."""
         if self._failed > 0:
-            raise typer.Exit(FAILED_EXIT_CODE)
+            raise typer.Exit(ExitCode.FAILED)

@@ -10,6 +10,7 @@ import typer
 from vibench.acquisition.campaign import verify_recordings
 from vibench.acquisition.recording import SealDepth, seal_key
 
+from .exit_code import ExitCode
 from .external_data import AllowExternal, external_data
 from .output import console, print_json
 from .paths import AsJson
@@ -57,4 +58,4 @@ def verify(
     if bad:
         named = ", ".join(each.path for each in bad[:MOST_NAMED]) + (" and more" if bad[MOST_NAMED:] else "")
         typer.echo(f"error: {len(bad)} of {len(found)} recordings cannot be trusted: {named}", err=True)
-        raise typer.Exit(1)
+        raise typer.Exit(ExitCode.FAILED)

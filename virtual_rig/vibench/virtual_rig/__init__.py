@@ -22,4 +22,7 @@ In another process, ``plug_in_remote(rig.daq_address)`` puts the generator on py
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from vibench.acquisition import naming_its_extra
+
+_found, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__ = naming_its_extra(_found, "bench")

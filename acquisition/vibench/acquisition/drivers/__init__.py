@@ -8,4 +8,7 @@ cannot tell a simulated instrument from a real one.
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from ..host import naming_its_extra
+
+_found, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__ = naming_its_extra(_found, "bench")

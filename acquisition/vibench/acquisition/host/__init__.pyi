@@ -4,12 +4,18 @@ from ._chosen import (
 from ._closed_on_leaving import (
     ClosedOnLeaving as ClosedOnLeaving,
 )
+from ._extras import (
+    naming_its_extra as naming_its_extra,
+    need_extra as need_extra,
+)
 from ._follow_parent import (
     follow_parent as follow_parent,
 )
 from ._shipped import (
     all_shipped as all_shipped,
+    named as named,
     shipped as shipped,
+    shipped_folder as shipped_folder,
 )
 from ._toml_file import (
     FrozenModel as FrozenModel,

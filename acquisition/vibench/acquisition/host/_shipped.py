@@ -1,18 +1,25 @@
-"""Where vibench's own configurations and campaigns lie."""
+"""Where vibench's own configurations, campaigns, studies and examples lie."""
 
-import sysconfig
 from pathlib import Path
 
 from ..errors import ConfigurationError
 
 FOLDERS = (
+    Path(__file__).resolve().parents[2] / "shipped",  # installed from a wheel
     Path(__file__).resolve().parents[4],  # a checkout, or an editable install of one
-    Path(sysconfig.get_path("data")) / "share" / "vibench",  # installed from a wheel
 )
+SUFFIX = ".toml"
 
 
 def shipped(name: str) -> Path:
-    """Path of a file that comes with vibench, ``"hardware_configs/virtual_rig.toml"`` for example."""
+    """Path of a file that comes with vibench, ``"hardware_configs/virtual_rig.toml"`` for example.
+
+    Raises
+    ------
+    ConfigurationError
+        When this installation has no such file.
+
+    """
     for folder in FOLDERS:
         path = folder / name
         if path.is_file():
@@ -20,7 +27,49 @@ def shipped(name: str) -> Path:
     raise ConfigurationError(f"{name} is not part of this installation; give the path of your own file")
 
 
+def shipped_folder(folder: str) -> Path:
+    """Path of a folder that comes with vibench: campaigns, hardware_configs, studies, examples.
+
+    Raises
+    ------
+    ConfigurationError
+        When this installation has no such folder.
+
+    """
+    found = next((place / folder for place in FOLDERS if (place / folder).is_dir()), None)
+    if found is None:
+        raise ConfigurationError(f"{folder} is not part of this installation; give the path of your own file")
+    return found
+
+
 def all_shipped(folder: str) -> tuple[Path, ...]:
     """Every TOML file that comes with vibench in a folder, ``"campaigns"`` for example, by name."""
-    found = next((place / folder for place in FOLDERS if (place / folder).is_dir()), None)
-    return () if found is None else tuple(sorted(found.glob("*.toml")))
+    return tuple(sorted(shipped_folder(folder).glob(f"*{SUFFIX}")))
+
+
+def named(given: Path | str, folder: str) -> Path:
+    """Path of a user's file, or of the file in a shipped folder that a bare name like ``"quick"`` stands for.
+
+    Parameters
+    ----------
+    given
+        A path, or a name without folder and suffix; a file of the user that has this very name comes first.
+    folder
+        Where shipped ones lie, ``"campaigns"`` for example.
+
+    Raises
+    ------
+    ConfigurationError
+        When a bare name is neither; it lists the names that there are.
+
+    """
+    path = Path(given).expanduser()
+    if path.suffix or path.name != str(path) or path.exists():
+        return path
+    known = {each.stem: each for each in all_shipped(folder)}
+    if path.name not in known:
+        raise ConfigurationError(
+            f"{path.name!r} is neither a file here nor one of those that come with vibench: "
+            f"{', '.join(known)}; give one of these names, or the path of a TOML file"
+        )
+    return known[path.name]

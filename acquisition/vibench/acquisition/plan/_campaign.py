@@ -12,7 +12,7 @@ from typing import Any, Self
 from pydantic import Field, NonNegativeFloat, PositiveInt, model_validator
 
 from ..excitation import EXCITATION_KINDS
-from ..host import FrozenModel, load_toml
+from ..host import FrozenModel, load_toml, named
 from ._measurement import Measurement, Name, Point
 from ._schedule import measured_s
 from ._sweep import Sweep
@@ -118,9 +118,16 @@ def _recorded_s(points: tuple[Point, ...]) -> float:
     return sum(measured_s(point.measurement) for point in points)
 
 
-def load_campaign(path: Path) -> Campaign:
-    """Read a campaign; raises ConfigurationError with file, key and what is allowed."""
-    return load_toml(path, Campaign)
+def load_campaign(path: Path | str) -> Campaign:
+    """Read a campaign: a TOML file, or by its name (``"quick"``) one that comes with vibench.
+
+    Raises
+    ------
+    ConfigurationError
+        With file, key, what was given and what is allowed.
+
+    """
+    return load_toml(named(path, "campaigns"), Campaign)
 
 
 def _names(measurement: Measurement) -> tuple[str, ...]:

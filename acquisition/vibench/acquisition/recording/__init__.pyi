@@ -64,6 +64,7 @@ from ._results import (
     SavedResult as SavedResult,
 )
 from ._seal import (
+    KEY_VARIABLE as KEY_VARIABLE,
     SealCheck as SealCheck,
     SealDepth as SealDepth,
     SealKey as SealKey,

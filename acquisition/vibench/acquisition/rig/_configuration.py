@@ -11,7 +11,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_
 from vibench.sim import SpecimenTable
 
 from ..errors import ConfigurationError
-from ..host import FrozenModel, load_toml
+from ..host import FrozenModel, load_toml, named
 from ._output import OutputConfig
 from ._virtual import VirtualConfig, fastest_sample_rate_hz
 
@@ -269,8 +269,16 @@ class Rig(FrozenModel):
         )
 
 
-def load_rig(path: Path) -> Rig:
-    """Read a hardware configuration; raises ConfigurationError with file, key and what is allowed."""
+def load_rig(path: Path | str) -> Rig:
+    """Read a hardware configuration: a TOML file, or by its name (``"virtual_rig"``) a shipped one.
+
+    Raises
+    ------
+    ConfigurationError
+        With file, key, what was given and what is allowed.
+
+    """
+    path = named(path, "hardware_configs")
     rig = load_toml(path, Rig)
     if rig.virtual is None or rig.virtual.faults is None:
         return rig
@@ -291,5 +299,6 @@ def with_faults(rig: Rig, script: Path) -> Rig:
             f"{script}: the rig {rig.name!r} is a real one, and faults can be scripted on a virtual one "
             "only. Nothing was opened; leave the script out, or name a rig with a [virtual] table"
         )
+    script = named(script, "hardware_configs/faults")
     scripted = rig.virtual.model_copy(update={"faults": str(script.absolute())})
     return rig.model_copy(update={"virtual": scripted})

@@ -14,7 +14,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
-from vibench.acquisition import FrozenModel, load_toml
+from vibench.acquisition import FrozenModel, load_toml, named
 
 from ..world import World
 from ._faults import Heal, RigFaults, nothing_to_heal
@@ -243,9 +243,16 @@ class FaultScript(FrozenModel):
     faults: tuple[FaultKind, ...] = ()
 
 
-def load_fault_script(path: Path) -> FaultScript:
-    """Read a script; raises ConfigurationError with file, key and what is allowed."""
-    return load_toml(path, FaultScript)
+def load_fault_script(path: Path | str) -> FaultScript:
+    """Read a script of faults: a TOML file, or by its name (``"night"``) one that comes with vibench.
+
+    Raises
+    ------
+    ConfigurationError
+        With file, key, what was given and what is allowed.
+
+    """
+    return load_toml(named(path, "hardware_configs/faults"), FaultScript)
 
 
 @dataclass(frozen=True)

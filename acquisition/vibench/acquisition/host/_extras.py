@@ -1,0 +1,50 @@
+"""Libraries that a plain installation leaves out, and the sentence where one of them is needed."""
+
+from collections.abc import Callable, Mapping
+from importlib.util import find_spec
+from types import MappingProxyType
+
+from ..errors import MissingLibrary
+
+EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "bench": ("pyvisa", "pyvisa_py", "usb", "nidaqmx", "grpc", "google.protobuf"),
+        "gui": ("PySide6", "pyqtgraph"),
+    }
+)
+"""Extra of `pyproject.toml`: what it brings, by the names that are imported."""
+
+
+def need_extra(extra: str) -> None:
+    """Make sure that the libraries of an extra can be imported; imports none of them.
+
+    Raises
+    ------
+    MissingLibrary
+        When one is not installed.
+
+    """
+    for library in EXTRAS[extra]:
+        # The parent first: finding a submodule of what is missing raises.
+        if find_spec(library.partition(".")[0]) is None or find_spec(library) is None:
+            raise _missing(library, extra)
+
+
+def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[str], object]:
+    """Wrap the ``__getattr__`` of a face whose names need an extra: what is missing is told with its name."""
+
+    def told(name: str) -> object:
+        try:
+            return found(name)
+        except ModuleNotFoundError as error:
+            if error.name is None or error.name.partition(".")[0] in {"vibench", name}:
+                raise
+            raise _missing(error.name, extra) from error
+
+    return told
+
+
+def _missing(library: str, extra: str) -> MissingLibrary:
+    return MissingLibrary(
+        f"{library} is not installed, which this needs; nothing was opened: pip install 'vibench[{extra}]'"
+    )

@@ -1,0 +1,106 @@
+"""`vibench doctor`: what a question about this installation has to say, as text to paste."""
+
+import os
+import platform
+import re
+import shutil
+import sys
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
+
+from vibench.acquisition import MissingLibrary, need_extra, shipped_folder
+from vibench.sim.kernels import advance_clock
+from vibench.sim.operating_system import state_folder
+
+from .environment import VARIABLES, shown
+from .output import console, print_json
+from .paths import AsJson
+
+NOT_INSTALLED = "not installed"
+FOR_DEVELOPERS = frozenset({"test", "docs", "peers"})
+"""Extras that no question of a user is about."""
+USB_DEVICES = Path("/dev/bus/usb")
+
+
+def doctor(as_json: AsJson = False) -> None:
+    """Say what this installation consists of, for a question to others: data only, nothing is changed."""
+    sections = {
+        "vibench": installation(),
+        "libraries": dict(libraries()),
+        "folders": dict(folders()),
+        "instruments": dict(instruments()),
+        "environment": {name: shown(name) for name in VARIABLES if name in os.environ},
+    }
+    if as_json:
+        print_json(sections)
+        return
+    for title, facts in sections.items():
+        console.print(f"{title}:")
+        for name, said in facts.items():
+            console.print(f"  {name}: {said}")
+
+
+def installation() -> dict[str, str]:
+    """Give versions and places of vibench, Python and system."""
+    library = " ".join(platform.libc_ver()).strip()
+    return {
+        "version": version("vibench"),
+        "shipped files": str(shipped_folder("campaigns").parent),
+        "python": f"{platform.python_version()} at {sys.executable}",
+        "system": f"{platform.platform()}{f', {library}' if library else ''}",
+        "processors": str(os.cpu_count()),
+    }
+
+
+def libraries() -> Iterator[tuple[str, str]]:
+    """Give the version of each library that vibench asks for; of an extra's, whether it is there."""
+    for requirement in dict.fromkeys(requires("vibench") or ()):
+        name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
+        extra = re.search(r"""extra == ['"](\w+)['"]""", requirement)
+        if name == "vibench" or (extra and extra[1] in FOR_DEVELOPERS):
+            continue
+        try:
+            yield name, version(name)
+        except PackageNotFoundError:
+            yield name, f"{NOT_INSTALLED}{f' (extra {extra[1]})' if extra else ''}"
+
+
+def folders() -> Iterator[tuple[str, str]]:
+    """Give where vibench keeps what it learns and compiles, and whether it may write there."""
+    state, here = state_folder(), Path.cwd()
+    # Where numba writes in truth: it falls back on a folder of the user if the first is not writable.
+    compiled = Path(advance_clock.stats.cache_path).parent  # type: ignore[attr-defined]
+    yield "state", _place(state)
+    yield "compiled kernels", f"{_place(compiled)}, {_size_mb(compiled):.0f} MB"
+    yield "this folder", _place(here)
+
+
+def _place(folder: Path) -> str:
+    standing = next(each for each in (folder, *folder.parents) if each.exists())
+    may = "writable" if os.access(standing, os.W_OK) else "NOT writable"
+    return f"{folder}, {may}, {shutil.disk_usage(standing).free / 1e9:.1f} GB free"
+
+
+def _size_mb(folder: Path) -> float:
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) / 1e6
+
+
+def instruments() -> Iterator[tuple[str, str]]:
+    """Give what can be seen of instruments, and what stands in between: libraries, drivers, permissions."""
+    try:
+        need_extra("bench")
+    except MissingLibrary as error:
+        yield "libraries", str(error)
+        return
+    from vibench.acquisition import list_instruments  # noqa: PLC0415 - loads the instruments' libraries
+
+    found = list_instruments()
+    yield "VISA", ", ".join(found.visa_resources) or "no instrument"
+    yield "DAQmx", ", ".join(str(device.name) for device in found.daq_devices) or "no device"
+    for number, remark in enumerate(found.remarks, 1):
+        yield f"remark {number}", remark
+    if USB_DEVICES.is_dir():
+        devices = [path for path in USB_DEVICES.glob("*/*") if not path.is_dir()]
+        mine = sum(os.access(path, os.R_OK | os.W_OK) for path in devices)
+        yield "USB devices", f"{mine} of {len(devices)} may be opened by this account"

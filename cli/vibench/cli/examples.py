@@ -1,0 +1,67 @@
+"""`vibench examples`: what comes with vibench, by name, and copies of it to change."""
+
+import shutil
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.acquisition import ConfigurationError, shipped_folder
+
+from .output import console, print_json
+from .paths import AsJson, room_for_folder
+
+FOLDERS = ("campaigns", "hardware_configs", "studies", "examples")
+
+
+def examples(
+    copy: Annotated[
+        Path | None,
+        typer.Option("--copy", metavar="DIR", help="Copy all of them there; nothing is overwritten."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """List the campaigns, rigs, studies and scripts that come with vibench, or copy them to change them."""
+    found = {folder: files_of(shipped_folder(folder)) for folder in FOLDERS}
+    if copy is not None:
+        copy_all(found, copy)
+    if as_json:
+        print_json({folder: [str(path) for path in paths] for folder, paths in found.items()})
+    elif copy is None:
+        for folder, paths in found.items():
+            console.print(f"{folder}: {', '.join(path.stem for path in paths)}")
+        console.print("vibench measure quick --out DIR takes a name; --copy DIR gives files to change")
+    else:
+        console.print(f"copied {sum(map(len, found.values()))} files to {copy}")
+
+
+def files_of(folder: Path) -> list[Path]:
+    """Give the files of a shipped folder, those of its folders too."""
+    return sorted(
+        path
+        for path in folder.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts and not path.name.startswith(".")
+    )
+
+
+def copy_all(found: dict[str, list[Path]], target: Path) -> None:
+    """Copy every file into a folder of the same name under ``target``.
+
+    Raises
+    ------
+    ConfigurationError
+        Before anything is copied, when a file of that name is there.
+
+    """
+    room_for_folder(target)
+    copies = {
+        path: target / folder / path.relative_to(shipped_folder(folder))
+        for folder, paths in found.items()
+        for path in paths
+    }
+    standing = next((each for each in copies.values() if each.exists()), None)
+    if standing is not None:
+        raise ConfigurationError(f"{standing} exists already; nothing was copied, give another folder")
+    for path, copy in copies.items():
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, copy)

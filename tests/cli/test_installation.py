@@ -1,0 +1,151 @@
+"""What a new user meets first: version, shipped files, a description of the installation, missing extras."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from vibench.acquisition import shipped_folder
+from vibench.cli.environment import VARIABLES
+from vibench.cli.exit_code import ExitCode
+
+ROOT = Path(__file__).resolve().parents[2]
+PORTIONS = ("acquisition", "analysis", "cli", "gui", "sim", "virtual_rig")
+
+WITHOUT = """
+import sys
+for library in {libraries!r}:
+    sys.modules[library] = None
+sys.argv = ["vibench", *{arguments!r}]
+from vibench.cli import main
+main()
+"""
+
+
+def without(libraries, *arguments, cwd):
+    """Run ``vibench`` where some libraries cannot be imported."""
+    program = WITHOUT.format(libraries=libraries, arguments=arguments)
+    environment = {**os.environ, "COLUMNS": "200"}
+    return subprocess.run(
+        [sys.executable, "-c", program], cwd=cwd, env=environment, capture_output=True, text=True, check=False
+    )
+
+
+def test_the_version_is_that_of_the_package(vibench_here, tmp_path):
+    assert vibench_here("--version", cwd=tmp_path).stdout == f"vibench {version('vibench')}\n"
+
+
+def test_a_shipped_campaign_is_estimated_by_name_from_an_empty_folder(vibench_here, tmp_path):
+    told = vibench_here("measure", "quick", "--out", "out", "--estimate", "--json", cwd=tmp_path)
+    assert json.loads(told.stdout)["recordings"] == 15
+    assert not (tmp_path / "out").exists()
+
+
+def test_copies_of_what_is_shipped_are_whole_and_never_overwrite(vibench_here, tmp_path):
+    assert vibench_here("examples", "--copy", "mine", cwd=tmp_path).returncode == 0
+    for folder in ("campaigns", "hardware_configs", "studies", "examples"):
+        for path in shipped_folder(folder).rglob("*.toml"):
+            copy = tmp_path / "mine" / folder / path.relative_to(shipped_folder(folder))
+            assert copy.read_bytes() == path.read_bytes()
+    changed = tmp_path / "mine" / "campaigns" / "quick.toml"
+    changed.write_text("changed", encoding="utf-8")
+    again = vibench_here("examples", "--copy", "mine", cwd=tmp_path)
+    assert again.returncode == 1
+    assert "exists already; nothing was copied" in again.stderr
+    assert changed.read_text(encoding="utf-8") == "changed"
+
+
+def test_the_doctor_names_versions_folders_and_permissions_and_keeps_secrets(vibench_here, tmp_path):
+    environment = {"VIBENCH_RIG_TOKEN": "do-not-tell", "VIBENCH_STATE_DIR": str(tmp_path / "state")}
+    told = vibench_here("doctor", "--json", cwd=tmp_path, environment=environment)
+    sections = json.loads(told.stdout)
+    assert sections["libraries"]["numba"] == version("numba")
+    assert sections["folders"]["state"].startswith(f"{tmp_path / 'state'}, writable, ")
+    assert re.search(r"kernels-\w+, writable, .* MB$", sections["folders"]["compiled kernels"])
+    assert sections["environment"]["VIBENCH_RIG_TOKEN"] == "(set, secret)"
+    assert "do-not-tell" not in told.stdout
+    assert vibench_here("doctor", cwd=tmp_path).stdout.startswith("vibench:\n  version: ")
+
+
+@pytest.mark.parametrize(
+    ("words", "completed"),
+    [("vibench pre", "predict"), ("vibench predict --ampl", "--amplitude"), ("vibench bench ch", "check")],
+)
+def test_a_shell_completes_commands_and_their_options(vibench, tmp_path, words, completed):
+    asked = {"_VIBENCH_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(words.count(" "))}
+    program = [
+        sys.executable,
+        "-c",
+        "import sys; sys.argv[0] = 'vibench'; from vibench.cli import main; main()",
+    ]
+    told = subprocess.run(program, env={**os.environ, **asked}, capture_output=True, text=True, check=False)
+    assert completed in told.stdout.split()
+
+
+@pytest.mark.parametrize(
+    ("library", "arguments", "extra"),
+    [
+        ("pyvisa", ("bench", "list"), "bench"),
+        ("nidaqmx", ("measure", "quick", "--out", "out"), "bench"),
+        ("grpc", ("serve-rig",), "bench"),
+        ("PySide6", ("gui",), "gui"),
+        ("pyqtgraph", ("gui",), "gui"),
+    ],
+)
+def test_a_missing_library_is_one_sentence_with_the_command_that_brings_it(
+    tmp_path, library, arguments, extra
+):
+    told = without([library], *arguments, cwd=tmp_path)
+    assert told.returncode == 1
+    assert told.stderr.startswith(f"error: {library}")
+    assert f"pip install 'vibench[{extra}]'" in told.stderr
+    assert "Traceback" not in told.stderr
+    assert not (tmp_path / "out").exists()
+
+
+EXTRAS = ["pyvisa", "pyvisa_py", "usb", "nidaqmx", "grpc", "google.protobuf", "PySide6", "pyqtgraph"]
+
+
+def test_a_prediction_needs_neither_instruments_nor_the_window(tmp_path):
+    arguments = ("predict", "--model", "linear", "--amplitude", "1e-6", "--frequency", "95", "--json")
+    told = without(EXTRAS, *arguments, cwd=tmp_path)
+    assert json.loads(told.stdout)["points"][0]["relative_i"] > 0, told.stderr
+
+
+def test_plans_recordings_and_figures_need_neither_instruments_nor_the_window(tmp_path):
+    program = (
+        f"import sys\nfor library in {EXTRAS!r}: sys.modules[library] = None\n"
+        "from vibench.acquisition import load_campaign, open_recording, run_campaign\n"
+        "from vibench.analysis import analyse\nfrom vibench.analysis.report import result_figures\n"
+        "print(load_campaign('paper').name)"
+    )
+    told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert told.stdout == "paper\n", told.stderr
+
+
+def test_the_page_lists_the_exit_codes_and_variables_that_there_are():
+    page = (ROOT / "docs" / "installation.md").read_text(encoding="utf-8")
+    assert [int(each) for each in re.findall(r"^\| (\d) \|", page, flags=re.M)] == list(ExitCode)
+    assert dict(re.findall(r"^\| `([A-Z_]+)` \| (.+) \|$", page, flags=re.M)) == {
+        name: told.replace("'", "`") for name, told in VARIABLES.items()
+    }
+
+
+def test_every_variable_that_the_sources_read_is_on_the_page():
+    read = r"""(?:environ(?:\.get|\.setdefault)?[\[(]|VARIABLE = )["']([A-Z][A-Z_]+)["']"""
+    sources = [path for portion in PORTIONS for path in (ROOT / portion).rglob("*.py")]
+    found = {name for path in sources for name in re.findall(read, path.read_text(encoding="utf-8"))}
+    page = (ROOT / "docs" / "installation.md").read_text(encoding="utf-8")
+    assert {"VIBENCH_STATE_DIR", "VIBENCH_SEAL_KEY", "OPENBLAS_NUM_THREADS"} <= found
+    assert [name for name in sorted(found) if f"`{name}`" not in page] == []
+
+
+def test_a_command_ends_with_an_exit_code_that_has_a_name():
+    numbered = re.compile(r"(?:sys\.exit|typer\.Exit)\(\d")
+    loose = [path.name for path in (ROOT / "cli").rglob("*.py") if numbered.search(path.read_text("utf-8"))]
+    assert loose == []
