@@ -3,10 +3,10 @@
     python benchmarks/installations.py --out table.md
     python benchmarks/installations.py --python python3.12 python3.13 --extra none bench --form wheel
 
-Each combination of interpreter, form (wheel, editable), extra and versions (newest, lowest) gets an environment
-and a compile cache of its own, and runs from an empty folder: ``vibench --version``, a prediction, the same
-again, then, where the extra has it, the shipped campaign by name and its analysis. Processor seconds, not
-seconds of a clock: other programs may run.
+Each combination of interpreter, form (wheel, editable), extra and versions (newest, lowest) gets an
+environment and a compile cache of its own, and runs from an empty folder: ``vibench --version``, a
+prediction, the same again, then, where the extra has it, the shipped campaign by name and its analysis.
+Processor seconds, not seconds of a clock: other programs may run.
 """
 
 import argparse
