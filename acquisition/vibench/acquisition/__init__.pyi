@@ -31,6 +31,7 @@ from .host import (
     FrozenModel as FrozenModel,
     all_shipped as all_shipped,
     follow_parent as follow_parent,
+    json_schema as json_schema,
     load_toml as load_toml,
     named as named,
     naming_its_extra as naming_its_extra,

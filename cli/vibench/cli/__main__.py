@@ -168,6 +168,11 @@ COMMANDS = {
         "examples",
         "List the campaigns, rigs, studies and scripts that come with vibench, or copy them to change them.",
     ),
+    "schema": Place(
+        "schema",
+        "schema",
+        "Print the JSON Schema (draft 4) of a kind of TOML file, for an editor that checks as one types.",
+    ),
     "warm": Place(
         "warm",
         "warm",

@@ -11,7 +11,7 @@ from vibench.acquisition import ConfigurationError, shipped_folder
 from .output import console, print_json
 from .paths import AsJson, room_for_folder
 
-FOLDERS = ("campaigns", "hardware_configs", "studies", "examples")
+FOLDERS = ("campaigns", "hardware_configs", "studies", "schemas", "examples")
 
 
 def examples(

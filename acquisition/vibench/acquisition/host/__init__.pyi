@@ -11,6 +11,9 @@ from ._extras import (
 from ._follow_parent import (
     follow_parent as follow_parent,
 )
+from ._schema import (
+    json_schema as json_schema,
+)
 from ._shipped import (
     all_shipped as all_shipped,
     named as named,

@@ -2,7 +2,7 @@
 
 import json
 import reprlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,6 +11,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from vibench.sim import UnreadableTomlError, toml_table
 
 from ..errors import ConfigurationError
+from ._schema import FORMAT, VERSION, schema_line
+from ._shipped import shipped_folder
 
 
 class FrozenModel(BaseModel):
@@ -37,7 +39,33 @@ def load_toml(path: Path, model: type[Model]) -> Model:
         content = toml_table(path)
     except UnreadableTomlError as error:
         raise ConfigurationError(str(error)) from error
+    content = migrated(content, model.__name__, str(path))
     return validated(content, model, str(path), path.absolute().parent)
+
+
+MIGRATIONS: dict[tuple[str, int], Callable[[dict[str, Any]], dict[str, Any]]] = {}
+"""Name of a model, version of a file: how its content becomes that of the next version."""
+
+
+def migrated(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]:
+    """Bring the content of a file that says its version up to the present one.
+
+    Raises
+    ------
+    ConfigurationError
+        When a later vibench wrote it, or what stands there is no version.
+
+    """
+    written = content.pop(FORMAT, VERSION)
+    if not isinstance(written, int) or isinstance(written, bool) or not 1 <= written <= VERSION:
+        raise ConfigurationError(
+            f"{origin}: {FORMAT} = {_shown(written)} is not a version that this vibench reads, 1 to "
+            f"{VERSION}; a later vibench wrote it: install that one"
+        )
+    for version in range(written, VERSION):
+        if (model, version) in MIGRATIONS:
+            content = MIGRATIONS[model, version](content)
+    return content
 
 
 def validated(content: dict[str, Any], model: type[Model], origin: str, folder: Path | None = None) -> Model:
@@ -142,7 +170,8 @@ def save_toml(model: BaseModel, path: Path) -> None:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(toml_text(model), encoding="utf-8")
+        schema = schema_line(model, shipped_folder("schemas"))
+        path.write_text(schema + toml_text(model), encoding="utf-8")
     except OSError as error:
         raise ConfigurationError(
             f"{path}: cannot be written ({error.strerror}); save it elsewhere"

@@ -1,0 +1,170 @@
+"""JSON Schemas of the TOML files that people write, for editors: what may stand where, as they are typed.
+
+Draft 4, since taplo, the language server of most editors for TOML, knows no later one. A schema is wider than
+its model where a file may leave out what its defaults or the specimen that it names say; never narrower.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, cast
+
+from pydantic import BaseModel
+
+from ..errors import ConfigurationError
+
+VERSION = 1
+"""Of all schemas; the next one comes with a change that an old file does not survive."""
+FORMAT = "format_version"
+"""Key by which a file may say which version it was written for; the present one if absent."""
+DRAFT = "http://json-schema.org/draft-04/schema#"
+_SPECIMEN = {"type": "string", "description": "Name or path of the specimen that this one starts from."}
+_RANGE = {
+    "type": "object",
+    "properties": {each: {"type": "number"} for each in ("start", "stop", "step")},
+    "required": ["start", "stop", "step"],
+    "additionalProperties": False,
+}
+Json = dict[str, Any]
+
+
+def _with_defaults(schema: Json) -> None:
+    """Let ``[defaults]`` and templates say what measurements and their excitations leave out."""
+    parts = schema["definitions"]
+    kinds = [
+        part["$ref"].rpartition("/")[2] for part in parts["Measurement"]["properties"]["excitation"]["oneOf"]
+    ]
+    for name in (*kinds, "Measurement"):
+        parts[name]["required"] = ["kind"] if "kind" in parts[name]["properties"] else []
+    shared: Json = {
+        name: part for name, part in parts["Measurement"]["properties"].items() if name not in {"name"}
+    }
+    for name in kinds:
+        of_kind = {**parts[name], "required": []}
+        del of_kind["required"]
+        parts[f"Shared{name}"] = of_kind
+        shared[parts[name]["properties"]["kind"]["enum"][0]] = {"$ref": f"#/definitions/Shared{name}"}
+    schema["properties"]["defaults"] = {"type": "object", "properties": shared, "additionalProperties": False}
+    template = {"anyOf": [{"$ref": f"#/definitions/Shared{name}"} for name in kinds]}
+    parts["Template"] = {
+        **parts["Measurement"],
+        "properties": {**parts["Measurement"]["properties"], "excitation": template},
+    }
+    del parts["Template"]["required"], parts["Measurement"]["required"]
+    parts["Sweep"]["properties"]["measurement"] = {"$ref": "#/definitions/Template"}
+    parts["Sweep"]["properties"]["excitations"] = {"type": "array", "items": template}
+
+
+def _with_a_base(schema: Json) -> None:
+    """Let a specimen start from a named one; a name alone is that one."""
+    for name, part in schema["definitions"].items():
+        if "masses_kg" in part.get("properties", {}):
+            part["properties"]["model"] = _SPECIMEN
+            part.pop("required", None)
+            schema["definitions"][name] = {"anyOf": [{"type": "string"}, part]}
+
+
+def _with_ranges(schema: Json) -> None:
+    """Let frequencies be ranges, numbers, and lists of both; a specimen's former key still stands for it."""
+    _with_a_base(schema)
+    several = {"type": "array", "items": {"anyOf": [{"type": "number"}, _RANGE]}, "minItems": 1}
+    schema["properties"]["frequencies_hz"] = {"anyOf": [_RANGE, several]}
+    schema["properties"]["structure"] = schema["properties"]["specimen"]
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """One kind of file: where its model stands, and what its files may leave to others."""
+
+    face: str
+    model: str
+    widen: Callable[[Json], None]
+
+    def load(self) -> type[BaseModel]:
+        found: type[BaseModel] = getattr(import_module(self.face), self.model)
+        return found
+
+
+SCHEMAS: Mapping[str, _Kind] = MappingProxyType(
+    {
+        "campaign": _Kind("vibench.acquisition.plan", "Campaign", _with_defaults),
+        "rig": _Kind("vibench.acquisition.rig", "Rig", _with_a_base),
+        "study": _Kind("vibench.sim.study", "Study", _with_ranges),
+        "mapping": _Kind("vibench.analysis.exchange", "ImportMapping", _with_a_base),
+    }
+)
+"""Word of a kind of file: what it is. Loaded by name: the models stand in higher rooms."""
+
+
+def json_schema(kind: str) -> Json:
+    """Give the JSON Schema (draft 4) of a kind of TOML file.
+
+    Parameters
+    ----------
+    kind
+        ``campaign``, ``rig``, ``study`` or ``mapping``.
+
+    Raises
+    ------
+    ConfigurationError
+        For any other word.
+
+    """
+    if kind not in SCHEMAS:
+        raise ConfigurationError(f"there is no schema of {kind!r}; there are {', '.join(SCHEMAS)}")
+    made: Json = _draft_4(SCHEMAS[kind].load().model_json_schema())
+    SCHEMAS[kind].widen(made)
+    made["properties"][FORMAT] = {"enum": [VERSION]}
+    return {"$schema": DRAFT, "title": f"vibench {kind}, version {VERSION}", **made}
+
+
+def schema_name(kind: str) -> str:
+    """Name of the file that comes with vibench, below its folder ``schemas``."""
+    return f"{kind}-{VERSION}.schema.json"
+
+
+def schema_line(model: BaseModel, schemas: Path) -> str:
+    """Give the line that tells an editor the schema of a file, or nothing where there is none."""
+    kind = next((kind for kind, each in SCHEMAS.items() if each.model == type(model).__name__), None)
+    return "" if kind is None else f"#:schema {(schemas / schema_name(kind)).as_uri()}\n"
+
+
+def _draft_4(part: Any) -> Any:
+    """Say in draft 4 what pydantic says in draft 2020-12, without what TOML has not: null."""
+    match part:
+        case list():
+            return [_draft_4(each) for each in part]
+        case dict():
+            part = cast("Json", part)
+            return _older(
+                {_KEYS.get(key, key): _draft_4(each) for key, each in part.items() if key not in _NEW}
+            )
+        case str():
+            return part.replace("#/$defs/", "#/definitions/")
+        case _:
+            return part
+
+
+_KEYS: Mapping[str, str] = {"$defs": "definitions"}
+_NEW = frozenset({"discriminator", "title", "examples"})
+
+
+def _older(part: Json) -> Json:
+    if "const" in part:
+        part["enum"] = [part.pop("const")]
+    for limit, exclusive in (("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum")):
+        if not isinstance(part.get(exclusive), bool) and isinstance(part.get(exclusive), int | float):
+            part[limit], part[exclusive] = part[exclusive], True
+    if "prefixItems" in part:
+        part["items"], part["additionalItems"] = part.pop("prefixItems"), False
+    choices = part.get("anyOf")
+    if isinstance(choices, list):
+        kept = [each for each in choices if each != {"type": "null"}]
+        part["anyOf"] = kept
+        if part.get("default", ...) is None:
+            del part["default"]
+    if "$ref" in part and len(part) > 1:  # its neighbours would not be read
+        part["allOf"] = [{"$ref": part.pop("$ref")}]
+    return part

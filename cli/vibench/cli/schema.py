@@ -1,0 +1,16 @@
+"""`vibench schema`: the JSON Schema of a kind of TOML file, for editors and other programs."""
+
+from typing import Annotated
+
+import typer
+
+from vibench.acquisition import json_schema
+
+from .output import print_json
+
+
+def schema(
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="campaign, rig, study or mapping.")],
+) -> None:
+    """Print the JSON Schema (draft 4) of a kind of TOML file, for an editor that checks as one types."""
+    print_json(json_schema(kind))

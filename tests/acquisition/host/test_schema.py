@@ -1,0 +1,188 @@
+"""JSON Schemas of the TOML files: as wide as what is loaded, and narrow enough to show a slip."""
+
+import json
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from vibench.acquisition import (
+    ConfigurationError,
+    all_shipped,
+    json_schema,
+    load_campaign,
+    load_toml,
+    save_toml,
+    shipped_folder,
+)
+from vibench.acquisition.plan import Campaign
+from vibench.acquisition.rig import Rig
+from vibench.analysis.exchange import ImportMapping
+from vibench.sim.study import Study
+
+jsonschema = pytest.importorskip("jsonschema", reason="pip install vibench[test] brings jsonschema")
+
+MODELS = {"campaign": Campaign, "rig": Rig, "study": Study, "mapping": ImportMapping}
+FOLDERS = {"campaign": "campaigns", "rig": "hardware_configs", "study": "studies"}
+MAPPING = """
+specimen = "gong2025"
+origin = "real"
+started_utc = 2026-01-01T00:00:00Z
+[measurement]
+name = "dwell"
+excitation = { kind = "dwell", amplitude_vpp = 1, frequency_hz = 260, settle_s = 1, duration_s = 2 }
+[[channels]]
+source = "1"
+role = "base_acceleration"
+[[channels]]
+source = "2"
+role = "m0_velocity"
+scale = 0.125
+"""
+
+
+def as_json(text):
+    """Read TOML as an editor hands it to a schema: dates are strings."""
+    return json.loads(json.dumps(tomllib.loads(text), default=str))
+
+
+def faults(kind, text):
+    return list(jsonschema.Draft4Validator(json_schema(kind)).iter_errors(as_json(text)))
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_a_schema_is_draft_4_and_the_file_that_comes_with_vibench_is_it(kind):
+    schema = json_schema(kind)
+    jsonschema.Draft4Validator.check_schema(schema)
+    newer = {"$defs", "const", "prefixItems", "if", "contains", "propertyNames", "discriminator"}
+    assert newer.isdisjoint(keys(schema))
+    written = shipped_folder("schemas") / f"{kind}-1.schema.json"
+    # vibench schema KIND > schemas/KIND-1.schema.json
+    assert json.loads(written.read_text(encoding="utf-8")) == schema
+
+
+def keys(part):
+    """Give every key of a schema that is a keyword, names of properties and definitions apart."""
+    match part:
+        case list():
+            return {key for each in part for key in keys(each)}
+        case dict():
+            named = part.keys() & {"properties", "definitions"}
+            inner = [each for key in named for each in part[key].values()]
+            inner += [each for key, each in part.items() if key not in named]
+            return set(part) | {key for each in inner for key in keys(each)}
+        case _:
+            return set()
+
+
+@pytest.mark.parametrize("kind", FOLDERS)
+def test_every_shipped_file_names_its_schema_and_passes_it(kind):
+    for path in all_shipped(FOLDERS[kind]):
+        text = path.read_text(encoding="utf-8")
+        assert text.startswith(f"#:schema ../schemas/{kind}-1.schema.json\n"), path
+        assert (path.parent / text.split()[1]).is_file()
+        assert faults(kind, text) == [], path
+
+
+@pytest.mark.parametrize(
+    ("kind", "text"),
+    [
+        ("mapping", MAPPING),
+        ("study", "amplitudes_m = [1e-6]\nfrequencies_hz = [10, {start = 20, stop = 30, step = 5}]"),
+        ("study", 'structure = "heavy"\namplitudes_m = [1e-6]\nfrequencies_hz = {start=9,stop=30,step=5}'),
+        (
+            "campaign",
+            (
+                'name = "x"\n[defaults]\nramp_s = 0.2\n[defaults.dwell]\namplitude_vpp = 1\nduration_s = 2\n'
+                '[[measurements]]\nname = "d"\nexcitation = {kind = "dwell", frequency_hz = 260, settle_s=1}'
+            ),
+        ),
+        (
+            "campaign",
+            (
+                'name = "x"\n[[sweeps]]\nname = "s"\nfrequency_hz = [200, 210]\namplitude_vpp = [1.0]\n'
+                'measurement = {excitation = {kind = "dwell", settle_s = 1, duration_s = 2}}'
+            ),
+        ),
+    ],
+)
+def test_what_is_loaded_passes_the_schema(kind, text, tmp_path):
+    path = tmp_path / "file.toml"
+    path.write_text(text, encoding="utf-8")
+    load_toml(path, MODELS[kind])
+    assert faults(kind, text) == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "old", "new"),
+    [
+        ("campaign", "ramp_s = 0.3", "ramp = 0.3"),
+        ("campaign", "realisations = 2", 'realisations = "two"'),
+        ("campaign", 'kind = "dwell"', 'kind = "dwel"'),
+        ("campaign", "attempts = 2", "attempts = 0"),
+        ("rig", "amplitude_limit_vpp = 10.0", "amplitude_limit = 10.0"),
+        ("rig", "connected_ohm = 15000", "connected_ohm = -15000"),
+        ("study", 'accuracy = "standard"', 'accuracy = "better"'),
+        ("study", "step = 1", "steps = 1"),
+        ("mapping", 'role = "m0_velocity"', 'role = "m0 velocity"'),
+        ("mapping", 'source = "1"', 'sauce = "1"'),
+    ],
+)
+def test_a_slip_that_is_refused_on_loading_is_shown_while_it_is_typed(kind, old, new, tmp_path):
+    named = {"campaign": "quick", "rig": "virtual_rig", "study": "paper"}
+    right = (
+        MAPPING
+        if kind == "mapping"
+        else (shipped_folder(FOLDERS[kind]) / f"{named[kind]}.toml").read_text(encoding="utf-8")
+    )
+    wrong = right.replace(old, new, 1)
+    assert wrong != right
+    path = tmp_path / "wrong.toml"
+    path.write_text(wrong, encoding="utf-8")
+    with pytest.raises(ConfigurationError):
+        load_toml(path, MODELS[kind])
+    assert faults(kind, wrong) != []
+
+
+def test_a_file_that_is_written_names_its_schema_and_comes_back(tmp_path):
+    campaign = load_campaign("paper")
+    save_toml(campaign, tmp_path / "mine.toml")
+    text = (tmp_path / "mine.toml").read_text(encoding="utf-8")
+    uri = text.split("\n")[0].removeprefix("#:schema ")
+    assert uri == (shipped_folder("schemas") / "campaign-1.schema.json").as_uri()
+    assert load_campaign(tmp_path / "mine.toml") == campaign
+    assert faults("campaign", text) == []
+
+
+@pytest.mark.parametrize("version", ["2", "0", '"1"', "true", "1.0"])
+def test_a_file_of_a_later_version_is_refused_with_what_to_do(version, tmp_path):
+    path = Path(tmp_path) / "later.toml"
+    text = (shipped_folder("campaigns") / "quick.toml").read_text(encoding="utf-8")
+    path.write_text(f"format_version = {version}\n{text}", encoding="utf-8")
+    with pytest.raises(ConfigurationError, match="a later vibench wrote it: install that one"):
+        load_campaign(path)
+    path.write_text(f"format_version = 1\n{text}", encoding="utf-8")
+    assert load_campaign(path) == load_campaign("quick")
+
+
+def test_the_language_server_of_editors_finds_a_slip_and_nothing_else(tmp_path):
+    taplo = shutil.which("taplo", path=str(Path(sys.executable).parent))
+    if taplo is None:
+        pytest.skip("pip install vibench[test] brings taplo")
+
+    def check(path):
+        # What a folder's taplo.toml or a catalogue on the web says must not matter.
+        command = [taplo, "check", "--no-auto-config", str(path)]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    save_toml(load_campaign("quick"), tmp_path / "mine.toml")
+    right = check(tmp_path / "mine.toml")
+    assert right.returncode == 0, right.stderr
+    text = (tmp_path / "mine.toml").read_text(encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(text.replace("realisations = 2", "realisation = 2"), encoding="utf-8")
+    wrong = check(tmp_path / "mine.toml")
+    assert wrong.returncode != 0
+    assert "realisation" in wrong.stderr
