@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from vibench.acquisition.instruments import PlugInKind
+
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 FOLDERS = (
@@ -58,7 +60,9 @@ def text_of(document):
 
 
 def resolves(dotted):
-    """Say whether a dotted name is a module, or something that stands on one."""
+    """Say whether a dotted name is a module, or something that stands on one, or a group of entry points."""
+    if dotted in {each.value for each in PlugInKind}:
+        return True
     module, *rest = None, *dotted.split(".")[1:]
     name = "vibench"
     while rest:

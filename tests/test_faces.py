@@ -20,6 +20,7 @@ FOR_PEOPLE = (
     "vibench.acquisition",
     "vibench.acquisition.plan",
     "vibench.acquisition.rig",
+    "vibench.acquisition.instruments",
     "vibench.acquisition.recording",
     "vibench.acquisition.campaign",
     "vibench.acquisition.engine",
@@ -39,7 +40,7 @@ FOR_OUR_PROGRAMS = (
     "vibench.analysis.simulation",
     "vibench.analysis.reproduction",
 )
-ONE_FILE_ROOMS = ("errors", "instruments", "tables", "analogue")
+ONE_FILE_ROOMS = ("errors", "tables", "analogue")
 
 
 def sources():
@@ -116,6 +117,7 @@ def test_every_module_in_a_room_is_private_or_a_program_or_a_room_of_one_file():
         if path.name != "__init__.py"
         and not name.rpartition(".")[2].startswith("_")
         and not room.startswith("vibench.cli")  # commands are loaded by their names
+        and room != "vibench.acquisition.contract"  # pytest finds tests by their names
         and name.rpartition(".")[2] not in ONE_FILE_ROOMS
     ]
     assert loose == []

@@ -109,6 +109,9 @@ class LoopbackGenerator:
 
     identity = Identity("MAKER", "GENERATOR", "1", "1.0", "MAKER,GENERATOR,1,1.0")
 
+    unconfirmed = ()
+    amplitude_range_vpp = (2e-3, 20.0)
+
     def __init__(self, world: LoopbackWorld) -> None:
         self._world = world
 

@@ -8,7 +8,7 @@ from vibench.acquisition.control._level_control import LevelControl, MeasuredLev
 from vibench.acquisition.excitation import BaseLevel
 from vibench.acquisition.recording import Held
 
-CONTROL = LevelControl(BaseLevel(acceleration_m_per_s2=10.0), most_vpp=5.0)
+CONTROL = LevelControl(BaseLevel(acceleration_m_per_s2=10.0), most_vpp=5.0, least_vpp=2e-3)
 
 
 @given(gain=st.floats(3.0, 300.0), start_vpp=st.floats(0.01, 5.0))

@@ -10,7 +10,7 @@ from vibench.acquisition.drivers import AFG1022X
 from vibench.acquisition.drivers._afg1022_limits import Shape
 from vibench.acquisition.drivers._afg1022_modes import SweepSupport, Unsupported
 from vibench.acquisition.errors import InstrumentBusy, SettingRefused
-from vibench.acquisition.rig import Knob
+from vibench.acquisition.instruments import Knob
 from vibench.virtual_rig.generator import Panel, Quirks
 from vibench.virtual_rig.generator._afg1022_settings import OPEN_AMPLITUDE_RANGE_VPP
 

@@ -5,7 +5,12 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from vibench.acquisition.excitation import held_lines
-from vibench.acquisition.excitation._multisine import MEMORY_POINTS, band_lines, flat_periods, hold_droop
+from vibench.acquisition.excitation._multisine import (
+    USUAL_POINTS as MEMORY_POINTS,
+    band_lines,
+    flat_periods,
+    hold_droop,
+)
 
 BAND = np.arange(20, 801)
 OVERSAMPLING = 16
@@ -17,7 +22,7 @@ def played_amplitudes(values):
     spectrum = 2 * np.abs(np.fft.rfft(held)) / len(held)
     # The picture itself holds each of its fine samples; take that second hold off again.
     fine = np.arange(len(spectrum))
-    return spectrum * np.abs(hold_droop(fine)) / _picture_droop(fine)
+    return spectrum * np.abs(hold_droop(fine, MEMORY_POINTS)) / _picture_droop(fine)
 
 
 def _picture_droop(harmonics):

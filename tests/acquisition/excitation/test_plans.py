@@ -79,8 +79,8 @@ def test_a_preview_that_cannot_show_the_plan_says_which_rate_can(plan):
         plan.preview(1.9 * plan.highest_frequency_hz)
 
 
-@pytest.mark.parametrize("amplitude_vpp", [0.0, -1.0, 0.0019, 20.1, float("nan"), float("inf")])
-def test_an_amplitude_the_generator_cannot_set_is_refused(amplitude_vpp):
+@pytest.mark.parametrize("amplitude_vpp", [0.0, -1.0, 2000.0, float("nan"), float("inf")])
+def test_an_amplitude_that_no_generator_has_is_refused(amplitude_vpp):
     with pytest.raises(ValidationError, match="amplitude_vpp"):
         Dwell(amplitude_vpp=amplitude_vpp, frequency_hz=260, duration_s=2)
 
@@ -231,11 +231,6 @@ def test_a_sweep_that_holds_a_motion_follows_that_power_of_frequency(hold, power
     first, last = shown.volts[:5120], shown.volts[-5120:]
     ratio = (tones[9].frequency_hz / tones[-1].frequency_hz) ** power
     assert np.max(np.abs(first)) / np.max(np.abs(last)) == pytest.approx(ratio, rel=0.02)
-
-
-def test_a_sweep_too_quiet_for_the_generator_at_its_low_end_is_refused():
-    with pytest.raises(ValidationError, match=r"holding the displacement needs .* at 10 Hz"):
-        SineSweep(amplitude_vpp=1.5, start_hz=10, stop_hz=350, duration_s=20, hold="displacement")
 
 
 def test_a_sweep_down_mirrors_the_sweep_up():

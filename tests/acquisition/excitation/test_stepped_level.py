@@ -56,6 +56,8 @@ def test_limits_know_the_highest_level_before_anything_moves():
         for one in (plan(), highest)
     )
     assert used.keys() == expected.keys()
+    lowest = "the lowest setting"
+    assert used.pop(lowest) == pytest.approx(expected[lowest] * 0.9 / plan().lowest_amplitude_vpp)
     for what, use in used.items():
         assert use == pytest.approx(expected[what], rel=1e-6), what
 
@@ -67,7 +69,7 @@ def test_limits_know_the_highest_level_before_anything_moves():
         ({"lowest_vpp": 1.0}, "leave no two levels"),
         ({"step_vpp": 1e-4}, "holds at most 4000"),
         ({"step_vpp": 0}, "greater than 0"),
-        ({"lowest_vpp": 1e-4}, "greater than or equal to 0.002"),
+        ({"lowest_vpp": 0}, "greater than 0"),
     ],
 )
 def test_what_makes_no_levels_is_refused_with_what_is_allowed(changed, said):

@@ -132,13 +132,13 @@ class TestRefusals:
         assert str(refused.value).count("no known key") == 1
 
     def test_the_file_the_key_and_what_is_allowed_are_named(self, tmp_path):
-        text = 'name = "c"\n' + DWELL_TABLE.replace("1.5", "50")
+        text = 'name = "c"\n' + DWELL_TABLE.replace("1.5", "5000")
         with pytest.raises(ConfigurationError) as refused:
             loaded(tmp_path, text)
         said = str(refused.value)
         assert said.startswith(str(tmp_path / "campaign.toml"))
-        assert "measurements.0.excitation.dwell.amplitude_vpp = 50" in said
-        assert "less than or equal to 20" in said
+        assert "measurements.0.excitation.dwell.amplitude_vpp = 5000" in said
+        assert "less than or equal to 1000" in said
 
     def test_two_measurements_of_one_name_are_refused(self, tmp_path):
         with pytest.raises(ConfigurationError, match="two measurements would be recorded as 'dwell'"):

@@ -185,7 +185,7 @@ class TestChains:
         ({"frequency_hz": {"start": 1, "stop": 1000, "step": 1e-9}}, "values, allowed are 10000"),
         ({"frequency_hz": {"start": 300, "stop": 200, "step": 1}}, "is not above start"),
         ({"frequency_hz": [200]}, "line-200hz: excitation.dwell.amplitude_vpp is missing"),
-        ({"frequency_hz": [200], "amplitude_vpp": [50]}, "less than or equal to 20"),
+        ({"frequency_hz": [200], "amplitude_vpp": [5000]}, "less than or equal to 1000"),
         (
             {"frequency_hz": [200], "amplitude_vpp": [1], "order": ["frequency_hz"]},
             "leaves out 'amplitude_vpp'",

@@ -10,7 +10,7 @@ from typing import Self
 
 from ..errors import AcquisitionError
 from ..host import chosen
-from ..instruments import AnalogOutput, Identity
+from ..instruments import AnalogOutput, Digitizer, FunctionGenerator, Identity
 from ..rig import (
     CalibrationRule,
     Channel,
@@ -21,10 +21,11 @@ from ..rig import (
     check_calibrations,
     confirm_at_terminal,
     confirm_simulated,
+    digitizer_driver,
+    generator_driver,
     load_rig,
+    output_driver,
 )
-from ._instrument_drivers import DAQ_DRIVERS, GENERATOR_DRIVERS
-from ._protocol import CountingDigitizer, VerifiedGenerator
 from ._result import CheckResult
 from ._rig_power import RigPower
 
@@ -46,8 +47,8 @@ class Bench:
     def __init__(
         self,
         rig: Rig,
-        generator: VerifiedGenerator,
-        digitizer: CountingDigitizer,
+        generator: FunctionGenerator,
+        digitizer: Digitizer,
         output: AnalogOutput | None,
         confirmations: KnobSheet,
         power: RigPower,
@@ -141,10 +142,10 @@ def open_bench(
 def _opened(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: ExitStack) -> Bench:
     power = closing.enter_context(RigPower(rig)) if power is None else power
     connected = power.connected
-    digitizer = DAQ_DRIVERS[connected.daq.driver].digitizer(connected)
+    digitizer = digitizer_driver(connected).open(connected)
     closing.callback(digitizer.close)
     output = _output(connected, digitizer, closing)
-    generator = GENERATOR_DRIVERS[connected.generator.driver](connected.generator)
+    generator = generator_driver(connected.generator).open(connected.generator)
     closing.callback(generator.close)
     closing.callback(generator.stop)  # the last to enter is the first to happen
     if output is not None:
@@ -154,11 +155,11 @@ def _opened(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: 
     return Bench(rig, generator, digitizer, output, sheet, power, closing)
 
 
-def _output(rig: Rig, digitizer: CountingDigitizer, closing: ExitStack) -> AnalogOutput | None:
+def _output(rig: Rig, digitizer: Digitizer, closing: ExitStack) -> AnalogOutput | None:
     config, physical = rig.daq.output, rig.daq.output_channel
     if config is None or physical is None:
         return None
-    output = DAQ_DRIVERS[rig.daq.driver].output(physical, config, digitizer)
+    output = output_driver(rig).open(physical, config, digitizer)
     closing.callback(output.close)
     return output
 

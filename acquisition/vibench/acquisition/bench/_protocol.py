@@ -4,24 +4,8 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from ..instruments import AnalogOutput, Digitizer, FunctionGenerator, Identity
-from ..rig import Channel, Knob, KnobSheet, Rig
+from ..rig import Channel, KnobSheet, Rig
 from ._result import CheckResult
-
-
-class VerifiedGenerator(FunctionGenerator, Protocol):
-    """A generator whose settings are read back."""
-
-    @property
-    def unconfirmed(self) -> tuple[Knob, ...]:
-        """Settings that could be neither made nor read remotely: the operator must confirm them."""
-
-
-class CountingDigitizer(Digitizer, Protocol):
-    """A digitizer that knows the step of its converter."""
-
-    @property
-    def volts_per_count(self) -> tuple[float | None, ...]:
-        """Step for each channel [V]; None where volts are no whole multiples of one step."""
 
 
 class RunBench(Protocol):
@@ -40,7 +24,7 @@ class RunBench(Protocol):
         """What plays signals that never repeat; None where the rig has no analogue output."""
 
     @property
-    def digitizer(self) -> CountingDigitizer:
+    def digitizer(self) -> Digitizer:
         """What samples."""
 
     @property

@@ -7,7 +7,8 @@ from typing import Self
 
 from ..bench import Bench, CheckResult, RigPower, open_bench
 from ..errors import AcquisitionError, CheckFailed
-from ..rig import Confirm, Knob, KnobSheet, Rig, load_rig
+from ..instruments import Knob
+from ..rig import Confirm, KnobSheet, Rig, load_rig
 
 LOOK_AGAIN_S = 1.0
 """Rig time that passes on a virtual rig before its bench is opened again: cables are put back in it."""

@@ -18,7 +18,7 @@ def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
     settling_controller = SettlingController(loop, plan.settling, plan.base_level)
     yield from started(loop, plan.frequency_hz, plan.base_level)
     yield from settling_controller.settled()
-    control = LevelControl(plan.base_level, loop.most_vpp)
+    control = LevelControl(plan.base_level, loop.most_vpp, loop.least_vpp)
     target = plan.base_level.acceleration_at(plan.frequency_hz)
     pieces = ceil(plan.duration_s / plan.update_s * (1 - 1e-9))
     outside = 0

@@ -5,7 +5,7 @@ from math import sqrt
 
 import numpy as np
 
-from ..excitation import LOWEST_AMPLITUDE_VPP, BaseLevel
+from ..excitation import BaseLevel
 from ..recording import Held
 from ._stroboscope import Phasors
 
@@ -52,6 +52,8 @@ class LevelControl:
     level: BaseLevel
     most_vpp: float
     """Largest setting that the plan allows [V]."""
+    least_vpp: float
+    """Smallest setting that the generator takes [V]."""
 
     def next_vpp(self, setting_vpp: float, measured: MeasuredLevel, target: float) -> float:
         """Give the next setting; the same one when the level is held, or the error may be chance [V]."""
@@ -63,4 +65,4 @@ class LevelControl:
             return setting_vpp
         most = self.level.most_change
         factor = min(max((target / measured.amplitude) ** _GAIN, 1 / most), most)
-        return float(min(max(setting_vpp * factor, LOWEST_AMPLITUDE_VPP), self.most_vpp))
+        return float(min(max(setting_vpp * factor, self.least_vpp), self.most_vpp))

@@ -114,7 +114,7 @@ class SettlingController:
         now = self.loop.setting
         measured = self.measured()
         require_answer(self.loop.rig, now.frequency_hz, now.setting_vpp, measured.amplitude)
-        control = LevelControl(self.level, self.loop.most_vpp)
+        control = LevelControl(self.level, self.loop.most_vpp, self.loop.least_vpp)
         next_vpp = control.next_vpp(now.setting_vpp, measured, self._target)
         if next_vpp == now.setting_vpp:
             return False

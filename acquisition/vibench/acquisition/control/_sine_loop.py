@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..excitation import LOWEST_AMPLITUDE_VPP, Segment, Tone
-from ..plan import HUSH_S, Measurement, Phase, RunState, ramp
+from ..excitation import Segment, Tone
+from ..plan import HUSH_S, Measurement, Phase, RunState, lowest_setting_vpp, ramp
 from ..recording import FeedbackNote
 from ..rig import Rig
 from ._control_action import ControlAction, Controller, PhaseSamples
@@ -34,7 +34,9 @@ class SineLoop:
         self.rig = rig
         self.most_vpp = measurement.excitation.amplitude_vpp
         """Largest setting of the plan [V]."""
-        self.setting = DriveSetting(0.0, LOWEST_AMPLITUDE_VPP)
+        self.least_vpp = lowest_setting_vpp(measurement, rig)
+        """Smallest setting of what plays [V]."""
+        self.setting = DriveSetting(0.0, self.least_vpp)
         self.elapsed_s = 0.0
         """Listened so far [s]."""
 
@@ -69,7 +71,7 @@ class SineLoop:
 
     def bounded_vpp(self, setting_vpp: float) -> float:
         """Keep a setting between the generator's smallest and the plan's largest [V]."""
-        return min(max(setting_vpp, LOWEST_AMPLITUDE_VPP), self.most_vpp)
+        return min(max(setting_vpp, self.least_vpp), self.most_vpp)
 
     def forget(self) -> None:
         """Look anew from the next move on."""

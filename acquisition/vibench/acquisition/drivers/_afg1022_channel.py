@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InstrumentError, SettingRefused
-from ..rig import HIGH_Z, Knob
+from ..instruments import Knob
+from ..rig import HIGH_Z
 from ._afg1022_limits import Load, Shape
 from ._afg1022_modes import switch_off_modes
 from ._arbitrary_codes import ArbitraryCodes

@@ -36,10 +36,16 @@ def shown_fraction(load: Load) -> float:
     return 1.0 if ohm == inf else ohm / (ohm + SOURCE_OHM)
 
 
+def instrument_range_vpp(load: Load) -> tuple[float, float]:
+    """Smallest and largest setting of the instrument with a load, peak to peak [V]."""
+    fraction = shown_fraction(load)
+    return _OPEN_MINIMUM_VPP * fraction, _OPEN_MAXIMUM_VPP * fraction
+
+
 def amplitude_range_vpp(config: GeneratorConfig) -> tuple[float, float]:
     """Smallest and largest amplitude setting of this bench, peak to peak [V]."""
-    fraction = shown_fraction(config.load_ohm)
-    return _OPEN_MINIMUM_VPP * fraction, min(_OPEN_MAXIMUM_VPP * fraction, config.amplitude_limit_vpp)
+    lowest, highest = instrument_range_vpp(config.load_ohm)
+    return lowest, min(highest, config.amplitude_limit_vpp)
 
 
 def check_frequency(shape: Shape, frequency_hz: float) -> None:

@@ -7,12 +7,19 @@ from contextlib import contextmanager, suppress
 from typing import Self
 
 from ..errors import AcquisitionError, InstrumentError, InstrumentLost
-from ..instruments import Identity, Samples
-from ..rig import GeneratorConfig, Knob
+from ..instruments import GeneratorDescription, Identity, Knob, Samples
+from ..rig import GeneratorConfig
 from ._afg1022_channel import Afg1022Channel, Playing, agree_on_load
-from ._afg1022_limits import Shape, amplitude_range_vpp, check_amplitude, check_frequency
+from ._afg1022_limits import (
+    HIGHEST_HZ,
+    Shape,
+    amplitude_range_vpp,
+    check_amplitude,
+    check_frequency,
+    instrument_range_vpp,
+)
 from ._afg1022_modes import SweepSupport, arm_burst, end_burst, probe_sweep, set_phase, trigger
-from ._arbitrary_codes import arbitrary_codes
+from ._arbitrary_codes import FEWEST_POINTS, MOST_POINTS, arbitrary_codes
 from ._scpi import ScpiPort
 from ._verified_settings import VerifiedSettings
 from ._visa_link import Link, open_link
@@ -76,6 +83,16 @@ class AFG1022X:
                 generator.close()
             raise
         return generator
+
+    @staticmethod
+    def describe(config: GeneratorConfig) -> GeneratorDescription:
+        """Say what an AFG1022 can do into the load that it is told to expect."""
+        return GeneratorDescription(
+            "AFG1022",
+            instrument_range_vpp(config.load_ohm),
+            HIGHEST_HZ[Shape.SINE],
+            (FEWEST_POINTS, MOST_POINTS),
+        )
 
     @property
     def identity(self) -> Identity:

@@ -11,8 +11,9 @@ from ..bench import Bench
 from ..campaign import planned_recordings
 from ..check import CheckRule, require_on_record
 from ..errors import CheckFailed
+from ..instruments import Knob
 from ..plan import LimitCheck, require_within_limits
-from ..rig import Confirm, Knob, KnobSheet, Rig
+from ..rig import Confirm, KnobSheet, Rig
 from ..run import drive_for
 from ..stopping import Cause, StopLevel, StopRequest, StopSwitch
 from ._campaign_request import CampaignRequest

@@ -38,7 +38,6 @@ from ._odd_multisine import (
     OddMultisine as OddMultisine,
 )
 from ._plan import (
-    LOWEST_AMPLITUDE_VPP as LOWEST_AMPLITUDE_VPP,
     AbstractExcitation as AbstractExcitation,
     AbstractFeedback as AbstractFeedback,
     Family as Family,

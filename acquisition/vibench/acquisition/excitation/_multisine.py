@@ -6,10 +6,10 @@ from numpy.typing import NDArray
 from ..errors import ConfigurationError
 from ._steps import Samples
 
-MEMORY_POINTS = 8192
-"""Points of one period: the whole arbitrary memory of an AFG1022 (Tektronix data sheet)."""
-HIGHEST_LINE = MEMORY_POINTS // 2 - 1
-"""Highest harmonic below half the playback rate."""
+USUAL_POINTS = 8192
+"""Points of one period, where a plan names none."""
+FEWEST_POINTS, MOST_POINTS = 64, 65_536
+"""Of a plan; the generator's description says what its memory takes."""
 CANDIDATES = 20
 """Sets of random phases that are tried; the one with the lowest crest factor is played. Twenty bring
 the crest factor of a thousand lines from about 3.8 to about 3.3, and further ones hardly more."""
@@ -31,7 +31,7 @@ def band_lines(start_hz: float, stop_hz: float, repetition_hz: float) -> Lines:
     return np.arange(max(first, 1), last + 1, dtype=np.int64)
 
 
-def hold_droop(lines: NDArray[np.integer], points: int = MEMORY_POINTS) -> Samples:
+def hold_droop(lines: NDArray[np.integer], points: int) -> Samples:
     """Gain of the zero-order hold at harmonic ``k`` of ``points`` held values: sin(pi k/N) / (pi k/N)."""
     return np.sinc(np.asarray(lines, dtype=np.float64) / points)
 
@@ -51,7 +51,9 @@ def held_lines(values: Samples, spans: int) -> NDArray[np.complex128]:
     return np.asarray(amplitudes)
 
 
-def flat_periods(lines: Lines, realisations: int, seed: int) -> tuple[Samples, ...]:
+def flat_periods(
+    lines: Lines, realisations: int, seed: int, points: int = USUAL_POINTS
+) -> tuple[Samples, ...]:
     """One period for every realisation: flat lines with random phases, all of one rms value.
 
     Every line is divided by the droop of the hold, so that it is the played spectrum that is flat.
@@ -62,28 +64,28 @@ def flat_periods(lines: Lines, realisations: int, seed: int) -> tuple[Samples, .
     Returns
     -------
     tuple of arrays
-        ``realisations`` arrays of shape (MEMORY_POINTS,).
+        ``realisations`` arrays of shape (points,).
 
     """
-    periods = [_smoothest(lines, realisation, seed) for realisation in range(realisations)]
+    periods = [_smoothest(lines, realisation, seed, points) for realisation in range(realisations)]
     highest = max(float(np.max(np.abs(period))) for period in periods)
     return tuple(period / highest for period in periods)
 
 
-def _smoothest(lines: Lines, realisation: int, seed: int) -> Samples:
-    candidates = [_period(lines, seed, (realisation, candidate)) for candidate in range(CANDIDATES)]
+def _smoothest(lines: Lines, realisation: int, seed: int, points: int) -> Samples:
+    candidates = [_period(lines, seed, (realisation, candidate), points) for candidate in range(CANDIDATES)]
     return min(candidates, key=lambda period: float(np.max(np.abs(period))))
 
 
-def _period(lines: Lines, seed: int, key: tuple[int, ...]) -> Samples:
+def _period(lines: Lines, seed: int, key: tuple[int, ...], points: int) -> Samples:
     random = np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key)))
-    spectrum = np.zeros(MEMORY_POINTS // 2 + 1, dtype=np.complex128)
-    spectrum[lines] = np.exp(2j * np.pi * random.random(len(lines))) / hold_droop(lines)
-    return np.fft.irfft(spectrum, MEMORY_POINTS)
+    spectrum = np.zeros(points // 2 + 1, dtype=np.complex128)
+    spectrum[lines] = np.exp(2j * np.pi * random.random(len(lines))) / hold_droop(lines, points)
+    return np.fft.irfft(spectrum, points)
 
 
-def require_far_image(stop_hz: float, repetition_hz: float) -> None:
-    """Refuse a band whose first image comes too near; what passes has at most ``HIGHEST_LINE`` lines.
+def require_far_image(stop_hz: float, repetition_hz: float, points: int) -> None:
+    """Refuse a band whose first image comes too near; what passes lies below half the playback rate.
 
     Raises
     ------
@@ -91,12 +93,12 @@ def require_far_image(stop_hz: float, repetition_hz: float) -> None:
         Which says what would be allowed.
 
     """
-    image_hz = MEMORY_POINTS * repetition_hz - stop_hz
+    image_hz = points * repetition_hz - stop_hz
     if image_hz < NEAREST_IMAGE_RATIO * stop_hz:
-        lowest_hz = (1 + NEAREST_IMAGE_RATIO) * stop_hz / MEMORY_POINTS
+        lowest_hz = (1 + NEAREST_IMAGE_RATIO) * stop_hz / points
         raise ConfigurationError(
             f"repetition_hz = {repetition_hz:g} puts the first image of {stop_hz:g} Hz at {image_hz:g} Hz, "
-            f"too near the band; repetition_hz must be at least {lowest_hz:.4g}"
+            f"too near the band; repetition_hz must be at least {lowest_hz:.4g} with {points} points"
         )
 
 

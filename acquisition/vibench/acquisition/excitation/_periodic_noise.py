@@ -9,12 +9,21 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_
 
 from ..recording import SegmentLabel
 from ._band_noise import BandNoise
-from ._multisine import Lines, band_lines, flat_periods, require_far_image, require_lines
+from ._multisine import (
+    FEWEST_POINTS,
+    MOST_POINTS,
+    USUAL_POINTS,
+    Lines,
+    band_lines,
+    flat_periods,
+    require_far_image,
+    require_lines,
+)
 from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Waveform
 
 MOST_REALISATIONS = 1000
-"""Of one measurement: all their waveforms, of 64 kB each, are of one level and made together."""
+"""Of one measurement: all their waveforms, of 8 bytes a point, are of one level and made together."""
 
 
 class PeriodicNoise(BandNoise):
@@ -27,6 +36,8 @@ class PeriodicNoise(BandNoise):
     """Waveforms with phases of their own, all on the same lines."""
     periods: PositiveInt = 2
     """Periods recorded of each realisation; two or more show the noise of the sensors."""
+    points: Annotated[int, Field(ge=FEWEST_POINTS, le=MOST_POINTS)] = USUAL_POINTS
+    """Points of one period in the generator's memory; what it takes is held against them beforehand."""
     settle_s: NonNegativeFloat = 3.0
     """Wait after each change of waveform until the transient has died out [s]."""
     seed: int = Field(default=1, ge=0)
@@ -44,9 +55,14 @@ class PeriodicNoise(BandNoise):
 
     @model_validator(mode="after")
     def _band_fits_the_memory(self) -> Self:
-        require_far_image(self.band_stop_hz, self.repetition_hz)
+        require_far_image(self.band_stop_hz, self.repetition_hz, self.points)
         require_lines(self.candidates, self.band_stop_hz, self.repetition_hz)
         return self
+
+    @property
+    def period_points(self) -> int:
+        """Points of one period."""
+        return self.points
 
     @property
     def playing_s(self) -> float:
@@ -61,7 +77,7 @@ class PeriodicNoise(BandNoise):
     def steps(self) -> Iterator[Step]:
         """Yield one step for every realisation."""
         lines = np.asarray(self.lines, dtype=np.int64)
-        for realisation, values in enumerate(flat_periods(lines, self.realisations, self.seed)):
+        for realisation, values in enumerate(flat_periods(lines, self.realisations, self.seed, self.points)):
             yield Step(
                 play=Waveform(values, self.repetition_hz),
                 settle_s=self.settle_s,

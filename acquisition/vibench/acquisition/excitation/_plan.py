@@ -15,12 +15,8 @@ from ._feedback import BaseLevel
 from ._preview import SignalPreview
 from ._steps import Step, Tone
 
-LOWEST_AMPLITUDE_VPP = 2e-3
-"""Smallest setting of an AFG1022 into an open output, peak to peak [V] (Tektronix data sheet)."""
-HIGHEST_AMPLITUDE_VPP = 20.0
-"""Largest setting of an AFG1022 into an open output, peak to peak [V] (Tektronix data sheet)."""
-
-AmplitudeVpp = Annotated[float, Field(ge=LOWEST_AMPLITUDE_VPP, le=HIGHEST_AMPLITUDE_VPP)]
+AmplitudeVpp = Annotated[float, Field(gt=0, le=1000)]
+"""What the generator takes, its description says; beyond the upper bound a unit was mistaken."""
 HIGHEST_FREQUENCY_HZ = 1e5
 """Beyond what any shaker follows [Hz]."""
 FrequencyHz = Annotated[float, Field(gt=0, le=HIGHEST_FREQUENCY_HZ)]
@@ -72,6 +68,16 @@ class AbstractExcitation(FrozenModel, ABC):
     @property
     def highest_amplitude_vpp(self) -> float:
         """The highest setting there is on the way, peak to peak [V]."""
+        return self.amplitude_vpp
+
+    @property
+    def period_points(self) -> int | None:
+        """Points of a waveform in the generator's memory; None where it needs none."""
+        return None
+
+    @property
+    def lowest_amplitude_vpp(self) -> float:
+        """The lowest setting there is on the way, ramps apart, peak to peak [V]."""
         return self.amplitude_vpp
 
     @property

@@ -10,7 +10,7 @@ from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 from ..recording import SegmentLabel
 from ._base_level import RelativeSetting
 from ._direction import Approach, Direction
-from ._plan import LOWEST_AMPLITUDE_VPP, AbstractExcitation, Family, FrequencyHz
+from ._plan import AbstractExcitation, Family, FrequencyHz
 from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
@@ -149,17 +149,10 @@ class SineSweep(MovingSine):
     settle_s: NonNegativeFloat = 3.0
     """Wait before the sweep starts, close to ``start_hz``, until the transient has died out [s]."""
 
-    @model_validator(mode="after")
-    def _quietest_step_is_playable(self) -> Self:
-        lowest_hz = min(self.start_hz, self.stop_hz)
-        quietest_vpp = self.amplitude_vpp * self.level(lowest_hz)
-        if quietest_vpp < LOWEST_AMPLITUDE_VPP:
-            raise ValueError(
-                f"holding the {self.hold} needs a setting of {quietest_vpp:.3g} Vpp at {lowest_hz:g} Hz, "
-                f"and the generator's smallest is {LOWEST_AMPLITUDE_VPP:g} Vpp; raise amplitude_vpp, or "
-                "narrow the band"
-            )
-        return self
+    @property
+    def lowest_amplitude_vpp(self) -> float:
+        """The setting at the lowest frequency [V]."""
+        return self.amplitude_vpp * self.level(self.band_hz[0])
 
     def level(self, frequency_hz: float) -> float:
         """Amplitude at a frequency as a fraction of ``amplitude_vpp``."""

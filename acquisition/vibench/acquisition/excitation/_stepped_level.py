@@ -52,6 +52,11 @@ class SteppedLevel(FixedSine):
         return self
 
     @property
+    def lowest_amplitude_vpp(self) -> float:
+        """The lowest level [V]."""
+        return self.rising_vpp[0]
+
+    @property
     def rising_vpp(self) -> tuple[float, ...]:
         """All levels, rising, the last one being ``amplitude_vpp`` [V]."""
         return tuple(

@@ -50,6 +50,7 @@ from ._campaign import BYTES_PER_SAMPLE, Campaign, Retryable, RetryPolicy, load_
 from ._drive_source import (
     DriveSource,
     drive_source_of,
+    lowest_setting_vpp,
 )
 from ._limits import (
     LimitCheck,
@@ -142,6 +143,7 @@ __all__ = [
     "known_phases",
     "lead_in_s",
     "load_campaign",
+    "lowest_setting_vpp",
     "measured_s",
     "needed_vpp",
     "phases",

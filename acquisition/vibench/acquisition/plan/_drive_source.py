@@ -3,7 +3,7 @@
 from enum import StrEnum
 
 from ..excitation import Play, Stream, Tone, Waveform
-from ..rig import OutputUse, Rig
+from ..rig import OutputUse, Rig, generator_driver
 from ._measurement import Measurement
 
 
@@ -19,6 +19,18 @@ def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
     use = OutputUse.STREAMS if rig.daq.output is None else rig.daq.output.plays
     drive_sources = {_source_of(step.play, use) for step in measurement.excitation.steps()}
     return DriveSource.OUTPUT if DriveSource.OUTPUT in drive_sources else DriveSource.GENERATOR
+
+
+LEAST_SHARE = 1e-4
+"""The least setting of an analogue output, as a share of its largest: some tens of a converter's counts."""
+
+
+def lowest_setting_vpp(measurement: Measurement, rig: Rig) -> float:
+    """Give the least setting of what plays a measurement, peak to peak [V]."""
+    output = rig.daq.output
+    if output is not None and drive_source_of(measurement, rig) is DriveSource.OUTPUT:
+        return LEAST_SHARE * 2 * output.limit_v / rig.generator.terminal_factor()
+    return generator_driver(rig.generator).describe(rig.generator).amplitude_range_vpp[0]
 
 
 def _source_of(play: Play, use: OutputUse) -> DriveSource:

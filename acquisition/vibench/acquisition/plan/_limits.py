@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from ..errors import LimitExceeded
+from ..excitation import AbstractExcitation
 from ..rig import (
     LARGEST_LEVEL_ERROR,
     BaseQuantity,
@@ -14,10 +15,11 @@ from ..rig import (
     Rig,
     Role,
     channels_of,
+    generator_driver,
     highest_carried_hz,
     suspended_mass_kg,
 )
-from ._drive_source import DriveSource, drive_source_of
+from ._drive_source import DriveSource, drive_source_of, lowest_setting_vpp
 from ._loads import needed_vpp, predicted_loads
 from ._measurement import Measurement, OnOverload
 from ._specimen_loads import predicted_specimen_loads
@@ -126,6 +128,18 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
         "amplitude_limit_vpp of the hardware configuration",
         "lower amplitude_vpp",
     )
+    source = drive_source_of(measurement, rig)
+    yield LimitCheck(
+        "the lowest setting",
+        excitation.lowest_amplitude_vpp,
+        lowest_setting_vpp(measurement, rig),
+        "Vpp",
+        f"smallest setting of the {source.value}",
+        "raise amplitude_vpp, or narrow the band",
+        LimitSide.AT_LEAST,
+    )
+    if source is DriveSource.GENERATOR:
+        yield from _generating(excitation, rig)
     yield from _held_levels(measurement, rig)
     yield LimitCheck(
         "the highest frequency",
@@ -145,7 +159,7 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
             f"levels there are {LARGEST_LEVEL_ERROR:.0%} off",
             "lower the frequency or raise virtual.grid_rate_hz",
         )
-    if rig.daq.output is not None and drive_source_of(measurement, rig) is DriveSource.OUTPUT:
+    if rig.daq.output is not None and source is DriveSource.OUTPUT:
         yield from _streaming(measurement, rig, rig.daq.output)
     yield LimitCheck(
         "the ramp",
@@ -156,6 +170,28 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
         "lengthen ramp_s",
         LimitSide.AT_LEAST,
     )
+
+
+def _generating(excitation: AbstractExcitation, rig: Rig) -> Iterator[LimitCheck]:
+    """Check what only the kind of generator limits."""
+    can = generator_driver(rig.generator).describe(rig.generator)
+    setting = "the setting beside what the generator can"
+    most_vpp, range_of = can.amplitude_range_vpp[1], f"range of the {can.name}"
+    yield LimitCheck(
+        setting, excitation.highest_amplitude_vpp, most_vpp, "Vpp", range_of, "lower amplitude_vpp"
+    )
+    highest = "the highest frequency of the generator"
+    yield LimitCheck(
+        highest, excitation.highest_frequency_hz, can.highest_sine_hz, "Hz", range_of, "lower the frequency"
+    )
+    if excitation.period_points is not None:
+        fewest, most = can.memory_points
+        memory = f"memory of the {can.name}"
+        for what, limit, remedy, side in (
+            ("points of a period", most, "lower points", LimitSide.AT_MOST),
+            ("points of a period, at least", fewest, "raise points", LimitSide.AT_LEAST),
+        ):
+            yield LimitCheck(what, excitation.period_points, limit, "points", memory, remedy, side)
 
 
 def _held_levels(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:

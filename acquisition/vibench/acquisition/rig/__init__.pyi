@@ -13,12 +13,17 @@ from ._configuration import (
     ChannelConfig as ChannelConfig,
     DaqConfig as DaqConfig,
     GeneratorConfig as GeneratorConfig,
-    Knob as Knob,
     Rig as Rig,
     Role as Role,
     VibrometerConfig as VibrometerConfig,
     load_rig as load_rig,
     with_faults as with_faults,
+)
+from ._drivers import (
+    GeneratorDriver as GeneratorDriver,
+    digitizer_driver as digitizer_driver,
+    generator_driver as generator_driver,
+    output_driver as output_driver,
 )
 from ._knobs import (
     Confirm as Confirm,
@@ -40,6 +45,12 @@ from ._model import (
 from ._output import (
     OutputConfig as OutputConfig,
     OutputUse as OutputUse,
+)
+from ._sensors import (
+    accelerometer as accelerometer,
+    sensor_name as sensor_name,
+    vibrometer as vibrometer,
+    wire as wire,
 )
 from ._virtual import (
     LARGEST_LEVEL_ERROR as LARGEST_LEVEL_ERROR,

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from datetime import date
 
 from ._configuration import ChannelConfig, Rig, Role
+from ._sensors import sensor_of
 
 
 @dataclass(frozen=True)
@@ -37,39 +38,20 @@ def channels_of(rig: Rig) -> tuple[Channel, ...]:
 
 
 def _channel(rig: Rig, config: ChannelConfig) -> Channel:
-    quantity, unit, per_volt, full_scale_v, sensor, serial, delay_s, calibrated = _sensor(rig, config.role)
+    sensor = sensor_of(rig, config)
     return Channel(
         role=config.role,
         physical=f"{rig.daq.device}/{config.physical}",
-        quantity=quantity,
-        unit=unit,
-        units_per_volt=per_volt * config.attenuation,
-        full_scale_v=min(config.range_v, full_scale_v / config.attenuation),
+        quantity=sensor.quantity,
+        unit=sensor.unit,
+        units_per_volt=sensor.units_per_volt * config.attenuation,
+        full_scale_v=min(config.range_v, sensor.full_scale_v / config.attenuation),
         range_v=config.range_v,
         coupling=config.coupling,
         iepe_current_a=config.iepe_current_a,
-        sensor=sensor,
-        serial=serial,
-        delay_s=delay_s,
-        sensor_calibrated=calibrated,
+        sensor=sensor.name,
+        serial=sensor.serial,
+        delay_s=sensor.delay_s,
+        sensor_calibrated=sensor.calibrated,
         converter_calibrated=config.calibrated,
     )
-
-
-def _sensor(rig: Rig, role: Role) -> tuple[str, str, float, float, str, str, float, date | None]:
-    match role:
-        case Role.DRIVE_VOLTAGE:
-            wire = "the amplifier's input, by wire"
-            return "voltage", "V", 1.0, float("inf"), wire, "", 0.0, None
-        case Role.AMPLIFIER_VOLTAGE:
-            wire = "amplifier output, by wire"
-            return "voltage", "V", 1.0, float("inf"), wire, rig.amplifier.serial, 0.0, None
-        case Role.BASE_ACCELERATION:
-            a = rig.accelerometer
-            per_volt = 1 / a.sensitivity_v_per_m_per_s2
-            return "acceleration", "m s-2", per_volt, a.full_scale_v, a.model, a.serial, 0.0, a.calibrated
-        case Role.M0_VELOCITY:
-            v = rig.vibrometer
-            per_volt = v.range_mm_per_s_per_v * 1e-3
-            name = f"{v.model} {v.decoder}"
-            return "velocity", "m s-1", per_volt, v.full_scale_v, name, v.serial, v.delay_s, v.calibrated

@@ -12,10 +12,15 @@ from vibench.sim import SpecimenTable
 
 from ..errors import ConfigurationError
 from ..host import FrozenModel, load_toml, named
+from ..instruments import Knob, PlugInKind, plug_in_names
 from ._output import OutputConfig
 from ._virtual import VirtualConfig, fastest_sample_rate_hz
 
 HIGH_Z: Literal["high-z"] = "high-z"
+
+
+Options = dict[str, str | int | float]
+"""Settings of a plug-in that only it knows; it says what it allows."""
 
 
 class Sourced(FrozenModel):
@@ -28,9 +33,12 @@ class Sourced(FrozenModel):
 class GeneratorConfig(FrozenModel):
     """The function generator and what its output sees."""
 
-    driver: Literal["afg1022x"] = "afg1022x"
-    resource: str = Field(pattern=r"^(USB|TCPIP|GPIB|ASRL).*::(INSTR|SOCKET)$")
-    """VISA resource name."""
+    driver: str = "afg1022x"
+    """Name of an entry point of ``vibench.generators``."""
+    resource: str = Field(default="", pattern=r"^$|^(USB|TCPIP|GPIB|ASRL).*::(INSTR|SOCKET)$")
+    """VISA resource name; empty for a generator that is not found by VISA."""
+    options: Options = Field(default_factory=dict)
+    """What else the driver wants to know; none of ours does."""
     visa_library: str = "@py"
     """``"@py"`` for pyvisa-py, empty for the system's VISA."""
     channel: Literal[1, 2] = 1
@@ -38,7 +46,7 @@ class GeneratorConfig(FrozenModel):
     """Load that the generator is told to expect; its panel shows volts into this load."""
     connected_ohm: PositiveFloat
     """Input impedance that really hangs on the output: the amplifier's [ohm]."""
-    amplitude_limit_vpp: PositiveFloat = Field(le=20.0)
+    amplitude_limit_vpp: PositiveFloat
     """The largest setting that this bench allows, peak to peak [V]."""
     settle_s: NonNegativeFloat = 0.0
     """Pause after each command that the instrument needs [s]."""
@@ -167,6 +175,10 @@ class ChannelConfig(FrozenModel):
     iepe_current_a: NonNegativeFloat = 0.0
     attenuation: PositiveFloat = 1.0
     """Divider in front of the input: volts at the source per volt at the input."""
+    sensor: str | None = None
+    """Name of an entry point of ``vibench.sensors``; absent: the usual one of the role."""
+    options: Options = Field(default_factory=dict)
+    """What else the sensor wants to know."""
     calibrated: date
     """Date of the converter's last calibration."""
 
@@ -174,7 +186,10 @@ class ChannelConfig(FrozenModel):
 class DaqConfig(FrozenModel):
     """The converter."""
 
-    driver: Literal["daqmx"] = "daqmx"
+    driver: str = "daqmx"
+    """Name of an entry point of ``vibench.digitizers``, and of ``vibench.outputs`` where it has an output."""
+    options: Options = Field(default_factory=dict)
+    """What else the driver wants to know."""
     product: str
     device: str
     """Device name in the driver: ``"cDAQ1Mod1"``."""
@@ -211,14 +226,6 @@ class SpecimenConfig(SpecimenTable):
 
     amplitude_limit_m: Sourced
     """Largest displacement of a mass that the springs bear."""
-
-
-class Knob(FrozenModel):
-    """A setting made by hand that no instrument reports: the operator confirms it."""
-
-    instrument: str
-    setting: str
-    value: str
 
 
 class Rig(FrozenModel):
@@ -280,9 +287,31 @@ def load_rig(path: Path | str) -> Rig:
     """
     path = named(path, "hardware_configs")
     rig = load_toml(path, Rig)
+    _require_plug_ins(rig, path)
     if rig.virtual is None or rig.virtual.faults is None:
         return rig
     return with_faults(rig, path.absolute().parent / rig.virtual.faults)
+
+
+def _require_plug_ins(rig: Rig, path: Path) -> None:
+    """Refuse names that no installed package offers; a recording that names them is read without."""
+    asked = [
+        ("generator.driver", PlugInKind.GENERATOR, rig.generator.driver),
+        ("daq.driver", PlugInKind.DIGITIZER, rig.daq.driver),
+        *(
+            ("daq.channels.sensor", PlugInKind.SENSOR, channel.sensor)
+            for channel in rig.daq.channels
+            if channel.sensor is not None
+        ),
+    ]
+    if rig.daq.output is not None:
+        asked.append(("daq.driver (of the output)", PlugInKind.OUTPUT, rig.daq.driver))
+    for key, kind, name in asked:
+        if name not in (names := plug_in_names(kind)):
+            raise ConfigurationError(
+                f"{path}: {key} = {name!r} is not installed: {', '.join(names)} may be given, or the name "
+                f"of an entry point {kind.value} of a package that you install (docs/instruments.md)"
+            )
 
 
 def with_faults(rig: Rig, script: Path) -> Rig:

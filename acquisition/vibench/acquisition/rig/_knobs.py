@@ -9,7 +9,7 @@ from pydantic import AwareDatetime, Field
 
 from ..errors import CheckFailed
 from ..host import FrozenModel, load_toml
-from ._configuration import Knob
+from ..instruments import Knob
 
 # Long enough for a campaign over a day and a night; whoever comes after may have turned a knob.
 SHEET_VALID = timedelta(hours=36)

@@ -6,13 +6,13 @@ from contextlib import suppress
 import numpy as np
 
 from ..errors import AcquisitionError, ConfigurationError
-from ..excitation import LOWEST_AMPLITUDE_VPP, Play, Stream, Tone, Waveform
+from ..excitation import Play, Stream, Tone, Waveform
 from ..instruments import FunctionGenerator
 from ..plan import DriveSource, Measurement, Phase, RunState, half_cosine, stairs
 
-QUIET_VPP = 1.25 * LOWEST_AMPLITUDE_VPP
-"""Amplitude of level 0 for a waveform that reaches full range: where ramps begin and end, safely above
-the smallest setting that the generator takes."""
+QUIET = 1.25
+"""Level 0 of a waveform that reaches full range, where ramps begin and end, over the generator's smallest
+setting."""
 
 
 GUARD_S = 0.02
@@ -242,9 +242,10 @@ class GeneratorDrive:
                 return self._amplitude_vpp
 
     def _quiet_vpp(self) -> float:
+        quiet_vpp = QUIET * self._generator.amplitude_range_vpp[0]
         match self._play:
             case Waveform(values):
                 # Generators stretch a waveform to their full range: their setting is then this much lower.
-                return QUIET_VPP / float(np.max(np.abs(values)))
+                return quiet_vpp / float(np.max(np.abs(values)))
             case _:
-                return QUIET_VPP
+                return quiet_vpp

@@ -5,7 +5,8 @@ from datetime import UTC, datetime
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QGroupBox, QLabel, QVBoxLayout, QWidget
 
-from vibench.acquisition.rig import Knob, KnobSheet, Rig
+from vibench.acquisition.instruments import Knob
+from vibench.acquisition.rig import KnobSheet, Rig
 
 from ...forms import LineField
 

@@ -4,58 +4,20 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-Samples = NDArray[np.float64]
+from ._values import Block, Identity, Knob, Samples
 
 
 @dataclass(frozen=True)
-class Identity:
-    """Who an instrument says it is, kept with every recording."""
-
-    maker: str
-    model: str
-    serial: str
-    firmware: str
-    reply: str
-    """The whole reply, as it came."""
-
-
-@dataclass(frozen=True)
-class FoundDevice:
-    """A device of a DAQmx system."""
+class GeneratorDescription:
+    """What a kind of generator can do, known before any is opened: plans are held against it."""
 
     name: str
-    """For ``daq.device``."""
-    product: str
-    """For ``daq.product``."""
-    serial: str
-    inputs: tuple[str, ...]
-    """For ``daq.channels.physical``, the part behind the slash."""
-    outputs: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Overload:
-    """An input past 95 % of its range: which channel, and which samples of the run."""
-
-    channel: str
-    """Role of the channel, ``"m0_velocity"`` for example."""
-    first_sample: int
-    last_sample: int
-    """Inclusive; counted from the first sample of the run."""
-
-
-@dataclass(frozen=True)
-class Block:
-    """Samples handed over at once, for all channels, without a gap to the block before."""
-
-    first_sample: int
-    """Position of the first sample in the run."""
-    volts: Samples
-    """Shape (channels, samples) [V] at the converter's input."""
-    overloads: tuple[Overload, ...] = ()
+    """For sentences: ``"AFG1022"``."""
+    amplitude_range_vpp: tuple[float, float]
+    """Smallest and largest setting with the load that the configuration declares, peak to peak [V]."""
+    highest_sine_hz: float
+    memory_points: tuple[int, int]
+    """Fewest and most points of one period of a waveform."""
 
 
 class FunctionGenerator(Protocol):
@@ -67,6 +29,14 @@ class FunctionGenerator(Protocol):
     @property
     def identity(self) -> Identity:
         """Who answered ``*IDN?``."""
+
+    @property
+    def unconfirmed(self) -> tuple[Knob, ...]:
+        """Settings that could be neither made nor read remotely: the operator must confirm them."""
+
+    @property
+    def amplitude_range_vpp(self) -> tuple[float, float]:
+        """Smallest and largest amplitude that may be set here, peak to peak [V]."""
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
         """Set up a sine. The output keeps its state."""
@@ -116,6 +86,10 @@ class Digitizer(Protocol):
     @property
     def roles(self) -> tuple[str, ...]:
         """Roles of the channels, in the order of the rows of a block."""
+
+    @property
+    def volts_per_count(self) -> tuple[float | None, ...]:
+        """Step of the converter for each channel [V]; None where volts are no whole multiples of one step."""
 
     def start(self) -> None:
         """Begin sampling; the first sample of the run is sample 0."""

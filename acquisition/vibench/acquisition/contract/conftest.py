@@ -1,0 +1,81 @@
+"""The instrument under test and its bench, from the command line."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ..bench import Bench, open_bench
+from ..errors import ConfigurationError
+from ..host import all_shipped
+from ..instruments import PlugInKind, Samples, plug_in_names
+from ..rig import CalibrationRule, Rig, Role, load_rig, sensor_name
+
+LEVEL = 0.02
+"""Of the bench's amplitude limit: what is played."""
+SETTLING_S = 0.3
+
+
+def named_in(rig: Rig) -> dict[PlugInKind, set[str]]:
+    """List which plug-ins a hardware configuration names."""
+    return {
+        PlugInKind.GENERATOR: {rig.generator.driver},
+        PlugInKind.DIGITIZER: {rig.daq.driver},
+        PlugInKind.OUTPUT: set() if rig.daq.output is None else {rig.daq.driver},
+        PlugInKind.SENSOR: {sensor_name(channel) for channel in rig.daq.channels},
+    }
+
+
+def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
+    """Read the bench that was given, or the first shipped virtual one that names the instrument."""
+    if given is not None:
+        rig = load_rig(Path(given))
+        return rig if name in named_in(rig)[kind] else None
+    rigs = (load_rig(path) for path in all_shipped("hardware_configs"))
+    return next((rig for rig in rigs if rig.virtual is not None and name in named_in(rig)[kind]), None)
+
+
+@pytest.fixture(scope="module")
+def rig(request: pytest.FixtureRequest) -> Rig:
+    """Give the bench's configuration; the module under way says of which kind its instrument is."""
+    name, given = request.config.getoption("--instrument"), request.config.getoption("--bench")
+    kind: PlugInKind = request.module.KIND
+    if name is None:
+        raise pytest.UsageError("--instrument NAME is missing: the name of an entry point, such as afg1022x")
+    kinds = [each for each in PlugInKind if name in plug_in_names(each)]
+    if not kinds:
+        raise pytest.UsageError(f"{name!r} is no installed instrument; install its package first")
+    if kind not in kinds:
+        pytest.skip(f"{name} is none of {kind.value}")
+    found = chosen_rig(name, given, kind)
+    if found is None:
+        raise ConfigurationError(
+            f"{given or 'no shipped virtual bench'} names {name!r} as one of {kind.value}; give a hardware "
+            "configuration that does with --bench"
+        )
+    return found
+
+
+@pytest.fixture
+def bench(rig: Rig) -> Iterator[Bench]:
+    """Open the bench anew for every test; who runs this has looked at its knobs."""
+    with open_bench(rig, calibration=CalibrationRule.WAIVED) as opened:
+        yield opened
+
+
+def heard_v(bench: Bench, duration_s: float) -> Samples:
+    """Read so long, and give the volts at the generator's terminal, the first moments left out."""
+    count = int(duration_s * bench.digitizer.sample_rate_hz)
+    bench.digitizer.read(max(1, int(SETTLING_S * bench.digitizer.sample_rate_hz)))
+    row = bench.digitizer.roles.index(Role.DRIVE_VOLTAGE.value)
+    volts = bench.digitizer.read(count).volts[row] * bench.channels[row].units_per_volt
+    return np.asarray(volts)
+
+
+def line_v(volts: Samples, frequency_hz: float, rate_hz: float) -> float:
+    """Amplitude of one sine in a stretch, by least squares [V]."""
+    angle = 2 * np.pi * frequency_hz * np.arange(len(volts)) / rate_hz
+    basis = np.stack((np.cos(angle), np.sin(angle), np.ones_like(angle)), axis=1)
+    found, *_ = np.linalg.lstsq(basis, volts)
+    return float(np.hypot(found[0], found[1]))

@@ -1,0 +1,72 @@
+"""What every converter must do: sample without a gap, count from zero, and say what it cannot."""
+
+import numpy as np
+import pytest
+
+from ..bench import Bench
+from ..errors import AcquisitionError
+from ..instruments import PlugInKind
+
+KIND = PlugInKind.DIGITIZER
+BLOCK = 256
+
+
+def test_it_says_who_it_is_what_it_reads_and_how_fast(bench: Bench) -> None:
+    digitizer = bench.digitizer
+    assert digitizer.identity.model
+    assert digitizer.identity.reply
+    assert digitizer.roles == tuple(channel.role.value for channel in bench.rig.daq.channels)
+    asked_hz = bench.rig.daq.sample_rate_hz
+    assert asked_hz * (1 - 1e-6) <= digitizer.sample_rate_hz <= 2 * asked_hz
+
+
+def test_blocks_follow_each_other_from_sample_zero(bench: Bench) -> None:
+    bench.digitizer.start()
+    due = 0
+    for count in (1, BLOCK, 3 * BLOCK, 7):
+        block = bench.digitizer.read(count)
+        assert block.first_sample == due
+        assert block.volts.shape == (len(bench.digitizer.roles), count)
+        assert block.volts.dtype == np.float64
+        assert np.all(np.isfinite(block.volts))
+        due += count
+    assert bench.digitizer.waiting_samples >= 0
+
+
+def test_a_run_after_a_stop_counts_from_zero_again(bench: Bench) -> None:
+    bench.digitizer.stop()
+    for _ in range(2):
+        bench.digitizer.start()
+        assert bench.digitizer.read(BLOCK).first_sample == 0
+        bench.digitizer.stop()
+        bench.digitizer.stop()
+
+
+def test_reading_without_a_start_and_starting_twice_are_refused(bench: Bench) -> None:
+    with pytest.raises(AcquisitionError):
+        bench.digitizer.read(BLOCK)
+    bench.digitizer.start()
+    with pytest.raises(AcquisitionError):
+        bench.digitizer.start()
+    with pytest.raises(AcquisitionError):
+        bench.digitizer.read(0)
+
+
+def test_volts_are_whole_counts_where_it_tells_the_step(bench: Bench) -> None:
+    steps_v = bench.digitizer.volts_per_count
+    assert len(steps_v) == len(bench.digitizer.roles)
+    bench.digitizer.start()
+    rows = bench.digitizer.read(4 * BLOCK).volts
+    for row, step_v in zip(rows, steps_v, strict=True):
+        if step_v is not None:
+            counts = row / step_v
+            assert np.max(np.abs(counts - np.rint(counts))) < 1e-3
+
+
+def test_close_may_be_repeated_and_ends_reading(bench: Bench) -> None:
+    bench.digitizer.start()
+    bench.digitizer.close()
+    bench.digitizer.close()
+    bench.digitizer.stop()
+    with pytest.raises(AcquisitionError):
+        bench.digitizer.read(BLOCK)

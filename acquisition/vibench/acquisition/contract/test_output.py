@@ -1,0 +1,98 @@
+"""What every analogue output must do: begin with the converter, play what was written, and end at zero."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from ..bench import Bench
+from ..errors import AcquisitionError, InstrumentError, LimitExceeded
+from ..instruments import AnalogOutput, IdleOutput, PlugInKind, Samples
+from .conftest import LEVEL, heard_v, line_v
+
+KIND = PlugInKind.OUTPUT
+TONE_HZ = 160.0
+
+
+def output_of(bench: Bench) -> AnalogOutput:
+    assert bench.output is not None
+    return bench.output
+
+
+def tone(output: AnalogOutput, amplitude_v: float, first: int, count: int) -> Samples:
+    time_s = np.arange(first, first + count) / output.sample_rate_hz
+    return np.asarray(amplitude_v * np.sin(2 * np.pi * TONE_HZ * time_s))
+
+
+def level_v(bench: Bench) -> float:
+    assert bench.rig.daq.output is not None
+    return LEVEL * bench.rig.daq.output.limit_v
+
+
+@contextmanager
+def playing(bench: Bench) -> Iterator[None]:
+    """Play a tone for as long as a second lasts."""
+    output = output_of(bench)
+    stretch = output.ahead_samples // 2
+    output.write(tone(output, level_v(bench), 0, stretch))
+    output.write(tone(output, level_v(bench), stretch, stretch))
+    output.arm()
+    bench.digitizer.start()
+    yield
+    output.stop()
+
+
+def test_it_says_who_it_is_and_how_far_ahead_it_is_written(bench: Bench) -> None:
+    output = output_of(bench)
+    assert output.identity.reply
+    assert bench.rig.daq.output is not None
+    assert output.sample_rate_hz == pytest.approx(bench.rig.daq.output.sample_rate_hz, rel=1e-6)
+    assert output.ahead_samples > 0
+    assert output.idle in IdleOutput
+
+
+def test_a_tone_is_heard_as_it_was_written_from_the_first_sample_on(bench: Bench) -> None:
+    with playing(bench):
+        rate_hz = bench.digitizer.sample_rate_hz
+        share = output_of(bench).ahead_samples / output_of(bench).sample_rate_hz
+        row = bench.digitizer.read(int(0.8 * share * rate_hz))
+        drive = bench.digitizer.roles.index("drive_voltage")
+        volts = row.volts[drive] * bench.channels[drive].units_per_volt
+    assert line_v(volts[len(volts) // 4 :], TONE_HZ, rate_hz) == pytest.approx(level_v(bench), rel=0.03)
+    begun = int(np.argmax(np.abs(volts) > 0.3 * level_v(bench)))
+    assert begun < 0.01 * rate_hz, "output and converter must begin with the same sample"
+
+
+@pytest.mark.parametrize("peak", [1.01, float("nan"), float("inf")])
+def test_a_sample_past_the_limit_is_refused_and_nothing_plays(bench: Bench, peak: float) -> None:
+    output = output_of(bench)
+    assert bench.rig.daq.output is not None
+    with pytest.raises(LimitExceeded):
+        output.write(np.array([0.0, peak * bench.rig.daq.output.limit_v, 0.0]))
+
+
+def test_there_must_be_something_to_play(bench: Bench) -> None:
+    with pytest.raises(InstrumentError):
+        output_of(bench).arm()
+
+
+def test_stop_is_zero_at_any_time_and_the_next_stream_is_a_new_one(bench: Bench) -> None:
+    output_of(bench).stop()
+    with playing(bench):
+        bench.digitizer.read(256)
+    output_of(bench).stop()
+    bench.digitizer.stop()
+    bench.digitizer.start()
+    assert float(np.ptp(heard_v(bench, 0.2))) < 0.1 * level_v(bench) + 2e-3
+    bench.digitizer.stop()
+    with playing(bench):
+        bench.digitizer.read(256)
+
+
+def test_close_may_be_repeated(bench: Bench) -> None:
+    output = output_of(bench)
+    output.close()
+    output.close()
+    with pytest.raises(AcquisitionError):
+        output.write(np.zeros(16))

@@ -1,0 +1,17 @@
+"""What every sensor must tell: how its quantity becomes volts."""
+
+from math import isfinite
+
+from ..instruments import PlugInKind
+from ..rig import Rig, channels_of
+
+KIND = PlugInKind.SENSOR
+
+
+def test_its_channel_has_a_sensitivity_a_range_and_a_name(rig: Rig) -> None:
+    for channel in channels_of(rig):
+        assert channel.sensor
+        assert isfinite(channel.units_per_volt)
+        assert channel.units_per_volt > 0
+        assert channel.full_scale_v > 0
+        assert channel.delay_s >= 0

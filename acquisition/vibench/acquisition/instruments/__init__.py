@@ -1,0 +1,15 @@
+"""What a bench needs of its instruments, and how they are found: promises, values, plug-ins.
+
+An instrument is a class that keeps one of the protocols here, and an entry point of an installed package
+that names it: ``vibench.generators``, ``vibench.digitizers``, ``vibench.outputs``, ``vibench.sensors``.
+A hardware configuration gives that name. Our own instruments are rows of the same kind. docs/instruments.md
+tells how to write one; `vibench.acquisition.contract` tests it.
+
+>>> from vibench.acquisition.instruments import PlugInKind, plug_in
+>>> plug_in(PlugInKind.GENERATOR, "afg1022x").__name__
+'AFG1022X'
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,21 @@
+from ._plug_in import (
+    PlugInKind as PlugInKind,
+    plug_in as plug_in,
+    plug_in_names as plug_in_names,
+)
+from ._protocols import (
+    AnalogOutput as AnalogOutput,
+    Digitizer as Digitizer,
+    FunctionGenerator as FunctionGenerator,
+    GeneratorDescription as GeneratorDescription,
+    IdleOutput as IdleOutput,
+)
+from ._values import (
+    Block as Block,
+    FoundDevice as FoundDevice,
+    Identity as Identity,
+    Knob as Knob,
+    Overload as Overload,
+    Samples as Samples,
+    SensorFacts as SensorFacts,
+)

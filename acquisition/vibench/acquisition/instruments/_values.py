@@ -1,0 +1,85 @@
+"""What instruments hand over: who they are, samples, and what a person must confirm."""
+
+from dataclasses import dataclass
+from datetime import date
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..host import FrozenModel
+
+Samples = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Who an instrument says it is, kept with every recording."""
+
+    maker: str
+    model: str
+    serial: str
+    firmware: str
+    reply: str
+    """The whole reply, as it came."""
+
+
+class Knob(FrozenModel):
+    """A setting made by hand that no instrument reports: the operator confirms it."""
+
+    instrument: str
+    setting: str
+    value: str
+
+
+@dataclass(frozen=True)
+class FoundDevice:
+    """A converter that was found."""
+
+    name: str
+    """For ``daq.device``."""
+    product: str
+    """For ``daq.product``."""
+    serial: str
+    inputs: tuple[str, ...]
+    """For ``daq.channels.physical``, the part behind the slash."""
+    outputs: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Overload:
+    """An input past 95 % of its range: which channel, and which samples of the run."""
+
+    channel: str
+    """Role of the channel, ``"m0_velocity"`` for example."""
+    first_sample: int
+    last_sample: int
+    """Inclusive; counted from the first sample of the run."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """Samples handed over at once, for all channels, without a gap to the block before."""
+
+    first_sample: int
+    """Position of the first sample in the run."""
+    volts: Samples
+    """Shape (channels, samples) [V] at the converter's input."""
+    overloads: tuple[Overload, ...] = ()
+
+
+@dataclass(frozen=True)
+class SensorFacts:
+    """How a sensor turns its quantity into volts."""
+
+    quantity: str
+    """``"voltage"``, ``"acceleration"`` or ``"velocity"``: what the role of its channel records."""
+    unit: str
+    """UDUNITS text: ``"V"``, ``"m s-2"``, ``"m s-1"``."""
+    units_per_volt: float
+    full_scale_v: float
+    """Largest output, peak [V]; infinite for a wire."""
+    name: str
+    serial: str = ""
+    delay_s: float = 0.0
+    """How much later its volts are than the quantity [s]."""
+    calibrated: date | None = None

@@ -1,0 +1,81 @@
+"""What is in front of an input: a wire, an accelerometer, a vibrometer, or the sensor of a plug-in."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from ..errors import ConfigurationError
+from ..instruments import PlugInKind, SensorFacts, plug_in
+from ._configuration import ChannelConfig, Rig, Role
+
+Sensor = Callable[[Rig, ChannelConfig], SensorFacts]
+"""What an entry point of ``vibench.sensors`` is: it tells the facts, and may ask its instrument for them."""
+
+_USUAL: Mapping[Role, str] = MappingProxyType(
+    {
+        Role.DRIVE_VOLTAGE: "wire",
+        Role.AMPLIFIER_VOLTAGE: "wire",
+        Role.BASE_ACCELERATION: "accelerometer",
+        Role.M0_VELOCITY: "vibrometer",
+    }
+)
+_RECORDED: Mapping[Role, tuple[str, str]] = MappingProxyType(
+    {
+        Role.DRIVE_VOLTAGE: ("voltage", "V"),
+        Role.AMPLIFIER_VOLTAGE: ("voltage", "V"),
+        Role.BASE_ACCELERATION: ("acceleration", "m s-2"),
+        Role.M0_VELOCITY: ("velocity", "m s-1"),
+    }
+)
+
+
+def sensor_name(config: ChannelConfig) -> str:
+    """Name the sensor in front of an input: the one that is given, or the usual one of its role."""
+    return config.sensor or _USUAL[config.role]
+
+
+def sensor_of(rig: Rig, config: ChannelConfig) -> SensorFacts:
+    """Give the facts of the sensor in front of an input.
+
+    Raises
+    ------
+    ConfigurationError
+        When no package offers it, or it measures something else than the role records.
+
+    """
+    name = sensor_name(config)
+    sensor: Sensor = plug_in(PlugInKind.SENSOR, name)
+    facts = sensor(rig, config)
+    if (facts.quantity, facts.unit) != _RECORDED[config.role]:
+        quantity, unit = _RECORDED[config.role]
+        raise ConfigurationError(
+            f"the sensor {name!r} of {config.physical} tells of {facts.quantity} in {facts.unit!r}, and "
+            f"{config.role.value} records {quantity} in {unit!r}; give the channel another role or sensor"
+        )
+    return facts
+
+
+def wire(rig: Rig, config: ChannelConfig) -> SensorFacts:
+    """Volts as they are, behind the attenuation of the channel."""
+    if config.role is Role.AMPLIFIER_VOLTAGE:
+        return SensorFacts(
+            "voltage", "V", 1.0, float("inf"), "amplifier output, by wire", rig.amplifier.serial
+        )
+    return SensorFacts("voltage", "V", 1.0, float("inf"), "the amplifier's input, by wire")
+
+
+def accelerometer(rig: Rig, config: ChannelConfig) -> SensorFacts:
+    """Give the accelerometer of the hardware configuration."""
+    del config
+    a = rig.accelerometer
+    per_volt = 1 / a.sensitivity_v_per_m_per_s2
+    return SensorFacts(
+        "acceleration", "m s-2", per_volt, a.full_scale_v, a.model, a.serial, calibrated=a.calibrated
+    )
+
+
+def vibrometer(rig: Rig, config: ChannelConfig) -> SensorFacts:
+    """Give the vibrometer of the hardware configuration."""
+    del config
+    v = rig.vibrometer
+    per_volt, name = v.range_mm_per_s_per_v * 1e-3, f"{v.model} {v.decoder}"
+    return SensorFacts("velocity", "m s-1", per_volt, v.full_scale_v, name, v.serial, v.delay_s, v.calibrated)

@@ -1,0 +1,148 @@
+"""Instruments by plug-in: ours keep the contract, and a stranger's measure without an edit of ours."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from vibench.acquisition import ConfigurationError
+from vibench.acquisition.instruments import PlugInKind, plug_in, plug_in_names
+from vibench.acquisition.instruments._plug_in import OURS
+from vibench.acquisition.rig import load_rig
+
+ROOT = Path(__file__).resolve().parents[3]
+PACKAGE = ROOT / "examples" / "instrument_package"
+BENCH = PACKAGE / "bench.toml"
+CONFIGS = ROOT / "hardware_configs"
+
+MEASURES = """
+import sys
+from pathlib import Path
+from vibench.acquisition import open_bench, open_recording, run_measurement
+from vibench.acquisition.plan import Dwell, Measurement
+plan = Measurement(name="dwell", ramp_s=0.5, excitation=Dwell(
+    amplitude_vpp=0.5, frequency_hz=160, settle_s=0.5, duration_s=1.0))
+with open_bench(Path(sys.argv[1])) as bench:
+    path = run_measurement(bench, plan, Path(sys.argv[2])).path
+with open_recording(path) as recording:
+    base = recording.channel("base_acceleration")
+    print(recording.state.value, recording.instruments["generator"].model, base.long_name)
+"""
+
+
+def run(*arguments, path=None):
+    """Run a program of this interpreter; a folder of packages may be put in front of its path."""
+    kept = os.environ if path is None else {**os.environ, "PYTHONPATH": str(path)}
+    return subprocess.run(
+        [sys.executable, *map(str, arguments)],
+        cwd=ROOT,
+        env=kept,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def contract(name, *options, path=None):
+    return run(
+        *("-m", "pytest", "-p", "no:cacheprovider", "-p", "vibench.acquisition.contract._options"),
+        *("--pyargs", "vibench.acquisition.contract", "--instrument", name, *options),
+        path=path,
+    )
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """Install the example package where nothing else is."""
+    target = tmp_path_factory.mktemp("installed")
+    done = run(
+        "-m", "pip", "--quiet", "install", "--no-deps", "--no-build-isolation", "--target", target, PACKAGE
+    )
+    assert done.returncode == 0, done.stderr
+    return target
+
+
+def test_every_row_of_ours_names_something_that_is_there():
+    for row in OURS:
+        assert plug_in(PlugInKind(row.group), row.name) is row.load()
+
+
+def test_a_name_that_nobody_offers_is_refused_with_those_that_there_are():
+    with pytest.raises(ConfigurationError, match=r"'afg' is no instrument of vibench\.generators: afg1022x"):
+        plug_in(PlugInKind.GENERATOR, "afg")
+
+
+def test_a_configuration_that_names_what_is_not_installed_is_refused_before_anything_opens():
+    with pytest.raises(
+        ConfigurationError, match=r"generator\.driver = 'plain_scpi' is not installed: afg1022x"
+    ):
+        load_rig(BENCH)
+
+
+def test_a_package_that_cannot_be_imported_says_so(tmp_path, monkeypatch):
+    offer(tmp_path, monkeypatch, "broken", "no_such_module_of_anyone:Driver")
+    with pytest.raises(ConfigurationError, match=r"no_such_module_of_anyone:Driver, which cannot be loaded"):
+        plug_in(PlugInKind.GENERATOR, "broken")
+
+
+def test_two_packages_with_one_name_are_told_apart_by_nobody(tmp_path, monkeypatch):
+    offer(tmp_path, monkeypatch, "afg1022x", "somebody:Else")
+    with pytest.raises(ConfigurationError, match=r"offered more than once \(somebody:Else, vibench"):
+        plug_in(PlugInKind.GENERATOR, "afg1022x")
+
+
+def offer(folder, monkeypatch, name, target):
+    """Let an installed package offer a generator."""
+    metadata = folder / "somebody-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: somebody\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text(f"[vibench.generators]\n{name} = {target}\n")
+    monkeypatch.syspath_prepend(folder)
+    assert name in plug_in_names(PlugInKind.GENERATOR)
+
+
+def test_a_stranger_s_instruments_measure_without_an_edit_of_ours(installed, tmp_path):
+    done = run("-c", MEASURES, BENCH, tmp_path / "dwell.h5", path=installed)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split(maxsplit=2) == ["complete", "AFG1022", "base acceleration (charge amplifier)\n"]
+
+
+@pytest.mark.parametrize("name", ["plain_scpi", "charge_amplifier"])
+def test_a_stranger_s_instruments_keep_the_contract(installed, name):
+    done = contract(name, "--bench", BENCH, path=installed)
+    assert done.returncode == 0, done.stdout
+    assert "passed" in done.stdout
+
+
+def test_a_generator_that_breaks_its_promises_is_found_out(tmp_path, installed):
+    broken = (installed / "example_instruments.py").read_text()
+    broken = broken.replace("self._stretch = peak", "self._stretch = 1.0").replace(
+        '"OUTP1:STAT OFF"', '"*WAI"'
+    )
+    (tmp_path / "example_instruments.py").write_text(broken)
+    done = contract("plain_scpi", "--bench", BENCH, path=os.pathsep.join((str(tmp_path), str(installed))))
+    assert done.returncode == 1
+    for promise in ("test_a_waveform_is_played_point_by_point", "test_stop_is_silence_at_any_time"):
+        assert promise in done.stdout
+
+
+def test_the_contract_says_which_option_is_missing():
+    done = run(
+        *("-m", "pytest", "-p", "no:cacheprovider", "-p", "vibench.acquisition.contract._options"),
+        *("--pyargs", "vibench.acquisition.contract.test_sensor"),
+    )
+    assert "--instrument NAME is missing" in done.stdout
+
+
+OUR_INSTRUMENTS = sorted({row.name for row in OURS})
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("name", OUR_INSTRUMENTS)
+def test_our_own_instruments_keep_the_contract(name):
+    done = contract(name)
+    assert done.returncode == 0, done.stdout
+    assert "passed" in done.stdout
