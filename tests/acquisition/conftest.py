@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from vibench.acquisition import Block, Identity
 from vibench.acquisition.errors import DataLost
-from vibench.acquisition.instruments import IdleOutput, Samples
+from vibench.acquisition.instruments import IdleOutput, Samples, Sweep
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import (
     BaseQuantity,
@@ -127,6 +127,10 @@ class LoopbackGenerator:
         self._world.period = waveform
         self._world.frequency_hz = repetition_hz
         self._set(amplitude_vpp)
+
+    def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
+        self._world.command("load_sweep", sweep)
+        self.load_sine(sweep.start_hz, amplitude_vpp)
 
     def set_frequency(self, frequency_hz: float) -> None:
         self._world.command("set_frequency", frequency_hz)

@@ -11,7 +11,7 @@ import numpy as np
 import pyvisa
 
 from vibench.acquisition import ConfigurationError, InstrumentError, InstrumentLost, LimitExceeded
-from vibench.acquisition.instruments import GeneratorDescription, Identity, Knob, Samples, SensorFacts
+from vibench.acquisition.instruments import GeneratorDescription, Identity, Knob, Samples, SensorFacts, Sweep
 from vibench.acquisition.rig import ChannelConfig, GeneratorConfig, Rig
 
 LOWEST_VPP, HIGHEST_VPP = 2e-3, 20.0
@@ -95,6 +95,10 @@ class PlainScpiGenerator:
         self._command(f"SOUR1:FREQ {repetition_hz:.6f}")
         self._stretch = peak
         self.set_amplitude(amplitude_vpp)
+
+    def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
+        """Refuse: sweeps are stepped by the computer, since `describe` promises none."""
+        raise LimitExceeded(f"{sweep} at {amplitude_vpp:g} Vpp: no sweeps of its own; use sine_sweep")
 
     def set_frequency(self, frequency_hz: float) -> None:
         """Change the frequency."""

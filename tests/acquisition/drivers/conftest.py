@@ -22,7 +22,7 @@ class Logged:
     """Listens in between the USB interface and the instrument."""
 
     def __init__(self, instrument: AFG1022) -> None:
-        self.serial = instrument.serial
+        self.serial, self.maker, self.model = instrument.serial, instrument.maker, instrument.model
         self.messages: list[str] = []
         self.states: list[ChannelSettings] = []
         self.before: Callable[[bytes], None] = _nothing

@@ -7,8 +7,8 @@ import pytest
 
 from vibench.acquisition import InstrumentError, InstrumentLost, LimitExceeded
 from vibench.acquisition.drivers import AFG1022X
-from vibench.acquisition.drivers._afg1022_limits import Shape
 from vibench.acquisition.drivers._afg1022_modes import SweepSupport, Unsupported
+from vibench.acquisition.drivers._generator_limits import Shape
 from vibench.acquisition.errors import InstrumentBusy, SettingRefused
 from vibench.acquisition.instruments import Knob
 from vibench.virtual_rig.generator import Panel, Quirks

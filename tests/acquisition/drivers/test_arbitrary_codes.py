@@ -6,11 +6,16 @@ from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 
 from vibench.acquisition import LimitExceeded
-from vibench.acquisition.drivers._arbitrary_codes import HIGHEST_CODE, arbitrary_codes
+from vibench.acquisition.drivers import AFG1022_MODEL
+from vibench.acquisition.drivers._arbitrary_codes import arbitrary_codes as codes_for
 
 waveforms = arrays(np.float64, st.integers(2, 300), elements=st.floats(-1, 1, allow_subnormal=False)).filter(
     lambda values: np.ptp(values) > 1e-6
 )
+
+
+def arbitrary_codes(waveform):
+    return codes_for(waveform, AFG1022_MODEL)
 
 
 @given(waveforms)
@@ -22,8 +27,8 @@ def test_what_the_codes_play_is_the_waveform_without_its_mean_within_half_a_step
 @given(waveforms)
 def test_the_largest_magnitude_takes_an_outermost_code_and_none_is_beyond(values):
     codes = arbitrary_codes(values).codes
-    assert codes.min() == 0 or codes.max() == HIGHEST_CODE
-    assert codes.max() <= HIGHEST_CODE
+    assert codes.min() == 0 or codes.max() == AFG1022_MODEL.top_code
+    assert codes.max() <= AFG1022_MODEL.top_code
 
 
 @given(waveforms)
@@ -35,7 +40,7 @@ def test_the_dc_that_is_left_is_less_than_half_a_step(values):
 def test_a_sine_of_full_range_needs_no_other_amplitude_on_the_panel():
     made = arbitrary_codes(np.sin(2 * np.pi * np.arange(4096) / 4096))
     assert made.panel_factor == pytest.approx(1.0, abs=1e-12)
-    assert (made.codes.min(), made.codes.max()) == (0, HIGHEST_CODE)
+    assert (made.codes.min(), made.codes.max()) == (0, AFG1022_MODEL.top_code)
     assert abs(made.residual_mean) < 1e-7
 
 

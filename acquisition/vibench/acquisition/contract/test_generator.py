@@ -5,7 +5,7 @@ import pytest
 
 from ..bench import Bench
 from ..errors import AcquisitionError, LimitExceeded
-from ..instruments import Knob, PlugInKind
+from ..instruments import Knob, PlugInKind, Sweep
 from ..rig import Rig, generator_driver
 from .conftest import LEVEL, heard_v, line_v
 
@@ -133,6 +133,28 @@ def test_a_burst_plays_its_cycles_and_ends_by_itself(bench: Bench) -> None:
     assert is_quiet(bench)
     bench.generator.end_burst()
     assert tone_v(bench, TONE_HZ) == pytest.approx(terminal_v(bench), rel=SAME)
+
+
+def test_a_sweep_of_its_own_waits_for_its_trigger_and_ends_where_it_should(bench: Bench) -> None:
+    sweep = Sweep(TONE_HZ, 1.25 * TONE_HZ, 2.0)
+    can = generator_driver(bench.rig.generator).describe(bench.rig.generator)
+    if can.longest_sweep_s < sweep.duration_s:
+        with pytest.raises(LimitExceeded):
+            bench.generator.load_sweep(sweep, level_vpp(bench))
+        return
+    bench.generator.load_sweep(sweep, level_vpp(bench))
+    bench.generator.start()
+    bench.digitizer.start()
+    assert tone_v(bench, sweep.start_hz) == pytest.approx(terminal_v(bench), rel=SAME)
+    bench.generator.trigger()
+    row = bench.digitizer.roles.index("drive_voltage")
+    rate_hz = bench.digitizer.sample_rate_hz
+    volts = bench.digitizer.read(int(2.5 * rate_hz)).volts[row]
+    rises = np.count_nonzero((volts[:-1] < 0) & (volts[1:] >= 0))
+    # What was read before the trigger is at the start, what came after the end at the stop: in between.
+    swept = sweep.duration_s * (sweep.start_hz + sweep.stop_hz) / 2
+    assert swept + 0.5 * sweep.start_hz - 2 <= rises <= swept + 0.5 * sweep.stop_hz + 2
+    assert tone_v(bench, sweep.stop_hz) == pytest.approx(terminal_v(bench), rel=SAME)
 
 
 def test_a_setting_takes_a_time_that_was_measured(bench: Bench) -> None:

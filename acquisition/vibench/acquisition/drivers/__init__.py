@@ -1,4 +1,4 @@
-"""Real instruments: the Tektronix AFG1022 over VISA, and converters and outputs behind NI-DAQmx.
+"""Real instruments: Tektronix AFG1022 and Keysight 33500B over VISA, inputs and outputs behind NI-DAQmx.
 
 Each keeps the promises of `vibench.acquisition.instruments`: every setting is read back, every refusal
 becomes an error that says what to do, and outputs go off whatever happens. The only place of this package

@@ -7,9 +7,9 @@ import numpy as np
 from ..errors import InstrumentError, SettingRefused
 from ..instruments import Knob
 from ..rig import HIGH_Z
-from ._afg1022_limits import Load, Shape
-from ._afg1022_modes import switch_off_modes
+from ._afg1022_modes import arm_burst, end_burst, switch_off_modes
 from ._arbitrary_codes import ArbitraryCodes
+from ._generator_limits import Load, Shape
 from ._scpi import ScpiPort, number_in
 from ._verified_settings import Tolerance, VerifiedSettings
 
@@ -84,12 +84,16 @@ class Afg1022Channel:
     def to_quiet_sine(self) -> None:
         """Whatever it was: no modes, no offset, the smallest amplitude, a sine."""
         # *RST is not used: what it does to the output of this model is not documented.
-        switch_off_modes(self.settings, self._channel)
+        self.switch_off_modes()
         self._playing = Playing(Shape.SINE, _QUIET_FREQUENCY_HZ, self._minimum_vpp, 0.0)
         self.set_offset(0.0)  # first: it lowers the peak whatever the amplitude is
         self.mute()
         self.select_sine()
         self.set_frequency(_QUIET_FREQUENCY_HZ)
+
+    def switch_off_modes(self) -> None:
+        """End sweep, burst, modulation and frequency lock."""
+        switch_off_modes(self.settings, self._channel)
 
     def mute(self) -> None:
         """Set the smallest amplitude."""
@@ -135,6 +139,18 @@ class Afg1022Channel:
                 f"of which {same} agree. Upload again; if it fails again, check the USB cable"
             )
 
+    def arm_burst(self, cycles: int) -> None:
+        """Play ``cycles`` periods at each trigger instead of playing on."""
+        arm_burst(self.settings, self._channel, cycles)
+
+    def end_burst(self) -> None:
+        """Play on without a trigger."""
+        end_burst(self.settings, self._channel)
+
+    def agree_on_load(self, load: Load) -> tuple[Knob, ...]:
+        """Make the generator expect ``load``; return what the operator must confirm."""
+        return agree_on_load(self.settings.port, f"OUTP{self._channel}:IMP", load)
+
     def _select(self, shape: Shape, codes: ArbitraryCodes | None) -> None:
         self.settings.set_word(f"SOUR{self._channel}:FUNC:SHAP", shape.value, _SHAPE_ANSWERS[shape])
         self._playing = replace(self.playing, shape=shape, codes=codes)
@@ -145,7 +161,7 @@ _INFINITE_OHM = 1e6
 _SAME_LOAD = 0.01
 
 
-def agree_on_load(port: ScpiPort, channel: int, load: Load) -> tuple[Knob, ...]:
+def agree_on_load(port: ScpiPort, header: str, load: Load) -> tuple[Knob, ...]:
     """Make the generator expect ``load``; return what the operator must confirm when it cannot be known.
 
     Sources contradict each other on whether an AFG1022 takes its load remotely (hardware reference
@@ -157,7 +173,6 @@ def agree_on_load(port: ScpiPort, channel: int, load: Load) -> tuple[Knob, ...]:
         When the generator says that it expects another load, and does not let it be changed.
 
     """
-    header = f"OUTP{channel}:IMP"
     wanted = "INF" if load == HIGH_Z else f"{load:g}"
     try:
         port.command(f"{header} {wanted}")

@@ -4,7 +4,7 @@ from enum import StrEnum
 from math import degrees
 
 from ..errors import InstrumentError, LimitExceeded, SettingRefused
-from ._afg1022_limits import BURST_CYCLES, Shape, check_frequency
+from ._generator_limits import AFG1022_MODEL, GeneratorModel, Shape
 from ._scpi import number_in
 from ._verified_settings import Tolerance, VerifiedSettings
 
@@ -53,7 +53,12 @@ def arm_burst(settings: VerifiedSettings, channel: int, cycles: int) -> None:
     """
     if channel != _BURST_CHANNEL:
         raise Unsupported(f"a burst was asked of channel {channel}; only channel {_BURST_CHANNEL} has bursts")
-    fewest, most = BURST_CYCLES
+    set_burst(settings, channel, cycles, AFG1022_MODEL)
+
+
+def set_burst(settings: VerifiedSettings, channel: int, cycles: int, model: GeneratorModel) -> None:
+    """Play ``cycles`` periods at each trigger; LimitExceeded for more than the counter takes."""
+    fewest, most = model.burst_cycles
     if not fewest <= cycles <= most:
         raise LimitExceeded(f"a burst of {cycles} cycles was asked for; {fewest} to {most} are allowed")
     header = f"SOUR{channel}:BURS"
@@ -98,8 +103,8 @@ def set_phase(settings: VerifiedSettings, channel: int, phase_deg: int) -> None:
 
 def probe_sweep(settings: VerifiedSettings, channel: int, start_hz: float, stop_hz: float) -> SweepSupport:
     """Try the sweep commands, see what they did, and go back to one frequency. Needs the output off."""
-    check_frequency(Shape.SINE, start_hz)
-    check_frequency(Shape.SINE, stop_hz)
+    AFG1022_MODEL.check_frequency(Shape.SINE, start_hz)
+    AFG1022_MODEL.check_frequency(Shape.SINE, stop_hz)
     header = f"SOUR{channel}:FREQ"
     try:
         settings.set_number(f"{header}:STAR", start_hz, f"{start_hz:.6f}", _FREQUENCY)

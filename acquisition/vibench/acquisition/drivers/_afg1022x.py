@@ -1,25 +1,19 @@
 """The Tektronix AFG1022: every setting read back, and an output that goes off whatever happens."""
 
+import re
 import statistics
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Self
+from typing import ClassVar, Self
 
 from ..errors import AcquisitionError, InstrumentError, InstrumentLost
-from ..instruments import GeneratorDescription, Identity, Knob, Samples
+from ..instruments import Identity, Knob, Samples, Sweep
 from ..rig import GeneratorConfig
-from ._afg1022_channel import Afg1022Channel, Playing, agree_on_load
-from ._afg1022_limits import (
-    HIGHEST_HZ,
-    Shape,
-    amplitude_range_vpp,
-    check_amplitude,
-    check_frequency,
-    instrument_range_vpp,
-)
-from ._afg1022_modes import SweepSupport, arm_burst, end_burst, probe_sweep, set_phase, trigger
-from ._arbitrary_codes import FEWEST_POINTS, MOST_POINTS, arbitrary_codes
+from ._afg1022_channel import Afg1022Channel, Playing
+from ._afg1022_modes import SweepSupport, probe_sweep, set_phase, trigger
+from ._arbitrary_codes import arbitrary_codes
+from ._generator_limits import AFG1022_MODEL, GeneratorModel, Shape
 from ._scpi import ScpiPort
 from ._verified_settings import VerifiedSettings
 from ._visa_link import Link, open_link
@@ -34,8 +28,6 @@ def noted(error: BaseException) -> Iterator[None]:
         error.add_note(f"While cleaning up: {failure}")
 
 
-MAKER = "TEKTRONIX"
-MODEL = "AFG1022"
 _STOP_ATTEMPTS = 2
 _LATENCY_TRIALS = 9
 
@@ -48,6 +40,12 @@ class AFG1022X:
     ``amplitude_limit_vpp`` forbid (`LimitExceeded`), and no step between two settings is larger than
     the larger of them.
     """
+
+    model: ClassVar[GeneratorModel] = AFG1022_MODEL
+    wanted: ClassVar[str] = "TEKTRONIX,AFG1022"
+    """Maker and model that ``*IDN?`` must answer, for people."""
+    answers: ClassVar[re.Pattern[str]] = re.compile("TEKTRONIX,AFG1022", re.IGNORECASE)
+    """And as they are compared."""
 
     def __init__(self, config: GeneratorConfig, connect: Callable[[], Link]) -> None:
         self._config = config
@@ -84,16 +82,6 @@ class AFG1022X:
             raise
         return generator
 
-    @staticmethod
-    def describe(config: GeneratorConfig) -> GeneratorDescription:
-        """Say what an AFG1022 can do into the load that it is told to expect."""
-        return GeneratorDescription(
-            "AFG1022",
-            instrument_range_vpp(config.load_ohm),
-            HIGHEST_HZ[Shape.SINE],
-            (FEWEST_POINTS, MOST_POINTS),
-        )
-
     @property
     def identity(self) -> Identity:
         """Who answered ``*IDN?``; the reply is kept whole, since its last field varies."""
@@ -114,12 +102,12 @@ class AFG1022X:
     @property
     def amplitude_range_vpp(self) -> tuple[float, float]:
         """Smallest and largest amplitude that may be set here, peak to peak [V]."""
-        return amplitude_range_vpp(self._config)
+        return self.model.amplitude_range_vpp(self._config)
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
         """Set up a sine. The output keeps its state."""
-        check_frequency(Shape.SINE, frequency_hz)
-        check_amplitude(self._config, amplitude_vpp, 0.0)
+        self.model.check_frequency(Shape.SINE, frequency_hz)
+        self.model.check_amplitude(self._config, amplitude_vpp, 0.0)
         with self._changing():
             self._ensure_known()
             if self.playing.shape is not Shape.SINE:
@@ -145,10 +133,10 @@ class AFG1022X:
             When points, repetition or amplitude are outside what instrument or bench allow.
 
         """
-        codes = arbitrary_codes(waveform)
+        codes = arbitrary_codes(waveform, self.model)
         panel_vpp = amplitude_vpp * codes.panel_factor
-        check_frequency(Shape.EDIT_MEMORY, repetition_hz)
-        check_amplitude(self._config, panel_vpp, 0.0)
+        self.model.check_frequency(Shape.EDIT_MEMORY, repetition_hz)
+        self.model.check_amplitude(self._config, panel_vpp, 0.0)
         with self._changing():
             self._ensure_known()
             self._channel.mute()
@@ -160,9 +148,14 @@ class AFG1022X:
             self._channel.set_frequency(repetition_hz)
             self._channel.set_panel(panel_vpp)
 
+    def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
+        """Refuse: its sweep time is set on the panel only; see `probe_sweep`."""
+        del amplitude_vpp
+        self.model.check_sweep(sweep)
+
     def set_frequency(self, frequency_hz: float) -> None:
         """Change the frequency of what is playing; the phase goes on without a jump."""
-        check_frequency(self.playing.shape, frequency_hz)
+        self.model.check_frequency(self.playing.shape, frequency_hz)
         with self._changing():
             self._channel.set_frequency(frequency_hz)
 
@@ -170,13 +163,13 @@ class AFG1022X:
         """Change the peak-to-peak amplitude of what is playing."""
         playing = self.playing
         panel_vpp = amplitude_vpp * playing.panel_factor
-        check_amplitude(self._config, panel_vpp, playing.offset_v)
+        self.model.check_amplitude(self._config, panel_vpp, playing.offset_v)
         with self._changing():
             self._channel.set_panel(panel_vpp)
 
     def set_offset(self, offset_v: float) -> None:
         """Add a constant to what is playing; raises LimitExceeded when the peak would pass the limit."""
-        check_amplitude(self._config, self.playing.panel_vpp, offset_v)
+        self.model.check_amplitude(self._config, self.playing.panel_vpp, offset_v)
         with self._changing():
             self._channel.set_offset(offset_v)
 
@@ -188,7 +181,7 @@ class AFG1022X:
     def arm_burst(self, cycles: int) -> None:
         """Play ``cycles`` periods at each `trigger` instead of playing on."""
         with self._changing():
-            arm_burst(self._channel.settings, self._config.channel, cycles)
+            self._channel.arm_burst(cycles)
 
     def trigger(self) -> None:
         """Fire an armed burst."""
@@ -198,7 +191,7 @@ class AFG1022X:
     def end_burst(self) -> None:
         """Play on without a trigger."""
         with self._changing():
-            end_burst(self._channel.settings, self._config.channel)
+            self._channel.end_burst()
 
     def probe_sweep(self, start_hz: float, stop_hz: float) -> SweepSupport:
         """Whether the instrument sweeps by itself. Turns the output off, and leaves a quiet sine."""
@@ -282,7 +275,7 @@ class AFG1022X:
 
     def _bring_up(self) -> None:
         self._channel.output_off()
-        self._unconfirmed = agree_on_load(self._port, self._config.channel, self._config.load_ohm)
+        self._unconfirmed = self._channel.agree_on_load(self._config.load_ohm)
         self._channel.to_quiet_sine()
 
     def _identify(self) -> None:
@@ -291,9 +284,9 @@ class AFG1022X:
         reply = self._port.query_patiently("*IDN?")
         fields = [field.strip() for field in reply.split(",")]
         maker, model, serial, firmware = (*fields, "", "", "", "")[:4]
-        if maker.upper() != MAKER or not model.upper().startswith(MODEL):
+        if self.answers.match(f"{maker},{model}") is None:
             raise InstrumentError(
-                f"{self._config.resource} answers *IDN? with {reply!r}; {MAKER},{MODEL} is needed. "
+                f"{self._config.resource} answers *IDN? with {reply!r}; {self.wanted} is needed. "
                 "It was told to switch its output off; correct generator.resource in the configuration"
             )
         self._identity = Identity(maker, model, serial, firmware, reply)

@@ -7,12 +7,7 @@ from numpy.typing import NDArray
 
 from ..errors import LimitExceeded
 from ..instruments import Samples
-
-# AFG1022 edit memory: hardware reference 1.2 (IVI driver tkafg1k; drivers that read it back).
-FEWEST_POINTS = 2
-MOST_POINTS = 8192
-HIGHEST_CODE = 16383
-_MIDDLE = HIGHEST_CODE / 2
+from ._generator_limits import GeneratorModel
 
 
 @dataclass(frozen=True)
@@ -24,16 +19,18 @@ class ArbitraryCodes:
     """
 
     codes: NDArray[np.uint16]
-    """0 to 16383, shape (points,)."""
+    """0 to ``top_code``, shape (points,)."""
     removed_mean: float
     """Mean of the values as given: taken out, since DC would push the shaker off its centre."""
+    top_code: int
+    """The code of plus half of the amplitude on the panel; 0 is that of minus half."""
     panel_factor: float
     """Largest magnitude that is left: 1 for a waveform that is free of DC and reaches 1."""
 
     @property
     def achieved(self) -> Samples:
         """Values that the codes stand for, on the scale of the values as given."""
-        return self.panel_factor * (self.codes / _MIDDLE - 1.0)
+        return self.panel_factor * (2 * self.codes / self.top_code - 1.0)
 
     @property
     def residual_mean(self) -> float:
@@ -43,13 +40,13 @@ class ArbitraryCodes:
     @property
     def step(self) -> float:
         """One code, on the scale of the values as given."""
-        return self.panel_factor / _MIDDLE
+        return 2 * self.panel_factor / self.top_code
 
 
-def arbitrary_codes(waveform: Samples) -> ArbitraryCodes:
+def arbitrary_codes(waveform: Samples, model: GeneratorModel) -> ArbitraryCodes:
     """Turn one period of values into codes of the full range.
 
-    Code 0 stands for minus, and 16383 for plus, half of the amplitude on the panel. The mean is
+    Code 0 stands for minus, and the highest one for plus, half of the amplitude on the panel. The mean is
     removed, and what is left is scaled so that its largest magnitude takes an outermost code.
 
     Raises
@@ -59,10 +56,11 @@ def arbitrary_codes(waveform: Samples) -> ArbitraryCodes:
 
     """
     values = np.asarray(waveform, dtype=np.float64)
-    if values.ndim != 1 or not FEWEST_POINTS <= values.size <= MOST_POINTS:
+    fewest, most = model.memory_points
+    if values.ndim != 1 or not fewest <= values.size <= most:
         raise LimitExceeded(
             f"the waveform has the shape {values.shape}; the generator's memory takes one period of "
-            f"{FEWEST_POINTS} to {MOST_POINTS} points. Nothing was sent; resample it"
+            f"{fewest} to {most} points. Nothing was sent; resample it"
         )
     peak = float(np.max(np.abs(values)))
     # Not "peak > 1": a NaN must not pass.
@@ -79,5 +77,6 @@ def arbitrary_codes(waveform: Samples) -> ArbitraryCodes:
             "the waveform is constant: without its mean nothing is left to play. Nothing was sent; "
             "give one period that moves"
         )
-    codes = np.clip(np.rint(_MIDDLE + swing / factor * _MIDDLE), 0, HIGHEST_CODE).astype(np.uint16)
-    return ArbitraryCodes(codes, mean, factor)
+    middle = model.top_code / 2
+    codes = np.clip(np.rint(middle + swing / factor * middle), 0, model.top_code).astype(np.uint16)
+    return ArbitraryCodes(codes, mean, model.top_code, factor)

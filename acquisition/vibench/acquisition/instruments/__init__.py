@@ -6,8 +6,8 @@ A hardware configuration gives that name. Our own instruments are rows of the sa
 tells how to write one; `vibench.acquisition.contract` tests it.
 
 >>> from vibench.acquisition.instruments import PlugInKind, plug_in
->>> plug_in(PlugInKind.GENERATOR, "afg1022x").__name__
-'AFG1022X'
+>>> plug_in(PlugInKind.GENERATOR, "afg1022x").name
+'AFG1022'
 """
 
 import lazy_loader

@@ -9,6 +9,8 @@ from ._protocols import (
     FunctionGenerator as FunctionGenerator,
     GeneratorDescription as GeneratorDescription,
     IdleOutput as IdleOutput,
+    Sweep as Sweep,
+    SweepSpacing as SweepSpacing,
 )
 from ._values import (
     Block as Block,

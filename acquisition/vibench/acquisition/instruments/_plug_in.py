@@ -23,7 +23,8 @@ _SENSORS = "vibench.acquisition.rig"
 OURS = tuple(
     EntryPoint(name, target, kind)
     for kind, name, target in (
-        (PlugInKind.GENERATOR, "afg1022x", f"{_DRIVERS}:AFG1022X"),
+        (PlugInKind.GENERATOR, "afg1022x", f"{_DRIVERS}:AFG1022_MODEL"),
+        (PlugInKind.GENERATOR, "keysight33500b", f"{_DRIVERS}:KEYSIGHT_33500B_MODEL"),
         (PlugInKind.DIGITIZER, "daqmx", f"{_DRIVERS}:DaqmxDigitizer"),
         (PlugInKind.OUTPUT, "daqmx", f"{_DRIVERS}:DaqmxOutput"),
         (PlugInKind.SENSOR, "wire", f"{_SENSORS}:wire"),

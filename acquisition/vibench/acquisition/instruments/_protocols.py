@@ -7,6 +7,23 @@ from typing import Protocol
 from ._values import Block, Identity, Knob, Samples
 
 
+class SweepSpacing(StrEnum):
+    """How a frequency moves with time."""
+
+    LINEAR = "linear"
+    LOGARITHMIC = "logarithmic"
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep that a generator makes by itself."""
+
+    start_hz: float
+    stop_hz: float
+    duration_s: float
+    spacing: SweepSpacing = SweepSpacing.LINEAR
+
+
 @dataclass(frozen=True)
 class GeneratorDescription:
     """What a kind of generator can do, known before any is opened: plans are held against it."""
@@ -18,6 +35,8 @@ class GeneratorDescription:
     highest_sine_hz: float
     memory_points: tuple[int, int]
     """Fewest and most points of one period of a waveform."""
+    longest_sweep_s: float = 0.0
+    """Longest sweep that it makes by itself [s]; 0 where it makes none."""
 
 
 class FunctionGenerator(Protocol):
@@ -44,6 +63,16 @@ class FunctionGenerator(Protocol):
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
         """Put one period (values -1 to 1, the full range being ``amplitude_vpp``) in memory and select it."""
 
+    def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
+        """Set up a sine that stays at the start until `trigger`, sweeps, and stays at the stop.
+
+        Raises
+        ------
+        LimitExceeded
+            When the generator makes no such sweep by itself; see `GeneratorDescription.longest_sweep_s`.
+
+        """
+
     def set_frequency(self, frequency_hz: float) -> None:
         """Change the frequency of what is playing; the phase goes on without a jump."""
 
@@ -54,7 +83,7 @@ class FunctionGenerator(Protocol):
         """Play so many periods at each `trigger` instead of playing on; 0 V before and after."""
 
     def trigger(self) -> None:
-        """Fire an armed burst."""
+        """Fire an armed burst, or begin a sweep."""
 
     def end_burst(self) -> None:
         """Play on without a trigger."""

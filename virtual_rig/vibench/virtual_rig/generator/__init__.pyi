@@ -4,6 +4,9 @@ from ._afg1022 import (
     MODEL as MODEL,
     Reply as Reply,
 )
+from ._keysight_33500b import (
+    Keysight33500B as Keysight33500B,
+)
 from ._output_signal import (
     Panel as Panel,
 )

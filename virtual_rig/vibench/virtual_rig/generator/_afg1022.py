@@ -58,6 +58,8 @@ class AFG1022:
 
     """
 
+    maker, model, firmware = MAKER, MODEL, FIRMWARE
+
     def __init__(
         self,
         clock: Callable[[], float],
@@ -70,11 +72,11 @@ class AFG1022:
         self.serial = serial
         self.quirks = quirks
         self.status = Status()
-        self.memory = ArbitraryMemory()
+        self.memory = self._new_memory()
         self._clock = clock
         self._lock = threading.RLock()
         self._now_s = 0.0
-        power_on = ChannelSettings(declared_load_ohm=panel.declared_load_ohm)
+        power_on = self._power_on(panel.declared_load_ohm)
         self._channels: dict[int, ChannelSettings] = dict.fromkeys(range(1, CHANNELS + 1), power_on)
         self._output = ChannelOutput(terminal, OutputHabits(quirks, panel, self.memory), power_on)
         self._saved: dict[int, tuple[ChannelSettings, ...]] = {}
@@ -244,6 +246,14 @@ class AFG1022:
                 if other == SOUNDING_CHANNEL:
                     self._play(follower)
 
+    def _new_memory(self) -> ArbitraryMemory:
+        """Return the memory of waveforms at power-on."""
+        return ArbitraryMemory()
+
+    def _power_on(self, declared_load_ohm: float) -> ChannelSettings:
+        """Return the settings of a channel at power-on."""
+        return ChannelSettings(declared_load_ohm=declared_load_ohm)
+
     def _table(self) -> tuple[Command, ...]:
         """Return every command this firmware knows."""
         quirks = self.quirks
@@ -263,7 +273,7 @@ class AFG1022:
         if self._identity_is_due_empty:
             self._identity_is_due_empty = False
             return b""
-        return f"{MAKER},{MODEL},{self.serial},{FIRMWARE}".encode("ascii")
+        return f"{self.maker},{self.model},{self.serial},{self.firmware}".encode("ascii")
 
     def clear_status(self) -> None:
         """Empty error queue and event register."""
@@ -275,7 +285,7 @@ class AFG1022:
         self._frequencies_locked = False
         for channel, settings in self._channels.items():
             load_ohm = settings.declared_load_ohm if self.quirks.load_is_panel_only else 50.0
-            self._replace(channel, ChannelSettings(declared_load_ohm=load_ohm))
+            self._replace(channel, self._power_on(load_ohm))
 
     def save(self, number: int) -> None:
         """Keep the settings of both channels under a number."""

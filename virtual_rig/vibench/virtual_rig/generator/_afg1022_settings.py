@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum, StrEnum
 
 from ._built_in_shape import FORMULAS
+from ._phase_course import Spacing
 from ._scpi_header import mnemonic_matches, short_form
 from ._scpi_status import ErrorCode, ScpiError
 from ._terminal_voltage import OUTPUT_RESISTANCE_OHM, Relay
@@ -102,6 +103,13 @@ class BurstMode(Enum):
     GATED = "GATed"
 
 
+class SweepTrigger(Enum):
+    """What starts a sweep, and a burst, of a generator that lets one choose."""
+
+    IMMEDIATE = "IMMediate"
+    BUS = "BUS"
+
+
 @dataclass(frozen=True)
 class ModulationSettings:
     """One kind of modulation."""
@@ -130,6 +138,16 @@ def _modulation_defaults() -> Mapping[RunMode, ModulationSettings]:
 
 
 @dataclass(frozen=True)
+class OwnSweep:
+    """A sweep whose time is set remotely, as some generators have it."""
+
+    sweep_s: float = 1.0
+    hold_s: float = 0.0
+    spacing: Spacing = Spacing.LINEAR
+    trigger: SweepTrigger = SweepTrigger.IMMEDIATE
+
+
+@dataclass(frozen=True)
 class ChannelSettings:
     """All settings of one channel; the defaults are those of ``*RST``."""
 
@@ -147,6 +165,8 @@ class ChannelSettings:
     mode: RunMode = RunMode.CONTINUOUS
     sweep_start_hz: float = 100e3
     sweep_stop_hz: float = 1e6
+    sweep: OwnSweep | None = None
+    """None where time and spacing are the panel's."""
     burst_cycles: float = 5
     """``math.inf`` for a burst that never ends."""
     burst_mode: BurstMode = BurstMode.TRIGGERED

@@ -21,7 +21,9 @@ _POWER_ON_POINTS = 1000
 class ArbitraryMemory:
     """Edit memory and user memories; every stored waveform is immutable."""
 
-    def __init__(self) -> None:
+    def __init__(self, most_points: int = MOST_POINTS, top_code: int = TOP_CODE) -> None:
+        self.top_code = top_code
+        self._most_points = most_points
         self._waveforms: dict[str, Codes] = {EDIT_MEMORY: _blank(_POWER_ON_POINTS)}
 
     def codes(self, name: str) -> Codes:
@@ -33,22 +35,22 @@ class ArbitraryMemory:
 
     def define(self, points: int) -> None:
         """Make the edit memory ``points`` long and flat."""
-        self._store(EDIT_MEMORY, _blank(_checked_length(points)))
+        self._store(EDIT_MEMORY, _blank(self._checked_length(points)))
 
     def load(self, name: str, data: bytes) -> None:
         """Fill a memory from big-endian 16-bit codes."""
         if len(data) % 2:
             raise ScpiError(ErrorCode.INVALID_BLOCK_DATA)
-        _checked_length(len(data) // 2)
+        self._checked_length(len(data) // 2)
         codes = np.frombuffer(data, dtype=">u2").astype(np.uint16)
-        if codes.max() > TOP_CODE:
+        if codes.max() > self.top_code:
             raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
         self._store(name, codes)
 
     def set_value(self, point: int, code: int) -> None:
         """Change one point of the edit memory; points count from 1."""
         codes = self._waveforms[EDIT_MEMORY].copy()
-        if not 1 <= point <= len(codes) or not 0 <= code <= TOP_CODE:
+        if not 1 <= point <= len(codes) or not 0 <= code <= self.top_code:
             raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
         codes[point - 1] = code
         self._store(EDIT_MEMORY, codes)
@@ -68,6 +70,16 @@ class ArbitraryMemory:
         """Names of all memories that hold a waveform, the edit memory first."""
         users = [name for name in self._waveforms if name != EDIT_MEMORY]
         return (EDIT_MEMORY, *sorted(users, key=lambda name: int(name.removeprefix("USER"))))
+
+    def hold(self, codes: Codes) -> None:
+        """Let the edit memory hold codes of any generator."""
+        self._checked_length(len(codes))
+        self._store(EDIT_MEMORY, codes)
+
+    def _checked_length(self, points: int) -> int:
+        if not FEWEST_POINTS <= points <= self._most_points:
+            raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
+        return points
 
     def _store(self, name: str, codes: Codes) -> None:
         codes.flags.writeable = False
@@ -96,9 +108,3 @@ def _blank(points: int) -> Codes:
     codes = np.full(points, _MIDDLE_CODE, dtype=np.uint16)
     codes.flags.writeable = False
     return codes
-
-
-def _checked_length(points: int) -> int:
-    if not FEWEST_POINTS <= points <= MOST_POINTS:
-        raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
-    return points

@@ -213,16 +213,22 @@ SWEEP_COMMANDS = (
     ),
 )
 LOAD_COMMANDS = (Command(HeaderPattern(LOAD.pattern), LOAD.write, _ask_load),)
-CHANNEL_COMMANDS = (
+COMMON_CHANNEL_COMMANDS = (
     switch(
         "OUTPut#[:STATe]",
         lambda s: s.relay is Relay.CLOSED,
         lambda s, on: replace(s, relay=Relay.CLOSED if on else Relay.OPEN),
     ),
-    Command(HeaderPattern("[SOURce#:]FUNCtion[:SHAPe]"), _write_shape, _ask_shape),
     FREQUENCY.command(),
     AMPLITUDE.command(),
     OFFSET.command(),
+    SWEEP_START.command(),
+    SWEEP_STOP.command(),
+)
+"""What the simulated generators have in common."""
+CHANNEL_COMMANDS = (
+    *COMMON_CHANNEL_COMMANDS[:4],
+    Command(HeaderPattern("[SOURce#:]FUNCtion[:SHAPe]"), _write_shape, _ask_shape),
     Command(HeaderPattern("[SOURce#:]PHASe[:ADJust]"), _write_phase, _ask_phase),
     Command(HeaderPattern(DUTY.pattern), _write_duty, DUTY.ask),
     switch(

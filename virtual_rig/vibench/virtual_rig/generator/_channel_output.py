@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _output_signal as output_signal
-from ._afg1022_settings import DC, NOISE, ChannelSettings
+from ._afg1022_settings import DC, NOISE, ChannelSettings, RunMode
 from ._arbitrary_memory import ArbitraryMemory
 from ._output_signal import Panel
 from ._phase_course import UHZ_PER_HZ, PhaseCourse, SteadyPhase
@@ -77,9 +77,14 @@ class ChannelOutput:
         self._timeline.change(signal, at_s)
 
     def trigger(self, settings: ChannelSettings, now_s: float) -> None:
-        """Start a waiting burst; while one is running, or without burst mode, nothing happens."""
+        """Start a waiting burst or sweep; while a burst runs, and without either mode, nothing happens."""
         at_s, own_s = self._when(now_s)
         latest = self._timeline.latest
+        if settings.mode is RunMode.SWEEP:
+            phase = latest.course.phase(own_s)
+            course = output_signal.swept(settings, self._habits.panel, phase, own_s, own_s)
+            self._timeline.change(replace(latest, course=course), at_s)
+            return
         burst = output_signal.triggered_burst(settings, own_s)
         if burst is None or latest.burst is None:
             return
@@ -122,5 +127,6 @@ def _course_key(settings: ChannelSettings) -> tuple[object, ...]:
         settings.phase_deg,
         settings.sweep_start_hz,
         settings.sweep_stop_hz,
+        settings.sweep,
         settings.modulation.get(settings.mode),
     )

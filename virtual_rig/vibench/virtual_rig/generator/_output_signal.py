@@ -14,8 +14,10 @@ from ._afg1022_settings import (
     BurstMode,
     ChannelSettings,
     ModulationSettings,
+    OwnSweep,
     RunMode,
     Source,
+    SweepTrigger,
 )
 from ._arbitrary_memory import ArbitraryMemory
 from ._periodic_shape import Flat, PeriodicShape, Rectangle, Sine, Table, Triangle
@@ -28,6 +30,7 @@ from ._phase_course import (
     Spacing,
     SteadyPhase,
     SweptPhase,
+    TriggeredSweepPhase,
 )
 from ._terminal_voltage import AmplitudeModulation, Burst, Constant, Envelope, PulseWidthModulation
 
@@ -59,7 +62,7 @@ def shape(name: str, memory: ArbitraryMemory, duty_percent: float) -> PeriodicSh
         return computed[name]
     if name in built_in_shape.FORMULAS:
         return Table(built_in_shape.codes(name))
-    return Table(memory.codes(name))
+    return Table(memory.codes(name), memory.top_code)
 
 
 def modulator(settings: ModulationSettings, memory: ArbitraryMemory) -> Modulator:
@@ -82,14 +85,7 @@ def course(
     """Return the course that the mode asks for, passing through a phase [cycles] at a time."""
     frequency_uhz = round(settings.frequency_hz * UHZ_PER_HZ)
     if settings.mode is RunMode.SWEEP:
-        return SweptPhase(
-            settings.sweep_start_hz,
-            settings.sweep_stop_hz,
-            panel.sweep_s,
-            panel.sweep_spacing,
-            own_time_s,
-            phase,
-        )
+        return swept(settings, panel, phase, own_time_s, math.inf)
     steady = SteadyPhase.through(frequency_uhz, phase, own_time_s)
     if settings.mode is RunMode.PM:
         chosen = settings.modulation[RunMode.PM]
@@ -111,6 +107,17 @@ def course(
         middle_uhz = (hop_uhz + frequency_uhz) // 2
         return _frequency_modulated(middle_uhz, half_hz, keying(chosen), phase, own_time_s)
     return steady
+
+
+def swept(
+    settings: ChannelSettings, panel: Panel, phase: float, own_time_s: float, begin_s: float
+) -> PhaseCourse:
+    """Return a sweep: one at a trigger, or one after the other."""
+    ends = settings.sweep_start_hz, settings.sweep_stop_hz
+    sweep = settings.sweep or OwnSweep(panel.sweep_s, spacing=panel.sweep_spacing)
+    if sweep.trigger is SweepTrigger.IMMEDIATE:
+        return SweptPhase(*ends, sweep.sweep_s, sweep.spacing, own_time_s, phase)
+    return TriggeredSweepPhase(*ends, sweep.sweep_s, sweep.hold_s, sweep.spacing, begin_s, own_time_s, phase)
 
 
 def _frequency_modulated(

@@ -86,11 +86,12 @@ class Triangle:
 class Table:
     """A waveform memory played with a zero-order hold: each point lasts 1/N of the cycle.
 
-    Codes 0..16383 span -1..1. The integral is a cumulative sum of whole numbers, so means are exact
-    but for one rounding.
+    Codes from 0 to ``top_code`` span -1..1. The integral is a cumulative sum of whole numbers, so means are
+    exact but for one rounding.
     """
 
     codes: Codes
+    top_code: int = TOP_CODE
     _sums: NDArray[np.int64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -110,7 +111,7 @@ class Table:
         area = (first + 1 - begin) * first_code + inside + (end - last) * last_code
         held = first == last
         mean_code = np.where(held, first_code, area / np.where(held, 1.0, end - begin))
-        return np.asarray(2 * mean_code / TOP_CODE - 1)
+        return np.asarray(2 * mean_code / self.top_code - 1)
 
     def _sum(self, points_passed: NDArray[np.int64]) -> NDArray[np.int64]:
         """Sum of all codes before a point, across as many cycles as needed."""

@@ -134,6 +134,55 @@ class SweptPhase:
 
 
 @dataclass(frozen=True)
+class TriggeredSweepPhase:
+    """One sweep at a trigger: the start frequency before it, the stop frequency for a time after it."""
+
+    start_hz: float
+    stop_hz: float
+    sweep_s: float
+    hold_s: float
+    spacing: Spacing
+    begin_s: float
+    """When it was triggered; ``math.inf`` while it waits."""
+    anchor_s: float
+    offset: float
+    """Phase at ``anchor_s`` [cycles]."""
+
+    def phase(self, time_s: float) -> float:
+        """Return the phase at one instant [cycles, 0..1)."""
+        return float(_fraction(self._cycles(np.asarray([time_s])))[0])
+
+    def _cycles(self, time_s: Samples) -> Samples:
+        before = self._since_zero(np.asarray([self.anchor_s]))[0]
+        return np.asarray(self.offset + self._since_zero(time_s) - before)
+
+    def _since_zero(self, time_s: Samples) -> Samples:
+        inside = SweptPhase(self.start_hz, self.stop_hz, self.sweep_s, self.spacing, 0.0, 0.0)
+        after_s = np.maximum(time_s - self.begin_s, 0.0)
+        swept = inside._cycles_within(np.minimum(after_s, self.sweep_s))  # noqa: SLF001 - its own kind
+        held_s = np.clip(after_s - self.sweep_s, 0.0, self.hold_s)
+        back_s = np.maximum(after_s - self.sweep_s - self.hold_s, 0.0)
+        waited_s = np.minimum(time_s, self.begin_s) + back_s
+        return np.asarray(self.start_hz * waited_s + swept + self.stop_hz * held_s)
+
+    def stretches(self, edges_s: Samples) -> tuple[Samples, Samples]:
+        """Return start and span between consecutive edges."""
+        cycles = self._cycles(edges_s)
+        return _fraction(cycles[:-1]), np.diff(cycles)
+
+    def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:
+        """Return where the sweep begins, ends and returns, and points between as its curvature asks for."""
+        end_of_sweep_s = self.begin_s + self.sweep_s
+        corners = np.array([self.begin_s, end_of_sweep_s, end_of_sweep_s + self.hold_s])
+        corners = corners[(corners > begin_s) & (corners < end_s)]
+        first_s, last_s = max(begin_s, self.begin_s), min(end_s, end_of_sweep_s)
+        if not first_s < last_s:
+            return corners
+        inside = SweptPhase(self.start_hz, self.stop_hz, self.sweep_s, self.spacing, self.begin_s, 0.0)
+        return np.concatenate((corners, inside.breakpoints(first_s, last_s, interval_s)))
+
+
+@dataclass(frozen=True)
 class Modulator:
     """The internal modulating signal: a shape between -1 and 1 at its own frequency."""
 

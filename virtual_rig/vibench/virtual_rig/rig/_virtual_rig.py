@@ -1,9 +1,10 @@
 """The whole virtual rig, switched on: a generator on the USB bus, a DAQ server, and the world between."""
 
+from collections.abc import Mapping
 from contextlib import ExitStack
 from enum import Enum, auto
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import Self
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
@@ -11,7 +12,7 @@ from vibench.acquisition.recording import DiskTrouble, troubled_disks
 from vibench.acquisition.rig import Rig, VirtualConfig
 
 from ..daqmx import LOOPBACK, DaqServer, OnDemandPace, Pace, WallPace, catalogue_with, serve, token_for
-from ..generator import AFG1022, Panel, Quirks, ScpiSocket, Terminal
+from ..generator import AFG1022, Keysight33500B, Panel, Quirks, ScpiSocket, Terminal
 from ..usb import UsbTmcInstrument, plug_in, unplug, usb_service
 from ..world import FULL_BAND_HZ, World, relative_clock_ppm, virtual_section, warm_up
 from ._fault_script import DISK_FAULTS, FaultPlay, FaultScript, PlayedFault, load_fault_script
@@ -20,6 +21,10 @@ from ._faults import RigFaults
 _USB_RESOURCE_FIELDS = 5
 REFUSED_S = 1.0
 """Rig time that every refusal of the disk but the first takes: it is emptied in time for who tries again."""
+
+
+GENERATORS: Mapping[int, type[AFG1022]] = MappingProxyType({0x0699: AFG1022, 0x0957: Keysight33500B})
+"""The simulated generators, by the maker's number in their USB address."""
 
 
 class DiskFaults(Enum):
@@ -74,9 +79,10 @@ class VirtualRig:
         """What calls from other computers must carry; None on loopback."""
         self._pace = _pace(virtual)
         # The generator and the world need each other: the clock is looked up when it is asked for.
-        self.generator = AFG1022(
+        usb_ids, serial = _address(rig.generator.resource)
+        self.generator = GENERATORS[usb_ids[0]](
             lambda: self.world.time_s,
-            serial=_serial(rig.generator.resource),
+            serial=serial,
             quirks=quirks,
             panel=panel,
             terminal=_terminal(rig, virtual),
@@ -84,7 +90,7 @@ class VirtualRig:
         """What is behind the USB cable."""
         self.world = World(rig, self.generator)
         """What is behind the terminals."""
-        self._usb = UsbTmcInstrument(self.generator)
+        self._usb = UsbTmcInstrument(self.generator, usb_ids=usb_ids)
         self._running: _Running | None = None
 
     @property
@@ -198,15 +204,20 @@ def _script(virtual: VirtualConfig, disk: DiskFaults) -> FaultScript:
     return script
 
 
-def _serial(resource: str) -> str:
-    """Take the serial number out of ``USB0::0x0699::0x0353::<serial>::INSTR``."""
+def _address(resource: str) -> tuple[tuple[int, int], str]:
+    """Take maker, product and serial number out of ``USB0::0x0699::0x0353::<serial>::INSTR``."""
     fields = resource.split("::")
-    if not fields[0].startswith("USB") or len(fields) < _USB_RESOURCE_FIELDS:
+    try:
+        ids = int(fields[1], 0), int(fields[2], 0)
+    except (IndexError, ValueError):
+        ids = 0, 0
+    if not fields[0].startswith("USB") or len(fields) < _USB_RESOURCE_FIELDS or ids[0] not in GENERATORS:
         raise ConfigurationError(
             f"generator.resource = {resource!r}: the virtual generator sits on USB; "
-            "give USB0::0x0699::0x0353::<serial>::INSTR"
+            "give USB0::0x0699::0x0353::<serial>::INSTR (AFG1022) or "
+            "USB0::0x0957::0x2C07::<serial>::INSTR (33522B)"
         )
-    return fields[3]
+    return ids, fields[3]
 
 
 def _terminal(rig: Rig, virtual: VirtualConfig) -> Terminal:

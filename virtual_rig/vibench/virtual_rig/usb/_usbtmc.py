@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
 from typing import NoReturn, Protocol
 
-from ..generator import BYTE, MAKER, MODEL, ErrorCode, Reply, StatusByte
+from ..generator import BYTE, ErrorCode, Reply, StatusByte
 from ._device import BULK_IN, BULK_OUT, Identification, Setup
 
 VENDOR_ID = 0x0699
@@ -78,6 +78,8 @@ class MessageDevice(Protocol):
     """What stands behind the interface."""
 
     serial: str
+    maker: str
+    model: str
 
     def execute(self, message: bytes) -> Reply:
         """Carry out one complete message and return its reply."""
@@ -122,10 +124,15 @@ class _Flight:
 class UsbTmcInstrument:
     """An instrument at the end of a USB cable that can be pulled."""
 
-    def __init__(self, device: MessageDevice, packet_bytes: int = 64) -> None:
+    def __init__(
+        self,
+        device: MessageDevice,
+        packet_bytes: int = 64,
+        usb_ids: tuple[int, int] = (VENDOR_ID, PRODUCT_ID),
+    ) -> None:
         self._device = device
         self._identification = Identification(
-            VENDOR_ID, PRODUCT_ID, MAKER, MODEL, device.serial, packet_bytes
+            *usb_ids, device.maker, device.model, device.serial, packet_bytes
         )
         self._lock = threading.RLock()
         self._is_plugged_in = True
