@@ -1,10 +1,11 @@
-"""Columns of numbers beside a figure, and as a CSV file that any program reads."""
+"""Columns of numbers beside a figure, and as a CSV file that any program reads; fields by their names."""
 
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,6 +47,11 @@ class Table:
 def table(name: str, **columns: ArrayLike) -> Table:
     """Build a table; ``frequency_hz`` becomes ``"frequency_hz"``: names carry the unit as in the code."""
     return Table(name, tuple((heading, _cells(values)) for heading, values in columns.items()))
+
+
+def named(source: object, *fields: str) -> dict[str, Any]:
+    """Give some fields of a value under their own names: columns of a table, keys of a document."""
+    return {field: getattr(source, field) for field in fields}
 
 
 def _cells(values: ArrayLike) -> tuple[float | str, ...]:

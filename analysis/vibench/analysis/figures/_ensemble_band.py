@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..model import AbstractOverlay, SimulatedRun
+from ..model import AbstractOverlay, ResponsePrediction, SimulatedRun
 from ..signals import Reals
+from ..tables import Table, named, table
 from ._style import SIMULATED
 
 
@@ -76,6 +77,12 @@ def agreement_text(laid: AbstractOverlay[Any]) -> str:
     if laid.escape is not None:
         said.append(laid.escape.sentence)
     return "".join(f"; {each}" for each in said)
+
+
+def sines_table(name: str, sines: ResponsePrediction) -> Table:
+    """Give the responses to steady sines that a figure shows beside a measurement."""
+    wanted = ("frequency_hz", "amplitude_m", "response_i", "response_ii", "linear", "impacts")
+    return table(f"{name}_sines", **named(sines, *wanted))
 
 
 def band_columns(laid: AbstractOverlay[Any], name: str, column: str) -> dict[str, Reals]:

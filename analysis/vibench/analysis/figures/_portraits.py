@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from ..chaos import MotionKind, MotionVerdict
 from ..sine import DwellAnalysis
-from ..tables import Table, plus_minus, table
+from ..tables import Table, named, plus_minus, table
 from ._drawn import DrawnFigure
 from ._style import BOUNDS, SIMULATED, legend_above, new_figure, prefixed, styled
 
@@ -94,7 +94,5 @@ def _table(analysis: DwellAnalysis) -> Table:
     section = analysis.motion.section
     return table(
         f"section_{analysis.facts.name}",
-        time_s=section.time_s,
-        displacement_m=section.displacement_m,
-        velocity_m_per_s=section.velocity_m_per_s,
+        **named(section, "time_s", "displacement_m", "velocity_m_per_s"),
     )

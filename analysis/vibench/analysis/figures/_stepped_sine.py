@@ -25,7 +25,7 @@ from ..sine import (
     level_jumps,
     noted_jumps,
 )
-from ..tables import plus_minus, table
+from ..tables import named, plus_minus, table
 from ._drawn import DrawnFigure
 from ._ensemble_band import band_columns, run_text, simulated_label
 from ._style import LINEAR, MEASURED, PREDICTED, SIMULATED, legend_above, magnitude_axis, new_figure, styled
@@ -67,12 +67,8 @@ def stepped_sine_figure(
     columns = {
         "frequency_hz": found.frequency_hz,
         "direction": np.asarray(found.direction),
-        "amplitude_vpp": found.amplitude_vpp,
-        "drive_amplitude_m": found.drive_amplitude_m,
-        "response_i": found.response_i,
-        "response_ii": found.response_ii,
-        "sd_response_ii": found.sd_response_ii,
-        "phase_rad": found.phase_rad,
+        **named(found, "amplitude_vpp", "drive_amplitude_m", "response_i"),
+        **named(found, "response_ii", "sd_response_ii", "phase_rad"),
     }
     if laid is not None:
         columns["response_i_simulated"] = laid.response.response_i

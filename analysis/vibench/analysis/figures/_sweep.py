@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike
 from ..model import RESPONSE_I, RESPONSE_II, SweepOverlay
 from ..signals import Reals
 from ..sine import Collisions, SweepAnalysis, SweepResponse
-from ..tables import Table, table
+from ..tables import Table, named, table
 from ._drawn import DrawnFigure
-from ._ensemble_band import band_columns, draw_band, run_text, simulated_label
+from ._ensemble_band import band_columns, draw_band, run_text, simulated_label, sines_table
 from ._hysteresis import jumps_text
 from ._style import (
     COLLIDING,
@@ -190,15 +190,10 @@ def _tables(analysis: SweepAnalysis, laid: SweepOverlay | None) -> tuple[Table, 
     name = f"sweep_{analysis.facts.name}"
     found = analysis.response
     columns = {
-        "time_s": found.time_s,
-        "frequency_hz": found.frequency_hz,
-        "drive_amplitude_m": found.drive_amplitude_m,
+        **named(found, "time_s", "frequency_hz", "drive_amplitude_m"),
         "velocity_upper_m_per_s": found.upper,
         "velocity_lower_m_per_s": found.lower,
-        "response_i": found.response_i,
-        "response_ii": found.response_ii,
-        "sd_response_ii": found.sd_response_ii,
-        "phase_rad": found.phase_rad,
+        **named(found, "response_i", "response_ii", "sd_response_ii", "phase_rad"),
         "is_colliding": analysis.collisions.is_colliding.astype(np.int64),
     }
     if laid is None:
@@ -208,16 +203,4 @@ def _tables(analysis: SweepAnalysis, laid: SweepOverlay | None) -> tuple[Table, 
     columns["response_i_simulated"] = laid.response.response_i
     columns["response_ii_simulated"] = laid.response.response_ii
     columns |= band_columns(laid, RESPONSE_I, "response_i") | band_columns(laid, RESPONSE_II, "response_ii")
-    sines = laid.prediction
-    return (
-        table(name, **columns),
-        table(
-            f"{name}_sines",
-            frequency_hz=sines.frequency_hz,
-            amplitude_m=sines.amplitude_m,
-            response_i=sines.response_i,
-            response_ii=sines.response_ii,
-            linear=sines.linear,
-            impacts=sines.impacts,
-        ),
-    )
+    return table(name, **columns), sines_table(name, laid.prediction)

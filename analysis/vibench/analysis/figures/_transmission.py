@@ -7,9 +7,9 @@ from ..frequency_response import MagnitudeScale, NoiseAnalysis, NoiseResponse
 from ..model import TRANSMISSION, NoiseOverlay, linear_transmissibility
 from ..recordings import specimen_of
 from ..signals import Reals
-from ..tables import Table, plus_minus, table
+from ..tables import Table, named, plus_minus, table
 from ._drawn import DrawnFigure
-from ._ensemble_band import band_columns, draw_band, run_text, simulated_label
+from ._ensemble_band import band_columns, draw_band, run_text, simulated_label, sines_table
 from ._marked_resonances import ModelResonances, label_resonances, mark_resonances, model_resonances
 from ._style import (
     BOUNDS,
@@ -238,10 +238,7 @@ def _tables(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> tuple[Table, 
     measured = view.shown(analysis.response.frequency_response)
     name = f"transmission_{analysis.facts.name}"
     columns = {
-        "frequency_hz": measured.frequency_hz,
-        "magnitude": measured.magnitude,
-        "magnitude_lower": measured.magnitude_lower,
-        "magnitude_upper": measured.magnitude_upper,
+        **named(measured, "frequency_hz", "magnitude", "magnitude_lower", "magnitude_upper"),
         "magnitude_db": measured.decibel,
         "phase_rad": measured.phase_rad,
         "phase_lower_rad": measured.phase_lower,
@@ -256,16 +253,4 @@ def _tables(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> tuple[Table, 
     columns["magnitude_simulated"] = view.shown(laid.response.frequency_response).magnitude
     columns["difference_db"] = laid.difference.decibel
     columns["difference_standard_errors"] = laid.difference.standard_errors
-    sines = laid.prediction
-    return (
-        table(name, **columns),
-        table(
-            f"{name}_sines",
-            frequency_hz=sines.frequency_hz,
-            amplitude_m=sines.amplitude_m,
-            response_i=sines.response_i,
-            response_ii=sines.response_ii,
-            linear=sines.linear,
-            impacts=sines.impacts,
-        ),
-    )
+    return table(name, **columns), sines_table(name, laid.prediction)

@@ -29,6 +29,7 @@ from ..sine import (
     settled_envelope,
     terminal_levels,
 )
+from ..tables import named
 from ._analysis_kind import AnalysisKind, Json
 
 
@@ -80,19 +81,11 @@ def _measured(analysis: DwellAnalysis) -> Json:
         "drive_amplitude_m": found.drive.amplitude_m,
         "sd_drive_amplitude_m": found.drive.sd_amplitude_m,
         "drive_distortion": found.drive.distortion,
-        "window_s": found.window_s,
-        "response_i": found.response_i,
-        "noise_bias_i": found.noise_bias_i,
-        "response_ii": found.response_ii,
-        "sd_response_ii": found.sd_response_ii,
-        "phase_rad": found.phase_rad,
-        "sd_phase_rad": found.sd_phase_rad,
+        **named(found, "window_s", "response_i", "noise_bias_i", "response_ii"),
+        **named(found, "sd_response_ii", "phase_rad", "sd_phase_rad"),
         "lines": [
             {
-                "label": each.label,
-                "frequency_hz": each.frequency_hz,
-                "amplitude_m": each.amplitude_m,
-                "sd_amplitude_m": each.sd_amplitude_m,
+                **named(each, "label", "frequency_hz", "amplitude_m", "sd_amplitude_m"),
                 "decibel_re_drive_line": each.decibel,
             }
             for each in found.lines
@@ -123,21 +116,14 @@ def _motion(verdict: MotionVerdict) -> Json:
 
 def _band(found: TerminalLevel) -> Json:
     return {
-        "towards_hz": found.towards_hz,
-        "low_hz": found.low_hz,
-        "high_hz": found.high_hz,
-        "peak_hz": found.peak_hz,
-        "rms_m": found.rms_m,
-        "relative_sd": found.relative_sd,
+        **named(found, "towards_hz", "low_hz", "high_hz", "peak_hz", "rms_m", "relative_sd"),
         "decibel_re_drive_line": found.decibel,
     }
 
 
 def _simulated(laid: DwellOverlay) -> Json:
     return {
-        "response_i": laid.response.response_i,
-        "response_ii": laid.response.response_ii,
-        "sd_response_ii": laid.response.sd_response_ii,
+        **named(laid.response, "response_i", "response_ii", "sd_response_ii"),
         "terminal_bands": [_band(each) for each in laid.terminal],
     }
 

@@ -21,6 +21,7 @@ from ..frequency_response import (
 )
 from ..model import Draw, NoiseOverlay, SimulatedChannels, noise_overlay, noise_quantities
 from ..recordings import Channels, RecordingFacts, measurement_checks
+from ..tables import named
 from ._analysis_kind import AnalysisKind, Json
 
 NOISE_FAMILY = "noise"
@@ -34,10 +35,7 @@ def _measured(analysis: NoiseAnalysis) -> Json:
         "transmission": _frequency_response(analysis),
         "distortion": None if found.periodic is None else _distortion(found.periodic),
         "independent_averages": found.frequency_response.n_eff,
-        "used_s": found.used_s,
-        "left_out": found.left_out,
-        "lost_samples": found.lost_samples,
-        "overloaded_samples": found.overloaded_samples,
+        **named(found, "used_s", "left_out", "lost_samples", "overloaded_samples"),
         "median_coherence": float(np.median(found.frequency_response.coherence)),
         "base_rms_acceleration_m_per_s2": found.base_level.rms_acceleration,
         "base_rms_displacement_m": found.base_level.rms_displacement_m,
@@ -57,17 +55,11 @@ def _frequency_response(analysis: NoiseAnalysis) -> Json:
         "window": how.window,
         "segment_s": how.segment_samples / how.sample_rate_hz,
         "overlap": how.overlap,
-        "resolution_hz": found.resolution_hz,
-        "segments_used": found.segments_used,
-        "segments_excluded": found.segments_excluded,
+        **named(found, "resolution_hz", "segments_used", "segments_excluded"),
         "delay_removed_s": how.delay_s,
         "confidence": how.confidence,
-        "coherence_significance": found.coherence_significance,
-        "frequency_hz": found.frequency_hz,
-        "magnitude": found.magnitude,
-        "magnitude_lower": found.magnitude_lower,
-        "magnitude_upper": found.magnitude_upper,
-        "phase_rad": found.phase_rad,
+        **named(found, "coherence_significance", "frequency_hz", "magnitude"),
+        **named(found, "magnitude_lower", "magnitude_upper", "phase_rad"),
         "phase_lower_rad": found.phase_lower,
         "phase_upper_rad": found.phase_upper,
         "coherence": found.coherence,
@@ -89,13 +81,8 @@ def _distortion(periodic: PeriodicFrequencyResponse) -> Json:
 
 def _resonance(found: Resonance) -> Json:
     return {
-        "frequency_hz": found.frequency_hz,
-        "sd_frequency_hz": found.sd_frequency_hz,
-        "damping_ratio": found.damping_ratio,
-        "sd_damping_ratio": found.sd_damping_ratio,
-        "peak_frequency_hz": found.peak_frequency_hz,
-        "peak_magnitude": found.peak_magnitude,
-        "sd_peak_magnitude": found.sd_peak_magnitude,
+        **named(found, "frequency_hz", "sd_frequency_hz", "damping_ratio", "sd_damping_ratio"),
+        **named(found, "peak_frequency_hz", "peak_magnitude", "sd_peak_magnitude"),
         "is_resolved": bool(found.is_resolved),
     }
 

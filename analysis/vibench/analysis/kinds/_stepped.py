@@ -10,6 +10,7 @@ from ..frequency_response import FrequencyResponseRequest
 from ..model import Draw, Quantity, SimulatedChannels, SteppedSineOverlay, stepped_overlay, stepped_quantities
 from ..recordings import Channels, RecordingFacts, Stretch, measurement_checks
 from ..sine import SteppedResponse, SteppedSineAnalysis, Steps, level_summary, stepped_response
+from ..tables import named
 from ._analysis_kind import AnalysisKind, Json
 
 Setting = Callable[[Steps, Stretch], float]
@@ -18,14 +19,8 @@ Setting = Callable[[Steps, Stretch], float]
 def _measured(analysis: SteppedSineAnalysis) -> Json:
     found = analysis.response
     return {
-        "frequency_hz": found.frequency_hz,
-        "direction": found.direction,
-        "drive_amplitude_m": found.drive_amplitude_m,
-        "response_i": found.response_i,
-        "noise_bias_i": found.noise_bias_i,
-        "response_ii": found.response_ii,
-        "sd_response_ii": found.sd_response_ii,
-        "left_out": found.left_out,
+        **named(found, "frequency_hz", "direction", "drive_amplitude_m", "response_i"),
+        **named(found, "noise_bias_i", "response_ii", "sd_response_ii", "left_out"),
     }
 
 

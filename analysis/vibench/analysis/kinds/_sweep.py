@@ -21,6 +21,7 @@ from ..sine import (
     played_check,
     smooth_jumps,
 )
+from ..tables import named
 from ._analysis_kind import AnalysisKind, Json
 
 
@@ -56,13 +57,7 @@ def _measured(analysis: SweepAnalysis) -> Json:
         "collision_regions": _regions(analysis.collisions),
         "jumps": [
             {
-                "frequency_hz": each.frequency_hz,
-                "lower_hz": each.lower_hz,
-                "upper_hz": each.upper_hz,
-                "time_s": each.time_s,
-                "before": each.before,
-                "after": each.after,
-                "decibel": each.decibel,
+                **named(each, "frequency_hz", "lower_hz", "upper_hz", "time_s", "before", "after", "decibel"),
             }
             for each in analysis.jumps
         ],

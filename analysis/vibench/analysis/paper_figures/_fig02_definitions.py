@@ -3,7 +3,7 @@
 from vibench.sim.study import Study, StudyResults
 
 from ..figures import MEASURED, SIMULATED, DrawnFigure, legend_above, new_figure, styled
-from ..tables import table
+from ..tables import named, table
 from ._options import FigureOptions
 from ._responses import draw_linear, drive_at, finish, responses, specimen_of
 from ._time_signal import draw_outline, draw_spectrum, time_signal
@@ -13,17 +13,7 @@ _AMPLITUDE_M, _SHOWN_HZ = 5e-6, 200.0
 
 def definitions_study(options: FigureOptions) -> Study:
     """Hertz stops at 5 um."""
-    return Study(
-        models=("hertz",),
-        amplitudes_m=(_AMPLITUDE_M,),
-        gaps_m=(options.gap_m,),
-        damping_times_s=(options.damping_time_s,),
-        frequencies_hz=options.frequencies_hz,
-        accuracy=options.accuracy,
-        duration_s=options.duration_s,
-        window_s=options.window_s,
-        budget_s=options.budget_s,
-    )
+    return options.study(("hertz",), (_AMPLITUDE_M,))
 
 
 def definitions_figure(options: FigureOptions, results: StudyResults) -> DrawnFigure:
@@ -59,9 +49,7 @@ def definitions_figure(options: FigureOptions, results: StudyResults) -> DrawnFi
         tables=(
             table(
                 "figure_2",
-                frequency_hz=curve.frequency_hz,
-                response_i=curve.response_i,
-                response_ii=curve.response_ii,
+                **named(curve, "frequency_hz", "response_i", "response_ii"),
             ),
             table("figure_2_spectrum", frequency_hz=signal.frequency_hz, amplitude_over_a0=signal.amplitude),
         ),

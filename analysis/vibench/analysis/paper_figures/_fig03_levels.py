@@ -18,7 +18,7 @@ from ..figures import (
     new_figure,
     styled,
 )
-from ..tables import Table, table
+from ..tables import Table, named, table
 from ._options import AMPLITUDES_M, CASES, FigureOptions
 from ._responses import Responses, draw_linear, finish, responses, shade, specimen_of
 
@@ -29,17 +29,7 @@ _PLACES = 60
 
 def levels_study(options: FigureOptions, model: str = "hertz") -> Study:
     """One model at the paper's four amplitudes."""
-    return Study(
-        models=(model,),
-        amplitudes_m=AMPLITUDES_M,
-        gaps_m=(options.gap_m,),
-        damping_times_s=(options.damping_time_s,),
-        frequencies_hz=options.frequencies_hz,
-        accuracy=options.accuracy,
-        duration_s=options.duration_s,
-        window_s=options.window_s,
-        budget_s=options.budget_s,
-    )
+    return options.study((model,), AMPLITUDES_M)
 
 
 def continuous_study(options: FigureOptions) -> Study:
@@ -130,8 +120,6 @@ def _four_panels(
 def _table(name: str, amplitude_m: float, curve: Responses) -> Table:
     return table(
         f"{name}_{1e6 * amplitude_m:g}um",
-        frequency_hz=curve.frequency_hz,
-        response_i=curve.response_i,
-        response_ii=curve.response_ii,
+        **named(curve, "frequency_hz", "response_i", "response_ii"),
         collides=curve.collides.astype(np.int64),
     )

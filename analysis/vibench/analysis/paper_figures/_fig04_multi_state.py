@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from vibench.sim import Observable
 from vibench.sim.study import Study, StudyResults
 
 from ..figures import (
@@ -16,8 +15,8 @@ from ..figures import (
     new_figure,
     styled,
 )
-from ..tables import table
-from ._options import FigureOptions
+from ..tables import named, table
+from ._options import WITH_EXPONENT, FigureOptions
 from ._responses import draw_linear, drive_at, finish, responses, shade, specimen_of
 from ._time_signal import draw_outline, draw_spectrum, time_signal
 
@@ -26,18 +25,7 @@ _AMPLITUDE_M, _SHOWN_HZ = 5e-6, 260.0
 
 def multi_state_study(options: FigureOptions) -> Study:
     """Study stops and no stops at 5 um, with the largest exponent."""
-    return Study(
-        models=("hertz", "linear"),
-        amplitudes_m=(_AMPLITUDE_M,),
-        gaps_m=(options.gap_m,),
-        damping_times_s=(options.damping_time_s,),
-        frequencies_hz=options.frequencies_hz,
-        accuracy=options.accuracy,
-        observe=(Observable.RESPONSE, Observable.LYAPUNOV),
-        duration_s=options.duration_s,
-        window_s=options.window_s,
-        budget_s=options.budget_s,
-    )
+    return options.study(("hertz", "linear"), (_AMPLITUDE_M,), observe=WITH_EXPONENT)
 
 
 def multi_state_figure(options: FigureOptions, results: StudyResults) -> DrawnFigure:
@@ -81,9 +69,7 @@ def multi_state_figure(options: FigureOptions, results: StudyResults) -> DrawnFi
             table(
                 "figure_4",
                 frequency_hz=f,
-                response_i=curve.response_i,
-                relative_i=curve.relative_i,
-                exponent_per_s=curve.exponent_per_s,
+                **named(curve, "response_i", "relative_i", "exponent_per_s"),
                 collides=curve.collides.astype(np.int64),
             ),
             table("figure_4_spectrum", frequency_hz=signal.frequency_hz, amplitude_over_a0=signal.amplitude),

@@ -37,16 +37,8 @@ def extreme_study(options: FigureOptions) -> Study:
 
 
 def _study(options: FigureOptions, models: tuple[str, ...]) -> Study:
-    return Study(
-        models=(_PIECE_WISE, *models),
-        amplitudes_m=AMPLITUDES_M,
-        gaps_m=(options.gap_m,),
-        damping_times_s=(options.damping_time_s,),
-        frequencies_hz=options.similarity_frequencies_hz,
-        accuracy=options.accuracy,
-        duration_s=options.duration_s,
-        window_s=options.window_s,
-        budget_s=options.budget_s,
+    return options.study(
+        (_PIECE_WISE, *models), AMPLITUDES_M, frequencies_hz=options.similarity_frequencies_hz
     )
 
 

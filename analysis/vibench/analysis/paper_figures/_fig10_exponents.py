@@ -3,13 +3,12 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from vibench.sim import Observable
 from vibench.sim.study import Study, StudyResults
 
 from ..figures import LEVEL_STYLES, LEVELS, DrawnFigure, legend_above, magnitude_axis, new_figure, styled
 from ..signals import Reals
 from ..tables import table
-from ._options import AMPLITUDES_M, FigureOptions
+from ._options import AMPLITUDES_M, WITH_EXPONENT, FigureOptions
 from ._responses import drive_at, responses, specimen_of
 from ._time_signal import time_signal
 
@@ -21,27 +20,12 @@ _SPECTRUM_HZ = 600.0
 
 def exponents_study(options: FigureOptions) -> Study:
     """Both models of panels a to c at four amplitudes."""
-    return _study(options, (_PIECE_WISE, _CONTINUOUS), AMPLITUDES_M)
+    return options.study((_PIECE_WISE, _CONTINUOUS), AMPLITUDES_M, observe=WITH_EXPONENT)
 
 
 def models_study(options: FigureOptions) -> Study:
     """All models of panel d at 5 um."""
-    return _study(options, _MODELS, (_MODERATE_M,))
-
-
-def _study(options: FigureOptions, models: tuple[str, ...], amplitudes_m: tuple[float, ...]) -> Study:
-    return Study(
-        models=models,
-        amplitudes_m=amplitudes_m,
-        gaps_m=(options.gap_m,),
-        damping_times_s=(options.damping_time_s,),
-        frequencies_hz=options.frequencies_hz,
-        accuracy=options.accuracy,
-        observe=(Observable.RESPONSE, Observable.LYAPUNOV),
-        duration_s=options.duration_s,
-        window_s=options.window_s,
-        budget_s=options.budget_s,
-    )
+    return options.study(_MODELS, (_MODERATE_M,), observe=WITH_EXPONENT)
 
 
 def exponents_figure(options: FigureOptions, levels: StudyResults, models: StudyResults) -> DrawnFigure:

@@ -13,20 +13,7 @@ GAPS_M = (5e-6, 15e-6, 30e-6, 45e-6, 60e-6)
 
 def clearance_studies(options: FigureOptions) -> tuple[Study, ...]:
     """One study a gap, for the amplitude goes with it."""
-    return tuple(
-        Study(
-            models=("hertz",),
-            amplitudes_m=(gap_m,),
-            gaps_m=(gap_m,),
-            damping_times_s=(options.damping_time_s,),
-            frequencies_hz=options.frequencies_hz,
-            accuracy=options.accuracy,
-            duration_s=options.duration_s,
-            window_s=options.window_s,
-            budget_s=options.budget_s,
-        )
-        for gap_m in GAPS_M
-    )
+    return tuple(options.study(("hertz",), (gap_m,), gaps_m=(gap_m,)) for gap_m in GAPS_M)
 
 
 def clearance_figure(options: FigureOptions, *results: StudyResults) -> DrawnFigure:

@@ -3,17 +3,21 @@
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
-from vibench.sim import Accuracy
-from vibench.sim.study import frequency_range
+from vibench.sim import Accuracy, Observable
+from vibench.sim.study import Study, StudyObservable, frequency_range
 
 from ..errors import InvalidRequest
 from ..model import SIMILARITY_THRESHOLD, LogarithmOf
+from ..tables import named
 
 AMPLITUDES_M = (1e-6, 5e-6, 10e-6, 50e-6)
 """The paper's four cases, weak to strong (its section 3.1; Figs. 3, 6 and 7)."""
 CASES = ("Case 1", "Case 2", "Case 3", "Case 4")
 LOWEST_HZ = 5.0
+WITH_EXPONENT: tuple[StudyObservable, ...] = (Observable.RESPONSE, Observable.LYAPUNOV)
+"""What a figure of exponents observes."""
 
 
 class FrequencyGrid(StrEnum):
@@ -67,6 +71,15 @@ class FigureOptions:
     def similarity_frequencies_hz(self) -> tuple[float, ...]:
         """Grid on which models are compared."""
         return frequency_range(LOWEST_HZ, self.similarity_highest_hz, self.grid.step_hz)
+
+    def study(self, models: tuple[str, ...], amplitudes_m: tuple[float, ...], **replaced: Any) -> Study:
+        """Ask for models at amplitudes under these options; fields of the study may be replaced."""
+        chosen: dict[str, Any] = {
+            "gaps_m": (self.gap_m,),
+            "damping_times_s": (self.damping_time_s,),
+            **named(self, "frequencies_hz", "accuracy", "duration_s", "window_s", "budget_s"),
+        }
+        return Study(models=models, amplitudes_m=amplitudes_m, **{**chosen, **replaced})
 
     @property
     def sentence(self) -> str:

@@ -10,7 +10,7 @@ from typing import TypeVar
 from vibench.sim import Observable, Specimen, gong2025
 from vibench.sim.study import GivenStart, Start, Study, StudyObservable, StudyResults
 
-from ..paper_figures import AMPLITUDES_M, Responses, responses
+from ..paper_figures import AMPLITUDES_M, WITH_EXPONENT, Responses, responses
 from ._case import Case
 
 Computed = TypeVar("Computed")
@@ -64,8 +64,7 @@ def levels_asked(case: Case, model: str = PIECE_WISE) -> Study:
 
 def with_exponents(model: str) -> tuple[StudyObservable, ...]:
     """Say what is observed of a model at the four amplitudes."""
-    both: tuple[StudyObservable, ...] = (Observable.RESPONSE, Observable.LYAPUNOV)
-    return both if model in WITH_EXPONENTS else both[:1]
+    return WITH_EXPONENT if model in WITH_EXPONENTS else (Observable.RESPONSE,)
 
 
 def model_study(
@@ -77,17 +76,10 @@ def model_study(
 ) -> Study:
     """One model over the case's grid, at the case's damping unless another is given."""
     options = case.options
-    chosen = options.damping_time_s if damping_time_s is None else damping_time_s
-    return Study(
-        models=(model,),
-        amplitudes_m=tuple(amplitudes_m),
-        gaps_m=(options.gap_m,),
-        damping_times_s=(chosen,),
-        frequencies_hz=options.frequencies_hz,
+    return options.study(
+        (model,),
+        tuple(amplitudes_m),
+        damping_times_s=(options.damping_time_s if damping_time_s is None else damping_time_s,),
         observe=observe,
-        accuracy=options.accuracy,
-        duration_s=options.duration_s,
-        window_s=options.window_s,
-        budget_s=options.budget_s,
         starts=(Start.REST if case.draw == 0 else GivenStart(label=f"draw {case.draw}", state=case.start),),
     )

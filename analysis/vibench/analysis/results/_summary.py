@@ -9,6 +9,7 @@ import numpy as np
 from ..kinds import ANALYSES, AnyResult, Json
 from ..model import CurveDifference, EnsembleCurve, EscapeRate, SimulatedRun
 from ..recordings import RecordingFacts
+from ..tables import named
 from ._campaign_results import CampaignResults
 
 
@@ -53,12 +54,8 @@ def _facts(facts: RecordingFacts) -> Json:
         "state": facts.state.value,
         "reason": facts.reason,
         "origin": facts.origin.value,
-        "started_utc": facts.started_utc,
-        "bench_check": facts.bench_check,
-        "recording_id": facts.recording_id,
-        "duration_s": facts.duration_s,
-        "sample_rate_hz": facts.sample_rate_hz,
-        "requested_sample_rate_hz": facts.requested_sample_rate_hz,
+        **named(facts, "started_utc", "bench_check", "recording_id"),
+        **named(facts, "duration_s", "sample_rate_hz", "requested_sample_rate_hz"),
         "excitation": facts.measurement.excitation.model_dump(mode="json"),
         "overload_s": dict(facts.overload_s),
         "lost_samples": facts.lost_samples,
@@ -72,9 +69,7 @@ def _facts(facts: RecordingFacts) -> Json:
 def _run(run: SimulatedRun) -> Json:
     return {
         "drive": run.driven.value,
-        "why": run.why,
-        "draws": run.draws,
-        "base_band_hz": run.base_band_hz,
+        **named(run, "why", "draws", "base_band_hz"),
         "accuracy": run.accuracy.value,
         "masses_kg": run.specimen.masses,
         "stiffnesses_n_per_m": run.specimen.stiffnesses,
@@ -90,18 +85,9 @@ def _ensemble(found: EnsembleCurve) -> Json:
     return {
         "quantity": found.name,
         "agrees": found.agrees if found.compared else None,
-        "compared": found.compared,
-        "outside": found.outside,
-        "largest_z": found.largest_z,
+        **named(found, "compared", "outside", "largest_z"),
         "limit_z": found.limit,
-        "share_in_band": found.share_in_band,
-        "frequency_hz": found.frequency_hz,
-        "measured": found.measured,
-        "median": found.median,
-        "lower": found.lower,
-        "upper": found.upper,
-        "z": found.z,
-        "rank": found.rank,
+        **named(found, "share_in_band", "frequency_hz", "measured", "median", "lower", "upper", "z", "rank"),
         "draws": found.count,
     }
 
@@ -109,15 +95,11 @@ def _ensemble(found: EnsembleCurve) -> Json:
 def _escape(found: EscapeRate) -> Json:
     low, high = found.bounds_per_s
     return {
-        "what": found.what,
-        "runs": found.runs,
-        "ends": found.ends,
+        **named(found, "what", "runs", "ends"),
         "measured_ended": found.measured.ended,
         "measured_end_s": found.measured.stop_s,
         "counted_from_s": found.from_s,
-        "events": found.events,
-        "exposure_s": found.exposure_s,
-        "per_s": found.per_s,
+        **named(found, "events", "exposure_s", "per_s"),
         "per_s_lower": low,
         "per_s_upper": high,
     }
