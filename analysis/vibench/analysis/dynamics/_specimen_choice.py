@@ -38,8 +38,12 @@ class SpecimenChoice(FrozenModel):
     @property
     def shaken(self) -> Specimen:
         """What is shaken."""
+        return self.specimen_under(self.law)
+
+    def specimen_under(self, model: str) -> Specimen:
+        """Build the same with another contact law."""
         assert self.described is not None, "validation fills it"
-        return self.described.specimen(self.law, self.damping_time_s, self.gap_m)
+        return self.described.specimen(model, self.damping_time_s, self.gap_m)
 
     @property
     def law(self) -> str:

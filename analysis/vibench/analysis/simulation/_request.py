@@ -5,26 +5,20 @@ What comes back of a simulation, piece by piece, small enough to cross from the 
 
 from dataclasses import dataclass
 from enum import StrEnum
-from pathlib import Path
-from typing import Annotated, Self
+from typing import Self
 
-from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
-from vibench.acquisition import FrozenModel
 from vibench.sim import (
     BUDGET_S,
-    USUAL_SPECIMEN,
     Accuracy,
     Ensemble,
     Observable,
-    Specimen,
-    SpecimenTable,
     StartMemory,
-    load_specimen,
 )
 from vibench.sim.study import Study, frequency_range
 
-from ..dynamics import BranchLine, ChainRun, SpectrumPoint
+from ..dynamics import BranchLine, ChainRun, SpecimenChoice, SpectrumPoint
 from ..signals import Reals
 
 
@@ -79,25 +73,11 @@ class Exponent(StrEnum):
     COMPUTED = "computed"
 
 
-def _known(specimen: str) -> str:
-    load_specimen(specimen)
-    return specimen
-
-
-class SimulationRequest(FrozenModel):
+class SimulationRequest(SpecimenChoice):
     """A scene at every frequency of a range."""
 
-    specimen: Annotated[str, AfterValidator(_known)] = USUAL_SPECIMEN
-    """gong2025, heavy, asymmetric, hardening, rigid_stops, linear_gap, or the path of a specimen's file."""
-    model: str = ""
-    """Contact: hertz, linear, linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, power:3+5+7, ...; empty for
-    the specimen's own."""
     compared_with: str = "linear"
     """A second model, for similarity with the first; empty for none."""
-    damping_time_s: NonNegativeFloat | None = None
-    """Damping over stiffness of every link: c = damping time times k; empty for the specimen's own."""
-    gap_m: PositiveFloat | None = None
-    """Clearance at both stops; empty for the specimen's own."""
     amplitude_m: PositiveFloat = 5e-6
     """Of the base displacement."""
     start_hz: PositiveFloat = 50.0
@@ -134,23 +114,8 @@ class SimulationRequest(FrozenModel):
     @property
     def models(self) -> tuple[str, ...]:
         """The first is the reference of the similarity."""
-        first = self.model.strip() or load_specimen(self.specimen).contact
         second = self.compared_with.strip()
-        return (first,) if second in ("", first) else (first, second)
-
-    def specimen_under(self, model: str) -> Specimen:
-        """Build what is simulated, with one of the contact laws."""
-        return load_specimen(self.specimen).specimen(model, self.damping_time_s, self.gap_m)
-
-    @property
-    def specimen_text(self) -> str:
-        """The specimen and what of it is replaced, for a caption."""
-        said = [Path(self.specimen).stem]
-        if self.gap_m is not None:
-            said.append(f"gap {1e6 * self.gap_m:g} µm")
-        if self.damping_time_s is not None:
-            said.append(f"damping time {self.damping_time_s:g} s")
-        return ", ".join(said)
+        return (self.law,) if second in ("", self.law) else (self.law, second)
 
     @property
     def study(self) -> Study:
@@ -158,7 +123,7 @@ class SimulationRequest(FrozenModel):
         exponents = (Observable.LYAPUNOV,) if self.exponent is Exponent.COMPUTED else ()
         varied = {"damping_times_s": self.damping_time_s, "gaps_m": self.gap_m}
         return Study(
-            specimen=SpecimenTable.model_validate(load_specimen(self.specimen).model_dump()),
+            specimen=self.described,
             models=self.models,
             **{name: (value,) for name, value in varied.items() if value is not None},
             amplitudes_m=(self.amplitude_m,),

@@ -40,7 +40,9 @@ class SimulatePage(Page):
 
     def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
         super().__init__(context, parent)
-        self.form: JudgedForm[SimulationRequest] = JudgedForm(SimulationRequest, "simulation")
+        self.form: JudgedForm[SimulationRequest] = JudgedForm(
+            SimulationRequest, "simulation", frozenset({"described"})
+        )
         self.plots = AnswerPlots(context.theme)
         self.simulator = Simulator(self)
         self._progress: SimulationProgress | None = None
