@@ -1,7 +1,8 @@
 """Columns of numbers beside a figure, and as a CSV file that any program reads; fields by their names."""
 
 import csv
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
@@ -52,6 +53,25 @@ def table(name: str, **columns: ArrayLike) -> Table:
 def named(source: object, *fields: str) -> dict[str, Any]:
     """Give some fields of a value under their own names: columns of a table, keys of a document."""
     return {field: getattr(source, field) for field in fields}
+
+
+def plain(value: Any) -> Any:
+    """Turn numpy's numbers into Python's, and what is not finite into None: JSON has neither."""
+    match value:
+        case bool() | str() | int() | None:
+            return value
+        case float():
+            return float(value) if math.isfinite(value) else None
+        case np.ndarray():
+            return plain(value.tolist())
+        case np.generic():
+            return plain(value.item())
+        case Mapping():
+            return {str(key): plain(each) for key, each in value.items()}
+        case Sequence():
+            return [plain(each) for each in value]
+        case _:
+            raise TypeError(f"{type(value).__name__} has no place in a document; turn it into numbers first")
 
 
 def _cells(values: ArrayLike) -> tuple[float | str, ...]:

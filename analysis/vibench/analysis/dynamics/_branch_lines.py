@@ -12,6 +12,7 @@ from vibench.sim.branches import FoundBranch
 
 from ..comparison import Curve, CurveKind, CurveOrigin
 from ..signals import Reals
+from ..tables import named, plain
 from ._branch_request import BranchRequest
 
 
@@ -208,37 +209,18 @@ class BranchDiagram:
 
 
 def _document(line: BranchLine) -> dict[str, object]:
-    return {
-        "periods": line.periods,
-        "shape": line.shape,
-        "has_twin": line.has_twin,
-        "is_isolated": line.is_isolated,
-        "origin": line.origin,
-        "begin": line.begin,
-        "end": line.end,
-        "elapsed_s": line.elapsed_s,
-        "events": [
-            {"kind": each.kind, "frequency_hz": each.frequency_hz, "amplitude_m": each.amplitude_m}
-            for each in line.events
-        ],
-        "points": [
-            {
-                "frequency_hz": float(line.frequency_hz[k]),
-                "amplitude_m": float(line.amplitude_m[k]),
-                "response_i": float(line.response_i[k, 0]),
-                "response_ii": float(line.response_ii[k, 0]),
-                "relative_i": float(line.response_i[k, 3]),
-                "relative_ii": float(line.response_ii[k, 3]),
-                "is_stable": bool(line.is_stable[k]),
-                "largest_multiplier": float(line.largest_multiplier[k]),
-                "impacts": int(line.impacts[k]),
-                "error_estimate": _finite(line.error_estimate[k]),
-                "state": [float(part) for part in line.states[k]],
-            }
-            for k in range(line.points)
-        ],
+    points = {
+        **named(line, "frequency_hz", "amplitude_m", "is_stable", "largest_multiplier", "impacts"),
+        "response_i": line.response_i[:, 0],
+        "response_ii": line.response_ii[:, 0],
+        "relative_i": line.response_i[:, 3],
+        "relative_ii": line.response_ii[:, 3],
+        "error_estimate": line.error_estimate,
+        "state": line.states,
     }
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    document = {
+        **named(line, "periods", "shape", "has_twin", "is_isolated", "origin", "begin", "end", "elapsed_s"),
+        "events": [named(each, "kind", "frequency_hz", "amplitude_m") for each in line.events],
+        "points": [dict(zip(points, values, strict=True)) for values in zip(*points.values(), strict=True)],
+    }
+    return dict(plain(document))

@@ -17,8 +17,8 @@ from vibench.sim.chain import (
 )
 
 from ..signals import Reals
+from ..tables import named, plain
 from ._chain_request import ChainRequest
-from ._json_numbers import number, numbers
 
 WAVES = 61
 """Wave numbers at which bands are drawn, from 0 to pi."""
@@ -68,21 +68,14 @@ class ChainRun:
 
     def to_dict(self) -> dict[str, object]:
         """Say everything but the picture; numbers that are not finite are null."""
-        return {
-            "cells": self.cells,
-            "frequency_hz": number(self.frequency_hz),
-            "over_hz": numbers(self.over_hz.tolist()),
-            "transmission": [numbers(row) for row in self.transmission.tolist()],
-            "largest_p_m": numbers(self.largest_m),
-            "impacts": self.impacts.tolist(),
-            "observed_s": self.observed_s,
-            "energy_j": numbers(self.energy_j),
-            "energy_error_j": numbers(self.energy_error_j),
-            "lyapunov_per_s": number(self.exponent_per_s),
-            "lyapunov_error_per_s": number(self.exponent_error_per_s),
-            "outcome": self.outcome,
-            "elapsed_s": self.elapsed_s,
+        document = {
+            **named(self, "cells", "frequency_hz", "over_hz", "transmission", "impacts", "observed_s"),
+            **named(self, "energy_j", "energy_error_j", "outcome", "elapsed_s"),
+            "largest_p_m": self.largest_m,
+            "lyapunov_per_s": self.exponent_per_s,
+            "lyapunov_error_per_s": self.exponent_error_per_s,
         }
+        return dict(plain(document))
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +163,7 @@ class ChainAnswer:
         """Say everything, for other programs."""
         return {
             "options": self.request.model_dump(mode="json"),
-            "gaps_hz": [[gap.lower_hz, number(gap.upper_hz)] for gap in self.gaps],
+            "gaps_hz": [[gap.lower_hz, plain(gap.upper_hz)] for gap in self.gaps],
             "wave_numbers_rad": self.wave_numbers.tolist(),
             "bands_hz": self.bands_hz.T.tolist(),
             "linear_hz": self.linear_hz.tolist(),

@@ -1,7 +1,7 @@
 """What is asked of exponents, and the answer at one drive."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Annotated, Self
 
 import numpy as np
@@ -10,7 +10,7 @@ from pydantic import Field, PositiveFloat, model_validator
 from vibench.sim import Accuracy, LyapunovSpectrum, Parameter, PowerLaw
 
 from ..signals import Reals
-from ._json_numbers import number, numbers
+from ..tables import plain
 from ._specimen_choice import SpecimenChoice
 
 MOST_POINTS = 20_000
@@ -122,26 +122,7 @@ class SpectrumPoint:
 
     def to_dict(self) -> dict[str, object]:
         """Say everything; numbers that are not finite are null."""
-        return {
-            "frequency_hz": self.frequency_hz,
-            "amplitude_m": self.amplitude_m,
-            "exponents_per_s": numbers(self.exponents_per_s),
-            "low_per_s": numbers(self.low_per_s),
-            "high_per_s": numbers(self.high_per_s),
-            "sum_per_s": number(self.sum_per_s),
-            "dampers_per_s": self.dampers_per_s,
-            "sum_difference": number(self.sum_difference),
-            "dimension": number(self.dimension),
-            "dimension_low": number(self.dimension_low),
-            "dimension_high": number(self.dimension_high),
-            "verdict": self.verdict,
-            "motion": self.motion,
-            "source": self.source,
-            "blocks": self.blocks,
-            "impact_rate_hz": self.impact_rate_hz,
-            "outcome": self.outcome,
-            "elapsed_s": self.elapsed_s,
-        }
+        return dict(plain({**asdict(self), "sum_difference": self.sum_difference}))
 
 
 def point_of(
@@ -210,6 +191,6 @@ class ExponentSpectrum:
         return {
             "options": self.request.model_dump(mode="json"),
             "points": [each.to_dict() for each in self.points],
-            "largest_sum_difference": number(self.largest_sum_difference),
+            "largest_sum_difference": plain(self.largest_sum_difference),
             "elapsed_s": self.elapsed_s,
         }

@@ -16,6 +16,7 @@ from ..errors import AnalysisError, NotEnoughData
 from ..recordings import described_specimen
 from ..results import CampaignResults
 from ..sine import DwellAnalysis
+from ..tables import named, plain
 from ._gap_fit import fit_gap
 from ._specimen_fit import FittedValue, Parameter, SpecimenFit, fit_specimen, with_values
 
@@ -157,17 +158,15 @@ class UpdatedSpecimen:
         return {
             "values": {
                 each.parameter.value: {
-                    "value": each.value,
-                    "low": each.low,
-                    "high": each.high,
-                    "sd": each.sd if np.isfinite(each.sd) else None,
+                    **named(each, "value", "low", "high"),
+                    "sd": plain(each.sd),
                     "bench": each.nominal,
                 }
                 for each in self.values
             },
             "linear_from": self.linear_from or None,
             "lines": self.lines,
-            "reduced_chi_square": self.reduced_chi_square if np.isfinite(self.reduced_chi_square) else None,
+            "reduced_chi_square": plain(self.reduced_chi_square),
             "not_told": list(self.not_told),
             "specimen": self.description.model_dump(mode="json", exclude_none=True),
         }

@@ -1,15 +1,9 @@
 """A result as one JSON document: every number with its unit in its name, and its uncertainty beside it."""
 
-import math
-from collections.abc import Mapping, Sequence
-from typing import Any
-
-import numpy as np
-
 from ..kinds import ANALYSES, AnyResult, Json
 from ..model import CurveDifference, EnsembleCurve, EscapeRate, SimulatedRun
 from ..recordings import RecordingFacts
-from ..tables import named
+from ..tables import named, plain
 from ._campaign_results import CampaignResults
 
 
@@ -34,8 +28,7 @@ def result_summary(result: AnyResult) -> Json:
             **row.simulated(laid),
         },
     }
-    plain: Json = _plain(document)
-    return plain
+    return dict(plain(document))
 
 
 def campaign_summary(results: CampaignResults) -> Json:
@@ -111,22 +104,3 @@ def _difference(found: CurveDifference) -> Json:
         "rms_db": found.rms_db,
         "share_within_two_standard_errors": found.share_within_two,
     }
-
-
-def _plain(value: Any) -> Any:
-    """Turn numpy's numbers into Python's, and what is not finite into None: JSON has neither."""
-    match value:
-        case bool() | str() | int() | None:
-            return value
-        case float():
-            return float(value) if math.isfinite(value) else None
-        case np.ndarray():
-            return _plain(value.tolist())
-        case np.generic():
-            return _plain(value.item())
-        case Mapping():
-            return {str(key): _plain(each) for key, each in value.items()}
-        case Sequence():
-            return [_plain(each) for each in value]
-        case _:
-            raise TypeError(f"{type(value).__name__} has no place in a summary; turn it into numbers first")
