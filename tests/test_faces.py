@@ -32,6 +32,7 @@ FOR_PEOPLE = (
     "vibench.analysis.exchange",
 )
 FOR_OUR_PROGRAMS = (
+    "vibench.acquisition.first_day",
     "vibench.sim.kernels",
     "vibench.sim.shaker",
     "vibench.sim.hdf5_files",

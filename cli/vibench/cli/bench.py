@@ -15,12 +15,14 @@ from vibench.acquisition import (
     last_check,
     list_instruments,
     list_rig_instruments,
+    named,
     open_bench,
     stop_on_signal,
 )
 from vibench.acquisition.engine import BenchLock
 from vibench.acquisition.rig import Rig, load_rig
 
+from .bench_new import new_bench
 from .exit_code import ExitCode
 from .output import bold, console, print_json
 from .paths import AsJson, BenchPath, bench_path
@@ -74,6 +76,26 @@ def check(
         )
         console.print(result.report.text(), markup=False, soft_wrap=True)
     if result.verdict is Verdict.FAIL:
+        raise typer.Exit(ExitCode.FAILED)
+
+
+@bench.command("new")
+def new(
+    target: Annotated[Path, typer.Argument(metavar="BENCH.toml", help="Where the configuration goes.")],
+    template: Annotated[
+        str, typer.Option("--from", metavar="NAME|FILE", help="Configuration whose values are proposed.")
+    ] = "lab_rig",
+    answers: Annotated[
+        Path | None,
+        typer.Option("--answers", metavar="FILE.toml", help="Answers, where nobody is to be asked."),
+    ] = None,
+) -> None:
+    """Set up a bench: ask and look, write its file, check wires, noise floor, a first 5 mV, gains and signs.
+
+    The page of it is kept beside the file. Exit code 1 if anything forbids to energise.
+    """
+    page = new_bench(target, named(template, "hardware_configs"), answers)
+    if page.verdict is Verdict.FAIL:
         raise typer.Exit(ExitCode.FAILED)
 
 

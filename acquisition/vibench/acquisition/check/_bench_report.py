@@ -33,11 +33,12 @@ ROOM_H = Bounds(-10.0, -1.0)
 """Recording time that the disk should hold, negative since more is better [h]."""
 
 
-def bench_report(bench: Bench, folder: Path, switch: StopSwitch | None = None) -> BenchReport:
+def bench_report(
+    bench: Bench, folder: Path, switch: StopSwitch | None = None, amplitude_vpp: float | None = None
+) -> BenchReport:
     """Check everything that can be known before a measurement; the generator is silent afterwards.
 
-    Reads all channels in silence, while two per cent of the amplitude limit play at 160 Hz for some seconds,
-    and in silence again.
+    Reads all channels in silence, while a small sine plays at 160 Hz for some seconds, and in silence again.
 
     Raises CheckStopped when somebody ended it, InstrumentError when an instrument fails; what is merely wrong
     is a finding.
@@ -50,10 +51,13 @@ def bench_report(bench: Bench, folder: Path, switch: StopSwitch | None = None) -
         Where recordings will go.
     switch
         Lets others end the check, within a block of samples.
+    amplitude_vpp
+        Of the sine; absent, two per cent of the amplitude limit [V].
 
     """
     findings = [*_identified(bench), *_calibrated(bench), _room(bench, folder)]
-    amplitude_vpp = CHECK_SHARE * bench.rig.generator.amplitude_limit_vpp
+    if amplitude_vpp is None:
+        amplitude_vpp = CHECK_SHARE * bench.rig.generator.amplitude_limit_vpp
     drive = drive_for(bench, _small_sine(amplitude_vpp))
     reader = _BlockReader(bench, StopSwitch() if switch is None else switch)
     bench.generator.stop()

@@ -46,6 +46,7 @@ class GeneratorModel:
     top_code: int
     """Codes of the memory run from 0 to this."""
     burst_cycles: tuple[int, int]
+    usb_ids: tuple[tuple[int, int], ...] = ()
     longest_sweep_s: float = 0.0
     """Of its own; 0 where its sweep time is no remote command."""
 
@@ -56,6 +57,7 @@ class GeneratorModel:
             self.range_vpp(config.load_ohm),
             self.highest_hz[Shape.SINE],
             self.memory_points,
+            self.usb_ids,
             self.longest_sweep_s,
         )
 
@@ -131,6 +133,7 @@ AFG1022_MODEL = GeneratorModel(
     memory_points=(2, 8192),
     top_code=16_383,
     burst_cycles=(1, 50_000),
+    usb_ids=((0x0699, 0x0353),),
 )
 KEYSIGHT_33500B_MODEL = GeneratorModel(
     # Keysight 33500B data sheet, the 20 MHz models; without a filter its memory plays up to 62.5 MSa/s.
@@ -143,6 +146,8 @@ KEYSIGHT_33500B_MODEL = GeneratorModel(
     memory_points=(8, 65_536),
     top_code=65_534,
     burst_cycles=(1, 100_000_000),
+    # One or two channels, 20 or 30 MHz: as public programs name them.
+    usb_ids=tuple((0x0957, product) for product in (0x2507, 0x2607, 0x2707, 0x2807, 0x2A07, 0x2B07, 0x2C07)),
     longest_sweep_s=500.0,  # linear ones may last longer, logarithmic ones may not
 )
 

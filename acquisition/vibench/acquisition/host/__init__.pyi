@@ -13,6 +13,7 @@ from ._follow_parent import (
 )
 from ._schema import (
     json_schema as json_schema,
+    schema_line as schema_line,
 )
 from ._shipped import (
     all_shipped as all_shipped,

@@ -64,7 +64,7 @@ def named(given: Path | str, folder: str) -> Path:
 
     """
     path = Path(given).expanduser()
-    if path.suffix or path.name != str(path) or path.exists():
+    if path.suffix or path.name != str(path) or path.is_file():
         return path
     known = {each.stem: each for each in all_shipped(folder)}
     if path.name not in known:

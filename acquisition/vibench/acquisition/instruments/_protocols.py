@@ -35,6 +35,8 @@ class GeneratorDescription:
     highest_sine_hz: float
     memory_points: tuple[int, int]
     """Fewest and most points of one period of a waveform."""
+    usb_ids: tuple[tuple[int, int], ...] = ()
+    """Numbers of maker and product by which it is found on the USB bus."""
     longest_sweep_s: float = 0.0
     """Longest sweep that it makes by itself [s]; 0 where it makes none."""
 

@@ -1,0 +1,133 @@
+"""`vibench bench new`: from nothing to a bench that is checked, with a page that says so."""
+
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from vibench.acquisition import (
+    CheckFailed,
+    ConfigurationError,
+    StopSwitch,
+    list_rig_instruments,
+    open_bench,
+    stop_on_signal,
+)
+from vibench.acquisition.engine import BenchLock
+from vibench.acquisition.first_day import QUESTIONS, DayPage, Question, configured, first_day
+from vibench.acquisition.instruments import Knob
+from vibench.acquisition.rig import Confirm, KnobSheet, Rig, load_rig
+from vibench.sim import toml_table
+
+from .output import console
+
+_WIRED, _OPERATOR, _KNOBS = "wired", "operator", "knobs"
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What a file answers: configuration, operator, whether all is wired and every knob as the file says."""
+
+    given: Mapping[str, str]
+
+    @classmethod
+    def read(cls, path: Path) -> "Answers":
+        """Read a TOML file of answers."""
+        return cls({key: str(value) for key, value in _flat(toml_table(path))})
+
+    @property
+    def questions(self) -> tuple[Question, ...]:
+        """What is asked, and what else of the template is answered."""
+        usual = {question.key for question in QUESTIONS} | {_WIRED, _OPERATOR, _KNOBS}
+        return (*QUESTIONS, *(Question(key, key) for key in self.given if key not in usual))
+
+    def ask(self, question: Question, choices: Sequence[str], held: str) -> str:
+        """Answer a question of the configuration; nothing: as the template has it."""
+        answer = self.given.get(question.key, "")
+        if choices:
+            console.print(f"seen: {', '.join(choices)}", markup=False)
+        console.print(f"{question.text} [{held}] {answer}", markup=False, soft_wrap=True)
+        return answer
+
+    def wired(self, pair: str) -> str:
+        """Say whether a pair of ends is plugged in."""
+        console.print(f"Plug {pair}: {self.given.get(_WIRED, '')}", markup=False, soft_wrap=True)
+        return self.given.get(_WIRED, "")
+
+    def knobs(self, knobs: tuple[Knob, ...]) -> KnobSheet:
+        """Confirm every setting made by hand, or none."""
+        if self.given.get(_KNOBS) != "as in the file":
+            raise CheckFailed(
+                'settings made by hand are not confirmed; give knobs = "as in the file" among the answers '
+                "once you have compared them"
+            )
+        return KnobSheet(operator=self.operator, confirmed=datetime.now(UTC), knobs=knobs)
+
+    @property
+    def operator(self) -> str:
+        """Who answers."""
+        return self.given.get(_OPERATOR, "nobody named")
+
+
+def _flat(table: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
+    found: list[tuple[str, Any]] = []
+    for key, value in table.items():
+        if isinstance(value, dict):
+            found += _flat(value, f"{before}{key}.")
+        else:
+            found.append((f"{before}{key}", value))
+    return found
+
+
+def _asked_at_terminal(question: Question, choices: Sequence[str], held: str) -> str:
+    for number, choice in enumerate(choices, start=1):
+        console.print(f"  {number}: {choice}", markup=False)
+    answer = str(typer.prompt(f"{question.text} [{held}]", default="", show_default=False))
+    if answer.isdigit() and 1 <= int(answer) <= len(choices):
+        return choices[int(answer) - 1]
+    return answer
+
+
+def _wired_at_terminal(pair: str) -> str:
+    return "plugged in, by eye" if typer.confirm(f"Plug {pair}. Done?") else ""
+
+
+def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
+    """Ask, write the configuration, go through the first day, and keep its page beside the file."""
+    given = None if answers is None else Answers.read(answers)
+    if given is None and not sys.stdin.isatty():
+        raise ConfigurationError(
+            "nobody sits at this terminal, and there are no answers; give --answers FILE.toml"
+        )
+    seen = list_rig_instruments(load_rig(template))
+    for remark in seen.remarks:
+        console.print(f"! {remark}", markup=False)
+    operator = str(typer.prompt("Who sets up this bench?")) if given is None else given.operator
+    note = f"{operator}, {datetime.now(UTC).astimezone().date()}"
+    ask, questions = (_asked_at_terminal, QUESTIONS) if given is None else (given.ask, given.questions)
+    rig = configured(template, target, seen, ask, note, questions)
+    console.print(f"\nwritten: {target}\n", markup=False)
+    page = _day(rig, target, operator, given)
+    kept = _free(target.with_suffix(".first_day.md"))
+    kept.write_text(page.text, encoding="utf-8")
+    console.print(page.text, markup=False, soft_wrap=True)
+    console.print(f"kept: {kept}", markup=False)
+    return page
+
+
+def _day(rig: Rig, target: Path, operator: str, given: Answers | None) -> DayPage:
+    confirm: Confirm | None = None if given is None or rig.virtual is not None else given.knobs
+    wired, switch = _wired_at_terminal if given is None else given.wired, StopSwitch()
+    with closing(BenchLock.of(rig)), open_bench(rig, confirm) as bench, stop_on_signal(switch):
+        return first_day(bench, target, operator, wired, switch)
+
+
+def _free(path: Path) -> Path:
+    """Give the path, or the next of its name that nothing has."""
+    names = (path.with_name(f"{path.stem}_{number}{path.suffix}") for number in range(2, 1000))
+    return path if not path.exists() else next(name for name in names if not name.exists())

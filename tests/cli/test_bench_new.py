@@ -1,0 +1,115 @@
+"""`vibench bench new`: the configuration that it writes, the page that it keeps, and what it refuses."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from vibench.acquisition.bench import InstrumentList
+from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition.first_day import QUESTIONS, configured
+from vibench.acquisition.first_day._template import value_in, with_answer
+from vibench.acquisition.instruments import FoundDevice
+from vibench.acquisition.rig import load_rig
+from vibench.cli.__main__ import app
+
+ROOT = Path(__file__).resolve().parents[2]
+LAB, VIRTUAL = (ROOT / "hardware_configs" / f"{name}.toml" for name in ("lab_rig", "virtual_rig"))
+ANSWERS = """
+operator = "A. Student"
+wired = "by eye"
+name = "bench by the window"
+[amplifier]
+serial = "12"
+current_limit_a = 1.8
+"""
+
+
+def seen(*resources, device="cDAQ9Mod2", product="NI 9234"):
+    inputs = tuple(f"{device}/ai{number}" for number in range(4))
+    return InstrumentList(resources, (FoundDevice(device, product, "1", inputs, ()),), ())
+
+
+def new(*arguments):
+    return CliRunner().invoke(app, ["bench", "new", *map(str, arguments)])
+
+
+def test_a_bench_is_made_checked_and_written_down(tmp_path):
+    (tmp_path / "answers.toml").write_text(ANSWERS)
+    done = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
+    assert done.exit_code == 0, done.output
+    rig = load_rig(tmp_path / "mine.toml")
+    assert (rig.name, rig.amplifier.serial) == ("bench by the window", "12")
+    assert rig.amplifier.current_limit_a.value == 1.8
+    assert "A. Student" in rig.amplifier.current_limit_a.source
+    page = (tmp_path / "mine.first_day.md").read_text()
+    for part in ("TEKTRONIX,AFG1022", "the first 5 mVpp: ok", "two per cent of the amplitude limit: ok"):
+        assert part in page
+    assert page.count(": by eye") == len(rig.daq.channels)
+    again = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
+    assert again.exit_code == 1
+    assert "is there already" in str(again.exception)
+
+
+def test_wires_that_nobody_confirms_end_the_day_before_anything_plays(tmp_path):
+    (tmp_path / "answers.toml").write_text('operator = "A. Student"')
+    done = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
+    assert done.exit_code == 1
+    assert "Nothing has played" in str(done.exception)
+    assert not list(tmp_path.glob("*.md"))
+
+
+def test_a_gain_that_is_another_is_found_at_5_mv_and_nothing_louder_plays(tmp_path):
+    (tmp_path / "faults.toml").write_text(
+        '[[faults]]\nat_s = 0.0\nfault = "turn_amplifier_gain"\ngain_db = 16\n'
+    )
+    scripted = VIRTUAL.read_text() + f"faults = '{tmp_path / 'faults.toml'}'\n"
+    (tmp_path / "template.toml").write_text(scripted)
+    (tmp_path / "answers.toml").write_text(ANSWERS)
+    template, answers = tmp_path / "template.toml", tmp_path / "answers.toml"
+    done = new(tmp_path / "mine.toml", "--from", template, "--answers", answers)
+    page = (tmp_path / "mine.first_day.md").read_text()
+    assert done.exit_code == 1
+    assert "set the gain of the Bruel & Kjaer 2706 to 10 dB" in page
+    assert "The bench check was not played" in page
+    assert "two per cent" not in page
+
+
+def test_what_is_seen_alone_is_proposed_and_its_driver_and_product_entered(tmp_path):
+    only = seen("USB0::2391::11271::MY5::0::INSTR")
+    rig = configured(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
+    assert rig.generator.resource == "USB0::2391::11271::MY5::0::INSTR"
+    assert rig.generator.driver == "keysight33500b"
+    assert (rig.daq.device, rig.daq.product) == ("cDAQ9Mod2", "NI 9234")
+    text = (tmp_path / "lab.toml").read_text()
+    assert "# CONFIRM: input of the 2706" in text, "comments on what was not asked stay"
+
+
+def test_an_answer_of_the_wrong_kind_is_refused_and_nothing_is_written(tmp_path):
+    def ask(question, choices, held):
+        return "ten" if question.key == "amplifier.gain_db" else ""
+
+    with pytest.raises(ConfigurationError, match=r"amplifier\.gain_db: 'ten' is no number"):
+        configured(LAB, tmp_path / "lab.toml", seen(), ask, "note")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_value_that_a_bench_cannot_have_is_refused_and_nothing_is_written(tmp_path):
+    def ask(question, choices, held):
+        return "-5" if question.key == "generator.settle_s" else ""
+
+    with pytest.raises(ConfigurationError, match=r"generator\.settle_s"):
+        configured(LAB, tmp_path / "lab.toml", seen(), ask, "note")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("question", QUESTIONS, ids=lambda each: each.key)
+@pytest.mark.parametrize("template", [LAB, VIRTUAL], ids=["lab", "virtual"])
+def test_every_question_has_a_place_in_the_templates(template, question):
+    text = template.read_text()
+    held = value_in(text, question.key)
+    answer = {"{": "1.25", '"': "word"}.get(held[:1], "2026-03-04" if held.count("-") == 2 else "0.125")
+    changed = with_answer(text, question.key, answer, "note")
+    assert answer in value_in(changed, question.key)
+    same = [line for line in changed.splitlines() if line in text.splitlines()]
+    assert len(same) >= len(text.splitlines()) - 1
