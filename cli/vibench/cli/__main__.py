@@ -125,6 +125,11 @@ COMMANDS = {
     "study": Place(
         "study", "study", "Predict responses over every combination of what a file lists, longest first."
     ),
+    "map": Place(
+        "map_motions",
+        "map_motions",
+        "Map the motions over two parameters or two coordinates of the start, or along one parameter.",
+    ),
     "figure": Place(
         "figure",
         "figure",

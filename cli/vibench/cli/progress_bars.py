@@ -46,7 +46,7 @@ def study_bar(points: int) -> Iterator[StudyObserver]:
         bar = bars.add_task("points", total=points, left="")
 
         def watch(progress: StudyProgress) -> None:
-            bars.update(bar, completed=progress.kept, left=_left(progress))
+            bars.update(bar, total=progress.points, completed=progress.kept, left=_left(progress))
 
         yield watch
 

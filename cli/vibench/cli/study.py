@@ -9,6 +9,8 @@ import typer
 from vibench.acquisition import load_toml, named
 from vibench.sim.study import (
     ExistingStudy,
+    GridResults,
+    Plan,
     Study,
     StudyResults,
     planned_work_s,
@@ -100,7 +102,7 @@ def tell(results: StudyResults, out: Path) -> None:
     console.print(f"{out}: {results.kept} of {results.study.grid.size} points, {failed} failed ({state})")
 
 
-def complain_about_points(results: StudyResults) -> None:
+def complain_about_points(results: GridResults[Plan]) -> None:
     """End with a sentence for each of the first points without an answer, or as a study that was stopped.
 
     Returns where every point is answered.
@@ -111,7 +113,7 @@ def complain_about_points(results: StudyResults) -> None:
         raise typer.Exit(ExitCode.STOPPED)
 
 
-def say_failures(results: StudyResults) -> int:
+def say_failures(results: GridResults[Plan]) -> int:
     """Say on standard error which points have no answer, and why; gives how many."""
     failures = list(results.failures())
     for where, why in failures[:SHOWN_FAILURES]:

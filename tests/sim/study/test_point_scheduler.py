@@ -12,7 +12,9 @@ def scheduler_of(planned_s, after=None, is_done=None):
     costs = Costs(Grid((points,), (True,)), np.array(planned_s, dtype=float))
     after = np.full(points, NOBODY) if after is None else np.array(after)
     is_done = np.zeros(points, dtype=bool) if is_done is None else np.array(is_done)
-    return PointScheduler(after, is_done, costs)
+    scheduler = PointScheduler(after, is_done, costs)
+    scheduler.release(np.arange(points))
+    return scheduler
 
 
 def test_the_longest_point_begins_first():

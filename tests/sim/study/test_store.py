@@ -120,7 +120,7 @@ def test_h5py_alone_finds_named_axes_units_and_missing_points(small, tmp_path):
         assert np.isnan(response[...]).all()
         assert np.all(file["impacts"][...] == file["impacts"].attrs["_FillValue"])
         assert np.all(file[STATE][...] == PointState.MISSING)
-        assert file[STATE].attrs["flag_meanings"] == b"missing done stopped failed"
+        assert file[STATE].attrs["flag_meanings"] == b"missing done stopped failed filled"
         assert json.loads(file["study_json"][()])["amplitudes_m"] == [5e-6, 20e-6]
         assert file.attrs["Conventions"].startswith(b"CF-")
 

@@ -13,12 +13,19 @@ on speed and accuracy is docs/accuracy.md. Results are taken as they are: nothin
 """
 
 from ..figures import (
+    MOTION_CLASSES,
+    SHOWN,
     DrawnFigure,
     ImageKind,
+    RecordedLevel,
     branches_figure,
     chain_figure,
     contact_forces_figure,
     exponent_spectrum_figure,
+    map_caption,
+    map_figure,
+    motion_classes,
+    motion_words,
     tradeoff_figure,
 )
 from ..paper_figures import (
@@ -46,18 +53,25 @@ from ._report import (
 
 __all__ = [
     "DRAWINGS",
+    "MOTION_CLASSES",
     "PAPER_FIGURES",
+    "SHOWN",
     "Drawing",
     "DrawnFigure",
     "FigureOptions",
     "FrequencyGrid",
     "ImageKind",
+    "RecordedLevel",
     "accuracy_document",
     "branches_figure",
     "chain_figure",
     "contact_forces_figure",
     "exponent_spectrum_figure",
     "levels_figure",
+    "map_caption",
+    "map_figure",
+    "motion_classes",
+    "motion_words",
     "recording_figures",
     "result_figures",
     "tradeoff_figure",

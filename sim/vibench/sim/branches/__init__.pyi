@@ -8,6 +8,7 @@ from ._found_branch import (
 from ._motion_search import (
     MotionSearch as MotionSearch,
     periodic_motions as periodic_motions,
+    random_state as random_state,
 )
 from ._shot_branches import (
     shot_branches as shot_branches,

@@ -102,16 +102,26 @@ def _starts(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterat
     yield np.zeros(6)
     if linear[3] < min(specimen.gaps_m):
         yield _free_state(specimen, drive)
+    rng = np.random.default_rng([search.seed, int(drive.frequency_hz * 1e3), int(drive.amplitude_m * 1e9)])
+    for _ in range(search.starts):
+        yield random_state(specimen, drive, rng)
+
+
+def random_state(specimen: Specimen, drive: Harmonic, rng: np.random.Generator) -> Vector:
+    """Draw a state between the stops, shape (6,), that may lead to any motion.
+
+    m0 and m2 lie within three times the gap, or the motion without stops where that is larger; velocities
+    spread as far, times 2 pi f.
+    """
+    linear = drive.amplitude_m * np.abs(base_transmissibility(specimen, drive.frequency_hz)[0])
     lower, upper = specimen.gaps_m
     near = min(lower, upper)
-    rng = np.random.default_rng([search.seed, int(drive.frequency_hz * 1e3), int(drive.amplitude_m * 1e9)])
     reach = RANDOM_REACH * max(near, float(linear[2]) if np.isfinite(linear[2]) else near)
     speed = 2.0 * np.pi * drive.frequency_hz
-    for _ in range(search.starts):
-        x, z = rng.uniform(-reach, reach, 2)
-        p = rng.uniform(-min(lower, 3.0 * near), min(upper, 3.0 * near)) * WITHIN
-        rates = rng.uniform(-reach, reach, 3) * speed
-        yield np.array([x, z + p, z, *rates])
+    x, z = rng.uniform(-reach, reach, 2)
+    p = rng.uniform(-min(lower, 3.0 * near), min(upper, 3.0 * near)) * WITHIN
+    rates = rng.uniform(-reach, reach, 3) * speed
+    return np.array([x, z + p, z, *rates])
 
 
 def _free_state(specimen: Specimen, drive: Harmonic) -> Vector:

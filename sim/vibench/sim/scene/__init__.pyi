@@ -1,4 +1,5 @@
 from ._measured_cost import (
+    expected_cost_s as expected_cost_s,
     learn_cost as learn_cost,
     measure_cost as measure_cost,
 )
@@ -24,11 +25,14 @@ from ._scene import (
     Scene as Scene,
 )
 from ._shares import (
+    Count as Count,
     EscapeRate as EscapeRate,
     Share as Share,
+    shares_of as shares_of,
     wilson_share as wilson_share,
 )
 from ._solve import (
+    settle_scene as settle_scene,
     solve_ensemble as solve_ensemble,
     solve_scene as solve_scene,
 )

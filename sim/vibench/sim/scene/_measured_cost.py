@@ -1,12 +1,14 @@
 """What runs of a scene's kind take on this machine: learnt from each, or measured where none was made."""
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 from ..costs import FEWEST, cost_ledger
-from ._plan import plan_scene
+from ._plan import ScenePlan, plan_scene
+from ._prediction import ScenePrediction
 from ._scene import Scene
-from ._solve import solve_scene
+from ._solve import settle_scene, solve_scene
 
 MEASURED_S = 0.5
 """Processor time after which no further run is made to measure a cost [s]."""
@@ -14,10 +16,26 @@ DETUNED = (0.93, 1.07, 0.87, 1.13, 1.0)
 """Frequencies of the runs by which a cost is measured, over the scene's: neighbours differ as runs do."""
 
 
-def learn_cost(scene: Scene, taken_s: float) -> None:
+Solver = Callable[[Scene], ScenePrediction]
+
+
+def learn_cost(scene: Scene, taken_s: float, solver: Solver = solve_scene) -> None:
     """Note the processor time that a scene took whose kernels were compiled and loaded before."""
     plan = plan_scene(scene)
-    cost_ledger().learn(plan.kind, plan.planned_s, taken_s)
+    cost_ledger().learn(_kind(plan, solver), plan.planned_s, taken_s)
+
+
+def expected_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
+    """Say how long a solver will take for a scene, by what such runs took lately [s].
+
+    Raises ValueError when the specimen cannot be followed in time.
+    """
+    plan = plan_scene(scene)
+    return cost_ledger().expected(_kind(plan, solver), plan.planned_s).time_s
+
+
+def _kind(plan: ScenePlan, solver: Solver) -> str:
+    return f"settled/{plan.kind}" if solver is settle_scene else plan.kind
 
 
 def measure_cost(scene: Scene) -> None:

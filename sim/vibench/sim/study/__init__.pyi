@@ -2,19 +2,46 @@ from ._answers import (
     prediction_at as prediction_at,
 )
 from ._arrays import (
+    Arrays as Arrays,
     PointAnswer as PointAnswer,
 )
+from ._axes import (
+    Grid as Grid,
+    StudyAxis as StudyAxis,
+)
 from ._columns import (
+    COLUMNS as COLUMNS,
     MESSAGE as MESSAGE,
+    NUMBERS as NUMBERS,
+    Cell as Cell,
+    Column as Column,
 )
 from ._errors import (
+    InvalidStudy as InvalidStudy,
     StudyError as StudyError,
 )
+from ._executor import (
+    Solved as Solved,
+)
 from ._expansion import (
+    continued_point as continued_point,
+    end_phase as end_phase,
+    failed_point as failed_point,
+    planned_times as planned_times,
     planned_work_s as planned_work_s,
+    predecessors as predecessors,
+)
+from ._file_reading import (
+    Plan as Plan,
+    read_arrays as read_arrays,
+    read_plan as read_plan,
+    read_sessions as read_sessions,
 )
 from ._frequency_range import (
     frequency_range as frequency_range,
+)
+from ._grid_plan import (
+    GridPlan as GridPlan,
 )
 from ._layout import (
     PointState as PointState,
@@ -23,14 +50,18 @@ from ._plausibility_warnings import (
     plausibility_warnings as plausibility_warnings,
 )
 from ._progress import (
+    Cancelled as Cancelled,
     StudyObserver as StudyObserver,
     StudyProgress as StudyProgress,
 )
 from ._results import (
+    GridResults as GridResults,
     StudyResults as StudyResults,
     open_study as open_study,
 )
 from ._run import (
+    StudyEnd as StudyEnd,
+    run_points as run_points,
     run_study as run_study,
 )
 from ._software import (
@@ -39,10 +70,13 @@ from ._software import (
 )
 from ._solve import (
     ExistingStudy as ExistingStudy,
+    executor_of as executor_of,
     solve_study as solve_study,
+    store_of as store_of,
 )
 from ._store import (
     MemoryStore as MemoryStore,
+    Store as Store,
 )
 from ._study import (
     GivenStart as GivenStart,

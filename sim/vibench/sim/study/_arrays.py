@@ -1,7 +1,7 @@
 """The answers of a study in memory: one array a column, over the study's axes."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from . import _layout as layout
 from ._axes import Grid
-from ._columns import COLUMNS, Cell, Column
+from ._columns import Cell, Column
+from ._grid_plan import GridPlan
 from ._layout import PointState
 
 Arrays = dict[str, NDArray[np.generic]]
@@ -27,17 +28,20 @@ class PointAnswer:
     """Processor time, where it is known."""
 
 
-def empty_arrays(grid: Grid) -> Arrays:
+def empty_arrays(plan: GridPlan) -> Arrays:
     """Make arrays in which every point is missing, shape (points,) or (points, components)."""
-    return {column.name: np.full(_shape(column, grid), column.missing, column.dtype) for column in COLUMNS}
+    return {
+        column.name: np.full(_shape(column, plan.grid), column.missing, column.dtype)
+        for column in plan.columns
+    }
 
 
-def put(arrays: Arrays, answer: PointAnswer) -> Iterator[tuple[Column, bytes]]:
+def put(arrays: Arrays, columns: Sequence[Column], answer: PointAnswer) -> Iterator[tuple[Column, bytes]]:
     """Write an answer's cells into the arrays; each comes back as the bytes of the file.
 
     The state is not among them: it is written when the cells are safe.
     """
-    for column in COLUMNS:
+    for column in columns:
         if column.name in answer.cells:
             values = arrays[column.name]
             values[answer.number] = answer.cells[column.name]
@@ -47,6 +51,11 @@ def put(arrays: Arrays, answer: PointAnswer) -> Iterator[tuple[Column, bytes]]:
 
 def _shape(column: Column, grid: Grid) -> tuple[int, ...]:
     return (grid.size,) if column.components == 1 else (grid.size, column.components)
+
+
+def is_failed(state: NDArray[np.uint8] | PointState) -> NDArray[np.bool_]:
+    """Whether there is an error for an answer, or a run that did not reach its end."""
+    return np.isin(state, (PointState.STOPPED, PointState.FAILED))
 
 
 def states(arrays: Mapping[str, NDArray[np.generic]]) -> NDArray[np.uint8]:

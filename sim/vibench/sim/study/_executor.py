@@ -81,7 +81,7 @@ def solve_timed(scene: Scene, solver: Solver) -> Solved:
     A scene that begins before one of its kind has ended may have compiled kernels, or waited for them: its
     time says nothing.
     """
-    kind: Kind = (type(scene.specimen.contact), scene.observe, type(scene.duration))
+    kind: Kind = (solver, type(scene.specimen.contact), scene.observe, type(scene.duration))
     is_compiled = kind in _solved_before
     start_s = time.thread_time()
     prediction = solver(scene)
@@ -89,5 +89,5 @@ def solve_timed(scene: Scene, solver: Solver) -> Solved:
     _solved_before.add(kind)
     # To plan a closed form takes about as long as to evaluate it.
     if is_compiled and prediction.method is not Method.CLOSED_FORM:
-        learn_cost(scene, taken_s)
+        learn_cost(scene, taken_s, solver)
     return Solved(prediction, taken_s if is_compiled else math.nan)

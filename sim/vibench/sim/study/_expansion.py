@@ -6,6 +6,7 @@ The identity of a scene: a digest of everything it says, the same in every proce
 import hashlib
 import json
 import math
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +18,7 @@ from ..model import Outcome
 from ..scene import Given, Rest, Scene, plan_scene
 from ._answers import cells_of, cut_text
 from ._arrays import Arrays, PointAnswer
+from ._axes import Grid
 from ._columns import CONTINUES, DURATION, FINAL_STATE, IDENTITY, IDENTITY_DIGITS, MESSAGE, PHASE, TAKEN, Cell
 from ._executor import Solved
 from ._layout import PointState
@@ -53,35 +55,71 @@ PLANNED = 2000
 """Points that are planned one by one; of a larger study every so manyth, for all up to the next."""
 
 
+def predecessors(grid: Grid, starts: Sequence[object]) -> NDArray[np.int64]:
+    """Give the point that each one continues, or NOBODY; starts are the last axis but one of the grid."""
+    blocks = np.full(grid.shape, NOBODY)
+    numbers = np.arange(grid.size).reshape(grid.shape)
+    for index, start in enumerate(starts):
+        match start:
+            case Start.UP:
+                blocks[..., index, 1:] = numbers[..., index, :-1]
+            case Start.DOWN:
+                blocks[..., index, :-1] = numbers[..., index, 1:]
+            case _:
+                pass
+    return blocks.reshape(-1)
+
+
+def planned_times(grid: Grid, planned: Callable[[int], float]) -> Floats:
+    """Give the time that each point is planned to take, shape (points,)."""
+    every = max(1, math.ceil(grid.size / PLANNED))
+    some = [planned(number) for number in range(0, grid.size, every)]
+    return np.repeat(some, every)[: grid.size]
+
+
+def continued_point(before: int, arrays: Arrays) -> int:
+    """Give a point's predecessor; NOBODY where that ended in no finite state."""
+    if before == NOBODY or not np.all(np.isfinite(arrays[FINAL_STATE][before].astype(np.float64))):
+        return NOBODY
+    return before
+
+
+def end_phase(frequency_hz: float, before: int, arrays: Arrays) -> float:
+    """Phase at which a point's drive stopped: the base of the one that continues it goes on from there."""
+    turns = math.fmod(frequency_hz * float(arrays[DURATION][before]), 1.0)
+    return math.fmod(2.0 * math.pi * turns + float(arrays[PHASE][before]), 2.0 * math.pi)
+
+
+def failed_point(number: int, error: BaseException) -> PointAnswer:
+    """Say what is kept of a scene that could not be computed: a refusal is a sentence by itself."""
+    match error:
+        case ValueError():
+            said = str(error)
+        case _:
+            said = f"{type(error).__name__}: {error}"
+    return PointAnswer(number, PointState.FAILED, {MESSAGE: cut_text(said)})
+
+
 class Expansion:
     """The scenes of a study, made when they are asked for."""
 
     def __init__(self, study: Study) -> None:
         self._study = study
-        self._grid = study.grid
+        self.grid = study.grid
 
     @cached_property
     def after(self) -> NDArray[np.int64]:
         """Point that each one continues, or NOBODY, shape (points,)."""
-        frequencies = len(self._study.frequencies_hz)
-        blocks = np.full((*self._grid.shape[:-2], len(self._study.starts), frequencies), NOBODY)
-        numbers = np.arange(self._grid.size).reshape(blocks.shape)
-        for index, start in enumerate(self._study.starts):
-            match start:
-                case Start.UP:
-                    blocks[..., index, 1:] = numbers[..., index, :-1]
-                case Start.DOWN:
-                    blocks[..., index, :-1] = numbers[..., index, 1:]
-                case _:
-                    pass
-        return blocks.reshape(-1)
+        return predecessors(self.grid, self._study.starts)
 
     @cached_property
     def planned_s(self) -> Floats:
         """Time that each point is planned to take, shape (points,)."""
-        every = max(1, math.ceil(self._grid.size / PLANNED))
-        some = [self._planned(number) for number in range(0, self._grid.size, every)]
-        return np.repeat(some, every)[: self._grid.size]
+        return planned_times(self.grid, self._planned)
+
+    def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
+        """Ask for every point."""
+        return np.arange(len(arrays[FINAL_STATE]))
 
     def scene(self, number: int, arrays: Arrays) -> Scene:
         """Make the scene of a point whose predecessor, if it has one, is done.
@@ -94,9 +132,9 @@ class Expansion:
             return self._unchained(number)
         state = tuple(float(value) for value in arrays[FINAL_STATE][before])
         x, y, z, vx, vy, vz = state
-        name = continued_from(self._study.frequencies_hz[self._grid.place(before)[-1]])
+        name = continued_from(self._study.frequencies_hz[self.grid.place(before)[-1]])
         start = Given((x, y, z, vx, vy, vz), name)
-        return self._study.scene(self._grid.place(number), start, self._end_phase(before, arrays))
+        return self._study.scene(self.grid.place(number), start, self._end_phase(before, arrays))
 
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
         """Say what is kept of a prediction."""
@@ -106,13 +144,8 @@ class Expansion:
         return PointAnswer(number, state, cells, solved.taken_s)
 
     def failure(self, number: int, error: BaseException) -> PointAnswer:
-        """Say what is kept of a scene that could not be computed: a refusal is a sentence by itself."""
-        match error:
-            case ValueError():
-                said = str(error)
-            case _:
-                said = f"{type(error).__name__}: {error}"
-        return PointAnswer(number, PointState.FAILED, {MESSAGE: cut_text(said)})
+        """Say what is kept of a scene that could not be computed."""
+        return failed_point(number, error)
 
     def _origin(self, number: int, scene: Scene, arrays: Arrays) -> dict[str, Cell]:
         """Say where a point began, and which scene it is."""
@@ -125,20 +158,15 @@ class Expansion:
         }
 
     def _predecessor(self, number: int, arrays: Arrays) -> int:
-        before = int(self.after[number])
-        if before == NOBODY or not np.all(np.isfinite(arrays[FINAL_STATE][before].astype(np.float64))):
-            return NOBODY
-        return before
+        return continued_point(int(self.after[number]), arrays)
 
     def _end_phase(self, before: int, arrays: Arrays) -> float:
         """Phase at which the predecessor's drive stopped: the base goes on from where it is."""
-        frequency_hz = self._study.frequencies_hz[self._grid.place(before)[-1]]
-        turns = math.fmod(frequency_hz * float(arrays[DURATION][before]), 1.0)
-        return math.fmod(2.0 * math.pi * turns + float(arrays[PHASE][before]), 2.0 * math.pi)
+        return end_phase(self._study.frequencies_hz[self.grid.place(before)[-1]], before, arrays)
 
     def _unchained(self, number: int) -> Scene:
         """Make the scene of a point that continues no other."""
-        place = self._grid.place(number)
+        place = self.grid.place(number)
         start = self._study.starts[place[-2]]
         match start:
             case GivenStart():

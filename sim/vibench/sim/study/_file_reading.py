@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import h5py
 import numpy as np
@@ -12,10 +13,11 @@ from pydantic import ValidationError
 from ..hdf5_files import UnsafeHdf5, open_hdf5
 from . import _layout as layout
 from ._arrays import Arrays
-from ._columns import COLUMNS
 from ._errors import StudyError
+from ._grid_plan import GridPlan
 from ._layout import PointState
-from ._study import Study
+
+Plan = TypeVar("Plan", bound=GridPlan)
 
 
 @dataclass(frozen=True)
@@ -38,45 +40,45 @@ class Session:
     executor: str
 
 
-def read_study(path: Path) -> Study:
-    """Read what was asked for; raises StudyError when the file is no study's."""
-    with _opened(path) as file:
-        return _study(path, file)
+def read_plan(path: Path, kind: type[Plan]) -> Plan:
+    """Read what was asked for; raises StudyError when the file is none of such a plan."""
+    with _opened(path, kind) as file:
+        return _plan(path, file, kind)
 
 
-def read_arrays(path: Path) -> Arrays:
+def read_arrays(path: Path, plan: GridPlan) -> Arrays:
     """Read every answer, one row a point; a point that is under way counts as missing."""
-    with _opened(path) as file:
-        return _arrays(file)
+    with _opened(path, type(plan)) as file:
+        return _arrays(file, plan)
 
 
-def read_sessions(path: Path) -> tuple[Session, ...]:
+def read_sessions(path: Path, kind: type[GridPlan]) -> tuple[Session, ...]:
     """Read who computed, and when."""
-    with _opened(path) as file:
+    with _opened(path, kind) as file:
         group = file[layout.SESSIONS]
         rows = range(int(group[layout.N_SESSIONS][0]))
         columns = [group[column.name][:] for column in layout.SESSION_COLUMNS]
     return tuple(Session(*(bytes(column[row]).decode() for column in columns)) for row in rows)
 
 
-def places_of(path: Path) -> Places:
+def places_of(path: Path, plan: GridPlan) -> Places:
     """Find the places of everything that is written later."""
-    with _opened(path) as file:
+    with _opened(path, type(plan)) as file:
         group = file[layout.SESSIONS]
         return Places(
-            columns={column.name: _offset(file[column.name]) for column in COLUMNS},
+            columns={column.name: _offset(file[column.name]) for column in plan.columns},
             session_columns={each.name: _offset(group[each.name]) for each in layout.SESSION_COLUMNS},
             n_sessions=_offset(group[layout.N_SESSIONS]),
             sessions=int(group[layout.N_SESSIONS][0]),
         )
 
 
-def _arrays(file: h5py.File) -> Arrays:
+def _arrays(file: h5py.File, plan: GridPlan) -> Arrays:
     # States first: an answer that comes while this reads is left for the next time.
     state = file[layout.STATE][...].reshape(-1)
     is_missing = state == PointState.MISSING
     arrays: Arrays = {layout.STATE: state}
-    for column in COLUMNS:
+    for column in plan.columns:
         if column.name != layout.STATE:
             whole = file[column.name][...]
             rows = whole.reshape(len(state), *((column.components,) if column.components > 1 else ()))
@@ -90,9 +92,9 @@ def _offset(dataset: h5py.Dataset) -> int:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[h5py.File]:
+def _opened(path: Path, kind: type[GridPlan]) -> Iterator[h5py.File]:
     if not path.is_file():
-        raise StudyError(f"{path} does not exist, or is no file; give the path of a study's file.")
+        raise StudyError(f"{path} does not exist, or is no file; give the path of a {kind.called}'s file.")
     try:
         # With HDF5's usual lock, which the writer's allows: a process that has the file open elsewhere, in
         # xarray for example, cannot open it with another one.
@@ -101,17 +103,19 @@ def _opened(path: Path) -> Iterator[h5py.File]:
         raise StudyError(f"{path} was not read: {error}") from error
     except OSError as error:
         raise StudyError(
-            f"{path} is no readable HDF5 file ({error}); give the path of a study's file."
+            f"{path} is no readable HDF5 file ({error}); give the path of a {kind.called}'s file."
         ) from error
     with file:
-        _require_ours(path, file)
+        _require_ours(path, file, kind)
         yield file
 
 
-def _require_ours(path: Path, file: h5py.File) -> None:
-    kind = file.attrs.get("format")
-    if not (isinstance(kind, bytes) and kind.decode() == layout.FORMAT):
-        raise StudyError(f"{path} is HDF5, but no study's file; give the path of a study's file.")
+def _require_ours(path: Path, file: h5py.File, kind: type[GridPlan]) -> None:
+    found = file.attrs.get("format")
+    if not (isinstance(found, bytes) and found.decode() == kind.format):
+        raise StudyError(
+            f"{path} is HDF5, but no {kind.called}'s file; give the path of a {kind.called}'s file."
+        )
     version = int(file.attrs["format_version"])
     if version != layout.FORMAT_VERSION:
         raise StudyError(
@@ -120,9 +124,11 @@ def _require_ours(path: Path, file: h5py.File) -> None:
         )
 
 
-def _study(path: Path, file: h5py.File) -> Study:
+def _plan(path: Path, file: h5py.File, kind: type[Plan]) -> Plan:
     text = np.asarray(file[layout.STUDY][()]).item()
     try:
-        return Study.model_validate_json(text)
+        return kind.model_validate_json(text)
     except ValidationError as error:
-        raise StudyError(f"{path} was written by another vibench, whose study differs: {error}") from error
+        raise StudyError(
+            f"{path} was written by another vibench, whose {kind.called} differs: {error}"
+        ) from error

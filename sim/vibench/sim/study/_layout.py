@@ -32,6 +32,8 @@ class PointState(IntEnum):
     """The run did not reach its end; ``outcome`` says why. Its numbers may be NaN."""
     FAILED = 3
     """The scene could not be computed; ``message`` says why. Its numbers are NaN."""
+    FILLED = 4
+    """Of a map: not computed, because its neighbours agree; its numbers lie between theirs."""
 
 
 @dataclass(frozen=True)

@@ -71,7 +71,8 @@ class PointScheduler:
         self._after = after
         self._costs = costs
         self._is_done = is_done.copy()
-        self._left = int(np.count_nonzero(~is_done))
+        self._is_released = np.zeros(len(after), dtype=np.bool_)
+        self._left = 0
         self._is_out = np.zeros(len(after), dtype=np.bool_)
         self._is_alone = np.zeros(len(after), dtype=np.bool_)
         self._next = np.full(len(after), NOBODY, dtype=np.int64)
@@ -79,18 +80,29 @@ class PointScheduler:
         self._next[after[chained]] = chained
         self._behind_s = self._times_behind()
         self._queue: list[tuple[float, int]] = []
-        for number in np.flatnonzero(~self._is_done):
+
+    def release(self, numbers: NDArray[np.int64]) -> None:
+        """Let these points be computed, those that have an answer excepted."""
+        new = numbers[~self._is_released[numbers]]
+        self._is_released[new] = True
+        self._left += int(np.count_nonzero(~self._is_done[new]))
+        for number in new:
             if self._is_ready(int(number)):
                 self._push(int(number))
 
     @property
+    def released(self) -> int:
+        """How many points were let be computed, those with an answer too."""
+        return int(np.count_nonzero(self._is_released))
+
+    @property
     def is_missing(self) -> NDArray[np.bool_]:
-        """Points without an answer, shape (points,); those under way too."""
-        return ~self._is_done
+        """Released points without an answer, shape (points,); those under way too."""
+        return self._is_released & ~self._is_done
 
     @property
     def left(self) -> int:
-        """How many points have no answer."""
+        """How many released points have no answer."""
         return self._left
 
     def take(self, worth_s: float, most: int) -> tuple[int, ...]:
@@ -139,7 +151,9 @@ class PointScheduler:
     def _is_ready(self, number: int) -> bool:
         before = int(self._after[number])
         is_free = before == NOBODY or bool(self._is_done[before])
-        return is_free and not self._is_done[number] and not self._is_out[number]
+        return bool(
+            is_free and self._is_released[number] and not self._is_done[number] and not self._is_out[number]
+        )
 
     def _weight(self, number: int) -> float:
         return self._costs.estimate_s(number) + float(self._behind_s[number])

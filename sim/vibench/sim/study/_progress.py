@@ -9,7 +9,7 @@ class StudyProgress:
     """How much is done, and how long the rest will take."""
 
     points: int
-    """Of the whole study."""
+    """That are wanted: of a study all, of a map more as it is refined."""
     kept: int
     """With an answer; those of earlier sessions too."""
     failed: int

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Generic
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,10 @@ from ..scene import ScenePrediction
 from ._answers import prediction_at
 from ._arrays import Arrays, states
 from ._axes import StudyAxis
-from ._columns import COLUMNS, CONTINUES, ENDED, MESSAGE
+from ._columns import CONTINUES, ENDED, MESSAGE
 from ._errors import InvalidStudy
 from ._expansion import continued_from
-from ._file_reading import Session, read_arrays, read_sessions, read_study
+from ._file_reading import Plan, Session, read_arrays, read_plan, read_sessions
 from ._layout import PointState
 from ._study import GivenStart, Start, Study
 
@@ -27,10 +28,10 @@ SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class StudyResults:
-    """Everything that is known of a study. Axes in the order of ``study.axes``."""
+class GridResults(Generic[Plan]):
+    """Everything that is known of a plan. Axes in the order of ``plan.axes``."""
 
-    study: Study
+    plan: Plan
     arrays: Mapping[str, NDArray[np.generic]]
     """One row a point, by column; as the file holds them."""
     sessions: tuple[Session, ...] = ()
@@ -39,12 +40,12 @@ class StudyResults:
     @property
     def axes(self) -> tuple[StudyAxis, ...]:
         """Dimensions of the arrays."""
-        return self.study.axes
+        return self.plan.axes
 
     @property
     def state(self) -> NDArray[np.uint8]:
         """A `JournalPointState` for each point, over all axes."""
-        return states(self.arrays).reshape(self.study.grid.shape)
+        return states(self.arrays).reshape(self.plan.grid.shape)
 
     @property
     def is_complete(self) -> bool:
@@ -69,19 +70,54 @@ class StudyResults:
         Raises
         ------
         InvalidStudy
-            When the study has no such column, axis or value.
+            When there is no such column, axis or value.
 
         """
-        columns = {column.name: column for column in COLUMNS if np.dtype(column.dtype).kind in "fiu"}
+        columns = {
+            column.name: column for column in self.plan.columns if np.dtype(column.dtype).kind in "fiu"
+        }
         if name not in columns:
-            raise InvalidStudy(f"{name!r} is no quantity of a study; there are {', '.join(columns)}.")
+            raise InvalidStudy(
+                f"{name!r} is no quantity of a {self.plan.called}; there are {', '.join(columns)}."
+            )
         column = columns[name]
         rows = self.arrays[name].astype(np.float64)
         if np.dtype(column.dtype).kind == "i":
             rows[self.arrays[name] == column.missing] = np.nan
-        shape = self.study.grid.shape
+        shape = self.plan.grid.shape
         whole = rows.reshape(shape if column.components == 1 else (*shape, column.components))
         return np.asarray(whole[self._place(fixed)])
+
+    def failures(self) -> Iterator[tuple[dict[str, Value], str]]:
+        """Where, and why, there is no answer: the scene could not be computed, or its run was lost."""
+        state = states(self.arrays)
+        for number in np.flatnonzero((state == PointState.STOPPED) | (state == PointState.FAILED)):
+            why = ENDED if state[number] == PointState.STOPPED and ENDED in self.arrays else MESSAGE
+            yield self.coordinates(int(number)), bytes(self.arrays[why][number]).decode()
+
+    def coordinates(self, number: int) -> dict[str, Value]:
+        """Values of the axes at a point."""
+        place = self.plan.grid.place(number)
+        return {axis.name: axis.values[index] for axis, index in zip(self.axes, place, strict=True)}
+
+    def _place(self, fixed: Mapping[str, Value]) -> tuple[int | slice, ...]:
+        unknown = sorted(fixed.keys() - {axis.name for axis in self.axes})
+        if unknown:
+            names = ", ".join(axis.name for axis in self.axes)
+            raise InvalidStudy(f"{unknown[0]!r} is no axis of this {self.plan.called}; there are {names}.")
+        return tuple(
+            _index(axis, fixed[axis.name]) if axis.name in fixed else slice(None) for axis in self.axes
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class StudyResults(GridResults[Study]):
+    """Everything that is known of a study."""
+
+    @property
+    def study(self) -> Study:
+        """What was asked for."""
+        return self.plan
 
     def predictions(self) -> Iterator[ScenePrediction]:
         """Give the answers of all points that were computed, in the order of the arrays."""
@@ -110,27 +146,6 @@ class StudyResults:
             name,
         )
 
-    def failures(self) -> Iterator[tuple[dict[str, Value], str]]:
-        """Where, and why, there is no answer: the scene could not be computed, or its run was lost."""
-        state = states(self.arrays)
-        for number in np.flatnonzero(state > PointState.DONE):
-            why = MESSAGE if state[number] == PointState.FAILED else ENDED
-            yield self.coordinates(int(number)), bytes(self.arrays[why][number]).decode()
-
-    def coordinates(self, number: int) -> dict[str, Value]:
-        """Values of the axes at a point."""
-        place = self.study.grid.place(number)
-        return {axis.name: axis.values[index] for axis, index in zip(self.axes, place, strict=True)}
-
-    def _place(self, fixed: Mapping[str, Value]) -> tuple[int | slice, ...]:
-        unknown = sorted(fixed.keys() - {axis.name for axis in self.axes})
-        if unknown:
-            names = ", ".join(axis.name for axis in self.axes)
-            raise InvalidStudy(f"{unknown[0]!r} is no axis of this study; there are {names}.")
-        return tuple(
-            _index(axis, fixed[axis.name]) if axis.name in fixed else slice(None) for axis in self.axes
-        )
-
 
 def open_study(path: Path | str) -> StudyResults:
     """Read a study's file, finished or growing.
@@ -142,7 +157,8 @@ def open_study(path: Path | str) -> StudyResults:
 
     """
     path = Path(path)
-    return StudyResults(read_study(path), read_arrays(path), read_sessions(path))
+    study = read_plan(path, Study)
+    return StudyResults(study, read_arrays(path, study), read_sessions(path, Study))
 
 
 def results_of(study: Study, arrays: Arrays) -> StudyResults:
@@ -156,7 +172,7 @@ def _index(axis: StudyAxis, value: Value) -> int:
             return index
     shown = ", ".join(str(each) for each in axis.values[:SHOWN_VALUES])
     more = ", …" if len(axis.values) > SHOWN_VALUES else ""
-    raise InvalidStudy(f"{value!r} is no {axis.name} of this study; there are {shown}{more}.")
+    raise InvalidStudy(f"{value!r} is no {axis.name} here; there are {shown}{more}.")
 
 
 def _is_same(here: Value, asked: Value) -> bool:

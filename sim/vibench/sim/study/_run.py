@@ -4,12 +4,17 @@ import math
 import time
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ._arrays import PointAnswer, states
+from ..kernels import Floats
+from ..scene import Scene
+from ._arrays import Arrays, PointAnswer, is_failed, states
+from ._axes import Grid
 from ._columns import TAKEN
-from ._executor import Bundle, Executor, Reply
+from ._executor import Bundle, Executor, Reply, Solved
 from ._expansion import Expansion
 from ._layout import PointState
 from ._point_scheduler import Costs, PointScheduler
@@ -36,6 +41,34 @@ class StudyEnd(StrEnum):
     CANCELLED = "cancelled"
 
 
+class Points(Protocol):
+    """The points of a plan as scenes, and which of them are to be computed."""
+
+    @property
+    def grid(self) -> Grid:
+        """All of them."""
+
+    @property
+    def after(self) -> NDArray[np.int64]:
+        """Point that each one continues, or NOBODY, shape (points,)."""
+
+    @property
+    def planned_s(self) -> Floats:
+        """Time that each point is planned to take, shape (points,)."""
+
+    def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
+        """Numbers of the points that what is known so far asks for; asked again when all have an answer."""
+
+    def scene(self, number: int, arrays: Arrays) -> Scene:
+        """Make the scene of a point whose predecessor, if it has one, is done; ValueError if not allowed."""
+
+    def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
+        """Say what is kept of a prediction."""
+
+    def failure(self, number: int, error: BaseException) -> PointAnswer:
+        """Say what is kept of a scene that could not be computed."""
+
+
 def run_study(
     study: Study,
     executor: Executor,
@@ -54,7 +87,18 @@ def run_study(
         When the store or the executor fails; what was kept before is kept.
 
     """
-    session = _Session(study, executor, store)
+    return run_points(Expansion(study), executor, store, observer, cancelled)
+
+
+def run_points(
+    points: Points,
+    executor: Executor,
+    store: Store,
+    observer: StudyObserver | None = None,
+    cancelled: Cancelled | None = None,
+) -> StudyEnd:
+    """Compute all points that are wanted and that the store misses; as `run_study`."""
+    session = _Session(points, executor, store)
     if session.is_unfinished:
         store.begin(executor.description)
     while session.is_unfinished:
@@ -72,18 +116,18 @@ def run_study(
 class _Session:
     """One go at a study."""
 
-    def __init__(self, study: Study, executor: Executor, store: Store) -> None:
+    def __init__(self, points: Points, executor: Executor, store: Store) -> None:
         self._executor = executor
         self._store = store
-        self._expansion = Expansion(study)
+        self._points = points
         is_done = states(store.arrays) != PointState.MISSING
-        self._costs = Costs(study.grid, self._expansion.planned_s)
+        self._costs = Costs(points.grid, points.planned_s)
         for number in np.flatnonzero(is_done & np.isfinite(store.arrays[TAKEN].astype(float))):
             for _ in self._costs.learn(int(number), float(store.arrays[TAKEN][number])):
                 pass
-        self._scheduler = PointScheduler(self._expansion.after, is_done, self._costs)
-        self._points = study.grid.size
-        self._failed = int(np.count_nonzero(states(store.arrays) > PointState.DONE))
+        self._scheduler = PointScheduler(points.after, is_done, self._costs)
+        self._scheduler.release(points.wanted(store.arrays))
+        self._failed = int(np.count_nonzero(is_failed(states(store.arrays))))
         self._out = 0
         self._looked_s = -math.inf
         self._work_left_s = 0.0
@@ -105,7 +149,7 @@ class _Session:
             numbers = self._scheduler.take(worth_s, MOST_IN_BUNDLE)
             if not numbers:
                 return
-            scenes = tuple(self._expansion.scene(number, self._store.arrays) for number in numbers)
+            scenes = tuple(self._points.scene(number, self._store.arrays) for number in numbers)
             self._executor.submit(Bundle(numbers, scenes))
             self._out += 1
 
@@ -116,12 +160,14 @@ class _Session:
             self._store.keep(answers)
         for answer in answers:
             self._scheduler.finish(answer.number)
-            self._failed += answer.state > PointState.DONE
+            self._failed += bool(is_failed(answer.state))
         for number, taken_s in [
             (each.number, each.taken_s) for each in answers if math.isfinite(each.taken_s)
         ]:
             self._scheduler.learn(number, taken_s)
             self._taken_s += taken_s
+        if answers and not self.is_unfinished:
+            self._scheduler.release(self._points.wanted(self._store.arrays))
         if answers and math.isnan(self._first_s):
             # Workers spend their first moments on compiling: what comes after tells their pace.
             self._first_s, self._taken_s = time.monotonic(), 0.0
@@ -129,8 +175,8 @@ class _Session:
     def progress(self) -> StudyProgress:
         """Where it stands."""
         return StudyProgress(
-            points=self._points,
-            kept=self._points - self._scheduler.left,
+            points=self._scheduler.released,
+            kept=self._scheduler.released - self._scheduler.left,
             failed=self._failed,
             elapsed_s=time.monotonic() - self._began_s,
             left_s=self._left_s(),
@@ -156,14 +202,14 @@ class _Session:
         self._out -= 1
         numbers = reply.bundle.numbers
         for number, scene, solved in zip(numbers, reply.bundle.scenes, reply.solved, strict=False):
-            yield self._expansion.answer(number, scene, solved, self._store.arrays)
+            yield self._points.answer(number, scene, solved, self._store.arrays)
         rest = numbers[len(reply.solved) :]
         match reply.error, rest:
             case None, _:
                 for number in rest:
                     self._scheduler.put_back(number)
             case error, (number,) if len(numbers) == 1:
-                yield self._expansion.failure(number, error)
+                yield self._points.failure(number, error)
             case _:
                 for number in rest:
                     self._scheduler.put_back_alone(number)

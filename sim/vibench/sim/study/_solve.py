@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import Literal
 
 from ..model import chosen
+from ..scene import solve_scene
 from ._errors import ClusterLost
-from ._executor import Executor
+from ._executor import Executor, Solver
+from ._grid_plan import GridPlan
 from ._progress import Cancelled, StudyObserver
 from ._results import StudyResults, open_study, results_of
 from ._run import run_study
-from ._store import FileStore, MemoryStore
+from ._store import FileStore, MemoryStore, Store
 from ._study import Study
 from ._threads import ThreadExecutor
 
@@ -65,31 +67,33 @@ def solve_study(
         In one sentence: a file of another study, a cluster that does not answer, a full disk, ...
 
     """
-    existing = chosen(ExistingStudy, existing)
-    with _executor(workers, cluster) as executor:
-        if out is None:
-            store = MemoryStore(study)
-            run_study(study, executor, store, observer, cancelled)
-            return results_of(study, store.arrays)
-        with _file_store(study, out, existing) as kept:
-            run_study(study, executor, kept, observer, cancelled)
-        return open_study(out)
-
-
-def _file_store(study: Study, out: Path, existing: ExistingStudy) -> FileStore:
-    if existing is ExistingStudy.RESUME and out.exists():
-        return FileStore(out, study)
-    return FileStore.created(out, study)
+    with executor_of(workers, cluster) as executor, store_of(study, out, existing) as store:
+        run_study(study, executor, store, observer, cancelled)
+        arrays = store.arrays
+    return results_of(study, arrays) if out is None else open_study(out)
 
 
 @contextmanager
-def _executor(workers: int | None, cluster: str | None) -> Iterator[Executor]:
-    executor = ThreadExecutor(workers) if cluster is None else _cluster_executor(cluster)
+def store_of(plan: GridPlan, out: Path | None, existing: ExistingStudy | ExistingWord) -> Iterator[Store]:
+    """Open the place for the answers to a plan: a file that is made or gone on with, or memory alone."""
+    existing = chosen(ExistingStudy, existing)
+    if out is None:
+        yield MemoryStore(plan)
+        return
+    is_there = existing is ExistingStudy.RESUME and out.exists()
+    with FileStore(out, plan) if is_there else FileStore.created(out, plan) as store:
+        yield store
+
+
+@contextmanager
+def executor_of(workers: int | None, cluster: str | None, solver: Solver = solve_scene) -> Iterator[Executor]:
+    """Open what computes: threads of this process, or the workers of a Dask scheduler."""
+    executor = ThreadExecutor(workers, solver) if cluster is None else _cluster_executor(cluster, solver)
     with closing(executor):
         yield executor
 
 
-def _cluster_executor(address: str) -> Executor:
+def _cluster_executor(address: str, solver: Solver) -> Executor:
     try:
         from ._cluster import ClusterExecutor  # noqa: PLC0415 - Dask is optional, and slow to import
     except ModuleNotFoundError as error:
@@ -97,4 +101,4 @@ def _cluster_executor(address: str) -> Executor:
             f"A cluster needs Dask, and {error.name} is not installed;"
             " install vibench with its extra 'cluster'."
         ) from error
-    return ClusterExecutor(address)
+    return ClusterExecutor(address, solver)

@@ -19,13 +19,13 @@ from typing import Protocol, Self
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from ..operating_system import sync_file, sync_folder
 from . import _layout as layout
 from ._arrays import Arrays, PointAnswer, empty_arrays, put
 from ._axes import StudyAxis
 from ._columns import (
-    COLUMNS,
     COORDINATE,
     COORDINATES,
     FOUND_MOTION,
@@ -35,29 +35,39 @@ from ._columns import (
 )
 from ._disk import Disk, sole_writer
 from ._errors import StudyError
-from ._file_reading import places_of, read_arrays, read_study
+from ._file_reading import places_of, read_arrays, read_plan
+from ._grid_plan import GridPlan
 from ._software import software
-from ._study import Study
 
 MAKING_SUFFIX = ".making"
-_MOTIONS = StudyAxis(
-    FOUND_MOTION, tuple(float(k) for k in range(MOST_FOUND)), "1", "motions of an ensemble, by their share"
-)
+_COMPONENTS = {
+    axis.name: axis
+    for axis in (
+        StudyAxis(COORDINATE, COORDINATES, "", "x, y, z and their velocities"),
+        StudyAxis(
+            FOUND_MOTION,
+            tuple(float(k) for k in range(MOST_FOUND)),
+            "1",
+            "motions of an ensemble, by their share",
+        ),
+    )
+}
+"""What the components of a column are, where that is more than their number."""
 HEAD_BYTES = 2_000_000
 """More than sessions, axes and attributes take together."""
 
 
-def make_file(path: Path, study: Study) -> None:
-    """Create a study's file, all points missing, or leave nothing.
+def make_file(path: Path, plan: GridPlan) -> None:
+    """Create a plan's file, all points missing, or leave nothing.
 
     Raises StudyError when the name is taken, the folder does not exist, or the disk is too full.
     """
     _claim_name(path)
     making = path.with_name(path.name + MAKING_SUFFIX)
     try:
-        _require_room(path, study)
+        _require_room(path, plan)
         with h5py.File(making, "w", libver=layout.LIBVER, locking=False) as file:
-            _fill(file, study)
+            _fill(file, plan)
         sync_file(making)
         os.replace(making, path)  # noqa: PTH105 - the pair of os.fsync
         sync_folder(path.parent)
@@ -86,38 +96,38 @@ def _claim_name(path: Path) -> None:
         raise StudyError(f"{path} cannot be created: {error.strerror}; choose another folder.") from error
 
 
-def _require_room(path: Path, study: Study) -> None:
-    needed_bytes = HEAD_BYTES + study.grid.size * sum(
-        np.dtype(column.dtype).itemsize * column.components for column in COLUMNS
+def _require_room(path: Path, plan: GridPlan) -> None:
+    needed_bytes = HEAD_BYTES + plan.grid.size * sum(
+        np.dtype(column.dtype).itemsize * column.components for column in plan.columns
     )
     free_bytes = shutil.disk_usage(path.parent).free
     if free_bytes < needed_bytes:
         raise StudyError(
-            f"{path} needs {needed_bytes / 1e6:.0f} MB for {study.grid.size} points; the disk has"
-            f" {free_bytes / 1e6:.0f} MB. Make room, or choose another folder or a smaller study."
+            f"{path} needs {needed_bytes / 1e6:.0f} MB for {plan.grid.size} points; the disk has"
+            f" {free_bytes / 1e6:.0f} MB. Make room, or choose another folder or a smaller {plan.called}."
         )
 
 
-def _fill(file: h5py.File, study: Study) -> None:
+def _fill(file: h5py.File, plan: GridPlan) -> None:
     _attach(
         file,
         {
             "Conventions": layout.CONVENTIONS,
-            "format": layout.FORMAT,
+            "format": plan.format,
             "format_version": layout.FORMAT_VERSION,
             "title": "predictions of vibro-impact responses",
         },
     )
-    text = study.model_dump_json().encode()
+    text = plan.model_dump_json().encode()
     file.create_dataset(layout.STUDY, data=np.array(text, dtype=h5py.string_dtype("utf-8", len(text))))
-    scales = [_scale(file, axis) for axis in study.axes]
-    last = {
-        COORDINATE: _scale(file, StudyAxis(COORDINATE, COORDINATES, "", "x, y, z and their velocities")),
-        FOUND_MOTION: _scale(file, _MOTIONS),
-    }
-    for column in COLUMNS:
-        dataset = _column(file, column, study.grid.shape)
-        for index, scale in enumerate([*scales, last[column.along]][: dataset.ndim]):
+    scales = [_scale(file, axis) for axis in plan.axes]
+    last: dict[str, h5py.Dataset] = {}
+    for column in plan.columns:
+        dataset = _column(file, column, plan.grid.shape)
+        if column.components > 1 and column.along not in last:
+            last[column.along] = _scale(file, _COMPONENTS.get(column.along) or _numbered(column))
+        along = [last[column.along]] if column.components > 1 else []
+        for index, scale in enumerate([*scales, *along]):
             dataset.dims[index].attach_scale(scale)
     _sessions(file)
 
@@ -134,6 +144,11 @@ def _scale(file: h5py.File, axis: StudyAxis) -> h5py.Dataset:
     _attach(dataset, {"long_name": axis.long_name})
     dataset.make_scale(axis.name)
     return dataset
+
+
+def _numbered(column: Column) -> StudyAxis:
+    """Give the axis of a column whose components are told by their number."""
+    return StudyAxis(column.along, tuple(float(k) for k in range(column.components)), "1", column.along)
 
 
 def _column(file: h5py.File, column: Column, shape: tuple[int, ...]) -> h5py.Dataset:
@@ -187,12 +202,15 @@ class Store(Protocol):
     def keep(self, answers: Sequence[PointAnswer]) -> None:
         """Keep answers; when it returns they are as safe as they will be."""
 
+    def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
+        """Fill in many points that are not computed, by column; their state says so."""
+
 
 class MemoryStore:
     """Keeps answers as long as the process lives."""
 
-    def __init__(self, study: Study) -> None:
-        self._arrays = empty_arrays(study.grid)
+    def __init__(self, plan: GridPlan) -> None:
+        self._arrays, self._columns = empty_arrays(plan), plan.columns
 
     @property
     def arrays(self) -> Arrays:
@@ -205,9 +223,15 @@ class MemoryStore:
     def keep(self, answers: Sequence[PointAnswer]) -> None:
         """Keep answers."""
         for answer in answers:
-            for _ in put(self._arrays, answer):
+            for _ in put(self._arrays, self._columns, answer):
                 pass
             self._arrays[layout.STATE][answer.number] = answer.state
+
+    def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
+        """Fill in many points that are not computed."""
+        for name, values in cells.items():
+            self._arrays[name][numbers] = values
+        self._arrays[layout.STATE][numbers] = layout.PointState.FILLED
 
 
 class FileStore:
@@ -220,23 +244,24 @@ class FileStore:
 
     """
 
-    def __init__(self, path: Path, study: Study, opened: Callable[[Path], Disk] = sole_writer) -> None:
+    def __init__(self, path: Path, plan: GridPlan, opened: Callable[[Path], Disk] = sole_writer) -> None:
         self._path = path
+        self._columns = plan.columns
         self._disk = opened(path)
         try:
-            _require_same(path, read_study(path), study)
-            self._places = places_of(path)
-            self._arrays = read_arrays(path)
+            _require_same(path, read_plan(path, type(plan)), plan)
+            self._places = places_of(path, plan)
+            self._arrays = read_arrays(path, plan)
         except BaseException:
             self._disk.close()
             raise
         self._session = 0
 
     @classmethod
-    def created(cls, path: Path, study: Study) -> Self:
+    def created(cls, path: Path, plan: GridPlan) -> Self:
         """Create the file first; refuses a name that is taken."""
-        make_file(path, study)
-        return cls(path, study)
+        make_file(path, plan)
+        return cls(path, plan)
 
     @property
     def arrays(self) -> Arrays:
@@ -262,12 +287,23 @@ class FileStore:
         """
         for answer in answers:
             cells = {**answer.cells, SESSION: self._session}
-            for column, raw in put(self._arrays, PointAnswer(answer.number, answer.state, cells)):
+            kept = PointAnswer(answer.number, answer.state, cells)
+            for column, raw in put(self._arrays, self._columns, kept):
                 self._write(self._places.columns[column.name] + answer.number * len(raw), raw)
         self._sync()
         for answer in answers:
             self._write(self._places.columns[layout.STATE] + answer.number, bytes([answer.state]))
             self._arrays[layout.STATE][answer.number] = answer.state
+        self._sync()
+
+    def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
+        """Fill in many points that are not computed: whole columns, in an order that cannot lie."""
+        for name, values in cells.items():
+            self._arrays[name][numbers] = values
+            self._write(self._places.columns[name], self._arrays[name].tobytes())
+        self._sync()
+        self._arrays[layout.STATE][numbers] = layout.PointState.FILLED
+        self._write(self._places.columns[layout.STATE], self._arrays[layout.STATE].tobytes())
         self._sync()
 
     def close(self) -> None:
@@ -301,12 +337,13 @@ class FileStore:
         )
 
 
-def _require_same(path: Path, kept: Study, asked: Study) -> None:
+def _require_same(path: Path, kept: GridPlan, asked: GridPlan) -> None:
     differing = asked.differences(kept)
     if differing:
         raise StudyError(
-            f"{path} holds another study: {', '.join(_difference(name, kept, asked) for name in differing)}."
-            " Nothing was changed; ask for the same study, or choose another file."
+            f"{path} holds another {asked.called}: "
+            f"{', '.join(_difference(name, kept, asked) for name in differing)}."
+            " Nothing was changed; ask for the same {asked.called}, or choose another file."
         )
 
 
@@ -314,9 +351,9 @@ SHOWN = 60
 """Characters of a value that a message shows."""
 
 
-def _difference(name: str, kept: Study, asked: Study) -> str:
-    """Say how one field of two studies differs; of long lists, where they begin to."""
-    there, here = (study.model_dump(mode="json")[name] for study in (kept, asked))
+def _difference(name: str, kept: GridPlan, asked: GridPlan) -> str:
+    """Say how one field of two plans differs; of long lists, where they begin to."""
+    there, here = (plan.model_dump(mode="json")[name] for plan in (kept, asked))
     match there, here:
         case [*some], [*others]:
             index = next(

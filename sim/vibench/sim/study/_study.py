@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -24,8 +24,11 @@ from ..model import (
     usual_specimen,
 )
 from ..scene import BUDGET_S, AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
-from ._axes import FREQUENCY, MODEL, START, Grid, StudyAxis, grid_of
+from ._axes import FREQUENCY, MODEL, START, StudyAxis
+from ._columns import COLUMNS, Column
 from ._frequency_range import listed
+from ._grid_plan import GridPlan
+from ._layout import FORMAT
 
 MOST_POINTS = 10_000_000
 """A file of 2 GB: a range that asks for more is a slip of the pen."""
@@ -94,10 +97,11 @@ def _described(said: dict[str, Any]) -> SpecimenTable:
     return found
 
 
-class Study(BaseModel):
+class Study(GridPlan):
     """What is to be predicted, completely: two equal studies have equal answers."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    called: ClassVar[str] = "study"
+    format: ClassVar[str] = FORMAT
 
     specimen: SpecimenTable = Field(
         default_factory=usual_specimen, validation_alias=AliasChoices("specimen", "structure")
@@ -144,7 +148,7 @@ class Study(BaseModel):
 
     @model_validator(mode="after")
     def _fits_a_file(self) -> Self:
-        points = grid_of(self.axes).size
+        points = self.grid.size
         if points > MOST_POINTS:
             raise ValueError(f"{points} points are asked for; a study holds at most {MOST_POINTS}")
         return self
@@ -167,9 +171,9 @@ class Study(BaseModel):
         )
 
     @property
-    def grid(self) -> Grid:
-        """All points."""
-        return grid_of(self.axes)
+    def columns(self) -> tuple[Column, ...]:
+        """What is kept of each point."""
+        return COLUMNS
 
     def scene(self, place: tuple[int, ...], start: Rest | Given, phase_rad: float = 0.0) -> Scene:
         """Make the scene at a place of the grid.
@@ -201,11 +205,6 @@ class Study(BaseModel):
                 return AutomaticDuration(window_s=self.window_s)
             case float(duration_s):
                 return FixedDuration(duration_s, self.window_s)
-
-    def differences(self, other: Self) -> tuple[str, ...]:
-        """Names of what differs between two studies."""
-        mine, theirs = self.model_dump(mode="json"), other.model_dump(mode="json")
-        return tuple(name for name in mine if mine[name] != theirs[name])
 
 
 def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> StudyAxis:

@@ -1,0 +1,181 @@
+"""`vibench map`: what motions there are over two quantities, or along one; computed as a study is."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.acquisition import load_toml
+from vibench.analysis import (
+    CurveKind,
+    CurveOrigin,
+    FrequencyResponseRequest,
+    InvalidRequest,
+    Simulation,
+    compare_recording,
+    level_of_drive,
+)
+from vibench.analysis.dynamics import read_diagram
+from vibench.analysis.report import SHOWN, ImageKind, RecordedLevel, map_caption, map_figure, motion_words
+from vibench.sim.maps import (
+    KickStability,
+    Map,
+    MapResults,
+    UncertaintyExponent,
+    estimate_map,
+    kick_stability,
+    solve_map,
+    uncertainty_exponent,
+)
+from vibench.sim.study import ExistingStudy
+
+from .external_data import AllowExternal, external_data
+from .interruption import told_to_stop
+from .output import bold, console, print_json
+from .paths import AsJson, room_for_folder
+from .progress_bars import study_bar
+from .study import Cluster, Workers, complain_about_points
+
+FILE = "map.h5"
+SHOWN_MOTIONS = 12
+
+
+def map_motions(
+    plan: Annotated[Path, typer.Argument(metavar="MAP.toml", help="What varies, and what is fixed.")],
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for map.h5, figure and table.")],
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with what DIR/map.h5 does not hold yet.")
+    ] = False,
+    workers: Workers = None,
+    cluster: Cluster = None,
+    only_estimate: Annotated[
+        bool, typer.Option("--estimate", help="Say how many points, how long and how large; compute nothing.")
+    ] = False,
+    show: Annotated[
+        str,
+        typer.Option("--show", metavar="QUANTITY", help=f"Beside the kinds of motion: {', '.join(SHOWN)}."),
+    ] = "response_i",
+    branches: Annotated[
+        Path | None,
+        typer.Option(
+            "--branches", metavar="BRANCHES.h5", help="Lay branches over a map along one parameter."
+        ),
+    ] = None,
+    like: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--like", metavar="RECORDING.h5", help="Lay a recording's level and responses over the map."
+        ),
+    ] = None,
+    kicks: Annotated[
+        int,
+        typer.Option(
+            "--kicks", metavar="N", help="Of a basin map: kick each motion so often, at three sizes."
+        ),
+    ] = 0,
+    allow_external: AllowExternal = False,
+    as_json: AsJson = False,
+) -> None:
+    """Map the motions over two parameters or two coordinates of the start, or along one parameter."""
+    asked = load_toml(plan, Map)
+    if show not in SHOWN:
+        raise InvalidRequest(f"--show was given as {show!r}; there are {', '.join(SHOWN)}")
+    if only_estimate:
+        told = estimate_map(asked, workers)
+        print_json(told.to_dict()) if as_json else console.print(told.sentence)
+        return
+    if kicks and not asked.is_basin:
+        raise InvalidRequest(
+            "--kicks needs a map in which only the start varies; give ranges for two coordinates"
+        )
+    diagram = None if branches is None else read_diagram(branches)
+    levels = [_level(path) for path in like or ()]
+    room_for_folder(out)
+    out.mkdir(parents=True, exist_ok=True)
+    existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
+    with (
+        external_data(allow_external),
+        told_to_stop() as is_stopped,
+        study_bar(asked.grid.size) as observer,
+    ):
+        results = solve_map(asked, out / FILE, existing, workers, cluster, observer, is_stopped)
+    stability = kick_stability(results, kicks=kicks, workers=workers) if kicks and results.is_complete else ()
+    drawn = map_figure(results, show, diagram, levels).save(out, (ImageKind.PNG, ImageKind.SVG))
+    if as_json:
+        print_json(document(results, stability, out / FILE))
+    else:
+        tell(results, stability)
+        console.print("The figure:", bold(drawn[0].resolve()))
+    complain_about_points(results)
+
+
+def _level(path: Path) -> RecordedLevel:
+    found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
+    measured = [
+        each
+        for each in found.curves
+        if each.origin is CurveOrigin.MEASURED and each.response is CurveKind.RESPONSE_I
+    ]
+    return RecordedLevel(path.stem, level_of_drive(found), measured)
+
+
+def tell(results: MapResults, stability: tuple[KickStability, ...]) -> None:
+    """Say what was found."""
+    console.print(map_caption(results))
+    for number, motion in enumerate(results.motions[:SHOWN_MOTIONS]):
+        console.print(f"{number}: {motion_words(motion)}")
+    if len(results.motions) > SHOWN_MOTIONS:
+        console.print(f"{len(results.motions) - SHOWN_MOTIONS} rarer ones are in the table and in --json.")
+    if results.plan.is_basin:
+        rough = _roughness(results)
+        console.print(
+            "The uncertainty exponent of the boundary is not determined: too few starts lie near it."
+            if rough is None
+            else f"Uncertainty exponent of the boundary {rough.exponent:.2f} ({rough.low:.2f} to "
+            f"{rough.high:.2f}), so its dimension is {2.0 - rough.exponent:.2f}."
+        )
+    for each in stability:
+        console.print(
+            f"Motion {each.motion}, kicked by {each.size:g} gaps: comes back in {each.returned.share:.0%} "
+            f"({each.returned.low:.0%} to {each.returned.high:.0%})"
+        )
+
+
+def _roughness(results: MapResults) -> UncertaintyExponent | None:
+    is_plane = results.plan.is_basin and len(results.plan.varied) == 2
+    return uncertainty_exponent(results.motion_numbers[:, 0]) if is_plane else None
+
+
+def document(results: MapResults, stability: tuple[KickStability, ...], file: Path) -> dict[str, object]:
+    """Say what a map holds, for other programs; its points are in the file."""
+    audit = results.audit
+    rough = _roughness(results)
+    return {
+        "file": str(file),
+        "points": results.plan.grid.size,
+        "computed": results.computed,
+        "is_complete": results.is_complete,
+        "audit": None
+        if audit is None
+        else {"filled": audit.filled, "audited": audit.audited, "wrong": audit.wrong},
+        "motions": [
+            {
+                "motion": str(each.motion),
+                "period": each.period,
+                "response_i": each.response_i,
+                "response_ii": each.response_ii,
+                "share": each.share.share,
+                "share_low": each.share.low,
+                "share_high": each.share.high,
+            }
+            for each in results.motions
+        ],
+        "uncertainty_exponent": None
+        if rough is None
+        else {"exponent": rough.exponent, "low": rough.low, "high": rough.high, "steps": rough.steps},
+        "kicks": [
+            {"motion": each.motion, "size": each.size, "returned": each.returned.share} for each in stability
+        ],
+        "failures": [{**where, "message": why} for where, why in results.failures()],
+        "map": results.plan.model_dump(mode="json"),
+    }

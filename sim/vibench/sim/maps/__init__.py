@@ -1,0 +1,19 @@
+"""Maps: the motions there are over two parameters, over two coordinates of the start, or along one of them.
+
+A map is a `vibench.sim.study` plan whose points are settled motions: kind, period, responses, impacts. It is
+computed coarsely first and then only where neighbours differ; what is left out is filled in, and a random
+sample of it is computed after all, so that a map says how often filling in was wrong (docs/maps.md).
+
+>>> from vibench.sim.maps import Map, Range, solve_map
+>>> plan = Map(
+...     frequency_hz=Range(start=120.0, stop=140.0, points=5),
+...     amplitude_m=Range(start=1e-6, stop=2e-5, points=3),
+... )
+>>> results = solve_map(plan, workers=1)
+>>> results.is_complete, results.values("response_i").shape
+(True, (3, 1, 5))
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,29 @@
+from ._basins import (
+    KickStability as KickStability,
+    UncertaintyExponent as UncertaintyExponent,
+    kick_stability as kick_stability,
+    uncertainty_exponent as uncertainty_exponent,
+)
+from ._estimate import (
+    MapEstimate as MapEstimate,
+    estimate_map as estimate_map,
+)
+from ._map import (
+    Map as Map,
+    Range as Range,
+    Refinement as Refinement,
+    Spacing as Spacing,
+)
+from ._quantities import (
+    QUANTITIES as QUANTITIES,
+    Quantity as Quantity,
+)
+from ._results import (
+    Audit as Audit,
+    MapMotion as MapMotion,
+    MapResults as MapResults,
+    open_map as open_map,
+)
+from ._solve import (
+    solve_map as solve_map,
+)

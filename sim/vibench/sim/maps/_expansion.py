@@ -1,0 +1,162 @@
+"""The points of a map as scenes: what each begins from, what is kept of it, and which are wanted."""
+
+import math
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels import Floats
+from ..model import Outcome
+from ..scene import Given, MotionKind, Scene, expected_cost_s, settle_scene
+from ..study import (
+    NUMBERS,
+    Arrays,
+    Cell,
+    Grid,
+    PointAnswer,
+    PointState,
+    Solved,
+    continued_point,
+    end_phase,
+    failed_point,
+    planned_times,
+    predecessors,
+)
+from ._columns import contact_energy_j, section_cells
+from ._map import Map
+from ._refinement import RefinementPlan, Seen, lattice, plan_refinement
+
+JUMP = 0.1
+"""Responses of neighbours that differ by more, relatively, are looked at more closely."""
+BASIN_JUMP = 2e-3
+"""Where only the start varies, responses of one motion are the same but for what has not settled."""
+NOTHING = -1
+NOBODY = -1
+
+
+class MapPoints:
+    """The scenes of a map, made when they are asked for."""
+
+    def __init__(self, plan: Map) -> None:
+        self.plan = plan
+        self.grid: Grid = plan.grid
+        self._kept = {column.name for column in plan.columns}
+
+    @cached_property
+    def after(self) -> NDArray[np.int64]:
+        """Point that each one continues, or NOBODY, shape (points,)."""
+        return predecessors(self.grid, self.plan.chain)
+
+    @cached_property
+    def planned_s(self) -> Floats:
+        """Time that each point is planned to take, shape (points,)."""
+        return planned_times(self.grid, self._planned)
+
+    @property
+    def wanted_first(self) -> NDArray[np.int64]:
+        """Numbers of the points that are computed before anything is known."""
+        if not self.plan.is_adaptive:
+            return np.arange(self.grid.size)
+        return points_of(np.flatnonzero(lattice(cells_shape(self.grid), self.plan.coarse)), self.grid)
+
+    def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
+        """Ask for the next cells of the lattice, from all their starts; for everything at once if told to."""
+        if not self.plan.is_adaptive:
+            return np.arange(self.grid.size)
+        return points_of(refinement_of(self.plan, arrays).missing, self.grid)
+
+    def scene(self, number: int, arrays: Arrays) -> Scene:
+        """Make the scene of a point whose predecessor, if it has one, is done."""
+        before = continued_point(int(self.after[number]), arrays)
+        place = self.grid.place(number)
+        if before == NOBODY:
+            return self.plan.scene(place)
+        x, y, z, vx, vy, vz = (float(value) for value in arrays["final_state"][before])
+        frequency_hz = self.plan.frequency_at(self.grid.place(before))
+        phase_rad = end_phase(frequency_hz, before, arrays)
+        return self.plan.scene(
+            place, Given((x, y, z, vx, vy, vz), self.plan.start_labels[place[-2]]), phase_rad
+        )
+
+    def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
+        """Say what is kept of a prediction."""
+        found = solved.prediction
+        numbers = {column.name: getattr(found, name) for name, column in NUMBERS.items()}
+        cells: dict[str, Cell] = {
+            name: value for name, value in numbers.items() if name in self._kept and value is not None
+        }
+        cells |= {
+            "motion": list(MotionKind).index(found.motion),
+            "outcome": int(found.outcome),
+            "final_state": found.final_state,
+            "drive_phase": scene.drive.phase_rad,
+            "continues": continued_point(int(self.after[number]), arrays),
+            "taken": solved.taken_s,
+            **section_cells(found),
+        }
+        energy_j = contact_energy_j(scene.specimen, found)
+        if energy_j is not None:
+            cells["contact_energy"] = energy_j
+        if found.outcome is Outcome.REACHED_END:
+            return PointAnswer(number, PointState.DONE, cells, solved.taken_s)
+        return PointAnswer(
+            number, PointState.STOPPED, {**cells, "message": found.outcome.text.encode()}, solved.taken_s
+        )
+
+    def failure(self, number: int, error: BaseException) -> PointAnswer:
+        """Say what is kept of a scene that could not be computed."""
+        return failed_point(number, error)
+
+    def _planned(self, number: int) -> float:
+        try:
+            return expected_cost_s(self.plan.scene(self.grid.place(number)), settle_scene)
+        except ValueError:
+            return 0.0
+
+
+def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
+    """Say which cells of an adaptive map are to be computed next, and what was filled in."""
+    shape = plan.grid.shape
+    state = np.asarray(arrays["state"]).reshape(shape)
+    is_known = np.all((state != PointState.MISSING) & (state != PointState.FILLED), axis=1)
+    motion, period = (
+        np.asarray(arrays[name], dtype=np.int64).reshape(shape) for name in ("motion", "period")
+    )
+    is_whole = state == PointState.DONE
+    label = np.where(is_whole, motion * 64 + period, NOTHING)
+    size = np.log(np.maximum(np.asarray(arrays["response_i"], dtype=np.float64).reshape(shape)[:, 0], 1e-300))
+    is_steady = is_whole[:, 0] & (motion[:, 0] == list(MotionKind).index(MotionKind.PERIODIC))
+    seen = Seen(
+        is_known,
+        _codes(label),
+        np.where(is_steady, size, math.nan),
+        BASIN_JUMP if plan.is_basin else JUMP,
+    )
+    return plan_refinement(seen, plan.coarse, plan.seed)
+
+
+def _codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Give cells a number for what the first start came to and which motions were found, (rows, columns)."""
+    rows, starts, columns = label.shape
+    if starts == 1:
+        return label[:, 0]
+    found = np.sort(label, axis=1)
+    # A motion counts once, however many starts came to it.
+    found[:, 1:][found[:, 1:] == found[:, :-1]] = NOTHING
+    cells = np.concatenate([label[:, :1], np.sort(found, axis=1)], axis=1)
+    flat = cells.transpose(0, 2, 1).reshape(rows * columns, starts + 1)
+    return np.asarray(np.unique(flat, axis=0, return_inverse=True)[1].reshape(rows, columns), dtype=np.int64)
+
+
+def cells_shape(grid: Grid) -> tuple[int, int]:
+    """Rows and columns of a map over two quantities."""
+    rows, _, columns = grid.shape
+    return rows, columns
+
+
+def points_of(cells: NDArray[np.int64], grid: Grid) -> NDArray[np.int64]:
+    """Give the numbers of the points of some cells of a map over two quantities, from all starts."""
+    _, starts, columns = grid.shape
+    row, column = np.divmod(cells, columns)
+    return np.asarray(((row[:, None] * starts + np.arange(starts)) * columns + column[:, None]).reshape(-1))

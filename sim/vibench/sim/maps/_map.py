@@ -1,0 +1,284 @@
+"""A map as it is asked for: numbers that are fixed, and one or two that vary."""
+
+import math
+from enum import StrEnum
+from functools import lru_cache
+from typing import Annotated, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFloat, model_validator
+
+from ..branches import random_state
+from ..model import Accuracy, ContactWord, Harmonic, Specimen, SpecimenTable, Triple, usual_specimen
+from ..scene import AutomaticDuration, Given, Observable, Rest, Scene
+from ..study import Column, GridPlan, Start, StudyAxis
+from ._columns import SECTION_COLUMNS, columns_with
+from ._quantities import QUANTITIES, START, Quantity
+
+MOST_POINTS = 4_000_000
+"""A file of 1 GB, and as much memory."""
+STARTS = "start"
+RANDOM = "random"
+
+
+class Spacing(StrEnum):
+    """How the values of a range lie."""
+
+    LINEAR = "linear"
+    LOGARITHMIC = "logarithmic"
+
+
+class Range(BaseModel):
+    """Values from one number to another."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    start: float
+    stop: float
+    points: Annotated[int, Field(ge=2, le=100_000)]
+    spacing: Spacing = Spacing.LINEAR
+
+    @model_validator(mode="after")
+    def _ascends(self) -> Self:
+        if not self.start < self.stop:
+            raise ValueError(
+                f"a range from {self.start:g} to {self.stop:g} does not ascend; give the lower first"
+            )
+        if self.spacing is Spacing.LOGARITHMIC and self.start <= 0.0:
+            raise ValueError(f"a logarithmic range cannot start at {self.start:g}; give a positive start")
+        return self
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Ascending, ends included."""
+        spaced = np.linspace if self.spacing is Spacing.LINEAR else np.geomspace
+        return tuple(float(value) for value in spaced(self.start, self.stop, self.points))
+
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """Where the cells of its values meet, one more than there are values."""
+        if self.spacing is Spacing.LINEAR:
+            half = 0.5 * (self.stop - self.start) / (self.points - 1)
+            return tuple(np.linspace(self.start - half, self.stop + half, self.points + 1).tolist())
+        half = 0.5 * math.log(self.stop / self.start) / (self.points - 1)
+        return tuple(
+            np.geomspace(self.start * math.exp(-half), self.stop * math.exp(half), self.points + 1).tolist()
+        )
+
+
+class Refinement(StrEnum):
+    """Which points of a map over two quantities are computed."""
+
+    ADAPTIVE = "adaptive"
+    """A coarse lattice, and between its points only where neighbours differ."""
+    FULL = "full"
+    """Every one."""
+
+
+Number = float | Range
+Positive = PositiveFloat | Range
+
+
+class Map(GridPlan):
+    """What motions there are: over two quantities, or along one. One or two fields are a `Range`."""
+
+    called: ClassVar[str] = "map"
+    format: ClassVar[str] = "vibench-map"
+
+    specimen: SpecimenTable = Field(default_factory=usual_specimen)
+    """A name or a path, or a table that may start from one (``model``); the paper's when absent."""
+    model: ContactWord | None = None
+    """Contact law; the specimen's own when absent."""
+    frequency_hz: Positive = 260.0
+    """Of the drive."""
+    amplitude_m: Positive = 5e-6
+    """Of the base displacement."""
+    gap_m: Positive | None = None
+    """Clearance at both stops; the specimen's own when absent, as the next five."""
+    damping_time_s: NonNegativeFloat | Range | None = None
+    """c_i = damping time * k_i."""
+    k0_n_per_m: Positive | None = None
+    """Stiffness between base and m0; where the specimen says a damping time, its dampers go with it."""
+    k1_n_per_m: Positive | None = None
+    """Between m2 and m1."""
+    k2_n_per_m: Positive | None = None
+    """Between m0 and m2."""
+    hertz_stiffness: Positive | None = None
+    """k of F = k d^(3/2) at a stop [N/m^1.5]."""
+    x_m: Number = 0.0
+    """The start: displacements and velocities of m0, m1 and m2, absolute."""
+    y_m: Number = 0.0
+    z_m: Number = 0.0
+    vx_m_per_s: Number = 0.0
+    vy_m_per_s: Number = 0.0
+    vz_m_per_s: Number = 0.0
+    chain: tuple[Literal[Start.UP, Start.DOWN], ...] = ()
+    """Instead of that start, the end of the point before it along the range: up, down, or both."""
+    random_starts: Annotated[int, Field(ge=0, le=1000)] = 0
+    """Random states beside it at every point: what tells how many motions there are, and their shares."""
+    seed: Annotated[int, Field(ge=0)] = 1
+    """Of the random states."""
+    observe: tuple[Literal[Observable.RESPONSE, Observable.LYAPUNOV], ...] = (Observable.RESPONSE,)
+    """With "lyapunov" the largest exponent too, over up to 25 s at every point: tens of times the work."""
+    accuracy: Accuracy = Accuracy.STANDARD
+    """Of every point."""
+    periods: Annotated[int, Field(ge=100)] = 3000
+    """Drive periods after which a motion that does not repeat is followed no longer."""
+    window_periods: Annotated[int, Field(ge=10)] = 200
+    """Drive periods over which a motion that does not repeat is observed."""
+    refinement: Refinement = Refinement.ADAPTIVE
+    """Which points of a map over two quantities are computed."""
+    coarse: Annotated[int, Field(ge=2, le=64)] = 16
+    """Steps between the points that are computed first; halved until it is 1."""
+
+    @model_validator(mode="after")
+    def _varies(self) -> Self:
+        names = [each.field for each in self.varied]
+        if len(names) not in (1, 2):
+            have = "none" if not names else ", ".join(names)
+            raise ValueError(
+                f"a map goes over one or two ranges, and {have} of its fields is one; give start, stop and "
+                f"points for one or two of {', '.join(each.field for each in QUANTITIES)}"
+            )
+        if len(set(self.chain)) != len(self.chain):
+            raise ValueError(f"chain = {', '.join(self.chain)} names a direction twice; give each once")
+        if self.chain and any(each in START for each in self.varied):
+            raise ValueError(f"a chain takes its starts from its neighbours, and {names[0]} varies the start")
+        if self.coarse & (self.coarse - 1):
+            raise ValueError(f"coarse = {self.coarse} is no power of 2; give 2, 4, 8, 16, 32 or 64")
+        if self.window_periods >= self.periods:
+            raise ValueError(
+                f"window_periods = {self.window_periods} does not fit {self.periods} periods; give fewer"
+            )
+        if self.grid.size > MOST_POINTS:
+            raise ValueError(f"{self.grid.size} points are asked for; a map holds at most {MOST_POINTS}")
+        for corner in (0, self.grid.size - 1):
+            self.scene(self.grid.place(corner))
+        return self
+
+    @property
+    def varied(self) -> tuple[Quantity, ...]:
+        """What varies, one or two quantities: the first lies along the last axis."""
+        return tuple(each for each in QUANTITIES if isinstance(getattr(self, each.field), Range))
+
+    def range_of(self, quantity: Quantity) -> Range:
+        """Give the range of a quantity that varies."""
+        found = getattr(self, quantity.field)
+        assert isinstance(found, Range), "only what varies is asked for"
+        return found
+
+    @property
+    def is_basin(self) -> bool:
+        """Whether only the start varies: every point is the same specimen under the same drive."""
+        return all(each in START for each in self.varied)
+
+    @property
+    def is_adaptive(self) -> bool:
+        """Whether points may be left out: of two quantities, where none waits for its neighbour."""
+        return self.refinement is Refinement.ADAPTIVE and len(self.varied) == 2 and not self.chain
+
+    @property
+    def start_labels(self) -> tuple[str, ...]:
+        """Names of the starts of every point."""
+        own = tuple(str(each) for each in self.chain) or ("given" if any(self._own_state(())) else "rest",)
+        return (*own, *(f"{RANDOM} {k + 1}" for k in range(self.random_starts)))
+
+    @property
+    def axes(self) -> tuple[StudyAxis, ...]:
+        """Dimensions of the results: the second quantity that varies if there is one, starts, the first."""
+        first, *second = (
+            StudyAxis(each.axis, self.range_of(each).values, each.units, each.long_name)
+            for each in self.varied
+        )
+        return (*second, StudyAxis(STARTS, self.start_labels, "", "state from which a point begins"), first)
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """What is kept of each point; states once a drive period only of a map along one quantity."""
+        return columns_with(SECTION_COLUMNS if len(self.varied) == 1 else ())
+
+    def scene(self, place: tuple[int, ...], start: Given | None = None, phase_rad: float = 0.0) -> Scene:
+        """Make the scene at a place of the grid, from its own start or another.
+
+        Raises
+        ------
+        ValueError
+            When a scene of these numbers is not allowed.
+
+        """
+        said = self._numbers(place)
+        frequency_hz = said["frequency_hz"]
+        drive = Harmonic(frequency_hz, said["amplitude_m"], phase_rad)
+        specimen = _specimen(
+            self.specimen,
+            self.model,
+            said["damping_time_s"],
+            said["gap_m"],
+            (said["k0_n_per_m"], said["k1_n_per_m"], said["k2_n_per_m"]),
+            said["hertz_stiffness"],
+        )
+        observe = (*self.observe, *((Observable.POINCARE,) if len(self.varied) == 1 else ()))
+        return Scene(
+            specimen,
+            drive,
+            observe=observe,
+            accuracy=self.accuracy,
+            duration=AutomaticDuration(self.window_periods / frequency_hz, self.periods / frequency_hz),
+            start=start or self._start(place, specimen, drive),
+            budget_s=0.0,
+        )
+
+    def frequency_at(self, place: tuple[int, ...]) -> float:
+        """Drive frequency at a place of the grid."""
+        return float(self._numbers(place)["frequency_hz"])
+
+    def _start(self, place: tuple[int, ...], specimen: Specimen, drive: Harmonic) -> Given | Rest:
+        label = self.start_labels[place[-2]]
+        if label.startswith(RANDOM):
+            drawn = np.random.default_rng([self.seed, place[-2]])
+            x, y, z, vx, vy, vz = (float(each) for each in random_state(specimen, drive, drawn))
+            return Given((x, y, z, vx, vy, vz), label)
+        if self.chain:
+            return Rest()
+        x, y, z, vx, vy, vz = self._own_state(place)
+        return Given((x, y, z, vx, vy, vz), label)
+
+    def _own_state(self, place: tuple[int, ...]) -> tuple[float, ...]:
+        """State that the fields say; of what varies the end of its range where no place is given."""
+        said = self._numbers(place)
+        return tuple(said[each.field] for each in START)
+
+    def _numbers(self, place: tuple[int, ...]) -> dict[str, float]:
+        """Value of every quantity at a place; the last of a range where the place is empty."""
+        said = {each.field: getattr(self, each.field) for each in QUANTITIES}
+        indices = (-1, -1) if not place else (place[-1], place[0])
+        for quantity, index in zip(self.varied, indices, strict=False):
+            said[quantity.field] = _values(self.range_of(quantity))[index]
+        return said
+
+
+@lru_cache(maxsize=64)
+def _values(of: Range) -> tuple[float, ...]:
+    return of.values
+
+
+@lru_cache(maxsize=4096)
+def _specimen(
+    described: SpecimenTable,
+    model: str | None,
+    damping_time_s: float | None,
+    gap_m: float | None,
+    stiffnesses: tuple[float | None, ...],
+    hertz_stiffness: float | None,
+) -> Specimen:
+    """Build a specimen once for all points that share it."""
+    said: dict[str, object] = {}
+    if any(each is not None for each in stiffnesses):
+        k0, k1, k2 = (
+            own if new is None else new for own, new in zip(described.stiffnesses, stiffnesses, strict=True)
+        )
+        triple: Triple = (k0, k1, k2)
+        said |= {"stiffnesses_n_per_m": triple, "single_frequencies_hz": None}
+    if hertz_stiffness is not None:
+        said["hertz_stiffness"] = hertz_stiffness
+    return described.model_copy(update=said).specimen(model, damping_time_s, gap_m)

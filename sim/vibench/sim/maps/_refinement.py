@@ -1,0 +1,230 @@
+"""Which cells of a map are computed: a coarse lattice first, then only where neighbours differ.
+
+The plan is a pure function of what is known: it is made anew from the coarse lattice on whenever all that it
+asked for has an answer. So a map that was stopped goes on to the same cells as one that never was.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels import Floats
+
+Mask = NDArray[np.bool_]
+Codes = NDArray[np.int64]
+Indices = NDArray[np.int64]
+
+AUDITED, AUDITED_SHARE = 400, 0.1
+"""Filled cells that are computed after all, drawn at random: they say how often filling in was wrong. So many
+at most, and this part of them at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What is compared of the cells of a map, each array of shape (rows, columns)."""
+
+    is_known: Mask
+    """Computed."""
+    codes: Codes
+    """Cells with other numbers are other motions."""
+    sizes: Floats
+    """Natural logarithm of a response that is the same wherever the motion is; NaN where it scatters."""
+    jump: float
+    """Neighbours whose sizes differ by more are different."""
+
+
+@dataclass(frozen=True, eq=False)
+class Filling:
+    """Cells of one level that were filled in: between which others, and how much each of those counts."""
+
+    cells: Indices
+    """Flat numbers, shape (n,)."""
+    donors: Indices
+    """Computed cells whose motion they are taken to have, shape (n,)."""
+    corners: Indices
+    """Computed or filled cells of coarser levels with the same motion, shape (n, 4)."""
+    weights: Floats
+    """Shape (n, 4); their sum is 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class RefinementPlan:
+    """What is to be computed now, and, once that is nothing, what was filled in."""
+
+    missing: Indices
+    """Flat numbers of the cells that are to be computed next."""
+    step: int
+    """Between the points of the lattice that this is about."""
+    fillings: tuple[Filling, ...] = ()
+    """Coarse levels first."""
+    audited: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """Cells that would have been filled in, and were computed to see."""
+    wrong: int = 0
+    """Of these, how many came to another motion than was filled in."""
+
+
+def plan_refinement(seen: Seen, coarse: int, seed: int) -> RefinementPlan:
+    """Say which cells are to be computed next; none when the map is done.
+
+    Parameters
+    ----------
+    seen
+        What is known so far.
+    coarse
+        Steps between the points of the first lattice, a power of 2.
+    seed
+        Of the choice of cells that are audited.
+
+    """
+    shape = seen.is_known.shape
+    sketch = _Sketch(seen)
+    first = lattice(shape, coarse)
+    missing = first & ~seen.is_known
+    if missing.any():
+        return RefinementPlan(np.flatnonzero(missing), coarse)
+    sketch.compute(first)
+    step = coarse
+    while step > 1:
+        fine = step // 2
+        missing = sketch.refine(fine, step)
+        if missing.any():
+            return RefinementPlan(np.flatnonzero(missing), fine)
+        step = fine
+    steps = [coarse >> k for k in range(coarse.bit_length() - 1)]
+    return _audited(sketch, tuple(sketch.filling(step // 2, step) for step in steps), seed)
+
+
+def _audited(sketch: "_Sketch", fillings: tuple[Filling, ...], seed: int) -> RefinementPlan:
+    filled = np.concatenate([np.zeros(0, dtype=np.int64), *(each.cells for each in fillings)])
+    rng = np.random.default_rng([seed, len(filled)])
+    audited = np.sort(rng.choice(filled, min(AUDITED, int(AUDITED_SHARE * len(filled))), replace=False))
+    known = sketch.seen.is_known.reshape(-1)[audited]
+    wrong = sketch.seen.codes.reshape(-1)[audited] != sketch.codes.reshape(-1)[audited]
+    return RefinementPlan(audited[~known], 1, fillings, audited, int(np.count_nonzero(wrong[known])))
+
+
+class _Sketch:
+    """The map as far as levels have been gone through: computed cells, and filled ones."""
+
+    def __init__(self, seen: Seen) -> None:
+        self.seen = seen
+        self.is_computed = np.zeros_like(seen.is_known)
+        self.codes = np.zeros_like(seen.codes)
+        self.sizes = np.full_like(seen.sizes, np.nan)
+        self.donors = np.arange(seen.codes.size).reshape(seen.codes.shape)
+
+    def compute(self, cells: Mask) -> None:
+        """Take these cells as they were computed."""
+        self.is_computed |= cells
+        self.codes[cells] = self.seen.codes[cells]
+        self.sizes[cells] = self.seen.sizes[cells]
+        self.donors[cells] = np.flatnonzero(cells)
+
+    def refine(self, fine: int, step: int) -> Mask:
+        """Go from a lattice to one twice as fine; gives the cells that have to be computed first, if any."""
+        cells = np.flatnonzero(lattice(self.codes.shape, fine) & ~lattice(self.codes.shape, step))
+        corners, weights = _corners(self.codes.shape, cells, step)
+        wanted = np.zeros_like(self.is_computed)
+        wanted.reshape(-1)[cells] = self._differ(corners)
+        self._fill(cells, corners, weights)
+        while True:
+            missing = wanted & ~self.seen.is_known
+            if missing.any():
+                return missing
+            self.compute(wanted)
+            # A filled cell beside a different one may be different too: motions thinner than the lattice.
+            beside = self._beside_others(fine) & ~self.is_computed & lattice(self.codes.shape, fine)
+            if not beside.any():
+                return missing
+            wanted = beside
+
+    def filling(self, fine: int, step: int) -> Filling:
+        """Say how the cells of a level that were not computed in the end are filled in.
+
+        A corner that turned out to be another motion later on does not count.
+        """
+        is_new = lattice(self.codes.shape, fine) & ~lattice(self.codes.shape, step) & ~self.is_computed
+        cells = np.flatnonzero(is_new)
+        corners, weights = _corners(self.codes.shape, cells, step)
+        codes, donors = self.codes.reshape(-1), self.donors.reshape(-1)[cells]
+        weights = np.where(codes[corners] == codes[cells][:, None], weights, 0.0)
+        is_alone = weights.sum(axis=1) == 0.0
+        corners[is_alone, 0], weights[is_alone, 0] = donors[is_alone], 1.0
+        return Filling(cells, donors, corners, weights / weights.sum(axis=1, keepdims=True))
+
+    def _fill(self, cells: Indices, corners: Indices, weights: Floats) -> None:
+        nearest = corners[np.arange(len(cells)), np.argmax(weights, axis=1)]
+        self.donors.reshape(-1)[cells] = self.donors.reshape(-1)[nearest]
+        self.codes.reshape(-1)[cells] = self.codes.reshape(-1)[nearest]
+        self.sizes.reshape(-1)[cells] = (self.sizes.reshape(-1)[corners] * weights).sum(axis=1)
+
+    def _differ(self, corners: Indices) -> Mask:
+        """Whether the corners of each cell are not all the same motion, shape (n,)."""
+        codes, sizes = self.codes.reshape(-1)[corners], self.sizes.reshape(-1)[corners]
+        spread = sizes.max(axis=1) - sizes.min(axis=1)
+        return np.asarray((codes != codes[:, :1]).any(axis=1) | (spread > self.seen.jump))
+
+    def _beside_others(self, fine: int) -> Mask:
+        """Whether one of the eight neighbours on a lattice is another motion, shape (rows, columns)."""
+        rows, columns = (_lines(length, fine) for length in self.codes.shape)
+        there = np.ix_(rows, columns)
+        differs = _differs_from_neighbours(self.codes[there], self.sizes[there], self.seen.jump)
+        found = np.zeros_like(self.is_computed)
+        found[there] = differs
+        return found
+
+
+def _differs_from_neighbours(codes: Codes, sizes: Floats, jump: float) -> Mask:
+    differs = np.zeros(codes.shape, dtype=np.bool_)
+    for here, there in _pairs():
+        unlike = (codes[here] != codes[there]) | (np.abs(sizes[here] - sizes[there]) > jump)
+        differs[here] |= unlike
+        differs[there] |= unlike
+    return differs
+
+
+def _pairs() -> Iterator[tuple[tuple[slice, slice], tuple[slice, slice]]]:
+    """Give the neighbours along rows, columns and both diagonals."""
+    whole, low, high = slice(None), slice(None, -1), slice(1, None)
+    yield (low, whole), (high, whole)
+    yield (whole, low), (whole, high)
+    yield (low, low), (high, high)
+    yield (low, high), (high, low)
+
+
+def _lines(length: int, step: int) -> Indices:
+    """Give the lines of a lattice along one axis; the last line of the map is one of them."""
+    return np.unique([*range(0, length, step), length - 1])
+
+
+def lattice(shape: tuple[int, ...], step: int) -> Mask:
+    """Give the cells on every so manyth line, the last line of the map included."""
+    found = np.zeros(shape, dtype=np.bool_)
+    found[np.ix_(*(_lines(length, step) for length in shape))] = True
+    return found
+
+
+def _corners(shape: tuple[int, ...], cells: Indices, step: int) -> tuple[Indices, Floats]:
+    """Give the corners of the coarser lattice around each cell, shape (n, 4), and their bilinear weights."""
+    rows, columns = np.divmod(cells, shape[1])
+    (low_row, high_row, up), (low_column, high_column, right) = (
+        _between(place, _lines(length, step)) for place, length in zip((rows, columns), shape, strict=True)
+    )
+    corners = np.stack(
+        [row * shape[1] + column for row in (low_row, high_row) for column in (low_column, high_column)],
+        axis=1,
+    )
+    weights = np.stack(
+        [(1.0 - up) * (1.0 - right), (1.0 - up) * right, up * (1.0 - right), up * right], axis=1
+    )
+    return corners, weights
+
+
+def _between(place: Indices, lines: Indices) -> tuple[Indices, Indices, Floats]:
+    """Give the lines at or below and above each place, and how far it is from the one to the other."""
+    above = np.searchsorted(lines, place, side="left")
+    high = lines[above]
+    low = np.where(high == place, place, lines[np.maximum(above - 1, 0)])
+    return low, high, (place - low) / np.maximum(high - low, 1)

@@ -1,0 +1,208 @@
+"""What a map has found: over its axes, computed or filled in, and which motions there are."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels import Floats
+from ..scene import Count, MotionKind, Share, shares_of, wilson_share
+from ..study import GridResults, PointState, end_phase, read_arrays, read_plan, read_sessions
+from ._expansion import BASIN_JUMP, refinement_of
+from ._map import Map
+
+UNKNOWN = -1
+SOLID = np.array([kind is MotionKind.PERIODIC for kind in MotionKind])
+"""Kinds of motion whose responses are the same each time."""
+
+
+@dataclass(frozen=True)
+class MapMotion:
+    """A motion that is found in a map, or at one of its points. Symmetric partners are one motion."""
+
+    motion: MotionKind
+    period: int | None
+    """Of a periodic motion, in drive periods."""
+    response_i: float
+    """Largest abs(x) over the drive amplitude; the median over its points."""
+    response_ii: float
+    share: Share
+    """Of the starts, after the drive periods of the map; chaos may die out later. The intervals of all
+    motions hold together in 19 cases of 20."""
+
+
+@dataclass(frozen=True)
+class Audit:
+    """How often filling in was wrong, on cells drawn at random from those filled in."""
+
+    filled: int
+    """Cells of the map that were not computed, those that were audited among them."""
+    audited: int
+    wrong: int
+    """Of these, how many came to another motion than was filled in."""
+
+    @property
+    def wrong_share(self) -> Share:
+        """Share of the filled cells that is wrong; the interval holds it in 19 cases of 20."""
+        return wilson_share(self.wrong, self.audited) if self.audited else Share(0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class MapResults(GridResults[Map]):
+    """Everything that is known of a map. Axes in the order of ``plan.axes``."""
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every point is computed or filled in."""
+        return bool(np.all(self.state != PointState.MISSING))
+
+    @property
+    def computed(self) -> int:
+        """Points that were computed."""
+        return int(np.count_nonzero(~np.isin(self.state, (PointState.MISSING, PointState.FILLED))))
+
+    @cached_property
+    def audit(self) -> Audit | None:
+        """How often filling in was wrong; None of a map of which every point is computed, or not complete."""
+        if not (self.plan.is_adaptive and self.is_complete):
+            return None
+        found = refinement_of(self.plan, dict(self.arrays))
+        filled = sum(len(each.cells) for each in found.fillings)
+        return Audit(filled, len(found.audited), found.wrong)
+
+    @cached_property
+    def motion_numbers(self) -> NDArray[np.int64]:
+        """Number of the motion that each point came to, over all axes; -1 where it is not known.
+
+        Points have the same number if they are of one kind and period. Where only the start varies the
+        responses of periodic motions are told apart too, so that each number is one attractor; the
+        commonest is 0.
+        """
+        state = self.state.reshape(-1)
+        is_known = np.flatnonzero((state == PointState.DONE) | (state == PointState.FILLED))
+        labels, sizes = self._labels[is_known], self._sizes[is_known] if self.plan.is_basin else None
+        numbers = np.full(state.shape, UNKNOWN)
+        numbers[is_known] = _by_frequency(_groups(labels, sizes))
+        return numbers.reshape(self.plan.grid.shape)
+
+    @cached_property
+    def motion_counts(self) -> Floats:
+        """How many motions the starts of each cell came to, NaN where none is known; starts are left out."""
+        shape = self.plan.grid.shape
+        labels, sizes = self._labels.reshape(shape), self._sizes.reshape(shape)
+        order = np.lexsort((sizes, labels), axis=-2)
+        labels = np.take_along_axis(labels, order, -2)
+        sizes = np.take_along_axis(sizes, order, -2)
+        before, after = labels[..., :-1, :], labels[..., 1:, :]
+        is_new = (after != before) | (np.diff(sizes, axis=-2) > BASIN_JUMP)
+        counts = np.asarray((labels[..., 0, :] >= 0) + (is_new & (after >= 0)).sum(axis=-2), dtype=np.float64)
+        return np.where(counts > 0, counts, np.nan)
+
+    @cached_property
+    def motions(self) -> tuple[MapMotion, ...]:
+        """The motions of the whole map, by `motion_numbers`.
+
+        Shares are of all known points. Of a map of which a part is filled in the intervals are wider by the
+        most of it that may be wrong.
+        """
+        return self._described(self.motion_numbers.reshape(-1), self.audit)
+
+    def motions_at(self, *place: int) -> tuple[MapMotion, ...]:
+        """Describe the motions that all starts of one cell came to, the commonest first."""
+        points = np.arange(self.plan.grid.size).reshape(self.plan.grid.shape)
+        cell = np.moveaxis(points, -2, -1)[place]
+        known = cell[self._labels[cell] >= 0]
+        numbers = np.full(self.plan.grid.size, UNKNOWN)
+        numbers[known] = _by_frequency(_groups(self._labels[known], self._sizes[known]))
+        return self._described(numbers, None)
+
+    def shown(self, name: str, start: int = 0) -> Floats:
+        """Give one quantity over what varies, from one of the starts; NaN where it is not known.
+
+        ``motions`` is how many motions the starts of a cell came to; all others are columns.
+        """
+        if name == "motions":
+            return self.motion_counts
+        values = self.values(name)
+        return np.asarray(np.take(values, start, axis=len(self.plan.grid.shape) - 2))
+
+    def example(self, number: int) -> int:
+        """Give the first computed point that came to a motion of this number."""
+        is_it = (self.motion_numbers.reshape(-1) == number) & (self.state.reshape(-1) == PointState.DONE)
+        return int(np.flatnonzero(is_it)[0])
+
+    def phase_after(self, point: int) -> float:
+        """Phase of the drive at the end of a computed point [rad]: where its final state goes on from."""
+        frequency_hz = self.plan.frequency_at(self.plan.grid.place(point))
+        return end_phase(frequency_hz, point, dict(self.arrays))
+
+    @cached_property
+    def _labels(self) -> NDArray[np.int64]:
+        state = self.state.reshape(-1)
+        motion, period = (self.arrays[name].astype(np.int64) for name in ("motion", "period"))
+        label = motion * 64 + period
+        return np.where((state == PointState.DONE) | (state == PointState.FILLED), label, UNKNOWN)
+
+    @cached_property
+    def _sizes(self) -> Floats:
+        """Logarithm of Response I where that is the same each time a motion is reached, else 0."""
+        response = np.maximum(self.arrays["response_i"].astype(np.float64), 1e-300)
+        is_solid = (self._labels >= 0) & SOLID[self.arrays["motion"].astype(np.int64)]
+        return np.where(is_solid, np.log(np.where(np.isfinite(response), response, 1.0)), 0.0)
+
+    def _median(self, name: str, points: NDArray[np.int64]) -> float:
+        return float(np.nanmedian(self.arrays[name][points].astype(np.float64)))
+
+    def _described(self, numbers: NDArray[np.int64], audit: Audit | None) -> tuple[MapMotion, ...]:
+        total = int(np.count_nonzero(numbers >= 0))
+        places = [
+            np.flatnonzero(numbers == number) for number in range(int(numbers.max(initial=UNKNOWN)) + 1)
+        ]
+        kinds = [list(MotionKind)[int(self.arrays["motion"][place[0]])] for place in places]
+        shares = shares_of([Count(len(place), is_final=True) for place in places])
+        off = 0.0 if audit is None else audit.wrong_share.high * audit.filled / total
+        return tuple(
+            MapMotion(
+                kind,
+                int(self.arrays["period"][place[0]]) if kind is MotionKind.PERIODIC else None,
+                self._median("response_i", place),
+                self._median("response_ii", place),
+                Share(share.share, max(0.0, share.low - off), min(1.0, share.high + off)),
+            )
+            for place, kind, share in zip(places, kinds, shares, strict=True)
+        )
+
+
+def _groups(labels: NDArray[np.int64], sizes: Floats | None) -> NDArray[np.int64]:
+    """Give rows numbers by label and, where there are sizes, by size: a gap parts two motions."""
+    if sizes is None:
+        return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)
+    order = np.lexsort((sizes, labels))
+    is_new = (np.diff(labels[order]) != 0) | (np.diff(sizes[order]) > BASIN_JUMP)
+    numbers = np.zeros(len(labels), dtype=np.int64)
+    numbers[order[1:]] = np.cumsum(is_new)
+    return numbers
+
+
+def _by_frequency(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Give the commonest the lowest number."""
+    if len(numbers) == 0:
+        return numbers
+    rank = np.argsort(np.argsort(-np.bincount(numbers), kind="stable"), kind="stable")
+    return np.asarray(rank[numbers], dtype=np.int64)
+
+
+def open_map(path: Path | str) -> MapResults:
+    """Read a map's file, finished or growing.
+
+    Raises
+    ------
+    StudyError
+        When it is no map's file, or another version's.
+
+    """
+    path = Path(path)
+    plan = read_plan(path, Map)
+    return MapResults(plan, read_arrays(path, plan), read_sessions(path, Map))

@@ -1,0 +1,118 @@
+"""One call that makes a map: computed point by point as a study is, then filled in where it was left out."""
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ..kernels import Floats
+from ..scene import settle_scene
+from ..study import (
+    Arrays,
+    Cancelled,
+    ExistingStudy,
+    PointState,
+    Store,
+    StudyEnd,
+    StudyObserver,
+    executor_of,
+    run_points,
+    store_of,
+)
+from ._expansion import MapPoints, points_of, refinement_of
+from ._map import Map
+from ._refinement import Filling
+from ._results import MapResults, open_map
+
+WHOLE = ("motion", "period", "outcome")
+"""Columns of which a filled cell takes that of a computed one."""
+BETWEEN = (
+    "response_i",
+    "response_ii",
+    "relative_i",
+    "relative_ii",
+    "impact_rate",
+    "contact_energy",
+    "lyapunov",
+)
+"""Columns that are interpolated between the corners of a filled cell."""
+
+
+def solve_map(
+    plan: Map,
+    out: Path | None = None,
+    existing: ExistingStudy | Literal["refuse", "resume"] = ExistingStudy.REFUSE,
+    workers: int | None = None,
+    cluster: str | None = None,
+    observer: StudyObserver | None = None,
+    cancelled: Cancelled | None = None,
+) -> MapResults:
+    """Compute a map, or what its file does not hold yet.
+
+    Parameters
+    ----------
+    plan
+        What is asked for.
+    out
+        The file that keeps the answers, ``NAME.h5``; in memory alone when None.
+    existing
+        Whether a file that is there is refused or resumed.
+    workers
+        Threads of this process; one for each processor when None.
+    cluster
+        Address of a Dask scheduler, whose workers compute instead.
+    observer, cancelled
+        Told, and asked, in the calling thread. How many points are wanted grows with every level.
+
+    Returns
+    -------
+    MapResults
+        Complete, or what there was when it was cancelled.
+
+    Raises
+    ------
+    StudyError
+        In one sentence: a file of another map, a cluster that does not answer, a full disk, ...
+
+    """
+    with executor_of(workers, cluster, settle_scene) as executor, store_of(plan, out, existing) as store:
+        end = run_points(MapPoints(plan), executor, store, observer, cancelled)
+        if end is StudyEnd.COMPLETE:
+            fill_in(plan, store)
+        arrays = store.arrays
+    return MapResults(plan, arrays) if out is None else open_map(out)
+
+
+def fill_in(plan: Map, store: Store) -> None:
+    """Fill in what an adaptive map left out; what is filled already stays."""
+    if not plan.is_adaptive or np.all(store.arrays["state"] != PointState.MISSING):
+        return
+    found = refinement_of(plan, store.arrays)
+    columns: Arrays = {name: store.arrays[name].copy() for name in (*WHOLE, *BETWEEN)}
+    for filling in found.fillings:
+        _fill_level(plan, filling, columns)
+    filled = points_of(np.concatenate([each.cells for each in found.fillings]), plan.grid)
+    filled = np.setdiff1d(filled, points_of(found.audited, plan.grid))
+    store.fill(filled, {name: values[filled] for name, values in columns.items()})
+
+
+def _fill_level(plan: Map, filling: Filling, columns: Arrays) -> None:
+    """Give the cells of one level what their corners have, start by start."""
+    cells = points_of(filling.cells, plan.grid)
+    starts = plan.grid.shape[-2]
+    of_cells = points_of(filling.corners.reshape(-1), plan.grid).reshape(-1, 4, starts)
+    corners = of_cells.transpose(0, 2, 1).reshape(-1, 4)
+    weights = np.repeat(filling.weights, starts, axis=0)
+    donors = points_of(filling.donors, plan.grid)
+    for name in WHOLE:
+        columns[name][cells] = columns[name][donors]
+    for name in BETWEEN:
+        columns[name][cells] = _mean(columns[name][corners].astype(np.float64), weights)
+
+
+def _mean(values: Floats, weights: Floats) -> Floats:
+    """Weigh the corners that have a number, shape (n, 4); NaN where none has."""
+    is_known = np.isfinite(values)
+    counted = np.where(is_known, weights, 0.0)
+    with np.errstate(invalid="ignore"):
+        return np.asarray((np.where(is_known, values, 0.0) * counted).sum(axis=1) / counted.sum(axis=1))

@@ -1,0 +1,136 @@
+"""A map as it is asked for: what may vary, and one sentence for what may not."""
+
+import math
+
+import numpy as np
+import pytest
+
+from vibench.sim import Hertz, gong2025, integrate
+from vibench.sim.maps import Map, Range, Spacing, estimate_map, solve_map
+from vibench.sim.maps._columns import contact_energy_j
+from vibench.sim.scene import settle_scene, solve_scene
+
+FREQUENCIES = Range(start=100.0, stop=300.0, points=5)
+LEVELS = Range(start=1e-6, stop=2e-5, points=4, spacing="logarithmic")
+
+
+@pytest.mark.parametrize(
+    ("said", "complaint"),
+    [
+        ({}, "a map goes over one or two ranges, and none of its fields is one"),
+        (
+            {"frequency_hz": FREQUENCIES, "amplitude_m": LEVELS, "gap_m": LEVELS},
+            "frequency_hz, amplitude_m, gap_m",
+        ),
+        ({"y_m": LEVELS, "chain": ("up",)}, "y_m varies the start"),
+        ({"frequency_hz": FREQUENCIES, "coarse": 12}, "coarse = 12 is no power of 2"),
+        ({"frequency_hz": FREQUENCIES, "window_periods": 5000}, "does not fit 3000 periods"),
+        ({"frequency_hz": {"start": -5.0, "stop": 20.0, "points": 3}}, "Drive frequency -5.0 Hz"),
+        ({"frequency_hz": {"start": 50.0, "stop": 20.0, "points": 3}}, "does not ascend"),
+        ({"frequency_hz": FREQUENCIES, "chain": ("up", "up")}, "names a direction twice"),
+        (
+            {
+                "frequency_hz": {"start": 1.0, "stop": 2.0, "points": 9999},
+                "amplitude_m": {"start": 1.0, "stop": 2.0, "points": 9999},
+            },
+            "a map holds at most",
+        ),
+    ],
+)
+def test_what_cannot_be_mapped_is_told_in_a_sentence(said, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        Map.model_validate(said)
+
+
+def test_values_of_a_range_lie_as_asked_and_between_their_edges():
+    for each in (FREQUENCIES, LEVELS):
+        values, edges = np.array(each.values), np.array(each.edges)
+        assert (values[0], values[-1]) == pytest.approx((each.start, each.stop), rel=1e-12)
+        assert np.all((edges[:-1] < values) & (values < edges[1:]))
+        spacing = np.diff(values) if each.spacing is Spacing.LINEAR else np.diff(np.log(values))
+        assert np.allclose(spacing, spacing[0], rtol=1e-9)
+
+
+def test_every_quantity_reaches_the_scene():
+    plan = Map(
+        k1_n_per_m=Range(start=500.0, stop=900.0, points=3),
+        hertz_stiffness=Range(start=1e9, stop=5e9, points=2),
+        gap_m=40e-6,
+        damping_time_s=1e-5,
+        vy_m_per_s=0.01,
+    )
+    # The first that varies lies along the last axis.
+    assert [axis.name for axis in plan.axes] == ["hertz_stiffness", "start", "k1"]
+    scene = plan.scene((1, 0, 2))
+    assert scene.specimen.stiffnesses[1] == 900.0
+    assert scene.specimen.dampings[1] == pytest.approx(900.0 * 1e-5)
+    assert scene.specimen.contact == Hertz(5e9)
+    assert scene.specimen.gap_m == 40e-6
+    assert scene.start.state == (0.0, 0.0, 0.0, 0.0, 0.01, 0.0)
+
+
+def test_random_starts_differ_and_are_the_same_again():
+    plan = Map(frequency_hz=FREQUENCIES, random_starts=3, seed=4)
+    assert plan.start_labels == ("rest", "random 1", "random 2", "random 3")
+    states = [plan.scene((k, 2)).start.state for k in range(4)]
+    assert len(set(states)) == 4
+    assert plan.scene((2, 2)).start.state == states[2]
+
+
+@pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(130.0, 2e-5), (95.0, 5e-6), (60.0, 1e-6)])
+def test_a_settled_scene_is_the_motion_that_the_whole_answer_describes(frequency_hz, amplitude_m):
+    scene = Map(frequency_hz=Range(start=50.0, stop=frequency_hz, points=2), amplitude_m=amplitude_m).scene(
+        (0, 1)
+    )
+    light, whole = settle_scene(scene), solve_scene(scene)
+    assert (light.motion, light.period, light.final_state) == (whole.motion, whole.period, whole.final_state)
+    assert (light.response_i, light.response_ii) == (whole.response_i, whole.response_ii)
+    assert whole.error_estimate is not None
+    assert light.error_estimate is None or light.error_estimate == whole.error_estimate
+
+
+def test_the_contact_energy_is_that_of_the_deepest_penetration():
+    plan = Map(frequency_hz=Range(start=129.0, stop=130.0, points=2), amplitude_m=2e-5)
+    scene = plan.scene((0, 1))
+    found = settle_scene(scene)
+    run = integrate(
+        scene.specimen,
+        scene.drive,
+        found.period / 130.0,
+        "standard",
+        found.final_state,
+        sample_rate_hz=2e6,
+        start_time_s=found.duration_s,
+    )
+    depth = np.abs(run.states[:, 1] - run.states[:, 2]).max() - scene.specimen.gap_m
+    energy_j = 0.4 * scene.specimen.contact.stiffness * depth**2.5
+    assert energy_j > 0.0
+    # The peak lies between two samples: a little above the largest of them.
+    assert contact_energy_j(scene.specimen, found) == pytest.approx(energy_j, rel=5e-3)
+    rigid = gong2025(contact="rigid:0.8")
+    assert contact_energy_j(rigid, found) is None
+
+
+def test_an_estimate_grows_with_the_work_and_shrinks_with_the_workers():
+    plan = Map(frequency_hz=FREQUENCIES, amplitude_m=LEVELS, coarse=2)
+    one, two = estimate_map(plan, 1), estimate_map(plan, 2)
+    assert (one.points, one.coarse_points) == (20, 9)
+    assert two.most_s < one.most_s
+    assert 0.0 < one.first_s < one.most_s
+    several = estimate_map(plan.model_copy(update={"random_starts": 3}), 1)
+    assert several.points == 80
+    assert several.work_s > one.work_s
+    assert math.isfinite(several.most_useful_workers)
+
+
+def test_a_map_along_one_quantity_keeps_states_once_a_drive_period():
+    plan = Map(frequency_hz=Range(start=120.0, stop=130.0, points=3), amplitude_m=2e-5, chain=("up", "down"))
+    results = solve_map(plan, workers=1)
+    section, period = results.values("section_p"), results.values("period")
+    for place in np.ndindex(period.shape):
+        assert np.count_nonzero(np.isfinite(section[place])) == (
+            64 if np.isnan(period[place]) else period[place]
+        )
+    # What goes up begins where the lower neighbour ended.
+    assert results.values("continues", start="up").tolist()[1:] == [0.0, 1.0]
+    assert results.values("continues", start="down").tolist()[:-1] == [4.0, 5.0]

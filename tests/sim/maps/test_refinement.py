@@ -1,0 +1,107 @@
+"""Which cells a map computes: all that differ from their neighbours, the same ones however it was stopped."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from vibench.sim.maps._refinement import AUDITED, Seen, plan_refinement
+
+
+def disc(shape, centre, radius):
+    rows, columns = np.indices(shape)
+    return ((rows - centre[0]) ** 2 + (columns - centre[1]) ** 2 < radius**2).astype(np.int64)
+
+
+def refined(codes, coarse=8, lost=None, sizes=None):
+    """Go on until nothing is missing; cells that are ``lost`` after each step are asked for again."""
+    known = np.zeros(codes.shape, dtype=bool)
+    sizes = np.full(codes.shape, np.nan) if sizes is None else sizes
+    for step in range(10_000):
+        # What is not known is not looked at: it would be believed otherwise.
+        seen = Seen(known, np.where(known, codes, 99), np.where(known, sizes, np.nan), 0.1)
+        plan = plan_refinement(seen, coarse, 1)
+        if not len(plan.missing):
+            return known, plan
+        computed = plan.missing if lost is None else plan.missing[lost(step, len(plan.missing))]
+        known.reshape(-1)[computed] = True
+    raise AssertionError("it never ends")
+
+
+def filled_codes(codes, known, plan):
+    found = np.where(known, codes, -1).reshape(-1)
+    audited = set(plan.audited.tolist())
+    for filling in plan.fillings:
+        for cell, donor in zip(filling.cells, filling.donors, strict=True):
+            assert known.reshape(-1)[donor]
+            if cell not in audited:
+                found[cell] = found[donor]
+    return found.reshape(codes.shape)
+
+
+def test_every_cell_is_computed_or_filled_in_once():
+    codes = disc((50, 71), (20, 30), 12)
+    known, plan = refined(codes)
+    filled = np.concatenate([each.cells for each in plan.fillings])
+    assert len(np.unique(filled)) == len(filled)
+    is_filled = np.zeros(codes.size, dtype=bool)
+    is_filled[filled] = True
+    is_filled[plan.audited] = False
+    assert np.array_equal(is_filled.reshape(codes.shape), ~known)
+    for each in plan.fillings:
+        assert np.allclose(each.weights.sum(axis=1), 1.0)
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    st.tuples(st.integers(17, 60), st.integers(17, 60)),
+    st.tuples(st.floats(0, 60), st.floats(0, 60)),
+    st.floats(9, 40),
+    st.sampled_from([2, 4, 8]),
+)
+def test_what_is_wider_than_the_lattice_is_filled_in_right(shape, centre, radius, coarse):
+    codes = disc(shape, centre, radius)
+    known, plan = refined(codes, coarse)
+    is_wrong = filled_codes(codes, known, plan) != codes
+    # A corner of the disc that no lattice point sees: a few cells of a rim, never the inside.
+    assert is_wrong.sum() <= 4
+    assert plan.wrong <= is_wrong.sum() + AUDITED
+
+
+def test_a_line_thinner_than_the_lattice_is_followed_once_it_is_met():
+    codes = np.zeros((65, 65), dtype=np.int64)
+    columns = np.arange(65)
+    codes[np.clip(columns // 2 + 16, 0, 64), columns] = 1
+    known, plan = refined(codes, 16)
+    assert np.array_equal(filled_codes(codes, known, plan), codes)
+    assert known.mean() < 0.3
+
+
+def test_a_jump_of_the_response_is_found_though_the_kind_is_the_same():
+    codes = np.zeros((40, 40), dtype=np.int64)
+    sizes = np.where(np.indices(codes.shape)[1] > 17, 1.0, 0.0)
+    known, _ = refined(codes, 8, sizes=sizes)
+    assert known[:, 17:19].all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_map_that_was_stopped_computes_the_same_cells(seed):
+    codes = disc((45, 60), (20, 30), 11) + 2 * disc((45, 60), (35, 50), 6)
+    rng = np.random.default_rng(seed)
+    whole, plan = refined(codes)
+    parts, other = refined(codes, lost=lambda _, count: rng.random(count) < 0.6)
+    assert np.array_equal(whole, parts)
+    assert plan.wrong == other.wrong
+    assert np.array_equal(plan.audited, other.audited)
+
+
+def test_the_audit_finds_what_filling_in_got_wrong():
+    # Single cells between the points of the lattice: nothing but chance finds them.
+    rng = np.random.default_rng(5)
+    codes = (rng.random((129, 129)) < 0.02).astype(np.int64)
+    codes[::16, ::16] = 0
+    _, plan = refined(codes, 16)
+    filled = np.concatenate([each.cells for each in plan.fillings])
+    share = np.count_nonzero(codes.reshape(-1)[filled]) / len(filled)
+    assert len(plan.audited) == AUDITED
+    expected = share * AUDITED
+    assert abs(plan.wrong - expected) < 4.0 * np.sqrt(expected) + 1.0

@@ -1,0 +1,107 @@
+"""Maps computed for real: adaptive beside full, several starts, and basins with their boundary."""
+
+import numpy as np
+import pytest
+
+from vibench.sim.maps import Map, Range, kick_stability, solve_map, uncertainty_exponent
+from vibench.sim.study import InvalidStudy, PointState
+
+# Over the edge between no contact and contact.
+PLAN = Map(
+    frequency_hz=Range(start=90.0, stop=140.0, points=17),
+    amplitude_m=Range(start=2e-6, stop=2e-5, points=13, spacing="logarithmic"),
+    coarse=4,
+    periods=600,
+)
+
+
+@pytest.fixture(scope="module")
+def adaptive():
+    return solve_map(PLAN)
+
+
+def test_an_adaptive_map_has_what_the_full_one_has_wherever_it_was_computed(adaptive):
+    full = solve_map(PLAN.model_copy(update={"refinement": "full"}))
+    is_computed = adaptive.state == PointState.DONE
+    assert 0 < adaptive.computed < full.computed == PLAN.grid.size
+    for name in ("motion", "period", "response_i", "impact_rate", "contact_energy"):
+        np.testing.assert_array_equal(adaptive.values(name)[is_computed], full.values(name)[is_computed])
+    whole = full.values("motion") * 64 + np.nan_to_num(full.values("period"))
+    here = adaptive.values("motion") * 64 + np.nan_to_num(adaptive.values("period"))
+    # What the audit found is what the full map finds of those cells, and of all filled ones about as many.
+    wrong = np.count_nonzero(whole != here)
+    low, high = adaptive.audit.wrong_share.low, adaptive.audit.wrong_share.high
+    assert low * adaptive.audit.filled <= wrong <= high * adaptive.audit.filled
+
+
+def test_the_shares_of_a_map_are_those_of_its_points(adaptive):
+    assert sum(each.share.share for each in adaptive.motions) == pytest.approx(1.0)
+    for number, motion in enumerate(adaptive.motions):
+        assert motion.share.share == np.mean(adaptive.motion_numbers == number)
+        assert motion.share.low <= motion.share.share <= motion.share.high
+
+
+def test_several_starts_tell_how_many_motions_there_are():
+    plan = Map(
+        frequency_hz=Range(start=100.0, stop=125.0, points=2),
+        amplitude_m=Range(start=5e-6, stop=9e-6, points=2),
+        random_starts=7,
+        periods=600,
+        coarse=2,
+    )
+    results = solve_map(plan)
+    counts = results.motion_counts
+    for place in np.ndindex(counts.shape):
+        found = results.motions_at(*place)
+        assert len(found) == counts[place]
+        assert sum(each.share.share for each in found) == pytest.approx(1.0)
+    assert counts.max() > 1
+
+
+def test_a_basin_map_tells_attractors_apart_and_kicks_them():
+    plan = Map(
+        frequency_hz=160.0,
+        amplitude_m=4e-6,
+        y_m=Range(start=-4e-5, stop=4e-5, points=5),
+        vx_m_per_s=Range(start=-0.5, stop=0.5, points=9),
+        periods=1200,
+        coarse=4,
+    )
+    results = solve_map(plan)
+    assert plan.is_basin
+    assert len(results.motions) >= 2
+    solid = [each for each in results.motions if each.period is not None]
+    found = kick_stability(results, (1e-6,), 10)
+    # A motion that attracts comes back from a millionth of a gap.
+    assert all(each.returned.share == 1.0 for each in found if results.motions[each.motion] in solid)
+
+
+def test_kicks_need_a_basin_map(adaptive):
+    with pytest.raises(InvalidStudy, match="over the start alone"):
+        kick_stability(adaptive)
+
+
+def test_a_straight_boundary_has_exponent_one():
+    rows, columns = np.indices((256, 256))
+    rough = uncertainty_exponent((rows + 2 * columns > 300).astype(np.int64))
+    assert rough.low < 1.0 < rough.high
+    assert rough.exponent == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_boundary_of_known_dimension_has_its_exponent():
+    # Stripes whose edges are the points of Cantor's middle-third set: dimension 1 + ln 2 / ln 3.
+    place = (np.arange(729) + 0.5) / 729
+    label = np.zeros(729, dtype=np.int64)
+    for generation in range(1, 7):
+        place = place * 3.0
+        is_gap = (np.floor(place) == 1.0) & (label == 0)
+        label[is_gap] = generation
+        place -= np.floor(place)
+    rough = uncertainty_exponent(np.tile(label, (729, 1)))
+    assert rough.exponent == pytest.approx(1.0 - np.log(2.0) / np.log(3.0), abs=0.12)
+
+
+def test_noise_has_no_exponent():
+    labels = np.random.default_rng(3).integers(0, 2, (200, 200))
+    assert uncertainty_exponent(labels) is None
+    assert uncertainty_exponent(np.zeros((64, 64), dtype=np.int64)) is None
