@@ -31,10 +31,10 @@ def truth():
     return solve_study(child.STUDY)
 
 
-def killed(path, words, after_answers, delay_s):
+def killed(path, words, after_answers, delay_s, program=CHILD):
     """Run the study in another process and kill it; how many answers it had said were kept."""
     with words.open("wb") as out:
-        process = subprocess.Popen([sys.executable, str(CHILD), str(path)], stdout=out)
+        process = subprocess.Popen([sys.executable, str(program), str(path)], stdout=out)
         deadline_s = time.monotonic() + PATIENCE_S
         while said(words) < after_answers and process.poll() is None:
             assert time.monotonic() < deadline_s

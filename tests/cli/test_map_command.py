@@ -1,0 +1,85 @@
+"""`vibench map` as a user meets it: a folder with a file and a picture, and one sentence for each error."""
+
+import json
+
+import pytest
+
+from vibench.cli.map_motions import FILE
+from vibench.sim.maps import open_map
+
+MAP = """
+frequency_hz = { start = 80, stop = 140, points = 9 }
+amplitude_m = { start = 2e-6, stop = 2e-5, points = 7, spacing = "logarithmic" }
+periods = 500
+coarse = 4
+"""
+DIAGRAM = """
+frequency_hz = { start = 120, stop = 130, points = 3 }
+amplitude_m = 2e-5
+chain = ["up", "down"]
+periods = 500
+"""
+BASIN = """
+frequency_hz = 160
+amplitude_m = 4e-6
+y_m = { start = -4e-5, stop = 4e-5, points = 5 }
+vx_m_per_s = { start = -0.5, stop = 0.5, points = 5 }
+periods = 800
+coarse = 2
+"""
+
+
+def plan(folder, text):
+    path = folder / "map.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_an_estimate_makes_nothing(vibench_here, tmp_path):
+    found = vibench_here("map", plan(tmp_path, MAP), "--out", "a", "--estimate", "--json", cwd=tmp_path)
+    assert found.returncode == 0, found.stderr
+    told = json.loads(found.stdout)
+    assert (told["points"], told["coarse_points"]) == (63, 9)
+    assert told["most_s"] >= told["first_s"] > 0.0
+    assert [path.name for path in tmp_path.iterdir()] == ["map.toml"]
+
+
+@pytest.mark.parametrize("text", [MAP, DIAGRAM], ids=["map", "diagram"])
+def test_a_map_becomes_a_file_and_a_picture_and_goes_on_where_it_was(vibench_here, tmp_path, text):
+    asked = plan(tmp_path, text)
+    found = vibench_here("map", asked, "--out", "a", "--json", cwd=tmp_path)
+    assert found.returncode == 0, found.stderr
+    told = json.loads(found.stdout)
+    assert told["is_complete"]
+    assert told["computed"] == open_map(tmp_path / "a" / FILE).computed
+    assert {"map.h5", "map.png", "map.svg"} <= {path.name for path in (tmp_path / "a").iterdir()}
+    again = vibench_here("map", asked, "--out", "a", cwd=tmp_path)
+    assert again.returncode == 1
+    assert "nothing is ever overwritten" in " ".join(again.stderr.split())
+    resumed = vibench_here("map", asked, "--out", "a", "--resume", "--json", cwd=tmp_path)
+    assert json.loads(resumed.stdout)["motions"] == told["motions"]
+
+
+def test_a_basin_map_tells_shares_and_kicks(vibench_here, tmp_path):
+    found = vibench_here("map", plan(tmp_path, BASIN), "--out", "a", "--kicks", "4", "--json", cwd=tmp_path)
+    assert found.returncode == 0, found.stderr
+    told = json.loads(found.stdout)
+    assert sum(each["share"] for each in told["motions"]) == pytest.approx(1.0)
+    assert len(told["kicks"]) == 3 * len(told["motions"])
+
+
+@pytest.mark.parametrize(
+    ("text", "more", "said"),
+    [
+        (MAP, ("--show", "beauty"), "'beauty'; there are response_i"),
+        (MAP, ("--kicks", "5"), "only the start varies"),
+        (DIAGRAM.replace("120", "200"), (), "does not ascend"),
+        (MAP + "gap = 3\n", (), "gap"),
+    ],
+)
+def test_what_cannot_be_mapped_is_one_sentence_and_no_folder(vibench_here, tmp_path, text, more, said):
+    found = vibench_here("map", plan(tmp_path, text), "--out", "a", *more, cwd=tmp_path)
+    assert found.returncode == 1
+    assert said in " ".join(found.stderr.split())
+    assert "Traceback" not in found.stderr
+    assert not (tmp_path / "a").exists()

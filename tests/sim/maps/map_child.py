@@ -1,0 +1,25 @@
+"""A process that computes a map into a file, says after every commit how much is kept, and may be killed."""
+
+import sys
+from pathlib import Path
+
+from vibench.sim.maps import Map, Range, solve_map
+from vibench.sim.study import ExistingStudy
+
+PLAN = Map(
+    frequency_hz=Range(start=80.0, stop=300.0, points=29),
+    amplitude_m=Range(start=1e-6, stop=3e-5, points=21, spacing="logarithmic"),
+    periods=800,
+)
+
+
+def main(path):
+    def tell(progress):
+        sys.stdout.write(f"{progress.kept}\n")
+        sys.stdout.flush()
+
+    solve_map(PLAN, Path(path), ExistingStudy.RESUME, workers=2, observer=tell)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
