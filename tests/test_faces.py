@@ -14,6 +14,7 @@ PORTIONS = ("sim", "acquisition", "virtual_rig", "analysis", "gui", "cli")
 FOR_PEOPLE = (
     "vibench.sim",
     "vibench.sim.study",
+    "vibench.sim.maps",
     "vibench.sim.branches",
     "vibench.sim.chain",
     "vibench.virtual_rig",

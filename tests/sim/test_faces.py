@@ -11,6 +11,7 @@ import pytest
 
 import vibench.sim as sim
 import vibench.sim.chain as chain
+import vibench.sim.maps as maps
 import vibench.sim.study as study
 
 FACES = (
@@ -20,6 +21,7 @@ FACES = (
     "vibench.sim.chain",
     "vibench.sim.shaker",
     "vibench.sim.stepping",
+    "vibench.sim.maps",
     "vibench.sim.study",
 )
 SPECIMEN, DRIVE = sim.gong2025(), sim.Harmonic(130.0, 20e-6)
@@ -27,6 +29,7 @@ SMOOTH = sim.gong2025(contact="linear")
 SHORT = {"duration_s": 0.05, "window_s": 0.02}
 SAMPLES = sim.Sampled(np.zeros(8), 1e4)
 
+SMALL_MAP = maps.Map(frequency_hz=maps.Range(start=90.0, stop=91.0, points=2), amplitude_m=1e-6)
 ONE_POINT = study.Study(models=["linear"], frequencies_hz=[90.0], amplitudes_m=[1e-6])
 
 
@@ -68,6 +71,8 @@ CALLS = {
         chain.chain_of(SPECIMEN, 2), DRIVE, duration_s=0.5, settle_s=0.01, **words
     ),
     study.solve_study: lambda **words: study.solve_study(ONE_POINT, **words),
+    study.store_of: lambda **words: study.store_of(ONE_POINT, None, **words).__enter__(),
+    maps.solve_map: lambda **words: maps.solve_map(SMALL_MAP, **words),
     study.prediction_at: lambda **words: study.prediction_at(
         study.solve_study(ONE_POINT).arrays, 0, 90.0, 1e-6, start="rest", **words
     ),
@@ -84,7 +89,7 @@ def enum_in(annotation):
 
 
 def asked_enums():
-    for face in (sim, study, chain):
+    for face in (sim, study, maps, chain):
         for name in face.__all__:
             function = getattr(face, name)
             if inspect.isfunction(function):
