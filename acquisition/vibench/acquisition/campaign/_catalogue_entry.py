@@ -36,23 +36,23 @@ class CatalogueEntry:
     reason: str
     verdict: str
     """``good``, or what is to be minded: ended early, near full scale, samples lost."""
-    started_utc: str
-    origin: str
-    kind: str
+    started_utc: str = ""
+    origin: str = ""
+    kind: str = ""
     """Of the excitation."""
-    amplitude_vpp: float | None
-    frequency_low_hz: float | None
-    frequency_high_hz: float | None
-    duration_s: float | None
-    size_bytes: int
-    bench_check: str
+    amplitude_vpp: float | None = None
+    frequency_low_hz: float | None = None
+    frequency_high_hz: float | None = None
+    duration_s: float | None = None
+    size_bytes: int = 0
+    bench_check: str = ""
     """What the bench check before it found."""
-    results: str
+    results: str = ""
     """Names of what analyses have saved, separated by commas."""
-    operator: str
-    notes: str
-    recording_id: str
-    seal: str
+    operator: str = ""
+    notes: str = ""
+    recording_id: str = ""
+    seal: str = ""
     """``intact`` as far as a quick look shows, ``damaged``, ``unsealed`` or ``unfinished``; or empty."""
 
     @property
@@ -73,7 +73,8 @@ def read_entry(folder: Path, path: Path, size_bytes: int) -> CatalogueEntry:
         with open_recording(path) as recording:
             return _entry(recording, where, size_bytes)
     except RecordingError as error:
-        return _unreadable(where, str(error), size_bytes)
+        stem = path.name.split(".")[0]
+        return CatalogueEntry(where, stem, UNREADABLE, str(error), "cannot be read", size_bytes=size_bytes)
 
 
 def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
@@ -102,30 +103,6 @@ def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
         notes=str(recording.plan.get("notes", "")),
         recording_id=recording.recording_id,
         seal=seal.state.value,
-    )
-
-
-def _unreadable(where: str, reason: str, size_bytes: int) -> CatalogueEntry:
-    return CatalogueEntry(
-        path=where,
-        name=Path(where).name.split(".")[0],
-        state=UNREADABLE,
-        reason=reason,
-        verdict="cannot be read",
-        started_utc="",
-        origin="",
-        kind="",
-        amplitude_vpp=None,
-        frequency_low_hz=None,
-        frequency_high_hz=None,
-        duration_s=None,
-        size_bytes=size_bytes,
-        bench_check="",
-        results="",
-        operator="",
-        notes="",
-        recording_id="",
-        seal="",
     )
 
 

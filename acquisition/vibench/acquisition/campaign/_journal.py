@@ -93,7 +93,7 @@ class Journal(ClosedOnLeaving):
     def start(self, name: str, file: str) -> None:
         """Say that an attempt begins, before anything plays."""
         with self._transaction() as connection:
-            self._set(connection, name, JournalPointState.RUNNING, ReasonCode.RUNNING, "")
+            _set(connection, name, JournalPointState.RUNNING, ReasonCode.RUNNING, "")
             connection.execute("UPDATE points SET file = ?, seal = '' WHERE name = ?", (file, name))
             connection.execute(
                 "INSERT INTO attempts SELECT ?, COUNT(*) + 1, ?, 'running', ?, '', ?, '', '' FROM attempts "
@@ -106,7 +106,7 @@ class Journal(ClosedOnLeaving):
     ) -> None:
         """Say how the running attempt came out, and how its recording is sealed."""
         with self._transaction() as connection:
-            self._set(connection, name, state, reason_code, reason)
+            _set(connection, name, state, reason_code, reason)
             connection.execute("UPDATE points SET seal = ? WHERE name = ?", (seal, name))
             connection.execute(
                 "UPDATE attempts SET state = ?, why = ?, reason = ?, ended_utc = ?, seal = ? "
@@ -117,12 +117,12 @@ class Journal(ClosedOnLeaving):
     def requeue(self, name: str, reason_code: ReasonCode, reason: str) -> None:
         """Put a point back, whose recording is not there after all."""
         with self._transaction() as connection:
-            self._set(connection, name, JournalPointState.QUEUED, reason_code, reason)
+            _set(connection, name, JournalPointState.QUEUED, reason_code, reason)
 
     def keep(self, name: str, file: str, seal: str) -> None:
         """Count a recording that lies in the folder already."""
         with self._transaction() as connection:
-            self._set(connection, name, JournalPointState.DONE, ReasonCode.FOUND, "complete before")
+            _set(connection, name, JournalPointState.DONE, ReasonCode.FOUND, "complete before")
             connection.execute("UPDATE points SET file = ?, seal = ? WHERE name = ?", (file, seal, name))
 
     def follow_up(self, name: str, further: Sequence[Point] = ()) -> None:
@@ -140,19 +140,6 @@ class Journal(ClosedOnLeaving):
     def _fact(self, key: str) -> str:
         (value,) = self._connection.execute("SELECT value FROM campaign WHERE key = ?", (key,)).fetchone()
         return str(value)
-
-    def _set(
-        self,
-        connection: sqlite3.Connection,
-        name: str,
-        state: JournalPointState,
-        reason_code: ReasonCode,
-        reason: str,
-    ) -> None:
-        connection.execute(
-            "UPDATE points SET state = ?, why = ?, reason = ? WHERE name = ?",
-            (state, reason_code, reason, name),
-        )
 
     def _insert(
         self, connection: sqlite3.Connection, points: Sequence[Point], place: int, added_after: str
@@ -189,6 +176,13 @@ class Journal(ClosedOnLeaving):
                 self._connection.execute("ROLLBACK")
                 raise
             self._connection.execute("COMMIT")
+
+
+def _set(
+    connection: sqlite3.Connection, name: str, state: JournalPointState, code: ReasonCode, reason: str
+) -> None:
+    command = "UPDATE points SET state = ?, why = ?, reason = ? WHERE name = ?"
+    connection.execute(command, (state, code, reason, name))
 
 
 def _now() -> str:
