@@ -32,3 +32,12 @@ def test_an_unknown_name_is_refused_with_those_that_there_are(tmp_path, monkeypa
         load_campaign("quik")
     with pytest.raises(ConfigurationError, match="not part of this installation"):
         shipped_folder("recipes")
+
+
+def test_a_folder_hides_no_shipped_file_of_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "virtual_rig").mkdir()  # as in a checkout
+    assert named("virtual_rig", "hardware_configs").name == "virtual_rig.toml"
+    (tmp_path / "mine").mkdir()
+    with pytest.raises(ConfigurationError, match="'mine' is neither a file here"):
+        load_campaign("mine")
