@@ -37,6 +37,7 @@ from .model import (
     similarity as similarity,
 )
 from .model_updating import (
+    Parameter as Parameter,
     UpdatedSpecimen as UpdatedSpecimen,
     update_model as update_model,
 )

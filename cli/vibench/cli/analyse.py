@@ -20,6 +20,7 @@ from vibench.analysis import (
     FrequencyResponseRequest,
     InvalidRequest,
     MagnitudeScale,
+    Parameter,
     ProgressObserver,
     Simulation,
     UpdatedSpecimen,
@@ -93,9 +94,16 @@ def analyse(
         bool,
         typer.Option(
             "--fit",
-            help="Fit damping, frequencies and gap to the recordings first, and lay that specimen over them.",
+            help="Fit damping, frequencies and gaps to the recordings first, and lay that specimen over "
+            "them; where no specimen fits, say which assumption would mend it.",
         ),
     ] = False,
+    free: Annotated[
+        list[Parameter] | None,
+        typer.Option(
+            "--free", help="With --fit: fit this to noise too; several times for several, one mass at a time."
+        ),
+    ] = None,
     hidden: Annotated[
         bool,
         typer.Option(
@@ -193,6 +201,11 @@ def analyse(
         raise InvalidRequest(
             "--fit and --specimen were given; one of the two says which specimen is laid over"
         )
+    if free and not fit:
+        raise InvalidRequest(
+            f"--free {free[0].value} was given without --fit, and only a fit frees anything; give both, "
+            "or neither"
+        )
     if keep and not hidden:
         raise InvalidRequest(
             "--keep was given without --hidden, and only a hidden motion is kept; give both or neither"
@@ -206,7 +219,7 @@ def analyse(
             request,
             diagrams,
             (simulation, draws),
-            fit=fit,
+            fit=tuple(free or ()) if fit else None,
             hidden=_Hidden.KEPT if keep else _Hidden.TOLD if hidden else _Hidden.LEFT_OUT,
             specimen=specimen,
             as_json=as_json,
@@ -220,7 +233,7 @@ def _analyse(
     diagrams: Sequence[BranchDiagram],
     simulated: tuple[Simulation, int],
     *,
-    fit: bool,
+    fit: Sequence[Parameter] | None,
     hidden: _Hidden,
     specimen: str | None,
     as_json: bool,
@@ -235,7 +248,7 @@ def _analyse(
         room_for_folder(folder)
     with reading_bar() as observer:
         simulation, draws = simulated
-        updated = fitted_to(paths, name, observer) if fit else None
+        updated = None if fit is None else fitted_to(paths, name, observer, fit)
         laid = None if updated is None else updated.specimen
         if specimen is not None:
             laid = described(specimen).specimen()
@@ -259,7 +272,7 @@ def _analyse(
         report = write_report(results, unused(folder / "report.html"), folder / "figures", diagrams, motions)
         if not as_json:
             console.print("The report:", bold(report.resolve()))
-        if updated is not None:
+        if updated is not None and updated.fitted:
             specimen_file = unused(folder / "specimen.toml")
             save_toml(updated.description, specimen_file)
             if not as_json:
@@ -282,9 +295,11 @@ def hidden_motions(
                 typer.echo(f"error: {facts.name}: no hidden motion: {error}", err=True)
 
 
-def fitted_to(paths: Sequence[Path], name: str, observer: ProgressObserver) -> UpdatedSpecimen:
+def fitted_to(
+    paths: Sequence[Path], name: str, observer: ProgressObserver, also_free: Sequence[Parameter] = ()
+) -> UpdatedSpecimen:
     """Fit the specimen to recordings, whatever the report is to show of them."""
-    return update_model(analyse_files(paths, name, Simulation.LEFT_OUT, observer=observer))
+    return update_model(analyse_files(paths, name, Simulation.LEFT_OUT, observer=observer), also_free)
 
 
 def complain_about(results: CampaignResults) -> None:

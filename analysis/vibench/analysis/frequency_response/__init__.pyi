@@ -2,6 +2,7 @@ from ._distortion import (
     Distortion as Distortion,
     distortion as distortion,
     is_even_line as is_even_line,
+    scatters_beyond_noise as scatters_beyond_noise,
 )
 from ._mode import (
     Resonance as Resonance,

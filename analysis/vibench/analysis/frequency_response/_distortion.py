@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import digamma, polygamma
 
 from ..signals import Flags, Reals
 from ._periodic import DetectionLines, PeriodicFrequencyResponse
@@ -42,6 +43,29 @@ def distortion(periodic: PeriodicFrequencyResponse) -> Distortion:
         even_m_per_s=_rms_without_noise(quiet, is_even),
         detection_noise_m_per_s=_rms(quiet.noise_amplitude),
     )
+
+
+_SURELY = 5.0
+"""Standard deviations by which scatter must exceed noise before it is called distortion."""
+
+
+def scatters_beyond_noise(periodic: PeriodicFrequencyResponse) -> bool | None:
+    """Say whether realisations scatter more than their periods do; None when there was one of either only.
+
+    The logarithm of a ratio of two variances has the mean and variance of that of Fisher's F; of a linear
+    specimen, over many lines, its average stays within some standard deviations.
+    """
+    count, periods = periodic.realisations, min(each.periods for each in periodic.repetitions)
+    if count < 2 or periods < 2:
+        return None
+    found = periodic.frequency_response
+    total = 2.0 * count * (found.relative_sd_magnitude * found.magnitude) ** 2
+    known = (periodic.noise_variance > 0) & np.isfinite(total) & (total > 0)
+    ratio = np.log(total[known] / periodic.noise_variance[known])
+    above, below = count - 1.0, count * (periods - 1.0)
+    expected = digamma(above) - np.log(above) - digamma(below) + np.log(below)
+    sd = np.sqrt((polygamma(1, above) + polygamma(1, below)) / max(ratio.size, 1))
+    return bool(ratio.size and np.mean(ratio) - expected > _SURELY * sd)
 
 
 def is_even_line(lines: DetectionLines) -> Flags:

@@ -15,6 +15,7 @@ from ._draws import (
 )
 from ._driven_rig import (
     Driven as Driven,
+    described_shaker as described_shaker,
     says_shaker as says_shaker,
 )
 from ._ensemble import (

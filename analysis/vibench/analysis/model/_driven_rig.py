@@ -88,7 +88,13 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
 
 def says_shaker(recording: Recording) -> bool:
     """Whether the bench configuration in a recording describes a whole rig, shaker included."""
-    return _configured(recording) is not None
+    return described_shaker(recording) is not None
+
+
+def described_shaker(recording: Recording) -> Shaker | None:
+    """Give the shaker that the bench configuration in a recording describes; None where it does not."""
+    rig = _configured(recording)
+    return None if rig is None else shaker_of(rig)
 
 
 def _configured(recording: Recording) -> Rig | None:

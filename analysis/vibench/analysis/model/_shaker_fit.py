@@ -65,11 +65,14 @@ class FittedShaker:
         return _shaker(logarithms)
 
 
-def fitted_shaker(recording: Recording, analysis: NoiseAnalysis, specimen: Specimen) -> FittedShaker:
+def fitted_shaker(
+    recording: Recording, analysis: NoiseAnalysis, specimen: Specimen, described: Shaker | None = None
+) -> FittedShaker:
     """Fit coil, table and suspension to the transmission from recorded voltage to base, without impacts.
 
     With D(s) = k + d s + (m + M(s)) s^2, M the specimen's mass as the base feels it, the base's acceleration
     over the voltage is s^2 G / ((R + L s) D + s G^2) (Beranek, Acoustics, ch. 3).
+    The search begins at the shaker that is ``described``, else at several usual ones.
 
     Raises
     ------
@@ -96,7 +99,7 @@ def fitted_shaker(recording: Recording, analysis: NoiseAnalysis, specimen: Speci
         ratio = np.log(_acceleration_per_volt(logarithms, s, carried) / measured) / sd
         return np.concatenate([ratio.real, ratio.imag])
 
-    best = _best(misfit)
+    best = _best(misfit, described)
     degrees = 2 * lines - len(_TYPICAL)
     chi2 = float(2 * best.cost / degrees)
     if chi2 > LARGEST_CHI2:
@@ -108,12 +111,14 @@ def fitted_shaker(recording: Recording, analysis: NoiseAnalysis, specimen: Speci
     return FittedShaker(_shaker(best.x), covariance, chi2, lines, analysis.facts.name)
 
 
-def _best(misfit: Callable[[Reals], Reals]) -> OptimizeResult:
+def _best(misfit: Callable[[Reals], Reals], described: Shaker | None) -> OptimizeResult:
     """Search from several starts: the products of coil and table are known better than each."""
     rng = np.random.default_rng(0)
     typical = np.log(_TYPICAL)
-    starts = [typical, *(typical + rng.uniform(-1.5, 1.5, (_STARTS, typical.size)))]
     bounds = (typical - _REACH, typical + _REACH)
+    starts = [typical, *(typical + rng.uniform(-1.5, 1.5, (_STARTS, typical.size)))]
+    if described is not None:
+        starts = [np.clip(_logarithms(described), bounds[0] + 1e-6, bounds[1] - 1e-6)]
     return min(
         (least_squares(misfit, each, bounds=bounds, x_scale="jac") for each in starts),
         key=lambda each: each.cost,

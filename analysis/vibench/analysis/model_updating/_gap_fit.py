@@ -11,7 +11,8 @@ from vibench.sim import Specimen, base_transmissibility
 from ..errors import NotEnoughData
 from ..signals import DEFAULT_CONFIDENCE, Complexes, Reals
 from ..sine import Edge, SweepAnalysis, SweepResponse
-from ._specimen_fit import FittedValue, Parameter, SpecimenFit, parameter_value, with_values
+from ._parameters import FittedValue, Parameter, parameter_value, with_values
+from ._specimen_fit import SpecimenFit
 
 _RELATIVE = 3
 """Column of p in `base_transmissibility`."""

@@ -1,128 +1,76 @@
-"""The specimen that is really on the shaker, from the recordings of one campaign.
+"""The specimen that is really on the shaker, from the recordings of one campaign."""
 
-The gap between two dwells: one whose relative motion does not fill it yet, and one whose motion does.
-"""
-
-import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
-from vibench.sim import Specimen, SpecimenDescription, SpecimenTable, base_transmissibility
+from vibench.sim import Specimen, SpecimenDescription, SpecimenTable
 
 from ..errors import AnalysisError, NotEnoughData
+from ..frequency_response import scatters_beyond_noise
+from ..kinds import NoiseResult
 from ..recordings import described_specimen
 from ..results import CampaignResults
-from ..sine import DwellAnalysis
-from ..tables import named, plain
+from ..tables import named, plain, plus_minus
+from ._bracketed_gap import bracketed_gap
 from ._gap_fit import fit_gap
-from ._specimen_fit import FittedValue, Parameter, SpecimenFit, fit_specimen, with_values
+from ._parameters import LINEAR, SHOWN, FittedValue, Parameter, with_values
+from ._specimen_fit import SpecimenFit, fit_specimen
+from ._suspects import Assumption, Suspect
+from ._table import TableFit, fitted_table
+from ._tracked_gaps import TrackedNumbers, tracked_numbers
 
-CALM, COLLIDING = 1.01, 1.05
-"""Response I over Response II: 1 for a sine; between the two nothing is said."""
-_RELATIVE = 3
-"""Column of p in `base_transmissibility`."""
-_SAME_HZ = 0.5
-"""Dwells whose frequencies differ by less were played at one frequency."""
-
-
-@dataclass(frozen=True)
-class Bracket:
-    """Bounds of the gap from the dwells at one frequency."""
-
-    frequency_hz: float
-    low_m: float
-    """Largest relative motion without collisions."""
-    high_m: float
-    """Smallest relative motion, had there been no stops, that collided."""
-
-
-def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedValue:
-    """Give the gap from the narrowest bracket; its value is the geometric mean of the bounds.
-
-    Raises NotEnoughData when no frequency has a dwell on either side of the onset.
-    """
-    found = list(brackets(dwells, linear))
-    if not found:
-        raise NotEnoughData(
-            "no frequency has both a dwell that does not collide and one that does, so the gap cannot be "
-            "told from dwells; add one below and one above the onset"
-        )
-    best = min(found, key=lambda each: each.high_m / each.low_m)
-    return FittedValue(
-        parameter=Parameter.GAP,
-        value=float(np.sqrt(best.low_m * best.high_m)),
-        low=best.low_m,
-        high=best.high_m,
-        sd=float("nan"),
-        nominal=min(linear.gaps_m),
-    )
-
-
-def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Bracket]:
-    """Give a bracket for every frequency with dwells on both sides.
-
-    Collisions push the base off its course, so the motion that a colliding dwell would have without them is
-    taken from the generator's setting and from what a volt did to the base in the largest calm dwell.
-    """
-    rest = list(dwells)
-    while rest:
-        at_hz = rest[0].response.drive.frequency_hz
-        here = [each for each in rest if abs(each.response.drive.frequency_hz - at_hz) < _SAME_HZ]
-        rest = [each for each in rest if each not in here]
-        calm = [each for each in here if _peakedness(each) <= CALM]
-        colliding = [each for each in here if _peakedness(each) >= COLLIDING]
-        if not calm or not colliding:
-            continue
-        loudest = max(calm, key=lambda each: each.excitation.amplitude_vpp)
-        per_m = abs(base_transmissibility(linear, [at_hz])[0, _RELATIVE])
-        low_m = float(per_m * loudest.response.drive.amplitude_m)
-        volts = min(each.excitation.amplitude_vpp for each in colliding)
-        high_m = low_m * volts / loudest.excitation.amplitude_vpp
-        if high_m > low_m:
-            yield Bracket(at_hz, low_m, high_m)
-
-
-def _peakedness(dwell: DwellAnalysis) -> float:
-    found = dwell.response
-    return (found.response_i - found.noise_bias_i) / found.response_ii
-
-
-_SHOWN = {
-    Parameter.DAMPING_TIME: ("c / k", 1e6, "µs"),
-    Parameter.F0: ("f0", 1.0, "Hz"),
-    Parameter.F1: ("f1", 1.0, "Hz"),
-    Parameter.F2: ("f2", 1.0, "Hz"),
-    Parameter.GAP: ("gap", 1e6, "µm"),
-}
 _NOT_FITTED = ("masses_kg", "contact", "hertz_stiffness")
-_LEFT_OVER = 2.0
-"""A reduced chi square above which the model is said to leave more than the scatter explains."""
 
 
 @dataclass(frozen=True, eq=False)
 class UpdatedSpecimen:
-    """A specimen fitted to recordings, with what could not be told."""
+    """A specimen fitted to recordings, with what could not be told and what does not fit."""
 
     specimen: Specimen
     values: tuple[FittedValue, ...]
+    """Of a model that fits; none where it does not."""
+    tracked: TrackedNumbers | None
+    """What collisions tell, tracked; None where they cannot be."""
+    linear: SpecimenFit | None
+    """Of the weakest noise; None where there is none."""
     linear_from: str
     """Recording whose transmission told damping and frequencies; empty if none did."""
-    reduced_chi_square: float
-    """Of that fit; NaN if there was none."""
-    lines: int
+    table: TableFit | None
     not_told: tuple[str, ...]
     """A sentence for everything that stays as the bench says, and why."""
     nominal: SpecimenTable
     """As the bench describes it."""
 
     @property
+    def fitted(self) -> bool:
+        """Whether anything of it is more than the bench's description."""
+        return bool(self.values) or self.tracked is not None
+
+    @property
+    def fits(self) -> bool:
+        """Whether no recording contradicts what the bench says and the fit takes for granted."""
+        return not self.suspects
+
+    @property
+    def reduced_chi_square(self) -> float:
+        """Of the linear fit; NaN if there was none."""
+        return float("nan") if self.linear is None else self.linear.reduced_chi_square
+
+    @property
+    def suspects(self) -> tuple[Suspect, ...]:
+        """Assumptions that a recording contradicts, of each recording the likeliest first."""
+        linear = () if self.linear is None else self.linear.suspects
+        table = () if self.table is None else self.table.suspects
+        return (*linear, *table, *_contradicted(self.tracked))
+
+    @property
     def description(self) -> SpecimenDescription:
         """The fitted specimen as a file has it; what was not fitted is the bench's."""
         lower, upper = self.specimen.gaps_m
         fitted = {each.parameter.value for each in self.values}
+        if self.tracked is not None:
+            fitted |= {each.what.value for each in self.tracked.gaps}
         return SpecimenDescription(
             name=f"{self.nominal.name}_fitted",
             about=f"{self.nominal.name}, fitted to recordings: {', '.join(sorted(fitted))}",
@@ -136,7 +84,7 @@ class UpdatedSpecimen:
                 **{key: source for key, source in self.nominal.sources.items() if key in _NOT_FITTED},
                 **(
                     {"stiffnesses_n_per_m": self.linear_from, "dampings_ns_per_m": self.linear_from}
-                    if self.linear_from
+                    if self.linear is not None and self.linear.fits
                     else {}
                 ),
             },
@@ -144,18 +92,14 @@ class UpdatedSpecimen:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Say every value with its interval, and what is to be known of it."""
-        said = [_said(each) for each in self.values]
-        if self.reduced_chi_square > _LEFT_OVER:
-            said.append(
-                f"The linear model leaves {self.reduced_chi_square:.3g} times the squared residual that the "
-                f"scatter of {self.linear_from} explains; the intervals are widened by that."
-            )
-        return (*said, *self.not_told)
+        """Say every value with its interval, what does not fit, and what is to be known of it."""
+        return tuple(_sentences(self))
 
     def to_dict(self) -> dict[str, object]:
         """Plain values for JSON."""
+        linear, table = self.linear, self.table
         return {
+            "fits": self.fits,
             "values": {
                 each.parameter.value: {
                     **named(each, "value", "low", "high"),
@@ -164,37 +108,105 @@ class UpdatedSpecimen:
                 }
                 for each in self.values
             },
+            "tracked_from": None if self.tracked is None else self.tracked.recording,
+            "tracked": {
+                each.what.value: {**named(each, "value", "low", "high"), "bench": each.described}
+                for each in (() if self.tracked is None else self.tracked.told)
+            },
             "linear_from": self.linear_from or None,
-            "lines": self.lines,
-            "reduced_chi_square": plain(self.reduced_chi_square),
+            "lines": 0 if linear is None else linear.lines,
+            "reduced_chi_square": None if linear is None else linear.reduced_chi_square,
+            "chi_square_limit": None if linear is None else linear.limit,
+            "table_mass_kg": None if table is None else table.mass_kg,
+            "sd_table_mass_kg": None if table is None else table.sd_kg,
+            "suspects": [
+                {
+                    "assumption": each.assumption.value,
+                    "would_mend_it": each.sentence,
+                    **named(each, "reduced_chi_square", "mends"),
+                    "behind_the_likeliest": each.behind,
+                }
+                for each in self.suspects
+            ],
             "not_told": list(self.not_told),
             "specimen": self.description.model_dump(mode="json", exclude_none=True),
         }
 
 
+def _sentences(updated: UpdatedSpecimen) -> Iterator[str]:
+    yield from (_said(each) for each in updated.values)
+    if updated.tracked is not None:
+        for label, said, described in updated.tracked.rows:
+            yield f"Tracked {label}: {said}; described as {described}."
+    linear, table = updated.linear, updated.table
+    if linear is not None and not linear.fits:
+        yield (
+            f"The model does not fit {updated.linear_from}: chi² is {linear.reduced_chi_square:.3g} per "
+            f"degree of freedom, and one right model in a thousand exceeds {linear.limit:.3g}. No value "
+            f"of it is given; {culprits_text(linear.suspects)}."
+        )
+    if table is not None:
+        yield table.sentence
+        if table.suspects:
+            yield f"The table does not fit: {culprits_text(table.suspects)}."
+    contradicted = _contradicted(updated.tracked)
+    if contradicted:
+        yield f"Collisions contradict the description: {culprits_text(contradicted)}."
+    yield from updated.not_told
+
+
+def culprits_text(suspects: Sequence[Suspect]) -> str:
+    """Say what would mend a model, as far as the data tell one explanation from another."""
+    best = suspects[0]
+    alike = list(dict.fromkeys(each.sentence for each in suspects if each.may_be_it))
+    named = ", or ".join(alike)
+    if not best.mends:
+        return (
+            "no single assumption that was tried mends it; the nearest, which leaves chi² at "
+            f"{best.reduced_chi_square:.3g}, is {named}"
+        )
+    choice = "either of these would mend it, and the data do not tell them apart: " if len(alike) > 1 else ""
+    return f"{choice}{named}" if choice else f"what would mend it is {named}"
+
+
+def _contradicted(tracked: TrackedNumbers | None) -> tuple[Suspect, ...]:
+    if tracked is None or not tracked.contradicted:
+        return ()
+    sentence = " and ".join(tracked.contradicted)
+    return (Suspect(Assumption.GAPS, sentence, tracked.innovation_level, mends=True, behind=0.0),)
+
+
 def _said(found: FittedValue) -> str:
-    name, scale, unit = _SHOWN[found.parameter]
+    name, scale, unit = SHOWN[found.parameter]
+    half = 0.5 * (found.high - found.low)
     # Two digits of the interval, so that it is an interval on paper too.
-    digits = max(0, 1 - math.floor(math.log10(scale * (found.high - found.low))))
+    places = len(plus_minus(scale * found.value, scale * half).partition(" ")[0].partition(".")[2])
     value, low, high, nominal = (
-        f"{scale * each:.{digits}f}" for each in (found.value, found.low, found.high, found.nominal)
+        f"{scale * each:.{places}f}" for each in (found.value, found.low, found.high, found.nominal)
     )
     return f"Fitted {name} = {value} {unit} ({low} to {high} {unit}, 95 %); the bench says {nominal} {unit}."
 
 
-def update_model(results: CampaignResults) -> UpdatedSpecimen:
-    """Fit damping and frequencies to the weakest noise, and the gap to where sweeps or dwells collide.
+def update_model(results: CampaignResults, also_free: Sequence[Parameter | str] = ()) -> UpdatedSpecimen:
+    """Fit a specimen to recordings, or say which assumption of the model they contradict.
+
+    Damping and frequencies come from the weakest noise; the gap of each side, m1, c1 and the contact law from
+    tracking a motion that collides; the gap of the nearer side, where no motion can be tracked, from where
+    sweeps begin to collide or from two dwells. The table's mass comes from how the base follows the voltage.
 
     Parameters
     ----------
     results
         Of recordings of one specimen; their simulation is not needed. Noise in displacement over
         displacement.
+    also_free
+        What is fitted to noise beside damping and frequencies: masses (one at a time) and single dampers.
 
     Raises
     ------
     NotEnoughData
-        When neither could be fitted: no noise, and no sweep or pair of dwells that tells the gap.
+        When nothing could be fitted: no noise, no motion that can be tracked, and no sweep or pair of
+        dwells that tells the gap.
 
     """
     if not results.results:
@@ -202,40 +214,73 @@ def update_model(results: CampaignResults) -> UpdatedSpecimen:
     described = described_specimen(results.facts[0].bench)
     nominal = described.specimen()
     not_told: list[str] = []
-    linear, linear_from = _linear(results, nominal, not_told)
-    model = nominal if linear is None else linear.specimen
-    values = () if linear is None else linear.values
-    gap = _gap(results, model, linear, not_told)
-    if gap is not None:
-        model, values = with_values(model, {Parameter.GAP: gap.value}), (*values, gap)
-    if not values:
-        raise NotEnoughData(f"no specimen can be fitted to {results.name!r}: {' '.join(not_told)}")
-    return UpdatedSpecimen(
-        specimen=model,
-        values=values,
-        linear_from=linear_from,
-        reduced_chi_square=float("nan") if linear is None else linear.reduced_chi_square,
-        lines=0 if linear is None else linear.lines,
-        not_told=tuple(not_told),
+    free = (*LINEAR, *(Parameter(each) for each in also_free))
+    linear = _linear(results, nominal, free, not_told)
+    table = _table(results.noise[0], linear, not_told) if linear is not None and linear.fits else None
+    updated = UpdatedSpecimen(
+        specimen=nominal if linear is None else linear.specimen,
+        values=() if linear is None else linear.values,
+        tracked=None,
+        linear=linear,
+        linear_from="" if linear is None else Path(results.noise[0].analysis.facts.name).name,
+        table=table,
+        not_told=(),
         nominal=described,
     )
+    if linear is not None and not linear.fits:
+        not_told.append("Gaps and contacts stay as the bench says: the linear model does not fit.")
+    else:
+        updated = _with_gaps(updated, results, not_told)
+        if not updated.fitted:
+            raise NotEnoughData(f"no specimen can be fitted to {results.name!r}: {' '.join(not_told)}")
+    return replace(updated, not_told=tuple(not_told))
 
 
 def _linear(
-    results: CampaignResults, nominal: Specimen, not_told: list[str]
-) -> tuple[SpecimenFit | None, str]:
+    results: CampaignResults, nominal: Specimen, free: Sequence[Parameter], not_told: list[str]
+) -> SpecimenFit | None:
     if not results.noise:
         not_told.append("Damping and frequencies stay as the bench says: no noise was recorded.")
-        return None, ""
-    weakest = results.noise[0].analysis
+        return None
+    weakest = results.noise[0].analysis.response
+    is_nonlinear = None if weakest.periodic is None else scatters_beyond_noise(weakest.periodic)
     try:
-        return fit_specimen(weakest.response.frequency_response, nominal), Path(weakest.facts.name).name
-    except AnalysisError as error:
+        return fit_specimen(weakest.frequency_response, nominal, free, is_nonlinear=is_nonlinear)
+    except NotEnoughData as error:
         not_told.append(f"Damping and frequencies stay as the bench says: {error}.")
-        return None, ""
+        return None
 
 
-def _gap(
+def _table(weakest: NoiseResult, linear: SpecimenFit, not_told: list[str]) -> TableFit | None:
+    try:
+        return fitted_table(weakest.analysis, linear.specimen)
+    except AnalysisError as error:
+        not_told.append(f"The table's mass stays as the bench says: {error}.")
+        return None
+
+
+def _with_gaps(updated: UpdatedSpecimen, results: CampaignResults, not_told: list[str]) -> UpdatedSpecimen:
+    """Give each side's gap by tracking; where that cannot be, the nearer one by where collisions begin."""
+    tracked, why = tracked_numbers(results, updated.specimen)
+    if tracked is not None:
+        lower, upper = (each.value for each in tracked.gaps)
+        return replace(
+            updated,
+            specimen=replace(updated.specimen, gap_m=upper, lower_gap_m=lower),
+            tracked=tracked,
+        )
+    not_told.append(f"Each side's gap, m1, c1 and the contact law are not determined: {why}.")
+    gap = _onset_gap(results, updated.specimen, updated.linear, not_told)
+    if gap is None:
+        return updated
+    return replace(
+        updated,
+        specimen=with_values(updated.specimen, {Parameter.GAP: gap.value}),
+        values=(*updated.values, gap),
+    )
+
+
+def _onset_gap(
     results: CampaignResults, model: Specimen, linear: SpecimenFit | None, not_told: list[str]
 ) -> FittedValue | None:
     """Give the narrower of what sweeps and dwells tell."""

@@ -7,6 +7,8 @@ from ._arrays import (
 from ._confidence import (
     DEFAULT_CONFIDENCE as DEFAULT_CONFIDENCE,
     chi_square_bounds as chi_square_bounds,
+    chi_square_limit as chi_square_limit,
+    chi_square_of as chi_square_of,
     coherence_significance as coherence_significance,
     magnitude_bounds as magnitude_bounds,
     phase_half_width as phase_half_width,
@@ -37,6 +39,7 @@ from ._window import (
     Window as Window,
     effective_averages as effective_averages,
     hop_samples as hop_samples,
+    line_correlation as line_correlation,
     named_window as named_window,
     taper as taper,
 )

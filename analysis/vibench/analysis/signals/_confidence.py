@@ -70,3 +70,24 @@ def chi_square_bounds(density: Reals, n_eff: float, confidence: float) -> tuple[
     high = float(scipy.stats.chi2.ppf((1 + confidence) / 2, freedom))
     low = float(scipy.stats.chi2.ppf((1 - confidence) / 2, freedom))
     return np.asarray(density * freedom / high), np.asarray(density * freedom / low)
+
+
+_ONE_IN = 1e-3
+"""Right models that exceed the limit of their chi square."""
+
+
+def chi_square_of(squared: Reals, n_eff: float) -> Reals:
+    """Chi square with 2 degrees of freedom of a line's squared residual over its estimated scatter.
+
+    The two parts of a residual, over a standard deviation from n averages, follow F(2, 2 (n - 1)) and not
+    chi square; what exceeds either with the same probability corresponds: nu ln(1 + squared / nu), nu =
+    2 (n - 1). It is twice the negative logarithm of Student's likelihood, but for a factor (nu + 2) / nu.
+    """
+    freedom = max(2 * (n_eff - 1), 1.0)
+    return np.asarray(freedom * np.log1p(squared / freedom))
+
+
+def chi_square_limit(freedom: int, lines_like_one: float = 1.0) -> float:
+    """Chi square per degree of freedom that one right model in a thousand exceeds."""
+    independent = max(freedom / lines_like_one, 1.0)
+    return float(scipy.stats.chi2.isf(_ONE_IN, independent) / independent)

@@ -84,3 +84,13 @@ def effective_averages(values: Reals, hop: int, used: Flags) -> float:
         correlation = float(values[: -lag * hop] @ values[lag * hop :]) / energy
         excess += pairs / count * correlation**2
     return count / (1 + 2 * excess)
+
+
+def line_correlation(window: Window | str) -> tuple[float, float]:
+    """How many neighbouring lines of a windowed spectrum say what one would, of values and of their squares.
+
+    Errors of lines k apart correlate as the transform of the squared window at k does over that at 0.
+    """
+    squared = taper(window, 256) ** 2
+    correlation = np.abs(np.fft.fft(squared)) / np.sum(squared)
+    return float(np.sum(correlation)), float(np.sum(correlation**2))

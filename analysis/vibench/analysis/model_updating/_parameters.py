@@ -1,0 +1,118 @@
+"""What of a specimen can be fitted to linear motion, by name: read from a specimen, and given to another."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import assert_never
+
+import numpy as np
+
+from vibench.sim import Specimen
+
+
+class Parameter(StrEnum):
+    """What of a specimen is fitted."""
+
+    DAMPING_TIME = "damping_time_s"
+    """c_i / k_i, one for all links."""
+    F0 = "f0_hz"
+    F1 = "f1_hz"
+    F2 = "f2_hz"
+    """Frequencies of the single oscillators, f_i = sqrt(k_i / m_i) / 2 pi."""
+    M0 = "m0_kg"
+    M1 = "m1_kg"
+    M2 = "m2_kg"
+    """One of the three at a time: motion tells ratios of masses, and a scale comes from the other two."""
+    C0 = "c0_ns_per_m"
+    C1 = "c1_ns_per_m"
+    C2 = "c2_ns_per_m"
+    """A damper that does not follow the one damping time."""
+    GAP = "gap_m"
+
+
+LINEAR = (Parameter.DAMPING_TIME, Parameter.F0, Parameter.F1, Parameter.F2)
+"""What a transmission without collisions is fitted by."""
+MASSES = (Parameter.M0, Parameter.M1, Parameter.M2)
+DAMPERS = (Parameter.C0, Parameter.C1, Parameter.C2)
+ALSO_FREE = MASSES + DAMPERS
+"""What can be fitted beside them, where the data ask for it."""
+SHOWN = {
+    Parameter.DAMPING_TIME: ("c / k", 1e6, "µs"),
+    Parameter.F0: ("f0", 1.0, "Hz"),
+    Parameter.F1: ("f1", 1.0, "Hz"),
+    Parameter.F2: ("f2", 1.0, "Hz"),
+    Parameter.M0: ("m0", 1e3, "g"),
+    Parameter.M1: ("m1", 1e3, "g"),
+    Parameter.M2: ("m2", 1e3, "g"),
+    Parameter.C0: ("c0", 1.0, "N s/m"),
+    Parameter.C1: ("c1", 1.0, "N s/m"),
+    Parameter.C2: ("c2", 1.0, "N s/m"),
+    Parameter.GAP: ("gap of the nearer side", 1e6, "µm"),
+}
+"""How a parameter is written: name, factor, unit."""
+
+
+@dataclass(frozen=True)
+class FittedValue:
+    """A parameter with its interval."""
+
+    parameter: Parameter
+    value: float
+    low: float
+    high: float
+    """Both with the confidence of the fit."""
+    sd: float
+    """Standard deviation; NaN where the interval is one of bounds."""
+    nominal: float
+    """What the bench configuration says."""
+
+
+def parameter_value(specimen: Specimen, parameter: Parameter) -> float:
+    """Read one parameter of a specimen; the damping time of a specimen with several is that of link 0."""
+    masses, stiffnesses = specimen.masses, specimen.stiffnesses
+    match parameter:
+        case Parameter.DAMPING_TIME:
+            return specimen.dampings[0] / stiffnesses[0]
+        case Parameter.F0 | Parameter.F1 | Parameter.F2:
+            link = LINEAR.index(parameter) - 1
+            return float(np.sqrt(stiffnesses[link] / masses[link]) / (2.0 * np.pi))
+        case Parameter.M0 | Parameter.M1 | Parameter.M2:
+            return masses[MASSES.index(parameter)]
+        case Parameter.C0 | Parameter.C1 | Parameter.C2:
+            return specimen.dampings[DAMPERS.index(parameter)]
+        case Parameter.GAP:
+            return min(specimen.gaps_m)
+        case _:
+            assert_never(parameter)
+
+
+def with_values(specimen: Specimen, values: Mapping[Parameter, float]) -> Specimen:
+    """Give a specimen other parameters; frequencies stay when a mass changes.
+
+    Dampings that are not given keep their proportions to the stiffnesses, and two gaps theirs to each other.
+    """
+    old = parameter_value(specimen, Parameter.DAMPING_TIME)
+    beta = values.get(Parameter.DAMPING_TIME, old)
+    shares = [
+        c / k / old if old else 1.0 for c, k in zip(specimen.dampings, specimen.stiffnesses, strict=True)
+    ]
+    m0, m1, m2 = masses = tuple(values.get(each, parameter_value(specimen, each)) for each in MASSES)
+    k0, k1, k2 = stiffnesses = [
+        mass * (2.0 * np.pi * values.get(name, parameter_value(specimen, name))) ** 2
+        for mass, name in zip(masses, LINEAR[1:], strict=True)
+    ]
+    c0, c1, c2 = (
+        values.get(each, share * beta * k)
+        for each, share, k in zip(DAMPERS, shares, stiffnesses, strict=True)
+    )
+    nearest = min(specimen.gaps_m)
+    wider = values.get(Parameter.GAP, nearest) / nearest
+    lower, upper = specimen.gaps_m
+    return replace(
+        specimen,
+        masses=(m0, m1, m2),
+        stiffnesses=(k0, k1, k2),
+        dampings=(c0, c1, c2),
+        gap_m=wider * upper,
+        lower_gap_m=None if specimen.lower_gap_m is None else wider * lower,
+    )

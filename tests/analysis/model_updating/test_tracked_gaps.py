@@ -1,0 +1,49 @@
+"""What a colliding motion tells of a specimen is a part of the fit's answer, or is refused."""
+
+from dataclasses import replace
+
+import pytest
+
+from vibench.analysis import Simulation, analyse_files, update_model
+from vibench.analysis.hidden_motion import Hidden
+from vibench.analysis.model_updating import Assumption
+from vibench.analysis.model_updating._tracked_gaps import tracked_numbers
+from vibench.sim import gong2025
+
+TRUE = gong2025(gap_m=(35e-6, 55e-6))
+
+
+@pytest.fixture(scope="module")
+def collided(world, tmp_path_factory):
+    """Analyse a dwell of a specimen with unequal gaps; the bench says 45 um on both sides."""
+    recorded = world.shaken(
+        tmp_path_factory.mktemp("unequal"), 258.0, 1.9, duration_s=2.6, seed=41, specimen=TRUE
+    )
+    return analyse_files([recorded.path], "unequal", Simulation.LEFT_OUT)
+
+
+def test_unequal_gaps_are_found_and_contradict_a_description_of_equal_ones(collided):
+    updated = update_model(collided)
+    lower, upper = updated.tracked.gaps
+    assert lower.low <= 35e-6 <= lower.high
+    assert upper.low <= 55e-6 <= upper.high
+    assert updated.specimen.gaps_m == (lower.value, upper.value)
+    assert updated.description.gap_m == (lower.value, upper.value)
+    told = {each.what: each for each in updated.tracked.told}
+    assert told[Hidden.M1].low <= TRUE.masses[1] <= told[Hidden.M1].high
+    assert not updated.fits
+    (suspect,) = updated.suspects
+    assert suspect.assumption is Assumption.GAPS
+    assert "lower gap of (3" in suspect.sentence
+    assert "upper gap of (5" in suspect.sentence
+    assert [each for each in updated.sentences if each.startswith("Collisions contradict")]
+    assert updated.to_dict()["suspects"][0]["assumption"] == "gaps"
+
+
+def test_a_motion_that_the_described_masses_do_not_explain_tells_no_gap(collided):
+    """Motion tells m1 and the springs by their ratio to m0 and m2, which must be right."""
+    m0, m1, m2 = TRUE.masses
+    found, why = tracked_numbers(collided, replace(TRUE, masses=(1.04 * m0, m1, m2)))
+    assert found is None
+    assert "run:" not in why
+    assert why.startswith("shaken: ")
