@@ -6,9 +6,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from ..recording import SegmentLabel
-from ._base_level import RelativeSetting
 from ._plan import Family, FixedSine, LeadIn
-from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
 MOST_LEAD_INS = 1000
@@ -52,11 +50,6 @@ class Dwell(FixedSine):
     def _tone(self) -> LeadIn:
         return LeadIn(frequency_hz=self.frequency_hz, amplitude_vpp=self.amplitude_vpp)
 
-    def level_at(self, frequency_hz: float) -> RelativeSetting:
-        """Give the setting, the same at every frequency."""
-        del frequency_hz
-        return RelativeSetting(1.0)
-
     @property
     def lead_in_s(self) -> float:
         """Time of all tones of the lead-in [s]."""
@@ -85,9 +78,3 @@ class Dwell(FixedSine):
             yield Step(Tone(tone.frequency_hz, level), 0.0, self.lead_s, way)
         segment = Segment(SegmentLabel.DWELL, {"frequency_hz": self.frequency_hz})
         yield Step(Tone(self.frequency_hz), self.settle_s, self.duration_s, segment)
-
-    def preview(self, sample_rate_hz: float) -> SignalPreview:
-        """Show the sine from the moment the lead-in, or the wait, begins."""
-        return signal_preview(
-            self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
-        )

@@ -8,7 +8,6 @@ from pydantic import PositiveFloat
 from ..recording import SegmentLabel
 from ._feedback import BaseLevel, Settling
 from ._plan import AbstractFeedback, Family, FixedSine
-from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
 
@@ -45,9 +44,3 @@ class HeldDwell(FixedSine, AbstractFeedback):
     def steps(self) -> Iterator[Step]:
         """One step, without its wait, at the largest setting."""
         yield Step(Tone(self.frequency_hz), 0.0, self.duration_s, self.segment)
-
-    def preview(self, sample_rate_hz: float) -> SignalPreview:
-        """Show the recorded part at the largest setting."""
-        return signal_preview(
-            self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
-        )

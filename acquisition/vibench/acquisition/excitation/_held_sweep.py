@@ -5,10 +5,8 @@ from typing import Literal
 
 from pydantic import PositiveFloat
 
-from ..recording import SegmentLabel
 from ._feedback import BaseLevel, Settling
 from ._plan import AbstractFeedback
-from ._preview import SignalPreview, signal_preview
 from ._sine_sweep import MovingSine
 from ._steps import Segment, Step, Tone
 
@@ -41,26 +39,10 @@ class HeldSweep(MovingSine, AbstractFeedback):
     @property
     def segment(self) -> Segment:
         """What the sweep is called."""
-        return Segment(
-            SegmentLabel.SWEEP,
-            {
-                "start_hz": self.start_hz,
-                "stop_hz": self.stop_hz,
-                "duration_s": self.duration_s,
-                "step_s": self.step_s,
-                "spacing": self.spacing.value,
-                "hold": f"measured {self.base_level.quantity}",
-            },
-        )
+        return self.segment_with(f"measured {self.base_level.quantity}")
 
     def steps(self) -> Iterator[Step]:
         """One step for every ``step_s``, all of one segment, at the largest setting."""
         segment = self.segment
         for mean_hz, duration_s in self.mean_steps():
             yield Step(Tone(mean_hz), 0.0, duration_s, segment)
-
-    def preview(self, sample_rate_hz: float) -> SignalPreview:
-        """Show the whole sweep at the largest setting."""
-        return signal_preview(
-            self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
-        )

@@ -19,7 +19,6 @@ from ._multisine import (
     require_far_image,
     require_lines,
 )
-from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Waveform
 
 MOST_REALISATIONS = 1000
@@ -94,10 +93,7 @@ class PeriodicNoise(BandNoise):
                 ),
             )
 
-    def preview(self, sample_rate_hz: float) -> SignalPreview:
+    def shown_steps(self) -> Iterator[Step]:
         """Show one period of the first realisation."""
         first = next(self.steps())
-        period = Step(first.play, settle_s=0.0, record_s=1 / self.repetition_hz, segment=first.segment)
-        return signal_preview(
-            [period], self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
-        )
+        yield Step(first.play, settle_s=0.0, record_s=1 / self.repetition_hz, segment=first.segment)

@@ -12,7 +12,7 @@ from ..recording import SegmentLabel
 from ._base_level import HeldAcceleration, LevelAtBase, RelativeSetting
 from ._direction import Approach, Direction
 from ._feedback import BaseLevel
-from ._preview import SignalPreview
+from ._preview import SignalPreview, signal_preview
 from ._steps import Step, Tone
 
 AmplitudeVpp = Annotated[float, Field(gt=0, le=1000)]
@@ -85,9 +85,10 @@ class AbstractExcitation(FrozenModel, ABC):
         """How strongly the base is driven, in words."""
         return f"{self.amplitude_vpp:g} Vpp"
 
-    @abstractmethod
     def level_at(self, frequency_hz: float) -> LevelAtBase:
-        """Say what decides the motion of the base while a frequency of the band is played."""
+        """Say what decides the motion of the base while a frequency of the band is played: the setting."""
+        del frequency_hz
+        return RelativeSetting(1.0)
 
     def held_accelerations(self) -> Iterator[tuple[float, float]]:
         """List frequencies [Hz] and amplitudes of the base's acceleration [m/s2] that feedback will hold."""
@@ -138,16 +139,22 @@ class AbstractExcitation(FrozenModel, ABC):
     def highest_frequency_hz(self) -> float:
         """The highest frequency that is meant to be there; what a converter must be able to follow [Hz]."""
 
-    @abstractmethod
+    def shown_steps(self) -> Iterator[Step]:
+        """List what a preview shows: all steps, unless less says as much."""
+        return self.steps()
+
     def preview(self, sample_rate_hz: float) -> SignalPreview:
         """Show what will be played, before anything moves.
 
-        Raises
-        ------
-        ConfigurationError
-            When ``sample_rate_hz`` is too low to show the highest frequency.
-
+        Raises ConfigurationError when ``sample_rate_hz`` is too low to show the highest frequency.
         """
+        return signal_preview(
+            self.shown_steps(),
+            self.amplitude_vpp,
+            sample_rate_hz,
+            self.highest_frequency_hz,
+            self.playing_s,
+        )
 
 
 class FixedSine(AbstractExcitation):

@@ -8,7 +8,6 @@ from pydantic import Field, PositiveFloat, model_validator
 from ..recording import SegmentLabel
 from ._feedback import BaseLevel, Settling
 from ._plan import AbstractFeedback, Family, FrequencyHz
-from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
 
@@ -106,9 +105,3 @@ class ResonanceTracking(AbstractFeedback):
         for number in range(count):
             frequency_hz = self.low_hz + (self.high_hz - self.low_hz) * number / (count - 1)
             yield Step(Tone(frequency_hz), 0.0, self.record_s, Segment(SegmentLabel.RESONANCE))
-
-    def preview(self, sample_rate_hz: float) -> SignalPreview:
-        """Show the recorded parts where the search begins, at the largest setting."""
-        return signal_preview(
-            self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
-        )

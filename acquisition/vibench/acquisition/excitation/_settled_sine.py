@@ -8,7 +8,6 @@ from pydantic import Field, PositiveFloat, model_validator
 from ..recording import SegmentLabel
 from ._feedback import BaseLevel, JumpSearch, Settling
 from ._plan import AbstractFeedback
-from ._preview import SignalPreview, signal_preview
 from ._stepped_sine import FrequencySteps
 from ._steps import Segment, Step, Tone
 
@@ -67,9 +66,3 @@ class SettledSine(FrequencySteps, AbstractFeedback):
             for frequency_hz in frequencies_hz:
                 segment = Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
                 yield Step(Tone(frequency_hz), 0.0, self.record_s, segment)
-
-    def preview(self, sample_rate_hz: float) -> SignalPreview:
-        """All steps of the list, waits left out, at the largest setting."""
-        return signal_preview(
-            self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
-        )

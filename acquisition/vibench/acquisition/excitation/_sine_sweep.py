@@ -11,7 +11,6 @@ from ..recording import SegmentLabel
 from ._base_level import RelativeSetting
 from ._direction import Approach, Direction
 from ._plan import AbstractExcitation, Family, FrequencyHz
-from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
 
@@ -139,6 +138,11 @@ class MovingSine(AbstractExcitation):
             end_s = min(begin_s + self.step_s, self.duration_s)
             yield (self.cycles(end_s) - self.cycles(begin_s)) / (end_s - begin_s), end_s - begin_s
 
+    def segment_with(self, held: str) -> Segment:
+        """Name the recorded sweep, and what is held along it."""
+        numbers = self.model_dump(include={"start_hz", "stop_hz", "duration_s", "step_s"})
+        return Segment(SegmentLabel.SWEEP, {**numbers, "spacing": self.spacing.value, "hold": held})
+
 
 class SineSweep(MovingSine):
     """A sine sweep at an amplitude setting that follows a power of the frequency."""
@@ -169,25 +173,12 @@ class SineSweep(MovingSine):
 
     def steps(self) -> Iterator[Step]:
         """One step for every ``step_s``, all of one segment."""
-        segment = Segment(
-            SegmentLabel.SWEEP,
-            {
-                "start_hz": self.start_hz,
-                "stop_hz": self.stop_hz,
-                "duration_s": self.duration_s,
-                "step_s": self.step_s,
-                "spacing": self.spacing.value,
-                "hold": self.hold.value,
-            },
-        )
+        segment = self.segment_with(self.hold.value)
         settle_s = self.settle_s
         for mean_hz, duration_s in self.mean_steps():
             yield Step(Tone(mean_hz, self.level(mean_hz)), settle_s, duration_s, segment)
             settle_s = 0.0
 
-    def preview(self, sample_rate_hz: float) -> SignalPreview:
+    def shown_steps(self) -> Iterator[Step]:
         """Show the whole sweep, without the wait before it."""
-        moving = (Step(step.play, 0.0, step.record_s, step.segment) for step in self.steps())
-        return signal_preview(
-            moving, self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
-        )
+        return (Step(step.play, 0.0, step.record_s, step.segment) for step in self.steps())

@@ -7,10 +7,8 @@ from typing import ClassVar, Literal, Self
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from ..recording import SegmentLabel
-from ._base_level import RelativeSetting
 from ._direction import Direction
 from ._plan import AmplitudeVpp, Family, FixedSine
-from ._preview import SignalPreview, signal_preview
 from ._stepped_sine import MOST_STEPS
 from ._steps import Segment, Step, Tone
 
@@ -63,11 +61,6 @@ class SteppedLevel(FixedSine):
             round(self.amplitude_vpp - number * self.step_vpp, 9) for number in reversed(range(self._count()))
         )
 
-    def level_at(self, frequency_hz: float) -> RelativeSetting:
-        """Give the highest level."""
-        del frequency_hz
-        return RelativeSetting(1.0)
-
     def turned(self, direction: Direction) -> Self:
         """Go through the levels in a direction."""
         return type(self).model_validate({**self.model_dump(exclude_unset=True), "direction": direction})
@@ -92,12 +85,6 @@ class SteppedLevel(FixedSine):
                 }
                 tone = Tone(self.frequency_hz, level_vpp / self.amplitude_vpp)
                 yield Step(tone, self.settle_s, self.record_s, Segment(SegmentLabel.STEP, numbers))
-
-    def preview(self, sample_rate_hz: float) -> SignalPreview:
-        """All levels, waits included."""
-        return signal_preview(
-            self.steps(), self.amplitude_vpp, sample_rate_hz, self.frequency_hz, self.playing_s
-        )
 
     def _steps(self) -> int:
         # Counted before any list of them is made: a wrong step could ask for millions.

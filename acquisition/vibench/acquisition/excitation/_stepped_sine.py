@@ -9,10 +9,8 @@ from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from ..host import FrozenModel
 from ..recording import SegmentLabel
-from ._base_level import RelativeSetting
 from ._direction import Approach, Direction
 from ._plan import AbstractExcitation, Family, FrequencyHz, around
-from ._preview import SignalPreview, signal_preview
 from ._steps import Segment, Step, Tone
 
 MOST_STEPS = 4000
@@ -124,11 +122,6 @@ class SteppedSine(FrequencySteps):
     settle_s: NonNegativeFloat = 3.0
     """Wait at every frequency until the transient has died out [s]."""
 
-    def level_at(self, frequency_hz: float) -> RelativeSetting:
-        """Give the setting, the same at every frequency."""
-        del frequency_hz
-        return RelativeSetting(1.0)
-
     @property
     def playing_s(self) -> float:
         """Settling and recording of all steps [s]."""
@@ -143,9 +136,3 @@ class SteppedSine(FrequencySteps):
                 # from being one segment.
                 segment = Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
                 yield Step(Tone(frequency_hz), self.settle_s, self.record_s, segment)
-
-    def preview(self, sample_rate_hz: float) -> SignalPreview:
-        """All steps, waits included."""
-        return signal_preview(
-            self.steps(), self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
-        )

@@ -10,7 +10,6 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from ..recording import SegmentLabel
 from ._band_noise import BandNoise
-from ._preview import SignalPreview, signal_preview
 from ._steps import Samples, Segment, Step, Stream
 
 CREST_FACTOR = 4.5
@@ -103,10 +102,7 @@ class StreamedNoise(BandNoise):
         band = {"band_start_hz": self.band_start_hz, "band_stop_hz": self.band_stop_hz}
         yield Step(Stream(self.source), self.settle_s, self.duration_s, Segment(SegmentLabel.NOISE, band))
 
-    def preview(self, sample_rate_hz: float) -> SignalPreview:
+    def shown_steps(self) -> Iterator[Step]:
         """Show the first seconds of it."""
-        (step,) = self.steps()
-        shown = Step(step.play, 0.0, min(self.duration_s, PREVIEW_S), step.segment)
-        return signal_preview(
-            [shown], self.amplitude_vpp, sample_rate_hz, self.highest_frequency_hz, self.playing_s
-        )
+        for step in self.steps():
+            yield Step(step.play, 0.0, min(self.duration_s, PREVIEW_S), step.segment)
