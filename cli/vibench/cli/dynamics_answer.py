@@ -24,11 +24,7 @@ SHOWN = 24
 def room_for(file: str, out: Path | None) -> None:
     """Refuse, before anything is computed, a folder that cannot be written to or holds an answer.
 
-    Raises
-    ------
-    InvalidRequest
-        When the file is there.
-
+    Raises InvalidRequest when the file is there.
     """
     if out is None:
         return

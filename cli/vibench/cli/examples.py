@@ -47,11 +47,7 @@ def files_of(folder: Path) -> list[Path]:
 def copy_all(found: dict[str, list[Path]], target: Path) -> None:
     """Copy every file into a folder of the same name under ``target``.
 
-    Raises
-    ------
-    ConfigurationError
-        Before anything is copied, when a file of that name is there.
-
+    Raises ConfigurationError before anything is copied, when a file of that name is there.
     """
     room_for_folder(target)
     copies = {

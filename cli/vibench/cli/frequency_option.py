@@ -12,11 +12,7 @@ _ADVICE = "give one frequency above 0 Hz, or START:STOP:STEP [Hz] such as 10:600
 def frequencies(text: str) -> tuple[float, ...]:
     """Read ``260`` or ``10:600:1``.
 
-    Raises
-    ------
-    InvalidRequest
-        When it is neither, or lists nothing, or too much.
-
+    Raises InvalidRequest when it is neither, or lists nothing, or too much.
     """
     numbers = [_number(text, part) for part in text.split(":")]
     if len(numbers) not in (1, _RANGE_PARTS):

@@ -42,11 +42,7 @@ def rig_at(bench: Path | None, faults: Path | None) -> Rig:
 def room_for_folder(path: Path) -> None:
     """Refuse a folder that cannot be written to, before anything is computed for it; makes none.
 
-    Raises
-    ------
-    ConfigurationError
-        When it, or what it would lie in, is a file or may not be written to.
-
+    Raises ConfigurationError when it, or what it would lie in, is a file or may not be written to.
     """
     standing = next(each for each in (path, *path.resolve().parents) if each.exists())
     if standing.is_dir() and os.access(standing, os.W_OK):

@@ -33,11 +33,7 @@ class Range:
 def range_of(text: str, parameter: Parameter, parts: tuple[int, ...]) -> Range:
     """Read ``260``, ``50:600`` or ``50:600:1``, whichever numbers of parts are allowed.
 
-    Raises
-    ------
-    InvalidRequest
-        When it is none of them.
-
+    Raises InvalidRequest when it is none of them.
     """
     try:
         return Range(*_rising(text, parts))

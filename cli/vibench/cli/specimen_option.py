@@ -36,11 +36,7 @@ Asked = TypeVar("Asked", bound=SpecimenChoice)
 def described(specimen: str | None) -> SpecimenTable:
     """Read the specimen that an option names, the paper's where it names none.
 
-    Raises
-    ------
-    InvalidRequest
-        When there is none, or when the file does not describe one.
-
+    Raises InvalidRequest when there is none, or when the file does not describe one.
     """
     if specimen is None:
         return usual_specimen()
@@ -65,11 +61,7 @@ def asked_of_specimen(
 ) -> Asked:
     """Make a question about a specimen, or say in one sentence which option is not allowed.
 
-    Raises
-    ------
-    InvalidRequest
-        With what was given.
-
+    Raises InvalidRequest with what was given.
     """
     replaced = {"model": model, "damping_time_s": damping_time, "gap_m": gap}
     given = {name: value for name, value in replaced.items() if value is not None}

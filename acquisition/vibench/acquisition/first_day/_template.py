@@ -22,12 +22,8 @@ def value_in(text: str, key: str) -> str:
 def with_answer(text: str, key: str, answer: str, note: str) -> str:
     """Put an answer in the place of what the template holds, with a note who gave it.
 
-    Raises
-    ------
-    ConfigurationError
-        When it is of another kind than what stands there (a word for a number, no date), or the template has
-        no such table.
-
+    Raises ConfigurationError when it is of another kind than what stands there (a word for a number, no
+    date), or the template has no such table.
     """
     found = _place(text, key)
     if found is not None:

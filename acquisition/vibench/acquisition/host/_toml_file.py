@@ -50,11 +50,7 @@ MIGRATIONS: dict[tuple[str, int], Callable[[dict[str, Any]], dict[str, Any]]] = 
 def migrated(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]:
     """Bring the content of a file that says its version up to the present one.
 
-    Raises
-    ------
-    ConfigurationError
-        When a later vibench wrote it, or what stands there is no version.
-
+    Raises ConfigurationError when a later vibench wrote it, or what stands there is no version.
     """
     written = content.pop(FORMAT, VERSION)
     if not isinstance(written, int) or isinstance(written, bool) or not 1 <= written <= VERSION:

@@ -36,11 +36,7 @@ def sensor_name(config: ChannelConfig) -> str:
 def sensor_of(rig: Rig, config: ChannelConfig) -> SensorFacts:
     """Give the facts of the sensor in front of an input.
 
-    Raises
-    ------
-    ConfigurationError
-        When no package offers it, or it measures something else than the role records.
-
+    Raises ConfigurationError when no package offers it, or it measures something else than the role records.
     """
     name = sensor_name(config)
     sensor: Sensor = plug_in(PlugInKind.SENSOR, name)

@@ -270,11 +270,7 @@ class FreeNumbers:
 def free_numbers(described: TrackedSpecimen, motion: PreparedMotion, firsts: Sequence[int]) -> FreeNumbers:
     """Fit m1, c1, k0, k2, c0 and c2 so that flights fit best: Gauss and Newton on the innovations.
 
-    Raises
-    ------
-    NotEnoughData
-        When no stretch is long enough.
-
+    Raises NotEnoughData when no stretch is long enough.
     """
     count = round(_FIT_STRETCH_S * motion.sample_rate_hz)
     places = [each for each in firsts if each + count < motion.samples]

@@ -64,13 +64,8 @@ class PreparedMotion:
 def prepared_motion(recording: Recording, start: int, stop: int) -> PreparedMotion:
     """Read both channels between two samples and take their sensors out.
 
-    Raises
-    ------
-    UnusableData
-        When a channel is missing, samples were lost, or the rate is too low.
-    NotEnoughData
-        When the stretch is empty.
-
+    Raises UnusableData when a channel is missing, samples were lost, or the rate is too low, and
+    NotEnoughData when the stretch is empty.
     """
     rate = recording.sample_rate_hz
     _require_channels(recording)

@@ -36,14 +36,7 @@ class TrackedSpecimen:
 
 
 def tracked_specimen(specimen: Specimen) -> TrackedSpecimen:
-    """Take a specimen as described.
-
-    Raises
-    ------
-    InvalidRequest
-        When its contact law has no stops that yield.
-
-    """
+    """Take a specimen as described; raises InvalidRequest when its contact law has no stops that yield."""
     match specimen.contact:
         case RigidStops() | PowerLaw():
             raise InvalidRequest(

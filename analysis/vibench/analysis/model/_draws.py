@@ -114,6 +114,8 @@ def voltage_source(
 ) -> DrawSource:
     """Let the recorded voltage move rig and specimen together.
 
+    Raises UnusableData when samples were lost, or nothing is known of the shaker.
+
     Parameters
     ----------
     recording
@@ -122,11 +124,6 @@ def voltage_source(
         A shaker to take instead of the described one; each draw takes another of its uncertainty.
     draws
         How many, at most.
-
-    Raises
-    ------
-    UnusableData
-        When samples were lost, or nothing is known of the shaker.
 
     """
     rig = driven_rig(recording, specimen, None if fitted is None else fitted.shaker)
@@ -160,13 +157,7 @@ def drawn(
     """Estimate from every draw what was estimated from the recording.
 
     Where most of what was ``measured`` is of a kind of motion that few draws come to, up to three times as
-    many are made.
-
-    Raises
-    ------
-    UnusableData
-        When a simulation did not reach its end.
-
+    many are made. Raises UnusableData when a simulation did not reach its end.
     """
     channels = source.channels(0)
     first = estimate(channels)

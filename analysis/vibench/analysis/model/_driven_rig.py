@@ -46,6 +46,8 @@ class DrivenRig:
 def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None = None) -> DrivenRig:
     """Say what the recorded voltage was played into.
 
+    Raises UnusableData when the recording does not say what shaker, or amplifier, it was made with.
+
     Parameters
     ----------
     recording
@@ -54,11 +56,6 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
         On the table.
     shaker
         Its numbers, as fitted; by default those of the bench configuration.
-
-    Raises
-    ------
-    UnusableData
-        When the recording does not say what shaker, or amplifier, it was made with.
 
     """
     rig = _configured(recording)
@@ -107,11 +104,7 @@ def _configured(recording: Recording) -> Rig | None:
 def recorded_voltage(recording: Recording, rig: DrivenRig) -> Reals:
     """Read the voltage that drove the rig, over the whole recording [V]; shape (samples,).
 
-    Raises
-    ------
-    UnusableData
-        When samples were lost: a motion cannot be followed across a hole.
-
+    Raises UnusableData when samples were lost: a motion cannot be followed across a hole.
     """
     volts = recording.read(rig.role)
     lost = int(np.count_nonzero(np.isnan(volts)))

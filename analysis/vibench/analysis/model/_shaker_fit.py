@@ -71,14 +71,9 @@ def fitted_shaker(
     """Fit coil, table and suspension to the transmission from recorded voltage to base, without impacts.
 
     With D(s) = k + d s + (m + M(s)) s^2, M the specimen's mass as the base feels it, the base's acceleration
-    over the voltage is s^2 G / ((R + L s) D + s G^2) (Beranek, Acoustics, ch. 3).
-    The search begins at the shaker that is ``described``, else at several usual ones.
-
-    Raises
-    ------
-    UnusableData
-        When there are too few lines, or no shaker explains them.
-
+    over the voltage is s^2 G / ((R + L s) D + s G^2) (Beranek, Acoustics, ch. 3). The search begins at the
+    shaker that is ``described``, else at several usual ones. Raises UnusableData when there are too few
+    lines, or no shaker explains them.
     """
     found = _over_voltage(recording, analysis)
     known = found.is_significant & np.isfinite(found.relative_sd_magnitude) & (found.magnitude > 0)

@@ -41,13 +41,8 @@ class RecordedBaseMotion:
 def recorded_base_motion(recording: Recording, measurement: Measurement) -> RecordedBaseMotion:
     """Integrate the recorded acceleration twice, in the frequency domain, over the whole recording.
 
-    Whole, because it begins and ends in silence: there the missing past and future disturb nothing.
-
-    Raises
-    ------
-    UnusableData
-        When samples were lost: a displacement cannot be followed across a hole.
-
+    Whole, because it begins and ends in silence: there the missing past and future disturb nothing. Raises
+    UnusableData when samples were lost: a displacement cannot be followed across a hole.
     """
     acceleration = recording.read(BASE)
     lost = int(np.count_nonzero(np.isnan(acceleration)))
@@ -158,13 +153,8 @@ def under_base_motion(
 ) -> SimulatedChannels:
     """Shake a specimen, from rest, by the base motion of a whole recording, at its full sample rate.
 
-    Nothing is decimated: an interval between samples costs a fraction of a microsecond.
-
-    Raises
-    ------
-    UnusableData
-        When samples were lost, or the simulation did not reach the end.
-
+    Nothing is decimated: an interval between samples costs a fraction of a microsecond. Raises UnusableData
+    when samples were lost, or the simulation did not reach the end.
     """
     base = recorded_base_motion(recording, measurement)
     velocity, impacts = shaken(specimen, base.displacement_m, base.sample_rate_hz, accuracy)

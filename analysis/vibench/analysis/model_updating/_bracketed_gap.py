@@ -32,11 +32,7 @@ class Bracket:
 def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedValue:
     """Give the gap from the narrowest bracket; its value is the geometric mean of the bounds.
 
-    Raises
-    ------
-    NotEnoughData
-        When no frequency has a dwell on either side of the onset.
-
+    Raises NotEnoughData when no frequency has a dwell on either side of the onset.
     """
     found = list(brackets(dwells, linear))
     if not found:

@@ -71,6 +71,9 @@ def fit_specimen(
     whose chi square a right model exceeds once in a thousand times is refused: it has no values, and the
     assumptions that could be wrong, ranked.
 
+    Raises InvalidRequest when nothing is free, or what no linear transmission tells: the gap, or more than
+    one mass, and NotEnoughData when fewer significant lines than twice what is fitted are left.
+
     Parameters
     ----------
     transmission
@@ -86,13 +89,6 @@ def fit_specimen(
         calibrations state it; taken as exact when 0.
     is_nonlinear
         Whether realisations scatter more than noise does: friction and not damping; None when not known.
-
-    Raises
-    ------
-    InvalidRequest
-        When nothing is free, or what no linear transmission tells: the gap, or more than one mass.
-    NotEnoughData
-        When fewer significant lines than twice what is fitted are left.
 
     """
     free = tuple(free)

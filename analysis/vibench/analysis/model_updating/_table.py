@@ -58,12 +58,7 @@ def fitted_table(analysis: NoiseAnalysis, specimen: Specimen) -> TableFit | None
     """Fit the shaker to weak noise, and hold its mass against the bench's; None where no shaker is described.
 
     The table's mass shows in how the specimen's resonances pull at the base; the coil's numbers go along.
-
-    Raises
-    ------
-    UnusableData
-        When no shaker explains how the base follows the voltage.
-
+    Raises UnusableData when no shaker explains how the base follows the voltage.
     """
     with open_recording(analysis.facts.path) as recording:
         described = described_shaker(recording)

@@ -34,11 +34,7 @@ def quantity_text(value: float, unit: str) -> str:
 def parsed_quantity(text: str, unit: str) -> float:
     """Read a value in SI; a comma is a decimal point, a unit may carry a prefix.
 
-    Raises
-    ------
-    ConfigurationError
-        When it is no number, or its unit is another one.
-
+    Raises ConfigurationError when it is no number, or its unit is another one.
     """
     match = _NUMBER.match(text)
     if match is None:

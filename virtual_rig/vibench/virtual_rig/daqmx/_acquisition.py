@@ -126,11 +126,7 @@ class Acquisition:
     def read_at(self, first: int, count: int) -> NDArray[np.float64]:
         """Hand over ``count`` samples from number ``first`` on, shape (channels, count) [V].
 
-        Raises
-        ------
-        DaqmxRefusal
-            When they have been overwritten (-200279).
-
+        Raises DaqmxRefusal when they have been overwritten (-200279).
         """
         if self.failure is not None:
             raise self.failure

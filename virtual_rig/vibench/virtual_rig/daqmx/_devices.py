@@ -241,11 +241,7 @@ class Catalogue:
 def catalogue_with(product_type: str, name: str) -> Catalogue:
     """Give the default system, in which the device of that product bears that name.
 
-    Raises
-    ------
-    ConfigurationError
-        When there is no such product, or the name is taken by another one.
-
+    Raises ConfigurationError when there is no such product, or the name is taken by another one.
     """
     devices = Catalogue().devices
     old = next((device for device in devices if device.product_type == product_type), None)

@@ -71,14 +71,7 @@ class Faults:
         self._seen.clear()
 
     def check(self, rpc: str, now_s: float) -> None:
-        """Fail the call if a rule says so.
-
-        Raises
-        ------
-        DaqmxRefusal, Unavailable
-            As the rule demands.
-
-        """
+        """Fail the call if a rule says so; raises DaqmxRefusal or Unavailable as the rule demands."""
         for rule in tuple(self.rules):
             if rule.rpc not in ("*", rpc) or now_s < rule.from_s:
                 continue

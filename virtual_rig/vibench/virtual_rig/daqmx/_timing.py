@@ -87,11 +87,7 @@ def kind_of(timing: Timing, side: AnalogInputs | AnalogOutputs) -> SampleTimingT
 def actual_rate(timing: Timing, side: AnalogInputs | AnalogOutputs, channels: int) -> float:
     """Rate the device really runs at [Hz]: the next one up that it has.
 
-    Raises
-    ------
-    DaqmxRefusal
-        When the request lies outside what the device can do (-200077).
-
+    Raises DaqmxRefusal when the request lies outside what the device can do (-200077).
     """
     highest = side.rates.maximum_hz / (channels if _shares_converter(side) else 1)
     lowest = side.rates.minimum_hz

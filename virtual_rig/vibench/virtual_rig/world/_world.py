@@ -140,14 +140,9 @@ class World:
         """Begin a conversion now.
 
         Any rate from 500 Hz to 250 kHz, and to half the grid's on a coarser grid than the usual one; whole
-        divisors of the grid's are the fast case. All inputs share one delay of 40 samples (at most the
-        grid's rate counted), as behind a delta-sigma converter.
-
-        Raises
-        ------
-        ConfigurationError
-            When the rate lies outside.
-
+        divisors of the grid's are the fast case. All inputs share one delay of 40 samples (at most the grid's
+        rate counted), as behind a delta-sigma converter. Raises ConfigurationError when the rate lies
+        outside.
         """
         fastest_hz = fastest_sample_rate_hz(self._grid.rate_hz) or HIGHEST_RATE_HZ
         if not LOWEST_RATE_HZ <= sample_rate_hz <= fastest_hz:
