@@ -123,6 +123,14 @@ class LoadedShaker:
     def gain(self, gain: float) -> None:
         self._tables = self._tables._replace(gain=gain)
 
+    def change_specimen(self, specimen: Specimen) -> None:
+        """Go on with another specimen on the table, its masses where those of the last one are now.
+
+        Raises ValueError when it cannot be there.
+        """
+        self._specimen = new_state(specimen, self._specimen[:6])
+        self._tables = self._tables._replace(specimen=interval_tables(specimen, self._tables.step))
+
     def move(self, drive_v: FloatArray, noise_v: FloatArray | None = None, end_rows: int = 0) -> ShakenMotion:
         """Advance by as many steps as ``drive_v`` has values.
 

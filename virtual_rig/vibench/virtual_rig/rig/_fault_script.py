@@ -134,6 +134,19 @@ class TurnGain(ScriptedFault):
         return rig.turn_gain_back
 
 
+class WidenGaps(ScriptedFault):
+    """Both stops of the specimen move away from m1, or towards it."""
+
+    fault: Literal["widen_gaps"]
+    by_m: float = Field(ge=-1e-4, le=1e-3)
+    """Against what the configuration says [m]."""
+
+    def begin(self, rig: RigFaults) -> Heal:
+        """Move them; healing puts them back."""
+        rig.widen_gaps(self.by_m)
+        return lambda: rig.widen_gaps(0.0)
+
+
 class Disconnect(ScriptedFault):
     """A cable falls out of an input of the converter."""
 
@@ -226,6 +239,7 @@ FaultKind = Annotated[
     | DropLaser
     | OverRange
     | TurnGain
+    | WidenGaps
     | Disconnect
     | Overrun
     | ReserveDevice

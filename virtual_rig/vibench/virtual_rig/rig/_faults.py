@@ -78,6 +78,10 @@ class RigFaults:
         """Turn the amplifier's knob to what the configuration says."""
         self._world.restore_amplifier_gain()
 
+    def widen_gaps(self, by_m: float) -> None:
+        """Let the specimen's stops stand further from m1, or nearer [m]: a screw is loose, a stop worn."""
+        self._world.widen_gaps(by_m)
+
     def drop_laser(self, duration_s: float) -> None:
         """Take the light from the vibrometer: it shows nothing for a while."""
         self._world.disturb_vibrometer(duration_s, DROPOUT_LEVEL)

@@ -96,7 +96,8 @@ class World:
             grid,
         )
         step_s = grid.physical_step_s(virtual.converter_clock_ppm)
-        self.plant = LoadedShaker(amplifier_of(rig), shaker_of(rig), specimen or specimen_of(rig), step_s)
+        self._specimen = specimen or specimen_of(rig)
+        self.plant = LoadedShaker(amplifier_of(rig), shaker_of(rig), self._specimen, step_s)
         self._accelerometer = Accelerometer(
             rig.accelerometer, virtual.accelerometer_noise_m_per_s2, noise("accelerometer"), grid
         )
@@ -195,6 +196,13 @@ class World:
     def restore_amplifier_gain(self) -> None:
         """Turn the amplifier's knob to what the rig's configuration says."""
         self.set_amplifier_gain_db(self._gain_db)
+
+    def widen_gaps(self, by_m: float) -> None:
+        """Move both stops away from m1 by so much against what the rig began with [m]."""
+        began = self._specimen
+        lower, upper = began.gaps_m
+        with self._turn:
+            self.plant.change_specimen(replace(began, gap_m=upper + by_m, lower_gap_m=lower + by_m))
 
     def disturb_vibrometer(self, duration_s: float, level: float) -> None:
         """Let the vibrometer show ``level`` (part of full scale) from now on, for a while."""
