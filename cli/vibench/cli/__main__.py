@@ -83,6 +83,11 @@ COMMANDS = {
         "watch",
         "Watch what an engine carries out, from any terminal of the same user; Ctrl-C leaves it be.",
     ),
+    "twin": Place(
+        "twin",
+        "twin",
+        "Follow the hidden motion of what an engine measures, and note when the specimen changes.",
+    ),
     "stop": Place(
         "watch",
         "stop",

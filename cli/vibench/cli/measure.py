@@ -23,7 +23,15 @@ from vibench.acquisition.campaign import (
     PointOutcome,
     estimate_campaign,
 )
-from vibench.acquisition.engine import CampaignRequest, Engine, JobQueue, RequestHandler, Supervision, serving
+from vibench.acquisition.engine import (
+    CampaignRequest,
+    Engine,
+    JobQueue,
+    RequestHandler,
+    Supervision,
+    TwinSwitch,
+    serving,
+)
 from vibench.acquisition.rig import Rig
 
 from .engine_bars import Watching
@@ -114,6 +122,10 @@ def measure(
     as_json: Annotated[
         bool, typer.Option("--json", help="With --estimate: print one JSON document and nothing else.")
     ] = False,
+    twin: Annotated[
+        bool,
+        typer.Option("--twin", help="Follow the hidden motion beside it; note when the specimen changes."),
+    ] = False,
     notify: NotifyCommand = None,
     mail: MailPath = None,
 ) -> None:
@@ -132,6 +144,7 @@ def measure(
     request = CampaignRequest(
         campaign=plan,
         folder=out,
+        twin=TwinSwitch.ON if twin else TwinSwitch.OFF,
         existing=existing,
         after_failure=after_failure,
         changed_bench=ChangedBench.ACCEPT if accept_changed_bench else ChangedBench.REFUSE,

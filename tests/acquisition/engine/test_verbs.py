@@ -21,8 +21,9 @@ from vibench.acquisition.engine._wire import Message
 WORDS = {
     *("open", "close", "check", "arm", "disarm", "start", "stop"),
     *("resume", "mark", "status", "beat", "look", "shutdown"),
+    *("rig", "twin", "tell_twin", "tell_change"),
 }
-RESTRICTED = {"open", "close", "check", "arm", "start", "mark"}
+RESTRICTED = {"open", "close", "check", "arm", "start", "mark", "tell_change"}
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import Block, LimitExceeded, Overload
-from vibench.acquisition.plan import Dwell, InRunLimits, Measurement, OnOverload
+from vibench.acquisition.plan import Dwell, InRunLimits, Measurement, OnChange, OnOverload
 from vibench.acquisition.rig import Role, channels_of
 from vibench.acquisition.run._limit_monitor import LimitMonitor
 from vibench.acquisition.run._run import Run
@@ -135,6 +135,21 @@ def test_a_vibrometer_at_its_range_is_named_by_its_range_and_a_converter_by_its_
         assert (trip.channel, trip.quantity, trip.sample) == (role.value, said, 100)
         assert trip.limit == pytest.approx(limit)
         assert "widen the range" in text
+
+
+@pytest.mark.parametrize("ending", OnChange)
+def test_a_change_of_the_specimen_ends_a_run_only_where_the_plan_says_so(rig, ending):
+    monitor, quiet = monitor_of(rig, on_changed_specimen=ending), np.zeros((4, BLOCK))
+    monitor.require_safe(Block(0, quiet))
+    monitor.note_change("The specimen is not what it was.", BLOCK)
+    following = Block(BLOCK, quiet)
+    match ending:
+        case OnChange.NOTE:
+            monitor.require_safe(following)
+        case OnChange.STOP:
+            trip, text = trip_of(monitor, [following])
+            assert (trip.quantity, trip.sample) == ("change of the specimen", BLOCK)
+            assert "vibench twin --new-baseline" in text
 
 
 def test_an_over_range_that_is_only_flagged_is_not_taken_for_an_amplitude(rig):

@@ -18,6 +18,25 @@ def _load(name):
 
 
 world = _load("shaken_world")
+live = _load("live_world")
+
+
+@pytest.fixture(scope="session")
+def live_world():
+    """Shake the rig's specimen, and follow it with a live twin."""
+    return live.live_world
+
+
+@pytest.fixture
+def at_once():
+    """Where numbers are found before anything goes on."""
+    return live.AtOnce()
+
+
+@pytest.fixture
+def virtual_rig():
+    """The shipped virtual rig's configuration."""
+    return world.RIG
 
 
 @pytest.fixture(scope="session")

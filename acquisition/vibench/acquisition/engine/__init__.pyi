@@ -23,6 +23,9 @@ from ._heartbeat import (
 from ._job_queue import (
     JobQueue as JobQueue,
 )
+from ._live_twin import (
+    TwinSwitch as TwinSwitch,
+)
 from ._lock import (
     BenchLock as BenchLock,
 )
@@ -52,6 +55,7 @@ from ._status import (
     MessageKind as MessageKind,
     RowStatus as RowStatus,
     RunStatus as RunStatus,
+    TwinStatus as TwinStatus,
 )
 from ._stop_engine import (
     StopDelivery as StopDelivery,

@@ -20,13 +20,15 @@ from ..campaign import (
 )
 from ..check import check_bench, require_fresh
 from ..errors import AcquisitionError, CheckStopped, InstrumentLost
+from ..plan import Campaign, OnChange
 from ..rig import Confirm, Rig
 from ..stopping import StopSwitch, stop_on_signal
 from ._campaign_request import CampaignRequest
+from ._live_twin import TwinProcess, TwinSwitch
 from ._lock import BenchLock
 from ._published_state import PublishedState
 from ._state import EngineState, Supervision
-from ._status import BenchFacts, ChannelFacts
+from ._status import BenchFacts, ChannelFacts, TwinStatus
 
 
 def bench_facts(bench: Bench) -> BenchFacts:
@@ -62,6 +64,13 @@ class Engine:
         """Holds or ends what runs; a new one for every campaign."""
         self._reconnecting: ReconnectingBench | None = None
         self._lock: BenchLock | None = None
+        self._twin = TwinProcess()
+
+    @property
+    def rig(self) -> Rig | None:
+        """The configuration of the open bench; None while there is none."""
+        reconnecting = self._reconnecting
+        return None if reconnecting is None else reconnecting.bench.rig
 
     @property
     def bench(self) -> Bench:
@@ -132,6 +141,8 @@ class Engine:
             on_event(event)
 
         self.published.begin(request.campaign, request.folder)
+        if request.twin is TwinSwitch.ON or _may_end_by_change(request.campaign):
+            self.turn_twin(TwinSwitch.ON)
         try:
             make_folder(request.folder)
             with stop_on_signal(self.switch):
@@ -160,6 +171,21 @@ class Engine:
         self.published.messages.info(_told(point_results))
         self.published.enter(EngineState.READY)
         return point_results
+
+    def turn_twin(self, switch: TwinSwitch) -> None:
+        """Start or end the live twin, a process of its own that nothing here waits for."""
+        self._twin.turn(switch)
+        self.published.twin(TwinStatus() if self._twin.is_on else None)
+
+    def look_after_twin(self) -> None:
+        """Say when the live twin has ended by itself: nobody looks for changes of the specimen then."""
+        if (words := self._twin.last_words()) is not None:
+            self.published.twin(None)
+            self.published.messages.warn(
+                f"The live twin has ended ({words}).",
+                "The measurement goes on.",
+                "Changes of the specimen are not noticed; turn the twin on again.",
+            )
 
     def _check_ended(self, stopped: CheckStopped) -> None:
         """Show that somebody wanted the check to end; nothing is wrong."""
@@ -190,6 +216,11 @@ class Engine:
             self.published.bench(None)
             if lock is not None:
                 lock.close()
+            self.turn_twin(TwinSwitch.OFF)
+
+
+def _may_end_by_change(campaign: Campaign) -> bool:
+    return any(each.limits.on_changed_specimen is OnChange.STOP for _, each in campaign.recordings())
 
 
 def _told(point_results: tuple[PointResult, ...]) -> str:

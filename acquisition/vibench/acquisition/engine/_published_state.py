@@ -26,6 +26,7 @@ from ._status import (
     MessageKind,
     RowStatus,
     RunStatus,
+    TwinStatus,
 )
 
 KEPT = 100
@@ -107,6 +108,7 @@ class PublishedState:
         self._done_s = 0.0
         self._campaign_s = 0.0
         self._planned_s: dict[str, float] = {}
+        self._plans: dict[str, str] = {}
         self._overloads = 0
 
     @property
@@ -157,6 +159,10 @@ class PublishedState:
         self._folder = folder
         self._campaign_s, self._done_s, self._file = campaign.duration_s, 0.0, Path()
         self._planned_s = {name: measured_s(each) + campaign.rest_s for name, each in campaign.recordings()}
+        self._plans = {
+            name: f"{each.excitation.kind}, {each.excitation.highest_amplitude_vpp:g} Vpp"
+            for name, each in campaign.recordings()
+        }
         self._put_rows(_queued(campaign))
         self._put(state=EngineState.RUNNING, armed=None)
 
@@ -174,6 +180,14 @@ class PublishedState:
             overloads=self._overloads,
             **self._disk(),
         )
+
+    def twin(self, told: TwinStatus | None) -> None:
+        """Show what the live twin tells; None when there is none any more."""
+        buffer = self.sample_buffer
+        if told is not None and told.run_id == buffer.run_id and self._status.bench is not None:
+            late = max(0, buffer.samples - told.end_sample)
+            told = told.model_copy(update={"behind_s": late / self._status.bench.sample_rate_hz})
+        self._put(twin=told)
 
     def note_pause(self, rest_s: float, text: str) -> None:
         """Show that the campaign rests between two recordings."""
@@ -220,6 +234,7 @@ class PublishedState:
             campaign_total_s=max(self._campaign_s, self._done_s + run.total_s),
             amplitude_vpp=run.amplitude_vpp,
             frequency_hz=run.frequency_hz,
+            plan=self._plans.get(progress.name, ""),
         )
 
     def _disk(self) -> dict[str, int]:

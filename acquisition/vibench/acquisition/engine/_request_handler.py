@@ -20,9 +20,10 @@ from ._campaign_request import CampaignRequest
 from ._engine import Engine
 from ._errors import EngineError
 from ._job_queue import JobQueue
+from ._live_twin import TwinSwitch
 from ._sample_buffer import SampleSlice
 from ._state import DRIVING, SOUNDING, VIEWER_PATIENCE_S, EngineState, Supervision
-from ._status import ArmedPlan, EngineStatus
+from ._status import ArmedPlan, EngineStatus, TwinStatus
 from ._verbs import Verb
 
 Answer = TypeVar("Answer")
@@ -191,6 +192,29 @@ class RequestHandler:
         """Note an event at the next sample of the recording."""
         self._engine.switch.mark(text)
 
+    def tell_change(self, text: str) -> None:
+        """Note that the specimen has changed."""
+        self._engine.published.messages.warn(text)
+        self._engine.switch.tell_change(text)
+
+    def open_rig(self) -> Rig:
+        """Give the configuration of the open bench."""
+        rig = self._engine.rig
+        if rig is None:
+            raise EngineError(
+                f"no bench is open while the engine is {self._engine.published.state.value}; open one first"
+            )
+        return rig
+
+    def turn_twin(self, switch: TwinSwitch) -> None:
+        """Start or end the live twin."""
+        with self._asking:
+            self._engine.turn_twin(switch)
+
+    def tell_twin(self, told: TwinStatus) -> None:
+        """Show what the live twin tells."""
+        self._engine.published.twin(told)
+
     def shutdown(self, cause: Cause = Cause.OPERATOR, reason: str = "the engine was told to end") -> None:
         """End what runs, silence everything, and let the engine end. Legal in every state."""
         self._stop(StopRequest.by(cause, reason))
@@ -202,6 +226,7 @@ class RequestHandler:
         since_s, self._last_round_s = now_s - self._last_round_s, now_s
         if since_s > STALL_S:  # whoever asked while this process did not run is not to blame
             self._last_request_s += since_s
+        engine.look_after_twin()
         if engine.published.state is EngineState.ARMED and now_s - self._armed_s > ARMED_S:
             self.disarm()
             engine.published.messages.warn(

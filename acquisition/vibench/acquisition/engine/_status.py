@@ -57,6 +57,8 @@ class RunStatus(FrozenModel):
     campaign_total_s: float
     amplitude_vpp: float
     frequency_hz: float | None
+    plan: str = ""
+    """What is played, in words: kind and highest level."""
 
 
 class ChannelLevel(FrozenModel):
@@ -99,6 +101,41 @@ class EngineMessage(FrozenModel):
     """Name of the error, for a search."""
 
 
+class TwinStatus(FrozenModel):
+    """What the live twin told last: where m1 is between its stops, its numbers, and how late it is."""
+
+    pid: int = 0
+    """Of its process, once it has told anything."""
+    state: str = "starting"
+    """``"starting"``, ``"waiting"``, ``"tracked"`` or ``"lost"``."""
+    sentence: str = ""
+    run_id: int = 0
+    end_sample: int = 0
+    """One past the newest sample that it used."""
+    step_s: float = 0.0
+    """Between two values of ``p_m``, which end at the newest sample."""
+    p_m: tuple[float | None, ...] = ()
+    """Relative displacement; None where it was not followed."""
+    forecast_m: tuple[float, ...] = ()
+    """From the newest sample on, as far as it is worth anything."""
+    forecast_error_m: tuple[float, ...] = ()
+    """Within which 68 % of earlier forecasts were, as far ahead."""
+    stops_m: tuple[float, float] = (0.0, 0.0)
+    """Places of the lower and the upper stop."""
+    numbers: tuple[tuple[str, str], ...] = ()
+    """What this run's collisions told: name, and value with bounds of 95 %."""
+    level: float | None = None
+    """Innovation of the last tenth of a second, 1 when nothing but noise is left; None when lost."""
+    limit: float | None = None
+    """Beyond which the specimen is suspected; None while the usual level is being learnt."""
+    busy_share: float = 0.0
+    """Processor time of the twin's process over the time since the run began."""
+    missed_s: float = 0.0
+    """Of motion that it was too slow for [s]; the recording has it."""
+    behind_s: float = 0.0
+    """By how much its newest sample was behind the newest of the run, when it told [s]."""
+
+
 class EngineStatus(FrozenModel):
     """Everything a viewer shows, but the samples."""
 
@@ -122,5 +159,7 @@ class EngineStatus(FrozenModel):
     """Samples per channel of this run so far."""
     run_id: int = 0
     """Changes with every recording; what was seen of another one is no longer true."""
+    twin: TwinStatus | None = None
+    """What the live twin told last; None while there is none."""
     messages: tuple[EngineMessage, ...] = ()
     """The newest, oldest first."""

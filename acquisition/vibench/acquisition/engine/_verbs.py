@@ -23,9 +23,10 @@ from ..host import FrozenModel, validated
 from ..rig import KnobSheet, Rig
 from ..stopping import StopLevel
 from ._campaign_request import CampaignRequest
+from ._live_twin import TwinSwitch
 from ._sample_buffer import SampleSlice
 from ._state import DRIVING, EngineState
-from ._status import ArmedPlan, EngineStatus
+from ._status import ArmedPlan, EngineStatus, TwinStatus
 from ._wire import Message
 
 P = ParamSpec("P")
@@ -122,7 +123,7 @@ def _samples_read(facts: Mapping[str, Any], payload: bytes) -> SampleSlice:
 
 DONE: Answer[None] = Answer(lambda _: Message(b'{"ok": true}'), lambda _facts, _payload: None)
 SAMPLES = Answer(_samples_written, _samples_read)
-PLAN, STATUS = _model(ArmedPlan), _model(EngineStatus)
+PLAN, STATUS, RIG = _model(ArmedPlan), _model(EngineStatus), _model(Rig)
 
 
 def _with_absolute_folder(request: CampaignRequest) -> CampaignRequest:
@@ -180,6 +181,23 @@ class EngineVerbs:
     @verb("mark", DONE, *sorted(DRIVING))
     def mark(self, text: Annotated[str, Field(min_length=1, max_length=200)]) -> None:
         """Note an event at the next sample of the recording."""
+
+    @verb("tell_change", DONE, *sorted(DRIVING))
+    def tell_change(self, text: Annotated[str, Field(min_length=1, max_length=400)]) -> None:
+        """Note that the specimen has changed; a run whose plan asks for it is ended."""
+
+    @verb("rig", RIG)
+    def open_rig(self) -> Rig:
+        """Give the configuration of the open bench."""
+        raise NotImplementedError
+
+    @verb("twin", DONE)
+    def turn_twin(self, switch: TwinSwitch) -> None:
+        """Start or end the live twin beside what runs."""
+
+    @verb("tell_twin", DONE)
+    def tell_twin(self, told: TwinStatus) -> None:
+        """Show what the live twin tells."""
 
     @verb("status", STATUS)
     def status_since(self, known_rows: int = -1) -> EngineStatus:

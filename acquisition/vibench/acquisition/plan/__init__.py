@@ -59,7 +59,7 @@ from ._limits import (
     shortest_ramp_s,
 )
 from ._loads import needed_vpp, predicted_loads
-from ._measurement import InRunLimits, Measurement, OnOverload, Point
+from ._measurement import InRunLimits, Measurement, OnChange, OnOverload, Point
 from ._measurement_preview import (
     MeasurementPreview,
     preview_measurement,
@@ -115,6 +115,7 @@ __all__ = [
     "MeasurementPreview",
     "MultisineNoise",
     "OddMultisine",
+    "OnChange",
     "OnOverload",
     "Phase",
     "Point",

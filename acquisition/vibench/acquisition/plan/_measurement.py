@@ -29,6 +29,15 @@ class OnOverload(StrEnum):
     """Ramp down and end the run."""
 
 
+class OnChange(StrEnum):
+    """What the run does when the live twin finds that the specimen is no longer what it was."""
+
+    NOTE = "note"
+    """Note it as an event in the recording and go on."""
+    STOP = "stop"
+    """Ramp down and end the run; the live twin is started for it where nobody has."""
+
+
 class InRunLimits(FrozenModel):
     """When the running measurement must end itself: fractions of the rig's own limits."""
 
@@ -48,6 +57,7 @@ class InRunLimits(FrozenModel):
     specimen_amplitude: Fraction = 1.0
     """Of the specimen's amplitude limit: the main mass against the base, from the vibrometer."""
     on_overload: OnOverload = OnOverload.FLAG
+    on_changed_specimen: OnChange = OnChange.NOTE
 
 
 class Measurement(FrozenModel):

@@ -30,6 +30,8 @@ class EventKind(StrEnum):
     MARK = "mark"
     LIMIT = "limit"
     """Numbers of a limit that was passed, as a JSON object."""
+    SPECIMEN = "specimen"
+    """What the live twin found to have changed of the specimen."""
     LATE = "late"
     """The drive fell behind its plan for a moment: by how much, and where."""
     END = "end"

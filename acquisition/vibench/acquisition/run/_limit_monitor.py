@@ -10,7 +10,7 @@ from scipy.signal import bilinear, lfilter, lfilter_zi
 
 from ..errors import LimitExceeded, LimitTrip
 from ..instruments import Block, Overload, Samples
-from ..plan import InRunLimits, OnOverload
+from ..plan import InRunLimits, OnChange, OnOverload
 from ..rig import Channel, Rig, Role, suspended_mass_kg
 
 HIGH_PASS_HZ = 2.0
@@ -125,6 +125,7 @@ class LimitMonitor:
         self._limits = limits
         self._rate_hz = sample_rate_hz
         self._next_sample = 0
+        self._change: LimitExceeded | None = None
         self._begin(0)
 
     def require_safe(self, block: Block) -> None:
@@ -136,8 +137,29 @@ class LimitMonitor:
         self._next_sample = block.first_sample + block.volts.shape[1]
         for monitored in self._monitored_quantities(block):
             self._require(monitored, block.first_sample)
+        if self._change is not None:
+            raise self._change
         if block.overloads and self._limits.on_overload is OnOverload.STOP:
             raise self._overloaded(block, block.overloads[0])
+
+    def note_change(self, text: str, sample: int) -> None:
+        """Take a change of the specimen, seen at a sample; the next block raises it if the plan says so."""
+        if self._limits.on_changed_specimen is OnChange.STOP and self._change is None:
+            trip = LimitTrip(
+                channel=Role.M0_VELOCITY.value,
+                quantity="change of the specimen",
+                value=1.0,
+                limit=0.0,
+                unit="1",
+                sample=sample,
+                time_s=sample / self._rate_hz,
+            )
+            self._change = LimitExceeded(
+                f"{text.rstrip('.')}. The run was ramped down and its recording kept, as on_changed_specimen "
+                "asks; look at the specimen, and begin a new baseline with 'vibench twin --new-baseline' if "
+                "it is meant to be so",
+                trip,
+            )
 
     def _begin(self, first_sample: int) -> None:
         self._settled_sample = first_sample + round(SETTLING_S * self._rate_hz)

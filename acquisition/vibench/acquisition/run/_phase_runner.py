@@ -230,6 +230,9 @@ class PhaseRunner:
         loop = self.loop
         for text in self._switch.take_marks():
             loop.log(EventKind.MARK, text)
+        for text in self._switch.take_changes():
+            loop.log(EventKind.SPECIMEN, text)
+            self._limit_monitor.note_change(text, loop.samples)
         level_vpp = self._drive.setting_vpp
         frequency_hz = self._play.frequency_hz if isinstance(self._play, Tone) else None
         return Progress(

@@ -91,6 +91,7 @@ class StopSwitch:
         self._asked: dict[StopLevel, StopRequest] = {}
         self._holding = False
         self._marks: deque[str] = deque()
+        self._changes: deque[str] = deque()
 
     @property
     def request(self) -> StopRequest | None:
@@ -129,6 +130,15 @@ class StopSwitch:
         """Give each mark once, oldest first."""
         while self._marks:
             yield self._marks.popleft()
+
+    def tell_change(self, text: str) -> None:
+        """Note that the specimen has changed; a run whose plan asks for it ends then."""
+        self._changes.append(text)
+
+    def take_changes(self) -> Iterator[str]:
+        """Give each change once, oldest first."""
+        while self._changes:
+            yield self._changes.popleft()
 
     def harder_than(self, level: StopLevel) -> StopRequest | None:
         """Give a request that is harder than ``level``, if there is one."""

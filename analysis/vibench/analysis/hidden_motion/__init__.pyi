@@ -1,3 +1,14 @@
+from ._change_watch import (
+    BLOCK_S as BLOCK_S,
+    FALSE_ALARM_S as FALSE_ALARM_S,
+    Baseline as Baseline,
+    ChangeWatch as ChangeWatch,
+    KnownNumber as KnownNumber,
+    Level as Level,
+    baseline_path as baseline_path,
+    keep_baseline as keep_baseline,
+    kept_baseline as kept_baseline,
+)
 from ._collisions import (
     Collisions as Collisions,
 )
@@ -6,6 +17,9 @@ from ._contact_free import (
     FreeImpacts as FreeImpacts,
     FreeMotion as FreeMotion,
     measured_gaps as measured_gaps,
+)
+from ._forecast import (
+    Forecast as Forecast,
 )
 from ._found_parameters import (
     FoundParameter as FoundParameter,
@@ -27,6 +41,11 @@ from ._hidden_view import (
 )
 from ._kept_motion import (
     keep_hidden_motion as keep_hidden_motion,
+)
+from ._live_twin import (
+    LiveMotion as LiveMotion,
+    LiveState as LiveState,
+    LiveTwin as LiveTwin,
 )
 from ._parameters import (
     Hidden as Hidden,

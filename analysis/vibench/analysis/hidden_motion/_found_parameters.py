@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from ..signals import Reals
+from ..tables import plus_minus
 from ._contact_free import FITTED, FreeGap, free_gaps, free_motion, free_numbers
 from ._estimation import Estimate, estimate
 from ._filtering import LOSS_LIMIT, FilterState, motion_model, run_filter
@@ -61,6 +62,26 @@ _STARTS_APART = 0.3
 """Prior standard deviations by which restarts begin elsewhere: what is not forgotten shows as scatter."""
 
 
+_SHOWN = {
+    Hidden.LOWER_GAP: ("lower gap", 1e6, "µm"),
+    Hidden.UPPER_GAP: ("upper gap", 1e6, "µm"),
+    Hidden.M1: ("m1", 1e3, "g"),
+    Hidden.C1: ("c1", 1e3, "mN s/m"),
+    Hidden.K0: ("k0", 1.0, "N/m"),
+    Hidden.K2: ("k2", 1.0, "N/m"),
+    Hidden.C0: ("c0", 1e3, "mN s/m"),
+    Hidden.C2: ("c2", 1e3, "mN s/m"),
+    Hidden.FORCE: ("contact force at 1 µm", 1.0, "N"),
+    Hidden.EXPONENT: ("contact exponent", 1.0, ""),
+}
+
+
+def with_unit(value: float, half: float, unit: str) -> str:
+    """Write a value with half the width of its bounds."""
+    shown = plus_minus(value, half)
+    return f"({shown}) {unit}".strip() if unit and "±" in shown else f"{shown} {unit}".strip()
+
+
 @dataclass(frozen=True)
 class FoundParameter:
     """One parameter as collisions tell it."""
@@ -78,6 +99,19 @@ class FoundParameter:
     def is_determined(self) -> bool:
         """Whether value and bounds mean something."""
         return not self.not_determined
+
+    @property
+    def half_width(self) -> float:
+        """Of the bounds."""
+        return 0.5 * (self.high - self.low)
+
+    @property
+    def row(self) -> tuple[str, str, str]:
+        """Name, value with bounds of 95 % or why there is none, as described."""
+        label, factor, unit = _SHOWN[self.what]
+        said = self.not_determined and f"not determined: {self.not_determined}"
+        value = with_unit(factor * self.value, factor * self.half_width, unit)
+        return label, said or value, f"{factor * self.described:.6g} {unit}".strip()
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,11 +13,10 @@ from vibench.sim import Specimen
 from ..errors import InvalidRequest
 from ..recordings import ProgressObserver, Unobserved, specimen_of
 from ..signals import Reals
-from ..tables import plus_minus
 from ._collisions import Collisions, collisions_of, joined_collisions
 from ._contact_free import FreeGap, FreeMotion, free_gaps, free_motion
 from ._filtering import motion_model
-from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen
+from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen, with_unit
 from ._parameters import Hidden
 from ._prepared_motion import ChannelNoise, PreparedMotion, motion_in_samples, prepared_motion
 from ._tracking import NotFollowed, TrackedPiece, follow
@@ -309,34 +308,9 @@ def _gap_sd(found: FoundSpecimen | None) -> float:
     return max(widths, default=0.0) / 4.0
 
 
-_SHOWN = {
-    Hidden.LOWER_GAP: ("lower gap", MICRO, "µm"),
-    Hidden.UPPER_GAP: ("upper gap", MICRO, "µm"),
-    Hidden.M1: ("m1", 1e3, "g"),
-    Hidden.C1: ("c1", 1e3, "mN s/m"),
-    Hidden.K0: ("k0", 1.0, "N/m"),
-    Hidden.K2: ("k2", 1.0, "N/m"),
-    Hidden.C0: ("c0", 1e3, "mN s/m"),
-    Hidden.C2: ("c2", 1e3, "mN s/m"),
-    Hidden.FORCE: ("contact force at 1 µm", 1.0, "N"),
-    Hidden.EXPONENT: ("contact exponent", 1.0, ""),
-}
-
-
-def _with_unit(value: float, half: float, unit: str) -> str:
-    shown = plus_minus(value, half)
-    return f"({shown}) {unit}".strip() if unit and "±" in shown else f"{shown} {unit}".strip()
-
-
 def parameter_rows(motion: HiddenMotion) -> tuple[tuple[str, str, str], ...]:
     """Give what was found as rows: name, value with bounds of 95 % or why there is none, as described."""
-    rows = []
-    for each in motion.parameters:
-        label, factor, unit = _SHOWN[each.what]
-        said = each.not_determined and f"not determined: {each.not_determined}"
-        value = _with_unit(factor * each.value, factor * 0.5 * (each.high - each.low), unit)
-        rows.append((label, said or value, f"{factor * each.described:.6g} {unit}".strip()))
-    return tuple(rows)
+    return tuple(each.row for each in motion.parameters)
 
 
 def _sentences(motion: HiddenMotion) -> Iterator[str]:
@@ -358,7 +332,7 @@ def _sentences(motion: HiddenMotion) -> Iterator[str]:
     yield (
         f"Without a contact model: {motion.free.impacts.samples.size} impacts"
         + "".join(
-            f", {side} gap {_with_unit(MICRO * gap.value_m, 2 * MICRO * gap.sd_m, 'µm')}"
+            f", {side} gap {with_unit(MICRO * gap.value_m, 2 * MICRO * gap.sd_m, 'µm')}"
             for side, gap in zip(("lower", "upper"), motion.free_gaps, strict=True)
             if gap is not None
         )

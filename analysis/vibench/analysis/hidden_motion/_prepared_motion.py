@@ -1,5 +1,6 @@
 """The two channels as base and m0 moved, and how noisy they are: what every way starts from."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -68,7 +69,7 @@ def prepared_motion(recording: Recording, start: int, stop: int) -> PreparedMoti
     NotEnoughData when the stretch is empty.
     """
     rate = recording.sample_rate_hz
-    _require_channels(recording)
+    require_channels(recording.path.name, recording.roles)
     _require_rate(rate)
     # A corrected sample is made of its neighbours, so the recording's first and last few have none.
     start, stop = max(start, HALF_LENGTH), min(stop, recording.samples - HALF_LENGTH)
@@ -93,7 +94,7 @@ def motion_from(
 ) -> PreparedMotion:
     """Correct samples as they were recorded, and keep those from ``start`` to ``stop``."""
     corrected = [each[start:stop] for each in correction.corrected(acceleration, velocity)]
-    noise = ChannelNoise(*(_white_noise(each) for each in corrected))
+    noise = ChannelNoise(*(white_noise(each) for each in corrected))
     return PreparedMotion(
         corrected[0],
         corrected[1],
@@ -139,16 +140,17 @@ def _require_finite(acceleration: Reals, velocity: Reals) -> None:
         )
 
 
-def _require_channels(recording: Recording) -> None:
-    missing = [role for role in (BASE, RESPONSE) if role not in recording.roles]
+def require_channels(name: str, roles: Collection[str]) -> None:
+    """Raise UnusableData where a recording, or a bench, lacks what the hidden motion is told from."""
+    missing = [role for role in (BASE, RESPONSE) if role not in roles]
     if missing:
         raise UnusableData(
-            f"{recording.path.name} has no channel {' and no channel '.join(missing)}; the hidden motion is "
+            f"{name} has no channel {' and no channel '.join(missing)}; the hidden motion is "
             f"told from {BASE} and {RESPONSE}"
         )
 
 
-def _white_noise(samples: Reals) -> float:
+def white_noise(samples: Reals) -> float:
     """Estimate the rms of white noise from the quietest band near the top; a median outvotes impacts."""
     count = samples.size // _SEGMENT
     pieces = samples[: count * _SEGMENT].reshape(count, _SEGMENT) * np.hanning(_SEGMENT)

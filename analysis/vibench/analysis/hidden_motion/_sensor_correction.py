@@ -3,11 +3,9 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-
-from vibench.acquisition.recording import ChannelHeader
 
 from ..signals import Complexes, Reals
 
@@ -22,6 +20,18 @@ COUPLING_CUT_HZ = 0.5
 """-3 dB of the coupling capacitor of NI 9234 and USB-4431, first order."""
 _ASSUMED_DAMPING_RATIO = 0.02
 """Of an accelerometer's mounted resonance; a certificate rarely says it, and far below it does not matter."""
+
+
+class Sensed(Protocol):
+    """A channel, of a recording or of a bench, as far as its sensor is undone."""
+
+    @property
+    def delay_s(self) -> float:
+        """By which it lags [s]."""
+
+    @property
+    def coupling(self) -> str:
+        """AC or DC."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +53,7 @@ class SensorCorrection:
 
 
 def sensor_correction(
-    bench: Mapping[str, Any], base: ChannelHeader, response: ChannelHeader, sample_rate_hz: float
+    bench: Mapping[str, Any], base: Sensed, response: Sensed, sample_rate_hz: float
 ) -> SensorCorrection:
     """Design the filters from what a recording says of its sensors; what it leaves out is ideal."""
     resonance_hz = float(bench.get("accelerometer", {}).get("resonance_hz") or math.inf)

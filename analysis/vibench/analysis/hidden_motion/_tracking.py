@@ -164,7 +164,7 @@ def _pieces(model: MotionModel, motion: PreparedMotion, at: FilterState) -> Iter
         ahead = min(overlap, left - count)
         run = run_filter(model, motion, at, count, loss_limit=LOSS_LIMIT)
         is_lost = run.states.shape[0] < count
-        kept = _believed(run, motion.sample_rate_hz) if is_lost else count
+        kept = believed(run, motion.sample_rate_hz) if is_lost else count
         whole = run
         if ahead and not is_lost:
             beyond = run_filter(model, motion, at.copy(), ahead)
@@ -203,7 +203,7 @@ def _joined(one: Filtered, other: Filtered) -> Filtered:
     )
 
 
-def _believed(run: Filtered, sample_rate_hz: float) -> int:
+def believed(run: Filtered, sample_rate_hz: float) -> int:
     """Count the samples before a loss: up to where innovations over some milliseconds were good last."""
     squared = run.squared
     used = ~np.isnan(squared)

@@ -1,0 +1,115 @@
+"""Where m1 will be in some milliseconds, under a sine that goes on; and how wrong that has turned out."""
+
+from collections import deque
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..signals import Reals
+from ._filter_kernels import STATES, VX, W, X, Y, Z
+from ._filtering import FilterState, MotionModel, run_filter
+from ._prepared_motion import PreparedMotion
+from ._tracking_model import equations, exact_flow
+
+AHEAD_S = 0.04
+LEARNT_S = 0.15
+"""Of motion that tells how the base moves."""
+_HARMONICS = 3
+_YIELDING = (X, VX, W)
+"""States that the base's acceleration follows: the specimen pushes the table through k0 and c0."""
+_BIN_S = 1e-3
+_WITHIN = 0.68
+_FEWEST, _MOST = 5, 40
+"""Forecasts whose errors are looked at: the newest."""
+_NOT_MEASURED = 1e30
+"""Variance of a sample that is not there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """p from now on, one value a sample."""
+
+    first: int
+    """Number in the recording of the first sample."""
+    p: Reals
+    """[m]"""
+    error: Reals
+    """Within which 68 % of the last forecasts were, as far ahead, as the track then showed [m]; NaN until
+    some were seen."""
+
+
+class Forecaster:
+    """Makes forecasts, and compares them with what came."""
+
+    def __init__(self, sample_rate_hz: float) -> None:
+        self._bin = max(1, round(_BIN_S * sample_rate_hz))
+        self._count = self._bin * round(AHEAD_S / _BIN_S)
+        self._errors: deque[Reals] = deque(maxlen=_MOST)
+        self._pending: deque[tuple[int, Reals]] = deque(maxlen=8)
+
+    def forecast(
+        self,
+        model: MotionModel,
+        motion: PreparedMotion,
+        at: FilterState,
+        states: Reals,
+        frequency_hz: float,
+    ) -> Forecast | None:
+        """Let the motion go on from ``at``; ``states`` are those of the newest samples up to it.
+
+        None where the base does not tell how it yields: it hardly moves, or moves otherwise.
+        """
+        rate = motion.sample_rate_hz
+        numbers = motion.first_sample + at.sample - np.arange(states.shape[0] - 1, -1, -1)
+        turned = 2 * np.pi * frequency_hz / rate
+        matrix = np.column_stack([*_tones(turned * numbers), states[:, _YIELDING]])
+        scale = np.sqrt(np.mean(matrix**2, axis=0)) + np.finfo(float).tiny
+        stop = at.sample + 1
+        told = motion.acceleration[stop - len(matrix) : stop]
+        weights = np.linalg.lstsq(matrix / scale, told, rcond=1e-9)[0] / scale
+        ahead = numbers[-1] + np.arange(self._count + 1)
+        tone = _tones(turned * ahead).T @ weights[: 2 * _HARMONICS]
+        yielding = _on_a_table(model, motion, weights[2 * _HARMONICS :])
+        coming = replace(motion, acceleration=tone, velocity=np.zeros(tone.size))
+        start = FilterState(0, at.state[:STATES].copy(), at.covariance[:STATES, :STATES].copy())
+        run = run_filter(yielding, coming, start, self._count)
+        if run.states.shape[0] < self._count:
+            return None
+        p = run.states[:, Y] - run.states[:, Z]
+        self._pending.append((int(numbers[-1]) + 1, p))
+        return Forecast(int(numbers[-1]) + 1, p, self._usual_error())
+
+    def _usual_error(self) -> Reals:
+        if len(self._errors) < _FEWEST:
+            return np.full(self._count, np.nan)
+        usual = np.quantile(np.array(self._errors), _WITHIN, axis=0)
+        return np.asarray(np.repeat(np.maximum.accumulate(usual), self._bin))
+
+    def compare(self, first: int, p: Reals) -> None:
+        """Hold forecasts against the track from sample ``first`` on, NaN where it was lost."""
+        while self._pending and self._pending[0][0] + self._count <= first + p.size:
+            begin, told = self._pending.popleft()
+            if begin < first:
+                continue
+            error = (told - p[begin - first : begin - first + self._count]) ** 2
+            if not np.isnan(error).any():
+                self._errors.append(np.sqrt(error.reshape(-1, self._bin).mean(axis=1)))
+
+
+def _tones(turns: Reals) -> Reals:
+    """Give sine and cosine of the drive and its harmonics, shape (2 harmonics, samples)."""
+    return np.concatenate([(np.sin(n * turns), np.cos(n * turns)) for n in range(1, _HARMONICS + 1)])
+
+
+def _on_a_table(model: MotionModel, motion: PreparedMotion, weights: Reals) -> MotionModel:
+    """Let the base yield to the specimen, as the recording shows it to do."""
+    a, base, _ = equations(model.specimen, motion.coupling_rad_per_s)
+    a[:, _YIELDING] += np.outer(base, weights)
+    tables = model.tables
+    flows = (exact_flow(a, base, tables.step_s / parts) for parts in (1, tables.small_steps))
+    flow, small_flow = flows
+    return replace(
+        model,
+        tables=replace(tables, flow=flow, small_flow=small_flow),
+        velocity_variance=_NOT_MEASURED,
+    )

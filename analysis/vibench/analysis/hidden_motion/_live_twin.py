@@ -1,0 +1,393 @@
+"""The hidden motion beside a running measurement: the same filter, fed as samples come.
+
+The sensors' dynamics are undone by the filters of `_sensor_correction`, which makes the motion a third of a
+millisecond late; the accelerometer's coupling is a state of the filter. Nothing here waits or sleeps.
+"""
+
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from vibench.acquisition.rig import Rig, channels_of, specimen_of
+from vibench.sim import Specimen
+
+from ..recordings import BASE, RESPONSE
+from ..signals import Reals
+from ._change_watch import BLOCK_S, ChangeWatch, KnownNumber, Level
+from ._filter_kernels import STATES
+from ._filtering import LOSS_LIMIT, Filtered, FilterState, MotionModel, motion_model, run_filter
+from ._forecast import LEARNT_S, Forecast, Forecaster
+from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen
+from ._parameters import Hidden, with_values
+from ._prepared_motion import ChannelNoise, PreparedMotion, require_channels, white_noise
+from ._sensor_correction import HALF_LENGTH, sensor_correction
+from ._tracking import ACQUISITION_S, acquire, believed
+from ._tracking_model import TrackedSpecimen, tracked_specimen
+
+HELD_S = 3.0
+"""Of motion that is held for finding numbers in."""
+_NOISE_S = 0.5
+_FIND_S = 2.4
+"""Of motion that numbers are found in."""
+_PATIENCE = 2.0
+"""After numbers were not found so many times as long is waited."""
+_FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.05, 0.4
+"""Between two attempts at a motion that does not fit."""
+_CLIPPED = 25.0
+"""Largest squared innovation that counts: a single impact met a little late is no change."""
+_APART = 3.0
+"""Half widths of both bounds, added in squares, beyond which two numbers are different."""
+
+
+class LiveState(StrEnum):
+    """What of the hidden motion is known at the moment."""
+
+    WAITING = "waiting"
+    """Too little has been measured, or nothing moves enough to be told."""
+    TRACKED = "tracked"
+    LOST = "lost"
+    """What is measured does not fit the specimen's numbers: nothing is shown as motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class LiveMotion:
+    """The newest of the hidden motion."""
+
+    state: LiveState
+    why: str
+    """Where it is not tracked."""
+    first: int
+    """Number in the recording of the first sample of ``p``."""
+    p: Reals
+    """Relative displacement, NaN where it was not followed [m]."""
+    forecast: Forecast | None
+    """Under a sine only."""
+    gaps_m: tuple[float, float]
+    level: float
+    """Of the last block; 1 when nothing but noise is left."""
+    limit: float
+    """Beyond which a block lies out; NaN while the usual level is being learnt."""
+
+
+class LiveTwin:
+    """Follows what m1 does from samples as they come, finds its numbers, and notices when they change.
+
+    `take` is given every stretch of samples once and in order, and gives sentences about what has happened
+    to the specimen; `newest` is for a picture.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        sample_rate_hz: float,
+        executor: Executor,
+        specimen: Specimen | None = None,
+        known: dict[Hidden, KnownNumber] | None = None,
+    ) -> None:
+        """Begin.
+
+        Parameters
+        ----------
+        rig
+            The bench: its sensors, and the specimen where none is given.
+        sample_rate_hz
+            Of both channels.
+        executor
+            Where numbers are found while the motion is being followed: a second of computing.
+        specimen
+            As it is known.
+        known
+            Numbers of its baseline, which take the place of those described.
+
+        Raises
+        ------
+        InvalidRequest
+            When its stops cannot be tracked.
+        UnusableData
+            When the bench lacks one of the two channels.
+
+        """
+        channels = {each.role.value: each for each in channels_of(rig)}
+        require_channels(rig.name, tuple(channels))
+        self._described = tracked_specimen(specimen_of(rig) if specimen is None else specimen)
+        self._known = dict(known or {})
+        self._tracked = with_values(self._described, {n: each.value for n, each in self._known.items()})
+        self._correction = sensor_correction(
+            rig.model_dump(mode="json"), channels[BASE], channels[RESPONSE], sample_rate_hz
+        )
+        self._rate = sample_rate_hz
+        self._executor = executor
+        self._finding: Future[FoundSpecimen] | None = None
+        self.found: tuple[FoundParameter, ...] = ()
+        """What this run's collisions told of the specimen last; empty before."""
+        self.watch = ChangeWatch()
+        self._begin_anew(0)
+
+    def warm_up(self) -> None:
+        """Load what is compiled before the first sample comes: later it would make the twin late."""
+        count = round(4 * ACQUISITION_S * self._rate)
+        noise = 1e-3 * np.random.default_rng(1).standard_normal((2, count))
+        self.take(0, noise[0], noise[1])
+        assert self._motion.samples > 0
+        model = motion_model(self._tracked, self._motion)
+        at = FilterState(0, np.zeros(STATES), np.eye(STATES) * 1e-12)
+        run_filter(model, self._motion, at, 1, loss_limit=LOSS_LIMIT)
+        self._begin_anew(0)
+
+    def begin_run(self, usual: Level | None) -> None:
+        """Forget the last run's motion; its numbers stay. ``usual`` is the level of what is played now."""
+        self.watch = ChangeWatch(usual)
+        self.found = ()
+        self._begin_anew(0)
+
+    def _begin_anew(self, sample: int) -> None:
+        self._next = sample
+        self._raw = np.empty((2, 0))
+        nothing = np.empty(0)
+        self._motion = PreparedMotion(
+            nothing,
+            nothing,
+            self._rate,
+            self._correction.coupling_rad_per_s,
+            sample + HALF_LENGTH,
+            ChannelNoise(1.0, 1.0),
+        )
+        self._states = np.empty((0, STATES))
+        self._at: FilterState | None = None
+        self._model: MotionModel | None = None
+        self._state, self._why = LiveState.WAITING, "too little was measured to begin"
+        self._looked = self._pause = 0
+        self._find_at = sample + round(_FIND_S * self._rate)
+        self._wait = round(_FIND_S * self._rate)
+        self._squares: list[Reals] = []
+        self._block_end = sample + self._block
+        self._is_out = False
+        self._level = np.nan
+        self._forecaster = Forecaster(self._rate)
+        self._forecast: Forecast | None = None
+
+    @property
+    def _block(self) -> int:
+        return round(BLOCK_S * self._rate)
+
+    @property
+    def next_sample(self) -> int:
+        """Number in the recording of the sample that comes next."""
+        return self._next
+
+    @property
+    def newest(self) -> LiveMotion:
+        """Give what is known now: p of what is held, and the forecast behind it."""
+        limit = np.nan if self.watch.usual is None else self.watch.usual.limit
+        return LiveMotion(
+            self._state,
+            self._why,
+            self._motion.first_sample,
+            self._states[:, 1] - self._states[:, 2],
+            self._forecast,
+            self._tracked.specimen.gaps_m,
+            self._level,
+            limit,
+        )
+
+    def take(
+        self, first_sample: int, acceleration: Reals, velocity: Reals, frequency_hz: float | None = None
+    ) -> tuple[str, ...]:
+        """Take the next samples, as recorded in channel units; after a hole all begins anew.
+
+        Parameters
+        ----------
+        first_sample
+            Their number in the recording.
+        acceleration, velocity
+            Of the base [m/s2] and of m0 [m/s], shape (samples,).
+        frequency_hz
+            Of the sine that is played, for a forecast; None under anything else.
+
+        """
+        if first_sample != self._next:
+            self._begin_anew(first_sample)
+        if not np.isfinite(acceleration).all() or not np.isfinite(velocity).all():
+            self._begin_anew(first_sample + acceleration.size)
+            return ()
+        self._next = first_sample + acceleration.size
+        self._append(acceleration, velocity)
+        said: list[str] = []
+        self._follow(said)
+        self._find(said)
+        self._foresee(frequency_hz)
+        return tuple(said)
+
+    def _append(self, acceleration: Reals, velocity: Reals) -> None:
+        """Correct new samples and hold them; forget the oldest."""
+        self._raw = np.concatenate([self._raw, (acceleration, velocity)], axis=1)
+        if self._raw.shape[1] <= 2 * HALF_LENGTH:
+            return
+        new = [
+            each[HALF_LENGTH:-HALF_LENGTH] for each in self._correction.corrected(self._raw[0], self._raw[1])
+        ]
+        self._raw = self._raw[:, -2 * HALF_LENGTH :]
+        held = self._motion
+        surplus = max(0, held.samples + new[0].size - round(HELD_S * self._rate))
+        self._motion = replace(
+            held,
+            acceleration=np.concatenate([held.acceleration, new[0]])[surplus:],
+            velocity=np.concatenate([held.velocity, new[1]])[surplus:],
+            first_sample=held.first_sample + surplus,
+        )
+        unknown = np.full((new[0].size, STATES), np.nan)
+        self._states = np.concatenate([self._states, unknown])[surplus:]
+        self._looked = max(0, self._looked - surplus)
+        if self._at is not None:
+            self._at.sample -= surplus
+
+    def _follow(self, said: list[str]) -> None:
+        """Track to the newest sample, block by block of the test for a change."""
+        motion = self._motion
+        while True:
+            if self._at is None:
+                self._acquire()
+            end = min(self._block_end - motion.first_sample, motion.samples)
+            if self._at is not None and self._at.sample < end - 1:
+                self._advance(self._at, end - 1 - self._at.sample)
+            if motion.first_sample + motion.samples < self._block_end:
+                return
+            self._block_end += self._block
+            self._judge(said)
+
+    def _acquire(self) -> None:
+        motion = self._motion
+        window = round(ACQUISITION_S * self._rate)
+        first = motion.samples - 2 - window
+        if first < self._looked:
+            return
+        # A third of the window is new: its middle third, where a track begins, was not looked at yet.
+        self._looked = first + max(window // 3, self._pause)
+        part = slice(max(0, motion.samples - round(_NOISE_S * self._rate)), None)
+        if motion.samples < 2 * window:
+            return
+        noise = ChannelNoise(white_noise(motion.acceleration[part]), white_noise(motion.velocity[part]))
+        self._motion = replace(motion, noise=noise)
+        model = motion_model(self._tracked, self._motion)
+        begun = acquire(model, self._motion, first)
+        match begun:
+            case str():
+                is_misfit = "equations" in begun
+                self._state = LiveState.LOST if is_misfit else LiveState.WAITING
+                self._why = begun
+                if is_misfit:
+                    self._wait_longer()
+            case FilterState():
+                self._at, self._model = begun, model
+                self._state, self._why = LiveState.TRACKED, ""
+
+    def _advance(self, at: FilterState, count: int) -> None:
+        assert self._model is not None
+        begin = at.sample + 1
+        run = run_filter(self._model, self._motion, at, count, loss_limit=LOSS_LIMIT)
+        kept = run.states.shape[0]
+        if kept < count:
+            kept = believed(run, self._rate)
+            self._at, self._is_out = None, True
+            self._state, self._why = LiveState.LOST, "the motion does not fit the specimen's numbers"
+            self._wait_longer()
+        self._states[begin : begin + kept] = run.states[:kept]
+        self._squares.append(_counted(run))
+
+    def _wait_longer(self) -> None:
+        """Try again at once, then less and less often: what does not fit costs no more than what does."""
+        longest = round(_LONGEST_PAUSE_S * self._rate)
+        self._pause = min(2 * self._pause + round(_FIRST_PAUSE_S * self._rate), longest)
+
+    def _judge(self, said: list[str]) -> None:
+        """Hold the block that has ended against the usual level."""
+        squares = np.concatenate(self._squares or [np.empty(0)])
+        self._squares = []
+        is_out, self._is_out = self._is_out or self._state is LiveState.LOST, False
+        if not is_out:
+            self._pause = 0
+        if not is_out and squares.size < self._block // 4:
+            return
+        self._level = np.inf if is_out else float(squares.mean())
+        # Before any number is known a description that does not fit is no change.
+        if (self._known or self.found) and self.watch.take(self._level):
+            time_s = self._block_end / self._rate
+            said.append(
+                f"The specimen is not what it was, at {time_s:.1f} s: what is measured no longer fits its "
+                f"numbers (innovation {'lost' if is_out else f'{self._level:.3g}'}, usual "
+                f"{self.watch.usual.mean if self.watch.usual else np.nan:.3g})."
+            )
+            # Numbers that are being found are still those of before.
+            self._finding = None
+            self._wait = round(_FIND_S * self._rate)
+            self._find_at = self._next + self._wait
+
+    def _find(self, said: list[str]) -> None:
+        """Find gaps and masses in what is held, beside the tracking."""
+        if self._finding is not None and self._finding.done():
+            finding, self._finding = self._finding, None
+            self._take_found(finding.result(), said)
+        enough = self._motion.samples >= round(_FIND_S * self._rate)
+        is_quiet = self._state is LiveState.WAITING
+        if self._finding is None and enough and not is_quiet and self._next >= self._find_at:
+            stop = self._motion.samples
+            part = self._motion.part(stop - round(_FIND_S * self._rate), stop)
+            self._finding = self._executor.submit(found_specimen, self._tracked, part)
+            self._wait = round(_PATIENCE * self._wait)
+            self._find_at = self._next + self._wait
+
+    def _take_found(self, found: FoundSpecimen, said: list[str]) -> None:
+        told = {each.what: each for each in found.parameters if each.is_determined}
+        if not told:
+            return
+        if Hidden.LOWER_GAP in told or Hidden.UPPER_GAP in told:
+            self._find_at = np.iinfo(np.int64).max
+        changed = [each for each in told.values() if self._is_other(each)]
+        for each in changed:
+            label, value, _ = each.row
+            before = replace(each, value=(was := self._known[each.what]).value, low=was.low, high=was.high)
+            said.append(f"The specimen's {label} is {value}; it was {before.row[1]}.")
+        is_first = not self._known and not self.found
+        self.found = tuple(found.parameters)
+        if is_first or changed or self.watch.has_changed:
+            self._known |= {
+                each.what: KnownNumber(value=each.value, low=each.low, high=each.high)
+                for each in told.values()
+            }
+            self._track_with(found.tracked)
+            self.watch = ChangeWatch()
+
+    def _is_other(self, found: FoundParameter) -> bool:
+        before = self._known.get(found.what)
+        return before is not None and abs(found.value - before.value) > _APART * float(
+            np.hypot(found.half_width, 0.5 * (before.high - before.low))
+        )
+
+    def _track_with(self, tracked: TrackedSpecimen) -> None:
+        self._tracked = tracked
+        if self._at is not None:
+            self._model = motion_model(tracked, self._motion)
+
+    @property
+    def known(self) -> dict[Hidden, KnownNumber]:
+        """The numbers that the motion is tracked with, as far as collisions told them."""
+        return dict(self._known)
+
+    def _foresee(self, frequency_hz: float | None) -> None:
+        motion, at = self._motion, self._at
+        self._forecaster.compare(motion.first_sample, self._states[:, 1] - self._states[:, 2])
+        self._forecast = None
+        count = round(LEARNT_S * self._rate)
+        if at is None or self._model is None or frequency_hz is None or at.sample < count:
+            return
+        states = self._states[at.sample + 1 - count : at.sample + 1]
+        if not np.isnan(states[:, 0]).any():
+            self._forecast = self._forecaster.forecast(self._model, motion, at, states, frequency_hz)
+
+
+def _counted(run: Filtered) -> Reals:
+    """Give the squared innovations of flight, the largest clipped."""
+    squared = run.squared
+    return np.asarray(np.minimum(squared[~np.isnan(squared)], _CLIPPED))

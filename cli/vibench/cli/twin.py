@@ -1,0 +1,219 @@
+"""`vibench twin`: the live twin of a running measurement, a viewer that follows the hidden motion."""
+
+import os
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from vibench.acquisition import AcquisitionError
+from vibench.acquisition.engine import (
+    DRIVING,
+    EngineClient,
+    EngineError,
+    EngineGone,
+    EngineStatus,
+    SampleSlice,
+    TwinStatus,
+    the_engine,
+)
+from vibench.acquisition.rig import Rig, specimen_of
+from vibench.analysis.hidden_motion import (
+    Baseline,
+    LiveMotion,
+    LiveTwin,
+    baseline_path,
+    keep_baseline,
+    kept_baseline,
+)
+from vibench.sim import Specimen
+from vibench.sim.operating_system import lower_priority
+
+from .output import console
+from .specimen_option import SpecimenOption, described
+from .watch import Pid
+
+NICE = 5
+POLL_S = 0.01
+"""Between two looks while nothing new has come [s]."""
+IDLE_S = 0.2
+"""Between two looks while nothing runs [s]."""
+PIECE_S = 0.1
+"""Of motion that is worked on at once, and told [s]."""
+LATEST_S = 3.0
+"""Behind the newest sample by more than this, the twin leaves out what it was too slow for [s]."""
+SHOWN_S = 0.05
+SHOWN_POINTS = 320
+_WORTH_OF_GAP = 0.25
+"""A forecast is told as long as its usual error is below this part of the smaller gap."""
+
+
+@dataclass
+class _Following:
+    """A twin, and what it has seen of one run."""
+
+    client: EngineClient
+    rig: Rig
+    specimen: Specimen
+    live: LiveTwin
+    rows: tuple[int, int]
+    """Of base acceleration and m0's velocity among the channels."""
+    run_id: int = -1
+    plan: str = ""
+    missed: int = 0
+    begun_s: float = 0.0
+    busy_s: float = 0.0
+    is_kept: bool = False
+
+    def look(self) -> float:
+        """Work on what is new and tell it; gives how long to wait before the next look [s]."""
+        status = self.client.status()
+        if status.state not in DRIVING or status.run is None:
+            return IDLE_S
+        if status.run_id != self.run_id:
+            self._begin(status)
+        rate_hz = 1.0 if status.bench is None else status.bench.sample_rate_hz
+        waiting = status.samples - self.live.next_sample
+        if waiting <= 0:
+            return POLL_S
+        is_late = waiting > LATEST_S * rate_hz
+        # More may have come since the status: what is asked for last is cut off at its beginning.
+        most = round((PIECE_S if is_late else 2 * LATEST_S) * rate_hz)
+        piece = self.client.look(self.live.next_sample, most=most)
+        if piece.run_id != self.run_id or piece.volts.shape[1] == 0:
+            return POLL_S
+        self.missed += piece.first_sample - self.live.next_sample
+        self._take(piece, status, round(PIECE_S * rate_hz))
+        return 0.0
+
+    def _begin(self, status: EngineStatus) -> None:
+        self.run_id, self.plan = status.run_id, "" if status.run is None else status.run.plan
+        baseline = kept_baseline(baseline_path(self.rig, self.specimen))
+        self.live.begin_run(None if baseline is None else baseline.levels.get(self.plan))
+        self.missed, self.is_kept = 0, False
+        self.begun_s, self.busy_s = time.monotonic(), time.process_time()
+
+    def _take(self, piece: SampleSlice, status: EngineStatus, most: int) -> None:
+        assert status.bench is not None
+        gains = [status.bench.channels[row].units_per_volt for row in self.rows]
+        base, velocity = (
+            gain * piece.volts[row].astype(np.float64) for row, gain in zip(self.rows, gains, strict=True)
+        )
+        frequency_hz = None if status.run is None else status.run.frequency_hz
+        for begin in range(0, base.size, most):
+            part = slice(begin, begin + most)
+            for sentence in self.live.take(
+                piece.first_sample + begin, base[part], velocity[part], frequency_hz
+            ):
+                self.client.tell_change(sentence)
+        self._keep_baseline()
+        self.client.tell_twin(self._told(piece.sample_rate_hz))
+
+    def _keep_baseline(self) -> None:
+        """Keep numbers and usual level when both are known: what comes after is held against them."""
+        live, watch = self.live, self.live.watch
+        if self.is_kept or watch.usual is None or watch.has_changed or not live.known:
+            return
+        self.is_kept = True
+        path = baseline_path(self.rig, self.specimen)
+        before = kept_baseline(path)
+        if before is None:
+            before = Baseline(bench=self.rig.name, since=datetime.now(UTC), numbers=live.known, levels={})
+        if self.plan not in before.levels:
+            levels = {**before.levels, self.plan: watch.usual}
+            keep_baseline(before.model_copy(update={"levels": levels}), path)
+
+    def _told(self, rate_hz: float) -> TwinStatus:
+        newest = self.live.newest
+        step = max(1, round(SHOWN_S * rate_hz / SHOWN_POINTS))
+        shown = newest.p[-round(SHOWN_S * rate_hz) :][::-1][::step][::-1]
+        forecast, error = _worth(newest, step)
+        used_s = time.process_time() - self.busy_s
+        return TwinStatus(
+            pid=os.getpid(),
+            state=newest.state.value,
+            sentence=newest.why,
+            run_id=self.run_id,
+            end_sample=newest.first + newest.p.size,
+            step_s=step / rate_hz,
+            p_m=tuple(None if np.isnan(each) else each for each in shown.tolist()),
+            forecast_m=forecast,
+            forecast_error_m=error,
+            stops_m=(-newest.gaps_m[0], newest.gaps_m[1]),
+            numbers=tuple(each.row[:2] for each in self.live.found),
+            level=newest.level if np.isfinite(newest.level) else None,
+            limit=newest.limit if np.isfinite(newest.limit) else None,
+            busy_share=used_s / max(time.monotonic() - self.begun_s, 1e-3),
+            missed_s=self.missed / rate_hz,
+        )
+
+
+def _worth(newest: LiveMotion, step: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Give a forecast and its errors as far as it is worth anything, nothing where none was tried yet."""
+    if newest.forecast is None:
+        return (), ()
+    error = newest.forecast.error
+    count = int(np.argmin(error < _WORTH_OF_GAP * min(newest.gaps_m))) if error.size else 0
+    part = slice(0, count, step)
+    return tuple(newest.forecast.p[part].tolist()), tuple(error[part].tolist())
+
+
+def twin(
+    pid: Pid = None,
+    specimen: SpecimenOption = None,
+    new_baseline: Annotated[
+        bool,
+        typer.Option("--new-baseline", help="Forget what the specimen was: it was changed on purpose."),
+    ] = False,
+) -> None:
+    """Follow the hidden motion of what an engine measures, and note when the specimen changes."""
+    lower_priority(NICE)  # a window, and the measurement, come first
+    engine = the_engine(pid)
+    with EngineClient.attach(engine.address) as client, ThreadPoolExecutor(1) as executor:
+        try:
+            rig = _rig_of(client)
+            following = _following(client, rig, specimen, executor)
+            if new_baseline:
+                baseline_path(rig, following.specimen).unlink(missing_ok=True)
+            console.print(f"Following {engine.what}, process {engine.pid}; Ctrl-C ends the twin.")
+            while True:
+                time.sleep(following.look())
+        except EngineGone:
+            console.print("The engine has ended.")
+        except KeyboardInterrupt:
+            console.print("The engine goes on.")
+
+
+def _rig_of(client: EngineClient) -> Rig:
+    while True:
+        try:
+            return client.open_rig()
+        except EngineGone:
+            raise
+        except AcquisitionError:  # the bench is being opened
+            time.sleep(IDLE_S)
+
+
+def _following(
+    client: EngineClient, rig: Rig, specimen: str | None, executor: ThreadPoolExecutor
+) -> _Following:
+    status = client.status()
+    if status.bench is None:
+        raise EngineError("the bench was closed before the twin could look at it; start the twin again")
+    known_as = specimen_of(rig) if specimen is None else described(specimen).specimen()
+    baseline = kept_baseline(baseline_path(rig, known_as))
+    live = LiveTwin(
+        rig,
+        status.bench.sample_rate_hz,
+        executor,
+        known_as,
+        None if baseline is None else dict(baseline.numbers),
+    )
+    live.warm_up()
+    roles = [each.role for each in status.bench.channels]
+    rows = (roles.index("base_acceleration"), roles.index("m0_velocity"))
+    return _Following(client, rig, known_as, live, rows)

@@ -1,0 +1,69 @@
+"""A world whose samples are fed to a live twin as they come."""
+
+import sys
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibench.acquisition.rig import channels_of
+from vibench.analysis.hidden_motion import LiveTwin
+from vibench.virtual_rig.analogue import Coupling, Input
+from vibench.virtual_rig.world import World
+
+shaken_world = sys.modules["shaken_world"]
+RATE_HZ = 51_200.0
+ROLES = ("base_acceleration", "m0_velocity")
+
+
+class AtOnce(Executor):
+    """Does what it is given before it goes on: a test whose outcome no clock decides."""
+
+    def submit(self, fn, /, *args, **kwargs):
+        future = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+@dataclass
+class LiveWorld:
+    """A world that plays, and the twin that follows it."""
+
+    rig: object
+    world: World
+    twin: LiveTwin
+    conversion: object
+    gains: list[tuple[int, float]]
+    frequency_hz: float | None
+    samples: int = 0
+
+    def go_on(self, samples: int) -> tuple[str, ...]:
+        """Let the next samples come."""
+        volts = self.conversion.read(samples)
+        base, velocity = (volts[row] * gain for row, gain in self.gains)
+        first, self.samples = self.samples, self.samples + samples
+        return self.twin.take(first, base, velocity, self.frequency_hz)
+
+    def p(self):
+        """Give the world's p at every sample so far; its truth is then handed over."""
+        truth = self.world.truth()
+        shaken = shaken_world
+        rows = ((np.arange(self.samples) - shaken.GROUP_DELAY) * (shaken.GRID_HZ / RATE_HZ) - 1).astype(int)
+        return (truth[:, 4] - truth[:, 5])[np.maximum(rows, 0)]
+
+
+def live_world(kind, level_vpp, duration_s, seed, known=None):
+    """Begin to shake the rig's specimen."""
+    rig = shaken_world.noisy(1.0, seed)
+    world = World(rig, shaken_world.Played(shaken_world.drive(kind, level_vpp, duration_s, seed)))
+    world.keep_truth()
+    channels = channels_of(rig)
+    inputs = tuple(
+        Input(f"{rig.daq.device}/{each.physical}", each.range_v, Coupling(each.coupling), each.iepe_current_a)
+        for each in rig.daq.channels
+    )
+    roles = [each.role.value for each in channels]
+    gains = [(roles.index(role), channels[roles.index(role)].units_per_volt) for role in ROLES]
+    twin = LiveTwin(rig, RATE_HZ, AtOnce(), known=known)
+    played_hz = kind if isinstance(kind, float) else None
+    return LiveWorld(rig, world, twin, world.sample(inputs, RATE_HZ), gains, played_hz)

@@ -1,0 +1,139 @@
+"""The live twin: p as the world has it while samples come, and changes of the specimen noticed in time."""
+
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vibench.analysis.errors import InvalidRequest, UnusableData
+from vibench.analysis.hidden_motion import Hidden, LiveState, LiveTwin
+from vibench.sim import RigidStops, gong2025
+
+BLOCK = 5120
+HOURS, SEED = float(os.environ.get("LIVE_HOURS", "0.2")), int(os.environ.get("LIVE_SEED", "7100"))
+
+
+@pytest.fixture(scope="module")
+def dwell(live_world):
+    """5.5 s of a chaotic dwell, in pieces of any length: sentences, pictures by their time, and the truth."""
+    running = live_world(261.0, 1.7, 6.0, seed=71)
+    rng, seen, said = np.random.default_rng(3), [], []
+    while running.samples < 5.5 * 51_200:
+        said += running.go_on(int(rng.integers(200, 9000)))
+        seen.append((running.samples, running.twin.newest))
+    return running, seen, said, running.p()
+
+
+def test_p_is_the_worlds_while_samples_come(dwell):
+    _, seen, said, truth = dwell
+    assert said == []
+    late = [(end, each) for end, each in seen if end > 0.6 * 51_200]
+    assert all(each.state is LiveState.TRACKED for _, each in late)
+    for end, each in late[::10]:
+        newest = slice(-4000, None)
+        error = (each.p - truth[each.first : each.first + each.p.size])[newest]
+        assert np.sqrt(np.mean(error**2)) < 0.1e-6
+        # A third of a millisecond behind what was recorded last: half of the sensors' filters.
+        assert end - (each.first + each.p.size) == 16
+
+
+def test_gaps_and_mass_are_found_on_the_way(dwell):
+    running, *_ = dwell
+    found = {each.what: each for each in running.twin.found}
+    for side in (Hidden.LOWER_GAP, Hidden.UPPER_GAP):
+        assert found[side].low < 45e-6 < found[side].high
+        assert found[side].half_width < 0.05e-6
+    assert found[Hidden.M1].value == pytest.approx(2.1e-3, rel=1e-3)
+
+
+def test_a_forecast_errs_as_it_says(dwell):
+    _, seen, _, truth = dwell
+    errors, said = [], []
+    for end, each in seen:
+        forecast = each.forecast
+        if forecast is None or np.isnan(forecast.error[0]) or end > 5.4 * 51_200:
+            continue
+        error = forecast.p - truth[forecast.first : forecast.first + forecast.p.size]
+        errors.append(np.abs(error[::51][:20]))
+        said.append(forecast.error[::51][:20])
+    assert len(errors) > 20
+    assert 0.55 < np.mean(np.array(errors) < np.array(said)) < 0.9
+    # Under a chaos of some 280 per second: micrometres after ten milliseconds, much of the gap after twenty.
+    typical = np.median(errors, axis=0)
+    assert typical[2] < 0.3e-6
+    assert typical[-1] > 3e-6
+
+
+@pytest.mark.parametrize(("kind", "level_vpp"), [(258.0, 1.6), ("noise", 8.0)])
+def test_gaps_wider_by_a_micrometre_are_noticed_within_a_second_and_found(live_world, dwell, kind, level_vpp):
+    running = live_world(kind, level_vpp, 7.0, seed=72, known=dwell[0].twin.known)
+    while running.samples < 3.03 * 51_200:
+        assert running.go_on(BLOCK) == ()
+    running.world.widen_gaps(1e-6)
+    changed_s, said = running.samples / 51_200, []
+    while not said:
+        said += running.go_on(BLOCK)
+    assert running.samples / 51_200 - changed_s < 1.0
+    assert "not what it was" in said[0]
+    said.clear()
+    while not said:
+        said += running.go_on(BLOCK)
+    assert "The specimen's upper gap is (4" in " ".join(said)
+    running.go_on(3 * BLOCK)
+    newest = running.twin.newest
+    assert newest.state is LiveState.TRACKED
+    assert newest.gaps_m == pytest.approx((46e-6, 46e-6), abs=0.05e-6)
+    # Where it was not followed no motion is shown.
+    assert np.isnan(newest.p).any()
+    shown = ~np.isnan(newest.p)
+    error = (newest.p - running.p()[newest.first : newest.first + newest.p.size])[shown]
+    assert np.sqrt(np.mean(error**2)) < 0.3e-6
+
+
+def test_after_a_hole_nothing_older_is_shown(live_world):
+    running = live_world(260.0, 1.5, 2.0, seed=73)
+    for _ in range(8):
+        running.go_on(BLOCK)
+    assert running.twin.newest.state is LiveState.TRACKED
+    running.samples += 1
+    running.go_on(400)
+    newest = running.twin.newest
+    assert newest.state is LiveState.WAITING
+    assert newest.p.size < 400
+    assert np.isnan(newest.p).all()
+    for _ in range(3):
+        running.go_on(BLOCK)
+    assert running.twin.newest.state is LiveState.TRACKED
+
+
+def test_a_bench_and_a_specimen_that_cannot_be_followed_are_refused(live_world, at_once):
+    rig = live_world(260.0, 1.5, 0.1, seed=1).rig
+    rigid = replace(gong2025(), contact=RigidStops(0.8))
+    with pytest.raises(InvalidRequest, match="cannot be tracked"):
+        LiveTwin(rig, 51_200.0, at_once, rigid)
+    daq = rig.daq.model_copy(update={"channels": rig.daq.channels[:1]})
+    with pytest.raises(UnusableData, match=r"has no channel base_acceleration and no channel m0_velocity"):
+        LiveTwin(rig.model_copy(update={"daq": daq}), 51_200.0, at_once)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1700)
+def test_hours_without_a_change_bring_no_alarm(live_world):
+    """LIVE_HOURS=H and LIVE_SEED=S in the environment ask for so much rig time, and for other rigs."""
+    rng, out, blocks, seed = np.random.default_rng(SEED), 0, 0, SEED
+    while blocks < 36_000 * HOURS:
+        kinds = ((float(rng.uniform(250, 272)), float(rng.uniform(1.2, 3))), ("sweep", 2.0), ("noise", 8.0))
+        kind, level_vpp = kinds[seed % 3]
+        running = live_world(kind, level_vpp, 120.0, seed=seed)
+        running.world.truth()
+        while running.samples < 119 * 51_200:
+            assert running.go_on(BLOCK) == (), (kind, level_vpp, seed, running.samples)
+            running.world.truth()
+            usual = running.twin.watch.usual
+            if usual is not None:
+                blocks += 1
+                out += running.twin.newest.level > usual.limit
+        seed += 1
+    # The threshold of the test rests on this: no more than one block in a hundred is out by chance.
+    assert out < 0.01 * blocks

@@ -1,0 +1,128 @@
+"""`vibench twin` beside a real engine at the wall's pace: what it tells, and that it keeps nothing up."""
+
+import os
+import signal
+import time
+from pathlib import Path
+from threading import Event
+
+import pytest
+
+from vibench.acquisition import open_recording
+from vibench.acquisition.check import CheckRule
+from vibench.acquisition.engine import (
+    DRIVING,
+    CampaignRequest,
+    EngineState,
+    Supervision,
+    TwinSwitch,
+    start_engine,
+)
+from vibench.acquisition.plan import Campaign
+from vibench.acquisition.rig import load_rig, with_faults
+
+ROOT = Path(__file__).resolve().parents[2]
+PAUSE, LOOK_S, PATIENCE_S = Event(), 0.02, 200.0
+STOPPING = {"on_changed_specimen": "stop"}
+
+
+def campaign(limits, duration_s=600.0):
+    dwell = {
+        "kind": "dwell",
+        "amplitude_vpp": 1.5,
+        "frequency_hz": 260,
+        "settle_s": 0.2,
+        "duration_s": duration_s,
+    }
+    one = {"name": "dwell", "ramp_s": 0.3, "excitation": dwell, "limits": limits}
+    return Campaign.model_validate({"name": "twins", "measurements": [one]})
+
+
+@pytest.fixture
+def running(tmp_path, monkeypatch):
+    """Start an engine on a rig at the wall's pace, and on it a campaign."""
+    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path / "state"))
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    rig = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
+    rig = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
+    with start_engine(Supervision.UNATTENDED) as engine:
+
+        def start(plan, faults=None, **how):
+            engine.client.open(rig if faults is None else with_faults(rig, faults))
+            until(engine.client, lambda status: status.state is EngineState.READY)
+            request = CampaignRequest(campaign=plan, folder=tmp_path, check=CheckRule.WAIVED, **how)
+            engine.client.arm_request(request)
+            engine.client.start()
+            return engine.client
+
+        yield start
+
+
+def until(client, is_so):
+    give_up_s = time.monotonic() + PATIENCE_S
+    while not is_so(status := client.status()):
+        assert time.monotonic() < give_up_s, status
+        PAUSE.wait(LOOK_S)
+    return status
+
+
+def is_tracked(status):
+    return status.twin is not None and status.twin.state == "tracked" and status.twin.level is not None
+
+
+def recorded(tmp_path):
+    with open_recording(tmp_path / "dwell.h5") as recording:
+        return [(each.kind, each.text) for each in recording.events], recording.gaps
+
+
+def test_p_is_told_while_it_is_measured_and_a_change_ends_a_run_whose_plan_says_so(running, tmp_path):
+    client = running(campaign(STOPPING))
+    told = until(client, is_tracked).twin
+    assert told.stops_m == pytest.approx((-45e-6, 45e-6), rel=1e-2)
+    shown = [each for each in told.p_m if each is not None]
+    assert len(shown) > 100
+    assert max(map(abs, shown)) < 48e-6
+    assert told.step_s * len(told.p_m) == pytest.approx(0.05, rel=0.1)
+    # It may be ended, and started again, and what is measured is measured on.
+    client.turn_twin(TwinSwitch.OFF)
+    assert client.status().twin is None
+    until(client, lambda status: status.samples > told.end_sample + 51_200)
+    client.tell_change("The specimen is not what it was.")
+    status = until(client, lambda status: status.state not in DRIVING)
+    assert [each.state for each in status.rows] == ["failed"]
+    assert "as on_changed_specimen asks" in status.rows[0].reason
+    events, gaps = recorded(tmp_path)
+    assert ("specimen", "The specimen is not what it was.") in events
+    assert "limit" in dict(events)
+    assert gaps == ()
+
+
+def test_a_twin_that_is_killed_is_told_and_disturbs_nothing(running, tmp_path):
+    client = running(campaign({}), twin=TwinSwitch.ON)
+    pid = until(client, lambda status: status.twin is not None and status.twin.pid > 0).twin.pid
+    os.kill(pid, signal.SIGKILL)
+    status = until(client, lambda status: status.twin is None)
+    assert "live twin has ended" in status.messages[-1].what
+    before = status.samples
+    until(client, lambda status: status.samples > before + 10_000)
+    client.tell_change("The upper gap is 46 um.")
+    client.stop("abort", "enough")
+    until(client, lambda status: status.state not in DRIVING)
+    events, gaps = recorded(tmp_path)
+    assert ("specimen", "The upper gap is 46 um.") in events
+    assert "limit" not in dict(events)
+    assert gaps == ()
+
+
+@pytest.mark.slow
+def test_gaps_that_widen_amid_a_dwell_end_it_within_a_second(running, tmp_path):
+    script = tmp_path / "faults.toml"
+    script.write_text('[[faults]]\nat_s = 40.0\nfault = "widen_gaps"\nby_m = 1e-6\n')
+    client = running(campaign(STOPPING), faults=script)
+    status = until(client, lambda status: status.state not in DRIVING)
+    assert [each.state for each in status.rows] == ["failed"]
+    with open_recording(tmp_path / "dwell.h5") as recording:
+        first = next(each for each in recording.events if each.kind == "specimen")
+        # The rig is on a little longer than it is recorded.
+        assert 38.0 < first.sample / recording.sample_rate_hz < 41.0
+        assert recording.gaps == ()
