@@ -159,9 +159,8 @@ def require_fresh(
 
     A virtual rig without a check that holds is checked at once; a real one plays nothing unasked.
 
-    Raises CheckFailed when the last check is missing, old, of another configuration, or did not pass; nothing
-    was played then. Or when the check made now does not pass, and InstrumentError when an instrument fails
-    while the bench is checked.
+    Raises CheckFailed when the last check is missing, old, of another configuration, or did not pass (nothing
+    was played then), or the one made now does not pass; InstrumentError when an instrument fails meanwhile.
 
     Parameters
     ----------
