@@ -48,7 +48,10 @@ def measure_and_analyse() -> None:
     with tempfile.TemporaryDirectory() as folder:
         plan, out = Path(folder) / "warm.toml", Path(folder) / "recordings"
         save_toml(Campaign(name="warm", measurements=(shortest,)), plan)
-        steps = (["measure", plan, "--out", out], ["analyse", out, "--hidden", "--out", Path(folder) / "report"])
+        steps = (
+            ["measure", plan, "--out", out],
+            ["analyse", out, "--hidden", "--out", Path(folder) / "report"],
+        )
         for arguments in steps:
             command = [sys.executable, "-m", str(__package__), *map(str, arguments)]
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - our own package
