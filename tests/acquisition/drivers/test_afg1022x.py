@@ -7,7 +7,7 @@ import pytest
 
 from vibench.acquisition import InstrumentError, InstrumentLost, LimitExceeded
 from vibench.acquisition.drivers import AFG1022X
-from vibench.acquisition.drivers._afg1022_modes import SweepSupport, Unsupported
+from vibench.acquisition.drivers._afg1022_modes import Unsupported
 from vibench.acquisition.drivers._generator_limits import Shape
 from vibench.acquisition.errors import InstrumentBusy, SettingRefused
 from vibench.acquisition.instruments import Knob
@@ -195,12 +195,10 @@ class TestPlaying:
         ]
         assert max(heard) == pytest.approx(OPEN_AMPLITUDE_RANGE_VPP[0])
 
-    def test_offset_and_phase_reach_the_instrument(self, plugged, generator):
+    def test_an_offset_reaches_the_instrument(self, plugged, generator):
         generator.load_sine(100.0, 1.0)
         generator.set_offset(-0.25)
-        generator.set_phase(31)
-        state = plugged.instrument.settings(1)
-        assert (state.offset_v, state.phase_deg) == (-0.25, 31)
+        assert plugged.instrument.settings(1).offset_v == -0.25
 
     def test_a_burst_counts_its_cycles_and_ends(self, plugged, generator):
         generator.load_sine(100.0, 1.0)
@@ -227,24 +225,6 @@ class TestPlaying:
         assert plugged.log.commands().count("SOUR1:VOLT 0.1000VPP") == 9
 
 
-class TestSweep:
-    def test_a_firmware_that_takes_the_commands_is_found_out_with_the_output_off(self, plugged, generator):
-        generator.load_sine(100.0, 0.1)
-        generator.start()
-        assert generator.probe_sweep(150.0, 350.0) is SweepSupport.SUPPORTED
-        assert not plugged.is_on
-        assert plugged.instrument.settings(1).mode.value == "CW"
-
-    def test_a_firmware_that_does_not_is_left_in_order(self, bus):
-        plugged = bus.plug_in(Quirks(sweep_is_unknown=True))
-        generator = AFG1022X.open(plugged.config)
-        assert generator.probe_sweep(150.0, 350.0) is SweepSupport.UNSUPPORTED
-        generator.load_sine(100.0, 0.1)
-        generator.start()
-        assert plugged.is_on
-        generator.close()
-
-
 class TestLimits:
     @pytest.mark.parametrize(
         ("act", "complaint"),
@@ -258,7 +238,6 @@ class TestLimits:
             (lambda g: g.set_amplitude(10.5), "10.5 Vpp"),
             (lambda g: g.set_frequency(0.0), "0 Hz"),
             (lambda g: g.set_offset(5.0), "peaks at"),
-            (lambda g: g.set_phase(360), "0 to 359"),
             (lambda g: g.arm_burst(0), "0 cycles"),
         ],
     )

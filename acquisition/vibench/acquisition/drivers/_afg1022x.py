@@ -11,7 +11,7 @@ from ..errors import AcquisitionError, InstrumentError, InstrumentLost
 from ..instruments import Identity, Knob, Samples, Sweep
 from ..rig import GeneratorConfig
 from ._afg1022_channel import Afg1022Channel, Playing
-from ._afg1022_modes import SweepSupport, probe_sweep, set_phase, trigger
+from ._afg1022_modes import trigger
 from ._arbitrary_codes import arbitrary_codes
 from ._generator_limits import AFG1022_MODEL, GeneratorModel, Shape
 from ._scpi import ScpiPort
@@ -149,7 +149,7 @@ class AFG1022X:
             self._channel.set_panel(panel_vpp)
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
-        """Refuse: its sweep time is set on the panel only; see `probe_sweep`."""
+        """Refuse: its sweep time is set on the panel only."""
         del amplitude_vpp
         self.model.check_sweep(sweep)
 
@@ -173,11 +173,6 @@ class AFG1022X:
         with self._changing():
             self._channel.set_offset(offset_v)
 
-    def set_phase(self, phase_deg: int) -> None:
-        """Set the start phase, in whole degrees from 0 to 359."""
-        with self._changing():
-            set_phase(self._channel.settings, self._config.channel, phase_deg)
-
     def arm_burst(self, cycles: int) -> None:
         """Play ``cycles`` periods at each `trigger` instead of playing on."""
         with self._changing():
@@ -192,14 +187,6 @@ class AFG1022X:
         """Play on without a trigger."""
         with self._changing():
             self._channel.end_burst()
-
-    def probe_sweep(self, start_hz: float, stop_hz: float) -> SweepSupport:
-        """Whether the instrument sweeps by itself. Turns the output off, and leaves a quiet sine."""
-        with self._changing():
-            self._channel.output_off()
-            support = probe_sweep(self._channel.settings, self._config.channel, start_hz, stop_hz)
-            self._channel.to_quiet_sine()
-        return support
 
     def start(self) -> None:
         """Turn the output on, and see that it is."""

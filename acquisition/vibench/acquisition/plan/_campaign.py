@@ -45,7 +45,6 @@ class RetryPolicy(FrozenModel):
     """How long a lost instrument is looked for before the campaign ends [s]."""
 
 
-DEFAULTS = "defaults"
 BYTES_PER_SAMPLE = 4
 """A recording keeps the converter's counts as 32-bit integers while it runs; the finished file is smaller."""
 

@@ -9,8 +9,6 @@ from vibench.sim.kernels import kernel
 from ..signals import Flags, Reals
 from ._filter_kernels import (
     LOWER,
-    PER_M1,
-    PER_M2,
     STATES,
     UPPER,
     VY,
@@ -143,9 +141,3 @@ def _follow_contacts(
             is_over = is_over or side == 0.0
         ready_at = at + 1
     return count
-
-
-def energy_lost(model: MotionModel, before: Reals, after: Reals) -> Reals:
-    """Give the energy of relative motion that collisions took, from the speeds of p on either side [J]."""
-    mass = 1.0 / (model.tables.stop[PER_M1] + model.tables.stop[PER_M2])
-    return np.asarray(0.5 * mass * (before**2 - after**2))

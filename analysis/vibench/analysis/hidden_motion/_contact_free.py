@@ -20,7 +20,6 @@ FITTED = (Hidden.M1, Hidden.C1, Hidden.K0, Hidden.K2, Hidden.C0, Hidden.C2)
 _SHARES = (0.1, 0.1, 0.03, 0.01, 0.004)
 """Closed shares, one after the other, while numbers are fitted: the first bear an m1 that is 5 % off."""
 _FIT_STRETCH_S = 0.12
-_FIT_STRETCHES = 4
 _LARGEST_RESIDUAL = 5.0
 _RESIDUAL_START_S = 4e-3
 _STEPS = {

@@ -54,7 +54,6 @@ class Estimate:
     covariance: Reals
     """As the filter claims it, shape (parameters, parameters)."""
     followed_s: float
-    losses: int
     innovation_level: float
     """Mean squared normalised innovation of the last part, at the channels' own noise; 1 for a good model."""
 
@@ -86,7 +85,7 @@ class _Search:
         self._deviation = np.array([_DEVIATION[each] for each in wanted]) * self._nominal
         # In units of the prior standard deviations: forces and gaps differ by six powers of ten.
         self._values, self._covariance = self._nominal.copy(), np.eye(len(wanted))
-        self._followed, self._losses, self._level = 0, 0, math.nan
+        self._followed, self._level = 0, math.nan
 
     def over(self, first: int, stop: int) -> Estimate | str:
         """Track from one sample to another, and begin again after every loss."""
@@ -117,7 +116,6 @@ class _Search:
                 if np.any(np.abs(self._values - self._nominal) > _FURTHEST * self._prior_sd):
                     return self._ran_away()
             else:
-                self._losses += 1
                 self._covariance = np.diag(np.minimum(4.0 * np.diag(self._covariance), 1.0))
                 looked, at = at.sample, None
         if not self._followed:
@@ -128,7 +126,6 @@ class _Search:
             self._values,
             self._covariance * np.outer(self._prior_sd, self._prior_sd),
             self._followed / rate,
-            self._losses,
             self._level,
         )
 

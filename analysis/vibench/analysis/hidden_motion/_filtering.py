@@ -7,7 +7,7 @@ import numpy as np
 from vibench.sim import Specimen
 
 from ..signals import Flags, Reals
-from ._filter_kernels import FLIGHT, IN_CONTACT, STATES, VX, X, forward
+from ._filter_kernels import FLIGHT, STATES, VX, X, forward
 from ._prepared_motion import ChannelNoise, PreparedMotion
 from ._smoother_kernels import backward
 from ._tracking_model import StepTables, TrackedSpecimen, step_tables
@@ -233,8 +233,3 @@ def smooth(model: MotionModel, run: Filtered, force_variance: Reals = _NOTHING) 
         covariance - covariance @ matrix @ covariance,
         run.kinds != FLIGHT,
     )
-
-
-def in_contact(run: Filtered) -> Flags:
-    """Where the filter's mean stood in a stop."""
-    return np.asarray(run.kinds == IN_CONTACT)

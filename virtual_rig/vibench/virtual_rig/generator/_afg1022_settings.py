@@ -18,9 +18,6 @@ from ._terminal_voltage import OUTPUT_RESISTANCE_OHM, Relay
 LOWEST_FREQUENCY_HZ = 1e-6
 LOWEST_BURST_FREQUENCY_HZ = 2e-3
 MODULATING_RANGE_HZ = (2e-3, 20e3)
-FREQUENCY_RESOLUTION_HZ = 1e-6
-VOLTAGE_RESOLUTION_V = 1e-4
-"""Assumed: 0.1 mV for amplitude and offset."""
 OPEN_AMPLITUDE_RANGE_VPP = (2e-3, 20.0)
 """Without load; 1 mVpp to 10 Vpp into 50 ohm (IVI driver tkafg1k)."""
 OPEN_PEAK_V = 10.0
