@@ -15,6 +15,7 @@ from vibench.acquisition.excitation import (
     Family,
     HeldAcceleration,
     HeldDwell,
+    HeldNoise,
     HeldSweep,
     LeadIn,
     MultisineNoise,
@@ -24,6 +25,7 @@ from vibench.acquisition.excitation import (
     RmsSetting,
     SettledSine,
     SineSweep,
+    SpectrumPoint,
     SteppedLevel,
     SteppedSine,
     StreamedNoise,
@@ -48,6 +50,9 @@ EXAMPLES = (
     HeldDwell(amplitude_vpp=1, frequency_hz=260, duration_s=2, base_level=HELD),
     ResonanceTracking(
         amplitude_vpp=1, start_hz=262, low_hz=240, high_hz=290, accelerations_m_per_s2=(0.6, 0.3)
+    ),
+    HeldNoise(
+        amplitude_vpp=1, realisations=2, spectrum=(SpectrumPoint(frequency_hz=20, density=0.01),), **BAND
     ),
 )
 by_kind = {each.kind: each for each in EXAMPLES}
@@ -93,6 +98,7 @@ def test_a_resonance_is_sought_in_the_whole_range_of_its_plan():
         ("held_sweep", HeldAcceleration(pytest.approx(5e-6 * (2 * np.pi * 250) ** 2))),
         ("held_dwell", HeldAcceleration(pytest.approx(5e-6 * (2 * np.pi * 250) ** 2))),
         ("resonance_tracking", HeldAcceleration(0.6)),
+        ("held_noise", RmsSetting()),
     ],
 )
 def test_a_kind_says_what_decides_the_motion_of_the_base(kind, level):
@@ -110,6 +116,7 @@ def test_a_settled_sine_without_a_level_plays_its_setting():
     [
         ("sine_sweep", "sine sweep, 1 Vpp"),
         ("held_dwell", "held dwell, base held at 5 µm, at most 1 Vpp"),
+        ("held_noise", "held noise, base held at 2.79 m/s² rms, at most 1 Vpp"),
         ("resonance_tracking", "resonance tracking, base held at 0.6 m/s², 0.3 m/s², at most 1 Vpp"),
     ],
 )

@@ -9,6 +9,7 @@ from ..rig import Channel, Rig
 from ._control_action import Controller
 from ._dwell_controller import hold_dwell
 from ._feedback_channels import feedback_channels_of
+from ._noise_controller import equalise_noise
 from ._resonance_controller import track_resonance
 from ._settled_controller import step_settled
 from ._sine_loop import SineLoop
@@ -20,6 +21,7 @@ CONTROLLERS: Mapping[str, Callable[[SineLoop, Any], Controller[None]]] = Mapping
         "held_dwell": hold_dwell,
         "held_sweep": hold_sweep,
         "resonance_tracking": track_resonance,
+        "held_noise": equalise_noise,
     }
 )
 """Controller of each kind with feedback: of the loop, and of a plan of its kind."""

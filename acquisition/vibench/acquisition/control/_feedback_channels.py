@@ -20,6 +20,8 @@ class FeedbackChannels:
     """Row of the drive's channel."""
     base: int
     response: int
+    drive_units_per_volt: float
+    """Behind its divider."""
     base_units_per_volt: float
     """[m/s2 per V]"""
     response_units_per_volt: float
@@ -31,7 +33,7 @@ class FeedbackChannels:
     def rows(self, samples: PhaseSamples) -> tuple[Samples, Samples, Samples]:
         """Give drive [V], base acceleration [m/s2] and m0 velocity [m/s], each of shape (samples,)."""
         return (
-            samples.volts[self.drive],
+            samples.volts[self.drive] * self.drive_units_per_volt,
             samples.volts[self.base] * self.base_units_per_volt,
             samples.volts[self.response] * self.response_units_per_volt,
         )
@@ -60,6 +62,7 @@ def feedback_channels_of(channels: tuple[Channel, ...], sample_rate_hz: float) -
         drive=drive,
         base=base,
         response=response,
+        drive_units_per_volt=channels[drive].units_per_volt,
         base_units_per_volt=channels[base].units_per_volt,
         response_units_per_volt=channels[response].units_per_volt,
         response_delay_s=channels[response].delay_s,

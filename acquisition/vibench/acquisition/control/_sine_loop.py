@@ -26,7 +26,7 @@ class SineLoop:
     """Knows what is played, and looks at it once a period."""
 
     def __init__(self, channels: FeedbackChannels, rig: Rig, measurement: Measurement) -> None:
-        self._measurement = measurement
+        self.measurement = measurement
         self._notes: list[FeedbackNote] = []
         self._scope: Stroboscope
         self._silence = np.zeros(0)
@@ -83,11 +83,11 @@ class SineLoop:
 
     def ramp_up(self) -> Controller[None]:
         """Begin to play."""
-        yield from self._run_phase(ramp(RunState.RAMPING_UP, self._tone, self._measurement))
+        yield from self._run_phase(ramp(RunState.RAMPING_UP, self._tone, self.measurement))
 
     def ramp_down(self) -> Controller[None]:
         """End the play."""
-        yield from self._run_phase(ramp(RunState.RAMPING_DOWN, self._tone, self._measurement))
+        yield from self._run_phase(ramp(RunState.RAMPING_DOWN, self._tone, self.measurement))
 
     def listen(self, state: RunState, duration_s: float, segment: Segment | None = None) -> Controller[None]:
         """Play on for a while, and look."""

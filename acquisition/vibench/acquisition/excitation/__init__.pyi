@@ -18,6 +18,11 @@ from ._feedback import (
 from ._held_dwell import (
     HeldDwell as HeldDwell,
 )
+from ._held_noise import (
+    HeldNoise as HeldNoise,
+    SpectrumPoint as SpectrumPoint,
+    density_at as density_at,
+)
 from ._held_sweep import (
     HeldSweep as HeldSweep,
 )
@@ -30,6 +35,7 @@ from ._kinds import (
 )
 from ._multisine import (
     held_lines as held_lines,
+    shaped_period as shaped_period,
 )
 from ._multisine_noise import (
     MultisineNoise as MultisineNoise,

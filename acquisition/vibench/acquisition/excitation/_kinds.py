@@ -9,6 +9,7 @@ from pydantic import Field
 
 from ._dwell import Dwell
 from ._held_dwell import HeldDwell
+from ._held_noise import HeldNoise
 from ._held_sweep import HeldSweep
 from ._multisine_noise import MultisineNoise
 from ._odd_multisine import OddMultisine
@@ -31,7 +32,8 @@ Excitation: TypeAlias = Annotated[
     | SettledSine
     | HeldSweep
     | HeldDwell
-    | ResonanceTracking,
+    | ResonanceTracking
+    | HeldNoise,
     Field(discriminator="kind"),
 ]
 Row = TypeVar("Row")

@@ -15,6 +15,7 @@ from ._feedback_note import (
     JumpSide as JumpSide,
     LevelNote as LevelNote,
     LockResult as LockResult,
+    NoiseNote as NoiseNote,
     ResonanceNote as ResonanceNote,
     SegmentNote as SegmentNote,
     SettledNote as SettledNote,

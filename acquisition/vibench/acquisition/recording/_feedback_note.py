@@ -199,11 +199,39 @@ class ResonanceNote(AbstractNote):
     damping_ratio: SixFigures | None = None
 
 
+class NoiseNote(AbstractNote):
+    """How near the base's spectrum came to the one that was asked for, over one realisation."""
+
+    kind: Literal["spectrum"] = "spectrum"
+    realisation: int
+    """Its number; -1 while it is equalised."""
+    base_rms: SixFigures
+    """Over the band [m/s2]."""
+    asked_rms: SixFigures
+    """At full level, where it was notched as it was [m/s2]."""
+    within: SixFigures
+    """Share of the lines within the plan's tolerance of the level of this realisation."""
+    worst_db: SixFigures
+    worst_hz: SixFigures
+    notched: SixFigures
+    """Share of the lines that are lowered for the response's sake."""
+    kurtosis: SixFigures
+    """Of the base's acceleration; 3 of Gaussian noise."""
+
+
 FeedbackNote: TypeAlias = (
-    SettledNote | SegmentNote | DwellNote | SweepNote | LevelNote | ExcursionNote | JumpNote | ResonanceNote
+    SettledNote
+    | SegmentNote
+    | DwellNote
+    | SweepNote
+    | LevelNote
+    | ExcursionNote
+    | JumpNote
+    | ResonanceNote
+    | NoiseNote
 )
 _NOTES: TypeAdapter[FeedbackNote] = TypeAdapter(FeedbackNote)
-_KINDS = frozenset({"settled", "achieved", "level", "jump", "resonance"})
+_KINDS = frozenset({"settled", "achieved", "level", "jump", "resonance", "spectrum"})
 
 
 def feedback_note(event: Event) -> FeedbackNote | None:

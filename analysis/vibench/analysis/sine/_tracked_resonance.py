@@ -7,12 +7,15 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import sqrt
+from statistics import fmean
 
 from vibench.acquisition.recording import (
     FeedbackNote,
     Held,
     JumpNote,
     JumpSearchEnd,
+    NoiseNote,
     ResonanceNote,
     SegmentNote,
     Steadiness,
@@ -47,6 +50,7 @@ def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
         yield f"Jumps between {said}."
     yield from _motions([each for each in notes if isinstance(each, SegmentNote)])
     yield from (_resonance(each) for each in notes if isinstance(each, ResonanceNote))
+    yield from _spectrum([each for each in notes if isinstance(each, NoiseNote) and each.realisation >= 0])
 
 
 def _motions(steps: Sequence[SegmentNote]) -> Iterator[str]:
@@ -65,6 +69,23 @@ def _motions(steps: Sequence[SegmentNote]) -> Iterator[str]:
     outside = sum(each.level is Held.OUTSIDE for each in steps)
     if outside:
         yield f"The base was off its level in {outside} of them."
+
+
+def _spectrum(kept: Sequence[NoiseNote]) -> Iterator[str]:
+    """Say how near the base came to the spectrum that was asked for, over what was kept."""
+    if not kept:
+        return
+    worst = max(kept, key=lambda each: abs(each.worst_db))
+    rms = sqrt(fmean(each.base_rms**2 for each in kept))
+    asked = sqrt(fmean(each.asked_rms**2 for each in kept))
+    yield (
+        f"The base moved with {rms:.3g} m/s² rms, asked for were {asked:.3g}; "
+        f"{fmean(each.within for each in kept):.1%} of the lines were within the tolerance, the worst "
+        f"{worst.worst_db:+.1f} dB at {worst.worst_hz:g} Hz; kurtosis "
+        f"{fmean(each.kurtosis for each in kept):.2f}."
+    )
+    if (notched := fmean(each.notched for each in kept)) > 0:
+        yield f"{notched:.1%} of the lines were lowered for the response's sake."
 
 
 def _resonance(note: ResonanceNote) -> str:
