@@ -78,7 +78,7 @@ class Bench:
     @property
     def kind(self) -> BenchKind:
         """Whether the instruments are simulated."""
-        return BenchKind.REAL if self.rig.virtual is None else BenchKind.SIMULATED
+        return _kind(self.rig, self.digitizer)
 
     def idle(self, duration_s: float) -> None:
         """Wait while nothing is sampled [s]; a virtual rig at its own pace lets its own time pass."""
@@ -150,7 +150,8 @@ def _opened(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: 
     closing.callback(generator.stop)  # the last to enter is the first to happen
     if output is not None:
         closing.callback(output.stop)
-    ask = confirm or _usual_confirmation(rig)
+    usual = confirm_simulated if _kind(rig, digitizer) is BenchKind.SIMULATED else confirm_at_terminal
+    ask: Callable[..., KnobSheet] = confirm or usual
     sheet = ask((*rig.knobs, *generator.unconfirmed))
     return Bench(rig, generator, digitizer, output, sheet, power, closing)
 
@@ -164,8 +165,10 @@ def _output(rig: Rig, digitizer: Digitizer, closing: ExitStack) -> AnalogOutput 
     return output
 
 
-def _usual_confirmation(rig: Rig) -> Callable[..., KnobSheet]:
-    return confirm_at_terminal if rig.virtual is None else confirm_simulated
+def _kind(rig: Rig, digitizer: Digitizer) -> BenchKind:
+    """Real, unless all is simulated or a recording is played back: nothing can then be energised."""
+    is_real = rig.virtual is None and not digitizer.identity.origin
+    return BenchKind.REAL if is_real else BenchKind.SIMULATED
 
 
 def _leave(closing: ExitStack, error: BaseException | None) -> None:

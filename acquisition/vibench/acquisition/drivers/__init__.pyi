@@ -10,12 +10,19 @@ from ._daqmx_discovery import (
 from ._daqmx_output import (
     DaqmxOutput as DaqmxOutput,
 )
+from ._file_player import (
+    FilePlayer as FilePlayer,
+)
 from ._generator_limits import (
     AFG1022_MODEL as AFG1022_MODEL,
     KEYSIGHT_33500B_MODEL as KEYSIGHT_33500B_MODEL,
 )
 from ._keysight_33500b import (
     Keysight33500B as Keysight33500B,
+)
+from ._no_generator import (
+    FILE_GENERATOR as FILE_GENERATOR,
+    NO_GENERATOR as NO_GENERATOR,
 )
 from ._visa_link import (
     list_visa_resources as list_visa_resources,

@@ -25,6 +25,9 @@ OURS = tuple(
     for kind, name, target in (
         (PlugInKind.GENERATOR, "afg1022x", f"{_DRIVERS}:AFG1022_MODEL"),
         (PlugInKind.GENERATOR, "keysight33500b", f"{_DRIVERS}:KEYSIGHT_33500B_MODEL"),
+        (PlugInKind.GENERATOR, "none", f"{_DRIVERS}:NO_GENERATOR"),
+        (PlugInKind.GENERATOR, "file", f"{_DRIVERS}:FILE_GENERATOR"),
+        (PlugInKind.DIGITIZER, "file", f"{_DRIVERS}:FilePlayer"),
         (PlugInKind.DIGITIZER, "daqmx", f"{_DRIVERS}:DaqmxDigitizer"),
         (PlugInKind.OUTPUT, "daqmx", f"{_DRIVERS}:DaqmxOutput"),
         (PlugInKind.SENSOR, "wire", f"{_SENSORS}:wire"),

@@ -21,6 +21,8 @@ class Identity:
     firmware: str
     reply: str
     """The whole reply, as it came."""
+    origin: str = ""
+    """``"simulated"`` or ``"imported"`` where the instrument knows that its numbers are; else empty."""
 
 
 class Knob(FrozenModel):

@@ -61,7 +61,7 @@ def run_header(bench: RunBench, measurement: Measurement, planned_s: float) -> R
         channels=tuple(_channel(channel, step) for channel, step in zip(bench.channels, steps, strict=True)),
         sample_rate_hz=sample_rate_hz,
         expected_samples=round(planned_s * sample_rate_hz),
-        origin=Origin.REAL if rig.virtual is None else Origin.SIMULATED,
+        origin=_origin(bench),
         plan_json=measurement.model_dump_json(),
         bench_json=rig.model_dump_json(),
         requested_sample_rate_hz=rig.daq.sample_rate_hz,
@@ -69,6 +69,13 @@ def run_header(bench: RunBench, measurement: Measurement, planned_s: float) -> R
         confirmations=_confirmations(bench.confirmations),
         bench_check_json="{}" if bench.last_check is None else bench.last_check.model_dump_json(),
     )
+
+
+def _origin(bench: RunBench) -> Origin:
+    """Say where samples come from: simulated where the rig is, or an instrument knows that its own are."""
+    told = {identity.origin for identity in bench.identities.values()}
+    simulated = bench.rig.virtual is not None or Origin.SIMULATED.value in told
+    return Origin.SIMULATED if simulated else Origin.REAL
 
 
 def _channel(channel: Channel, volts_per_count: float | None) -> ChannelHeader:

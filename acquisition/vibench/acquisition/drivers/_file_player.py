@@ -1,0 +1,120 @@
+"""A recording played back as if it were measured: the whole chain, on samples that are known."""
+
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from ..errors import ConfigurationError, InstrumentError, InstrumentLost
+from ..instruments import Block, Identity, Overload
+from ..recording import Recording, open_recording
+from ..rig import Channel, Rig, channels_of
+
+_SAME_RATE = 1e-9
+
+
+class FilePlayer:
+    """A `Digitizer` that hands out the volts of a recording, from its first sample at every start.
+
+    ``daq.options.recording`` names it. Under the plan that it was made with, check and segments lie where
+    they lay; ``generator.driver = "file"`` takes what that plan commands.
+    """
+
+    def __init__(self, recording: Recording, channels: tuple[Channel, ...]) -> None:
+        self._recording = recording
+        self._channels = channels
+        self._next_sample = 0
+        self._is_running = False
+        self._is_open = True
+
+    @classmethod
+    def open(cls, rig: Rig) -> Self:
+        """Open the recording; raises ConfigurationError where channels or rate are not the rig's."""
+        path = rig.daq.options.get("recording")
+        if not isinstance(path, str):
+            raise ConfigurationError(
+                'a bench with daq.driver = "file" plays a recording back, and none is named; give '
+                'daq.options.recording = "PATH.h5"'
+            )
+        recording = open_recording(Path(path))
+        channels = channels_of(rig)
+        missing = [each.role.value for each in channels if each.role.value not in recording.roles]
+        rate_hz, asked_hz = recording.sample_rate_hz, rig.daq.sample_rate_hz
+        if missing or abs(rate_hz - asked_hz) > _SAME_RATE * rate_hz:
+            recording.close()
+            raise ConfigurationError(
+                f"{path} has {', '.join(recording.roles)} at {rate_hz:.12g} samples a second; the "
+                f"configuration asks for {', '.join(each.role.value for each in channels)} at "
+                f"{asked_hz:.12g}. Make them agree"
+            )
+        return cls(recording, channels)
+
+    @property
+    def identity(self) -> Identity:
+        """The recording, by its id; what it was, it stays."""
+        made = self._recording
+        reply = f"{made.path.name}, recorded {made.started_utc}, {made.origin.value}"
+        return Identity("", "recording", made.recording_id, "", reply, origin=made.origin.value)
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """The recording's."""
+        return self._recording.sample_rate_hz
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """Roles of the channels, in the order of the rows of a block."""
+        return tuple(channel.role.value for channel in self._channels)
+
+    @property
+    def volts_per_count(self) -> tuple[float | None, ...]:
+        """Steps of the converter that made it, where its counts begin at zero volts [V]."""
+        heads = (self._recording.channel(role) for role in self.roles)
+        return tuple(None if head.volts_at_zero_count else head.volts_per_count for head in heads)
+
+    def start(self) -> None:
+        """Begin with the recording's first sample."""
+        if not self._is_open or self._is_running:
+            raise InstrumentError(
+                "the recording is closed, or playing already; open the bench again, or stop it"
+            )
+        self._is_running, self._next_sample = True, 0
+
+    def read(self, samples: int) -> Block:
+        """Hand over the next samples; raises InstrumentLost where the recording has no more."""
+        if not self._is_running or samples < 1:
+            raise InstrumentError(f"{samples} samples were asked of a recording that does not play; start it")
+        first, last = self._next_sample, self._next_sample + samples
+        if last > self._recording.samples:
+            self._is_running = False
+            raise InstrumentLost(
+                f"{self._recording.path.name} ends after {self._recording.samples} samples, and sample {last} "
+                "was asked for; play it back under the plan that it was made with"
+            )
+        volts = np.stack([self._volts(role, first, last) for role in self.roles])
+        self._next_sample = last
+        told = tuple(
+            Overload(each.channel, max(each.first_sample, first), min(each.last_sample, last - 1))
+            for each in self._recording.overloads
+            if each.channel in self.roles and each.first_sample < last and each.last_sample >= first
+        )
+        return Block(first, volts, told)
+
+    @property
+    def waiting_samples(self) -> int:
+        """None: a recording is as fast as whoever reads it."""
+        return 0
+
+    def stop(self) -> None:
+        """Stop playing. Legal at any time."""
+        self._is_running = False
+
+    def close(self) -> None:
+        """Close the recording. Legal at any time."""
+        self._is_running = self._is_open = False
+        self._recording.close()
+
+    def _volts(self, role: str, first: int, last: int) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        head = self._recording.channel(role)
+        values = self._recording.read(role, first, last)
+        return np.asarray((values - head.physical_offset) / head.physical_per_volt, dtype=np.float64)

@@ -1,0 +1,78 @@
+"""A recording played back: the same plan records it again, sample for sample."""
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import ConfigurationError, open_bench, open_recording, run_measurement
+from vibench.acquisition.errors import InstrumentLost
+from vibench.acquisition.plan import Dwell, Measurement
+from vibench.acquisition.rig import CalibrationRule
+
+PLAN = Measurement(
+    name="dwell",
+    excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.3, duration_s=0.5),
+    ramp_s=0.3,
+    ramp_step_s=0.03,
+)
+
+
+@pytest.fixture
+def original(rig, tmp_path):
+    path = tmp_path / "original.h5"
+    with open_bench(rig) as bench:
+        run_measurement(bench, PLAN, path)
+    return path
+
+
+@pytest.fixture
+def playing(rig, original):
+    """Give the rig on which the recording takes the place of generator and converter."""
+
+    def rig_of(**daq):
+        options = {"recording": str(original)}
+        played = rig.daq.model_copy(update={"driver": "file", "options": options, **daq})
+        silent = rig.generator.model_copy(update={"driver": "file", "resource": ""})
+        return rig.model_copy(update={"daq": played, "generator": silent, "virtual": None})
+
+    return rig_of
+
+
+def test_the_same_plan_records_it_again_sample_for_sample(playing, original, tmp_path):
+    with open_bench(playing(), calibration=CalibrationRule.WAIVED) as bench:
+        again = run_measurement(bench, PLAN, tmp_path / "again.h5").path
+    with open_recording(original) as first, open_recording(again) as second:
+        assert second.state.value == "complete"
+        assert second.origin.value == "simulated", "what was simulated stays so"
+        assert second.instruments["digitizer"].serial == first.recording_id
+        count = min(first.samples, second.samples)
+        assert count > 0.95 * first.samples
+        for role in first.roles:
+            np.testing.assert_array_equal(second.read(role, 0, count), first.read(role, 0, count))
+        for one, other in zip(first.segments, second.segments, strict=True):
+            assert (one.label, one.first_sample, one.last_sample) == (
+                other.label,
+                other.first_sample,
+                other.last_sample,
+            )
+
+
+def test_the_end_of_the_recording_is_told(playing, original):
+    with open_bench(playing(), calibration=CalibrationRule.WAIVED) as bench:
+        with open_recording(original) as recording:
+            samples = recording.samples
+        bench.digitizer.start()
+        bench.digitizer.read(samples)
+        with pytest.raises(InstrumentLost, match=rf"ends after {samples} samples"):
+            bench.digitizer.read(1)
+
+
+@pytest.mark.parametrize(
+    ("daq", "said"),
+    [
+        ({"options": {}}, "none is named"),
+        ({"sample_rate_hz": 25600.0}, "samples a second; the configuration"),
+    ],
+)
+def test_a_bench_that_does_not_fit_the_recording_is_refused(playing, daq, said):
+    with pytest.raises(ConfigurationError, match=said):
+        open_bench(playing(**daq), calibration=CalibrationRule.WAIVED)
