@@ -55,6 +55,7 @@ from ._provenance import (
 from ._reader import (
     RecordedBlock as RecordedBlock,
     Recording as Recording,
+    RecordingDescription as RecordingDescription,
     open_recording as open_recording,
 )
 from ._recover import (

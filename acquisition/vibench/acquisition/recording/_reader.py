@@ -68,32 +68,38 @@ class _OpenFile:
         self.file = open_hdf5(self.path)
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
-    """One recording, as it was when it was opened. Close it, or use it in a ``with`` block."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RecordingDescription:
+    """What a recording says of itself, of its bench and of how it ended."""
 
     path: Path
     state: RecordingState
     reason: str
     """Why it ended; empty when nobody said."""
-    samples: int
-    """Valid samples per channel."""
     sample_rate_hz: float
     requested_sample_rate_hz: float
-    expected_samples: int | None
     origin: Origin
     started_utc: str
     recording_id: str
-    channels: tuple[ChannelHeader, ...]
-    plan: Mapping[str, Any]
     bench: Mapping[str, Any]
     instruments: Mapping[str, Identity]
     confirmations: Mapping[str, str | float]
     provenance: Mapping[str, Any]
-    seal: str
-    """SHA-256 of the manifest, as the file says it; empty without one. see `check_seal`."""
     bench_check: Mapping[str, Any]
     """The last check of the bench before it: ``checked``, ``verdict``, ``findings``, ...; may be empty."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Recording(RecordingDescription):
+    """One recording, as it was when it was opened. Close it, or use it in a ``with`` block."""
+
+    samples: int
+    """Valid samples per channel."""
+    expected_samples: int | None
+    channels: tuple[ChannelHeader, ...]
+    plan: Mapping[str, Any]
+    seal: str
+    """SHA-256 of the manifest, as the file says it; empty without one. see `check_seal`."""
     segments: tuple[Segment, ...]
     events: tuple[Event, ...]
     overloads: tuple[Overload, ...]

@@ -1,50 +1,37 @@
 """What a recording says about itself: what was measured, with what, and how it ended."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, fields
 from typing import Annotated, Any
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
-from vibench.acquisition import Identity
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import (
     EventKind,
     FeedbackNote,
     Origin,
     Recording,
-    RecordingState,
+    RecordingDescription,
     SealCheck,
     feedback_note,
 )
 from vibench.sim import Specimen, SpecimenTable
 
 from ..errors import UnusableData
+from ..tables import named
 from ._channel_levels import ChannelLevel, OnRead, channel_levels, ignore_reading
 from ._intact import require_intact
 
 
-@dataclass(frozen=True, eq=False)
-class RecordingFacts:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RecordingFacts(RecordingDescription):
     """Everything but the result."""
 
     name: str
-    path: Path
-    state: RecordingState
-    reason: str
-    origin: Origin
-    started_utc: str
-    recording_id: str
     duration_s: float
     planned_s: float | None
-    sample_rate_hz: float
-    requested_sample_rate_hz: float
     measurement: Measurement
-    bench: Mapping[str, Any]
-    instruments: Mapping[str, Identity]
-    confirmations: Mapping[str, str | float]
-    provenance: Mapping[str, Any]
     channels: tuple[ChannelLevel, ...]
     overload_s: Mapping[str, float]
     """Time each channel spent near its full scale, by role; channels that never did are left out."""
@@ -56,8 +43,6 @@ class RecordingFacts:
     check: str
     """What the check of the bench found before the run; empty when it was left out."""
     seal: SealCheck
-    bench_check: Mapping[str, Any]
-    """The last check of the whole bench before it, as the recording has it; may be empty."""
     feedback: tuple[FeedbackNote, ...] = ()
     """What a measurement with feedback found while it ran; empty for any other."""
     feedback_s: tuple[float, ...] = ()
@@ -92,22 +77,11 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
     played = [each for each in recording.segments if each.label in labels]
     noted = [(each.sample / rate, note) for each in recording.events if (note := feedback_note(each))]
     return RecordingFacts(
+        **named(recording, *(each.name for each in fields(RecordingDescription))),
         name=recording.path.name.removesuffix(".part").removesuffix(".h5"),
-        path=recording.path,
-        state=recording.state,
-        reason=recording.reason,
-        origin=recording.origin,
-        started_utc=recording.started_utc,
-        recording_id=recording.recording_id,
         duration_s=recording.duration_s,
         planned_s=None if recording.expected_samples is None else recording.expected_samples / rate,
-        sample_rate_hz=rate,
-        requested_sample_rate_hz=recording.requested_sample_rate_hz,
         measurement=measurement,
-        bench=recording.bench,
-        instruments=recording.instruments,
-        confirmations=recording.confirmations,
-        provenance=recording.provenance,
         channels=channel_levels(recording, on_read),
         overload_s=overload_s,
         lost_samples=sum(each.last_sample - each.first_sample + 1 for each in recording.gaps),
@@ -116,7 +90,6 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
         late=tuple(each.text for each in recording.events if each.kind == EventKind.LATE),
         check=recording.check_text,
         seal=seal,
-        bench_check=recording.bench_check,
         feedback=tuple(note for _, note in noted),
         feedback_s=tuple(time_s for time_s, _ in noted),
     )
