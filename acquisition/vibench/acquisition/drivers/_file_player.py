@@ -88,8 +88,8 @@ class FilePlayer:
         if last > self._recording.samples:
             self._is_running = False
             raise InstrumentLost(
-                f"{self._recording.path.name} ends after {self._recording.samples} samples, and sample {last} "
-                "was asked for; play it back under the plan that it was made with"
+                f"{self._recording.path.name} ends after {self._recording.samples} samples, and sample "
+                f"{last} was asked for; play it back under the plan that it was made with"
             )
         volts = np.stack([self._volts(role, first, last) for role in self.roles])
         self._next_sample = last
