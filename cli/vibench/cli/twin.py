@@ -179,6 +179,7 @@ def twin(
             following = _following(client, rig, specimen, executor)
             if new_baseline:
                 baseline_path(rig, following.specimen).unlink(missing_ok=True)
+            client.tell_twin(TwinStatus(pid=os.getpid(), state="waiting", sentence="nothing is measured"))
             console.print(f"Following {engine.what}, process {engine.pid}; Ctrl-C ends the twin.")
             while True:
                 time.sleep(following.look())

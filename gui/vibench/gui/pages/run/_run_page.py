@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
 
-from vibench.acquisition.engine import EngineClient, EngineState
+from vibench.acquisition.engine import EngineClient, EngineState, TwinSwitch
 from vibench.acquisition.plan import EXCITATION_KINDS
 from vibench.acquisition.rig import channels_of
 from vibench.analysis import MeasurementPrediction
@@ -18,6 +18,7 @@ from ...engine_link import measurement_called
 from ...page import KIND_VIEWS, OF_A_BAND, AppContext, LivePicture, Page, UserActions
 from ...widgets import FILES, Theme
 from ._arm_card import ArmCard
+from ._hidden_motion_plot import HiddenMotionPlot
 from ._portrait_plot import PortraitPlot
 from ._spectrum_plot import SpectrumPlot
 from ._sweep_history_plot import SweepEnvelopePlot, SweepHistoryPlot
@@ -50,6 +51,7 @@ class RunPage(Page):
         self.history = SweepHistoryPlot(theme)
         self.envelope = SweepEnvelopePlot(theme)
         self.portrait = PortraitPlot(theme)
+        self.hidden_motion = HiddenMotionPlot(theme)
         self.left_tabs, self.right_tabs = QTabWidget(), QTabWidget()
         self.look_button = QPushButton("Look at the recording")
         self.look_button.setToolTip("Show the last recording on the Files page")
@@ -77,6 +79,8 @@ class RunPage(Page):
         reason = "" if measurement is not None else "The test is not complete; see the Test page (Ctrl+2)."
         self.arm_card.show_status(status, test, reason)
         self.watch_card.show_status(status)
+        if not self.watch_card.freeze.isChecked() and self.hidden_motion.isVisible():
+            self.hidden_motion.show_status(status)
         view = self.context.bridge.view
         if view is None or self.watch_card.freeze.isChecked():
             return
@@ -91,12 +95,12 @@ class RunPage(Page):
         self.time_histories.show_view(view, self.watch_card.span_s)
         for tabs in (self.left_tabs, self.right_tabs):
             shown = tabs.currentWidget()
-            assert isinstance(shown, LivePlot)
-            shown.show_view(view)
+            if isinstance(shown, LivePlot):
+                shown.show_view(view)
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
-        for part in (self.time_histories, self.watch_card, *self._pictures.values()):
+        for part in (self.time_histories, self.watch_card, self.hidden_motion, *self._pictures.values()):
             part.retheme(theme)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -172,12 +176,18 @@ class RunPage(Page):
         if self.context.bridge.state in (EngineState.RUNNING, EngineState.HELD):
             self.context.bridge.order(EngineClient.mark, text)
 
+    def _turn_twin(self, switch: TwinSwitch) -> None:
+        self.context.bridge.order(EngineClient.turn_twin, switch)
+        if switch is TwinSwitch.ON:
+            self.right_tabs.setCurrentWidget(self.hidden_motion)
+
     def _connect(self) -> None:
         self.arm_card.arm_wanted.connect(self._actions.arm_test)
         self.arm_card.start_wanted.connect(self._actions.start)
         self.arm_card.cancel_wanted.connect(self._actions.disarm)
         self.arm_card.hold_wanted.connect(self._actions.hold_or_resume)
         self.watch_card.mark_wanted.connect(self._mark)
+        self.watch_card.twin_wanted.connect(self._turn_twin)
         self.look_button.clicked.connect(self._look)
         self.context.recording_made.connect(self._recorded)
         self.context.selection.rig_changed.connect(self._show_channels)
@@ -193,7 +203,7 @@ class RunPage(Page):
         self.look_button.hide()
         for tabs, name, pictures in (
             (self.left_tabs, "Pictures on the left", (self.frequency_response, self.history, self.envelope)),
-            (self.right_tabs, "Pictures on the right", (self.spectrum, self.portrait)),
+            (self.right_tabs, "Pictures on the right", (self.spectrum, self.portrait, self.hidden_motion)),
         ):
             tabs.setAccessibleName(name)
             tabs.setDocumentMode(True)

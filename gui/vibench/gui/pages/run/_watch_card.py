@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from vibench.acquisition.engine import DRIVING, EngineStatus, RunStatus
+from vibench.acquisition.engine import DRIVING, EngineStatus, RunStatus, TwinSwitch
 from vibench.analysis.live import OVER_SHARE, Level, LevelVerdict, LiveView
 
 from ...forms import Choice, LineField
@@ -99,6 +99,8 @@ class WatchCard(QGroupBox):
     """What is watched in numbers, and what may be done about the picture."""
 
     mark_wanted = Signal(str)
+    twin_wanted = Signal(object)
+    """A `TwinSwitch`."""
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__("Watch", parent)
@@ -119,6 +121,14 @@ class WatchCard(QGroupBox):
         self.span.setToolTip("Seconds in a time history")
         self.freeze = QCheckBox("Freeze the picture  (Space)")
         self.freeze.setToolTip("Only the picture stands still; the recording goes on")
+        self.twin = QCheckBox("Live twin")
+        self.twin.setToolTip(
+            "Follow m1 between its stops, and note when the specimen changes. It is a process of its own: "
+            "the measurement does not wait for it"
+        )
+        self.twin.clicked.connect(
+            lambda is_on: self.twin_wanted.emit(TwinSwitch.ON if is_on else TwinSwitch.OFF)
+        )
         self.mark = LineField("event")
         self.mark.setToolTip("What the mark in the recording says")
         self.mark_button = QPushButton("Mark  (M)")
@@ -140,6 +150,8 @@ class WatchCard(QGroupBox):
         run = None if status is None else status.run
         is_running = status is not None and status.state in DRIVING
         self.mark_button.setEnabled(is_running)
+        self.twin.setEnabled(status is not None and status.bench is not None)
+        self.twin.setChecked(status is not None and status.twin is not None)
         if run is not None:
             self.progress.setValue(round(1000 * min(1.0, run.elapsed_s / max(run.total_s, 1e-9))))
             self.progress.setFormat(_progress_text(run) if is_running else "the last run has ended")
@@ -169,6 +181,7 @@ class WatchCard(QGroupBox):
         layout.addLayout(form)
         layout.addWidget(self.meters)
         layout.addWidget(self.freeze)
+        layout.addWidget(self.twin)
         layout.addLayout(marks)
 
 

@@ -1,0 +1,92 @@
+"""The Run page's picture of the hidden motion, from what a live twin tells."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from vibench.acquisition.engine import EngineState, EngineStatus, Supervision, TwinStatus, TwinSwitch
+from vibench.gui.pages.run._hidden_motion_plot import HiddenMotionPlot
+from vibench.gui.pages.run._watch_card import WatchCard
+
+STEP_S, STOPS_M = 1.6e-4, (-44e-6, 46e-6)
+P_M = tuple((40e-6 * np.sin(np.arange(300) / 7)).tolist())
+FORECAST_M = tuple((40e-6 * np.sin(np.arange(300, 360) / 7)).tolist())
+ERROR_M = tuple(np.geomspace(1e-8, 1.05e-5, 60).tolist())
+
+
+def status(**twin):
+    told = TwinStatus(
+        **{
+            "state": "tracked",
+            "run_id": 1,
+            "end_sample": 5120,
+            "step_s": STEP_S,
+            "p_m": P_M,
+            "forecast_m": FORECAST_M,
+            "forecast_error_m": ERROR_M,
+            "stops_m": STOPS_M,
+            "numbers": (("lower gap", "(44.001 ± 0.005) µm"),),
+        }
+        | twin
+    )
+    return EngineStatus(state=EngineState.RUNNING, attendance=Supervision.ATTENDED, twin=told)
+
+
+@pytest.fixture
+def picture(context):
+    return HiddenMotionPlot(context.theme)
+
+
+def is_empty(curve):
+    across, _ = curve.getData()
+    return across is None or not len(across)
+
+
+def test_p_ends_at_the_newest_sample_between_the_stops(picture):
+    picture.show_status(status())
+    time_s, p = picture.told.getData()
+    assert time_s[-1] == 0.0
+    assert np.diff(time_s) == pytest.approx(np.full(299, STEP_S))
+    assert p == pytest.approx(np.array(P_M))
+    assert [line.value() for line in picture._stops] == list(STOPS_M)
+    assert "tracked · lower gap (44.001 ± 0.005) µm" in picture.said.text()
+
+
+def test_a_forecast_goes_on_from_there_and_fades_as_its_error_grows(picture):
+    picture.show_status(status())
+    pieces = [np.array(curve.getData()) for curve in picture.forecast]
+    assert all(piece.shape[1] for piece in pieces)
+    assert pieces[0][0, 0] == pytest.approx(STEP_S)
+    for piece, following in pairwise(pieces):
+        assert following[0, 0] == piece[0, -1]
+    ends = [np.interp(piece[0, -1], STEP_S * np.arange(1, 61), ERROR_M) for piece in pieces]
+    assert ends[:-1] == pytest.approx([0.25 * 44e-6 * (n + 1) / 5 for n in range(4)], rel=0.15)
+
+
+def test_what_was_not_followed_is_a_hole_and_a_lost_track_is_said(picture):
+    lost = (*P_M[:100], *[None] * 200)
+    picture.show_status(
+        status(state="lost", sentence="the motion does not fit", p_m=lost, forecast_m=(), forecast_error_m=())
+    )
+    assert np.isnan(picture.told.getData()[1]).sum() == 200
+    assert picture.said.text().startswith("lost · the motion does not fit")
+    assert all(is_empty(curve) for curve in picture.forecast)
+
+
+def test_without_a_twin_nothing_is_shown(picture):
+    picture.show_status(status())
+    picture.show_status(EngineStatus(state=EngineState.RUNNING, attendance=Supervision.ATTENDED))
+    assert is_empty(picture.told)
+    assert picture.said.text() == "The live twin is off."
+
+
+def test_the_switch_shows_whether_a_twin_is_on_and_asks_for_one(context, qtbot):
+    card = WatchCard(context.theme)
+    card.show_status(status())
+    assert card.twin.isChecked()
+    assert not card.twin.isEnabled()
+    card.twin.setEnabled(True)
+    with qtbot.waitSignal(card.twin_wanted) as asked:
+        card.twin.click()
+    assert asked.args == [TwinSwitch.OFF]
