@@ -51,6 +51,8 @@ from .results import (
     FailedStep as FailedStep,
     analyse as analyse,
     analyse_files as analyse_files,
+    budget_sentences as budget_sentences,
+    budgets_of as budgets_of,
     campaign_summary as campaign_summary,
     compare_recording as compare_recording,
     level_of_drive as level_of_drive,

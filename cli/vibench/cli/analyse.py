@@ -26,6 +26,7 @@ from vibench.analysis import (
     UpdatedSpecimen,
     Window,
     analyse_files,
+    budget_sentences,
     campaign_summary,
     quantities_named,
     recordings_in,
@@ -265,7 +266,13 @@ def _analyse(
         )
         print_json({**campaign_summary(results), **fitted, **told})
     for sentence in (
-        () if as_json else (*results.model_said, *(s for each in motions for s in each.sentences))
+        ()
+        if as_json
+        else (
+            *results.model_said,
+            *(s for each in motions for s in each.sentences),
+            *budget_sentences(results),
+        )
     ):
         console.print(sentence)
     if results.results and has_report:

@@ -2,6 +2,7 @@
 
 import csv
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from vibench.analysis.figures import (
     bench_levels_figure,
     dwells_figure,
     excitation_figure,
+    regions_text,
     stepped_sine_figure,
     sweep_figure,
     transmission_figure,
@@ -116,7 +118,12 @@ def test_a_sweep_figure_shades_the_measured_collision_region(sweep_file):
     measured = line(drawn.figure.axes[1], "measured response")
     np.testing.assert_array_equal(measured.get_ydata(), found.analysis.response.response_i)
     assert drawn.figure.axes[0].get_xlabel() == "time of the sweep [s]"
-    assert f"{region.start.frequency_hz:.1f} ±" in drawn.caption
+    half = 0.5 * (region.start.upper_hz - region.start.lower_hz)
+    assert f"{plus_minus(region.start.frequency_hz, half)} Hz" in drawn.caption
+    (region,) = found.analysis.collisions.regions
+    ended = replace(found.analysis.collisions, regions=(replace(region, reaches_stop=False),))
+    # How long collisions live on is chance: their end has no bounds.
+    assert regions_text(ended).endswith(f" to {region.stop.frequency_hz:.1f} Hz in this run")
     assert f"{found.laid.run.impact_rate_hz:.0f} impacts per second" in drawn.caption
 
 

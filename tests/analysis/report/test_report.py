@@ -12,6 +12,7 @@ from vibench.analysis import (
     NotEnoughData,
     Simulation,
     analyse_files,
+    budgets_of,
     campaign_summary,
     recordings_in,
     result_summary,
@@ -83,7 +84,10 @@ def test_a_report_holds_the_results_numbers(page, campaign):
     region = campaign.sweeps[0].analysis.collisions.regions[0]
     assert f"{region.start.frequency_hz:.1f} ({region.start.lower_hz:.1f} to" in page.text
     for dwell in campaign.dwells:
-        assert f"{dwell.analysis.response.response_i:.4g}" in page.text
+        for budget in budgets_of(dwell):
+            assert budget.text.strip("()").split(")")[0] in page.text
+    assert "not stated" in page.text
+    assert "Uncertainty, and what it is made of" in page.text
 
 
 def test_a_report_says_how_it_was_measured_and_that_it_was_simulated(page):

@@ -15,6 +15,7 @@ from ._configuration import (
     GeneratorConfig as GeneratorConfig,
     Rig as Rig,
     Role as Role,
+    StatedUncertainty as StatedUncertainty,
     VibrometerConfig as VibrometerConfig,
     load_rig as load_rig,
     with_faults as with_faults,

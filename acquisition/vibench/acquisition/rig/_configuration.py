@@ -30,6 +30,17 @@ class Sourced(FrozenModel):
     source: str = Field(min_length=1)
 
 
+class StatedUncertainty(FrozenModel):
+    """Relative uncertainty of a sensitivity, as a certificate or a data sheet states it."""
+
+    relative: float = Field(gt=0.0, lt=1.0)
+    """Expanded uncertainty over the value: 0.01 for 1 %."""
+    coverage_factor: PositiveFloat = 2.0
+    """Expanded over standard uncertainty: 2 on most certificates, 1.73 for bounds of a rectangle."""
+    source: str = Field(min_length=1)
+    """Certificate with its number, or data sheet."""
+
+
 class GeneratorConfig(FrozenModel):
     """The function generator and what its output sees."""
 
@@ -135,6 +146,10 @@ class VibrometerConfig(FrozenModel):
     delay_s: NonNegativeFloat
     """Signal delay of the decoder [s]; the analysis takes it out of the phase."""
     calibrated: date
+    uncertainty: StatedUncertainty | None = None
+    """Of the calibration; absent: not stated, and every result says so."""
+    alignment_deg: Sourced | None = None
+    """Largest angle between beam and motion [degree]."""
 
     @property
     def full_scale_m_per_s(self) -> float:
@@ -152,6 +167,10 @@ class AccelerometerConfig(FrozenModel):
     resonance_hz: PositiveFloat
     iepe: Literal["yes", "no"]
     calibrated: date
+    uncertainty: StatedUncertainty | None = None
+    """Of the sensitivity; absent: not stated."""
+    alignment_deg: Sourced | None = None
+    """Largest angle between the sensitive axis and the motion [degree]."""
 
 
 class Role(StrEnum):
@@ -181,6 +200,8 @@ class ChannelConfig(FrozenModel):
     """What else the sensor wants to know."""
     calibrated: date
     """Date of the converter's last calibration."""
+    uncertainty: StatedUncertainty | None = None
+    """Of volts, the divider in front included; absent: not stated."""
 
 
 class DaqConfig(FrozenModel):
@@ -198,6 +219,8 @@ class DaqConfig(FrozenModel):
     sample_rate_hz: PositiveFloat
     """Rate to ask for; the rate that the hardware takes is read back and stored beside it."""
     buffer_s: PositiveFloat = 10.0
+    clock_ppm: Sourced | None = None
+    """Bounds of the sample clock [parts in a million]; absent: not stated."""
     channels: tuple[ChannelConfig, ...] = Field(min_length=1)
     output: OutputConfig | None = None
     """An analogue output for streamed noise; absent when there is none."""

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from ..model import RESPONSE_I, RESPONSE_II, SweepOverlay
 from ..signals import Reals
 from ..sine import Collisions, SweepAnalysis, SweepResponse
-from ..tables import Table, named, table
+from ..tables import Table, named, plus_minus, table
 from ._drawn import DrawnFigure
 from ._ensemble_band import band_columns, draw_band, run_text, simulated_label, sines_table
 from ._hysteresis import jumps_text
@@ -175,14 +175,13 @@ def regions_text(found: Collisions) -> str:
         return "the masses did not collide"
     parts = []
     for region in found.regions:
-        edges = []
-        for edge, is_open, word in (
-            (region.start, region.reaches_start, "the sweep's beginning"),
-            (region.stop, region.reaches_stop, "the sweep's end"),
-        ):
-            half = 0.5 * (edge.upper_hz - edge.lower_hz)
-            edges.append(word if is_open else f"{edge.frequency_hz:.1f} ± {half:.1f} Hz")
-        parts.append(f"from {edges[0]} to {edges[1]}")
+        start, stop = region.start, region.stop
+        begin = plus_minus(start.frequency_hz, 0.5 * (start.upper_hz - start.lower_hz)) + " Hz"
+        # Collisions live on by chance: where they end in one run is no edge with bounds.
+        end = f"{stop.frequency_hz:.1f} Hz in this run"
+        first = "the sweep's beginning" if region.reaches_start else begin
+        last = "the sweep's end" if region.reaches_stop else end
+        parts.append(f"from {first} to {last}")
     return f"the masses collide {' and '.join(parts)}"
 
 

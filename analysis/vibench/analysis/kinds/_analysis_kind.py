@@ -19,6 +19,7 @@ from ..model import (
 )
 from ..recordings import AbstractAnalysis, Channels, RecordingFacts
 from ..sine import DwellAnalysis, SteppedSineAnalysis, SweepAnalysis
+from ..uncertainty import Budget
 
 Json = dict[str, Any]
 P = TypeVar("P")
@@ -64,5 +65,7 @@ class AnalysisKind(Generic[P, A, L]):
     measured: Callable[[A], Json]
     """The numbers of a result."""
     simulated: Callable[[L], Json]
+    budgets: Callable[[A, L | None], tuple[Budget, ...]]
+    """Of the numbers that a reader takes away."""
     place: Callable[[P], tuple[float, ...]] = lambda _: ()
     """Sorts the results of a family, weak to strong; without it they stay in the order given."""

@@ -30,6 +30,7 @@ from ..sine import (
     terminal_levels,
 )
 from ..tables import named
+from ..uncertainty import dwell_budgets
 from ._analysis_kind import AnalysisKind, Json
 
 
@@ -137,5 +138,6 @@ DWELL = AnalysisKind(
     curves=dwell_traces,
     measured=_measured,
     simulated=_simulated,
+    budgets=dwell_budgets,
     place=lambda plan: (plan.frequency_hz, plan.amplitude_vpp),
 )

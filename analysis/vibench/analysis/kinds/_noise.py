@@ -22,6 +22,7 @@ from ..frequency_response import (
 from ..model import Draw, NoiseOverlay, SimulatedChannels, noise_overlay, noise_quantities
 from ..recordings import Channels, RecordingFacts, measurement_checks
 from ..tables import named
+from ..uncertainty import noise_budgets
 from ._analysis_kind import AnalysisKind, Json
 
 NOISE_FAMILY = "noise"
@@ -112,6 +113,7 @@ def _noise(estimate: Estimate) -> AnalysisKind[Noise, NoiseAnalysis, NoiseOverla
         curves=noise_traces,
         measured=_measured,
         simulated=_simulated,
+        budgets=noise_budgets,
         place=lambda plan: (plan.amplitude_vpp,),
     )
 

@@ -11,6 +11,7 @@ from ..model import Draw, Quantity, SimulatedChannels, SteppedSineOverlay, stepp
 from ..recordings import Channels, RecordingFacts, Stretch, measurement_checks
 from ..sine import SteppedResponse, SteppedSineAnalysis, Steps, level_summary, stepped_response
 from ..tables import named
+from ..uncertainty import stepped_budgets
 from ._analysis_kind import AnalysisKind, Json
 
 Setting = Callable[[Steps, Stretch], float]
@@ -52,7 +53,15 @@ def _stepped(
         return Draw(response, stepped_quantities(response), (), *channels.played_impacts(label))
 
     return AnalysisKind(
-        "stepped_sine", analyse, draw, _compared, stepped_overlay, stepped_traces, measured, _simulated
+        family="stepped_sine",
+        analyse=analyse,
+        draw=draw,
+        compared=_compared,
+        lay=stepped_overlay,
+        curves=stepped_traces,
+        measured=measured,
+        simulated=_simulated,
+        budgets=stepped_budgets,
     )
 
 

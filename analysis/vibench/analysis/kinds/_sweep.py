@@ -22,6 +22,7 @@ from ..sine import (
     smooth_jumps,
 )
 from ..tables import named
+from ..uncertainty import sweep_budgets
 from ._analysis_kind import AnalysisKind, Json
 
 
@@ -90,4 +91,5 @@ SWEEP = AnalysisKind(
     curves=sweep_traces,
     measured=_measured,
     simulated=_simulated,
+    budgets=sweep_budgets,
 )

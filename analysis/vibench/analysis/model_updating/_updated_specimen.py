@@ -12,6 +12,7 @@ from ..kinds import NoiseResult
 from ..recordings import described_specimen
 from ..results import CampaignResults
 from ..tables import named, plain, plus_minus
+from ..uncertainty import stated_of
 from ._bracketed_gap import bracketed_gap
 from ._gap_fit import fit_gap
 from ._parameters import LINEAR, SHOWN, FittedValue, Parameter, with_values
@@ -245,7 +246,13 @@ def _linear(
     weakest = results.noise[0].analysis.response
     is_nonlinear = None if weakest.periodic is None else scatters_beyond_noise(weakest.periodic)
     try:
-        return fit_specimen(weakest.frequency_response, nominal, free, is_nonlinear=is_nonlinear)
+        return fit_specimen(
+            weakest.frequency_response,
+            nominal,
+            free,
+            scale_sd=stated_of(results.noise[0].analysis.facts.bench).scale_sd,
+            is_nonlinear=is_nonlinear,
+        )
     except NotEnoughData as error:
         not_told.append(f"Damping and frequencies stay as the bench says: {error}.")
         return None

@@ -39,7 +39,14 @@ from ._findings import (
     sweep_findings,
     tracked_findings,
 )
-from ._result_tables import ReportTable, collision_table, dwell_table, line_table, resonance_table
+from ._result_tables import (
+    ReportTable,
+    collision_table,
+    dwell_table,
+    line_table,
+    resonance_table,
+    uncertainty_table,
+)
 
 A = TypeVar("A", bound=AbstractAnalysis[Any, Any])
 L = TypeVar("L", bound=AbstractOverlay[Any])
@@ -138,7 +145,9 @@ def result_figures(results: CampaignResults) -> Iterator[DrawnFigure]:
 
 def result_tables(results: CampaignResults) -> tuple[ReportTable, ...]:
     """Build every table for which there are results."""
-    return tuple(build(group) for drawing, group in _groups(results) for build in drawing.tables)
+    found = tuple(build(group) for drawing, group in _groups(results) for build in drawing.tables)
+    budgets = uncertainty_table(results.in_order)
+    return (*found, budgets) if budgets.rows else found
 
 
 def findings(results: CampaignResults) -> Iterator[str]:

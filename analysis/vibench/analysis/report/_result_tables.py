@@ -7,7 +7,7 @@ import numpy as np
 
 from ..figures import verdict_text
 from ..frequency_response import Resonance
-from ..kinds import DwellResult, NoiseResult, SweepResult
+from ..kinds import AnyResult, DwellResult, NoiseResult, SweepResult
 from ..model import (
     PAPER_RESONANCES_HZ,
     PAPER_TERMINAL_RESONANCES_HZ,
@@ -16,8 +16,10 @@ from ..model import (
     DwellOverlay,
 )
 from ..recordings import specimen_of
+from ..results import budgets_of
 from ..sine import Edge
 from ..tables import plus_minus
+from ..uncertainty import COVERAGE, Budget, Cause
 
 _NEAR = 0.08
 """Two resonances are set beside each other when they lie within 8 %: the modes lie at least 9 % apart."""
@@ -52,10 +54,33 @@ def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:
             "paper [Hz]",
         ),
         tuple(row for each in noise for row in _resonance_rows(each)),
-        "± is two standard deviations. Simulated: one draw under the recorded voltage or base motion, "
-        "the same estimator. Model: undamped natural frequency, without contact or (terminal) with m1 "
-        "stuck to m2. Paper: Gong et al. 2025, section 5.",
+        "± is two standard deviations of the lines' scatter alone. Simulated: one draw under the recorded"
+        " voltage or base motion, the same estimator. Model: undamped natural frequency, without contact "
+        "or (terminal) with m1 stuck to m2. Paper: Gong et al. 2025, section 5.",
     )
+
+
+def uncertainty_table(results: Sequence[AnyResult]) -> ReportTable:
+    """Say what each cause adds to the uncertainty of each quantity."""
+    return ReportTable(
+        "Uncertainty, and what it is made of",
+        ("recording", "quantity", "value", *(each.value for each in Cause)),
+        tuple(
+            (each.analysis.facts.name, budget.quantity, budget.text, *(_share(budget, c) for c in Cause))
+            for each in results
+            for budget in budgets_of(each)
+        ),
+        f"± is the expanded uncertainty, k = {COVERAGE:g}, of all that is stated, combined as in JCGM "
+        "100:2008; each column is a standard uncertainty over the value. What the hardware configuration "
+        "does not state is in no ±. Chance: what another run of the same motion would give otherwise.",
+    )
+
+
+def _share(budget: Budget, cause: Cause) -> str:
+    share = budget.share(cause)
+    if share is None:
+        return "not stated"
+    return f"{100 * share:.2g} %" if share else ABSENT
 
 
 def _resonance_rows(result: NoiseResult) -> Iterator[tuple[str, ...]]:
@@ -102,7 +127,9 @@ def collision_table(sweeps: Sequence[SweepResult]) -> ReportTable:
         ("sweep", "measured from", "measured to", "simulated from", "simulated to", "paper"),
         tuple(row for each in sweeps for row in _collision_rows(each)),
         "Bounds hold the edge: between the last interval that is clearly the one and the first that is "
-        "clearly the other. Which state a sweep stays in depends on its direction and on how it began.",
+        "clearly the other. "
+        "An end has none: collisions live on by chance, and another run ends "
+        "elsewhere. Which state a sweep stays in depends on its direction and on how it began.",
     )
 
 
@@ -119,7 +146,7 @@ def _collision_rows(result: SweepResult) -> Iterator[tuple[str, ...]]:
             if number < len(regions):
                 region = regions[number]
                 cells.append(_edge(region.start, "start of sweep" if region.reaches_start else ""))
-                cells.append(_edge(region.stop, "end of sweep" if region.reaches_stop else ""))
+                cells.append("end of sweep" if region.reaches_stop else _last(region.stop))
             else:
                 cells += [ABSENT, ABSENT]
         yield (*cells, _PAPER_COLLISION)
@@ -127,6 +154,11 @@ def _collision_rows(result: SweepResult) -> Iterator[tuple[str, ...]]:
 
 def _edge(edge: Edge, instead: str) -> str:
     return instead or f"{edge.frequency_hz:.1f} ({edge.lower_hz:.1f} to {edge.upper_hz:.1f}) Hz"
+
+
+def _last(edge: Edge) -> str:
+    """Say an end without bounds: collisions live on by chance, and another run ends elsewhere."""
+    return f"{edge.frequency_hz:.1f} Hz in this run"
 
 
 def dwell_table(dwells: Sequence[DwellResult]) -> ReportTable:
@@ -147,25 +179,26 @@ def dwell_table(dwells: Sequence[DwellResult]) -> ReportTable:
             "impacts per s (sim.)",
         ),
         tuple(_dwell_row(each) for each in dwells),
-        "Response I: largest |x| over the window, over A0; in chaos one draw from a scatter. Response II: "
-        "component at the drive frequency, over A0; ± two standard deviations. Simulated: median and 95 % "
-        "band of the draws under the recorded voltage, or the one run under the recorded base motion; z: "
-        "place of the measured value among the draws, beyond 2.6 in one of a hundred cases.",
+        "Response I: largest |x| over the window, over A0; in chaos one draw from a scatter. Response II:"
+        " component at the drive frequency, over A0. ± is expanded (k = 2); the table of uncertainty says"
+        " of what. Simulated: median and 95 % band of the draws under the recorded voltage, or the one "
+        "run under the recorded base motion; z: place of the measured value among the draws, beyond 2.6 "
+        "in one of a hundred cases.",
     )
 
 
 def _dwell_row(result: DwellResult) -> tuple[str, ...]:
     found, laid = result.analysis.response, result.laid
     plan = result.analysis.excitation
-    amplitude_m = found.drive.amplitude_m
+    amplitude, first, second = budgets_of(result)
     is_small = abs(found.noise_bias_i) < _SMALLEST_BIAS
     bias = f"below {_SMALLEST_BIAS:g}" if is_small else f"{found.noise_bias_i:.1g}"
     return (
         f"{plan.amplitude_vpp:g} Vpp, {plan.frequency_hz:g} Hz",
-        plus_minus(1e6 * amplitude_m, 2e6 * found.drive.sd_amplitude_m),
-        f"{found.response_i:.4g}",
+        amplitude.text.removesuffix(f" {amplitude.unit}").strip("()"),
+        first.text,
         bias,
-        plus_minus(found.response_ii, 2 * found.sd_response_ii),
+        second.text,
         verdict_text(result.analysis.motion.verdict),
         *_simulated(laid, RESPONSE_I),
         *_simulated(laid, RESPONSE_II),

@@ -20,6 +20,8 @@ from ._measurement_analysis import (
     analyse as analyse,
 )
 from ._summary import (
+    budget_sentences as budget_sentences,
+    budgets_of as budgets_of,
     campaign_summary as campaign_summary,
     result_summary as result_summary,
 )

@@ -1,9 +1,12 @@
 """A result as one JSON document: every number with its unit in its name, and its uncertainty beside it."""
 
+from collections.abc import Iterator
+
 from ..kinds import ANALYSES, AnyResult, Json
 from ..model import CurveDifference, EnsembleCurve, EscapeRate, SimulatedRun
 from ..recordings import RecordingFacts
 from ..tables import named, plain
+from ..uncertainty import Budget
 from ._campaign_results import CampaignResults
 
 
@@ -18,6 +21,7 @@ def result_summary(result: AnyResult) -> Json:
         ],
         "kind": row.family,
         "measured": row.measured(result.analysis),
+        "uncertainty": [each.to_dict() for each in budgets_of(result)],
         "simulated": None
         if laid is None
         else {
@@ -29,6 +33,26 @@ def result_summary(result: AnyResult) -> Json:
         },
     }
     return dict(plain(document))
+
+
+def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
+    """Give the budget of uncertainty of each number that a reader takes away from a result.
+
+    Returns
+    -------
+    A budget each for A0 and Responses I and II of a dwell, the largest Response II of a sweep or of steps,
+    and for frequency, damping and transmissibility at each resonance under noise (JCGM 100:2008).
+
+    """
+    found: tuple[Budget, ...] = ANALYSES[result.kind].budgets(result.analysis, result.laid)
+    return found
+
+
+def budget_sentences(results: CampaignResults) -> Iterator[str]:
+    """Say the numbers of each recording with their uncertainty and what it is made of, a sentence each."""
+    for each in results.in_order:
+        for budget in budgets_of(each):
+            yield f"{each.analysis.facts.name}: {budget.sentence}."
 
 
 def campaign_summary(results: CampaignResults) -> Json:

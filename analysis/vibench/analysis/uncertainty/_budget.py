@@ -1,0 +1,105 @@
+"""A quantity with everything that makes it uncertain, combined as the GUM does."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from ..tables import plain, plus_minus
+
+COVERAGE = 2.0
+"""Coverage factor of expanded uncertainties: about 95 %."""
+
+
+class Cause(StrEnum):
+    """What makes a quantity uncertain."""
+
+    VIBROMETER = "vibrometer calibration"
+    ACCELEROMETER = "accelerometer calibration"
+    CONVERTER = "converter"
+    ALIGNMENT = "alignment"
+    CLOCK = "clock"
+    NOISE = "noise"
+    CHANCE = "chance"
+    """Of a motion that never repeats, or of noise as the specimen answers it: one draw of many."""
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What one cause adds."""
+
+    cause: Cause
+    relative: float | None
+    """Standard uncertainty that it makes, over the value; None where it is not stated."""
+    source: str
+    """Where the figure comes from, or what is missing."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """One quantity of one measurement."""
+
+    quantity: str
+    value: float
+    unit: str
+    contributions: tuple[Contribution, ...]
+
+    @property
+    def standard(self) -> float:
+        """Combined standard uncertainty of what is stated (JCGM 100:2008, eq. 10) [unit]."""
+        stated = [each.relative for each in self.contributions if each.relative is not None]
+        return float(abs(self.value) * np.sqrt(np.sum(np.square(stated))))
+
+    @property
+    def expanded(self) -> float:
+        """Twice that [unit]."""
+        return COVERAGE * self.standard
+
+    @property
+    def not_stated(self) -> tuple[Cause, ...]:
+        """Causes that act, and of which nobody said how much."""
+        return tuple(dict.fromkeys(each.cause for each in self.contributions if each.relative is None))
+
+    @property
+    def text(self) -> str:
+        """The value with its expanded uncertainty and unit."""
+        said = plus_minus(self.value, self.expanded)
+        return f"({said}) {self.unit}" if self.unit and "±" in said else f"{said} {self.unit}".strip()
+
+    def share(self, cause: Cause) -> float | None:
+        """Give the relative standard uncertainty of one cause: 0 if it plays no part, None if not stated."""
+        mine = [each.relative for each in self.contributions if each.cause is cause]
+        stated = [each for each in mine if each is not None]
+        return None if len(stated) < len(mine) else float(np.sqrt(np.sum(np.square(stated))))
+
+    @property
+    def sentence(self) -> str:
+        """The same in words, the largest contribution first."""
+        parts = sorted(
+            ((each.relative, each.cause.value) for each in self.contributions if each.relative),
+            reverse=True,
+        )
+        said = ", ".join(f"{what} {100 * relative:.2g} %" for relative, what in parts)
+        missing = ", ".join(self.not_stated)
+        left = f"; not stated: {missing}" if missing else ""
+        return f"{self.quantity} {self.text} (k = {COVERAGE:g}: {said or 'nothing stated'}{left})"
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values for JSON."""
+        return {
+            "quantity": self.quantity,
+            "value": plain(self.value),
+            "unit": self.unit,
+            "standard": plain(self.standard),
+            "expanded": plain(self.expanded),
+            "coverage_factor": COVERAGE,
+            "contributions": [
+                {
+                    "cause": each.cause.value,
+                    "standard": None if each.relative is None else plain(each.relative * abs(self.value)),
+                    "source": each.source,
+                }
+                for each in self.contributions
+            ],
+            "not_stated": list(self.not_stated),
+        }

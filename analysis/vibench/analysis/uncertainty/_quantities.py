@@ -1,0 +1,189 @@
+"""The budgets of each kind of measurement: which causes act on its numbers, and how strongly."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ..chaos import MotionKind
+from ..frequency_response import NoiseAnalysis, NoiseResponse, Resonance
+from ..model import RESPONSE_I, RESPONSE_II, AbstractOverlay, DwellOverlay
+from ..recordings import RecordingFacts
+from ..signals import Reals
+from ..sine import DwellAnalysis, SteppedSineAnalysis, SweepAnalysis
+from ._budget import Budget, Cause, Contribution
+from ._stated import Stated, stated_of
+
+_BLOCKS, _FEWEST_BLOCKS = 50, 10
+"""Parts of a window whose maxima tell how that of a whole one scatters."""
+_FEWEST_DRAWS = 5
+_FEWEST_PERIODS = 20.0
+"""Of the drive in a part: its maximum is then one of many turns."""
+
+
+def noise_budgets(analysis: NoiseAnalysis, _: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
+    """Give frequency, damping ratio and transmissibility of every resonance."""
+    stated = stated_of(analysis.facts.bench)
+    found = analysis.response
+    chance = _chance_share(found)
+    return tuple(each for one in found.resonances for each in _of_resonance(one, stated, chance))
+
+
+def _of_resonance(found: Resonance, stated: Stated, chance: float) -> Iterator[Budget]:
+    where = f"{found.frequency_hz:.0f} Hz"
+
+    def scatter(sd: float, value: float) -> tuple[Contribution, ...]:
+        parts = ((Cause.NOISE, 1.0 - chance), (Cause.CHANCE, chance))
+        return tuple(
+            Contribution(cause, float(sd / abs(value) * np.sqrt(part)), "scatter of the lines")
+            for cause, part in parts
+            if part > 0.0
+        )
+
+    yield Budget(
+        f"resonance at {where}, frequency",
+        found.frequency_hz,
+        "Hz",
+        (*stated.timed(1), *scatter(found.sd_frequency_hz, found.frequency_hz)),
+    )
+    yield Budget(
+        f"resonance at {where}, damping ratio",
+        100 * found.damping_ratio,
+        "%",
+        scatter(found.sd_damping_ratio, found.damping_ratio),
+    )
+    yield Budget(
+        f"transmissibility at {where}",
+        found.peak_magnitude,
+        "",
+        (
+            *stated.response,
+            *stated.base,
+            *stated.timed(1),
+            *scatter(found.sd_peak_magnitude, found.peak_magnitude),
+        ),
+    )
+
+
+def _chance_share(found: NoiseResponse) -> float:
+    """Part of the lines' variance that the periods' noise does not explain; 0 where nothing tells it."""
+    if found.periodic is None or found.periodic.distortion_variance is None:
+        return 0.0
+    more = float(np.median(found.periodic.distortion_variance))
+    return more / (more + float(np.median(found.periodic.noise_variance)))
+
+
+def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Budget, ...]:
+    """Give base amplitude and both responses of a dwell."""
+    stated, found = stated_of(analysis.facts.bench), analysis.response
+    is_steady = analysis.motion.verdict.kind is MotionKind.PERIODIC
+    scatter = Cause.NOISE if is_steady else Cause.CHANCE
+    drive = found.drive
+    noise = Contribution(
+        Cause.NOISE, found.noise_displacement_m / drive.amplitude_m / found.response_i, "velocity channel"
+    )
+    return (
+        _amplitude(drive.amplitude_m, drive.sd_amplitude_m, stated, scatter),
+        Budget(
+            RESPONSE_I,
+            found.response_i,
+            "",
+            (*_ratio(stated), noise, *(() if is_steady else _one_draw(analysis, laid))),
+        ),
+        Budget(
+            RESPONSE_II,
+            found.response_ii,
+            "",
+            (
+                *_ratio(stated),
+                Contribution(scatter, found.sd_response_ii / found.response_ii, "tenths of the window"),
+            ),
+        ),
+    )
+
+
+def _ratio(stated: Stated) -> tuple[Contribution, ...]:
+    """Displacement over displacement, from velocity over acceleration: once by the frequency."""
+    return (*stated.response, *stated.base, *stated.timed(1))
+
+
+def _amplitude(value_m: float, sd_m: float, stated: Stated, scatter: Cause) -> Budget:
+    noise = Contribution(scatter, sd_m / value_m, "parts of the window")
+    return Budget("base amplitude A0", 1e6 * value_m, "µm", (*stated.base, *stated.timed(2), noise))
+
+
+def _one_draw(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Contribution, ...]:
+    """Scatter of the largest |x| over equal windows: that of the draws, else of the window's parts."""
+    drawn = None if laid is None else laid.quantity(RESPONSE_I)
+    if drawn is not None and int(drawn.count[0]) >= _FEWEST_DRAWS:
+        source = f"{int(drawn.count[0])} simulated draws"
+        return (Contribution(Cause.CHANCE, float(drawn.relative_sd[0]), source),)
+    found = analysis.response
+    motion = found.displacement.settled
+    window = motion[-round(found.window_s * found.displacement.sample_rate_hz) :]
+    blocks = int(min(_BLOCKS, found.window_s * found.drive.frequency_hz / _FEWEST_PERIODS))
+    if blocks < _FEWEST_BLOCKS:
+        return (Contribution(Cause.CHANCE, None, "the window is too short to tell"),)
+    largest = np.max(np.abs(window[: window.size // blocks * blocks].reshape(blocks, -1)), axis=1)
+    relative = float(_sd_of_largest(largest) / np.max(largest))
+    return (Contribution(Cause.CHANCE, relative, f"largest |x| of {blocks} parts of the window"),)
+
+
+def _sd_of_largest(maxima: Reals) -> float:
+    """Tell how the largest of as many maxima scatters, as generalised extreme values.
+
+    With their shape k, from L-moments (Hosking, Wallis and Wood 1985, Technometrics 27), the scale of the
+    largest of n is n^-k of that of one: less where the motion is bounded, the same where it is not.
+    """
+    ordered, count = np.sort(maxima), maxima.size
+    place = np.arange(count)
+    first, second, third = (
+        float(np.mean(ordered * weight))
+        for weight in (
+            np.ones(count),
+            place / (count - 1),
+            place * (place - 1) / ((count - 1) * (count - 2)),
+        )
+    )
+    skewness = (6 * third - 6 * second + first) / (2 * second - first)
+    off = 2 / (3 + skewness) - np.log(2) / np.log(3)
+    shape = float(np.clip(7.8590 * off + 2.9554 * off**2, 0.0, 0.5))
+    return float(np.std(maxima, ddof=1) * count**-shape)
+
+
+def sweep_budgets(analysis: SweepAnalysis, _: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
+    """Largest Response II of a sweep, with where it is."""
+    found = analysis.response
+    top = int(np.argmax(found.response_ii))
+    collides = bool(analysis.collisions.is_colliding[top])
+    return _largest(
+        analysis.facts,
+        float(found.response_ii[top]),
+        float(found.sd_response_ii[top]),
+        f"{found.frequency_hz[top]:.4g} Hz",
+        Cause.CHANCE if collides else Cause.NOISE,
+    )
+
+
+def stepped_budgets(analysis: SteppedSineAnalysis, _: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
+    """Largest Response II of the steps, with where it is."""
+    found = analysis.response
+    if not found.response_ii.size:
+        return ()
+    top = int(np.argmax(found.response_ii))
+    return _largest(
+        analysis.facts,
+        float(found.response_ii[top]),
+        float(found.sd_response_ii[top]),
+        f"{found.frequency_hz[top]:.4g} Hz",
+        Cause.NOISE,
+    )
+
+
+def _largest(
+    facts: RecordingFacts, value: float, sd: float, where: str, scatter: Cause
+) -> tuple[Budget, ...]:
+    noise = Contribution(scatter, sd / value, "parts of the interval")
+    return (
+        Budget(f"largest {RESPONSE_II}, at {where}", value, "", (*_ratio(stated_of(facts.bench)), noise)),
+    )

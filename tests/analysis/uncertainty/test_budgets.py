@@ -1,0 +1,162 @@
+"""Budgets are what propagation of distributions gives, and say what nobody stated."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import open_recording
+from vibench.acquisition.rig import StatedUncertainty, VibrometerConfig
+from vibench.analysis import Simulation, analyse_files, budgets_of, campaign_summary
+from vibench.analysis.report._result_tables import uncertainty_table
+from vibench.analysis.sine import dwell_response
+from vibench.analysis.uncertainty import Cause, dwell_budgets, stated_of
+from vibench.analysis.uncertainty._quantities import _sd_of_largest
+
+DRAWS = 150
+STATED = {
+    "vibrometer": {
+        "uncertainty": {"relative": 0.012, "coverage_factor": 2.0, "source": "certificate 17"},
+        "alignment_deg": {"value": 6.0, "source": "level"},
+        "calibrated": "2026-02-10",
+    },
+    "accelerometer": {
+        "uncertainty": {"relative": 0.0173, "coverage_factor": 1.73, "source": "data sheet"},
+        "alignment_deg": {"value": 3.0, "source": "mount"},
+    },
+    "daq": {
+        "clock_ppm": {"value": 4000.0, "source": "made large, to be seen"},
+        "channels": [
+            {"role": "m0_velocity", "uncertainty": {"relative": 0.004, "source": "certificate 18"}},
+            {"role": "base_acceleration", "uncertainty": {"relative": 0.006, "source": "certificate 18"}},
+        ],
+    },
+}
+BASE_NOISE, LASER_NOISE = 0.02, 2e-4
+"""Over the largest acceleration; and of the velocity, over its largest."""
+
+
+@pytest.fixture(scope="module")
+def weak(dwell_file):
+    return analyse_files([dwell_file("weak")], "weak", Simulation.LEFT_OUT).results[0]
+
+
+@pytest.fixture(scope="module")
+def samples(dwell_file):
+    with open_recording(dwell_file("weak")) as recording:
+        part = next(each for each in recording.segments if each.label == "dwell")
+        roles = ("drive_voltage", "base_acceleration", "m0_velocity")
+        rate = recording.sample_rate_hz
+        return np.stack([recording.read(each, part.start, part.stop) for each in roles]), rate
+
+
+def seen(samples, weak, rng, *, base=1.0, response=1.0, clock=0.0):
+    """Analyse the dwell as sensors and a clock show it that are off."""
+    (drive, acceleration, velocity), rate = samples
+    noisy = (
+        drive,
+        base * (acceleration + BASE_NOISE * np.abs(acceleration).max() * rng.standard_normal(drive.size)),
+        response * (velocity + LASER_NOISE * np.abs(velocity).max() * rng.standard_normal(drive.size)),
+    )
+    # What a fast clock counts is taken for more seconds than passed.
+    return dwell_response(
+        *noisy, rate * (1 + clock), near_hz=weak.analysis.excitation.frequency_hz, window_s=2.0
+    )
+
+
+def test_a_budget_is_what_propagation_of_distributions_gives(samples, weak):
+    """JCGM 101:2008: all inputs drawn from their distributions, through the whole analysis."""
+    rng = np.random.default_rng(12)
+
+    def calibrated(relative, factor=2.0):
+        return 1 + relative / factor * rng.standard_normal()
+
+    def tilted(degrees):
+        return np.cos(np.radians(degrees) * rng.uniform())
+
+    found = []
+    for _ in range(DRAWS):
+        base = calibrated(0.0173, 1.73) * calibrated(0.006) * tilted(3.0)
+        response = calibrated(0.012) * calibrated(0.004) * tilted(6.0)
+        one = seen(samples, weak, rng, base=base, response=response, clock=rng.uniform(-1, 1) * 4e-3)
+        found.append((1e6 * one.drive.amplitude_m, one.response_i, one.response_ii))
+    facts = replace(weak.analysis.facts, bench={**weak.analysis.facts.bench, **STATED})
+    measured = replace(weak.analysis, facts=facts, response=seen(samples, weak, rng))
+    budgets = dwell_budgets(measured, None)
+    truth = seen(samples, weak, np.random.default_rng(0))
+    true_values = (1e6 * truth.drive.amplitude_m, truth.response_i, truth.response_ii)
+    for budget, values, true in zip(budgets, np.transpose(found), true_values, strict=True):
+        # The cosine's error has a mean, too: uncorrected, it is a part of the uncertainty.
+        rms = np.sqrt(np.mean((values - true) ** 2))
+        assert budget.not_stated == ()
+        # Three standard deviations of an rms from so many draws.
+        assert budget.standard == pytest.approx(rms, rel=3 / np.sqrt(2 * DRAWS)), budget.quantity
+        assert budget.share(Cause.CHANCE) == 0.0
+
+
+def test_what_is_not_stated_is_said_and_is_not_zero(weak):
+    amplitude, _, second = budgets_of(weak)
+    assert second.not_stated == (
+        Cause.VIBROMETER,
+        Cause.CONVERTER,
+        Cause.ALIGNMENT,
+        Cause.ACCELEROMETER,
+        Cause.CLOCK,
+    )
+    assert second.share(Cause.VIBROMETER) is None
+    assert "not stated: vibrometer calibration" in second.sentence
+    assert Cause.VIBROMETER not in amplitude.not_stated
+    table = uncertainty_table([weak])
+    assert table.rows[2][1] == "Response II"
+    assert table.rows[2][3] == "not stated"
+
+
+def test_calibration_source_and_date_reach_the_document(weak):
+    facts = replace(weak.analysis.facts, bench={**weak.analysis.facts.bench, **STATED})
+    stated = stated_of(facts.bench)
+    assert stated.response[0].source == "vibrometer: certificate 17 (calibrated 2026-02-10)"
+    tilts = np.radians([6.0, 3.0]) ** 2 / np.sqrt(20.0)
+    assert stated.scale_sd == pytest.approx(np.linalg.norm([0.006, 0.01, 0.002, 0.003, *tilts]))
+    document = dwell_budgets(replace(weak.analysis, facts=facts), None)[2].to_dict()
+    json.dumps(document)
+    parts = {each["cause"]: each["standard"] for each in document["contributions"]}
+    assert parts["vibrometer calibration"] == pytest.approx(0.006 * document["value"])
+
+
+def test_a_motion_that_never_repeats_has_chance_in_response_i(dwell_file):
+    results = analyse_files([dwell_file("strong")], "strong", Simulation.LEFT_OUT)
+    (strong,) = results.results
+    _, first, second = budgets_of(strong)
+    assert first.share(Cause.CHANCE) > 5 * first.share(Cause.NOISE)
+    assert second.share(Cause.CHANCE) > 0.0
+    said = campaign_summary(results)["results"][0]["uncertainty"]
+    assert [each["quantity"] for each in said] == ["base amplitude A0", "Response I", "Response II"]
+
+
+def test_noise_has_a_budget_for_each_resonance_without_a_calibration_in_its_damping(noise_file):
+    (noise,) = analyse_files([noise_file()], "noise", Simulation.LEFT_OUT).results
+    budgets = budgets_of(noise)
+    assert len(budgets) == 3 * len(noise.analysis.response.resonances) > 0
+    for frequency, damping, height in zip(budgets[::3], budgets[1::3], budgets[2::3], strict=True):
+        assert frequency.not_stated == (Cause.CLOCK,)
+        assert damping.not_stated == ()
+        assert Cause.VIBROMETER in height.not_stated
+
+
+def test_a_statement_needs_its_source():
+    with pytest.raises(ValueError, match="source"):
+        StatedUncertainty(relative=0.01, source="")
+    with pytest.raises(ValueError, match="less than 1"):
+        StatedUncertainty(relative=1.5, source="per cent, by mistake")
+    assert VibrometerConfig.model_fields["uncertainty"].default is None
+
+
+@pytest.mark.parametrize("bounded", [False, True])
+def test_the_scatter_of_a_maximum_is_told_from_one_window(bounded):
+    """Against many windows: of unbounded motion, and of one whose largest value has a bound."""
+    rng = np.random.default_rng(5)
+    values = rng.beta(2, 3, (400, 2000)) if bounded else rng.exponential(size=(400, 2000))
+    true = np.std(values.max(axis=1))
+    told = [_sd_of_largest(each.reshape(50, -1).max(axis=1)) for each in values]
+    assert np.median(told) == pytest.approx(true, rel=0.3)
