@@ -24,6 +24,10 @@ from ._no_generator import (
     FILE_GENERATOR as FILE_GENERATOR,
     NO_GENERATOR as NO_GENERATOR,
 )
+from ._sound_card import (
+    SoundCardDigitizer as SoundCardDigitizer,
+    SoundCardOutput as SoundCardOutput,
+)
 from ._visa_link import (
     list_visa_resources as list_visa_resources,
 )

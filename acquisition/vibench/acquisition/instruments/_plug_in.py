@@ -30,6 +30,8 @@ OURS = tuple(
         (PlugInKind.DIGITIZER, "file", f"{_DRIVERS}:FilePlayer"),
         (PlugInKind.DIGITIZER, "daqmx", f"{_DRIVERS}:DaqmxDigitizer"),
         (PlugInKind.OUTPUT, "daqmx", f"{_DRIVERS}:DaqmxOutput"),
+        (PlugInKind.DIGITIZER, "soundcard", f"{_DRIVERS}:SoundCardDigitizer"),
+        (PlugInKind.OUTPUT, "soundcard", f"{_DRIVERS}:SoundCardOutput"),
         (PlugInKind.SENSOR, "wire", f"{_SENSORS}:wire"),
         (PlugInKind.SENSOR, "accelerometer", f"{_SENSORS}:accelerometer"),
         (PlugInKind.SENSOR, "vibrometer", f"{_SENSORS}:vibrometer"),
@@ -64,7 +66,7 @@ def plug_in(kind: PlugInKind, name: str) -> Any:
     (row,) = found.values()
     try:
         return row.load()
-    except (ImportError, AttributeError) as error:
+    except (ImportError, AttributeError, OSError) as error:
         raise ConfigurationError(
             f"{name!r} of {kind.value} is {row.value}, which cannot be loaded ({error}); install what its "
             "package needs, or correct its entry point"

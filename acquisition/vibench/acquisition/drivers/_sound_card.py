@@ -1,0 +1,352 @@
+"""A sound card as converter and analogue output, over PortAudio: what any laboratory has, once calibrated.
+
+A sound card tells no volts and passes no constant: both are measured once and written in ``daq.options``
+(docs/instruments.md), and without them nothing opens. Inputs and output are one stream, so that they begin
+together but for the card's own delay.
+"""
+
+from collections import deque
+from threading import Condition
+from typing import Any, Self
+
+import numpy as np
+import sounddevice
+
+from ..errors import ConfigurationError, DataLost, InstrumentError, InstrumentLost, LimitExceeded
+from ..instruments import Block, Identity, IdleOutput, Samples
+from ..rig import Channel, OutputConfig, Rig, channels_of
+from ._overload import overload_ranges
+
+_LATEST_S = 10.0
+"""How late samples may be before the card counts as dead."""
+_SAME_RATE = 1e-6
+_NEEDED = "calibrated", "input_full_scale_v", "low_cut_hz"
+
+
+class _Card:
+    """One stream of a card: samples in, samples out, on PortAudio's own thread."""
+
+    def __init__(self, rig: Rig, inputs: tuple[int, ...]) -> None:
+        daq, self.rate_hz = rig.daq, rig.daq.sample_rate_hz
+        self.inputs = inputs
+        self.changed = Condition()
+        self.blocks: deque[Samples] = deque()
+        self.waiting = 0
+        self.most_waiting = round(daq.buffer_s * self.rate_hz)
+        self.queued: deque[Samples] = deque()
+        self.unplayed = 0
+        self.is_armed = False
+        self.failure = ""
+        self.ran_dry = False
+        self._output = None if daq.output is None else int(daq.output.physical.removeprefix("ao"))
+        highest = 1 + max(inputs)
+        common = {"samplerate": self.rate_hz, "dtype": "float32", "device": daq.device}
+        self.stream: Any = (
+            sounddevice.InputStream(channels=highest, callback=self._hear, **common)
+            if self._output is None
+            else sounddevice.Stream(
+                channels=(highest, 1 + self._output), callback=self._hear_and_play, **common
+            )
+        )
+
+    def begin(self) -> None:
+        """Forget what was heard, and start."""
+        with self.changed:
+            self.blocks.clear()
+            self.waiting, self.failure = 0, ""
+        self.stream.start()
+
+    def drop(self) -> None:
+        """Forget what is still to be played."""
+        with self.changed:
+            self.queued.clear()
+            self.unplayed, self.is_armed, self.ran_dry = 0, False, False
+            self.changed.notify_all()
+
+    def _hear(self, heard: Samples, frames: int, time: object, status: Any) -> None:
+        del frames, time
+        with self.changed:
+            if status.input_overflow or self.waiting > self.most_waiting:
+                self.failure = "samples were overwritten before they were read"
+            self.blocks.append(heard.T[list(self.inputs)].astype(np.float64))
+            self.waiting += heard.shape[0]
+            self.changed.notify_all()
+
+    def _hear_and_play(self, heard: Samples, played: Samples, frames: int, time: object, status: Any) -> None:
+        played.fill(0.0)
+        with self.changed:
+            if self.is_armed and self._output is not None:
+                samples = self._taken(frames)
+                played[: samples.size, self._output] = samples
+                self.ran_dry = self.ran_dry or samples.size < frames or bool(status.output_underflow)
+        self._hear(heard, frames, time, status)
+
+    def _taken(self, frames: int) -> Samples:
+        parts, left = [np.zeros(0)], frames
+        while left and self.queued:
+            part = self.queued.popleft()
+            if part.size > left:
+                self.queued.appendleft(part[left:])
+                part = part[:left]
+            parts.append(part)
+            left -= part.size
+        self.unplayed -= frames - left
+        return np.concatenate(parts)
+
+
+class SoundCardDigitizer:
+    """A `Digitizer` on the inputs of a sound card; ``physical`` is ``"in0"``, ``"in1"``, ..."""
+
+    def __init__(self, card: _Card, rig: Rig, channels: tuple[Channel, ...]) -> None:
+        self.card = card
+        self.options = rig.daq.options
+        self._device = rig.daq.device
+        self._channels = channels
+        self._full_scale_v = float(rig.daq.options["input_full_scale_v"])
+        self._next_sample = 0
+        self._is_running = False
+        self._is_open = True
+
+    @classmethod
+    def open(cls, rig: Rig) -> Self:
+        """Open the card that ``daq.device`` names, with its calibration.
+
+        Raises
+        ------
+        ConfigurationError
+            When a calibration is missing, or an input is to be coupled to DC or fed with a current.
+        InstrumentLost, InstrumentError
+            When there is no such card, or it does not take the rate.
+
+        """
+        _require_calibration(rig)
+        channels = channels_of(rig)
+        inputs = tuple(_input(channel, rig) for channel in channels)
+        try:
+            card = _Card(rig, inputs)
+        except ValueError as error:
+            raise InstrumentLost(
+                f"no sound card {rig.daq.device!r} is there ({error}); name one of the system's in daq.device"
+            ) from error
+        except sounddevice.PortAudioError as error:
+            raise InstrumentError(
+                f"the sound card {rig.daq.device!r} cannot be opened at {rig.daq.sample_rate_hz:g} samples "
+                f"a second ({error}); give a rate and channels that it has, and close what else uses it"
+            ) from error
+        if abs(card.stream.samplerate - card.rate_hz) > _SAME_RATE * card.rate_hz:
+            card.stream.close()
+            raise InstrumentError(
+                f"the sound card {rig.daq.device!r} runs at {card.stream.samplerate:g} samples a second "
+                f"where {card.rate_hz:g} were asked for; give daq.sample_rate_hz a rate that it has"
+            )
+        return cls(card, rig, channels)
+
+    @property
+    def identity(self) -> Identity:
+        """Which card, by which PortAudio, and when it was calibrated."""
+        version = sounddevice.get_portaudio_version()[1]
+        reply = f"{self._device}, {version}, {', '.join(f'{key} {self.options[key]}' for key in _NEEDED)}"
+        return Identity("", self._device, "", version, reply)
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """As PortAudio says that it runs."""
+        return float(self.card.stream.samplerate)
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """Roles of the channels, in the order of the rows of a block."""
+        return tuple(channel.role.value for channel in self._channels)
+
+    @property
+    def volts_per_count(self) -> tuple[float | None, ...]:
+        """None: PortAudio hands over numbers, not counts."""
+        return (None,) * len(self._channels)
+
+    def start(self) -> None:
+        """Begin sampling, and playing what an output was armed with."""
+        if not self._is_open or self._is_running:
+            raise InstrumentError(f"{self._device} is closed, or samples already; open it, or stop it first")
+        self._next_sample = 0
+        with _portaudio(f"starting {self._device}"):
+            self.card.begin()
+        self._is_running = True
+
+    def read(self, samples: int) -> Block:
+        """Wait for the next samples; DataLost when some were overwritten, InstrumentLost when none come."""
+        if not self._is_running or samples < 1:
+            raise InstrumentError(
+                f"{samples} samples were asked of {self._device}, which does not sample; start it"
+            )
+        card = self.card
+        with card.changed:
+            wait_s = samples / card.rate_hz + _LATEST_S
+            came = card.changed.wait_for(lambda: card.failure or card.waiting >= samples, wait_s)
+            if card.failure:
+                raise DataLost(
+                    f"{self._device}: {card.failure}. Stop, and read more often or raise daq.buffer_s"
+                )
+            if not came:
+                raise InstrumentLost(
+                    f"{self._device} gives no samples any more; see whether it is plugged in"
+                )
+            joined = np.concatenate(list(card.blocks), axis=1)
+            card.blocks.clear()
+            card.blocks.append(joined[:, samples:])
+            card.waiting -= samples
+        first, self._next_sample = self._next_sample, self._next_sample + samples
+        volts = joined[:, :samples] * self._full_scale_v
+        scales_v = tuple(channel.full_scale_v for channel in self._channels)
+        return Block(first, volts, overload_ranges(volts, self.roles, scales_v, first))
+
+    @property
+    def waiting_samples(self) -> int:
+        """How many samples are heard and not read yet."""
+        return self.card.waiting
+
+    def stop(self) -> None:
+        """End sampling. Legal at any time."""
+        if self._is_running:
+            self._is_running = False
+            with _portaudio(f"stopping {self._device}"):
+                self.card.stream.abort()
+
+    def close(self) -> None:
+        """Release the card. Legal at any time."""
+        self.stop()
+        if self._is_open:
+            self._is_open = False
+            with _portaudio(f"closing {self._device}"):
+                self.card.stream.close()
+
+
+class SoundCardOutput:
+    """An `AnalogOutput` on the card of a `SoundCardDigitizer`, in its stream."""
+
+    idle = IdleOutput.ZERO
+
+    def __init__(self, physical: str, config: OutputConfig, digitizer: SoundCardDigitizer) -> None:
+        self._physical = physical
+        self._config = config
+        self._digitizer = digitizer
+        self._card = digitizer.card
+        self._full_scale_v = float(digitizer.options["output_full_scale_v"])
+        self._is_open = True
+
+    @classmethod
+    def open(cls, physical: str, config: OutputConfig, digitizer: SoundCardDigitizer) -> Self:
+        """Take the output of the stream; ConfigurationError for another rate, or a limit past its own."""
+        output = cls(physical, config, digitizer)
+        if config.sample_rate_hz != digitizer.sample_rate_hz or config.limit_v > output._full_scale_v:
+            raise ConfigurationError(
+                f"daq.output asks for {config.limit_v:g} V at {config.sample_rate_hz:g} samples a second; "
+                f"the card gives {output._full_scale_v:g} V at {digitizer.sample_rate_hz:g}, the rate of its "
+                "inputs. Lower limit_v, or give the same rate"
+            )
+        return output
+
+    @property
+    def identity(self) -> Identity:
+        """The card's, and which of its outputs."""
+        card = self._digitizer.identity
+        return Identity(card.maker, card.model, "", card.firmware, f"{self._physical} of {card.reply}")
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """The rate of the stream."""
+        return self._digitizer.sample_rate_hz
+
+    @property
+    def ahead_samples(self) -> int:
+        """How many samples fit in front of what is being played."""
+        return int(self._config.ahead_s * self.sample_rate_hz)
+
+    def write(self, volts: Samples) -> None:
+        """Put samples behind those still to be played, waiting for room; as `AnalogOutput.write` raises."""
+        peak_v = float(np.max(np.abs(volts), initial=0.0))
+        if not peak_v <= self._config.limit_v:
+            raise LimitExceeded(
+                f"{self._physical} was to play a peak of {peak_v:g} V; {self._config.limit_v:g} V are "
+                "allowed here. Nothing was written; lower the amplitude"
+            )
+        if not self._is_open:
+            raise InstrumentError(f"{self._physical} is closed; open the bench again")
+        card, needed = self._card, np.asarray(volts, dtype=np.float64).size
+        with card.changed:
+            there_is_room = card.changed.wait_for(
+                lambda: card.ran_dry or card.unplayed + needed <= self.ahead_samples, _LATEST_S
+            )
+            if card.ran_dry or not there_is_room:
+                raise DataLost(
+                    f"{self._physical} ran dry, or stands still: what it played has ended; begin anew"
+                )
+            card.queued.append(np.asarray(volts, dtype=np.float64) / self._full_scale_v)
+            card.unplayed += needed
+
+    def arm(self) -> None:
+        """Play from the digitizer's start on."""
+        with self._card.changed:
+            if not self._card.unplayed:
+                raise InstrumentError(
+                    f"{self._physical} has nothing to play; write the first stretch, then arm"
+                )
+            self._card.is_armed = True
+
+    def stop(self) -> None:
+        """Play zero volts from the next block on. Legal at any time."""
+        self._card.drop()
+
+    def close(self) -> None:
+        """Zero volts. Legal at any time."""
+        self._is_open = False
+        self.stop()
+
+
+def _portaudio(doing: str) -> "_Told":
+    return _Told(doing)
+
+
+class _Told:
+    """Says what PortAudio's errors mean here."""
+
+    def __init__(self, doing: str) -> None:
+        self._doing = doing
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, sounddevice.PortAudioError):
+            raise InstrumentLost(
+                f"{self._doing} failed ({error}); see whether the card is plugged in"
+            ) from error
+
+
+def _require_calibration(rig: Rig) -> None:
+    needed = (*_NEEDED, "output_full_scale_v") if rig.daq.output is not None else _NEEDED
+    if missing := [key for key in needed if key not in rig.daq.options]:
+        raise ConfigurationError(
+            f"a sound card tells no volts and passes no constant: daq.options lacks {', '.join(missing)}. "
+            "Nothing was opened; play a known sine into it, measure what its output gives at full scale, and "
+            "enter them (docs/instruments.md)"
+        )
+
+
+def _input(channel: Channel, rig: Rig) -> int:
+    """Give the number of a card's input; raises ConfigurationError for what no card can do."""
+    name = channel.physical.rpartition("/")[2]
+    full_scale_v = float(rig.daq.options["input_full_scale_v"])
+    if (
+        channel.coupling != "AC"
+        or channel.iepe_current_a
+        or channel.range_v > full_scale_v * (1 + _SAME_RATE)
+    ):
+        raise ConfigurationError(
+            f"{channel.role.value}: a sound card's input is coupled to AC, feeds no sensor, and reaches "
+            f"{full_scale_v:g} V here; {channel.coupling}, {1e3 * channel.iepe_current_a:g} mA and "
+            f'{channel.range_v:g} V were asked for. Give coupling = "AC", a range within it, and an IEPE '
+            "supply in front"
+        )
+    if not name.startswith("in") or not name[2:].isdigit():
+        raise ConfigurationError(f"physical = {name!r} is no input of a sound card; give in0, in1, ...")
+    return int(name[2:])

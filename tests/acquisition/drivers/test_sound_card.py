@@ -1,0 +1,190 @@
+"""A sound card as converter and output: real sounddevice on a simulated PortAudio, and the analogue world."""
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import ConfigurationError, open_bench, open_recording, run_measurement
+from vibench.acquisition.bench import Verdict
+from vibench.acquisition.check import bench_report
+from vibench.acquisition.errors import DataLost, InstrumentLost, LimitExceeded
+from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep, StreamedNoise
+from vibench.acquisition.rig import CalibrationRule, OutputConfig, confirm_simulated
+from vibench.analysis import analyse
+from vibench.virtual_rig.world import World
+
+from .portaudio import simulated
+
+pytest.importorskip("_sounddevice", reason="pip install 'vibench[sound]'")
+
+CARD = "Simulated card"
+RATE_HZ = 48_000.0
+CALIBRATION = {
+    "calibrated": "2026-02-10",
+    "input_full_scale_v": 2.0,
+    "output_full_scale_v": 1.5,
+    "low_cut_hz": 0.5,
+}
+WIRES = ("drive_voltage", 2.0), ("amplifier_voltage", 10.0), ("base_acceleration", 1.0), ("m0_velocity", 1.0)
+
+
+class Silent:
+    """The generator's terminal, where there is no generator."""
+
+    def render(self, start_s, interval_s, count):
+        return np.zeros(count)
+
+
+@pytest.fixture
+def card_rig(rig):
+    """Give the virtual rig with a sound card in the place of its converter and generator."""
+
+    def changed(**options):
+        by_role = {channel.role.value: channel for channel in rig.daq.channels}
+        channels = tuple(
+            by_role[role].model_copy(
+                update={
+                    "physical": f"in{number}", "range_v": 2.0, "coupling": "AC",
+                    "iepe_current_a": 0.0, "attenuation": attenuation,
+                }
+            )
+            for number, (role, attenuation) in enumerate(WIRES)
+        )  # fmt: skip
+        output = OutputConfig(
+            physical="ao0", plays="tones_and_streams", limit_v=1.5, sample_rate_hz=RATE_HZ, source="test"
+        )
+        given = {key: value for key, value in {**CALIBRATION, **options}.items() if value is not None}
+        daq = {
+            "driver": "soundcard", "device": CARD, "product": "sound card", "sample_rate_hz": RATE_HZ,
+            "channels": channels, "output": output, "options": given,
+        }  # fmt: skip
+        return rig.model_copy(
+            update={
+                "generator": rig.generator.model_copy(update={"driver": "none", "resource": ""}),
+                "accelerometer": rig.accelerometer.model_copy(update={"iepe": "no"}),
+                "daq": rig.daq.model_copy(update=daq),
+            }
+        )
+
+    return changed
+
+
+@pytest.fixture
+def audio():
+    audio = simulated()
+    audio.plugged = True
+    yield audio
+    audio.Pa_AbortStream(None)
+
+
+@pytest.fixture
+def opened(card_rig, audio):
+    """Open the bench on the card, its jacks wired to the world that the rig describes."""
+    benches = []
+
+    def opens():
+        simulated_rig = card_rig()
+        world = World(simulated_rig, Silent())
+        real = simulated_rig.model_copy(update={"virtual": None})
+        bench = open_bench(real, confirm_simulated, CalibrationRule.WAIVED)
+        names = tuple(f"{CARD}/in{number}" for number in range(len(WIRES)))
+        scales = CALIBRATION["input_full_scale_v"], CALIBRATION["output_full_scale_v"]
+        card = bench.digitizer.card
+        audio.wire(world, names, f"{CARD}/ao0", scales, lambda: card.waiting < 9600)
+        benches.append(bench)
+        return bench
+
+    yield opens
+    for bench in benches:
+        bench.close()
+
+
+def test_the_bench_passes_its_check(opened, tmp_path):
+    report = bench_report(opened(), tmp_path)
+    assert [each.name for each in report.findings if each.verdict is Verdict.FAIL] == []
+    assert report["drive over setting"].number == pytest.approx(1.0, abs=0.02)
+    assert report["amplifier gain"].number == pytest.approx(10.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    "excitation",
+    [
+        Dwell(amplitude_vpp=0.8, frequency_hz=160, settle_s=0.5, duration_s=2.5),
+        SineSweep(amplitude_vpp=0.8, start_hz=120, stop_hz=220, duration_s=4.0, step_s=0.05, settle_s=0.5),
+        StreamedNoise(amplitude_vpp=1.5, band_start_hz=40, band_stop_hz=800, duration_s=6.0, settle_s=0.5),
+    ],
+    ids=lambda each: each.kind,
+)
+def test_what_it_plays_is_recorded_without_a_gap_and_analysed(opened, tmp_path, excitation):
+    plan = Measurement(name="card", excitation=excitation, ramp_s=0.5, ramp_step_s=0.05)
+    path = run_measurement(opened(), plan, tmp_path / "card.h5").path
+    with open_recording(path) as recording:
+        assert recording.state.value == "complete"
+        assert not recording.gaps
+        assert recording.instruments["digitizer"].model == CARD
+        if excitation.kind == "sine_sweep":
+            (sweep,) = [each for each in recording.segments if each.label == "sweep"]
+            drive = recording.read("drive_voltage", sweep.first_sample, sweep.last_sample + 1)
+            rises = np.count_nonzero((drive[:-1] < 0) & (drive[1:] >= 0))
+            assert abs(rises - 4.0 * 170) <= 2
+    assert analyse(path) is not None
+
+
+def test_noise_that_needs_a_generator_is_refused_before_anything_plays(opened, tmp_path):
+    plan = Measurement(
+        name="card",
+        excitation=MultisineNoise(amplitude_vpp=0.5, band_start_hz=40, band_stop_hz=400),
+        ramp_s=0.5,
+    )
+    with pytest.raises(LimitExceeded, match="range of the no function generator"):
+        run_measurement(opened(), plan, tmp_path / "card.h5")
+
+
+@pytest.mark.parametrize("missing", ["calibrated", "input_full_scale_v", "output_full_scale_v", "low_cut_hz"])
+def test_without_a_calibration_nothing_opens(card_rig, audio, missing):
+    rig = card_rig(**{missing: None}).model_copy(update={"virtual": None})
+    with pytest.raises(ConfigurationError, match=rf"daq\.options lacks {missing}"):
+        open_bench(rig, confirm_simulated, CalibrationRule.WAIVED)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"coupling": "DC"}, "coupled to AC"),
+        ({"iepe_current_a": 0.002}, "feeds no sensor"),
+        ({"range_v": 5.0}, "reaches 2 V"),
+    ],
+)
+def test_what_no_card_can_do_is_refused(card_rig, audio, wrong, said):
+    rig = card_rig().model_copy(update={"virtual": None})
+    first, *others = rig.daq.channels
+    daq = rig.daq.model_copy(update={"channels": (first.model_copy(update=wrong), *others)})
+    with pytest.raises(ConfigurationError, match=said):
+        open_bench(rig.model_copy(update={"daq": daq}), confirm_simulated, CalibrationRule.WAIVED)
+
+
+def test_a_card_that_is_not_there_is_told(card_rig, audio):
+    audio.plugged = False
+    rig = card_rig().model_copy(update={"virtual": None})
+    with pytest.raises(InstrumentLost, match="no sound card 'Simulated card'"):
+        open_bench(rig, confirm_simulated, CalibrationRule.WAIVED)
+
+
+def test_samples_that_nobody_reads_in_time_are_lost_and_told(opened, audio):
+    bench = opened()
+    card = bench.digitizer.card
+    card.most_waiting = 2000
+    bench.digitizer.start()
+    with card.changed:
+        card.changed.wait_for(lambda: card.failure, 10.0)
+    with pytest.raises(DataLost, match="overwritten before they were read"):
+        bench.digitizer.read(100)
+
+
+def test_an_output_that_nobody_feeds_runs_dry_and_says_so(opened):
+    bench = opened()
+    bench.output.write(np.zeros(600))
+    bench.output.arm()
+    bench.digitizer.start()
+    bench.digitizer.read(4096)
+    with pytest.raises(DataLost, match="ran dry"):
+        bench.output.write(np.zeros(600))
