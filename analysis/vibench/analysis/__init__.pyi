@@ -57,6 +57,7 @@ from .results import (
     compare_recording as compare_recording,
     level_of_drive as level_of_drive,
     merged_results as merged_results,
+    recorded_response as recorded_response,
     recordings_in as recordings_in,
     result_summary as result_summary,
 )

@@ -6,17 +6,9 @@ from typing import Annotated
 import typer
 
 from vibench.acquisition import load_toml
-from vibench.analysis import (
-    CurveKind,
-    CurveOrigin,
-    FrequencyResponseRequest,
-    InvalidRequest,
-    Simulation,
-    compare_recording,
-    level_of_drive,
-)
-from vibench.analysis.dynamics import read_diagram
-from vibench.analysis.report import SHOWN, ImageKind, RecordedLevel, map_caption, map_figure, motion_words
+from vibench.analysis import InvalidRequest, recorded_response
+from vibench.analysis.dynamics import map_caption, motion_words, read_diagram
+from vibench.analysis.report import SHOWN, ImageKind, map_figure
 from vibench.sim.maps import (
     KickStability,
     Map,
@@ -52,9 +44,9 @@ def map_motions(
         bool, typer.Option("--estimate", help="Say how many points, how long and how large; compute nothing.")
     ] = False,
     show: Annotated[
-        str,
+        str | None,
         typer.Option("--show", metavar="QUANTITY", help=f"Beside the kinds of motion: {', '.join(SHOWN)}."),
-    ] = "response_i",
+    ] = None,
     branches: Annotated[
         Path | None,
         typer.Option(
@@ -78,7 +70,7 @@ def map_motions(
 ) -> None:
     """Map the motions over two parameters or two coordinates of the start, or along one parameter."""
     asked = load_toml(plan, Map)
-    if show not in SHOWN:
+    if show not in (None, *SHOWN):
         raise InvalidRequest(f"--show was given as {show!r}; there are {', '.join(SHOWN)}")
     if only_estimate:
         told = estimate_map(asked, workers)
@@ -89,7 +81,7 @@ def map_motions(
             "--kicks needs a map in which only the start varies; give ranges for two coordinates"
         )
     diagram = None if branches is None else read_diagram(branches)
-    levels = [_level(path) for path in like or ()]
+    levels = [recorded_response(path) for path in like or ()]
     room_for_folder(out)
     out.mkdir(parents=True, exist_ok=True)
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
@@ -109,16 +101,6 @@ def map_motions(
     complain_about_points(results)
 
 
-def _level(path: Path) -> RecordedLevel:
-    found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
-    measured = [
-        each
-        for each in found.curves
-        if each.origin is CurveOrigin.MEASURED and each.response is CurveKind.RESPONSE_I
-    ]
-    return RecordedLevel(path.stem, level_of_drive(found), measured)
-
-
 def tell(results: MapResults, stability: tuple[KickStability, ...]) -> None:
     """Say what was found."""
     console.print(map_caption(results))
@@ -129,7 +111,7 @@ def tell(results: MapResults, stability: tuple[KickStability, ...]) -> None:
     if results.plan.is_basin:
         rough = _roughness(results)
         console.print(
-            "The uncertainty exponent of the boundary is not determined: too few starts lie near it."
+            "The uncertainty exponent is not determined: too few starts lie near a boundary, or most do."
             if rough is None
             else f"Uncertainty exponent of the boundary {rough.exponent:.2f} ({rough.low:.2f} to "
             f"{rough.high:.2f}), so its dimension is {2.0 - rough.exponent:.2f}."

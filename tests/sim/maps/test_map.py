@@ -134,3 +134,10 @@ def test_a_map_along_one_quantity_keeps_states_once_a_drive_period():
     # What goes up begins where the lower neighbour ended.
     assert results.values("continues", start="up").tolist()[1:] == [0.0, 1.0]
     assert results.values("continues", start="down").tolist()[:-1] == [4.0, 5.0]
+
+
+def test_sections_of_a_chain_are_taken_where_the_drive_is_at_its_beginning():
+    # The lower points touch nothing and are known in closed form; what goes on from them strikes.
+    plan = Map(frequency_hz=Range(start=84.0, stop=90.0, points=4), amplitude_m=5e-6, chain=("up",))
+    phase = solve_map(plan, workers=1).values("drive_phase")
+    assert np.allclose(np.exp(1j * phase), 1.0, atol=1e-6)

@@ -32,6 +32,13 @@ from ._dynamics_file import (
     write_diagram as write_diagram,
     write_spectrum as write_spectrum,
 )
+from ._map_words import (
+    MOTION_CLASSES as MOTION_CLASSES,
+    RecordedLevel as RecordedLevel,
+    map_caption as map_caption,
+    motion_classes as motion_classes,
+    motion_words as motion_words,
+)
 from ._recorded_level import (
     recorded_level as recorded_level,
 )

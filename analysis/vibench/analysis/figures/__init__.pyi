@@ -44,13 +44,8 @@ from ._hysteresis import (
     hysteresis_figure as hysteresis_figure,
 )
 from ._maps import (
-    MOTION_CLASSES as MOTION_CLASSES,
     SHOWN as SHOWN,
-    RecordedLevel as RecordedLevel,
-    map_caption as map_caption,
     map_figure as map_figure,
-    motion_classes as motion_classes,
-    motion_words as motion_words,
 )
 from ._portraits import (
     portraits_figure as portraits_figure,

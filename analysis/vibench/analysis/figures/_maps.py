@@ -1,7 +1,6 @@
 """Maps, basins and diagrams along one parameter: what motions there are, and one quantity of them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -12,11 +11,17 @@ from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from vibench.sim import MotionKind
-from vibench.sim.maps import QUANTITIES, MapMotion, MapResults, Quantity, Spacing
+from vibench.sim.maps import MapMotion, MapResults, Quantity, Spacing
 
-from ..comparison import Curve
-from ..dynamics import BranchDiagram, BranchLine
+from ..dynamics import (
+    MOTION_CLASSES,
+    BranchDiagram,
+    BranchLine,
+    RecordedLevel,
+    map_caption,
+    motion_classes,
+    motion_words,
+)
 from ..signals import Reals
 from ..tables import Table, table
 from ._branches import draw_line
@@ -34,18 +39,6 @@ from ._style import (
 
 _PANEL_IN = 3.6
 _STRIP_IN = 2.6
-MOTION_CLASSES = (
-    ("no impacts", "#eef3f7"),
-    ("period 1", "#0072b2"),
-    ("period 2", "#56b4e9"),
-    ("period 3", "#009e73"),
-    ("period 4", "#f0e442"),
-    ("period 5 or more", "#e69f00"),
-    ("quasi-periodic", "#cc79a7"),
-    ("chaotic", "#d55e00"),
-    ("undecided", "#9a9a9a"),
-)
-"""How the motions of a map are told apart, and their colours."""
 SHOWN = {
     "response_i": "Response I of m0 over A0",
     "response_ii": "Response II of m0 over A0",
@@ -64,20 +57,9 @@ _COLOURS = (*LEVELS, "#f0e442", "#1b1b1b")
 _UP_AND_DOWN = {"up": ("#0072b2", "up"), "down": ("#d55e00", "down")}
 
 
-@dataclass(frozen=True, eq=False)
-class RecordedLevel:
-    """A recording's level over frequency, and what was measured at it."""
-
-    name: str
-    pairs: Sequence[tuple[float, float]]
-    """Frequency [Hz] and amplitude of the base [m]."""
-    measured: Sequence[Curve]
-    """Responses I of m0."""
-
-
 def map_figure(
     results: MapResults,
-    shown: str = "response_i",
+    shown: str | None = None,
     diagram: BranchDiagram | None = None,
     levels: Sequence[RecordedLevel] = (),
 ) -> DrawnFigure:
@@ -88,7 +70,8 @@ def map_figure(
     results
         The map, complete or growing.
     shown
-        One of `SHOWN`, beside the kinds of motion.
+        One of `SHOWN`, beside the kinds of motion. When None, Response I, and of a basin map how long each
+        start was followed.
     diagram
         Branches that are laid over a diagram along one quantity.
     levels
@@ -99,7 +82,8 @@ def map_figure(
         if len(results.plan.varied) == 1:
             figure, title = _diagram(results, diagram), "Motions along one parameter"
         else:
-            figure, title = _map(results, shown, levels), "Map of motions"
+            usual = "duration" if results.plan.is_basin else "response_i"
+            figure, title = _map(results, shown or usual, levels), "Map of motions"
     return DrawnFigure(
         name="map",
         title=f"{title}: {', '.join(each.long_name for each in results.plan.varied)}",
@@ -107,52 +91,6 @@ def map_figure(
         figure=figure,
         tables=(motion_table(results.motions),),
     )
-
-
-def motion_classes(results: MapResults, start: int = 0) -> Reals:
-    """Give the place in `MOTION_CLASSES` of each point over what varies, from one start; NaN: not known."""
-    motion, period, impacts = (results.shown(name, start) for name in ("motion", "period", "impact_rate"))
-    kinds = list(MotionKind)
-    found = np.full(motion.shape, np.nan)
-    is_periodic = motion == kinds.index(MotionKind.PERIODIC)
-    found[is_periodic] = np.minimum(period[is_periodic], 5.0)
-    found[is_periodic & (impacts == 0.0)] = 0.0
-    found[motion == kinds.index(MotionKind.QUASI_PERIODIC)] = 6.0
-    found[np.isin(motion, [kinds.index(MotionKind.CHAOTIC), kinds.index(MotionKind.CHAOTIC_SO_FAR)])] = 7.0
-    found[motion == kinds.index(MotionKind.UNDECIDED)] = 8.0
-    return found
-
-
-def motion_words(motion: MapMotion) -> str:
-    """Name a motion and its share."""
-    kind = f"period {motion.period}" if motion.period is not None else str(motion.motion)
-    share = motion.share
-    return (
-        f"{kind}, Response I {motion.response_i:.3g}: {share.share:.2%} ({share.low:.2%} to {share.high:.2%})"
-    )
-
-
-def map_caption(results: MapResults) -> str:
-    """Say what was computed, what was filled in, and how often that was wrong."""
-    plan = results.plan
-    values = {each.field: getattr(plan, each.field) for each in QUANTITIES}
-    fixed = [f"{name} = {value:g}" for name, value in values.items() if isinstance(value, float) and value]
-    said = [
-        (
-            f"{', '.join((f'Specimen {plan.specimen.name}', *fixed))}; {plan.accuracy.value}; motions "
-            f"followed for up to {plan.periods} drive periods from {len(plan.start_labels)} start(s)."
-        ),
-        f"{results.computed} of {plan.grid.size} points computed.",
-    ]
-    audit = results.audit
-    if audit is not None and audit.audited:
-        share = audit.wrong_share
-        said.append(
-            f"The others lie between neighbours that agree; of {audit.audited} such cells drawn at random "
-            f"and computed {audit.wrong} came to another motion ({share.low:.1%} to {share.high:.1%} of the "
-            "filled)."
-        )
-    return " ".join(said)
 
 
 def _map(
@@ -262,7 +200,8 @@ def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:
     factor = _scaled(results, quantity)[0][0] / results.plan.range_of(quantity).edges[0]
     for index, start in enumerate(results.plan.start_labels):
         colour, said = _UP_AND_DOWN.get(start, (LEVELS[index % len(LEVELS)], f"from {start}"))
-        dots = {"color": colour, "linestyle": "none", "marker": ".", "label": said}
+        dots = {"color": colour, "linestyle": "none", "marker": "."}
+        panels[0].plot([], [], markersize=5.0, label=said, **dots)
         panels[0].plot(factor * values, results.shown("response_i", index), markersize=2.0, **dots)
         sections = MICRO * results.shown("section_p", index)
         places = np.repeat(factor * values[:, None], sections.shape[1], axis=1)

@@ -13,19 +13,14 @@ on speed and accuracy is docs/accuracy.md. Results are taken as they are: nothin
 """
 
 from ..figures import (
-    MOTION_CLASSES,
     SHOWN,
     DrawnFigure,
     ImageKind,
-    RecordedLevel,
     branches_figure,
     chain_figure,
     contact_forces_figure,
     exponent_spectrum_figure,
-    map_caption,
     map_figure,
-    motion_classes,
-    motion_words,
     tradeoff_figure,
 )
 from ..paper_figures import (
@@ -53,7 +48,6 @@ from ._report import (
 
 __all__ = [
     "DRAWINGS",
-    "MOTION_CLASSES",
     "PAPER_FIGURES",
     "SHOWN",
     "Drawing",
@@ -61,17 +55,13 @@ __all__ = [
     "FigureOptions",
     "FrequencyGrid",
     "ImageKind",
-    "RecordedLevel",
     "accuracy_document",
     "branches_figure",
     "chain_figure",
     "contact_forces_figure",
     "exponent_spectrum_figure",
     "levels_figure",
-    "map_caption",
     "map_figure",
-    "motion_classes",
-    "motion_words",
     "recording_figures",
     "result_figures",
     "tradeoff_figure",

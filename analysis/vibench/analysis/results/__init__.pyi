@@ -14,6 +14,7 @@ from ._compared_recording import (
     drive_level as drive_level,
     kept_result as kept_result,
     level_of_drive as level_of_drive,
+    recorded_response as recorded_response,
 )
 from ._measurement_analysis import (
     UNOBSERVED as UNOBSERVED,

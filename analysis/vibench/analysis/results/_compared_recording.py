@@ -10,8 +10,8 @@ import numpy as np
 
 from vibench.acquisition import open_recording
 
-from ..comparison import Curve, CurveOrigin, predicted_curves, sorted_curve
-from ..dynamics import recorded_level
+from ..comparison import Curve, CurveKind, CurveOrigin, predicted_curves, sorted_curve
+from ..dynamics import RecordedLevel, recorded_level
 from ..errors import NotEnoughData
 from ..frequency_response import FrequencyResponseRequest
 from ..kinds import ANALYSES, AnyResult
@@ -82,6 +82,24 @@ def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ..
             f"{compared.name} has no level over a range of frequencies; take a stepped sine or a sweep"
         )
     return found
+
+
+def recorded_response(path: Path) -> RecordedLevel:
+    """Give the level of a stepped sine or a sweep, and Response I as measured: a line on a map.
+
+    Raises
+    ------
+    NotEnoughData
+        When the recording is of another kind, or of one frequency.
+
+    """
+    found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
+    measured = [
+        each
+        for each in found.curves
+        if each.origin is CurveOrigin.MEASURED and each.response is CurveKind.RESPONSE_I
+    ]
+    return RecordedLevel(path.stem, level_of_drive(found), measured)
 
 
 def drive_level(result: AnyResult) -> tuple[tuple[float, float], ...]:

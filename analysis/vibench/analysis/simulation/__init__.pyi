@@ -1,6 +1,14 @@
 from ._accuracy_cost import (
     cost_sentences as cost_sentences,
 )
+from ._map_request import (
+    MapPicture as MapPicture,
+    MapRequest as MapRequest,
+    MotionRequest as MotionRequest,
+    SettledMotion as SettledMotion,
+    picture_of as picture_of,
+    settled_motion as settled_motion,
+)
 from ._progress import (
     MOTION_COLUMNS as MOTION_COLUMNS,
     SimulationProgress as SimulationProgress,

@@ -20,6 +20,7 @@ from vibench.sim.study import Study, frequency_range
 
 from ..dynamics import BranchLine, ChainRun, SpecimenChoice, SpectrumPoint
 from ..signals import Reals
+from ._map_request import MapPicture, SettledMotion
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,16 @@ class Trouble:
     sentence: str
 
 
-PartialResult = SimulatedPoint | SimulatedSignal | BranchLine | SpectrumPoint | ChainRun | Trouble
+PartialResult = (
+    SimulatedPoint
+    | SimulatedSignal
+    | BranchLine
+    | SpectrumPoint
+    | ChainRun
+    | MapPicture
+    | SettledMotion
+    | Trouble
+)
 MOST_POINTS = 20_000
 """Of both models together: a picture shows no more, and an afternoon computes no more."""
 

@@ -34,6 +34,7 @@ from ..dynamics import (
     chain_runs,
     spectrum_points,
 )
+from ._map_request import MapRequest, MotionRequest, map_pictures, settled_motion
 from ._request import PartialResult, SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
 
 Tell = Callable[[tuple[PartialResult, ...]], None]
@@ -137,7 +138,7 @@ def simulated_point(model: str, found: ScenePrediction) -> SimulatedPoint:
     )
 
 
-Asked = SimulationRequest | BranchRequest | SpectrumRequest | ChainRequest
+Asked = SimulationRequest | BranchRequest | SpectrumRequest | ChainRequest | MapRequest | MotionRequest
 """What the process answers."""
 
 
@@ -152,6 +153,10 @@ def answer(request: Asked, tell: Tell, cancelled: Cancelled) -> None:
             _tell_each(spectrum_points(request), tell, cancelled)
         case ChainRequest():
             _tell_each(chain_runs(request), tell, cancelled)
+        case MapRequest():
+            map_pictures(request, lambda picture: tell((picture,)), cancelled)
+        case MotionRequest():
+            tell((settled_motion(request),))
 
 
 def _tell_each(parts: Iterable[PartialResult], tell: Tell, cancelled: Cancelled) -> None:

@@ -16,6 +16,9 @@ from ._settings import (
     Settings as Settings,
     default_settings_path as default_settings_path,
 )
+from ._simulator import (
+    Simulator as Simulator,
+)
 from ._user_actions import (
     UserActions as UserActions,
 )

@@ -33,6 +33,8 @@ class AppContext(QObject):
     """Paths of recordings to lay over one another; Compare takes them."""
     prediction_made = Signal(object)
     """Curves of a prediction to lay over recordings; Compare takes them."""
+    scene_wanted = Signal(float, float)
+    """Drive frequency [Hz] and base amplitude [m] of a scene to simulate; Simulate takes them."""
     theme_changed = Signal(object)
     """The `Theme` from now on."""
 

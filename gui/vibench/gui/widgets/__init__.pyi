@@ -13,6 +13,7 @@ from ._notice import (
 from ._page_names import (
     COMPARE as COMPARE,
     FILES as FILES,
+    MAPS as MAPS,
     QUEUE as QUEUE,
     RIG as RIG,
     RUN as RUN,

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from ..page import AppContext, Page
 from ..pages.compare import ComparePage
 from ..pages.files import FilesPage
+from ..pages.maps import MapsPage
 from ..pages.queue import QueuePage
 from ..pages.rig import RigPage
 from ..pages.run import RunPage
 from ..pages.simulate import SimulatePage
 from ..pages.test import TestPage
-from ..widgets import COMPARE, FILES, QUEUE, RIG, RUN, SIMULATE, TEST
+from ..widgets import COMPARE, FILES, MAPS, QUEUE, RIG, RUN, SIMULATE, TEST
 
 
 @dataclass(frozen=True)
@@ -32,4 +33,5 @@ PAGES: tuple[PageEntry, ...] = (
     PageEntry(COMPARE, 5, ComparePage),
     PageEntry(SIMULATE, 6, SimulatePage),
     PageEntry(QUEUE, 7, QueuePage),
+    PageEntry(MAPS, 8, MapsPage),
 )

@@ -25,5 +25,6 @@ from ._results import (
     open_map as open_map,
 )
 from ._solve import (
+    compute_map as compute_map,
     solve_map as solve_map,
 )

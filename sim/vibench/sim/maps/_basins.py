@@ -24,7 +24,7 @@ FEWEST_UNCERTAIN = 100
 """Cells that must be uncertain at a distance for it to count."""
 MOST_UNCERTAIN = 0.5
 """Of all cells: beyond, neighbours are told apart by their shares alone."""
-SPREAD = 5.0
+SPREAD = 4.0
 """The largest distance over the smallest, at least: a slope over less says little."""
 
 

@@ -10,6 +10,7 @@ from ..scene import settle_scene
 from ..study import (
     Arrays,
     Cancelled,
+    Executor,
     ExistingStudy,
     PointState,
     Store,
@@ -34,6 +35,7 @@ BETWEEN = (
     "impact_rate",
     "contact_energy",
     "lyapunov",
+    "duration",
 )
 """Columns that are interpolated between the corners of a filled cell."""
 
@@ -76,11 +78,23 @@ def solve_map(
 
     """
     with executor_of(workers, cluster, settle_scene) as executor, store_of(plan, out, existing) as store:
-        end = run_points(MapPoints(plan), executor, store, observer, cancelled)
-        if end is StudyEnd.COMPLETE:
-            fill_in(plan, store)
+        compute_map(plan, executor, store, observer, cancelled)
         arrays = store.arrays
     return MapResults(plan, arrays) if out is None else open_map(out)
+
+
+def compute_map(
+    plan: Map,
+    executor: Executor,
+    store: Store,
+    observer: StudyObserver | None = None,
+    cancelled: Cancelled | None = None,
+) -> StudyEnd:
+    """Compute what a store misses of a map and fill in the rest; the solver is `settle_scene`."""
+    end = run_points(MapPoints(plan), executor, store, observer, cancelled)
+    if end is StudyEnd.COMPLETE:
+        fill_in(plan, store)
+    return end
 
 
 def fill_in(plan: Map, store: Store) -> None:

@@ -200,7 +200,7 @@ def settle_scene(scene: Scene) -> ScenePrediction:
 
     It is the same motion that `solve_scene` describes, in a third of the time or less: for maps, whose
     neighbouring points tell more than the error of each. Chaos is followed on for as long as the scene's
-    duration allows.
+    duration allows. One of an automatic duration ends after whole drive periods.
 
     Raises
     ------
@@ -211,7 +211,10 @@ def settle_scene(scene: Scene) -> ScenePrediction:
     motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
     method = plan_of(scene, motion).method
     if method is Method.CLOSED_FORM:
-        return _in_closed_form(scene, motion)
+        found = _in_closed_form(scene, motion)
+        # As a motion that is followed: what goes on from its end finds the drive where it was at its start.
+        length_s = math.ceil(found.duration_s * scene.drive.frequency_hz) / scene.drive.frequency_hz
+        return replace(found, duration_s=length_s, final_state=_state(motion.state(length_s)))
     run = _begun(scene)
     seen, _ = _seen(scene, run, motion, math.inf)
     return _found(scene, method, run, seen, _Judged())

@@ -21,6 +21,7 @@ from ._errors import (
     StudyError as StudyError,
 )
 from ._executor import (
+    Executor as Executor,
     Solved as Solved,
 )
 from ._expansion import (

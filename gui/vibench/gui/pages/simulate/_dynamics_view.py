@@ -12,9 +12,8 @@ from vibench.analysis.dynamics import SpecimenChoice
 from vibench.analysis.simulation import Asked, PartialResult, Trouble
 
 from ...forms import JudgedForm
-from ...page import AppContext, SideAndPicture
+from ...page import AppContext, SideAndPicture, Simulator
 from ...widgets import COMPARE, Notice, NoticeKind, Theme, push_button
-from ._simulator import Simulator
 
 Request = TypeVar("Request", bound=SpecimenChoice)
 Answer = TypeVar("Answer")

@@ -22,14 +22,13 @@ from vibench.analysis.simulation import (
 )
 
 from ...forms import JudgedForm
-from ...page import AppContext, Page, SideAndPicture
+from ...page import AppContext, Page, SideAndPicture, Simulator
 from ...widgets import COMPARE, SIMULATE, Notice, NoticeKind, ReadTable, Theme, push_button
 from ._answer_plots import AnswerPlots
 from ._chain_picture import ChainPicture
 from ._dynamics_kinds import BRANCHES, CHAIN, SPECTRUM
 from ._dynamics_pictures import BranchPicture, SpectrumPicture
 from ._dynamics_view import DynamicsView
-from ._simulator import Simulator
 
 _LINES = 6
 """Of the table of motions, headings among them."""
@@ -58,6 +57,7 @@ class SimulatePage(Page):
         self.simulator.ended.connect(self._end)
         self.simulator.died.connect(self._die)
         self.destroyed.connect(self.simulator.close)
+        context.scene_wanted.connect(self.show_scene)
         self._say_cost()
         self._say_progress("Nothing has been simulated yet.")
 
@@ -107,6 +107,14 @@ class SimulatePage(Page):
         self._is_stale = True
         self.simulator.begin(request)
         self._say_progress("Simulating; the first answer waits for the program to be made ready…")
+
+    def show_scene(self, frequency_hz: float, amplitude_m: float) -> None:
+        """Fill the form in for the surroundings of a drive, and for its time signal."""
+        content = {**self.form.form.content(), "amplitude_m": amplitude_m, "signal_hz": frequency_hz}
+        content |= {"start_hz": 0.9 * frequency_hz, "stop_hz": 1.1 * frequency_hz}
+        content["step_hz"] = 0.01 * frequency_hz
+        self.form.form.show_content(content)
+        self.tabs.setCurrentIndex(0)
 
     def cancel(self) -> None:
         """Stop at once; what has been found stays."""

@@ -1,0 +1,82 @@
+"""What is said of a map: motions as classes and in words, and a caption that says what was filled in."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibench.sim import MotionKind
+from vibench.sim.maps import QUANTITIES, MapMotion, MapResults
+
+from ..comparison import Curve
+from ..signals import Reals
+
+MOTION_CLASSES = (
+    ("no impacts", "#eef3f7"),
+    ("period 1", "#0072b2"),
+    ("period 2", "#56b4e9"),
+    ("period 3", "#009e73"),
+    ("period 4", "#f0e442"),
+    ("period 5 or more", "#e69f00"),
+    ("quasi-periodic", "#cc79a7"),
+    ("chaotic", "#d55e00"),
+    ("undecided", "#9a9a9a"),
+)
+"""How the motions of a map are told apart, and their colours."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedLevel:
+    """A recording's level over frequency, and what was measured at it."""
+
+    name: str
+    pairs: Sequence[tuple[float, float]]
+    """Frequency [Hz] and amplitude of the base [m]."""
+    measured: Sequence[Curve]
+    """Responses I of m0."""
+
+
+def motion_classes(results: MapResults, start: int = 0) -> Reals:
+    """Give the place in `MOTION_CLASSES` of each point over what varies, from one start; NaN: not known."""
+    motion, period, impacts = (results.shown(name, start) for name in ("motion", "period", "impact_rate"))
+    kinds = list(MotionKind)
+    found = np.full(motion.shape, np.nan)
+    is_periodic = motion == kinds.index(MotionKind.PERIODIC)
+    found[is_periodic] = np.minimum(period[is_periodic], 5.0)
+    found[is_periodic & (impacts == 0.0)] = 0.0
+    found[motion == kinds.index(MotionKind.QUASI_PERIODIC)] = 6.0
+    found[np.isin(motion, [kinds.index(MotionKind.CHAOTIC), kinds.index(MotionKind.CHAOTIC_SO_FAR)])] = 7.0
+    found[motion == kinds.index(MotionKind.UNDECIDED)] = 8.0
+    return found
+
+
+def motion_words(motion: MapMotion) -> str:
+    """Name a motion and its share."""
+    kind = f"period {motion.period}" if motion.period is not None else str(motion.motion)
+    share = motion.share
+    return (
+        f"{kind}, Response I {motion.response_i:.3g}: {share.share:.2%} ({share.low:.2%} to {share.high:.2%})"
+    )
+
+
+def map_caption(results: MapResults) -> str:
+    """Say what was computed, what was filled in, and how often that was wrong."""
+    plan = results.plan
+    values = {each.field: getattr(plan, each.field) for each in QUANTITIES}
+    fixed = [f"{name} = {value:g}" for name, value in values.items() if isinstance(value, float) and value]
+    said = [
+        (
+            f"{', '.join((f'Specimen {plan.specimen.name}', *fixed))}; {plan.accuracy.value}; motions "
+            f"followed for up to {plan.periods} drive periods from {len(plan.start_labels)} start(s)."
+        ),
+        f"{results.computed} of {plan.grid.size} points computed.",
+    ]
+    audit = results.audit
+    if audit is not None and audit.audited:
+        share = audit.wrong_share
+        said.append(
+            f"The others lie between neighbours that agree; of {audit.audited} such cells drawn at random "
+            f"and computed {audit.wrong} came to another motion ({share.low:.1%} to {share.high:.1%} of the "
+            "filled)."
+        )
+    return " ".join(said)

@@ -1,0 +1,3 @@
+from ._maps_page import (
+    MapsPage as MapsPage,
+)

@@ -1,0 +1,241 @@
+"""Maps: what is asked on the left; on the right the map as far as it has come, and the motion at a point."""
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QLabel, QSplitter, QVBoxLayout, QWidget
+
+from vibench.analysis import recorded_response
+from vibench.analysis.dynamics import MOTION_CLASSES, RecordedLevel
+from vibench.analysis.simulation import (
+    MapPicture,
+    MapRequest,
+    MotionRequest,
+    PartialResult,
+    SettledMotion,
+    Trouble,
+    settled_motion,
+)
+
+from ...background import Job
+from ...forms import Choice, JudgedForm
+from ...page import AppContext, Page, SideAndPicture, Simulator
+from ...widgets import MAPS, SIMULATE, Notice, NoticeKind, Theme, push_button
+from ._map_plot import COLOURINGS, MapPlot
+from ._motion_view import MotionView
+
+MAP_SHARE = 640
+"""Of 1000, of the height; the rest is for the motion at a point."""
+DIGITS = 5
+"""Of numbers that a zoom puts into the form."""
+
+
+class MapsPage(Page):
+    """One map at a time; what nobody wants any more is dropped."""
+
+    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
+        super().__init__(context, parent)
+        self.form: JudgedForm[MapRequest] = JudgedForm(MapRequest, "map", frozenset({"described"}))
+        self.map = MapPlot(context.theme)
+        self.motion = MotionView(context.theme)
+        self.simulator = Simulator(self)
+        self.picture: MapPicture | None = None
+        self._asked: MapRequest | None = None
+        self._point: tuple[float, float] | None = None
+        self._job: Job | None = None
+        self._levels: list[RecordedLevel] = []
+        self._is_stale = False
+        self._build()
+        self.form.changed.connect(self._judge)
+        self.simulator.grown.connect(self._grow)
+        self.simulator.ended.connect(self._end)
+        self.simulator.died.connect(self._die)
+        self.destroyed.connect(self.simulator.close)
+        self.map.picked.connect(self.pick)
+        context.comparison_wanted.connect(self.add_recordings)
+        self._judge()
+
+    @property
+    def is_done(self) -> bool:
+        """Ticked once there is a whole map."""
+        return self.picture is not None and not self.simulator.is_busy
+
+    @property
+    def said(self) -> str:
+        """What stands below the map."""
+        return self._state.text()
+
+    def refresh(self) -> None:
+        """Draw what has come since the last time."""
+        if self._is_stale and self.picture is not None:
+            self._is_stale = False
+            self.map.show_picture(self.picture, self.quantity.currentText())
+
+    def left(self) -> None:
+        """Keep how the page is divided."""
+        self._parts.keep()
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        self.map.retheme(theme)
+        self.motion.retheme(theme)
+
+    def begin(self) -> None:
+        """Compute what the form says."""
+        request = self.form.value
+        if request is None:
+            return
+        self._asked, self.picture = request, None
+        self.map.look_at_next()
+        self.simulator.begin(request)
+        self._say("Computing; the first picture waits for the program to be made ready…")
+
+    def begin_in_sight(self) -> None:
+        """Compute the part that the axes show, with as many points as the whole had."""
+        asked = self.form.value
+        if asked is None:
+            return
+        (left, right), (low, high) = self.map.in_sight
+        edges = {"start_hz": max(left, 1e-3), "stop_hz": right, "lowest_m": low, "highest_m": high}
+        rounded = {name: float(f"{value:.{DIGITS}g}") for name, value in edges.items()}
+        self.form.form.show_content({**self.form.form.content(), **rounded})
+        self.begin()
+
+    def cancel(self) -> None:
+        """Stop at once; what has been found stays."""
+        self.simulator.cancel()
+        self._say("Cancelled; what had been found is shown.")
+
+    def pick(self, frequency_hz: float, amplitude_m: float) -> None:
+        """Show the motion at a point of the map."""
+        request = self._asked or self.form.value
+        if request is None or frequency_hz <= 0.0:
+            return
+        asked = MotionRequest(
+            **request.model_dump(include={"specimen", "model", "damping_time_s", "gap_m", "periods"}),
+            described=request.described,
+            frequency_hz=frequency_hz,
+            amplitude_m=amplitude_m,
+        )
+        self._point = (frequency_hz, amplitude_m)
+        self.map.mark(frequency_hz, amplitude_m)
+        self.motion.said.setText("Following the motion…")
+        self._open.setEnabled(True)
+        if self._job is not None:
+            self._job.drop()
+        self._job = self.context.background.ask(settled_motion, self._show_motion, self._fail, asked)
+
+    def add_recordings(self, paths: object) -> None:
+        """Lay the levels of recordings over the map, where they have one over frequency."""
+        for path in paths if isinstance(paths, (list, tuple)) else ():
+            self.context.background.ask(recorded_response, self._show_level, _let_pass, Path(path))
+
+    def _grow(self, parts: tuple[PartialResult, ...]) -> None:
+        for part in parts:
+            match part:
+                case MapPicture():
+                    self.picture, self._is_stale = part, True
+                    self._say(part.said)
+                case Trouble():
+                    self.context.say(Notice(NoticeKind.WARNING, part.sentence))
+                case _:
+                    pass
+
+    def _end(self) -> None:
+        self._say(self.said)
+
+    def _die(self, what: str) -> None:
+        self.context.say(
+            Notice(NoticeKind.FAULT, what, "What had been found is shown.", "Compute again.", "SIMULATOR")
+        )
+        self._say("It broke off.")
+
+    def _show_motion(self, motion: SettledMotion) -> None:
+        self.motion.show_motion(motion)
+
+    def _fail(self, error: BaseException) -> None:
+        self.motion.said.setText(str(error))
+
+    def _show_level(self, level: RecordedLevel) -> None:
+        self._levels.append(level)
+        self.map.show_level(level, len(self._levels) - 1)
+
+    def _say(self, text: str) -> None:
+        self._state.setText(text)
+        self._cancel.setEnabled(self.simulator.is_busy)
+
+    def _judge(self) -> None:
+        self._begin.setEnabled(self.form.value is not None)
+        self._finer.setEnabled(self.form.value is not None)
+
+    def _recolour(self, *_: object) -> None:
+        self._is_stale = True
+
+    def _open_in_simulate(self) -> None:
+        if self._point is not None:
+            self.context.scene_wanted.emit(*self._point)
+            self.context.page_wanted.emit(SIMULATE)
+
+    def _build(self) -> None:
+        self._parts = SideAndPicture(self.context, MAPS, self._side(), self._answer())
+        QVBoxLayout(self).addWidget(self._parts)
+
+    def _side(self) -> QWidget:
+        scene = QGroupBox("Map")
+        QVBoxLayout(scene).addWidget(self.form)
+        self._begin = push_button("&Map", "Compute what the form says, in another process", self.begin)
+        self._begin.setProperty("rank", "first")
+        self._finer = push_button("&Finer", "Compute only what the axes show now", self.begin_in_sight)
+        self._cancel = push_button("&Cancel", "Stop at once; what has been found stays", self.cancel)
+        self._cancel.setEnabled(False)
+        row = QHBoxLayout()
+        for button in (self._begin, self._finer, self._cancel):
+            row.addWidget(button, 1)
+        side = QWidget()
+        layout = QVBoxLayout(side)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scene)
+        layout.addLayout(row)
+        layout.addStretch(1)
+        return side
+
+    def _answer(self) -> QWidget:
+        self.quantity = Choice()
+        self.quantity.addItems(list(COLOURINGS))
+        self.quantity.setAccessibleName("What the colours of the map say")
+        self.quantity.currentIndexChanged.connect(self._recolour)
+        self._state = QLabel("Nothing has been computed yet.")
+        self._state.setWordWrap(True)
+        self._state.setAccessibleName("How far the map is")
+        self._open = push_button(
+            "&Open in Simulate",
+            "Simulate the surroundings of this point, with errors",
+            self._open_in_simulate,
+        )
+        self._open.setEnabled(False)
+        legend = QLabel(
+            "  ".join(f'<span style="color:{colour}">■</span> {name}' for name, colour in MOTION_CLASSES)
+        )
+        legend.setWordWrap(True)
+        legend.setAccessibleName("Colours of the kinds of motion")
+        row = QHBoxLayout()
+        row.addWidget(self.quantity)
+        row.addWidget(self._state, 1)
+        row.addWidget(self._open)
+        upper = QWidget()
+        layout = QVBoxLayout(upper)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(legend)
+        layout.addWidget(self.map, 1)
+        layout.addLayout(row)
+        answer = QSplitter(Qt.Orientation.Vertical)
+        answer.setAccessibleName("Map and motion")
+        answer.addWidget(upper)
+        answer.addWidget(self.motion)
+        answer.setSizes([MAP_SHARE, 1000 - MAP_SHARE])
+        answer.setChildrenCollapsible(False)
+        return answer
+
+
+def _let_pass(_error: BaseException) -> None:
+    """Say nothing: noise and dwells have no level over frequency, and Compare tells what cannot be read."""

@@ -1,0 +1,57 @@
+"""The motion at one point of a map: over time, its portrait, and its spectrum."""
+
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from vibench.analysis.simulation import SettledMotion
+
+from ...plots import FREQUENCY, TIME, Plot, PlotAxis, Scale, curve_style
+from ...widgets import Theme
+
+RELATIVE = PlotAxis("p = y - z", "µm", 1e6, short="p (µm)")
+DISPLACEMENT = PlotAxis("m0 displacement", "µm", 1e6, short="x (µm)")
+LINE = PlotAxis("|x|", "µm", 1e6, scale=Scale.LOGARITHMIC)
+SHOWN_PERIODS = 12
+HIGHEST_MULTIPLE = 6.0
+"""Of the drive frequency: the end of the spectrum."""
+
+
+class MotionView(QWidget):
+    """Three plots side by side, and what they show in words."""
+
+    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.said = QLabel("A click on the map shows the motion there.")
+        self.said.setWordWrap(True)
+        self.said.setAccessibleName("The motion at the point that was clicked")
+        self.plots = (
+            Plot("Motion of m1 between its stops", TIME, RELATIVE, theme),
+            Plot("Portrait", DISPLACEMENT, RELATIVE, theme),
+            Plot("Spectrum of m0", FREQUENCY, LINE, theme),
+        )
+        self.curves = tuple(plot.with_hint("No motion yet.").curve(curve_style(0)) for plot in self.plots)
+        row = QHBoxLayout()
+        for plot in self.plots:
+            row.addWidget(plot, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self.said)
+        layout.addLayout(row, 1)
+
+    def show_motion(self, motion: SettledMotion) -> None:
+        """Draw another motion."""
+        self.said.setText(motion.said)
+        shown = motion.time_s <= SHOWN_PERIODS / motion.frequency_hz
+        is_low = (motion.line_hz > 0.0) & (motion.line_hz < HIGHEST_MULTIPLE * motion.frequency_hz)
+        data = (
+            (motion.time_s[shown], motion.relative_m[shown]),
+            (motion.displacement_m, motion.relative_m),
+            (motion.line_hz[is_low], motion.line_m[is_low]),
+        )
+        for plot, curve, (across, up) in zip(self.plots, self.curves, data, strict=True):
+            curve.setData(across, up)
+            plot.show_everything()
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        for plot in self.plots:
+            plot.retheme(theme)

@@ -1,0 +1,102 @@
+"""The Maps page: a map that grows, a part of it computed finer, and the motion at a point."""
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from vibench.analysis.dynamics import MOTION_CLASSES, RecordedLevel
+from vibench.analysis.simulation import MapRequest
+from vibench.gui.pages.maps import MapsPage
+from vibench.gui.widgets import DARK, SIMULATE
+
+SMALL = {
+    "start_hz": 100.0,
+    "stop_hz": 140.0,
+    "lowest_m": 5e-6,
+    "highest_m": 2e-5,
+    "columns": 7,
+    "rows": 5,
+    "periods": 400,
+}
+
+
+@pytest.fixture(scope="module")
+def page(shared_context):
+    """One page, whose process serves all tests."""
+    page = MapsPage(shared_context)
+    page.resize(1300, 900)
+    page.show()
+    yield page
+    page.simulator.close()
+    page.close()
+
+
+def mapped(page, waited, **changes):
+    page.form.show_value(MapRequest(**{**SMALL, **changes}))
+    page.begin()
+    waited(lambda: not page.simulator.is_busy, 100.0)
+    page.refresh()
+
+
+def test_a_map_is_drawn_and_every_point_has_a_kind(page, waited):
+    mapped(page, waited)
+    assert page.is_done
+    assert page.picture.classes.shape == (5, 7)
+    assert 0 <= page.picture.classes.min() <= page.picture.classes.max() < len(MOTION_CLASSES)
+    assert page.map.image.image.shape == (5, 7, 4)
+    assert "points computed" in page.said
+    page.quantity.setCurrentText("Response I")
+    before = page.map.image.image.copy()
+    page.refresh()
+    assert not np.array_equal(page.map.image.image, before)
+
+
+def test_what_is_in_sight_is_computed_finer(page, waited):
+    mapped(page, waited)
+    page.map.plot.setXRange(110.0, 120.0, padding=0.0)
+    page.map.plot.setYRange(-5.2, -5.0, padding=0.0)
+    page.begin_in_sight()
+    waited(lambda: not page.simulator.is_busy, 100.0)
+    asked = page.form.value
+    assert (asked.start_hz, asked.stop_hz) == pytest.approx((110.0, 120.0), rel=1e-3)
+    assert (asked.lowest_m, asked.highest_m) == pytest.approx((10**-5.2, 1e-5), rel=1e-3)
+    assert (asked.columns, asked.rows) == (7, 5)
+    assert page.picture.frequency_hz[0] == pytest.approx(110.0, abs=1.0)
+
+
+def test_a_click_shows_the_motion_there_and_opens_it_in_simulate(page, waited):
+    mapped(page, waited)
+    wanted, pages = [], []
+    page.context.scene_wanted.connect(lambda *point: wanted.append(point))
+    page.context.page_wanted.connect(pages.append)
+    box = page.map.plot.getViewBox()
+    place = page.map.plot.mapFromScene(box.mapViewToScene(box.viewRect().center()))
+    QTest.mouseClick(
+        page.map.plot.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(round(place.x()), round(place.y()))
+    )
+    assert page.motion.said.text() == "Following the motion…"
+    waited(lambda: "from rest" in page.motion.said.text(), 100.0)
+    assert page.motion.said.text().startswith("120")
+    assert all(len(curve.getOriginalDataset()[0]) > 10 for curve in page.motion.curves)
+    page._open.click()
+    assert wanted[0] == pytest.approx((120.0, 1e-5), rel=0.05)
+    assert pages == [SIMULATE]
+
+
+def test_a_level_lies_on_the_map_as_a_line(page):
+    page._show_level(RecordedLevel("steps", ((100.0, 6e-6), (140.0, 7e-6)), ()))
+    across, up = page.map._levels[0].getOriginalDataset()
+    assert across.tolist() == [100.0, 140.0]
+    assert up.tolist() == [6e-6, 7e-6]
+
+
+def test_what_is_too_large_for_a_window_is_told(page):
+    page.form.form.show_content({**SMALL, "columns": 900, "rows": 900})
+    assert not page._begin.isEnabled()
+    assert "810000 points are too many for a window" in page.form.complaint
+
+
+def test_the_page_turns_dark(page):
+    page.retheme(DARK)
+    assert page.map.plot.backgroundBrush().color().name() == DARK.base
