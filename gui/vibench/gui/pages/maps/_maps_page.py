@@ -185,7 +185,7 @@ class MapsPage(Page):
         QVBoxLayout(scene).addWidget(self.form)
         self._begin = push_button("&Map", "Compute what the form says, in another process", self.begin)
         self._begin.setProperty("rank", "first")
-        self._finer = push_button("&Finer", "Compute only what the axes show now", self.begin_in_sight)
+        self._finer = push_button("Fi&ner", "Compute only what the axes show now", self.begin_in_sight)
         self._cancel = push_button("&Cancel", "Stop at once; what has been found stays", self.cancel)
         self._cancel.setEnabled(False)
         row = QHBoxLayout()
