@@ -87,7 +87,7 @@ def cost(asked: argparse.Namespace) -> int:
     taken_s = float(np.nansum(results.arrays["taken"].astype(float)))
     print(
         f"{results.computed} of {plan.grid.size} points computed in {time.perf_counter() - began_s:.1f} s, "
-        f"{time.process_time() - began_cpu_s:.1f} s of processor time, of which {taken_s:.1f} s are the points' "
+        f"{time.process_time() - began_cpu_s:.1f} s of processor time, {taken_s:.1f} s of them the points' "
         f"own; {results.audit}"
     )
     return 0

@@ -8,7 +8,7 @@ import pytest
 from vibench.sim import Hertz, gong2025, integrate
 from vibench.sim.maps import Map, Range, Spacing, estimate_map, solve_map
 from vibench.sim.maps._columns import contact_energy_j
-from vibench.sim.scene import settle_scene, solve_scene
+from vibench.sim.scene import Method, settle_scene, solve_scene
 
 FREQUENCIES = Range(start=100.0, stop=300.0, points=5)
 LEVELS = Range(start=1e-6, stop=2e-5, points=4, spacing="logarithmic")
@@ -83,7 +83,9 @@ def test_a_settled_scene_is_the_motion_that_the_whole_answer_describes(frequency
         (0, 1)
     )
     light, whole = settle_scene(scene), solve_scene(scene)
-    assert (light.motion, light.period, light.final_state) == (whole.motion, whole.period, whole.final_state)
+    assert (light.motion, light.period) == (whole.motion, whole.period)
+    # What is known in closed form ends after whole drive periods in a map, for what goes on from there.
+    assert light.final_state == whole.final_state or light.method is Method.CLOSED_FORM
     assert (light.response_i, light.response_ii) == (whole.response_i, whole.response_ii)
     assert whole.error_estimate is not None
     assert light.error_estimate is None or light.error_estimate == whole.error_estimate
