@@ -6,13 +6,21 @@ together but for the card's own delay.
 """
 
 from collections import deque
+from importlib import import_module
 from threading import Condition
 from typing import Any, Self
 
 import numpy as np
-import sounddevice
 
-from ..errors import ConfigurationError, DataLost, InstrumentError, InstrumentLost, LimitExceeded
+from ..errors import (
+    ConfigurationError,
+    DataLost,
+    InstrumentError,
+    InstrumentLost,
+    LimitExceeded,
+    MissingLibrary,
+)
+from ..host import need_extra
 from ..instruments import Block, Identity, IdleOutput, Samples
 from ..rig import Channel, OutputConfig, Rig, channels_of
 from ._overload import overload_ranges
@@ -20,14 +28,26 @@ from ._overload import overload_ranges
 _LATEST_S = 10.0
 """How late samples may be before the card counts as dead."""
 _SAME_RATE = 1e-6
+
 _NEEDED = "calibrated", "input_full_scale_v", "low_cut_hz"
+
+
+def _sounddevice() -> Any:
+    """Load the library; MissingLibrary where it, or the PortAudio of the system, is not installed."""
+    need_extra("sound")
+    try:
+        return import_module("sounddevice")
+    except OSError as error:
+        raise MissingLibrary(
+            f"{error}; nothing was opened: install PortAudio on this system (Debian: apt install libportaudio2)"
+        ) from error
 
 
 class _Card:
     """One stream of a card: samples in, samples out, on PortAudio's own thread."""
 
     def __init__(self, rig: Rig, inputs: tuple[int, ...]) -> None:
-        daq, self.rate_hz = rig.daq, rig.daq.sample_rate_hz
+        daq, library, self.rate_hz = rig.daq, _sounddevice(), rig.daq.sample_rate_hz
         self.inputs = inputs
         self.changed = Condition()
         self.blocks: deque[Samples] = deque()
@@ -42,11 +62,9 @@ class _Card:
         highest = 1 + max(inputs)
         common = {"samplerate": self.rate_hz, "dtype": "float32", "device": daq.device}
         self.stream: Any = (
-            sounddevice.InputStream(channels=highest, callback=self._hear, **common)
+            library.InputStream(channels=highest, callback=self._hear, **common)
             if self._output is None
-            else sounddevice.Stream(
-                channels=(highest, 1 + self._output), callback=self._hear_and_play, **common
-            )
+            else library.Stream(channels=(highest, 1 + self._output), callback=self._hear_and_play, **common)
         )
 
     def begin(self) -> None:
@@ -128,7 +146,7 @@ class SoundCardDigitizer:
             raise InstrumentLost(
                 f"no sound card {rig.daq.device!r} is there ({error}); name one of the system's in daq.device"
             ) from error
-        except sounddevice.PortAudioError as error:
+        except _sounddevice().PortAudioError as error:
             raise InstrumentError(
                 f"the sound card {rig.daq.device!r} cannot be opened at {rig.daq.sample_rate_hz:g} samples "
                 f"a second ({error}); give a rate and channels that it has, and close what else uses it"
@@ -144,7 +162,7 @@ class SoundCardDigitizer:
     @property
     def identity(self) -> Identity:
         """Which card, by which PortAudio, and when it was calibrated."""
-        version = sounddevice.get_portaudio_version()[1]
+        version = _sounddevice().get_portaudio_version()[1]
         reply = f"{self._device}, {version}, {', '.join(f'{key} {self.options[key]}' for key in _NEEDED)}"
         return Identity("", self._device, "", version, reply)
 
@@ -316,7 +334,7 @@ class _Told:
         return None
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, sounddevice.PortAudioError):
+        if isinstance(error, _sounddevice().PortAudioError):
             raise InstrumentLost(
                 f"{self._doing} failed ({error}); see whether the card is plugged in"
             ) from error

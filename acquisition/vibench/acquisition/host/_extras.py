@@ -9,6 +9,7 @@ from ..errors import MissingLibrary
 EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "bench": ("pyvisa", "pyvisa_py", "usb", "nidaqmx", "grpc", "google.protobuf"),
+        "sound": ("sounddevice",),
         "gui": ("PySide6", "pyqtgraph"),
     }
 )
