@@ -64,3 +64,7 @@ from .results import (
 from .signals import (
     Window as Window,
 )
+from .uncertainty import (
+    Expected as Expected,
+    expected_uncertainty as expected_uncertainty,
+)

@@ -1,15 +1,17 @@
 """`vibench measure`: carry out a campaign, one recording a measurement."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import asdict
 from datetime import timedelta
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import vibench.analysis
 from vibench.acquisition import CheckRule, ConfigurationError, load_campaign, load_toml
 from vibench.acquisition.campaign import (
     AfterFailure,
@@ -32,12 +34,16 @@ from vibench.acquisition.engine import (
     TwinSwitch,
     serving,
 )
+from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import Rig
 
 from .engine_bars import Watching
 from .exit_code import ExitCode
 from .output import console, print_json
 from .paths import BenchPath, FaultsPath, rig_at
+
+if TYPE_CHECKING:
+    from vibench.analysis import Expected
 
 
 class Form(StrEnum):
@@ -47,13 +53,26 @@ class Form(StrEnum):
     JSON = "json"
 
 
-def tell_estimate(expected: CampaignEstimate, form: Form) -> None:
-    """Say how many recordings, how long and how large, and whether the disk has room for them."""
+def tell_estimate(
+    expected: CampaignEstimate, form: Form, known: Mapping[str, Sequence["Expected"]] = MappingProxyType({})
+) -> None:
+    """Say how many recordings, how long and how large, whether the disk has room, and what they will tell."""
     match form:
         case Form.JSON:
-            print_json(asdict(expected) | {"needed_bytes": expected.needed_bytes, "fits": expected.fits})
+            document = asdict(expected) | {"needed_bytes": expected.needed_bytes, "fits": expected.fits}
+            told = {name: [each.to_dict() for each in found] for name, found in known.items()}
+            print_json(document | {"uncertainty": told})
         case Form.TEXT:
             console.print(estimate_text(expected), markup=False)
+            for name, found in known.items():
+                for each in found:
+                    console.print(f"{name}: {each.sentence}", markup=False)
+
+
+def expected_of(campaign: Campaign, rig: Rig) -> dict[str, tuple["Expected", ...]]:
+    """Say for each measurement of a campaign what it will tell, and how well."""
+    found = {each.name: vibench.analysis.expected_uncertainty(each, rig) for each in campaign.measurements}
+    return {name: each for name, each in found.items() if each}
 
 
 def estimate_text(expected: CampaignEstimate) -> str:
@@ -117,7 +136,11 @@ def measure(
         CheckRule, typer.Option(help="A passed check of the bench, of today: ask for it, make it, or not.")
     ] = CheckRule.FRESH,
     only_estimate: Annotated[
-        bool, typer.Option("--estimate", help="Say how long it takes and how large it becomes; play nothing.")
+        bool,
+        typer.Option(
+            "--estimate",
+            help="Say how long it takes, how large it becomes, and how well results will be known.",
+        ),
     ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="With --estimate: print one JSON document and nothing else.")
@@ -137,7 +160,8 @@ def measure(
         )
     plan, rig = load_campaign(campaign), rig_at(bench, faults)
     existing = ExistingRecordings.RESUME if resume else ExistingRecordings.REFUSE
-    tell_estimate(estimate_campaign(plan, rig, out, existing), Form.JSON if as_json else Form.TEXT)
+    known = expected_of(plan, rig) if only_estimate else {}
+    tell_estimate(estimate_campaign(plan, rig, out, existing), Form.JSON if as_json else Form.TEXT, known)
     if only_estimate:
         return
     messengers = messengers_of(notify, mail)

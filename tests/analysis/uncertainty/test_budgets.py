@@ -12,7 +12,7 @@ from vibench.analysis import Simulation, analyse_files, budgets_of, campaign_sum
 from vibench.analysis.report._result_tables import uncertainty_table
 from vibench.analysis.sine import dwell_response
 from vibench.analysis.uncertainty import Cause, dwell_budgets, stated_of
-from vibench.analysis.uncertainty._quantities import _sd_of_largest
+from vibench.analysis.uncertainty._quantities import sd_of_largest
 
 DRAWS = 150
 STATED = {
@@ -158,5 +158,5 @@ def test_the_scatter_of_a_maximum_is_told_from_one_window(bounded):
     rng = np.random.default_rng(5)
     values = rng.beta(2, 3, (400, 2000)) if bounded else rng.exponential(size=(400, 2000))
     true = np.std(values.max(axis=1))
-    told = [_sd_of_largest(each.reshape(50, -1).max(axis=1)) for each in values]
+    told = [sd_of_largest(each.reshape(50, -1).max(axis=1)) for each in values]
     assert np.median(told) == pytest.approx(true, rel=0.3)

@@ -150,6 +150,8 @@ class VibrometerConfig(FrozenModel):
     """Of the calibration; absent: not stated, and every result says so."""
     alignment_deg: Sourced | None = None
     """Largest angle between beam and motion [degree]."""
+    noise_per_rthz: Sourced | None = None
+    """Density of its noise [m/s per root hertz]; absent: not stated."""
 
     @property
     def full_scale_m_per_s(self) -> float:
@@ -171,6 +173,8 @@ class AccelerometerConfig(FrozenModel):
     """Of the sensitivity; absent: not stated."""
     alignment_deg: Sourced | None = None
     """Largest angle between the sensitive axis and the motion [degree]."""
+    noise_per_rthz: Sourced | None = None
+    """Density of its noise [m/s2 per root hertz]; absent: not stated."""
 
 
 class Role(StrEnum):

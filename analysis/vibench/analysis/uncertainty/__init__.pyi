@@ -4,6 +4,10 @@ from ._budget import (
     Cause as Cause,
     Contribution as Contribution,
 )
+from ._expected import (
+    Expected as Expected,
+    expected_uncertainty as expected_uncertainty,
+)
 from ._quantities import (
     dwell_budgets as dwell_budgets,
     noise_budgets as noise_budgets,

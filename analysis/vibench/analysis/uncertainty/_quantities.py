@@ -125,11 +125,11 @@ def _one_draw(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Contr
     if blocks < _FEWEST_BLOCKS:
         return (Contribution(Cause.CHANCE, None, "the window is too short to tell"),)
     largest = np.max(np.abs(window[: window.size // blocks * blocks].reshape(blocks, -1)), axis=1)
-    relative = float(_sd_of_largest(largest) / np.max(largest))
+    relative = float(sd_of_largest(largest) / np.max(largest))
     return (Contribution(Cause.CHANCE, relative, f"largest |x| of {blocks} parts of the window"),)
 
 
-def _sd_of_largest(maxima: Reals) -> float:
+def sd_of_largest(maxima: Reals) -> float:
     """Tell how the largest of as many maxima scatters, as generalised extreme values.
 
     With their shape k, from L-moments (Hosking, Wallis and Wood 1985, Technometrics 27), the scale of the

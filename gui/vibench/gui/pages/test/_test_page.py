@@ -29,10 +29,10 @@ from ._library import NamedTest, load_test, own_tests, shipped_tests
 from ._limit_table import LimitTable
 from ._preview_plots import PredictionPlot, PreviewPlots
 from ._test_form import TestForm
-from ._test_preview import TestPreview, predict_test, preview_test
+from ._test_preview import TestPrediction, TestPreview, predict_test, preview_test
 
 if TYPE_CHECKING:
-    from vibench.analysis import MeasurementPrediction
+    pass
 
 _SHOWN = {
     BaseQuantity.STROKE: "stroke",
@@ -89,6 +89,9 @@ class TestPage(Page):
         self.prediction_note = QLabel()
         self.prediction_note.setWordWrap(True)
         self.prediction_note.setProperty("rank", "second")
+        self.expectation = QLabel()
+        self.expectation.setWordWrap(True)
+        self.expectation.setProperty("rank", "second")
         self.arm_button = QPushButton("A&rm the test…  (Ctrl+Return)")
         self.arm_button.setProperty("rank", "first")
         self.arm_button.setToolTip("Show in words what will happen; nothing plays before Start")
@@ -156,7 +159,8 @@ class TestPage(Page):
     def _look_failed(self, error: BaseException) -> None:
         self.summary.setText(f"✖ {error}")
 
-    def _predicted(self, seen: "MeasurementPrediction") -> None:
+    def _predicted(self, prediction: TestPrediction) -> None:
+        seen = prediction.motion
         self.context.selection.keep_prediction(seen)
         self.prediction.show_prediction(seen)
         bands = ", ".join(f"{low:.0f}–{high:.0f} Hz" for low, high in seen.collision_bands_hz)
@@ -165,10 +169,14 @@ class TestPage(Page):
             f"Simulated ({seen.model}), {seen.approach.value}, base amplitude {seen.base_text} from "
             f"{seen.basis}. {collides}"
         )
+        told = [each.sentence for each in prediction.expected]
+        self.expectation.setText(f"Will be known: {told[0]} …" if len(told) > 1 else "".join(told))
+        self.expectation.setToolTip("\n".join(told))
 
     def _prediction_failed(self, error: BaseException) -> None:
         self.prediction.show_prediction(None)
         self.prediction_note.setText(f"No prediction: {error}")
+        self.expectation.setText("")
 
     def _list_tests(self) -> None:
         self._tests = (*own_tests(self._own_folder), *shipped_tests())
@@ -258,7 +266,14 @@ class TestPage(Page):
         cells.addWidget(_boxed("What will be played", self.plots), 1, 0, 1, 2)
         cells.addWidget(_boxed("Against the limits", self.limits), 2, 0)
         cells.addWidget(
-            _boxed("What the specimen is predicted to do", self.prediction, self.prediction_note), 2, 1
+            _boxed(
+                "What the specimen is predicted to do",
+                self.prediction,
+                self.prediction_note,
+                self.expectation,
+            ),
+            2,
+            1,
         )
         for row in (1, 2):
             cells.setRowStretch(row, 1)

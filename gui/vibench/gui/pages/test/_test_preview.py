@@ -8,7 +8,7 @@ from vibench.acquisition.plan import Measurement, MeasurementPreview, preview_me
 from vibench.acquisition.rig import Rig
 
 if TYPE_CHECKING:
-    from vibench.analysis import MeasurementPrediction
+    from vibench.analysis import Expected, MeasurementPrediction
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,17 @@ def preview_test(test: TestPreview) -> MeasurementPreview:
     return preview_measurement(test.measurement, test.rig)
 
 
-def predict_test(test: TestPreview) -> "MeasurementPrediction":
+@dataclass(frozen=True, eq=False)
+class TestPrediction:
+    """What a test will do, and how well it will tell what it is made for."""
+
+    motion: "MeasurementPrediction"
+    expected: tuple["Expected", ...]
+
+
+def predict_test(test: TestPreview) -> TestPrediction:
     """Simulate what the specimen will do."""
-    return vibench.analysis.predict_measurement(test.measurement, test.rig)
+    return TestPrediction(
+        vibench.analysis.predict_measurement(test.measurement, test.rig),
+        vibench.analysis.expected_uncertainty(test.measurement, test.rig),
+    )

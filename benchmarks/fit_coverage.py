@@ -1,0 +1,270 @@
+"""How often a fit's intervals hold the truth, and how often wrong models are refused and named.
+
+    python benchmarks/fit_coverage.py --draws 200                    # all cases, on random rigs
+    python benchmarks/fit_coverage.py --draws 250 --shard 1/4 --json # a quarter of a thousand, as numbers
+
+Each draw is another specimen (masses, frequencies, damping), another bench description (all linear
+numbers some per cent off), another clock, other noise, and from 4 to 24 realisations. Wrong models hold
+one thing that is not so; the further mode is a fourth mass, solved as such, and friction is what
+Gaussian linearisation makes of it. A wrong model's effect is above the noise where the chi square of its
+misfit without noise would be refused in 95 of 100 cases.
+"""
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import ncx2
+
+from vibench.analysis import Estimator, FrequencyResponse
+from vibench.analysis.frequency_response import FrequencyResponseSettings
+from vibench.analysis.model_updating import Assumption, Parameter, fit_specimen
+from vibench.sim import Specimen, base_transmissibility, gong2025
+
+Complexes = NDArray[np.complex128]
+Reals = NDArray[np.float64]
+LINES_HZ = np.arange(50.0, 600.0, 4.0)
+EXTRA_HZ, EXTRA_SHARE, EXTRA_DAMPING = 1200.0, 0.03, 0.01
+_SURELY = 0.95
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A specimen, how it is described, and how well its transmission is measured."""
+
+    true: Specimen
+    described: Specimen
+    sd: Reals
+    """Relative, of every line."""
+    realisations: int
+
+
+@dataclass(frozen=True)
+class Count:
+    """What became of the draws of one case."""
+
+    case: str
+    draws: int
+    above_noise: int
+    refused: int
+    """Of those above the noise; of a right model, of all."""
+    named_first: int
+    """Of the refused."""
+    intervals: int
+    held: int
+
+
+def random_rig(rng: np.random.Generator) -> Rig:
+    """Draw one."""
+    usual = gong2025(damping_time_s=float(rng.uniform(1.2e-5, 2.6e-5)))
+
+    def near(values: tuple[float, float, float], share: float) -> tuple[float, float, float]:
+        a, b, c = (float(each * (1 + share * rng.uniform(-1, 1))) for each in values)
+        return a, b, c
+
+    masses = near(usual.masses, 0.05)
+    k0, k1, k2 = springs = near(usual.stiffnesses, 0.08)
+    beta = usual.dampings[0] / usual.stiffnesses[0]
+    true = replace(usual, masses=masses, stiffnesses=springs, dampings=(beta * k0, beta * k1, beta * k2))
+    k0, k1, k2 = springs = near(springs, 0.03)
+    beta *= float(rng.uniform(0.7, 1.4))
+    described = replace(true, stiffnesses=springs, dampings=(beta * k0, beta * k1, beta * k2))
+    size = np.abs(base_transmissibility(true, LINES_HZ)[:, 0])
+    level = 10 ** rng.uniform(-3.6, -2.6)
+    return Rig(true, described, level * np.sqrt(1 + 1 / size**2), int(rng.integers(4, 25)))
+
+
+def measured(value: Complexes, rig: Rig, rng: np.random.Generator) -> FrequencyResponse:
+    """Average so many realisations, whose scatter is all that is known of the lines'."""
+    count, shape = rig.realisations, (rig.realisations, value.size, 2)
+    parts = math.sqrt(count) * rig.sd[:, None] * rng.standard_normal(shape)
+    mean = parts.mean(axis=0)
+    sd = np.sqrt(np.sum((parts - mean) ** 2, axis=(0, 2)) / (2 * (count - 1)) / count)
+    return _response(value * np.exp(mean[:, 0] + 1j * mean[:, 1]), sd, count)
+
+
+def _response(value: Complexes, sd: Reals, averages: float) -> FrequencyResponse:
+    return FrequencyResponse(
+        frequency_hz=LINES_HZ,
+        value=value,
+        coherence=np.full(value.size, 0.999),
+        n_eff=float(averages),
+        relative_sd_magnitude=sd,
+        sd_phase_rad=sd,
+        half_width=2 * sd,
+        coherence_significance=0.5,
+        resolution_hz=0.0,
+        segments_used=round(averages),
+        segments_excluded=0,
+        settings=FrequencyResponseSettings(Estimator.DRIVE, 51200.0, 12800, "boxcar", 0.0, 0.95),
+    )
+
+
+Wrong = Callable[[Rig], tuple[Complexes, Specimen, bool]]
+"""What is measured of a rig, how it is described, and whether realisations scatter beyond noise."""
+
+
+def plain(specimen: Specimen) -> Complexes:
+    """Without contact."""
+    return np.asarray(base_transmissibility(specimen, LINES_HZ)[:, 0])
+
+
+def clocked(rig: Rig, rng: np.random.Generator) -> Rig:
+    """Give the rig whose motion a clock within 50 parts in a million shows as this one's."""
+    faster = (1 + 50e-6 * rng.uniform(-1, 1)) ** 2
+    k0, k1, k2 = (faster * each for each in rig.true.stiffnesses)
+    c0, c1, c2 = (math.sqrt(faster) * each for each in rig.true.dampings)
+    return replace(rig, true=replace(rig.true, stiffnesses=(k0, k1, k2), dampings=(c0, c1, c2)))
+
+
+def right(rig: Rig) -> tuple[Complexes, Specimen, bool]:
+    """Nothing is wrong but the numbers that are fitted."""
+    return plain(rig.true), rig.described, False
+
+
+def mass(index: int) -> Wrong:
+    """Describe a mass 3 % too light."""
+
+    def wrong(rig: Rig) -> tuple[Complexes, Specimen, bool]:
+        masses = [*rig.described.masses]
+        masses[index] /= 1.03
+        return plain(rig.true), replace(rig.described, masses=tuple(masses)), False
+
+    return wrong
+
+
+def damper(rig: Rig) -> tuple[Complexes, Specimen, bool]:
+    """Shake a specimen whose c0 is three times what it is described as."""
+    c0, c1, c2 = rig.true.dampings
+    return plain(replace(rig.true, dampings=(3 * c0, c1, c2))), rig.described, False
+
+
+def sensitivity(rig: Rig) -> tuple[Complexes, Specimen, bool]:
+    """Show everything 1 % too large."""
+    return 1.01 * plain(rig.true), rig.described, False
+
+
+def extra_mode(rig: Rig) -> tuple[Complexes, Specimen, bool]:
+    """Hang a small mass on m0 whose mode is at 1.2 kHz; four masses, solved as such."""
+    (m0, m1, m2), k, c = rig.true.masses, rig.true.stiffnesses, rig.true.dampings
+    small = EXTRA_SHARE * m0
+    spring = small * (2 * np.pi * EXTRA_HZ) ** 2
+    dash = 2 * EXTRA_DAMPING * np.sqrt(spring * small)
+    mass = np.diag([m0, m1, m2, small])
+    links = ((0, 2, k[2], c[2]), (1, 2, k[1], c[1]), (0, 3, spring, dash))
+    stiffness, damping = np.zeros((4, 4)), np.zeros((4, 4))
+    stiffness[0, 0], damping[0, 0] = k[0], c[0]
+    for a, b, spring_ab, dash_ab in links:
+        pair = np.zeros(4)
+        pair[a], pair[b] = 1.0, -1.0
+        stiffness += spring_ab * np.outer(pair, pair)
+        damping += dash_ab * np.outer(pair, pair)
+    s = 2j * np.pi * LINES_HZ[:, None, None]
+    force = np.zeros((LINES_HZ.size, 4, 1), dtype=np.complex128)
+    force[:, 0, 0] = k[0] + c[0] * s[:, 0, 0]
+    return np.linalg.solve(mass * s**2 + damping * s + stiffness, force)[:, 0, 0], rig.described, False
+
+
+FRICTION_SHARE = 0.25
+"""Friction force between base and m0, over the rms force in the damper of that link."""
+
+
+def friction(rig: Rig) -> tuple[Complexes, Specimen, bool]:
+    """Let m0 rub on the base: what noise of one level sees of it is Gaussian linearisation's damper.
+
+    F sign(v) acts on average as c = F sqrt(2 / pi) / sd(v) (Roberts and Spanos 2003, ch. 5); with the
+    force a share of c0 sd(v), and its distortion, which scatters between realisations.
+    """
+    c0, c1, c2 = rig.true.dampings
+    more = c0 * (1 + 4 * FRICTION_SHARE * math.sqrt(2 / math.pi))
+    return plain(replace(rig.true, dampings=(more, c1, c2))), rig.described, True
+
+
+CASES: dict[str, tuple[Wrong, Assumption | None]] = {
+    "right model": (right, None),
+    "m0 +3 %": (mass(0), Assumption.M0),
+    "m1 +3 %": (mass(1), Assumption.M1),
+    "c0 x3": (damper, Assumption.C0),
+    "vibrometer +1 %": (sensitivity, Assumption.SENSITIVITY),
+    "extra mode, 1.2 kHz": (extra_mode, Assumption.EXTRA_MODE),
+    "friction": (friction, Assumption.FRICTION),
+}
+
+
+def counted(case: str, draws: int, seed: int) -> Count:
+    """Fit so many rigs of one case."""
+    wrong, culprit = CASES[case]
+    above, refused, named, intervals, held = 0, 0, 0, 0, 0
+    for number in range(draws):
+        rng = np.random.default_rng((seed, list(CASES).index(case), number))
+        rig = random_rig(rng)
+        value, described, nonlinear = wrong(clocked(rig, rng))
+        fit = fit_specimen(measured(value, rig, rng), described, is_nonlinear=nonlinear)
+        if culprit is None:
+            refused += not fit.fits
+            for each in fit.values:
+                intervals += 1
+                held += each.low <= _true(rig.true, each.parameter) <= each.high
+            continue
+        if not _is_above(value, rig, described):
+            continue
+        above += 1
+        refused += not fit.fits
+        named += bool(fit.suspects) and fit.suspects[0].assumption is culprit
+    return Count(case, draws, above, refused, named, intervals, held)
+
+
+def _is_above(value: Complexes, rig: Rig, described: Specimen) -> bool:
+    """Whether the misfit without noise would be refused surely."""
+    # Of a noise-free measurement whose scatter is known exactly.
+    clean = fit_specimen(_response(value, rig.sd, 1e6), described, is_nonlinear=False)
+    freedom = 2 * clean.lines - 6
+    return bool(ncx2.sf(clean.limit * freedom, freedom, clean.reduced_chi_square * freedom) > _SURELY)
+
+
+def _true(specimen: Specimen, parameter: Parameter) -> float:
+    (k0, k1, k2), (m0, m1, m2) = specimen.stiffnesses, specimen.masses
+    return {
+        Parameter.DAMPING_TIME: specimen.dampings[0] / k0,
+        Parameter.F0: math.sqrt(k0 / m0) / (2 * math.pi),
+        Parameter.F1: math.sqrt(k1 / m1) / (2 * math.pi),
+        Parameter.F2: math.sqrt(k2 / m2) / (2 * math.pi),
+    }[parameter]
+
+
+def rows(counts: list[Count]) -> Iterator[str]:
+    """Give a table as the document has it."""
+    yield "| model | draws | effect above the noise | refused | right culprit first | intervals that hold |"
+    yield "|---|---|---|---|---|---|"
+    for each in counts:
+        of = each.above_noise or each.draws
+        named = f"{each.named_first} of {each.refused}" if each.above_noise else ""
+        held = f"{100 * each.held / each.intervals:.1f} % of {each.intervals}" if each.intervals else ""
+        above = str(each.above_noise) if each.above_noise else ""
+        yield f"| {each.case} | {each.draws} | {above} | {each.refused} of {of} | {named} | {held} |"
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--draws", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--shard", default="1/1", help="n/of: other seeds for each")
+    parser.add_argument("--case", choices=CASES, action="append")
+    parser.add_argument("--json", action="store_true")
+    asked = parser.parse_args()
+    seed = 1000 * asked.seed + int(asked.shard.partition("/")[0])
+    counts = [counted(each, asked.draws, seed) for each in asked.case or CASES]
+    if asked.json:
+        json.dump([asdict(each) for each in counts], sys.stdout)
+    else:
+        print(*rows(counts), sep="\n")
+
+
+if __name__ == "__main__":
+    main()
