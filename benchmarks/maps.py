@@ -63,7 +63,7 @@ def basin(asked: argparse.Namespace) -> int:
 
 def cost(asked: argparse.Namespace) -> int:
     """Compute a map and say what it took."""
-    plan = load_toml(Path(__file__).parents[1] / "studies" / "map.toml", Map)
+    plan = load_toml(Path(__file__).parents[1] / "studies" / "maps" / "map.toml", Map)
     said = plan.model_dump(exclude={"specimen"})
     said["frequency_hz"]["points"], said["amplitude_m"]["points"] = asked.columns, asked.rows
     plan = Map(specimen=plan.specimen, **said)

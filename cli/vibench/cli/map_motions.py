@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition import load_toml
+from vibench.acquisition import load_toml, named
 from vibench.analysis import InvalidRequest, recorded_response
 from vibench.analysis.dynamics import map_caption, motion_words, read_diagram
 from vibench.analysis.report import SHOWN, ImageKind, map_figure
@@ -33,7 +33,12 @@ SHOWN_MOTIONS = 12
 
 
 def map_motions(
-    plan: Annotated[Path, typer.Argument(metavar="MAP.toml", help="What varies, and what is fixed.")],
+    plan: Annotated[
+        Path,
+        typer.Argument(
+            metavar="MAP", help="TOML file of what varies, or a shipped name: map, basin, diagram."
+        ),
+    ],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for map.h5, figure and table.")],
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with what DIR/map.h5 does not hold yet.")
@@ -69,7 +74,7 @@ def map_motions(
     as_json: AsJson = False,
 ) -> None:
     """Map the motions over two parameters or two coordinates of the start, or along one parameter."""
-    asked = load_toml(plan, Map)
+    asked = load_toml(named(plan, "studies/maps"), Map)
     if show not in (None, *SHOWN):
         raise InvalidRequest(f"--show was given as {show!r}; there are {', '.join(SHOWN)}")
     if only_estimate:

@@ -21,12 +21,13 @@ from vibench.acquisition import (
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import Rig
 from vibench.analysis.exchange import ImportMapping
+from vibench.sim.maps import Map
 from vibench.sim.study import Study
 
 jsonschema = pytest.importorskip("jsonschema", reason="pip install vibench[test] brings jsonschema")
 
-MODELS = {"campaign": Campaign, "rig": Rig, "study": Study, "mapping": ImportMapping}
-FOLDERS = {"campaign": "campaigns", "rig": "hardware_configs", "study": "studies"}
+MODELS = {"campaign": Campaign, "rig": Rig, "study": Study, "map": Map, "mapping": ImportMapping}
+FOLDERS = {"campaign": "campaigns", "rig": "hardware_configs", "study": "studies", "map": "studies/maps"}
 MAPPING = """
 specimen = "gong2025"
 origin = "real"
@@ -82,7 +83,8 @@ def keys(part):
 def test_every_shipped_file_names_its_schema_and_passes_it(kind):
     for path in all_shipped(FOLDERS[kind]):
         text = path.read_text(encoding="utf-8")
-        assert text.startswith(f"#:schema ../schemas/{kind}-1.schema.json\n"), path
+        up = "../" * (1 + FOLDERS[kind].count("/"))
+        assert text.startswith(f"#:schema {up}schemas/{kind}-1.schema.json\n"), path
         assert (path.parent / text.split()[1]).is_file()
         assert faults(kind, text) == [], path
 
@@ -127,12 +129,14 @@ def test_what_is_loaded_passes_the_schema(kind, text, tmp_path):
         ("rig", "connected_ohm = 15000", "connected_ohm = -15000"),
         ("study", 'accuracy = "standard"', 'accuracy = "better"'),
         ("study", "step = 1", "steps = 1"),
+        ("map", "amplitude_m = {", "amplitude = {"),
+        ("map", 'spacing = "logarithmic"', 'spacing = "log"'),
         ("mapping", 'role = "m0_velocity"', 'role = "m0 velocity"'),
         ("mapping", 'source = "1"', 'sauce = "1"'),
     ],
 )
 def test_a_slip_that_is_refused_on_loading_is_shown_while_it_is_typed(kind, old, new, tmp_path):
-    named = {"campaign": "quick", "rig": "virtual_rig", "study": "paper"}
+    named = {"campaign": "quick", "rig": "virtual_rig", "study": "paper", "map": "map"}
     right = (
         MAPPING
         if kind == "mapping"

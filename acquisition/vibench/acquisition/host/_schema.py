@@ -92,6 +92,7 @@ SCHEMAS: Mapping[str, _Kind] = MappingProxyType(
         "campaign": _Kind("vibench.acquisition.plan", "Campaign", _with_defaults),
         "rig": _Kind("vibench.acquisition.rig", "Rig", _with_a_base),
         "study": _Kind("vibench.sim.study", "Study", _with_ranges),
+        "map": _Kind("vibench.sim.maps", "Map", _with_a_base),
         "mapping": _Kind("vibench.analysis.exchange", "ImportMapping", _with_a_base),
     }
 )
@@ -104,7 +105,7 @@ def json_schema(kind: str) -> Json:
     Parameters
     ----------
     kind
-        ``campaign``, ``rig``, ``study`` or ``mapping``.
+        ``campaign``, ``rig``, ``study``, ``map`` or ``mapping``.
 
     Raises
     ------
