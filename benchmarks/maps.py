@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from vibench.acquisition import load_toml
+from vibench.sim import Given, MotionKind, settle_scene, wilson_share
 from vibench.sim.maps import Map, Range, estimate_map, open_map, solve_map
-from vibench.sim.scene import Given, MotionKind, settle_scene, wilson_share
 
 SAME = 2e-3
 """Relative difference of Response I of one periodic motion."""

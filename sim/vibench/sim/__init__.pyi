@@ -105,6 +105,7 @@ from .scene import (
     StartMemory as StartMemory,
     measure_cost as measure_cost,
     plan_scene as plan_scene,
+    settle_scene as settle_scene,
     solve_ensemble as solve_ensemble,
     solve_scene as solve_scene,
     wilson_share as wilson_share,

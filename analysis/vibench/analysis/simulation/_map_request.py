@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat, model_validator
 from scipy.ndimage import distance_transform_edt
 
-from vibench.sim import Harmonic, MotionKind, integrate
+from vibench.sim import Harmonic, MotionKind, Scene, integrate, settle_scene
 from vibench.sim.maps import Map, MapResults, Range, Spacing, compute_map
-from vibench.sim.scene import Scene, settle_scene
 from vibench.sim.study import MemoryStore, PointAnswer, executor_of
 
 from ..dynamics import SpecimenChoice, map_caption, motion_classes
