@@ -6,6 +6,7 @@ import h5py
 import pytest
 from typer.testing import CliRunner
 
+from vibench.acquisition import shipped
 from vibench.cli.__main__ import app
 
 
@@ -37,6 +38,19 @@ def test_branches_along_the_level_are_told_in_sentences():
     assert result.exit_code == 0, result.output
     assert "1: period 1, mirrored: 1 to 2 µm" in result.output
     assert "1 branches (0 isolated)" in result.output
+
+
+def test_what_a_bench_can_hold_is_told_beside_branches():
+    bench = shipped("hardware_configs/virtual_rig.toml")
+    result = run(
+        "branches", "--frequency", "60:62", "--amplitude", "5e-6", "--places", 2, "--starts", 0,
+        "--holdable", bench, "--json",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    # Ten looks of ten periods or of a fifth of a second.
+    assert found["least_growth_time_s"] == pytest.approx(2.0, rel=0.05)
+    assert all(point["growth_time_s"] is None for point in found["branches"][0]["points"])
 
 
 def test_exponents_are_printed_as_json_and_written(tmp_path):

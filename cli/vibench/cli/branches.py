@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from vibench.acquisition.plan import loop_time_s
+from vibench.acquisition.rig import load_rig
 from vibench.analysis import (
     Curve,
     CurveOrigin,
@@ -77,6 +79,14 @@ def branches(
         int, typer.Option("--most-periods", metavar="N", help="Longest motion looked for, in drive periods.")
     ] = 4,
     seed: Annotated[int, typer.Option("--seed", help="Of the random states.")] = 1,
+    holdable: Annotated[
+        Path | None,
+        typer.Option(
+            "--holdable",
+            metavar="BENCH.toml",
+            help="Tell which unstable motions the feedback of this bench is fast enough to hold.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for branches.h5, figure and tables.")
     ] = None,
@@ -98,6 +108,9 @@ def branches(
         seed=seed,
         **drive,
     )
+    if holdable is not None:
+        lowest_hz = asked.start if asked.along is Parameter.FREQUENCY else asked.frequency_hz
+        asked = asked.model_copy(update={"loop_time_s": loop_time_s(load_rig(holdable), lowest_hz)})
     room_for(FILE, out)
     if not as_json:
         console.print("Looking for motions; each branch is told as it is found.")
@@ -111,7 +124,7 @@ def branches(
     if as_json:
         print_answer(diagram.to_dict(), is_complete=is_complete)
     else:
-        console.print(diagram.cost_sentence)
+        console.print(f"{diagram.cost_sentence} {diagram.holding_sentence}".rstrip())
     keep(
         out,
         lambda folder: write_diagram(diagram, folder / FILE),

@@ -175,6 +175,32 @@ def test_a_figure_has_dashes_where_motions_are_unstable_and_marks_at_events(alon
     assert [each.name for each in drawn.tables] == ["branches", "branches_special_points"]
 
 
+def test_what_a_bench_can_hold_is_told_in_figure_sentence_table_and_json():
+    growth_s = FOLDED.growth_time_s
+    assert np.isinf(growth_s[:3]).all()
+    assert growth_s[3:] == pytest.approx([1 / (115.0 * math.log(1.2)), 1 / (105.0 * math.log(1.5))])
+    # Between the two unstable motions: the slower one can be held, the quicker one cannot.
+    loop_s = 0.1 * math.sqrt(growth_s[3] * growth_s[4])
+    diagram = BranchDiagram(BranchRequest(start=100.0, stop=120.0, loop_time_s=loop_s), (FOLDED,), 1.0)
+    assert diagram.holdable[0].tolist() == [True, True, True, True, False]
+    assert "1 of 2 unstable motions; the quickest takes 0.023 s" in diagram.holding_sentence
+    drawn = branches_figure(diagram)
+    third = drawn.figure.axes[2]
+    labelled = {each.get_label(): each for each in third.get_lines()}
+    assert labelled["holdable"].get_xdata().tolist() == [115.0]
+    assert labelled["not holdable by this bench"].get_xdata().tolist() == [105.0]
+    assert diagram.holding_sentence in drawn.caption
+    assert "growth_time_s" in dict(drawn.tables[0].columns)
+    document = json.loads(json.dumps(diagram.to_dict(), allow_nan=False))
+    assert document["least_growth_time_s"] == pytest.approx(10.0 * loop_s)
+    assert [each["growth_time_s"] is None for each in document["branches"][0]["points"]] == [True] * 3 + [
+        False
+    ] * 2
+    assert DIAGRAM.holdable is None
+    assert DIAGRAM.holding_sentence == ""
+    assert len(branches_figure(DIAGRAM).figure.axes) == 2
+
+
 def test_a_spectrum_adds_up_and_is_kept(tmp_path):
     request = SpectrumRequest(start=255.0, stop=260.0, step=5.0, duration_s=1.5, settle_s=0.5)
     found = exponent_spectrum(request)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import isfinite
 
 from ..excitation import BaseLevel, Settling
-from ..plan import RunState
+from ..plan import LOOK_PERIODS, RunState, look_s
 from ..recording import Held, SettledNote, Steadiness
 from ._closed_loop_check import require_answer
 from ._control_action import Controller
@@ -13,9 +13,6 @@ from ._level_control import LevelControl, MeasuredLevel, measured_level
 from ._sine_loop import SineLoop
 from ._steadiness import Judgement, judged
 
-LOOK_S = 0.2
-"""Time between two looks at the motion [s]; ten periods at least."""
-LOOK_PERIODS = 10
 _SURE = 2.0
 
 
@@ -40,6 +37,11 @@ class SettledState:
     def response(self) -> float:
         """Response II: the magnitude of the transmissibility."""
         return abs(self.transmissibility)
+
+    @property
+    def against_base(self) -> complex:
+        """Displacement of m0 against the base, over that of the base, fundamentals."""
+        return self.transmissibility - 1.0
 
     @property
     def point(self) -> SettledPoint:
@@ -77,15 +79,15 @@ class SettlingController:
         """Wait at the frequency that is played; correct the setting whenever the level is off."""
         waited_s = 0.0
         while True:
-            look_s = max(LOOK_S, LOOK_PERIODS / self.loop.setting.frequency_hz)
-            yield from self.loop.listen(RunState.SETTLING, look_s)
-            waited_s += look_s
-            is_late = waited_s + look_s > self.rule.longest_wait_s
+            stretch_s = look_s(self.loop.setting.frequency_hz)
+            yield from self.loop.listen(RunState.SETTLING, stretch_s)
+            waited_s += stretch_s
+            is_late = waited_s + stretch_s > self.rule.longest_wait_s
             if waited_s < self.rule.shortest_wait_s and not is_late:
                 continue
             if not is_late and self._corrected():
                 continue
-            found = self._found(waited_s)
+            found = self.found(waited_s)
             if is_late or (self._is_steady(found) and found.judgement.steadiness is not Steadiness.UNSETTLED):
                 self.loop.note(found.note)
                 return found
@@ -121,7 +123,8 @@ class SettlingController:
         self.loop.change(now.frequency_hz, next_vpp)
         return True
 
-    def _found(self, waited_s: float) -> SettledState:
+    def found(self, waited_s: float) -> SettledState:
+        """Judge what was seen since the last change."""
         loop, periods = self.loop, self.loop.periods
         newest = periods.last(max(self.rule.periods, periods.count // 2))
         measured = measured_level(newest.base)

@@ -61,6 +61,11 @@ from ._limits import (
     shortest_ramp_s,
 )
 from ._loads import needed_vpp, predicted_loads
+from ._loop_time import (
+    LOOK_PERIODS,
+    look_s,
+    loop_time_s,
+)
 from ._measurement import InRunLimits, Measurement, OnChange, OnOverload, Point
 from ._measurement_preview import (
     MeasurementPreview,
@@ -95,6 +100,7 @@ __all__ = [
     "CHECK_S",
     "EXCITATION_KINDS",
     "HUSH_S",
+    "LOOK_PERIODS",
     "AbstractExcitation",
     "Approach",
     "BaseMotion",
@@ -148,6 +154,8 @@ __all__ = [
     "known_phases",
     "lead_in_s",
     "load_campaign",
+    "look_s",
+    "loop_time_s",
     "lowest_setting_vpp",
     "measured_s",
     "needed_vpp",

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibench.sim import Parameter
-from vibench.sim.branches import FoundBranch
+from vibench.sim.branches import FoundBranch, growth_time_s, least_growth_time_s
 
 from ..comparison import Curve, CurveKind, CurveOrigin
 from ..signals import Reals
@@ -80,6 +80,11 @@ class BranchLine:
     def is_stable(self) -> NDArray[np.bool_]:
         """All multipliers inside the unit circle, shape (n,)."""
         return np.asarray(self.largest_multiplier < 1.0)
+
+    @property
+    def growth_time_s(self) -> Reals:
+        """Time in which a small distance from the motion grows by e; infinite where stable, shape (n,)."""
+        return growth_time_s(self.frequency_hz, self.largest_multiplier, self.periods)
 
     def along(self, parameter: Parameter) -> Reals:
         """Frequencies [Hz] or amplitudes [m]."""
@@ -171,11 +176,37 @@ class BranchDiagram:
             f"middle of the worst branch, {worst:.1g} at the worst point."
         )
 
+    @property
+    def holdable(self) -> tuple[NDArray[np.bool_], ...] | None:
+        """Of each branch, which motions the bench's loop is fast enough to hold; None where none is named."""
+        if self.request.loop_time_s is None:
+            return None
+        least_s = least_growth_time_s(self.request.loop_time_s)
+        return tuple(line.growth_time_s >= least_s for line in self.lines)
+
+    @property
+    def holding_sentence(self) -> str:
+        """Say how many unstable motions the bench can hold; nothing where no bench is named."""
+        loop_s, holdable = self.request.loop_time_s, self.holdable
+        if loop_s is None or not holdable:
+            return ""
+        is_unstable = [~line.is_stable for line in self.lines]
+        count = sum(int(each.sum()) for each in is_unstable)
+        held = sum(int((a & b).sum()) for a, b in zip(is_unstable, holdable, strict=True))
+        quickest = min(float(line.growth_time_s.min()) for line in self.lines)
+        told = (
+            f"A loop of {loop_s:.3g} s holds what takes {least_growth_time_s(loop_s):.3g} s or more to grow "
+            f"by e: {held} of {count} unstable motions"
+        )
+        return told + (f"; the quickest takes {quickest:.2g} s." if count else ".")
+
     def to_dict(self) -> dict[str, object]:
         """Say everything, for other programs; numbers that are not finite are null."""
+        loop_s = self.request.loop_time_s
         return {
             "options": self.request.model_dump(mode="json"),
             "branches": [_document(line) for line in self.lines],
+            "least_growth_time_s": None if loop_s is None else least_growth_time_s(loop_s),
             "elapsed_s": self.elapsed_s,
         }
 
@@ -210,7 +241,7 @@ class BranchDiagram:
 
 def _document(line: BranchLine) -> dict[str, object]:
     points = {
-        **named(line, "frequency_hz", "amplitude_m", "is_stable", "largest_multiplier", "impacts"),
+        **named(line, "frequency_hz", "amplitude_m", "is_stable", "largest_multiplier", "growth_time_s", "impacts"),
         "response_i": line.response_i[:, 0],
         "response_ii": line.response_ii[:, 0],
         "relative_i": line.response_i[:, 3],

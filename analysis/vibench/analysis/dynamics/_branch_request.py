@@ -60,6 +60,8 @@ class BranchRequest(SpecimenChoice):
     """Longest motion that is looked for, in drive periods."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Of the random states."""
+    loop_time_s: PositiveFloat | None = None
+    """Of a bench, from a motion to the drive that answers it: what it can hold is then told [s]."""
     recorded_level: tuple[tuple[PositiveFloat, PositiveFloat], ...] = ()
     """Pairs of frequency [Hz] and base amplitude [m] that stand in the place of one amplitude."""
 

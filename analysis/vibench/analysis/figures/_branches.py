@@ -4,8 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from vibench.sim import Parameter
+from vibench.sim.branches import least_growth_time_s
 
 from ..comparison import Curve, CurveKind, CurveOrigin
 from ..dynamics import BranchDiagram, BranchLine
@@ -13,6 +15,7 @@ from ..signals import Reals
 from ..tables import Table, table
 from ._drawn import DrawnFigure
 from ._style import (
+    COLLIDING,
     LEVELS,
     MEASURED,
     PREDICTED,
@@ -25,6 +28,8 @@ from ._style import (
 )
 
 _HEIGHT_IN = 5.6
+_GROWTH_HEIGHT_IN = 1.8
+"""Of a third panel, where a bench is asked what it can hold."""
 EVENT_MARKS = {
     "fold": ("o", "#d55e00"),
     "period doubling": ("s", "#009e73"),
@@ -39,6 +44,8 @@ _PANELS = (("response_i", CurveKind.RESPONSE_I), ("response_ii", CurveKind.RESPO
 def branches_figure(diagram: BranchDiagram, measured: Sequence[Curve] = ()) -> DrawnFigure:
     """Draw Responses I and II of m0 on every branch, over what changes, and recordings beneath.
 
+    Where the request names a bench's loop, a third panel says which unstable motions it can hold.
+
     Parameters
     ----------
     diagram
@@ -48,16 +55,19 @@ def branches_figure(diagram: BranchDiagram, measured: Sequence[Curve] = ()) -> D
 
     """
     with styled():
-        figure = new_figure(_HEIGHT_IN)
-        panels = figure.subplots(2, 1, sharex=True)
-        for axes, (name, kind) in zip(panels, _PANELS, strict=True):
+        holdable = diagram.holdable
+        figure = new_figure(_HEIGHT_IN + (0.0 if holdable is None else _GROWTH_HEIGHT_IN))
+        panels = figure.subplots(2 if holdable is None else 3, 1, sharex=True)
+        for axes, (name, kind) in zip(panels[:2], _PANELS, strict=True):
             _measured(axes, diagram, [each for each in measured if each.response is kind])
             for line in diagram.lines:
                 draw_line(axes, line, _place(diagram, line), getattr(line, name)[:, 0])
             magnitude_axis(axes)
             axes.set_ylabel(f"{kind.value}\nof m0 over A0")
         _events(panels[1], diagram)
-        _across(panels[1], diagram)
+        if diagram.request.loop_time_s is not None and holdable is not None:
+            _growth(panels[2], diagram, holdable, least_growth_time_s(diagram.request.loop_time_s))
+        _across(panels[-1], diagram)
         legend_above(figure, list(panels), columns=4)
         figure.align_ylabels()
     return DrawnFigure(
@@ -65,7 +75,8 @@ def branches_figure(diagram: BranchDiagram, measured: Sequence[Curve] = ()) -> D
         title=f"Branches: {diagram.request.title}",
         caption=(
             "Periodic motions; solid: stable, dashed: unstable. Motions of more than one drive period are "
-            f"in other colours. {diagram.cost_sentence} {diagram.request.sentence} Chaotic and "
+            f"in other colours. {diagram.cost_sentence} {diagram.request.sentence}"
+            f"{diagram.holding_sentence and ' '}{diagram.holding_sentence} Chaotic and "
             "quasi-periodic motions are no branches: where no solid line is, look for them."
         ),
         figure=figure,
@@ -86,6 +97,28 @@ def draw_line(axes: Axes, line: BranchLine, place: Reals, size: Reals) -> None:
             linewidth=1.3 if is_stable else 0.9,
             label=f"{'stable' if is_stable else 'unstable'}{period}",
         )
+
+
+def _growth(
+    axes: Axes, diagram: BranchDiagram, holdable: Sequence[NDArray[np.bool_]], least_s: float
+) -> None:
+    """Draw how fast unstable motions are left; below the line no loop of this bench holds them."""
+    for line, held in zip(diagram.lines, holdable, strict=True):
+        place, grows = _place(diagram, line), ~line.is_stable
+        for told, chosen, colour in (
+            ("holdable", grows & held, MEASURED),
+            ("not holdable by this bench", grows & ~held, SIMULATED),
+        ):
+            if np.any(chosen):
+                axes.plot(
+                    place[chosen], line.growth_time_s[chosen], ".", markersize=3, color=colour, label=told
+                )
+    axes.axhline(least_s, color=MEASURED, linewidth=0.8, linestyle=":", label=f"{least_s:.3g} s")
+    axes.set_yscale("log")
+    low, high = axes.get_ylim()
+    axes.axhspan(min(low, 0.5 * least_s), least_s, color=COLLIDING, alpha=0.6, linewidth=0)
+    axes.set_ylim(min(low, 0.5 * least_s), max(high, 2.0 * least_s))
+    axes.set_ylabel("time to\ngrow by e [s]")
 
 
 def _place(diagram: BranchDiagram, line: BranchLine) -> Reals:
@@ -156,6 +189,7 @@ def branch_tables(diagram: BranchDiagram) -> tuple[Table, ...]:
         response_i=np.concatenate([line.response_i[:, 0] for line in lines]),
         response_ii=np.concatenate([line.response_ii[:, 0] for line in lines]),
         largest_multiplier=np.concatenate([line.largest_multiplier for line in lines]),
+        growth_time_s=np.concatenate([line.growth_time_s for line in lines]),
         impacts=np.concatenate([line.impacts for line in lines]),
         error_estimate=np.concatenate([line.error_estimate for line in lines]),
     )

@@ -5,6 +5,11 @@ from ._found_branch import (
     BranchOrigin as BranchOrigin,
     FoundBranch as FoundBranch,
 )
+from ._holding import (
+    UPDATES_TO_HOLD as UPDATES_TO_HOLD,
+    growth_time_s as growth_time_s,
+    least_growth_time_s as least_growth_time_s,
+)
 from ._motion_search import (
     MotionSearch as MotionSearch,
     periodic_motions as periodic_motions,
