@@ -26,7 +26,7 @@ from vibench.analysis.dynamics import (
     write_diagram,
 )
 from vibench.analysis.report import branches_figure
-from vibench.sim import Parameter
+from vibench.sim import Parameter, PhaseReference
 
 from .dynamics_answer import computed, keep, leave, print_answer, room_for
 from .output import console
@@ -58,6 +58,18 @@ def branches(
             help="Take range and level from a stepped sine or sweep, and lay the branches over it.",
         ),
     ] = None,
+    resonance: Annotated[
+        str | None,
+        typer.Option(
+            "--resonance",
+            metavar="LOW:HIGH",
+            help="Follow the phase resonance of the mode between these frequencies [Hz] over the level.",
+        ),
+    ] = None,
+    phase_of: Annotated[
+        PhaseReference,
+        typer.Option("--phase-of", help="Motion of m0 that is a quarter of a period behind at a resonance."),
+    ] = PhaseReference.RELATIVE,
     method: Annotated[
         BranchMethod,
         typer.Option("--method", help="Exact; harmonic balance; or with one harmonic, the paper's eq. 5."),
@@ -93,7 +105,11 @@ def branches(
     as_json: AsJson = False,
 ) -> None:
     """Find and follow periodic motions over frequency or level, stable and unstable; name bifurcations."""
-    measured, drive = _drive(amplitude, frequency, like)
+    measured, drive = (
+        _drive(amplitude, frequency, like)
+        if resonance is None
+        else _resonance(amplitude, frequency, like, resonance)
+    )
     asked = asked_of_specimen(
         BranchRequest,
         specimen,
@@ -106,10 +122,13 @@ def branches(
         starts=starts,
         most_periods=most_periods,
         seed=seed,
+        phase_of=phase_of,
         **drive,
     )
     if holdable is not None:
         lowest_hz = asked.start if asked.along is Parameter.FREQUENCY else asked.frequency_hz
+        if asked.resonance_band_hz is not None:
+            lowest_hz = asked.resonance_band_hz[0]
         asked = asked.model_copy(update={"loop_time_s": loop_time_s(load_rig(holdable), lowest_hz)})
     room_for(FILE, out)
     if not as_json:
@@ -158,6 +177,25 @@ def _drive(
             "range START:STOP and the other as one number"
         )
     return (), _along(a, f)
+
+
+def _resonance(
+    amplitude: str | None, frequency: str | None, like: Path | None, resonance: str
+) -> tuple[Sequence[Curve], dict[str, object]]:
+    """Read the levels over which a phase resonance is followed."""
+    if amplitude is None or frequency is not None or like is not None:
+        raise InvalidRequest(
+            f"--resonance {resonance} goes over the level; give --amplitude START:STOP beside it, and "
+            "neither --frequency nor --like"
+        )
+    band = range_of(resonance, Parameter.FREQUENCY, (2,))
+    levels = range_of(amplitude, Parameter.AMPLITUDE, (2,))
+    return (), {
+        "along": Parameter.AMPLITUDE,
+        "resonance_band_hz": (band.start, band.stop),
+        "start": levels.start,
+        "stop": levels.stop,
+    }
 
 
 def _along(amplitude: Range, frequency: Range) -> dict[str, object]:

@@ -73,6 +73,7 @@ from .periodic import (
     OrbitShape as OrbitShape,
     Parameter as Parameter,
     PeriodicOrbit as PeriodicOrbit,
+    PhaseReference as PhaseReference,
     PowerSpring as PowerSpring,
     RestoringForce as RestoringForce,
     balance_specimen as balance_specimen,
@@ -83,6 +84,7 @@ from .periodic import (
     periodic_branch as periodic_branch,
     periodic_branch_within as periodic_branch_within,
     periodic_orbit as periodic_orbit,
+    phase_resonance_branch as phase_resonance_branch,
     spring_of as spring_of,
     structure_of as structure_of,
 )

@@ -40,6 +40,14 @@ class Oscillator:
         k3 = rate(x + h / 2 * k2)
         self.motion = x + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(x + h * k3))
 
+    def highest_seen_m(self, frequency_hz: float, acceleration: float) -> float:
+        """Amplitude of the base and x together on the highest branch, as a vibrometer sees it."""
+        omega, natural = 2 * np.pi * frequency_hz, 2 * np.pi * self.natural_hz
+        x = max(self.steady_amplitudes(frequency_hz, acceleration))
+        stiffness = natural**2 - omega**2 + 0.75 * self.hardening * x**2
+        moved = -acceleration / (stiffness + 2j * self.damping * natural * omega)
+        return abs(moved - acceleration / omega**2)
+
     def steady_amplitudes(self, frequency_hz: float, acceleration: float) -> list[float]:
         """All steady amplitudes of x, stable or not: the cubic of harmonic balance."""
         omega, natural = 2 * np.pi * frequency_hz, 2 * np.pi * self.natural_hz
@@ -105,7 +113,9 @@ class Bench:
         cycles = self.cycles + frequency_hz * np.arange(count + 1) / RATE_HZ
         self.cycles = float(cycles[-1] % 1.0)
         turning = np.exp(2j * np.pi * cycles[:-1])
-        velocity = np.real(2j * np.pi * frequency_hz * motion * turning)
+        omega = 2 * np.pi * frequency_hz
+        # The vibrometer sees x on top of the base: its acceleration a sin(w t) is a displacement i a / w^2.
+        velocity = np.real(1j * omega * (motion + 1j * base / omega**2) * turning)
         physical = {
             Role.DRIVE_VOLTAGE: 0.5 * amplitude * turning.imag,
             Role.AMPLIFIER_VOLTAGE: amplitude * turning.imag,

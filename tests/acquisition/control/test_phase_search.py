@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.acquisition.control._resonance_controller import PhaseError, PhaseSearch
+from vibench.acquisition.control._phase_search import PhaseError, PhaseSearch
 
 
 def error_deg(frequency_hz, natural_hz, damping):

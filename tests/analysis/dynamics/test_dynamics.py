@@ -32,6 +32,7 @@ from vibench.analysis.dynamics import (
     write_spectrum,
 )
 from vibench.analysis.report import branches_figure, exponent_spectrum_figure
+from vibench.analysis.sine import TrackedResonance
 from vibench.sim import Parameter, gong2025
 
 
@@ -72,6 +73,8 @@ def computed():
         ({"recorded_level": ((100.0, 1e-6),)}, "two or more ascending"),
         ({"recorded_level": ((200.0, 1e-6), (100.0, 1e-6))}, "two or more ascending"),
         ({"recorded_level": ((100.0, 1e-6), (200.0, 1e-6)), "along": "amplitude"}, "goes along frequency"),
+        ({"resonance_band_hz": (97.0, 92.0), "along": "amplitude"}, "does not ascend"),
+        ({"resonance_band_hz": (92.0, 97.0)}, "is followed along amplitude"),
         ({"amplitude_m": 0.0}, "greater than 0"),
         ({"amplitude_m": math.nan}, "finite"),
         ({"gap_m": -1.0}, "greater than 0"),
@@ -199,6 +202,20 @@ def test_what_a_bench_can_hold_is_told_in_figure_sentence_table_and_json():
     assert DIAGRAM.holdable is None
     assert DIAGRAM.holding_sentence == ""
     assert len(branches_figure(DIAGRAM).figure.axes) == 2
+
+
+def test_a_phase_resonance_is_drawn_by_its_frequency_with_what_was_tracked_on_it():
+    request = BranchRequest(along=Parameter.AMPLITUDE, start=1e-8, stop=1e-7, resonance_band_hz=(92.0, 97.0))
+    diagram = diagram_of(request)
+    (found,) = diagram.lines
+    assert found.frequency_hz == pytest.approx(94.602, abs=1e-3)
+    base = 5e-8 * (2 * np.pi * 94.6) ** 2
+    tracked = TrackedResonance(0, base, 94.6, 0.01, 1.9e-7, None, None, None)
+    first, second = branches_figure(diagram, tracked=(tracked,)).figure.axes
+    (bars,) = first.containers
+    assert bars.lines[0].get_xydata().tolist() == [[pytest.approx(0.05), 94.6]]
+    assert second.get_lines()[-1].get_ydata().tolist() == [pytest.approx(3.8)]
+    assert first.get_lines()[0].get_ydata() == pytest.approx(found.frequency_hz)
 
 
 def test_a_spectrum_adds_up_and_is_kept(tmp_path):

@@ -1,195 +1,38 @@
-"""Tracking a mode's phase resonance from level to level.
-
-A mode from a few points of its transmissibility: one resonance beside whatever else is near.
-
-Finding the frequency at which a phase has a wanted value: secants inside a bracket that only narrows.
-"""
+"""Tracking a phase resonance from level to level: searched once, then followed by a phase-locked loop."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from math import degrees, hypot, pi, sqrt
+from dataclasses import dataclass
+from math import degrees, exp, hypot, pi, radians, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..excitation import ResonanceTracking
-from ..recording import LockResult, ResonanceNote, Steadiness
+from ..plan import LOOK_PERIODS, RunState
+from ..recording import Held, LockResult, ResonanceNote, Steadiness
+from ._closed_loop_check import require_answer
 from ._control_action import Controller
-from ._record import recorded
+from ._mode_fit import Mode, fitted_mode
+from ._phase_search import PhaseError, PhaseResonance, PhaseSearch
+from ._record import recorded, recorded_and_judged
 from ._settling_controller import SettledState, SettlingController
 from ._sine_loop import SineLoop
 from ._start import moved, started
 from ._stroboscope import Periods
 
-_UNKNOWNS = 8
-"""Real numbers that are fitted: frequency, damping, and a complex polynomial of degree two."""
-
-
-@dataclass(frozen=True)
-class Mode:
-    """A damped mode."""
-
-    frequency_hz: float
-    """Undamped natural frequency [Hz]."""
-    frequency_u_hz: float
-    """Standard uncertainty, from what the points leave [Hz]."""
-    damping_ratio: float
-
-
-def fitted_mode(frequency_hz: NDArray[np.float64], transmissibility: NDArray[np.complex128]) -> Mode | None:
-    """Fit T (s^2 + a1 s + a2) = b0 + b1 s + b2 s^2 with real a and complex b; None with too few points.
-
-    The polynomial on the right holds the mode's residue, the motion of the base itself and the flanks
-    of other modes; a constant error of all phases only turns it. Levy's linear least squares, weighted
-    once more by the denominator that it found.
-
-    Parameters
-    ----------
-    frequency_hz, transmissibility
-        Shape (points,), around the resonance.
-
-    """
-    if 2 * len(frequency_hz) <= _UNKNOWNS:
-        return None
-    middle_hz = float(np.mean(frequency_hz))
-    s = np.asarray(1j * frequency_hz / middle_hz, dtype=np.complex128)
-    weight = np.ones(len(s))
-    solution, covariance = np.zeros(_UNKNOWNS), np.zeros((_UNKNOWNS, _UNKNOWNS))
-    for _ in range(3):
-        solution, covariance = _solved(s, transmissibility, weight)
-        weight = 1 / np.abs(s**2 + solution[0] * s + solution[1])
-    if solution[1] <= 0:
-        return None
-    natural = sqrt(float(solution[1]))
-    return Mode(
-        frequency_hz=middle_hz * natural,
-        frequency_u_hz=middle_hz * sqrt(max(0.0, float(covariance[1, 1]))) / (2 * natural),
-        damping_ratio=float(solution[0]) / (2 * natural),
-    )
-
-
-def _solved(
-    s: NDArray[np.complex128], answer: NDArray[np.complex128], weight: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    # a1 s T + a2 T - (b0 + b1 s + b2 s^2) = -s^2 T, real and imaginary parts apart.
-    powers = np.stack([np.ones_like(s), s, s**2], axis=1)
-    columns = np.concatenate([(s * answer)[:, None], answer[:, None], -powers, -1j * powers], axis=1)
-    weighted = weight[:, None] * columns
-    right = -weight * s**2 * answer
-    matrix = np.concatenate([weighted.real, weighted.imag])
-    target = np.concatenate([right.real, right.imag])
-    solution = np.linalg.lstsq(matrix, target)[0]
-    left = target - matrix @ solution
-    variance = float(left @ left) / max(1, len(target) - _UNKNOWNS)
-    return solution, variance * np.linalg.pinv(matrix.T @ matrix)
-
-
-_NEAR_DEG = 35.0
-"""Errors up to this are on the straight part of the phase: its slope is taken from them."""
-_FEWEST = 2
-_STEEPEST_DEG = 85.0
-"""Errors beyond are taken for this: the tangent of a right angle has no end."""
-_BEND = 0.15
-"""How far the slope over that part is off the one at the resonance, at most."""
-
-
-@dataclass(frozen=True)
-class PhaseError:
-    """Phase minus the wanted one at a frequency [degrees], with its standard uncertainty by chance."""
-
-    frequency_hz: float
-    error_deg: float
-    uncertainty_deg: float
-
-
-@dataclass(frozen=True)
-class PhaseResonance:
-    """Where the phase is met."""
-
-    frequency_hz: float
-    uncertainty_hz: float
-    """Standard uncertainty, that of the sensors' phases included [Hz]."""
-    slope_deg_per_hz: float
-
-    @property
-    def half_width_hz(self) -> float:
-        """Half of the half-power width: damping ratio times frequency, from the slope of the phase [Hz]."""
-        return 180 / (pi * abs(self.slope_deg_per_hz)) if self.slope_deg_per_hz else 0.0
-
-
-@dataclass
-class PhaseSearch:
-    """Seeks a falling phase's crossing: motion lags more and more as the frequency rises through a mode."""
-
-    low_hz: float
-    high_hz: float
-    widest_step_hz: float
-    """What one step takes at most while the resonance is not bracketed [Hz]."""
-    tries: list[PhaseError] = field(default_factory=list)
-
-    def next_hz(self) -> float:
-        """Give the next frequency to try, after at least one."""
-        last = self.tries[-1]
-        if len(self.tries) == 1:
-            step_hz = 0.5 * self.widest_step_hz
-            return self._bounded(last.frequency_hz + (step_hz if last.error_deg > 0 else -step_hz))
-        below = [each for each in self.tries if each.error_deg > 0]
-        above = [each for each in self.tries if each.error_deg <= 0]
-        if below and above:
-            low = max(below, key=lambda each: each.frequency_hz)
-            high = min(above, key=lambda each: each.frequency_hz)
-            if low.frequency_hz < high.frequency_hz:
-                return _between(low, high)
-        return self._bounded(self._outwards(last))
-
-    def resonance(self, sensor_phase_deg: float) -> PhaseResonance:
-        """Draw a line through the tries near the resonance; it crosses zero there.
-
-        Parameters
-        ----------
-        sensor_phase_deg
-            Standard uncertainty of the phase that all tries share [degrees].
-
-        """
-        nearest = sorted(self.tries, key=lambda each: abs(each.error_deg))
-        near = [each for each in nearest if abs(each.error_deg) <= _NEAR_DEG]
-        used = near if len(near) >= _FEWEST else nearest[:_FEWEST]
-        best = nearest[0]
-        frequency_hz = np.array([each.frequency_hz for each in used])
-        error_deg = np.array([each.error_deg for each in used])
-        spread = float(np.var(frequency_hz))
-        if spread == 0.0:
-            return PhaseResonance(best.frequency_hz, float("inf"), 0.0)
-        # The tangent of the error is a straight line through a mode, whose phase itself bends away from it.
-        error = np.degrees(np.tan(np.radians(np.clip(error_deg, -_STEEPEST_DEG, _STEEPEST_DEG))))
-        # A given phase moves the tangent the more, the further out it is.
-        weight = np.cos(np.radians(error_deg)) ** 4
-        away_hz = frequency_hz - float(weight @ frequency_hz / weight.sum())
-        slope = float((weight * away_hz) @ error / ((weight * away_hz) @ away_hz))
-        # From the best try, not from the line's own crossing: other modes bend it further out.
-        crossing_hz = best.frequency_hz - best.error_deg / slope
-        uncertainty_deg = hypot(best.uncertainty_deg, sensor_phase_deg, _BEND * best.error_deg)
-        return PhaseResonance(crossing_hz, uncertainty_deg / abs(slope), slope)
-
-    def _outwards(self, last: PhaseError) -> float:
-        before = self.tries[-2]
-        widest_hz = self.widest_step_hz
-        rise = last.frequency_hz - before.frequency_hz
-        slope = (last.error_deg - before.error_deg) / rise if rise else 0.0
-        step_hz = -last.error_deg / slope if slope < 0 else (widest_hz if last.error_deg > 0 else -widest_hz)
-        return last.frequency_hz + min(max(step_hz, -widest_hz), widest_hz)
-
-    def _bounded(self, frequency_hz: float) -> float:
-        return min(max(frequency_hz, self.low_hz), self.high_hz)
-
-
-def _between(low: PhaseError, high: PhaseError) -> float:
-    """Cross the secant, kept away from both ends so that the bracket shrinks from either side."""
-    share = low.error_deg / (low.error_deg - high.error_deg)
-    edge = 0.05
-    return low.frequency_hz + min(max(share, edge), 1 - edge) * (high.frequency_hz - low.frequency_hz)
-
-
+_LOOP_GAIN = 0.5
+"""Part of the error of the phase that the phase-locked loop takes out at each look."""
+_SLOW, _GROWTH, _LARGEST_GAIN = 0.75, 1.5, 4.0
+"""An error that keeps more than this of itself in a look makes the gain grow by this factor, up to this."""
+_LOST_RAD = pi / 4
+"""An error of the phase beyond which the loop is no longer on the resonance."""
+_CORRECTED = 0.5
+"""Standard uncertainty of the correction for the phase that is left, as a share."""
+_LEFT = 2.0
+"""How far the motion may have to go still, over the tolerance of the phase in radians."""
+_AHEAD = 0.5
+"""Part of the way from the level before that is gone ahead."""
+_LOOKS_LOCKED = 3
+"""Looks in a row with phase and level where they should be, before it counts as locked."""
 _BATCHES = 8
 _FURTHEST = 1.5
 """Half-widths of the resonance between it and the furthest point of a flank."""
@@ -198,23 +41,149 @@ _FURTHEST = 1.5
 def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]:
     """Lock on to the resonance at every level, record there, go on to the next level from there."""
     yield from started(loop, plan.start_hz, plan.held_levels[0])
-    frequency_hz = plan.start_hz
+    last = TrackedPlace(plan.start_hz, 0.0)
     for number in range(len(plan.accelerations_m_per_s2)):
-        frequency_hz = yield from _tracked(loop, plan, number, frequency_hz)
+        followed = (yield from _followed(loop, plan, number, last)) if last.half_width_hz else None
+        last = followed or (yield from _searched(loop, plan, number, last))
     yield from loop.ramp_down()
     yield from loop.say()
 
 
-def _tracked(loop: SineLoop, plan: ResonanceTracking, number: int, start_hz: float) -> Controller[float]:
+@dataclass(frozen=True)
+class TrackedPlace:
+    """Where a level was left, and what the phase-locked loop needs to know of the mode."""
+
+    frequency_hz: float
+    half_width_hz: float
+    """Zero as long as no level was found: the next one is searched for."""
+    risen_hz: float = 0.0
+    """From the level before."""
+
+    @property
+    def ahead_hz(self) -> float:
+        """Where the next level is begun: short of the line, as a bent resonance lies beside its fold [Hz]."""
+        return self.frequency_hz + _AHEAD * self.risen_hz
+
+
+def _followed(
+    loop: SineLoop, plan: ResonanceTracking, number: int, last: TrackedPlace
+) -> Controller[TrackedPlace | None]:
+    """Go to the next level under the phase-locked loop and record there; None far off the resonance."""
+    controller = SettlingController(loop, plan.settling, plan.held_levels[number])
+    law = PhaseLaw(plan, last.half_width_hz)
+    looks, lock = yield from _locked(controller, plan, law, last.ahead_hz)
+    if lock is None:
+        return None
+    periods, half_width_hz = looks * LOOK_PERIODS, law.seen_half_width_hz
+    segment = plan.segment(number, loop.setting.frequency_hz)
+    found = yield from recorded_and_judged(controller, segment, plan.record_s, periods / loop.drive_hz)
+    error = _phase_error(loop.periods, found, plan)
+    if abs(error.error_deg) > plan.phase_tolerance_deg:
+        lock = LockResult.LOST
+    left_deg = hypot(error.uncertainty_deg, _sensor_phase_deg(plan, found), _CORRECTED * error.error_deg)
+    resonance = PhaseResonance(
+        found.drive_hz + radians(error.error_deg) * half_width_hz,
+        radians(left_deg) * half_width_hz,
+        -degrees(1.0) / half_width_hz,
+    )
+    _say(loop, plan, number, found, Tracked(resonance, None, lock, looks, periods))
+    return TrackedPlace(found.frequency_hz, last.half_width_hz, found.frequency_hz - last.frequency_hz)
+
+
+def _locked(
+    controller: SettlingController, plan: ResonanceTracking, law: "PhaseLaw", start_hz: float
+) -> Controller[tuple[int, LockResult | None]]:
+    """Hold phase and level at once; gives the looks it took, and how it ended: None far off the resonance.
+
+    The frequency moves by ``g (tau / L (e[k] - e[k-1]) + e[k])`` half-widths, e the error of the phase in
+    radians, L the time of a look and tau that in which the mode forgets: proportion and sum, whose zero lies
+    on the mode's pole, so that the error falls by the share g at every look. Contacts make the phase fall
+    more gently over the frequency: g grows as long as the error does not fall as it should.
+    """
+    loop, error_rad = controller.loop, 0.0
+    moved(loop, start_hz, controller.level)
+    tolerance_rad = radians(plan.phase_tolerance_deg)
+    in_a_row, looks = 0, plan.most_periods // LOOK_PERIODS
+    for look in range(1, looks + 1):
+        now = loop.setting
+        yield from loop.listen(RunState.SETTLING, LOOK_PERIODS / now.frequency_hz)
+        base, seen = controller.measured(), controller.found(0.0)
+        require_answer(loop.rig, now.frequency_hz, now.setting_vpp, base.amplitude)
+        error_rad, left = law.see(now.frequency_hz, seen)
+        is_on = abs(error_rad) <= tolerance_rad and left <= _LEFT * tolerance_rad and seen.held is Held.WITHIN
+        in_a_row = in_a_row + 1 if is_on else 0
+        if in_a_row == _LOOKS_LOCKED:
+            return look, LockResult.LOCKED
+        frequency_hz = law.next_hz(now.frequency_hz)
+        loop.change(frequency_hz, controller.prompt_vpp(base, frequency_hz))
+    return looks, None if abs(error_rad) > _LOST_RAD else LockResult.LOST
+
+
+class PhaseLaw:
+    """The law of the phase-locked loop."""
+
+    def __init__(self, plan: ResonanceTracking, half_width_hz: float) -> None:
+        self._plan = plan
+        self._half_width_hz = half_width_hz
+        self._before_rad = self._error_rad = 0.0
+        self._motion = 0j
+        self._gain = _LOOP_GAIN
+        self._rested: list[tuple[float, float]] = []
+
+    @property
+    def seen_half_width_hz(self) -> float:
+        """Half-width by the line through the newer half of frequencies and errors, or the one given [Hz]."""
+        frequency_hz, rested_rad = np.array(self._rested[len(self._rested) // 2 :]).T
+        away_hz = frequency_hz - frequency_hz.mean()
+        fallen = -float(away_hz @ rested_rad)
+        if fallen <= 0.0:
+            return self._half_width_hz * _LARGEST_GAIN / _LOOP_GAIN
+        return max(self._half_width_hz, float(away_hz @ away_hz) / fallen)
+
+    def see(self, frequency_hz: float, seen: SettledState) -> tuple[float, float]:
+        """Take in a look; gives the error of the phase [rad] and what the motion has still to go, a share."""
+        moved = self._plan.phase_of.motion(seen.transmissibility)
+        off = float(np.angle(moved)) - radians(self._plan.phase_deg)
+        error_rad = (off + pi) % (2 * pi) - pi
+        # Nothing is known of what was before the first look but that it was another level.
+        self._before_rad = self._error_rad if self._rested else error_rad
+        self._error_rad = error_rad
+        kept = exp(-1.0 / self._forgets(frequency_hz))
+        rested_rad = (error_rad - kept * self._before_rad) / (1.0 - kept)
+        self._rested.append((frequency_hz, rested_rad))
+        motion = moved * seen.base.amplitude
+        left = abs(motion - self._motion) * kept / (1.0 - kept) / max(abs(motion), 1e-300)
+        self._motion = motion
+        return error_rad, left
+
+    def next_hz(self, frequency_hz: float) -> float:
+        """Give the next frequency, within the plan's band [Hz]."""
+        error_rad, before_rad = self._error_rad, self._before_rad
+        is_slow = error_rad * before_rad > 0 and abs(error_rad) > _SLOW * abs(before_rad)
+        self._gain = min(self._gain * _GROWTH, _LARGEST_GAIN) if is_slow else _LOOP_GAIN
+        wanted = self._gain * error_rad + _LOOP_GAIN * self._forgets(frequency_hz) * (error_rad - before_rad)
+        widest_hz = self._plan.widest_step_hz
+        step_hz = min(max(wanted * self._half_width_hz, -widest_hz), widest_hz)
+        return min(max(frequency_hz + step_hz, self._plan.low_hz), self._plan.high_hz)
+
+    def _forgets(self, frequency_hz: float) -> float:
+        """Give the looks in which the mode forgets."""
+        return frequency_hz / (2 * pi * self._half_width_hz * LOOK_PERIODS)
+
+
+def _searched(
+    loop: SineLoop, plan: ResonanceTracking, number: int, last: TrackedPlace
+) -> Controller[TrackedPlace]:
+    """Search the resonance at one level in settled motion, and record there."""
     level = plan.held_levels[number]
     settling_controller = SettlingController(loop, plan.settling, level)
     search = PhaseSearch(plan.low_hz, plan.high_hz, plan.widest_step_hz)
     states: list[SettledState] = []
-    frequency_hz, lock = start_hz, LockResult.LOST
+    frequency_hz, lock = last.frequency_hz, LockResult.LOST
     for _ in range(plan.most_tries):
         moved(loop, frequency_hz, level)
         states.append((yield from settling_controller.settled()))
-        error = _phase_error(loop.periods, states[-1], plan.phase_deg)
+        error = _phase_error(loop.periods, states[-1], plan)
         search.tries.append(error)
         if abs(error.error_deg) <= plan.phase_tolerance_deg and len(search.tries) > 1:
             lock = LockResult.LOCKED
@@ -225,14 +194,22 @@ def _tracked(loop: SineLoop, plan: ResonanceTracking, number: int, start_hz: flo
             break
         frequency_hz = next_hz
     found = states[-1]
-    resonance = search.resonance(plan.sensor_phase_deg)
-    yield from recorded(settling_controller, found, plan.segment(number, found.frequency_hz), plan.record_s)
+    resonance = search.resonance(_sensor_phase_deg(plan, found))
     mode = None
     if lock is LockResult.LOCKED:
         flanks = yield from _flanks(settling_controller, plan, resonance)
         mode = _mode([*states, *flanks], resonance)
-    _say(loop, plan, number, found, Tracked(resonance, mode, lock, len(search.tries)))
-    return found.frequency_hz
+        # Back from the flanks before the recording: the next level begins where this one ends.
+        moved(loop, found.frequency_hz, level)
+        found = yield from settling_controller.settled()
+    yield from recorded(settling_controller, found, plan.segment(number, found.frequency_hz), plan.record_s)
+    periods = round(sum(each.waited_s * each.drive_hz for each in states))
+    _say(loop, plan, number, found, Tracked(resonance, mode, lock, len(search.tries), periods))
+    if lock is not LockResult.LOCKED:
+        return TrackedPlace(found.frequency_hz, last.half_width_hz)
+    width_hz = resonance.half_width_hz if mode is None else mode.damping_ratio * mode.frequency_hz
+    # Contacts bend the flanks: the first width, found without them, is kept.
+    return TrackedPlace(found.frequency_hz, last.half_width_hz or width_hz)
 
 
 @dataclass(frozen=True)
@@ -243,6 +220,8 @@ class Tracked:
     mode: Mode | None
     lock: LockResult
     tries: int
+    periods: int
+    """Of the drive, until then."""
 
 
 def _flanks(
@@ -268,18 +247,28 @@ def _mode(states: Sequence[SettledState], resonance: PhaseResonance) -> Mode | N
     )
 
 
-def _phase_error(periods: Periods, found: SettledState, wanted_deg: float) -> PhaseError:
-    """Compare the phase of m0 over the base with the wanted one; batches of periods tell its uncertainty."""
+def _sensor_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
+    """Give what both sensors' phases and sensitivities leave open of the phase [degrees]."""
+    # Of a difference of motions the phase also turns with their ratio; of a single one it does not.
+    turned = plan.phase_of.motion(found.transmissibility) - found.transmissibility
+    size = max(abs(plan.phase_of.motion(found.transmissibility)), plan.sensor_gain)
+    return hypot(plan.sensor_phase_deg, degrees(plan.sensor_gain * abs(turned) / size))
+
+
+def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking) -> PhaseError:
+    """Compare the phase of m0 against the base with the wanted one; batches tell its uncertainty."""
     newer = periods.last(periods.count // 2)
     length = len(newer.base) // _BATCHES
-    angle = float(np.angle(found.transmissibility))
-    error_deg = (degrees(angle) - wanted_deg + 180) % 360 - 180
+    angle = float(np.angle(plan.phase_of.motion(found.transmissibility)))
+    error_deg = (degrees(angle) - plan.phase_deg + 180) % 360 - 180
     if length == 0:
         return PhaseError(found.drive_hz, error_deg, 180.0)
     used = slice(len(newer.base) - length * _BATCHES, None)
     base = newer.base[used].reshape(_BATCHES, length).mean(axis=1)
     response = newer.response[used, 1].reshape(_BATCHES, length).mean(axis=1)
     ratios = response / base
+    turn = found.transmissibility / ratios.mean()
+    ratios = np.array([plan.phase_of.motion(complex(each * turn)) for each in ratios])
     spread = float(np.std(np.angle(ratios * ratios.mean().conjugate()), ddof=1))
     return PhaseError(found.drive_hz, error_deg, degrees(spread) / sqrt(_BATCHES))
 
@@ -294,13 +283,14 @@ def _say(loop: SineLoop, plan: ResonanceTracking, number: int, found: SettledSta
             frequency_hz=None if resonance is None else resonance.frequency_hz,
             frequency_u_hz=None if resonance is None else resonance.uncertainty_hz,
             at_hz=found.drive_hz,
-            phase_deg=degrees(float(np.angle(found.transmissibility))),
+            phase_deg=degrees(float(np.angle(plan.phase_of.motion(found.transmissibility)))),
             response_ii=found.response,
             base_m_per_s2=found.base.amplitude,
             base_u=found.base.uncertainty,
             held=found.held,
             motion=found.judgement.steadiness,
             tries=tracked.tries,
+            periods=tracked.periods,
             lock=tracked.lock,
             mode_hz=None if mode is None else mode.frequency_hz,
             mode_u_hz=None if mode is None else mode.frequency_u_hz,

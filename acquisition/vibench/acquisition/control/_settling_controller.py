@@ -39,11 +39,6 @@ class SettledState:
         return abs(self.transmissibility)
 
     @property
-    def against_base(self) -> complex:
-        """Displacement of m0 against the base, over that of the base, fundamentals."""
-        return self.transmissibility - 1.0
-
-    @property
     def point(self) -> SettledPoint:
         """What a search for a jump needs of it."""
         return SettledPoint(self.frequency_hz, self.response, self.judgement.period)
@@ -96,6 +91,13 @@ class SettlingController:
         """Measure the base over the newer half of what was seen since the last change."""
         periods = self.loop.periods
         return measured_level(periods.base[periods.count // 2 :])
+
+    def prompt_vpp(self, measured: MeasuredLevel, frequency_hz: float) -> float:
+        """Give the setting that brings a motion without scatter to its level at another frequency [V]."""
+        assert self.level is not None
+        control = LevelControl(self.level, self.loop.most_vpp)
+        seen = MeasuredLevel(measured.amplitude, 0.0)
+        return control.next_vpp(self.loop.setting.setting_vpp, seen, self.level.acceleration_at(frequency_hz))
 
     def held(self, measured: MeasuredLevel) -> Held:
         """Say whether a measured level is the one to be held."""

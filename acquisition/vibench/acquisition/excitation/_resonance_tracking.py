@@ -5,8 +5,10 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
+from vibench.sim import PhaseReference
+
 from ..recording import SegmentLabel
-from ._feedback import BaseLevel, Settling
+from ._feedback import MOST_PERIODS, BaseLevel, Settling, Share
 from ._plan import AbstractFeedback, Family, FrequencyHz
 from ._steps import Segment, Step, Tone
 
@@ -14,10 +16,11 @@ from ._steps import Segment, Step, Tone
 class ResonanceTracking(AbstractFeedback):
     """Phase resonance of one mode at rising (or falling) levels of the base: its backbone.
 
-    At the resonance m0 moves a quarter of a period behind the base. The loop measures that phase on
-    the fundamental of settled motion and moves the frequency until it is met. Other modes shift it a
-    little; the flanks tell the natural frequency and the damping apart from them, as long as the motion
-    is linear.
+    At the resonance m0 moves a quarter of a period behind the base, seen from the base or in space. The
+    first level is searched for in settled motion; from there a phase-locked loop, which acts every ten
+    periods, follows the resonance from level to level, and where it loses it, the search begins anew. Other
+    modes shift the phase a little; the flanks tell the natural frequency and the damping apart from them, as
+    long as the motion is linear.
     """
 
     family: ClassVar[Family] = Family.STEPPED
@@ -31,10 +34,14 @@ class ResonanceTracking(AbstractFeedback):
     """The frequency never goes above [Hz]."""
     phase_deg: float = Field(default=-90.0, gt=-180, lt=180)
     """Phase of m0 over the base at the resonance, both as displacements [degrees]."""
+    phase_of: PhaseReference = PhaseReference.RELATIVE
+    """Which motion of m0 has it: the one against the base, or the absolute one."""
     phase_tolerance_deg: float = Field(default=1.0, gt=0, le=30)
     """How closely the phase must be met [degrees]."""
     sensor_phase_deg: float = Field(default=0.3, ge=0, le=30)
     """Standard uncertainty of the phase between accelerometer and vibrometer [degrees]."""
+    sensor_gain: Share = 0.01
+    """Standard uncertainty of the ratio of their sensitivities; it turns the difference of their motions."""
     accelerations_m_per_s2: tuple[PositiveFloat, ...] = Field(min_length=1, max_length=100)
     """Levels of the base's fundamental, peak, in the order played [m/s2]."""
     level_tolerance: float = Field(default=0.025, gt=0, lt=1)
@@ -45,6 +52,8 @@ class ResonanceTracking(AbstractFeedback):
     """Longest step of the search; shorter than from the resonance to the antiresonance beside it [Hz]."""
     most_tries: int = Field(default=25, ge=3, le=200)
     """How many frequencies are tried for one level."""
+    most_periods: int = Field(default=150, ge=30, le=MOST_PERIODS)
+    """Drive periods within which the phase-locked loop must be on the resonance of the next level."""
     flank_pairs: int = Field(default=3, ge=0, le=10)
     """Pairs of frequencies measured on both flanks, for the mode's natural frequency and damping."""
     record_s: PositiveFloat = 1.0

@@ -193,6 +193,8 @@ class ResonanceNote(AbstractNote):
     motion: Steadiness
     tries: int
     lock: LockResult
+    periods: int = 0
+    """Drive periods that the search, or the phase-locked loop, took; 0 in recordings that do not say."""
     mode_hz: SixFigures | None = None
     """Natural frequency; left out where the flanks do not tell it."""
     mode_u_hz: SixFigures | None = None

@@ -13,6 +13,7 @@ from vibench.sim import (
     FrequencyPath,
     HarmonicSet,
     Parameter,
+    PhaseReference,
     PowerLaw,
     RigidStops,
 )
@@ -60,6 +61,10 @@ class BranchRequest(SpecimenChoice):
     """Longest motion that is looked for, in drive periods."""
     seed: Annotated[int, Field(ge=0)] = 1
     """Of the random states."""
+    resonance_band_hz: tuple[PositiveFloat, PositiveFloat] | None = None
+    """Along amplitude: follow the phase resonance of the one mode between these frequencies [Hz]."""
+    phase_of: PhaseReference = PhaseReference.RELATIVE
+    """Of a phase resonance: the motion of m0 that is a quarter of a period behind the base."""
     loop_time_s: PositiveFloat | None = None
     """Of a bench, from a motion to the drive that answers it: what it can hold is then told [s]."""
     recorded_level: tuple[tuple[PositiveFloat, PositiveFloat], ...] = ()
@@ -72,12 +77,32 @@ class BranchRequest(SpecimenChoice):
                 f"the range {self.start:g} to {self.stop:g} does not ascend; give the lower first"
             )
         self._refuse_other_laws()
+        self._refuse_other_resonances()
         pairs = self.recorded_level
         if pairs and self.along is Parameter.AMPLITUDE:
             raise ValueError("a recorded level goes along frequency; along amplitude give one frequency")
         if pairs and (len(pairs) < 2 or not all(a[0] < b[0] for a, b in pairwise(pairs))):
             raise ValueError("a recorded level needs two or more ascending frequencies")
         return self
+
+    def _refuse_other_resonances(self) -> None:
+        if self.resonance_band_hz is None:
+            return
+        low_hz, high_hz = self.resonance_band_hz
+        if not low_hz < high_hz:
+            raise ValueError(
+                f"the band {low_hz:g} to {high_hz:g} Hz does not ascend; give the lower end first"
+            )
+        lower, upper = self.shaken.gaps_m
+        if (
+            self.along is not Parameter.AMPLITUDE
+            or self.method is not BranchMethod.SHOOTING
+            or lower != upper
+        ):
+            raise ValueError(
+                "a phase resonance is followed along amplitude, by shooting, between two equal stops; give a "
+                "range of amplitudes, and a specimen with one gap"
+            )
 
     def _refuse_other_laws(self) -> None:
         law = self.shaken.contact
@@ -129,6 +154,9 @@ class BranchRequest(SpecimenChoice):
     def title(self) -> str:
         """Name curves and figures by it."""
         where = f"{1e6 * self.amplitude_m:g} µm"
+        if self.resonance_band_hz is not None:
+            low_hz, high_hz = self.resonance_band_hz
+            return f"{self.law}, {self.phase_of.value} phase resonance between {low_hz:g} and {high_hz:g} Hz"
         if self.along is Parameter.AMPLITUDE:
             where = f"{self.frequency_hz:g} Hz"
         elif self.recorded_level:
@@ -138,6 +166,8 @@ class BranchRequest(SpecimenChoice):
     @property
     def sentence(self) -> str:
         """Say the options under a figure."""
+        if self.resonance_band_hz is not None:
+            return f"{self.title}; {self.specimen_text}."
         return (
             f"{self.title}; {self.specimen_text}; motions looked for "
             f"at {self.places} places from {self.starts} random states each, seed {self.seed}, up to "

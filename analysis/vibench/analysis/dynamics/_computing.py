@@ -3,8 +3,8 @@
 import time
 from collections.abc import Iterator
 
-from vibench.sim import Harmonic, lyapunov_spectrum
-from vibench.sim.branches import FoundBranch, balanced_branches, shot_branches
+from vibench.sim import Harmonic, OrbitShape, lyapunov_spectrum, phase_resonance_branch
+from vibench.sim.branches import BranchOrigin, FoundBranch, balanced_branches, shot_branches
 
 from ._branch_lines import BranchDiagram, BranchLine, line_of
 from ._branch_request import BranchMethod, BranchRequest
@@ -17,10 +17,20 @@ def branch_lines(request: BranchRequest) -> Iterator[BranchLine]:
 
 
 def _found(request: BranchRequest) -> Iterator[FoundBranch]:
+    if request.resonance_band_hz is not None:
+        return _resonance(request, request.resonance_band_hz)
     where = request.shaken, request.path, request.start, request.stop
     if request.method is BranchMethod.SHOOTING:
         return shot_branches(*where, request.search)
     return balanced_branches(*where, request.balance_options, request.search)
+
+
+def _resonance(request: BranchRequest, band_hz: tuple[float, float]) -> Iterator[FoundBranch]:
+    began = time.perf_counter()
+    levels_m = request.start, request.stop
+    branch = phase_resonance_branch(request.shaken, band_hz, levels_m, request.phase_of)
+    origin, elapsed_s = BranchOrigin.PHASE_RESONANCE, time.perf_counter() - began
+    yield FoundBranch(branch, OrbitShape.MIRRORED, 1, origin, has_twin=False, elapsed_s=elapsed_s)
 
 
 def diagram_of(request: BranchRequest) -> BranchDiagram:

@@ -12,6 +12,7 @@ from vibench.sim.branches import least_growth_time_s
 from ..comparison import Curve, CurveKind, CurveOrigin
 from ..dynamics import BranchDiagram, BranchLine
 from ..signals import Reals
+from ..sine import TrackedResonance
 from ..tables import Table, table
 from ._drawn import DrawnFigure
 from ._style import (
@@ -41,7 +42,9 @@ EVENT_MARKS = {
 _PANELS = (("response_i", CurveKind.RESPONSE_I), ("response_ii", CurveKind.RESPONSE_II))
 
 
-def branches_figure(diagram: BranchDiagram, measured: Sequence[Curve] = ()) -> DrawnFigure:
+def branches_figure(
+    diagram: BranchDiagram, measured: Sequence[Curve] = (), tracked: Sequence[TrackedResonance] = ()
+) -> DrawnFigure:
     """Draw Responses I and II of m0 on every branch, over what changes, and recordings beneath.
 
     Where the request names a bench's loop, a third panel says which unstable motions it can hold.
@@ -52,6 +55,8 @@ def branches_figure(diagram: BranchDiagram, measured: Sequence[Curve] = ()) -> D
         What was found.
     measured
         Responses of stepped sines and sweeps; drawn where frequency changes.
+    tracked
+        Resonances at every level; drawn over a phase resonance, whose first panel is its frequency.
 
     """
     with styled():
@@ -64,6 +69,8 @@ def branches_figure(diagram: BranchDiagram, measured: Sequence[Curve] = ()) -> D
                 draw_line(axes, line, _place(diagram, line), getattr(line, name)[:, 0])
             magnitude_axis(axes)
             axes.set_ylabel(f"{kind.value}\nof m0 over A0")
+        if diagram.request.resonance_band_hz is not None:
+            _backbone(panels, diagram, tracked)
         _events(panels[1], diagram)
         if diagram.request.loop_time_s is not None and holdable is not None:
             _growth(panels[2], diagram, holdable, least_growth_time_s(diagram.request.loop_time_s))
@@ -97,6 +104,25 @@ def draw_line(axes: Axes, line: BranchLine, place: Reals, size: Reals) -> None:
             linewidth=1.3 if is_stable else 0.9,
             label=f"{'stable' if is_stable else 'unstable'}{period}",
         )
+
+
+def _backbone(panels: Sequence[Axes], diagram: BranchDiagram, tracked: Sequence[TrackedResonance]) -> None:
+    """Draw the frequency of a phase resonance in the place of Response I, and what was tracked."""
+    panels[0].clear()
+    for line in diagram.lines:
+        draw_line(panels[0], line, _place(diagram, line), line.frequency_hz)
+    panels[0].set_ylabel("phase\nresonance [Hz]")
+    if not tracked:
+        return
+    frequency_hz = np.array([each.frequency_hz for each in tracked])
+    base_m = np.array([each.base_m_per_s2 for each in tracked]) / (2.0 * np.pi * frequency_hz) ** 2
+    response = np.array([each.amplitude_m for each in tracked]) / base_m
+    error_hz = [2.0 * each.u_frequency_hz for each in tracked]
+    panels[0].errorbar(
+        1e6 * base_m, frequency_hz, error_hz, color=MEASURED, linestyle="none", marker="o", markersize=3.5,
+        capsize=2, label="tracked, ± two standard uncertainties",
+    )  # fmt: skip
+    panels[1].plot(1e6 * base_m, response, color=MEASURED, linestyle="none", marker="o", markersize=3.5)
 
 
 def _growth(

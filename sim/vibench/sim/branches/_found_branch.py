@@ -26,6 +26,7 @@ class BranchOrigin(StrEnum):
     SEARCH = "a motion found from rest, between the stops or from a random state"
     SYMMETRY_BREAKING = "switched to where a symmetry breaks"
     PERIOD_DOUBLING = "switched to where a period doubles"
+    PHASE_RESONANCE = "the phase resonance of the motion without contacts"
     FIRST_ORDER = "a solution of the first-order balance"
 
 

@@ -56,6 +56,10 @@ from ._period_map import (
     OrbitShape as OrbitShape,
     PeriodMap as PeriodMap,
 )
+from ._phase_resonance import (
+    PhaseReference as PhaseReference,
+    phase_resonance_branch as phase_resonance_branch,
+)
 from ._restoring_force import (
     PowerSpring as PowerSpring,
     RestoringForce as RestoringForce,

@@ -41,7 +41,7 @@ def _no_curves(_answer: ExponentSpectrum | ChainAnswer) -> tuple[Curve, ...]:
 BRANCHES = DynamicsKind(
     name="branches",
     request=BranchRequest,
-    hidden=frozenset({"loop_time_s", "recorded_level", "described"}),
+    hidden=frozenset({"resonance_band_hz", "phase_of", "loop_time_s", "recorded_level", "described"}),
     answer=_diagram,
     cost=lambda answer: answer.cost_sentence,
     curves=lambda answer: answer.curves(),

@@ -1,0 +1,64 @@
+"""A phase resonance along the level: against the motion itself, and against the motion without contacts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vibench.sim import PhaseReference, PowerLaw, gong2025, integrate, phase_resonance_branch
+from vibench.sim.model import Harmonic, base_transmissibility
+
+
+def hardening():
+    """The paper's specimen with k3 p^3 in the place of stops, a tenth of k1 p at 100 um."""
+    specimen = gong2025()
+    return replace(specimen, contact=PowerLaw(100e-6, ((3, 0.1 * specimen.stiffnesses[1] * 100e-6),)))
+
+
+@pytest.mark.parametrize(
+    ("of", "band_hz"),
+    [
+        (PhaseReference.RELATIVE, (92.0, 97.0)),
+        (PhaseReference.ABSOLUTE, (250.0, 280.0)),
+        (PhaseReference.ABSOLUTE, (480.0, 520.0)),
+    ],
+)
+def test_between_the_stops_it_is_the_quadrature_of_the_linear_motion(of, band_hz):
+    specimen = gong2025()
+    branch = phase_resonance_branch(specimen, band_hz, (1e-8, 1e-7), of)
+    assert np.ptp(branch.frequencies_hz) < 1e-6
+    assert branch.amplitudes_m[-1] == pytest.approx(1e-7)
+    answer = complex(base_transmissibility(specimen, float(branch.frequencies_hz[0]))[0, 0])
+    seen = of.motion(answer)
+    assert abs(seen.real) < 1e-6 * abs(seen)
+    assert seen.imag < 0
+    assert branch.response_ii[:, 0] == pytest.approx(abs(answer), rel=1e-6)
+
+
+def test_along_a_hardening_mode_every_motion_repeats_and_is_a_quarter_of_a_period_behind():
+    specimen = hardening()
+    branch = phase_resonance_branch(specimen, (92.0, 97.0), (4e-7, 5e-6))
+    assert branch.frequencies_hz[-1] > branch.frequencies_hz[0] + 10.0
+    for k in range(0, len(branch.frequencies_hz), 5):
+        drive = Harmonic(float(branch.frequencies_hz[k]), float(branch.amplitudes_m[k]))
+        period_s = 1 / drive.frequency_hz
+        run = integrate(specimen, drive, period_s, "reference", branch.states[k], 512 * drive.frequency_hz)
+        assert np.abs(run.final_state[:3] - branch.states[k, :3]).max() < 1e-12
+        against = run.states[:512, 0] - drive.amplitude_m * np.sin(2 * np.pi * np.arange(512) / 512)
+        # Of a motion -cos, a quarter of a period behind the sine of the base, the coefficient is negative.
+        coefficient = 2 * np.mean(against * np.exp(-2j * np.pi * np.arange(512) / 512))
+        assert coefficient.real < 0
+        assert abs(coefficient.imag) < 1e-6 * abs(coefficient.real)
+
+
+@pytest.mark.parametrize(
+    ("band_hz", "levels_m", "said"),
+    [
+        ((102.0, 107.0), (1e-8, 1e-6), "give a band around one mode"),
+        ((92.0, 97.0), (1e-6, 2e-6), "m1 reaches its stops"),
+        ((92.0, 97.0), (2e-7, 1e-7), "ascending"),
+    ],
+)
+def test_what_has_no_phase_resonance_to_begin_with_is_refused(band_hz, levels_m, said):
+    with pytest.raises(ValueError, match=said):
+        phase_resonance_branch(gong2025(), band_hz, levels_m)
