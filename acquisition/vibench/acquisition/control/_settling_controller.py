@@ -95,7 +95,7 @@ class SettlingController:
     def prompt_vpp(self, measured: MeasuredLevel, frequency_hz: float) -> float:
         """Give the setting that brings a motion without scatter to its level at another frequency [V]."""
         assert self.level is not None
-        control = LevelControl(self.level, self.loop.most_vpp)
+        control = LevelControl(self.level, self.loop.most_vpp, self.loop.least_vpp)
         seen = MeasuredLevel(measured.amplitude, 0.0)
         return control.next_vpp(self.loop.setting.setting_vpp, seen, self.level.acceleration_at(frequency_hz))
 

@@ -241,7 +241,9 @@ class BranchDiagram:
 
 def _document(line: BranchLine) -> dict[str, object]:
     points = {
-        **named(line, "frequency_hz", "amplitude_m", "is_stable", "largest_multiplier", "growth_time_s", "impacts"),
+        **named(
+            line, "frequency_hz", "amplitude_m", "is_stable", "largest_multiplier", "growth_time_s", "impacts"
+        ),
         "response_i": line.response_i[:, 0],
         "response_ii": line.response_ii[:, 0],
         "relative_i": line.response_i[:, 3],
