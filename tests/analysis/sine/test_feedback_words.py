@@ -96,7 +96,7 @@ def test_a_tracked_resonance_is_analysed_and_said(analysed):
     said = findings(CampaignResults("run", (Result(analysis, None),), ()))
     assert list(said) == [sentence], "it is no stepped sine"
     drawn = stepped_sine_figure(analysis, None, TRACKED_RESONANCE)
-    assert drawn.title == "Tracked resonance, around 266.4 Hz"
+    assert drawn.title == "Tracked resonance, around 266.2 Hz"
     assert drawn.caption == f"Resonance tracked, levels of the base: 1. {sentence}"
     (figure,) = result_figures(CampaignResults("run", (Result(analysis, None),), ()))
     assert figure.name == "backbone_run", "what is stepped is the level"

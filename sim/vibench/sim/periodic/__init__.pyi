@@ -56,8 +56,10 @@ from ._period_map import (
     OrbitShape as OrbitShape,
     PeriodMap as PeriodMap,
 )
-from ._phase_resonance import (
+from ._phase_reference import (
     PhaseReference as PhaseReference,
+)
+from ._phase_resonance import (
     phase_resonance_branch as phase_resonance_branch,
 )
 from ._restoring_force import (

@@ -9,7 +9,6 @@ continuation follows it over the level.
 
 import math
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 from scipy.optimize import brentq
@@ -24,6 +23,7 @@ from ._drive_path import AmplitudePath, DrivePath
 from ._frequency_time import phasors_of
 from ._orbit_branch import OrbitFamily
 from ._period_map import OrbitShape, PeriodMap
+from ._phase_reference import PhaseReference
 
 QUARTER_BEHIND = -0.5 * math.pi
 STEPS = ArcSteps(first=0.05, longest=0.3, shortest=1e-6, tolerance=1e-9, most_points=600)
@@ -37,19 +37,6 @@ SAMPLES = 256
 DIFFERENCE = 1e-6
 """Step of the differences by which the phase's slopes are taken, over each unknown's scale."""
 SCAN_POINTS = 400
-
-
-class PhaseReference(StrEnum):
-    """Which motion of m0 has the phase of a resonance."""
-
-    RELATIVE = "relative"
-    """Against the base: of the lowest mode, and wherever contacts leave little of the motion."""
-    ABSOLUTE = "absolute"
-    """In space: of a mode far above others, where m0 hardly follows the base."""
-
-    def motion(self, transmissibility: complex) -> complex:
-        """Give the motion whose phase counts, over that of the base, from m0's displacement over it."""
-        return transmissibility - 1.0 if self is PhaseReference.RELATIVE else transmissibility
 
 
 @dataclass(frozen=True, eq=False)

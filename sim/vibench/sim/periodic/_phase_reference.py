@@ -1,0 +1,16 @@
+"""Which motion has the phase of a resonance: apart, as plans name it, which load no compiled code."""
+
+from enum import StrEnum
+
+
+class PhaseReference(StrEnum):
+    """Which motion of m0 has the phase of a resonance."""
+
+    RELATIVE = "relative"
+    """Against the base: of the lowest mode, and wherever contacts leave little of the motion."""
+    ABSOLUTE = "absolute"
+    """In space: of a mode far above others, where m0 hardly follows the base."""
+
+    def motion(self, transmissibility: complex) -> complex:
+        """Give the motion whose phase counts, over that of the base, from m0's displacement over it."""
+        return transmissibility - 1.0 if self is PhaseReference.RELATIVE else transmissibility
